@@ -1,0 +1,130 @@
+"""One verdict for all ranks: the suite under mpirun fails as a whole, reports once, and never hangs.
+
+Ranks meet after collection and after every phase (setup, call, teardown) of every test, on a communicator of their own.
+A phase that failed on one rank is failed on all, so that all go on with the same next test. A rank that does not come to
+the meeting is stuck in a collective call the others never made: the run is then aborted with the reports known.
+"""
+
+from __future__ import annotations
+
+import faulthandler
+import os
+import shutil
+import tempfile
+import time
+from collections.abc import Generator, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+RANK = int(os.environ.get("OMPI_COMM_WORLD_RANK", os.environ.get("PMI_RANK", "0")))
+SIZE = int(os.environ.get("OMPI_COMM_WORLD_SIZE", os.environ.get("PMI_SIZE", "1")))
+TEST_SECONDS = 600  # a test that takes longer is taken to be stuck
+MEETING_SECONDS = 30  # patience of a rank that has failed: the others are probably waiting for it in a collective call
+
+_meeting: dict[str, Any] = {}  # the communicator, made at first use: pure numpy tests need no MPI
+_stderr = os.fdopen(os.dup(2), "w")  # the real one: pytest captures fd 2 during a test
+
+
+def _comm() -> Any:
+    if not _meeting:
+        from mpi4py import MPI
+
+        _meeting["comm"] = MPI.COMM_WORLD.Dup()
+    return _meeting["comm"]
+
+
+def _meet(mine: str, *, where: str, seconds: float) -> list[str]:
+    """The texts of all ranks, in rank order; aborts the run if some rank does not come within `seconds`."""
+    comm = _comm()
+    request, deadline = comm.Ibarrier(), time.monotonic() + seconds
+    while not request.Test():
+        if time.monotonic() > deadline:
+            _abort(f"{where}: the other ranks did not arrive within {seconds:.0f} s\n{mine}")
+        time.sleep(1e-3)
+    return list(comm.allgather(mine))
+
+
+def _abort(message: str) -> None:
+    print(f"\n[rank {RANK} of {SIZE}] {message}", file=_stderr, flush=True)
+    _comm().Abort(1)
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_configure(config: pytest.Config) -> None:
+    if RANK:  # rank 0 speaks for all
+        config.pluginmanager.unregister(name="terminalreporter")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    if SIZE == 1:
+        return
+    serial = [item for item in items if item.get_closest_marker("serial")]
+    if serial:
+        items[:] = [item for item in items if not item.get_closest_marker("serial")]
+        config.hook.pytest_deselected(items=serial)
+
+
+def pytest_collection_finish(session: pytest.Session) -> None:
+    if SIZE == 1:
+        return
+    mine = "\n".join([f"{session.testsfailed} errors", *(item.nodeid for item in session.items)])
+    texts = _meet(mine, where="collection", seconds=TEST_SECONDS)
+    if any(text != mine for text in texts):
+        _abort(f"ranks collected different tests:\n{mine}")
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, Any, None]:
+    faulthandler.dump_traceback_later(TEST_SECONDS, exit=True, file=_stderr)
+    yield
+    faulthandler.cancel_dump_traceback_later()
+
+
+@pytest.hookimpl(hookwrapper=True, tryfirst=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, Any, None]:
+    outcome = yield
+    if SIZE > 1:
+        _agree(outcome.get_result())
+
+
+def _agree(report: pytest.TestReport) -> None:
+    """Make a phase that did not end alike on all ranks a failure on all ranks, told with the first failing rank's text."""
+    failed = report.outcome == "failed"
+    mine = report.outcome + ("\n" + report.longreprtext if failed else "")
+    texts = _meet(mine, where=f"{report.nodeid} ({report.when})", seconds=MEETING_SECONDS if failed else TEST_SECONDS)
+    outcomes = [text.split("\n", 1)[0] for text in texts]
+    if len(set(outcomes)) > 1 and not failed:
+        told = next((rank for rank, o in enumerate(outcomes) if o == "failed"), RANK)
+        report.outcome = "failed"
+        report.longrepr = f"outcomes of ranks 0..{SIZE - 1}: {', '.join(outcomes)}\n[rank {told}] {texts[told]}"
+
+
+def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
+    if SIZE > 1 and exitstatus == pytest.ExitCode.NO_TESTS_COLLECTED:
+        session.exitstatus = pytest.ExitCode.OK  # all were serial: they ran on one rank
+
+
+def pytest_terminal_summary(terminalreporter: Any) -> None:
+    """Leave the counts where tests/run.sh sums them."""
+    if tally := os.environ.get("VI_CONTACT_TALLY"):
+        stats = terminalreporter.stats
+        passed, skipped = len(stats.get("passed", [])), len(stats.get("skipped", []))
+        failed = len(stats.get("failed", [])) + len(stats.get("error", []))
+        Path(tally).write_text(f"{passed} {failed} {skipped}\n")
+
+
+@pytest.fixture
+def comm() -> Any:
+    """MPI.COMM_WORLD."""
+    return pytest.importorskip("mpi4py.MPI").COMM_WORLD
+
+
+@pytest.fixture
+def shared_tmp(comm: Any) -> Iterator[Path]:
+    """A temporary directory, the same on all ranks. Removed at the end: the ranks have met after the call phase."""
+    path = comm.bcast(tempfile.mkdtemp(prefix="vi_contact-") if comm.rank == 0 else None, root=0)
+    yield Path(path)
+    if comm.rank == 0:
+        shutil.rmtree(path, ignore_errors=True)

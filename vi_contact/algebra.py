@@ -1,0 +1,153 @@
+"""Linear algebra on distributed vectors, seen as numpy arrays of the entries this rank owns.
+
+Everything above this file (schemes, condensed solver, recorders) is written against the protocols below and never
+asks how many ranks there are. ``SerialAlgebra`` (scipy) serves one process and needs no finite element package;
+``fem.petsc_algebra`` serves any number of ranks. Rules: a vector is the float64 array of its owned entries; scalars
+returned by ``dot`` and by ``Comm`` are the same number on every rank.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Protocol
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.linalg import splu
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Indices = NDArray[np.int64]
+
+
+class Comm(Protocol):
+    """The few collective operations the package needs."""
+
+    rank: int
+    size: int
+
+    def sum(self, x: Array) -> Array: ...
+    def max(self, x: Array) -> Array: ...
+    def bcast(self, value: Any) -> Any: ...
+    def gather(self, value: Any) -> list[Any] | None: ...
+
+
+class Matrix(Protocol):
+    """A square sparse matrix whose rows are distributed like the vectors it multiplies."""
+
+    @property
+    def rows(self) -> int:
+        """Rows owned by this rank."""
+        ...
+
+    def __matmul__(self, x: Array) -> Array: ...
+    def transpose_apply(self, x: Array) -> Array: ...
+    def diagonal(self) -> Array: ...
+
+
+class Factor(Protocol):
+    """A factorised symmetric matrix; ``solve`` is one forward and back substitution."""
+
+    def solve(self, b: Array) -> Array: ...
+
+    def solve_units(self, owned: Indices, slots: Indices, m: int) -> Array:
+        """Columns A^-1 e_j for m unit vectors: e_{slots[k]} has its one in row ``owned[k]`` of the owning rank.
+        Returns the owned rows, shape (rows, m)."""
+        ...
+
+
+class Algebra(Protocol):
+    """Makes matrices out of matrices. ``symmetric`` operators only: M, C, K and their combinations."""
+
+    comm: Comm
+
+    def combine(self, terms: Sequence[tuple[float, Matrix]]) -> Matrix: ...
+    def congruence(self, T: Matrix, K: Matrix) -> Matrix:
+        """Tᵀ K T."""
+        ...
+
+    def factor(self, A: Matrix) -> Factor: ...
+    def dot(self, x: Array, y: Array) -> float: ...
+
+
+class SerialComm:
+    """One process: every collective operation is the identity."""
+
+    rank = 0
+    size = 1
+
+    def sum(self, x: Array) -> Array:
+        return x
+
+    def max(self, x: Array) -> Array:
+        return x
+
+    def bcast(self, value: Any) -> Any:
+        return value
+
+    def gather(self, value: Any) -> list[Any] | None:
+        return [value]
+
+
+class SerialMatrix:
+    """A scipy sparse matrix behind the ``Matrix`` protocol."""
+
+    def __init__(self, matrix: Any) -> None:
+        self.csr: sp.csr_matrix = sp.csr_matrix(matrix, dtype=float)
+
+    @property
+    def rows(self) -> int:
+        return int(self.csr.shape[0])
+
+    def __matmul__(self, x: Array) -> Array:
+        return np.asarray(self.csr @ x)
+
+    def transpose_apply(self, x: Array) -> Array:
+        return np.asarray(self.csr.T @ x)
+
+    def diagonal(self) -> Array:
+        return np.asarray(self.csr.diagonal())
+
+
+class SerialFactor:
+    """Sparse LU of scipy (SuperLU) with a symmetric ordering."""
+
+    def __init__(self, matrix: SerialMatrix) -> None:
+        self._lu = splu(matrix.csr.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+        self._rows = matrix.rows
+
+    def solve(self, b: Array) -> Array:
+        return np.asarray(self._lu.solve(b))
+
+    def solve_units(self, owned: Indices, slots: Indices, m: int) -> Array:
+        units = np.zeros((self._rows, m))
+        units[owned, slots] = 1.0
+        return np.asarray(self._lu.solve(units)) if m else units
+
+
+class SerialAlgebra:
+    """scipy.sparse on one process."""
+
+    def __init__(self) -> None:
+        self.comm: Comm = SerialComm()
+
+    def combine(self, terms: Sequence[tuple[float, Matrix]]) -> Matrix:
+        return SerialMatrix(sum(factor * serial(matrix).csr for factor, matrix in terms))
+
+    def congruence(self, T: Matrix, K: Matrix) -> Matrix:
+        basis = serial(T).csr
+        return SerialMatrix(basis.T @ serial(K).csr @ basis)
+
+    def factor(self, A: Matrix) -> Factor:
+        return SerialFactor(serial(A))
+
+    def dot(self, x: Array, y: Array) -> float:
+        return float(x @ y)
+
+
+def serial(matrix: Matrix) -> SerialMatrix:
+    """The matrix as a SerialMatrix; TypeError when it belongs to another algebra."""
+    if not isinstance(matrix, SerialMatrix):
+        raise TypeError(f"SerialAlgebra got a {type(matrix).__name__}")
+    return matrix

@@ -1,0 +1,106 @@
+"""Post-impact velocity laws (seed 000, section 4: inelastic collision, velocity reversal, "any other type").
+
+After each step a law says which normal velocity every contact condition shall have, and a reading says how the
+velocity vector is given it:
+
+* ``ComponentReset`` sets the components, as the seed does. With a consistent mass this is not an impulse: its energy
+  change ½ v⁻ᵀMv⁻ - ½ v⁺ᵀMv⁺ may have either sign and the ledger books it with its sign (verification V9.6).
+* ``MassProjection`` applies the impulse on the contact unknowns that produces them, the M-orthogonal projection
+  v⁺ = v⁻ + M⁻¹Bᵀ(B M⁻¹Bᵀ)⁻¹(target - B v⁻); identical for lumped masses, never gains energy for 0 <= e <= 1.
+
+Restitution here is a nodal law; on a fine mesh it has no macroscopic effect.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from .algebra import Array, Indices
+from .errors import InputError
+from .step import Impact
+from .surfaces import ContactSurface
+from .system import SemiDiscreteSystem
+
+
+class Reading(Protocol):
+    """How a velocity vector is given prescribed normal velocities."""
+
+    def __call__(self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array) -> Array: ...
+
+
+@dataclass(frozen=True)
+class ComponentReset:
+    """The seed's literal rule: overwrite the normal components."""
+
+    def __call__(self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array) -> Array:
+        wanted = target[surface.slots]
+        chosen = ~np.isnan(wanted)
+        after = v.copy()
+        after[surface.owned[chosen]] = wanted[chosen]
+        return after
+
+
+class MassProjection:
+    """The M-orthogonal reading: an impulse on the chosen contact unknowns. Keeps M⁻¹Bᵀ, one solve per contact point."""
+
+    def __init__(self) -> None:
+        self._system: SemiDiscreteSystem | None = None
+        self._columns: Array = np.zeros((0, 0))
+        self._delassus: Array = np.zeros((0, 0))
+
+    def _prepare(self, system: SemiDiscreteSystem, surface: ContactSurface) -> None:
+        factor = system.algebra.factor(system.M)
+        self._columns = factor.solve_units(surface.owned, surface.slots, surface.count)
+        rows = np.zeros((surface.count, surface.count))
+        rows[surface.slots] = self._columns[surface.owned]
+        self._delassus = system.algebra.comm.sum(rows)
+        self._system = system
+
+    def __call__(self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array) -> Array:
+        chosen: Indices = np.flatnonzero(~np.isnan(target))
+        if len(chosen) == 0:
+            return v
+        if self._system is not system:
+            self._prepare(system, surface)
+        jump = target[chosen] - surface.normal_values(v)[chosen]
+        impulse = np.linalg.solve(self._delassus[np.ix_(chosen, chosen)], jump)
+        return np.asarray(v + self._columns[:, chosen] @ impulse)
+
+
+@dataclass(frozen=True)
+class Inelastic:
+    """v_n⁺ = 0 on every closed point: the seed's perfectly plastic collision."""
+
+    reading: Reading = field(default_factory=ComponentReset)
+
+    def target(self, impact: Impact) -> Array:
+        return np.where(impact.active, 0.0, np.nan)
+
+    def apply(self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array) -> Array:
+        return self.reading(system, surface, v, target)
+
+
+@dataclass(frozen=True)
+class Newton:
+    """Newton's law v_n⁺ = -e v_n⁻ on points that have just closed; points that stay closed are left to the step."""
+
+    e: float
+    reading: Reading = field(default_factory=ComponentReset)
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.e <= 1.0:
+            raise InputError(f"restitution coefficient e is {self.e}: give a number from 0 (inelastic) to 1 (elastic)")
+
+    def target(self, impact: Impact) -> Array:
+        return np.where(impact.closing, -self.e * impact.v_n, np.nan)
+
+    def apply(self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array) -> Array:
+        return self.reading(system, surface, v, target)
+
+
+def Elastic(reading: Reading | None = None) -> Newton:
+    """Velocity reversal, Newton's law with e = 1."""
+    return Newton(1.0, ComponentReset() if reading is None else reading)

@@ -1,0 +1,160 @@
+"""The general linear multistep operators of seed 000, eqs. 11a,b, with Newmark as one member.
+
+    sum_r a[r] u(p-r)     = dt    sum_r b[r] u'(p-r)          (11a)
+    sum_r gamma[r] u(p-r) = mu dt² sum_r b[r] u''(p-r)        (11b)     r = 0..q, b[0] != 0
+
+Solved for the newest velocity and acceleration and put into M u'' + C u' + K u = f - B_nᵀ r_n at t_p:
+
+    A = gamma[0]/(mu dt² b[0]) M + a[0]/(dt b[0]) C + K,   x = u(p),   scale = 1
+
+(The text prints -A u on the right of the semi-discrete equation; with A > 0 the sign is +, verification 4.1.)
+Start, and restart after every velocity jump: the past is filled in with constant acceleration, which makes Newmark's
+two-step form reproduce its one-step form exactly and keeps second order for the other members.
+Energy: unlike the midpoint form, contact in the acceleration balance at t_p can *gain* energy with hard contact (V9.2);
+the ledger shows it as algorithmic loss of negative sign.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..algebra import Array
+from ..errors import InputError
+from ..step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
+
+
+@dataclass(frozen=True)
+class LinearMultistep:
+    """Coefficients of eqs. 11a,b, newest level first, all of the same length q + 1 >= 2.
+
+    InputError for unequal lengths, b[0] = 0, or inconsistent operators (they must be exact for u = 1, t and t²).
+    """
+
+    a: tuple[float, ...]
+    b: tuple[float, ...]
+    gamma: tuple[float, ...]
+    mu: float = 1.0
+
+    def __post_init__(self) -> None:
+        q = len(self.a) - 1
+        if q < 1 or len(self.b) != q + 1 or len(self.gamma) != q + 1:
+            raise InputError("LinearMultistep a, b and gamma must have the same length q + 1 >= 2 (levels p, p-1, ..., p-q)")
+        if self.b[0] == 0.0 or self.mu == 0.0 or self.gamma[0] == 0.0:
+            raise InputError("LinearMultistep needs b[0], gamma[0] and mu different from zero: only implicit members can hold contact")
+        if not self._consistent():
+            raise InputError(
+                "LinearMultistep coefficients are inconsistent: eq. 11a must be exact for u = 1, t and eq. 11b for u = 1, t, t²"
+            )
+
+    def _consistent(self) -> bool:
+        level = -np.arange(len(self.a), dtype=float)
+        a, b, gamma = (np.asarray(c, dtype=float) for c in (self.a, self.b, self.gamma))
+        defects = (a.sum(), a @ level - b.sum(), gamma.sum(), gamma @ level, gamma @ level**2 - 2.0 * self.mu * b.sum())
+        scale = np.abs(a).sum() + np.abs(b).sum() + np.abs(gamma).sum()
+        return bool(np.max(np.abs(defects)) <= 1e-12 * scale * len(a) ** 2)
+
+    @classmethod
+    def newmark(cls, beta: float = 0.25, gamma: float = 0.5) -> LinearMultistep:
+        """Newmark(beta, gamma) as the q = 2 member (verification 4.1)."""
+        if beta <= 0.0:
+            raise InputError(f"Newmark beta is {beta}: give beta > 0, the explicit member cannot hold contact")
+        b = (beta, 0.5 + gamma - 2.0 * beta, 0.5 - gamma + beta)
+        return cls(a=(gamma, 1.0 - 2.0 * gamma, gamma - 1.0), b=b, gamma=(1.0, -2.0, 1.0))
+
+    def check(self, problem: ContactProblem) -> None:
+        """Works with every contact problem."""
+
+    def _velocity_factor(self, dt: float) -> float:
+        return self.a[0] / (dt * self.b[0])
+
+    def _acceleration_factor(self, dt: float) -> float:
+        return self.gamma[0] / (self.mu * dt**2 * self.b[0])
+
+    def start(self, problem: ContactProblem, state: State, dt: float) -> State:
+        """The initial acceleration, and a past of constant acceleration."""
+        if "a_0" in state.memory:
+            return state
+        surface = problem.surface
+        reaction = surface.reaction_load(state.r_n, len(state.u))
+        a = problem.equations.initial_acceleration(state.t, state.u, state.v, reaction)
+        return replace(state, memory=self._past(state.u, state.v, a, dt) | {"a_0": a, "v_minus": state.v})
+
+    def jump(self, state: State, v: Array, dt: float) -> State:
+        """After a velocity jump the past is restarted; the acceleration, which the jump does not change, is kept."""
+        return replace(state, v=v, memory=dict(state.memory) | self._past(state.u, v, state.memory["a_0"], dt))
+
+    def _past(self, u: Array, v: Array, a: Array, dt: float) -> dict[str, Array]:
+        """Levels 1..q before (u, v) under constant acceleration a."""
+        past = {}
+        for r in range(1, len(self.a)):
+            back = r * dt
+            past[f"u_{r}"] = u - back * v + 0.5 * back**2 * a
+            past[f"v_{r}"] = v - back * a
+            past[f"a_{r}"] = a
+        return past
+
+    def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
+        """A of the module's equations."""
+        system = problem.equations
+        terms = [(self._acceleration_factor(dt), system.M), (1.0, system.K)]
+        if system.C is not None:
+            terms.append((self._velocity_factor(dt), system.C))
+        return EffectiveMatrix(system.algebra.combine(terms), system.algebra)
+
+    def _levels(self, state: State) -> dict[str, Array]:
+        """u, v, a at the q levels before the step, 1 = newest."""
+        levels = {"u_1": state.u, "v_1": state.v, "a_1": state.memory["a_0"]}
+        for r in range(2, len(self.a)):
+            for name in "uva":
+                levels[f"{name}_{r}"] = state.memory[f"{name}_{r - 1}"]
+        return levels
+
+    def _known(self, levels: dict[str, Array], dt: float) -> tuple[Array, Array]:
+        """(v, a) of the new level for u = 0: the parts of eqs. 11c,d that the past fixes."""
+        v = np.zeros_like(levels["u_1"])
+        a = np.zeros_like(v)
+        for r in range(1, len(self.a)):
+            v += self.a[r] * levels[f"u_{r}"] - dt * self.b[r] * levels[f"v_{r}"]
+            a += self.gamma[r] * levels[f"u_{r}"] - self.mu * dt**2 * self.b[r] * levels[f"a_{r}"]
+        return v / (dt * self.b[0]), a / (self.mu * dt**2 * self.b[0])
+
+    def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem:
+        """b = f(t_p) - M a_known - C v_known."""
+        system = problem.equations
+        v, a = self._known(self._levels(state), dt)
+        b = system.load(state.t + dt) - system.M @ a
+        if system.C is not None:
+            b -= system.C @ v
+        return StepProblem(
+            A=A,
+            b=b,
+            bound=problem.surface.gap0,
+            surface=problem.surface,
+            scale=1.0,
+            guess=state.u + dt * state.v,
+            active=state.active,
+            t=state.t + dt,
+            k=state.k + 1,
+        )
+
+    def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
+        """Newest velocity and acceleration from eqs. 11c,d; the levels move one down."""
+        levels = self._levels(state)
+        v_known, a_known = self._known(levels, dt)
+        v = v_known + self._velocity_factor(dt) * result.x
+        a = a_known + self._acceleration_factor(dt) * result.x
+        memory = levels | {"a_0": a, "v_minus": v}
+        return State(step.t, step.k, result.x, v, result.r_n, result.active, memory)
+
+    def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
+        """Mean of the equations of motion at both ends of the step (each holds with the velocity before an impact)."""
+        load = problem.equations.load
+        return Balance(
+            u=0.5 * (old.u + new.u),
+            v=0.5 * (old.memory["v_minus"] + new.memory["v_minus"]),
+            a=0.5 * (old.memory["a_0"] + new.memory["a_0"]),
+            f=0.5 * (load(old.t) + load(new.t)),
+            r_n=0.5 * (old.r_n + new.r_n),
+        )

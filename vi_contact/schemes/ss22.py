@@ -1,0 +1,90 @@
+"""SS22, the single-step form of the Zienkiewicz-Wood-Taylor method with two general weights theta1, theta2.
+
+    u(tau) = u0 + v0 tau + ½ alpha tau²,  weighted residual with mean values of tau/dt (theta1) and (tau/dt)² (theta2):
+    (M + theta1 dt C + ½ theta2 dt² K) alpha = f(t0 + theta1 dt) - C v0 - K (u0 + theta1 dt v0) - B_nᵀ r̄_n
+    u1 = u0 + dt v0 + ½ dt² alpha,   v1 = v0 + dt alpha,   gap(u1) >= 0
+
+In x = u1:  A = 2/(theta2 dt²) M + 2 theta1/(theta2 dt) C + K,  scale = 1/theta2.
+Same amplification as Newmark(beta = theta2/2, gamma = theta1): unconditionally stable for theta2 >= theta1 >= ½, order 2
+at theta1 = ½. Energy: as the midpoint rule (V9.1) at theta1 = theta2 = ½; dissipates for theta1 > ½.
+Source: verification 4.1 (Zienkiewicz, Wood and Taylor, reference 25 of seed 000).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from ..algebra import Array
+from ..errors import InputError
+from ..step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
+
+
+@dataclass(frozen=True)
+class SS22:
+    """See the module's equations. InputError unless theta2 >= theta1 >= ½ (else only conditionally stable)."""
+
+    theta1: float = 0.5
+    theta2: float = 0.5
+
+    def __post_init__(self) -> None:
+        if not self.theta2 >= self.theta1 >= 0.5:
+            raise InputError(
+                f"SS22 weights theta1={self.theta1}, theta2={self.theta2}: give theta2 >= theta1 >= 0.5, "
+                "the unconditionally stable range"
+            )
+
+    def check(self, problem: ContactProblem) -> None:
+        """Works with every contact problem."""
+
+    def start(self, problem: ContactProblem, state: State, dt: float) -> State:
+        """Self-starting: nothing to prepare."""
+        return state
+
+    def jump(self, state: State, v: Array, dt: float) -> State:
+        """A velocity jump needs no restart."""
+        return replace(state, v=v)
+
+    def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
+        """A = 2/(theta2 dt²) M + 2 theta1/(theta2 dt) C + K."""
+        system = problem.equations
+        terms = [(2.0 / (self.theta2 * dt**2), system.M), (1.0, system.K)]
+        if system.C is not None:
+            terms.append((2.0 * self.theta1 / (self.theta2 * dt), system.C))
+        return EffectiveMatrix(system.algebra.combine(terms), system.algebra)
+
+    def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem:
+        """b = A (u0 + dt v0) + (f - C v0 - K (u0 + theta1 dt v0))/theta2."""
+        system = problem.equations
+        guess = state.u + dt * state.v
+        force = system.load(state.t + self.theta1 * dt) - system.K @ (state.u + self.theta1 * dt * state.v)
+        if system.C is not None:
+            force -= system.C @ state.v
+        return StepProblem(
+            A=A,
+            b=A @ guess + force / self.theta2,
+            bound=problem.surface.gap0,
+            surface=problem.surface,
+            scale=1.0 / self.theta2,
+            guess=guess,
+            active=state.active,
+            t=state.t + dt,
+            k=state.k + 1,
+        )
+
+    def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
+        """alpha = 2 (u1 - u0 - dt v0)/dt², v1 = v0 + dt alpha."""
+        v = state.v + 2.0 * (result.x - step.guess) / dt
+        return replace(
+            state, t=step.t, k=step.k, u=result.x, v=v, r_n=result.r_n / step.scale, active=result.active
+        )
+
+    def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
+        """Averages of the residual equation."""
+        alpha = (new.v - old.v) / dt
+        return Balance(
+            u=old.u + self.theta1 * dt * old.v + 0.5 * self.theta2 * dt**2 * alpha,
+            v=old.v + self.theta1 * dt * alpha,
+            a=alpha,
+            f=problem.equations.load(old.t + self.theta1 * dt),
+            r_n=new.r_n,
+        )

@@ -1,0 +1,92 @@
+"""The step of Zienkiewicz, Wood and Taylor that seed 000 uses: displacement and velocity interpolated independently.
+
+Linear u and v over the step, weighted residual with weight phi (verification 4.1):
+
+    (u1 - u0)/dt = (1 - phi) v0 + phi v1
+    M (v1 - v0)/dt + C (u1 - u0)/dt + K ((1 - phi) u0 + phi u1) = f(t0 + phi dt) - B_nᵀ r̄_n,    gap(u1) >= 0
+
+In x = u1:  A = M/(phi dt)² + C/(phi dt) + K,  scale = 1/phi (r_n = r̄_n / phi; seed 000's doubled form at phi = ½).
+
+Order 2 at phi = ½, else 1; unconditionally stable for phi >= ½. Energy at phi = ½ (V9.1): it changes only by work of
+loads, damping and contact, and contact with gap >= 0 at the end of the step never creates energy. At phi = ½ it is the
+midpoint rule, SS22(½, ½) and Newmark(¼, ½) in (u, v). No accelerations are stored, so nothing restarts after an impact.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from ..algebra import Array
+from ..errors import InputError
+from ..step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
+
+
+@dataclass(frozen=True)
+class ZienkiewiczWoodTaylor:
+    """See the module's equations. ``phi`` in [½, 1]: InputError below ½, where the step is unstable."""
+
+    phi: float = 0.5
+
+    def __post_init__(self) -> None:
+        if not 0.5 <= self.phi <= 1.0:
+            raise InputError(f"ZienkiewiczWoodTaylor phi is {self.phi}: give a weight from 0.5 to 1, less is unstable")
+
+    def check(self, problem: ContactProblem) -> None:
+        """Works with every contact problem."""
+
+    def start(self, problem: ContactProblem, state: State, dt: float) -> State:
+        """Self-starting: nothing to prepare."""
+        return state
+
+    def jump(self, state: State, v: Array, dt: float) -> State:
+        """A velocity jump needs no restart."""
+        return replace(state, v=v)
+
+    def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
+        """A = M/(phi dt)² + C/(phi dt) + K."""
+        system = problem.equations
+        terms = [(1.0 / (self.phi * dt) ** 2, system.M), (1.0, system.K)]
+        if system.C is not None:
+            terms.append((1.0 / (self.phi * dt), system.C))
+        return EffectiveMatrix(system.algebra.combine(terms), system.algebra)
+
+    def _load(self, problem: ContactProblem, state: State, dt: float) -> Array:
+        return problem.equations.load(state.t + self.phi * dt)
+
+    def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem:
+        """b = f/phi + M (u0 + phi dt v0)/(phi dt)² + C u0/(phi dt) - (1 - phi)/phi K u0."""
+        system = problem.equations
+        phi = self.phi
+        b = self._load(problem, state, dt) / phi
+        b += (system.M @ (state.u + phi * dt * state.v)) / (phi * dt) ** 2
+        b -= (1.0 - phi) / phi * (system.K @ state.u)
+        if system.C is not None:
+            b += system.C @ (state.u / (phi * dt))
+        return StepProblem(
+            A=A,
+            b=b,
+            bound=problem.surface.gap0,
+            surface=problem.surface,
+            scale=1.0 / phi,
+            guess=state.u + dt * state.v,
+            active=state.active,
+            t=state.t + dt,
+            k=state.k + 1,
+        )
+
+    def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
+        """v1 = v0 + ((u1 - u0)/dt - v0)/phi."""
+        v = state.v + ((result.x - state.u) / dt - state.v) / self.phi
+        return replace(
+            state, t=step.t, k=step.k, u=result.x, v=v, r_n=result.r_n / step.scale, active=result.active
+        )
+
+    def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
+        """Averages of the equation above."""
+        return Balance(
+            u=old.u + self.phi * (new.u - old.u),
+            v=(new.u - old.u) / dt,
+            a=(new.v - old.v) / dt,
+            f=self._load(problem, old, dt),
+            r_n=new.r_n,
+        )

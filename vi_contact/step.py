@@ -1,0 +1,258 @@
+"""THE CONTRACT between time schemes and solvers, and the values that pass between them.
+
+Every time scheme turns a step into the same one-step problem, and every solver solves it:
+
+    A x = b - B_nᵀ r_n,    0 <= r_n  ⊥  bound - B_n x + compliance r_n / scale >= 0
+
+(bilateral rows: equality and r_n of either sign). A is constant as long as dt is, so it is factorised once.
+``r_n`` is ``scale`` times the mean reaction of the step in newtons; ``compliance`` is zero on a rigid support.
+Vectors are arrays of owned unknowns in the rotated basis; contact arrays have shape (m,) and are equal on all ranks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+
+from .algebra import Algebra, Array, Factor, Mask, Matrix
+from .errors import InputError
+from .friction import Frictionless
+from .surfaces import ContactSurface
+from .system import SemiDiscreteSystem
+
+
+class Excitation(Protocol):
+    """A ground acceleration: a scalar history [m/s²] along a direction."""
+
+    direction: tuple[float, ...]
+
+    def acceleration(self, t: float) -> float: ...
+
+
+class FrictionLaw(Protocol):
+    """A friction law (friction.py)."""
+
+
+@dataclass(frozen=True)
+class Impact:
+    """What an impact law is told: normal velocities of all m conditions [m/s], which are closed, which have just closed."""
+
+    v_n: Array
+    active: Mask
+    closing: Mask
+
+
+class ImpactLaw(Protocol):
+    """Post-impact velocity law: impact.py, or the user's own object with these two methods."""
+
+    def target(self, impact: Impact) -> Array:
+        """Normal velocities (m,) after the impact; NaN where the law leaves the velocity alone."""
+        ...
+
+    def apply(self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array) -> Array:
+        """The velocity vector that has these normal velocities."""
+        ...
+
+
+@dataclass(frozen=True)
+class ContactProblem:
+    """A semi-discrete system, a contact surface, what shakes it and how it rubs and rebounds.
+
+    The system is turned into the surface's nodal frames once, here. ``impact=None`` leaves velocities alone.
+    """
+
+    system: SemiDiscreteSystem
+    surface: ContactSurface
+    friction: FrictionLaw = field(default_factory=Frictionless)
+    impact: ImpactLaw | None = None
+    excitation: Excitation | Sequence[Excitation] = ()
+
+    def __post_init__(self) -> None:
+        for excitation in self.excitations:
+            if len(excitation.direction) != self.system.influence.shape[1]:
+                raise InputError(
+                    f"excitation direction {excitation.direction} has {len(excitation.direction)} components but the "
+                    f"body has {self.system.influence.shape[1]}: give one component per dimension"
+                )
+
+    @property
+    def excitations(self) -> tuple[Excitation, ...]:
+        """The excitations as a tuple."""
+        return tuple(self.excitation) if isinstance(self.excitation, Sequence) else (self.excitation,)
+
+    @cached_property
+    def equations(self) -> SemiDiscreteSystem:
+        """The system in the rotated basis, with the inertia loads -M r a_g(t) of the excitations; schemes see this."""
+        system = self.system if self.surface.basis is None else self.system.in_basis(self.surface.basis)
+        inertia = []
+        for excitation in self.excitations:
+            rigid = system.influence @ np.asarray(excitation.direction, dtype=float)
+            inertia.append((-(system.M @ rigid), excitation.acceleration))
+        return system.with_load(*inertia)
+
+    @cached_property
+    def static_load(self) -> SemiDiscreteSystem:
+        """The rotated system without excitation: the gravity stage."""
+        return self.system if self.surface.basis is None else self.system.in_basis(self.surface.basis)
+
+    def cartesian(self, x: Array) -> Array:
+        """T x: unknowns in the rotated basis back to the system's own."""
+        return x if self.surface.basis is None else self.surface.basis @ x
+
+    def ground_acceleration(self, t: float) -> Array:
+        """Vector a_g(t) [m/s²] summed over the excitations."""
+        total = np.zeros(self.system.influence.shape[1])
+        for excitation in self.excitations:
+            total += excitation.acceleration(t) * np.asarray(excitation.direction, dtype=float)
+        return total
+
+
+@dataclass(frozen=True)
+class State:
+    """Displacement, velocity and contact at time t = t_k, in the rotated basis.
+
+    ``r_n`` [N] is the reaction of the step that led here (mean or end value, as the scheme says); ``memory`` holds what
+    a multistep scheme carries besides u and v.
+    """
+
+    t: float
+    k: int
+    u: Array
+    v: Array
+    r_n: Array
+    active: Mask
+    memory: Mapping[str, Array] = field(default_factory=dict)
+
+
+class EffectiveMatrix:
+    """A and its factor. Identity matters: a prepared solver belongs to one of these, and it lives as long as dt."""
+
+    def __init__(self, matrix: Matrix, algebra: Algebra) -> None:
+        self.matrix = matrix
+        self.algebra = algebra
+
+    @cached_property
+    def factor(self) -> Factor:
+        """The one factorisation of A."""
+        return self.algebra.factor(self.matrix)
+
+    def __matmul__(self, x: Array) -> Array:
+        return self.matrix @ x
+
+
+@dataclass(frozen=True)
+class StepProblem:
+    """One step, as every solver sees it. ``guess``: predicted x; ``active``: predicted contact set."""
+
+    A: EffectiveMatrix
+    b: Array
+    bound: Array
+    surface: ContactSurface
+    scale: float
+    guess: Array
+    active: Mask
+    t: float
+    k: int
+
+
+@dataclass(frozen=True)
+class StepResult:
+    """x, r_n and the active set; iterations count changes of the active set, sweeps or Newton steps (method says)."""
+
+    x: Array
+    r_n: Array
+    active: Mask
+    iterations: int
+    method: str
+
+
+@dataclass(frozen=True)
+class Balance:
+    """The equation of motion that the step satisfied, M a + C v + K u = f - B_nᵀ r_n, with the scheme's own averages.
+
+    Multiplying it by the displacement increment gives the energy ledger of any scheme (verify.ledger).
+    """
+
+    u: Array
+    v: Array
+    a: Array
+    f: Array
+    r_n: Array
+
+
+class Scheme(Protocol):
+    """A time scheme: turns a state into a StepProblem and its solution into the next state."""
+
+    def check(self, problem: ContactProblem) -> None: ...
+    def start(self, problem: ContactProblem, state: State, dt: float) -> State: ...
+    def jump(self, state: State, v: Array, dt: float) -> State: ...
+    def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix: ...
+    def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem: ...
+    def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State: ...
+    def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance: ...
+
+
+class PreparedSolver(Protocol):
+    """A solver bound to one effective matrix and one surface."""
+
+    def solve(self, step: StepProblem) -> StepResult: ...
+
+
+class Solver(Protocol):
+    """Settings of a one-step solver; ``prepare`` does the work that is shared by all steps with the same A."""
+
+    def check(self, problem: ContactProblem) -> None: ...
+    def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> PreparedSolver: ...
+
+
+@dataclass(frozen=True)
+class Report:
+    """What happened in one step, for recorders. ``new.v`` is after the impact law, ``v_minus`` before it."""
+
+    old: State
+    new: State
+    v_minus: Array
+    step: StepProblem
+    result: StepResult
+    certificate: Certificate
+    balance: Balance
+    escalated: bool
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """Dimensionless residuals of the inequality problem of one step (design idea 5); each is 0 for an exact solution.
+
+    equilibrium: |A x - b + B_nᵀ r_n|_max / max(|b|_max, |A x|_max).
+    penetration: max(-gap, 0) / x_ref;  tension: max(-r_n, 0) / r_ref.
+    complementarity: max |min(r_n / r_ref, gap / x_ref)|; on bilateral rows |gap| / x_ref.
+    x_ref = max(|x|, |guess|, finite |bound|), r_ref = max(|b|, |r_n|), maxima over all unknowns.
+    """
+
+    equilibrium: float
+    penetration: float
+    tension: float
+    complementarity: float
+
+    @property
+    def worst(self) -> float:
+        """The largest residual; NaN counts as infinite."""
+        values = (self.equilibrium, self.penetration, self.tension, self.complementarity)
+        return float("inf") if any(np.isnan(values)) else max(values)
+
+
+class Recorder(Protocol):
+    """Listens to the loop. ``columns`` names what ``row`` returns each step: name -> (unit, meaning)."""
+
+    def columns(self) -> Mapping[str, tuple[str, str]]: ...
+    def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Mapping[str, Any]:
+        """The row of the initial state; ``resumed`` is the last row of the run that a restart continues."""
+        ...
+
+    def row(self, report: Report) -> Mapping[str, Any]:
+        """The row of a step: numbers, or arrays (which go to HDF5 only)."""
+        ...

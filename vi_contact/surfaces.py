@@ -1,0 +1,204 @@
+"""Contact surfaces and the obstacles they may touch.
+
+A contact condition bounds one unknown: after the change of basis u = T û (nodal frames turned to the contact
+direction) the normal displacement u_n of a contact point *is* an entry of û, and B_n is a selection of entries.
+Sign: the direction n points from the body to the obstacle, u_n = u·n, gap = gap0 - u_n >= 0, reaction r_n >= 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from .algebra import Array, Comm, Indices, Mask, Matrix
+from .errors import InputError
+
+
+class Obstacle(Protocol):
+    """A rigid support. ``directions`` gives the unit contact direction of each point, ``gap`` its initial gap [m]."""
+
+    def directions(self, points: Array, normals: Array) -> Array: ...
+    def gap(self, points: Array, normals: Array) -> Array: ...
+
+
+@dataclass(frozen=True)
+class Touching:
+    """A support that fits the boundary exactly: zero initial gap, contact along the body's outward normal."""
+
+    def directions(self, points: Array, normals: Array) -> Array:
+        return normals
+
+    def gap(self, points: Array, normals: Array) -> Array:
+        return np.zeros(len(points))
+
+
+@dataclass(frozen=True)
+class HalfSpace:
+    """The rigid half-space behind the plane through ``point`` with ``normal`` pointing out of it, towards the body.
+
+    The condition is exact for any boundary shape: (X + u - point)·normal >= 0, so the contact direction is -normal.
+    """
+
+    point: tuple[float, ...]
+    normal: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        length = float(np.linalg.norm(self.normal))
+        if not np.isfinite(length) or length == 0.0 or len(self.point) != len(self.normal):
+            raise InputError(
+                f"HalfSpace(point={self.point}, normal={self.normal}): give a point and a nonzero normal "
+                "with the same number of components"
+            )
+
+    @property
+    def unit_normal(self) -> Array:
+        """The normal with length one."""
+        normal = np.asarray(self.normal, dtype=float)
+        return np.asarray(normal / np.linalg.norm(normal))
+
+    def _check(self, points: Array, normals: Array) -> None:
+        if points.shape[1] != len(self.normal):
+            raise InputError(
+                f"HalfSpace has {len(self.normal)} components but the body has {points.shape[1]}: give one per dimension"
+            )
+        if len(points) and np.any(normals @ self.unit_normal > 0.0):
+            raise InputError(
+                f"HalfSpace normal {self.normal} points away from the body: turn its sign, "
+                "it must point out of the obstacle towards the contact boundary"
+            )
+
+    def directions(self, points: Array, normals: Array) -> Array:
+        self._check(points, normals)
+        return np.tile(-self.unit_normal, (len(points), 1))
+
+    def gap(self, points: Array, normals: Array) -> Array:
+        self._check(points, normals)
+        return np.asarray((points - np.asarray(self.point, dtype=float)) @ self.unit_normal)
+
+
+@dataclass(frozen=True)
+class AnalyticGap:
+    """Initial gap g0(x) given as a function of points (k, d) -> (k,) [m], measured along the body's outward normal."""
+
+    function: Callable[[Array], Array]
+
+    def directions(self, points: Array, normals: Array) -> Array:
+        return normals
+
+    def gap(self, points: Array, normals: Array) -> Array:
+        gap = np.asarray(self.function(points), dtype=float)
+        if gap.shape != (len(points),):
+            raise InputError(f"AnalyticGap returned shape {gap.shape} for {len(points)} points: return one gap per point")
+        return gap
+
+
+@dataclass(frozen=True)
+class ContactSurface:
+    """m contact conditions, the same on every rank and in the same order for any number of ranks.
+
+    Attributes:
+        comm: the ranks that share the surface.
+        points: (m, d) positions [m]; normals: (m, d) unit contact directions (towards the obstacle).
+        weights: (m,) tributary length [m] times thickness, or area [m²]: pressure = r_n / weights.
+        gap0: (m,) initial gap [m], >= 0.
+        bilateral: (m,) True where the point is held on the obstacle (u_n = gap0, reaction of either sign).
+        compliance: (m,) of the support [m/N]; 0 is rigid (springs, remark after seed 000 eq. 6).
+        owned: indices in û of the normal unknowns this rank owns; slots: their rows among the m conditions.
+        tangents: (len(owned), d-1) indices in û of the tangential unknowns of the same points.
+        basis: T with u = T û, or None when the nodal frames already point along the axes.
+    """
+
+    comm: Comm
+    points: Array
+    normals: Array
+    weights: Array
+    gap0: Array
+    bilateral: Mask
+    compliance: Array
+    owned: Indices
+    slots: Indices
+    tangents: Indices
+    basis: Matrix | None = None
+
+    @property
+    def count(self) -> int:
+        """Number of contact conditions m."""
+        return len(self.gap0)
+
+    def normal_values(self, x: Array) -> Array:
+        """B_n x on every rank, shape (m,)."""
+        values = np.zeros(self.count)
+        values[self.slots] = x[self.owned]
+        return self.comm.sum(values)
+
+    def reaction_load(self, r_n: Array, rows: int) -> Array:
+        """B_nᵀ r_n: the owned part of the contact reaction on the unknowns [N]."""
+        load = np.zeros(rows)
+        load[self.owned] = r_n[self.slots]
+        return load
+
+    def held(self) -> ContactSurface:
+        """The bilateral comparison case: every point stays on the obstacle."""
+        return replace(self, bilateral=np.ones(self.count, dtype=bool))
+
+    def on_springs(self, stiffness: float) -> ContactSurface:
+        """On a linearly deformable support of foundation modulus ``stiffness`` [Pa/m]: the remark after eq. 6.
+
+        Each point presses a fictitious spring k = stiffness * weight, whose far end obeys the unilateral law.
+        """
+        if not np.isfinite(stiffness) or stiffness <= 0.0:
+            raise InputError(f"support stiffness is {stiffness}: give a positive foundation modulus in Pa/m")
+        return replace(self, compliance=1.0 / (stiffness * self.weights))
+
+
+def admissible_gap(gap: Array, points: Array, size: float) -> Array:
+    """The initial gap with round-off (1e-12 of the body's size) removed; InputError where the body penetrates."""
+    if not np.all(np.isfinite(gap)):
+        raise InputError("the initial gap contains NaN or infinite values: check the obstacle's gap function")
+    if len(gap) and gap.min() < -1e-12 * size:
+        worst = int(np.argmin(gap))
+        where = ", ".join(f"{x:g}" for x in points[worst])
+        raise InputError(
+            f"the body penetrates its obstacle by {-gap[worst]:.3g} m at ({where}) before the first step: "
+            "move the obstacle or the mesh so that every initial gap is >= 0"
+        )
+    return np.maximum(gap, 0.0)
+
+
+def nodal_frames(directions: Array) -> Array:
+    """Orthonormal frames (k, d, d) whose first column is the contact direction n, the others tangential.
+
+    2D: t = (-n_y, n_x). 3D: t1 is the projection of the axis least aligned with n, t2 = n x t1.
+    """
+    k, d = directions.shape
+    frames = np.empty((k, d, d))
+    frames[:, :, 0] = directions
+    if d == 2:
+        frames[:, :, 1] = np.column_stack([-directions[:, 1], directions[:, 0]])
+    if d == 3:
+        axis = np.eye(3)[np.argmin(np.abs(directions), axis=1)]
+        t1 = axis - np.sum(axis * directions, axis=1)[:, None] * directions
+        t1 /= np.linalg.norm(t1, axis=1)[:, None]
+        frames[:, :, 1] = t1
+        frames[:, :, 2] = np.cross(directions, t1)
+    return frames
+
+
+def empty_surface(comm: Comm, dimension: int) -> ContactSurface:
+    """No contact at all: the linear comparison case."""
+    none = np.zeros(0, dtype=np.int64)
+    return ContactSurface(
+        comm=comm,
+        points=np.zeros((0, dimension)),
+        normals=np.zeros((0, dimension)),
+        weights=np.zeros(0),
+        gap0=np.zeros(0),
+        bilateral=np.zeros(0, dtype=bool),
+        compliance=np.zeros(0),
+        owned=none,
+        slots=none,
+        tangents=np.zeros((0, max(dimension - 1, 0)), dtype=np.int64),
+    )

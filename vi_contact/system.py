@@ -1,0 +1,140 @@
+"""The semi-discrete equations of motion M u'' + C u' + K u = f(t) and the loads on their right-hand side."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Protocol
+
+import numpy as np
+
+from .algebra import Algebra, Array, Matrix
+
+
+class Space(Protocol):
+    """What the unknowns mean: how an owned vector of unknowns becomes displacements of points.
+
+    ``ids`` are the rank-independent numbers of the owned unknowns, used by checkpoints.
+    """
+
+    dimension: int
+    ids: np.ndarray
+    unknowns: int
+
+    def find_nodes(self, points: Array) -> np.ndarray:
+        """Node numbers nearest to the points (k, d); InputError for a point outside the body."""
+        ...
+
+    def sample(self, u: Array, nodes: np.ndarray, t: float, derivative: int = 0) -> Array:
+        """Values (k, d) at the nodes, the same on every rank; derivative 0, 1, 2 says which prescribed motion applies."""
+        ...
+
+
+@dataclass(frozen=True)
+class Load:
+    """f(t) = constant + sum_i vector_i * history_i(t) + sum_j general_j(t), in newtons on the unknowns.
+
+    Separable parts cost one vector update a step; general parts are evaluated anew at every time.
+    """
+
+    constant: Array
+    separable: tuple[tuple[Array, Callable[[float], float]], ...] = ()
+    general: tuple[Callable[[float], Array], ...] = ()
+
+    def __call__(self, t: float) -> Array:
+        total = self.constant.copy()
+        for vector, history in self.separable:
+            total += history(t) * vector
+        for function in self.general:
+            total += function(t)
+        return total
+
+    def in_basis(self, T: Matrix) -> Load:
+        """The same load on the unknowns û of u = T û: Tᵀ f."""
+
+        def turned(function: Callable[[float], Array]) -> Callable[[float], Array]:
+            return lambda t: T.transpose_apply(function(t))
+
+        return Load(
+            T.transpose_apply(self.constant),
+            tuple((T.transpose_apply(vector), history) for vector, history in self.separable),
+            tuple(turned(function) for function in self.general),
+        )
+
+
+@dataclass(frozen=True)
+class SemiDiscreteSystem:
+    """M u'' + C u' + K u = f(t) on the free unknowns; prescribed displacements are already eliminated into f.
+
+    Attributes:
+        algebra: how its matrices are combined, factorised and reduced over ranks.
+        M, K: consistent mass [kg] and stiffness [N/m] (per thickness of the section), symmetric.
+        C: damping [N s/m] or None (seed 000 eq. 7 with c = 0).
+        load: f(t) [N].
+        influence: (n, d) rigid unit translation in each direction, for the inertia load -M r a_g(t).
+        u0, v0: initial displacement [m] and velocity [m/s].
+        space: what the unknowns mean.
+        floating: True when some rigid motion is not held by prescribed displacements (static stages refuse it).
+    """
+
+    algebra: Algebra
+    M: Matrix
+    C: Matrix | None
+    K: Matrix
+    load: Load
+    influence: Array
+    u0: Array
+    v0: Array
+    space: Space
+    floating: bool = False
+    _cache: dict[str, object] = field(default_factory=dict, compare=False, repr=False)
+
+    @property
+    def rows(self) -> int:
+        """Unknowns owned by this rank."""
+        return len(self.u0)
+
+    def kinetic_energy(self, v: Array) -> float:
+        """½ vᵀ M v [J]."""
+        return 0.5 * self.algebra.dot(v, self.M @ v)
+
+    def strain_energy(self, u: Array) -> float:
+        """½ uᵀ K u [J]."""
+        return 0.5 * self.algebra.dot(u, self.K @ u)
+
+    def solve_mass(self, b: Array) -> Array:
+        """M⁻¹ b; the factor is made at the first call."""
+        if "mass" not in self._cache:
+            self._cache["mass"] = self.algebra.factor(self.M)
+        return self._cache["mass"].solve(b)  # type: ignore[attr-defined, no-any-return]
+
+    def initial_acceleration(self, t: float, u: Array, v: Array, reaction: Array) -> Array:
+        """M⁻¹ (f(t) - C v - K u - reaction), the acceleration consistent with a state [m/s²]."""
+        force = self.load(t) - self.K @ u - reaction
+        if self.C is not None:
+            force -= self.C @ v
+        return self.solve_mass(force)
+
+    def with_load(self, *terms: tuple[Array, Callable[[float], float]]) -> SemiDiscreteSystem:
+        """The same system with separable loads vector * history(t) added."""
+        load = replace(self.load, separable=self.load.separable + terms)
+        return replace(self, load=load, _cache={})
+
+    def in_basis(self, T: Matrix) -> SemiDiscreteSystem:
+        """The same system in the unknowns û of u = T û: TᵀMT, TᵀCT, TᵀKT, Tᵀf (design idea 3).
+
+        T is orthogonal here (rotated nodal frames), so initial values and influence vectors turn with Tᵀ.
+        """
+        turn = self.algebra.congruence
+        influence = np.column_stack([T.transpose_apply(column) for column in self.influence.T])
+        return replace(
+            self,
+            M=turn(T, self.M),
+            C=None if self.C is None else turn(T, self.C),
+            K=turn(T, self.K),
+            load=self.load.in_basis(T),
+            influence=influence,
+            u0=T.transpose_apply(self.u0),
+            v0=T.transpose_apply(self.v0),
+            _cache={},
+        )

@@ -1,0 +1,96 @@
+"""Checks that ship with the package: the certificate of a step and the energy balance of a step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .algebra import Array
+from .step import Balance, Certificate, ContactProblem, State, StepProblem, StepResult
+
+
+def _ratio(value: float, reference: float) -> float:
+    """value/reference, with 0/0 = 0 (nothing happens, nothing is wrong)."""
+    if reference > 0.0 or np.isnan(reference):
+        return value / reference
+    return 0.0 if value == 0.0 else float("inf")
+
+
+def kkt_residual(step: StepProblem, result: StepResult) -> Certificate:
+    """The certificate of a step: how well (x, r_n) satisfies the inequality problem. Definitions: ``Certificate``."""
+    surface, x, r_n = step.surface, result.x, result.r_n
+    Ax = step.A @ x
+    residual = Ax - step.b
+    residual[surface.owned] += r_n[surface.slots]
+    local = [_max_abs(residual), _max_abs(step.b), _max_abs(Ax), _max_abs(x), _max_abs(step.guess)]
+    equilibrium, b_max, Ax_max, x_max, guess_max = surface.comm.max(np.array(local))
+    finite = np.isfinite(step.bound)
+    gap = (step.bound - surface.normal_values(x) + surface.compliance * r_n / step.scale)[finite]
+    x_ref = max(x_max, guess_max, _max_abs(step.bound[finite]))
+    r_ref = max(b_max, _max_abs(r_n))
+    held = surface.bilateral[finite]
+    r = np.where(held, 0.0, r_n[finite])
+    loose = r_n[~finite]
+    return Certificate(
+        equilibrium=_ratio(equilibrium, max(b_max, Ax_max)),
+        penetration=_ratio(_max_abs(np.where(held, 0.0, np.minimum(gap, 0.0))), x_ref),
+        tension=_ratio(_max_abs(np.minimum(r, 0.0)), r_ref),
+        complementarity=max(
+            _complementarity(r, gap, r_ref, x_ref, held),
+            _ratio(_max_abs(loose), r_ref),
+        ),
+    )
+
+
+def _complementarity(r: Array, gap: Array, r_ref: float, x_ref: float, held: Array) -> float:
+    """max |min(r/r_ref, gap/x_ref)|, and |gap|/x_ref on bilateral rows."""
+    scaled_gap = np.array([_ratio(abs(g), x_ref) * np.sign(g) for g in gap]) if x_ref == 0.0 else gap / x_ref
+    scaled_r = r / r_ref if r_ref > 0.0 else r
+    return _max_abs(np.where(held, scaled_gap, np.minimum(scaled_r, scaled_gap)))
+
+
+def _max_abs(x: Array) -> float:
+    return float(np.max(np.abs(x))) if len(x) else 0.0
+
+
+@dataclass(frozen=True)
+class StepEnergy:
+    """Where the energy of one step went [J]: change = input - damping - contact - algorithmic + defect."""
+
+    change: float
+    input: float
+    damping: float
+    contact: float
+    algorithmic: float
+
+    @property
+    def defect(self) -> float:
+        """What the ledger cannot explain; round-off when the equation of motion was satisfied."""
+        return self.change - (self.input - self.damping - self.contact - self.algorithmic)
+
+
+def energy_balance(problem: ContactProblem, old: State, new: State, balance: Balance) -> StepEnergy:
+    """The ledger of a step before the impact law, for any scheme (verification V9).
+
+    The step satisfied M a + C v + K u = f - B_nᵀ r_n with the averages of ``balance``. Times the increment du = u1 - u0:
+        input = f·du,  damping = du·C v,  contact = r_n·B_n du (work lost to the support, stored or dissipated there),
+        algorithmic = du·M a - ½(v0 + v1)·M (v1 - v0) + du·K u - ½(u0 + u1)·K du   (0 for the midpoint rule)
+    and change is computed from the energies themselves, so the defect measures the equation of motion.
+    """
+    system, surface = problem.equations, problem.surface
+    dot = system.algebra.dot
+    du, dv = new.u - old.u, new.v - old.v
+    mean_u, mean_v = 0.5 * (old.u + new.u), 0.5 * (old.v + new.v)
+    Mdv, Kdu = system.M @ dv, system.K @ du
+    kinetic, strain = dot(mean_v, Mdv), dot(mean_u, Kdu)
+    inertia = dot(du, system.M @ balance.a)
+    stiffness = dot(balance.u, Kdu)
+    contact = float(balance.r_n @ surface.normal_values(du))
+    return StepEnergy(
+        change=kinetic + strain,
+        input=dot(balance.f, du),
+        damping=0.0 if system.C is None else dot(du, system.C @ balance.v),
+        contact=contact,
+        algorithmic=inertia - kinetic + stiffness - strain,
+    )
