@@ -1,0 +1,16 @@
+#!/usr/bin/env bash
+# bash demos/run.sh [-n RANKS] NAME [arguments of the demo…]     runs demos/NAME.py; installs what is missing on Debian 12 or 13
+set -euo pipefail
+demos=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+. "$demos/../install/setup.sh"
+
+launch=()
+if [ "${1:-}" = -n ]; then launch=(mpirun -n "${2:?number of ranks}"); shift 2; fi
+name=${1:-}
+if [ -z "$name" ] || [ ! -f "$demos/$name.py" ]; then
+  echo "vi_contact: ${name:+no demo \"$name\"; }choose one of:" $(cd "$demos" && ls ./*.py 2>/dev/null | sed 's|^\./||; s|\.py$||') >&2
+  exit 2
+fi
+shift
+vi_setup
+exec "${launch[@]}" "$vi_python" "$demos/$name.py" "$@"

@@ -1,0 +1,82 @@
+# Shared by demos/run.sh, tests/run.sh and .ci/run, which source it: clean environment, Debian's packages, MPI settings.
+# Silent unless it installs something or fails.
+
+vi_root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+vi_python=/usr/bin/python3
+
+vi_fail() { echo "vi_contact: $*" >&2; exit 1; }
+
+# Debian's interpreter, compiler and mpirun, whatever another Python distribution has put into the environment.
+vi_clean_environment() {
+  unset PYTHONHOME PYTHONSTARTUP PYTHONPLATLIBDIR VIRTUAL_ENV CONDA_PREFIX PETSC_ARCH PETSC_DIR SLEPC_DIR
+  export PYTHONPATH=$vi_root PYTHONNOUSERSITE=1
+  export PATH=/usr/sbin:/usr/bin:/sbin:/bin:$PATH
+}
+
+# One thread a rank; Open MPI 4 (Debian 12) and 5 (Debian 13) on one machine: as root, more ranks than cores, no noise.
+vi_mpi_environment() {
+  export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 BLIS_NUM_THREADS=1
+  export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
+  export OMPI_MCA_rmaps_base_oversubscribe=1 PRTE_MCA_rmaps_default_mapping_policy=:oversubscribe
+  export OMPI_MCA_hwloc_base_binding_policy=none PRTE_MCA_hwloc_default_binding_policy=none
+  export OMPI_MCA_mpi_yield_when_idle=1
+  export OMPI_MCA_pml=ob1 OMPI_MCA_btl=^openib,ofi,uct,usnic OMPI_MCA_btl_vader_single_copy_mechanism=none
+}
+
+# dolfinx keeps compiled forms, and matplotlib its fonts, under ~/.cache: elsewhere when there is no such place.
+vi_cache_environment() {
+  local cache=${XDG_CACHE_HOME:-${HOME:+$HOME/.cache}}
+  if [ -z "$cache" ] || ! mkdir -p "$cache/fenics" 2>/dev/null || ! [ -w "$cache/fenics" ]; then
+    cache=${TMPDIR:-/tmp}/vi_contact-cache-$(id -u)
+    mkdir -p "$cache/fenics" || vi_fail "no writable cache directory: set XDG_CACHE_HOME to one"
+  fi
+  export XDG_CACHE_HOME=$cache
+  [ -n "${HOME:-}" ] && [ -w "$HOME" ] || export HOME=$cache
+}
+
+# The build with real numbers, also where the complex one is installed and preferred.
+vi_choose_real_petsc() {
+  [ ! -d /usr/lib/petscdir/petsc-real ] || export PETSC_DIR=/usr/lib/petscdir/petsc-real
+}
+
+vi_missing_packages() {
+  local wanted
+  mapfile -t wanted < <(grep -v '^#' "$vi_root/install/debian-packages.txt")
+  comm -23 <(printf '%s\n' "${wanted[@]}" | sort -u) \
+    <(dpkg-query -W -f '${db:Status-Status} ${Package}\n' "${wanted[@]}" 2>/dev/null | sed -n 's/^installed //p' | sort -u)
+}
+
+vi_apt() {
+  local command=("${become[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -q -o DPkg::Lock::Timeout=300 -o Acquire::Retries=3)
+  "${command[@]}" update || true  # one broken third-party source must not stop us: the installation tells
+  "${command[@]}" "$@"
+}
+
+vi_install_packages() {
+  local missing log become=()
+  mapfile -t missing < <(vi_missing_packages)
+  [ ${#missing[@]} -eq 0 ] && return
+  command -v apt-get >/dev/null || vi_fail "needs Debian 12 or 13 (no apt-get here); missing: ${missing[*]}"
+  if [ "$(id -u)" -ne 0 ]; then
+    if sudo -n true 2>/dev/null; then become=(sudo -n)
+    elif command -v sudo >/dev/null && [ -t 0 ]; then become=(sudo)
+    else vi_fail "missing packages; as root: apt-get install --no-install-recommends ${missing[*]}"
+    fi
+  fi
+  echo "vi_contact: installing ${#missing[@]} Debian packages (once)…" >&2
+  log=$(mktemp)
+  if ! vi_apt install -y --no-install-recommends "${missing[@]}" >"$log" 2>&1; then
+    local why; why=$(grep -m1 '^E:' "$log")
+    rm -f "$log"
+    vi_fail "could not install (offline?) ${missing[*]}: ${why:-apt-get failed}"
+  fi
+  rm -f "$log"
+}
+
+vi_setup() {
+  vi_clean_environment
+  vi_install_packages
+  vi_choose_real_petsc
+  vi_mpi_environment
+  vi_cache_environment
+}
