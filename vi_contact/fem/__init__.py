@@ -1,0 +1,21 @@
+"""Finite elements on DOLFINx. Names are imported when first used, so that `import vi_contact` needs no finite element library."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+_HOME = {"read_mesh": "mesh", "build_mesh": "mesh", "node_numbers": "mesh", "Cells": "mesh", "Facets": "mesh", "Tags": "mesh"}
+"""Public name -> module of this folder it lives in."""
+
+__all__ = sorted(_HOME)
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -1,0 +1,218 @@
+"""Assembles the semi-discrete system of a linear elastic body: M u'' + C u' + K u = f(t) (seed 000 eqs. 7-10a).
+
+    sigma = lambda_eff tr(eps) I + 2 mu eps,   M = ∫ rho u·v,   K = ∫ sigma(u):eps(v),   C = alpha M + beta K (per material)
+
+integrated over the mesh times the section's thickness. Prescribed displacements are eliminated: u = P u_free + U(t),
+so M, C, K are Pᵀ(·)P and the load gets -Pᵀ(K U + C U' + M U'').
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import ufl
+
+from ..algebra import Array
+from ..errors import InputError
+from ..materials import Damping, LinearElastic, NoDamping, PlaneStrain, Section, Solid
+from ..system import Load, SemiDiscreteSystem
+from . import compat
+from .loads import BodyForce, Prescribed, TangentialTraction, Traction, as_tuple, evaluate, is_constant
+from .mesh import Cells, Facets
+from .petsc_algebra import PetscAlgebra, PetscMatrix
+from .space import FemSpace
+
+Materials = LinearElastic | Sequence[tuple[Cells, LinearElastic]]
+Initial = tuple[float, ...] | Callable[[Array], Array] | None
+
+
+def assemble(
+    mesh: Any,
+    material: Materials,
+    *,
+    section: Section | None = None,
+    clamped: Facets | Sequence[Facets] = (),
+    prescribed: Prescribed | Sequence[Prescribed] = (),
+    loads: Traction | BodyForce | Sequence[Traction | BodyForce] = (),
+    damping: Damping | None = None,
+    initial_displacement: Initial = None,
+    initial_velocity: Initial = None,
+) -> SemiDiscreteSystem:
+    """The system of a body, on the free unknowns.
+
+    Args:
+        mesh: DOLFINx mesh (``read_mesh``), first-order cells; unknowns are P1 or Q1.
+        material: one material, or (cells, material) pairs that cover the mesh.
+        section: PlaneStrain() by default in 2D (Solid() in 3D); PlaneStress(thickness) for panels.
+        clamped: facets with u = 0; prescribed: facets that move (eq. 3) or are held in some components.
+        loads: tractions (eqs. 4, 6) and body forces.
+        damping: NoDamping() by default, MassProportional(c) (eq. 7) or Rayleigh.
+        initial_displacement, initial_velocity: constant or points (k, d) -> (k, d) (eqs. 10, 10a).
+    Raises:
+        InputError: cells without material, NaN in data, components that do not exist.
+    """
+    section = section or (PlaneStrain() if mesh.geometry.dim == 2 else Solid())
+    conditions = tuple(Prescribed(facets) for facets in as_tuple(clamped)) + as_tuple(prescribed)
+    space = FemSpace(mesh, conditions)
+    forms = ElasticForms(space, cell_materials(mesh, material), section, damping or NoDamping())
+    algebra = PetscAlgebra(mesh.comm)
+    mass, stiffness, damper = forms.matrices()
+
+    def reduced(full: Any) -> PetscMatrix:
+        return PetscMatrix(full.PtAP(space.selection))
+
+    rigid = np.zeros((len(space.ids), space.dimension))
+    for direction in range(space.dimension):
+        rigid[:, direction] = space.restrict(np.tile(np.eye(space.dimension)[direction], (len(space.nodes), 1)))
+    system = SemiDiscreteSystem(
+        algebra=algebra,
+        M=reduced(mass),
+        C=None if damper is None else reduced(damper),
+        K=reduced(stiffness),
+        load=assemble_loads(space, section, as_tuple(loads), (stiffness, damper, mass)),
+        influence=rigid,
+        u0=_initial(space, "initial displacement", initial_displacement),
+        v0=_initial(space, "initial velocity", initial_velocity),
+        space=space,
+        floating=floats(space),
+    )
+    space.forms = forms
+    return system
+
+
+class ElasticForms:
+    """The variational forms of one body; material constants are cellwise, so one compiled form serves all materials."""
+
+    def __init__(self, space: FemSpace, materials: list[tuple[Any, LinearElastic]], section: Section, damping: Damping):
+        self.space, self.section = space, section
+        cells = compat.cell_space(space.mesh)
+        names = ("lame", "shear", "rho", "alpha_rho", "beta", "lame_out")
+        self.fields = {name: compat.function(cells) for name in names}
+        for indices, material in materials:
+            lame, shear = section.elastic_constants(material)
+            alpha, beta = damping.coefficients(material)
+            # sigma_zz = lambda tr(eps) in plane strain, 0 in plane stress: only von Mises stress needs it
+            lame_out = lame if lame == material.lame_lambda and space.dimension == 2 else 0.0
+            values = (lame, shear, material.rho, alpha * material.rho, beta, lame_out)
+            for name, value in zip(names, values, strict=True):
+                self.fields[name].x.array[indices] = section.thickness * value if name != "beta" else value
+        self.damped = any(any(damping.coefficients(material)) for _, material in materials)
+
+    def stress(self, u: Any) -> Any:
+        """sigma(u) times the thickness."""
+        eps = ufl.sym(ufl.grad(u))
+        return self.fields["lame"] * ufl.tr(eps) * ufl.Identity(self.space.dimension) + 2 * self.fields["shear"] * eps
+
+    def matrices(self) -> tuple[Any, Any, Any | None]:
+        """Full mass, stiffness and damping matrices (PETSc), before elimination."""
+        u, v = ufl.TrialFunction(self.space.V), ufl.TestFunction(self.space.V)
+        mass = self.fields["rho"] * ufl.inner(u, v) * ufl.dx
+        stiffness = ufl.inner(self.stress(u), ufl.sym(ufl.grad(v))) * ufl.dx
+        M, K = (compat.assemble_matrix(compat.compile_form(form)) for form in (mass, stiffness))
+        if not self.damped:
+            return M, K, None
+        beta = self.fields["beta"]
+        damper = self.fields["alpha_rho"] * ufl.inner(u, v) * ufl.dx
+        damper += beta * ufl.inner(self.stress(u), ufl.sym(ufl.grad(v))) * ufl.dx
+        return M, K, compat.assemble_matrix(compat.compile_form(damper))
+
+
+def cell_materials(mesh: Any, material: Materials) -> list[tuple[Any, LinearElastic]]:
+    """(local cells, material) pairs that cover every local cell; InputError for cells without material."""
+    cell_map = mesh.topology.index_map(mesh.topology.dim)
+    count = cell_map.size_local + cell_map.num_ghosts
+    if isinstance(material, LinearElastic):
+        return [(np.arange(count), material)]
+    covered = np.zeros(count, dtype=bool)
+    for cells, _ in material:
+        covered[cells.indices] = True
+    missing = mesh.comm.allreduce(int((~covered).sum()))
+    if missing:
+        raise InputError(f"{missing} cells have no material: give a (cells, material) pair for every cell group of the mesh")
+    return [(cells.indices, one) for cells, one in material]
+
+
+def assemble_loads(space: FemSpace, section: Section, loads: tuple[Any, ...], full: tuple[Any, Any, Any]) -> Load:
+    """f(t) on the free unknowns: tractions, body forces and the pull of prescribed motions."""
+    constant = np.zeros(len(space.ids))
+    separable: list[tuple[Array, Callable[[float], float]]] = []
+    general: list[Callable[[float], Array]] = []
+    for load in loads:
+        integrate = _integrator(space, section, load)
+        name = type(load).__name__
+        if load.history is not None:
+            separable.append((integrate(evaluate(name, load.value, space.points, 0.0)), load.history))
+        elif is_constant(load):
+            constant += integrate(evaluate(name, load.value, space.points, 0.0))
+        else:
+            general.append(_field_load(space, name, load.value, integrate))
+    if any(condition.moves for condition in space.prescribed):
+        general.append(_prescribed_load(space, full))
+    return Load(constant, tuple(separable), tuple(general))
+
+
+def _field_load(space: FemSpace, name: str, value: Any, integrate: Callable[[Array], Array]) -> Callable[[float], Array]:
+    return lambda t: integrate(evaluate(name, value, space.points, t))
+
+
+def _integrator(space: FemSpace, section: Section, load: Traction | BodyForce) -> Callable[[Array], Array]:
+    """Nodal values (owned, d) -> Pᵀ ∫ interpolated value · v, as one product with a matrix assembled here."""
+    g, v = ufl.TrialFunction(space.V), ufl.TestFunction(space.V)
+    if isinstance(load, BodyForce):
+        form = ufl.inner(g, v) * ufl.dx
+    else:
+        n = ufl.FacetNormal(space.mesh)
+        tangential = isinstance(load, TangentialTraction)
+        acting = g - ufl.dot(g, n) * n if tangential else g
+        form = ufl.inner(acting, v) * compat.measure(space.mesh, space.mesh.topology.dim - 1, load.facets.indices)
+    matrix = PetscMatrix(compat.assemble_matrix(compat.compile_form(form)))
+
+    def integrate(values: Array) -> Array:
+        full = section.thickness * (matrix @ values.ravel())
+        return full[space.free]
+
+    return integrate
+
+
+def _prescribed_load(space: FemSpace, full: tuple[Any, Any, Any]) -> Callable[[float], Array]:
+    """-Pᵀ(K U + C U' + M U'')."""
+    matrices = [None if mat is None else PetscMatrix(mat) for mat in full]
+
+    def load(t: float) -> Array:
+        pull = np.zeros(len(space.ids))
+        for derivative, matrix in enumerate(matrices):
+            if matrix is not None:
+                pull -= (matrix @ space.prescribed_values(t, derivative))[space.free]
+        return pull
+
+    return load
+
+
+def _initial(space: FemSpace, name: str, value: Initial) -> Array:
+    """Initial values on the free unknowns."""
+    if value is None:
+        return np.zeros(len(space.ids))
+    field = (lambda points, t: value(points)) if callable(value) else value
+    return space.restrict(evaluate(name, field, space.points, 0.0))
+
+
+def floats(space: FemSpace) -> bool:
+    """Whether a rigid motion of the whole body leaves every prescribed component at rest.
+
+    The Gram matrix of the rigid modes on the prescribed components is singular exactly then (scaled by the body's size).
+    """
+    d = space.dimension
+    middle = space.comm.sum(np.append(space.points.sum(axis=0), len(space.points)))
+    x = (space.points - middle[:d] / middle[d]) / space.size
+    modes = [np.tile(np.eye(d)[i], (len(x), 1)) for i in range(d)]
+    for i in range(d):
+        for j in range(i + 1, d):
+            turn = np.zeros_like(x)
+            turn[:, i], turn[:, j] = -x[:, j], x[:, i]
+            modes.append(turn)
+    rows = np.column_stack([mode.ravel()[~space.free] for mode in modes])
+    gram = space.comm.sum(rows.T @ rows)
+    values = np.linalg.eigvalsh(gram)
+    return bool(values[0] <= 1e-10 * max(values[-1], np.finfo(float).tiny))

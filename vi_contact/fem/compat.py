@@ -1,0 +1,151 @@
+"""DOLFINx differs from version to version; every difference this package meets is settled here and nowhere else.
+
+Supported: 0.5 (Debian 12), 0.9 (Debian 13) and 0.11. The rest of `fem` calls these functions and never looks at the version.
+What changed, by version: UFL elements became Basix elements and function spaces take tuples (0.7), dofmaps became
+two-dimensional arrays and the ghost mode moved into the partitioner (0.6-0.7), `create_mesh` swapped two arguments (0.10), the
+partitioner counts cells per facet and the geometry has one dofmap per cell type (0.11).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import dolfinx
+import numpy as np
+import numpy.typing as npt
+import ufl
+from dolfinx import fem
+from dolfinx.fem import petsc as fem_petsc
+from dolfinx.mesh import GhostMode, Mesh, create_cell_partitioner, meshtags
+from mpi4py import MPI
+from petsc4py import PETSc
+
+Indices = npt.NDArray[np.int32]
+
+VERSION: tuple[int, ...] = tuple(int(part) for part in dolfinx.__version__.split(".")[:2])
+"""DOLFINx's (major, minor)."""
+
+_BASIX_ELEMENTS = VERSION >= (0, 7)
+_COUNTED_FACETS = VERSION >= (0, 10)
+_DOFMAP_PER_CELL_TYPE = VERSION >= (0, 11)
+
+
+# Meshes ---------------------------------------------------------------------------------------------------------------
+
+def create_mesh(comm: MPI.Comm, cell: str, cells: npt.NDArray[np.int64], x: npt.NDArray[np.float64]) -> Mesh:
+    """A first-order mesh, distributed by the default graph partitioner (fixed seed), ghosted over shared facets.
+
+    `cell` is a UFL name ("interval", "triangle", "quadrilateral", "tetrahedron", "hexahedron"), `cells` (n_cells, n_vertices)
+    holds 0-based rows of the input points in DOLFINx's (tensor-product) vertex order, `x` (n_points, gdim) the points [m].
+    A rank without input passes arrays of the right width and no rows. Collective.
+    """
+    gdim = x.shape[1]
+    if _BASIX_ELEMENTS:
+        import basix.ufl
+
+        partitioner = create_cell_partitioner(*((GhostMode.shared_facet, 2) if _COUNTED_FACETS else (GhostMode.shared_facet,)))
+        domain = ufl.Mesh(basix.ufl.element("Lagrange", cell, 1, shape=(gdim,)))
+        return dolfinx.mesh.create_mesh(comm, cells=cells, x=x, e=domain, partitioner=partitioner)
+    domain = ufl.Mesh(ufl.VectorElement("Lagrange", ufl.Cell(cell, geometric_dimension=gdim), 1))
+    return dolfinx.mesh.create_mesh(comm, cells, x, domain, ghost_mode=GhostMode.shared_facet)
+
+
+def geometry_dofmap(mesh: Mesh) -> Indices:
+    """Local geometry nodes of each local cell (owned, then ghosts), (n_cells, n_vertices)."""
+    if _DOFMAP_PER_CELL_TYPE:
+        return mesh.geometry.dofmaps[0]
+    return _as_table(mesh.geometry.dofmap)
+
+
+def entities_to_geometry(mesh: Mesh, dim: int, entities: Indices) -> Indices:
+    """Local geometry nodes of each given mesh entity, (n_entities, n_vertices). Builds what connectivity it needs: collective."""
+    tdim = mesh.topology.dim
+    mesh.topology.create_entities(dim)
+    mesh.topology.create_connectivity(dim, tdim)
+    mesh.topology.create_connectivity(tdim, dim)
+    if _BASIX_ELEMENTS:
+        return dolfinx.mesh.entities_to_geometry(mesh, dim, entities)
+    return dolfinx.cpp.mesh.entities_to_geometry(mesh._mesh, dim, entities, False)
+
+
+def measure(mesh: Mesh, dim: int, indices: Indices) -> ufl.Measure:
+    """The measure dx (dim = topological dimension) or ds (one less) restricted to sorted local entities; ds ignores inner facets."""
+    kind = "dx" if dim == mesh.topology.dim else "ds"
+    tags = meshtags(mesh, dim, np.asarray(indices, dtype=np.int32), np.ones(len(indices), dtype=np.int32))
+    return ufl.Measure(kind, domain=mesh, subdomain_data=tags)(1)
+
+
+# Function spaces ------------------------------------------------------------------------------------------------------
+
+def scalar_space(mesh: Mesh) -> Any:
+    """Continuous P1 or Q1 functions on the mesh."""
+    return fem.functionspace(mesh, ("Lagrange", 1)) if _BASIX_ELEMENTS else fem.FunctionSpace(mesh, ("Lagrange", 1))
+
+
+def vector_space(mesh: Mesh) -> Any:
+    """Continuous P1 or Q1 vector fields with as many components as the mesh has coordinates; the block size is gdim."""
+    if _BASIX_ELEMENTS:
+        return fem.functionspace(mesh, ("Lagrange", 1, (mesh.geometry.dim,)))
+    return fem.VectorFunctionSpace(mesh, ("Lagrange", 1))
+
+
+def dof_to_node(space: Any) -> Indices:
+    """Local geometry node of each local block of unknowns (owned, then ghosts) of a P1/Q1 space, (n_blocks,).
+
+    Unknown c of block i (index bs*i + c, P16) is component c at the point `mesh.geometry.x[dof_to_node(space)[i]]`.
+    """
+    index_map = space.dofmap.index_map
+    nodes = np.full(index_map.size_local + index_map.num_ghosts, -1, dtype=np.int32)
+    nodes[_as_table(space.dofmap.list)] = geometry_dofmap(space.mesh)
+    return nodes
+
+
+def _as_table(connections: Any) -> Indices:
+    """A list of equally long rows as a two-dimensional array: an AdjacencyList up to 0.6, an array already since."""
+    if isinstance(connections, np.ndarray):
+        return connections
+    return connections.array.reshape(connections.num_nodes, -1)
+
+
+# Assembly -------------------------------------------------------------------------------------------------------------
+
+def compile_form(ufl_form: ufl.Form) -> Any:
+    """Generate, compile and load the code of a variational form; collective, cached on disk by its signature."""
+    return fem.form(ufl_form)
+
+
+def assemble_scalar(form: Any, comm: MPI.Comm) -> float:
+    """Value of a compiled functional, summed over all ranks of `comm`."""
+    return float(comm.allreduce(fem.assemble_scalar(form), op=MPI.SUM))
+
+
+def assemble_matrix(form: Any) -> PETSc.Mat:
+    """Matrix of a compiled bilinear form, without boundary conditions, ready to use."""
+    matrix = fem_petsc.assemble_matrix(form)
+    matrix.assemble()
+    return matrix
+
+
+def assemble_vector(form: Any) -> PETSc.Vec:
+    """Vector of a compiled linear form with the contributions of all ranks added on the owner; ghost entries are left stale."""
+    vector = fem_petsc.assemble_vector(form)
+    vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+    return vector
+
+
+def cell_space(mesh: Mesh) -> Any:
+    """Functions that are constant on every cell."""
+    return fem.functionspace(mesh, ("DG", 0)) if _BASIX_ELEMENTS else fem.FunctionSpace(mesh, ("DG", 0))
+
+
+def function(space: Any) -> Any:
+    """A zero finite element function."""
+    return fem.Function(space)
+
+
+def facet_dofs(space: Any, facets: Indices) -> Indices:
+    """Local blocks of unknowns on the facets, found on every rank that owns or ghosts them; collective."""
+    mesh = space.mesh
+    tdim = mesh.topology.dim
+    mesh.topology.create_connectivity(tdim - 1, tdim)
+    return fem.locate_dofs_topological(space, tdim - 1, np.asarray(facets, dtype=np.int32))

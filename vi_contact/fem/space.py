@@ -1,0 +1,146 @@
+"""What the unknowns of a finite element system mean: nodes, free and prescribed components, points and output."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from petsc4py import PETSc
+
+from ..algebra import Array, Indices, Mask
+from ..errors import InputError
+from . import compat
+from .loads import Prescribed, evaluate
+from .mesh import node_numbers
+from .petsc_algebra import MpiComm
+
+
+class FemSpace:
+    """Nodal unknowns of a P1/Q1 displacement space, with the prescribed ones eliminated.
+
+    "Full" vectors hold every owned component (bs*i + c, P16); "free" vectors only those the equations solve for.
+
+    Attributes:
+        V: the DOLFINx function space; dimension d; free: (owned full,) mask of free components.
+        nodes: original node numbers of the owned blocks; points: their coordinates (k, d).
+        ids: rank-independent numbers of the free unknowns (node * d + component).
+        unknowns: number of free unknowns on all ranks.
+        selection: P with u_full = P u_free + prescribed.
+    """
+
+    def __init__(self, mesh: Any, prescribed: tuple[Prescribed, ...]) -> None:
+        self.mesh = mesh
+        self.V = compat.vector_space(mesh)
+        self.comm = MpiComm(mesh.comm)
+        self.dimension: int = mesh.geometry.dim
+        owned = self.V.dofmap.index_map.size_local
+        geometry_nodes = compat.dof_to_node(self.V)
+        self.all_nodes: Indices = node_numbers(mesh)[geometry_nodes].astype(np.int64)
+        self.all_points: Array = mesh.geometry.x[geometry_nodes][:, : self.dimension]
+        self.nodes = self.all_nodes[:owned]
+        self.points = self.all_points[:owned]
+        self.size = self._size()
+        self.prescribed = prescribed
+        self.held = np.zeros((owned, self.dimension), dtype=bool)
+        for condition in prescribed:
+            self.held[np.ix_(self.facet_blocks(condition.facets.indices), self._components(condition))] = True
+        self.free: Mask = ~self.held.ravel()
+        ids = self.nodes[:, None] * self.dimension + np.arange(self.dimension)
+        self.ids: Indices = ids.ravel()[self.free]
+        self.unknowns = int(self.comm.sum(np.array([float(self.free.sum())]))[0])
+        self.free_index: Indices = np.where(self.free, np.cumsum(self.free) - 1, -1)
+        self.selection = self._selection()
+        self.forms: Any = None  # the ElasticForms of the system made on it; stress output needs them
+
+    def _size(self) -> float:
+        """Diagonal of the bounding box [m], the length that tolerances are relative to."""
+        low = -self.comm.max(-np.min(self.points, axis=0, initial=np.inf))
+        high = self.comm.max(np.max(self.points, axis=0, initial=-np.inf))
+        return float(np.linalg.norm(high - low))
+
+    def _components(self, condition: Prescribed) -> list[int]:
+        components = range(self.dimension) if condition.components is None else condition.components
+        for c in components:
+            if not 0 <= c < self.dimension:
+                raise InputError(f"prescribed component {c} does not exist: give numbers from 0 to {self.dimension - 1}")
+        return list(components)
+
+    def facet_blocks(self, facets: Any) -> Indices:
+        """Owned blocks (nodes) on the facets, wherever the facets are owned."""
+        blocks = compat.facet_dofs(self.V, facets)
+        return np.asarray(blocks[blocks < len(self.nodes)], dtype=np.int64)
+
+    def _selection(self) -> Any:
+        """P as a PETSc matrix: one 1 per free component."""
+        rows, columns = len(self.free), int(self.free.sum())
+        P = PETSc.Mat().createAIJ(((rows, None), (columns, None)), nnz=1, comm=self.mesh.comm)
+        P.setUp()
+        row0, column0 = P.getOwnershipRange()[0], P.getOwnershipRangeColumn()[0]
+        for column, row in enumerate(np.flatnonzero(self.free)):
+            P.setValue(row0 + row, column0 + column, 1.0)
+        P.assemble()
+        return P
+
+    # Vectors ---------------------------------------------------------------------------------------------------------
+
+    def prescribed_values(self, t: float, derivative: int = 0) -> Array:
+        """Full owned vector of U(x, t) or its time derivative; zero on free components."""
+        values = np.zeros((len(self.nodes), self.dimension))
+        for condition in self.prescribed:
+            if condition.moves:
+                blocks = self.facet_blocks(condition.facets.indices)
+                name = f"prescribed motion on '{condition.facets.name}'"
+                motion = evaluate(name, condition.motions[derivative], self.points[blocks], t)
+                for c in self._components(condition):
+                    values[blocks, c] = motion[:, c]
+        return values.ravel()
+
+    def expand(self, u: Array, t: float, derivative: int = 0) -> Array:
+        """Free vector -> nodal values (owned nodes, d), prescribed components included."""
+        full = self.prescribed_values(t, derivative)
+        full[self.free] = u
+        return full.reshape(-1, self.dimension)
+
+    def restrict(self, full: Array) -> Array:
+        """Nodal values (owned nodes, d) -> free vector."""
+        return full.ravel()[self.free]
+
+    # Points ----------------------------------------------------------------------------------------------------------
+
+    def find_nodes(self, points: Array) -> Indices:
+        """Original numbers of the nodes nearest to the points (k, d), equal on all ranks.
+
+        InputError for a point farther from every node than the body is large (5 % of its diagonal).
+        """
+        found = np.empty(len(points), dtype=np.int64)
+        for i, point in enumerate(np.atleast_2d(np.asarray(points, dtype=float))):
+            if point.shape != (self.dimension,):
+                raise InputError(f"point {tuple(point)} has {len(point)} coordinates: give {self.dimension}")
+            distance = np.linalg.norm(self.points - point, axis=1)
+            nearest = -float(self.comm.max(np.array([-np.min(distance, initial=np.inf)]))[0])
+            if nearest > 0.05 * self.size:
+                raise InputError(
+                    f"point ({', '.join(f'{x:g}' for x in point)}) is {nearest:.3g} m away from the nearest node: "
+                    "give a point of the body"
+                )
+            close = self.nodes[distance <= nearest + 1e-9 * self.size]
+            found[i] = -int(self.comm.max(np.array([-float(np.min(close, initial=np.iinfo(np.int64).max))]))[0])
+        return found
+
+    def sample(self, u: Array, nodes: Indices, t: float, derivative: int = 0) -> Array:
+        """Nodal values (k, d) at original node numbers, equal on all ranks."""
+        values = np.zeros((len(nodes), self.dimension))
+        where = self._where(nodes)
+        mine = where >= 0
+        values[mine] = self.expand(u, t, derivative)[where[mine]]
+        return self.comm.sum(values)
+
+    def _where(self, nodes: Indices) -> Indices:
+        """Owned block of each original node number, -1 when another rank owns it."""
+        order = np.argsort(self.nodes)
+        place = np.searchsorted(self.nodes[order], nodes)
+        place = np.minimum(place, max(len(order) - 1, 0))
+        if len(order) == 0:
+            return np.full(len(nodes), -1)
+        blocks = order[place]
+        return np.where(self.nodes[blocks] == nodes, blocks, -1)
