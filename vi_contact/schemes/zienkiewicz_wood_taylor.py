@@ -54,11 +54,11 @@ class ZienkiewiczWoodTaylor:
         return problem.equations.load(state.t + self.phi * dt)
 
     def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem:
-        """b = f/phi + M (u0 + phi dt v0)/(phi dt)² + C u0/(phi dt) - (1 - phi)/phi K u0."""
+        """b = f/phi + M (u0 + dt v0)/(phi dt)² + C u0/(phi dt) - (1 - phi)/phi K u0."""
         system = problem.equations
         phi = self.phi
         b = self._load(problem, state, dt) / phi
-        b += (system.M @ (state.u + phi * dt * state.v)) / (phi * dt) ** 2
+        b += (system.M @ (state.u + dt * state.v)) / (phi * dt) ** 2
         b -= (1.0 - phi) / phi * (system.K @ state.u)
         if system.C is not None:
             b += system.C @ (state.u / (phi * dt))
