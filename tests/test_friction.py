@@ -1,0 +1,68 @@
+"""Friction limits and the projection onto the friction disk."""
+
+import math
+
+import numpy as np
+import pytest
+
+from vi_contact.errors import InputError
+from vi_contact.friction import Coulomb, Frictionless, Tresca, project
+
+pytestmark = pytest.mark.serial
+
+R_N = np.array([0.0, 2.0, -1e-9, 5.0])
+WEIGHTS = np.array([0.5, 1.0, 1.0, 0.5])
+
+
+def test_frictionless_limit_is_zero():
+    assert np.array_equal(Frictionless().limit(R_N, WEIGHTS, 1.0), np.zeros(4))
+
+
+def test_tresca_limit_is_stress_times_weight_times_scale_whatever_the_pressure():
+    assert np.array_equal(Tresca(100.0).limit(R_N, WEIGHTS, 1.0), [50.0, 100.0, 100.0, 50.0])
+    assert np.array_equal(Tresca(100.0).limit(R_N, WEIGHTS, 0.25), [12.5, 25.0, 25.0, 12.5])
+
+
+def test_coulomb_limit_follows_the_reaction_and_needs_no_scale():
+    for scale in (1.0, 1e-3):
+        assert np.array_equal(Coulomb(0.5).limit(R_N, WEIGHTS, scale), [0.0, 1.0, 0.0, 2.5])
+
+
+@pytest.mark.parametrize("law", [Tresca, Coulomb])
+@pytest.mark.parametrize("value", [-0.1, math.nan, math.inf, "0.3"])
+def test_bad_coefficient_is_refused(law, value):
+    with pytest.raises(InputError, match="give zero or a positive finite number"):
+        law(value)
+
+
+def test_projection_in_two_dimensions_is_clipping():
+    r_t, limit = np.array([[3.0], [-3.0], [0.5], [0.0]]), np.array([1.0, 2.0, 1.0, 0.0])
+    assert np.array_equal(project(r_t, limit), [[1.0], [-2.0], [0.5], [0.0]])
+
+
+def test_projection_in_three_dimensions_keeps_the_direction():
+    r_t, limit = np.array([[3.0, 4.0], [3.0, -4.0], [0.3, 0.4], [1.0, 1.0]]), np.array([10.0, 2.5, 0.0, math.inf])
+    assert np.array_equal(project(r_t, limit), [[3.0, 4.0], [1.5, -2.0], [0.0, 0.0], [1.0, 1.0]])
+
+
+def test_projection_is_the_nearest_point_of_the_disk():
+    """Its variational inequality: (r - p)·(q - p) <= 0 for every q of the disk."""
+    rng = np.random.default_rng(0)
+    r_t, q = rng.normal(size=(200, 2)), rng.normal(size=(200, 2))
+    limit = rng.uniform(0.1, 1.0, 200)
+    p, q = project(r_t, limit), project(q, limit)
+    assert np.all(np.linalg.norm(p, axis=1) <= limit * (1.0 + 1e-15 * 4))
+    assert np.max(np.sum((r_t - p) * (q - p), axis=1)) <= 1e-14
+
+
+def test_projection_leaves_its_argument_alone():
+    r_t = np.array([[3.0]])
+    project(r_t, np.array([1.0]))
+    assert r_t[0, 0] == 3.0
+
+
+@pytest.mark.parametrize("r_t, limit", [(np.zeros(3), np.zeros(3)), (np.zeros((3, 1)), np.zeros(2)),
+                                        (np.zeros((3, 1)), np.zeros((3, 1)))])
+def test_shapes_that_do_not_match_are_refused(r_t, limit):
+    with pytest.raises(InputError, match="one limit per node"):
+        project(r_t, limit)

@@ -1,0 +1,232 @@
+"""What a body is made of: isotropic elasticity, the section it is cut to, and the damping of its motion.
+
+Everything here is a frozen value checked when it is built; SI units throughout; no finite element is needed.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from numbers import Real
+from typing import ClassVar, Protocol
+
+from .errors import InputError
+
+
+def _number(owner: str, meaning: str, value: float) -> None:
+    """Raise InputError unless `value` is a finite real number (not NaN, not infinite, not text)."""
+    if not isinstance(value, Real) or not math.isfinite(value):
+        raise InputError(f"{owner}: {meaning} is {value!r}; give a finite number")
+
+
+def _positive(owner: str, meaning: str, value: float) -> None:
+    _number(owner, meaning, value)
+    if value <= 0:
+        raise InputError(f"{owner}: {meaning} is {value!r}; give a number above zero")
+
+
+def _not_negative(owner: str, meaning: str, value: float) -> None:
+    _number(owner, meaning, value)
+    if value < 0:
+        raise InputError(f"{owner}: {meaning} is {value!r}; give zero or a positive number")
+
+
+@dataclass(frozen=True)
+class LinearElastic:
+    """Isotropic elasticity, sigma = lame_lambda tr(eps) I + 2 shear_modulus eps (seed 000 eq. 9, isotropic case).
+
+    E: Young's modulus [Pa] > 0; nu: Poisson's ratio, -1 < nu < 1/2; rho: mass density [kg/m³] > 0.
+    Raises InputError when one of them is outside its range or not finite.
+    """
+
+    E: float
+    nu: float
+    rho: float
+
+    def __post_init__(self) -> None:
+        _positive("LinearElastic", "Young's modulus E [Pa]", self.E)
+        _number("LinearElastic", "Poisson's ratio nu", self.nu)
+        _positive("LinearElastic", "the mass density rho [kg/m³]", self.rho)
+        if not -1.0 < self.nu < 0.5:
+            raise InputError(f"LinearElastic: Poisson's ratio nu is {self.nu!r}; give a number between -1 and 0.5, "
+                             "both excluded (nearly incompressible materials need a mixed method)")
+
+    @classmethod
+    def from_wave_speeds(cls, c_p: float, c_s: float, rho: float) -> LinearElastic:
+        """The material whose pressure and shear waves travel at c_p and c_s [m/s] (verification.md section 7).
+
+        nu = (c_p² - 2 c_s²) / (2 (c_p² - c_s²)), shear_modulus = rho c_s², E = 2 shear_modulus (1 + nu).
+        Raises InputError unless c_p > sqrt(4/3) c_s > 0, which is nu > -1.
+        """
+        _positive("LinearElastic.from_wave_speeds", "c_p [m/s]", c_p)
+        _positive("LinearElastic.from_wave_speeds", "c_s [m/s]", c_s)
+        if 3.0 * c_p**2 <= 4.0 * c_s**2:
+            raise InputError(f"LinearElastic.from_wave_speeds: c_p = {c_p!r} is too slow for c_s = {c_s!r}; "
+                             "an elastic solid needs c_p > sqrt(4/3) c_s")
+        nu = (c_p**2 - 2.0 * c_s**2) / (2.0 * (c_p**2 - c_s**2))
+        return cls(E=2.0 * rho * c_s**2 * (1.0 + nu), nu=nu, rho=rho)
+
+    @property
+    def lame_lambda(self) -> float:
+        """First Lamé constant E nu / ((1 + nu)(1 - 2 nu)) [Pa]."""
+        return self.E * self.nu / ((1.0 + self.nu) * (1.0 - 2.0 * self.nu))
+
+    @property
+    def shear_modulus(self) -> float:
+        """Second Lamé constant E / (2 (1 + nu)) [Pa]; never called mu here, mu is friction."""
+        return self.E / (2.0 * (1.0 + self.nu))
+
+    @property
+    def c_p(self) -> float:
+        """Pressure wave speed sqrt((lame_lambda + 2 shear_modulus) / rho) [m/s] in a solid or in plane strain."""
+        return math.sqrt((self.lame_lambda + 2.0 * self.shear_modulus) / self.rho)
+
+    @property
+    def c_s(self) -> float:
+        """Shear wave speed sqrt(shear_modulus / rho) [m/s]."""
+        return math.sqrt(self.shear_modulus / self.rho)
+
+    @property
+    def c_p_plane_stress(self) -> float:
+        """Pressure wave speed in a thin plate, sqrt(E / (rho (1 - nu²))) [m/s]."""
+        return math.sqrt(self.E / (self.rho * (1.0 - self.nu**2)))
+
+    @property
+    def c_bar(self) -> float:
+        """Wave speed in a thin bar, sqrt(E / rho) [m/s]."""
+        return math.sqrt(self.E / self.rho)
+
+
+class Section(Protocol):
+    """How the body is cut out of space: integrals over the mesh are multiplied by `thickness` [m] (1 for a solid)."""
+
+    @property
+    def thickness(self) -> float: ...
+
+    def elastic_constants(self, material: LinearElastic) -> tuple[float, float]:
+        """(lambda_eff, shear_modulus) [Pa] of sigma = lambda_eff tr(eps) I + 2 shear_modulus eps, in plane."""
+        ...
+
+
+@dataclass(frozen=True)
+class PlaneStress:
+    """A thin panel of the given thickness [m], free of stress across it: lambda_eff = 2 lambda mu / (lambda + 2 mu)."""
+
+    thickness: float = 1.0
+
+    def __post_init__(self) -> None:
+        _positive("PlaneStress", "the thickness [m]", self.thickness)
+
+    def elastic_constants(self, material: LinearElastic) -> tuple[float, float]:
+        """(lambda_eff, shear_modulus) [Pa]; equal to (E nu / (1 - nu²), E / (2 (1 + nu)))."""
+        lame, shear = material.lame_lambda, material.shear_modulus
+        return 2.0 * lame * shear / (lame + 2.0 * shear), shear
+
+
+@dataclass(frozen=True)
+class PlaneStrain:
+    """A slice of the given thickness [m] of a long body that cannot strain along its axis: lambda_eff = lambda."""
+
+    thickness: float = 1.0
+
+    def __post_init__(self) -> None:
+        _positive("PlaneStrain", "the thickness [m]", self.thickness)
+
+    def elastic_constants(self, material: LinearElastic) -> tuple[float, float]:
+        """(lame_lambda, shear_modulus) [Pa]."""
+        return material.lame_lambda, material.shear_modulus
+
+
+@dataclass(frozen=True)
+class Solid:
+    """A three-dimensional body: lambda_eff = lambda, nothing to multiply integrals by."""
+
+    thickness: ClassVar[float] = 1.0
+
+    def elastic_constants(self, material: LinearElastic) -> tuple[float, float]:
+        """(lame_lambda, shear_modulus) [Pa]."""
+        return material.lame_lambda, material.shear_modulus
+
+
+class Damping(Protocol):
+    """Viscous damping built from the mass and stiffness of one material: C = alpha M + beta K."""
+
+    def coefficients(self, material: LinearElastic) -> tuple[float, float]:
+        """(alpha [1/s], beta [s]) of C = alpha M + beta K on the part of the body made of `material`."""
+        ...
+
+
+@dataclass(frozen=True)
+class NoDamping:
+    """C = 0, as in both examples of seed 000."""
+
+    def coefficients(self, material: LinearElastic) -> tuple[float, float]:
+        """(0, 0)."""
+        return 0.0, 0.0
+
+
+@dataclass(frozen=True)
+class MassProportional:
+    """Damping force c u' per unit volume, rho u'' + c u' = div sigma + f (seed 000 eq. 7); c in [kg/(m³ s)] >= 0."""
+
+    c: float
+
+    def __post_init__(self) -> None:
+        _not_negative("MassProportional", "the damping coefficient c [kg/(m³ s)]", self.c)
+
+    def coefficients(self, material: LinearElastic) -> tuple[float, float]:
+        """(c / rho, 0): integrating c against the shape functions is c / rho times the consistent mass."""
+        return self.c / material.rho, 0.0
+
+
+@dataclass(frozen=True)
+class Rayleigh:
+    """C = alpha M + beta K; alpha [1/s] >= 0, beta [s] >= 0, K the stiffness without any contact term.
+
+    Once a body lifts off, alpha M also resists its rigid rocking, which nothing physical does: with uplift prefer
+    alpha = 0 (seismic.md 2.4). Raises InputError for a negative or non-finite coefficient.
+    """
+
+    alpha: float
+    beta: float
+
+    def __post_init__(self) -> None:
+        _not_negative("Rayleigh", "the mass coefficient alpha [1/s]", self.alpha)
+        _not_negative("Rayleigh", "the stiffness coefficient beta [s]", self.beta)
+
+    @classmethod
+    def from_frequencies(cls, f1: float, f2: float, *, xi1: float, xi2: float) -> Rayleigh:
+        """Damping ratio xi1 at f1 and xi2 at f2 [Hz]: solves alpha / (2 w_i) + beta w_i / 2 = xi_i with w_i = 2 pi f_i.
+
+        alpha = 2 w1 w2 (w2 xi1 - w1 xi2) / (w2² - w1²), beta = 2 (w2 xi2 - w1 xi1) / (w2² - w1²); for equal ratios xi
+        alpha = 2 xi w1 w2 / (w1 + w2) and beta = 2 xi / (w1 + w2). 5 % at 1 and 10 Hz: 0.5712 1/s and 1.4469e-3 s
+        (seismic.md 2.4). Raises InputError when f1 = f2 or when the solution needs a negative coefficient.
+        """
+        for name, f in (("f1", f1), ("f2", f2)):
+            _positive("Rayleigh.from_frequencies", f"the frequency {name} [Hz]", f)
+        for name, xi in (("xi1", xi1), ("xi2", xi2)):
+            _not_negative("Rayleigh.from_frequencies", f"the damping ratio {name}", xi)
+        if f1 == f2:
+            raise InputError(f"Rayleigh.from_frequencies: f1 and f2 are both {f1!r} Hz; give two frequencies")
+        w1, w2 = 2.0 * math.pi * min(f1, f2), 2.0 * math.pi * max(f1, f2)
+        low, high = (xi1, xi2) if f1 < f2 else (xi2, xi1)
+        mass, stiffness = w2 * low - w1 * high, w2 * high - w1 * low
+        round_off = 1e-12 * (w1 + w2) * (low + high)
+        if min(mass, stiffness) < -round_off:
+            raise InputError(f"Rayleigh.from_frequencies: ratios {xi1!r} at {f1!r} Hz and {xi2!r} at {f2!r} Hz would "
+                             "need a negative coefficient; keep xi2/xi1 between f1/f2 and f2/f1")
+        factor = 2.0 / (w2**2 - w1**2)
+        return cls(alpha=factor * w1 * w2 * max(mass, 0.0), beta=factor * max(stiffness, 0.0))
+
+    def coefficients(self, material: LinearElastic) -> tuple[float, float]:
+        """(alpha, beta), whatever the material."""
+        return self.alpha, self.beta
+
+    def ratio(self, f: float) -> float:
+        """Damping ratio alpha / (2 w) + beta w / 2 of a mode of frequency f = w / 2 pi [Hz] > 0.
+
+        Smallest at w = sqrt(alpha / beta), where it is sqrt(alpha beta).
+        """
+        _positive("Rayleigh.ratio", "the frequency f [Hz]", f)
+        w = 2.0 * math.pi * f
+        return 0.5 * (self.alpha / w + self.beta * w)
