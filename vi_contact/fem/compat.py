@@ -54,7 +54,7 @@ def geometry_dofmap(mesh: Mesh) -> Indices:
     """Local geometry nodes of each local cell (owned, then ghosts), (n_cells, n_vertices)."""
     if _DOFMAP_PER_CELL_TYPE:
         return mesh.geometry.dofmaps[0]
-    return _as_table(mesh.geometry.dofmap)
+    return _as_table(mesh.geometry.dofmap, mesh)
 
 
 def entities_to_geometry(mesh: Mesh, dim: int, entities: Indices) -> Indices:
@@ -96,15 +96,15 @@ def dof_to_node(space: Any) -> Indices:
     """
     index_map = space.dofmap.index_map
     nodes = np.full(index_map.size_local + index_map.num_ghosts, -1, dtype=np.int32)
-    nodes[_as_table(space.dofmap.list)] = geometry_dofmap(space.mesh)
+    nodes[_as_table(space.dofmap.list, space.mesh)] = geometry_dofmap(space.mesh)
     return nodes
 
 
-def _as_table(connections: Any) -> Indices:
-    """A list of equally long rows as a two-dimensional array: an AdjacencyList up to 0.6, an array already since."""
-    if isinstance(connections, np.ndarray):
-        return connections
-    return connections.array.reshape(connections.num_nodes, -1)
+def _as_table(rows: Any, mesh: Mesh) -> Indices:
+    """First-order cell rows as a two-dimensional array: an AdjacencyList up to 0.5, an array already since. A rank may have none."""
+    if isinstance(rows, np.ndarray):
+        return rows
+    return rows.array.reshape(-1, dolfinx.cpp.mesh.cell_num_vertices(mesh.topology.cell_type))
 
 
 # Assembly -------------------------------------------------------------------------------------------------------------
