@@ -1,0 +1,127 @@
+"""The primal-dual active set: warm starts, memory of the last factor, and problems on which the plain method cycles."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from reference_lcp import KINDS, degenerate, enumerate_lcp, generic, problems, spd
+
+from vi_contact.errors import StepFailure
+from vi_contact.solvers import active_set
+from vi_contact.solvers.active_set import ActiveSet
+from vi_contact.solvers.lcp import LCP
+
+pytestmark = pytest.mark.serial
+
+
+def full_exchange(G: np.ndarray, q: np.ndarray, active: np.ndarray, steps: int) -> list[tuple[bool, ...]]:
+    """The plain method, as in the papers: the sets it visits until it stops."""
+    sets = [tuple(active.tolist())]
+    for _ in range(steps):
+        r = np.zeros(q.size)
+        r[active] = -np.linalg.solve(G[np.ix_(active, active)], q[active])
+        active = np.where(active, r > 0.0, q + G @ r < 0.0)
+        if tuple(active.tolist()) == sets[-1]:
+            break
+        sets.append(tuple(active.tolist()))
+    return sets
+
+
+CYCLING = np.array([[4.0, 5.0, -5.0], [5.0, 9.0, -5.0], [-5.0, -5.0, 7.0]])
+
+
+@pytest.mark.parametrize("q", [(2.0, 1.0, -3.0), (-2.0, -1.0, 3.0), (2.0, 0.0, -3.0)])
+def test_a_cycle_of_the_plain_method_is_broken(q):
+    """SPD, m = 3 (the least order with cycles; Ben Gharbia and Gilbert 2012 have unsymmetric P-matrices)."""
+    q = np.array(q)
+    assert np.linalg.eigvalsh(CYCLING)[0] > 0.03
+    visited = full_exchange(CYCLING, q, q < 0.0, 30)
+    assert len(visited) == 31 and len(set(visited)) <= 3  # it goes round for ever
+    unilateral = np.zeros(3, dtype=bool)
+    exact = enumerate_lcp(CYCLING, q, unilateral)
+    for bits in range(8):
+        guess = np.array([bool(bits & 1), bool(bits & 2), bool(bits & 4)])
+        result = ActiveSet().solve(LCP(CYCLING, q, unilateral), guess=guess)
+        assert result.r == pytest.approx(exact, abs=1e-12)
+        assert result.iterations <= 3 + 8  # once round the cycle, and the fallback visits no set twice
+    assert 1.0 in ActiveSet().solve(LCP(CYCLING, q, unilateral)).history  # the fallback moved a single row
+
+
+def test_many_cycling_blocks_at_once():
+    """Ten cycling problems side by side, weakly coupled: no set of full exchange solves them together."""
+    rng = np.random.default_rng(4)
+    G = np.kron(np.eye(10), CYCLING) + 1e-4 * spd(rng, 30)
+    q = np.tile([2.0, 1.0, -3.0], 10)
+    assert len(set(full_exchange(G, q, q < 0.0, 200))) < 20
+    result = ActiveSet().solve(LCP(G, q, np.zeros(30, dtype=bool)))
+    assert result.residual <= 1e-13
+
+
+def test_the_exponential_example_of_murtys_rule_is_not_exponential():
+    """Fathi (1979): M = L Lᵀ with ones on and twos below the diagonal, q = -1; Murty's rule alone takes 2^m pivots."""
+    for m in (8, 16, 24):
+        L = np.eye(m) + 2.0 * np.tril(np.ones((m, m)), -1)
+        result = ActiveSet().solve(LCP(L @ L.T, -np.ones(m), np.zeros(m, dtype=bool)))
+        exact = np.eye(m)[0]
+        assert np.abs(result.r - exact).max() <= 1e-12
+        assert result.iterations <= 4 * m
+
+
+@pytest.mark.parametrize("kind", range(len(KINDS)), ids=[kind.__name__ for kind in KINDS])
+def test_a_warm_start_at_the_solution_costs_no_iteration(kind):
+    for problem in problems(kind):
+        cold = ActiveSet().solve(problem)
+        for guess in (cold.active, cold.r):
+            warm = ActiveSet().solve(problem, guess=guess)
+            assert warm.iterations == 0 and warm.history == ()
+            assert np.abs(warm.r - cold.r).max() <= 1e-13 * np.abs(cold.r).max()
+
+
+def test_iterations_count_changes_of_the_set_and_history_the_rows():
+    """G = I: the rows with q < 0 are active, so that a guess off by two rows is mended in one change."""
+    problem = LCP(np.eye(4), np.array([-1.0, -2.0, 3.0, 4.0]), np.zeros(4, dtype=bool))
+    result = ActiveSet().solve(problem, guess=np.array([True, False, True, False]))
+    assert result.iterations == 1 and result.history == (2.0,)
+    assert result.r.tolist() == [1.0, 2.0, 0.0, 0.0]
+
+
+def test_the_same_set_is_not_factored_twice(monkeypatch):
+    """Prepared once, marching with an unchanged set: triangular solves only."""
+    calls, original = [], active_set.cholesky
+    monkeypatch.setattr(active_set, "cholesky", lambda G: calls.append(G.shape[0]) or original(G))
+    rng = np.random.default_rng(9)
+    problem = generic(rng, 12)
+    prepared = ActiveSet().prepare(problem.G, problem.bilateral)
+    first = prepared.solve(problem.q)
+    count = len(calls)
+    for factor in (1.0, 1.5, 3.0):
+        again = prepared.solve(factor * problem.q, first.active)
+        assert np.abs(again.r - factor * first.r).max() <= 1e-13 * np.abs(again.r).max()
+    assert len(calls) == count
+    prepared.solve(-problem.q)
+    assert len(calls) > count
+
+
+def test_grazing_rows_do_not_flip_for_ever():
+    """r = w = 0 to rounding in two rows of five: still solved by full exchange, in few changes."""
+    rng = np.random.default_rng(10)
+    for _ in range(50):
+        assert ActiveSet().solve(degenerate(rng, 12)).iterations <= 6
+
+
+def test_refinement_keeps_an_ill_conditioned_answer_certified():
+    """Hilbert matrix, condition 1.5e10: the residual stays at rounding level although r itself has six digits."""
+    G = 1.0 / (1.0 + np.add.outer(np.arange(8.0), np.arange(8.0)))
+    r = np.ones(8)
+    result = ActiveSet().solve(LCP(G, -G @ r, np.zeros(8, dtype=bool)))
+    assert result.residual <= 1e-14
+    assert np.abs(result.r - r).max() <= 1e-5
+
+
+def test_failure_tells_what_happened_and_what_to_do():
+    problem = LCP(CYCLING, np.array([2.0, 1.0, -3.0]), np.zeros(3, dtype=bool))
+    with pytest.raises(StepFailure, match=r"ActiveSet.*after 2 iterations with residual .*raise max_iterations"):
+        ActiveSet(max_iterations=2).solve(problem)
+    G = 1.0 / (1.0 + np.add.outer(np.arange(8.0), np.arange(8.0)))
+    with pytest.raises(StepFailure, match="ill-conditioned"):
+        ActiveSet(tolerance=1e-18).solve(LCP(G, -np.linspace(1.0, 2.0, 8), np.zeros(8, dtype=bool)))
