@@ -1,11 +1,18 @@
-"""Finite elements on DOLFINx. Names are imported when first used, so that `import vi_contact` needs no finite element library."""
+"""Finite elements on DOLFINx. Names are imported when first used: `import vi_contact` needs no finite element library."""
 
 from __future__ import annotations
 
 from importlib import import_module
 from typing import Any
 
-_HOME = {"read_mesh": "mesh", "build_mesh": "mesh", "node_numbers": "mesh", "Cells": "mesh", "Facets": "mesh", "Tags": "mesh"}
+_HOME = {
+    "Cells": "mesh",
+    "Facets": "mesh",
+    "Tags": "mesh",
+    "build_mesh": "mesh",
+    "node_numbers": "mesh",
+    "read_mesh": "mesh",
+}
 """Public name -> module of this folder it lives in."""
 
 __all__ = sorted(_HOME)

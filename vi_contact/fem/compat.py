@@ -1,9 +1,9 @@
 """DOLFINx differs from version to version; every difference this package meets is settled here and nowhere else.
 
-Supported: 0.5 (Debian 12), 0.9 (Debian 13) and 0.11. The rest of `fem` calls these functions and never looks at the version.
-What changed, by version: UFL elements became Basix elements and function spaces take tuples (0.7), dofmaps became
-two-dimensional arrays and the ghost mode moved into the partitioner (0.6-0.7), `create_mesh` swapped two arguments (0.10), the
-partitioner counts cells per facet and the geometry has one dofmap per cell type (0.11).
+Supported: 0.5 (Debian 12), 0.9 (Debian 13) and 0.11. Nothing else in `fem` asks for the version.
+What changed: dofmaps became two-dimensional arrays and the ghost mode moved into the partitioner (0.6), UFL elements became
+Basix elements and function spaces take tuples (0.7), `create_mesh` swapped two arguments (0.10), the partitioner counts the
+cells of a facet and the geometry has one dofmap per cell type (0.11).
 """
 
 from __future__ import annotations
@@ -14,13 +14,15 @@ import dolfinx
 import numpy as np
 import numpy.typing as npt
 import ufl
-from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
 from dolfinx.mesh import GhostMode, Mesh, create_cell_partitioner, meshtags
 from mpi4py import MPI
 from petsc4py import PETSc
 
 Indices = npt.NDArray[np.int32]
+
+fem: Any = dolfinx.fem  # untyped on purpose: names missing from the installed version are not errors here
+_mesh: Any = dolfinx.mesh
 
 VERSION: tuple[int, ...] = tuple(int(part) for part in dolfinx.__version__.split(".")[:2])
 """DOLFINx's (major, minor)."""
@@ -35,19 +37,20 @@ _DOFMAP_PER_CELL_TYPE = VERSION >= (0, 11)
 def create_mesh(comm: MPI.Comm, cell: str, cells: npt.NDArray[np.int64], x: npt.NDArray[np.float64]) -> Mesh:
     """A first-order mesh, distributed by the default graph partitioner (fixed seed), ghosted over shared facets.
 
-    `cell` is a UFL name ("interval", "triangle", "quadrilateral", "tetrahedron", "hexahedron"), `cells` (n_cells, n_vertices)
-    holds 0-based rows of the input points in DOLFINx's (tensor-product) vertex order, `x` (n_points, gdim) the points [m].
-    A rank without input passes arrays of the right width and no rows. Collective.
+    `cell` is a UFL name ("interval", "triangle", "quadrilateral", "tetrahedron", "hexahedron"). `cells`
+    (n_cells, n_vertices) holds rows of `x` in DOLFINx's (tensor-product) vertex order, `x` (n_points, gdim) the points [m]. A rank without
+    input passes arrays of the right width and no rows. Collective.
     """
     gdim = x.shape[1]
     if _BASIX_ELEMENTS:
         import basix.ufl
 
-        partitioner = create_cell_partitioner(*((GhostMode.shared_facet, 2) if _COUNTED_FACETS else (GhostMode.shared_facet,)))
+        cells_per_facet = (2,) if _COUNTED_FACETS else ()
+        partitioner = create_cell_partitioner(GhostMode.shared_facet, *cells_per_facet)
         domain = ufl.Mesh(basix.ufl.element("Lagrange", cell, 1, shape=(gdim,)))
-        return dolfinx.mesh.create_mesh(comm, cells=cells, x=x, e=domain, partitioner=partitioner)
+        return _mesh.create_mesh(comm, cells=cells, x=x, e=domain, partitioner=partitioner)
     domain = ufl.Mesh(ufl.VectorElement("Lagrange", ufl.Cell(cell, geometric_dimension=gdim), 1))
-    return dolfinx.mesh.create_mesh(comm, cells, x, domain, ghost_mode=GhostMode.shared_facet)
+    return _mesh.create_mesh(comm, cells, x, domain, ghost_mode=GhostMode.shared_facet)
 
 
 def geometry_dofmap(mesh: Mesh) -> Indices:
@@ -58,18 +61,18 @@ def geometry_dofmap(mesh: Mesh) -> Indices:
 
 
 def entities_to_geometry(mesh: Mesh, dim: int, entities: Indices) -> Indices:
-    """Local geometry nodes of each given mesh entity, (n_entities, n_vertices). Builds what connectivity it needs: collective."""
+    """Local geometry nodes of each given entity, (n_entities, n_vertices). Builds the connectivity it needs: collective."""
     tdim = mesh.topology.dim
     mesh.topology.create_entities(dim)
     mesh.topology.create_connectivity(dim, tdim)
     mesh.topology.create_connectivity(tdim, dim)
     if _BASIX_ELEMENTS:
-        return dolfinx.mesh.entities_to_geometry(mesh, dim, entities)
+        return _mesh.entities_to_geometry(mesh, dim, entities)
     return dolfinx.cpp.mesh.entities_to_geometry(mesh._mesh, dim, entities, False)
 
 
 def measure(mesh: Mesh, dim: int, indices: Indices) -> ufl.Measure:
-    """The measure dx (dim = topological dimension) or ds (one less) restricted to sorted local entities; ds ignores inner facets."""
+    """dx (dim = topological dimension) or ds (one less) on some local entities, given sorted; ds ignores inner facets."""
     kind = "dx" if dim == mesh.topology.dim else "ds"
     tags = meshtags(mesh, dim, np.asarray(indices, dtype=np.int32), np.ones(len(indices), dtype=np.int32))
     return ufl.Measure(kind, domain=mesh, subdomain_data=tags)(1)
@@ -101,7 +104,7 @@ def dof_to_node(space: Any) -> Indices:
 
 
 def _as_table(rows: Any, mesh: Mesh) -> Indices:
-    """First-order cell rows as a two-dimensional array: an AdjacencyList up to 0.5, an array already since. A rank may have none."""
+    """First-order cell rows as a two-dimensional array: an AdjacencyList in 0.5, an array since. A rank may have none."""
     if isinstance(rows, np.ndarray):
         return rows
     return rows.array.reshape(-1, dolfinx.cpp.mesh.cell_num_vertices(mesh.topology.cell_type))
@@ -127,7 +130,7 @@ def assemble_matrix(form: Any) -> PETSc.Mat:
 
 
 def assemble_vector(form: Any) -> PETSc.Vec:
-    """Vector of a compiled linear form with the contributions of all ranks added on the owner; ghost entries are left stale."""
+    """Vector of a compiled linear form, contributions of all ranks added on the owner; ghost entries are left stale."""
     vector = fem_petsc.assemble_vector(form)
     vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
     return vector
