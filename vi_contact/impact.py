@@ -71,6 +71,17 @@ class MassProjection:
 
 
 @dataclass(frozen=True)
+class NoImpact:
+    """Velocities are left as the step computed them."""
+
+    def target(self, impact: Impact) -> Array:
+        return np.full(len(impact.v_n), np.nan)
+
+    def apply(self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array) -> Array:
+        return v
+
+
+@dataclass(frozen=True)
 class Inelastic:
     """v_n⁺ = 0 on every closed point: the seed's perfectly plastic collision."""
 

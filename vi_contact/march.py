@@ -44,8 +44,18 @@ class CertifiedSolver:
             self._prepared[rank] = self._solvers[rank].prepare(self._A, self._surface, self._scale)
         return self._prepared[rank]
 
+    def _refuse_nan(self, step: StepProblem) -> None:
+        """A NaN would spread silently through every solver; asked of all ranks, so that all stop."""
+        bad = float(not np.isfinite(np.sum(step.b)))
+        if self._surface.comm.max(np.array([bad]))[0]:
+            raise StepFailure(
+                f"the load of step {step.k} at t = {step.t:.6g} s contains NaN or infinite values: "
+                "check the excitation, the tractions and the initial data"
+            )
+
     def solve(self, step: StepProblem) -> tuple[StepResult, Certificate, bool]:
         """(result, certificate, escalated) of the first method below tolerance; StepFailure when there is none."""
+        self._refuse_nan(step)
         tried = []
         for rank in range(len(self._solvers)):
             try:

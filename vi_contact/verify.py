@@ -24,7 +24,7 @@ def kkt_residual(step: StepProblem, result: StepResult) -> Certificate:
     residual = Ax - step.b
     residual[surface.owned] += r_n[surface.slots]
     local = [_max_abs(residual), _max_abs(step.b), _max_abs(Ax), _max_abs(x), _max_abs(step.guess)]
-    equilibrium, b_max, Ax_max, x_max, guess_max = surface.comm.max(np.array(local))
+    equilibrium, b_max, Ax_max, x_max, guess_max = surface.comm.max(np.nan_to_num(np.array(local), nan=np.inf, posinf=np.inf))
     finite = np.isfinite(step.bound)
     gap = (step.bound - surface.normal_values(x) + surface.compliance * r_n / step.scale)[finite]
     x_ref = max(x_max, guess_max, _max_abs(step.bound[finite]))

@@ -6,12 +6,11 @@ from importlib import import_module
 from typing import Any
 
 _HOME = {
-    "Cells": "mesh",
-    "Facets": "mesh",
-    "Tags": "mesh",
-    "build_mesh": "mesh",
-    "node_numbers": "mesh",
-    "read_mesh": "mesh",
+    "read_mesh": "mesh", "build_mesh": "mesh", "node_numbers": "mesh", "Cells": "mesh", "Facets": "mesh", "Tags": "mesh",
+    "assemble": "assemble",
+    "BodyForce": "loads", "Prescribed": "loads", "TangentialTraction": "loads", "Traction": "loads",
+    "contact_surface": "trace",
+    "XDMF": "fields",
 }
 """Public name -> module of this folder it lives in."""
 

@@ -1,0 +1,58 @@
+"""vi_contact: dynamic unilateral contact of elastic structures, certified step by step.
+
+The table of contents. Names below are imported when they are first used, so ``import vi_contact`` needs neither PETSc
+nor DOLFINx; those live in ``vi_contact.fem``, ``vi_contact.models`` and the volume solvers.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+__version__ = "0.1.0"
+
+_CONTENTS = {
+    "errors": ("InputError", "StepFailure", "ViContactError"),
+    # values
+    "materials": (
+        "LinearElastic", "MassProportional", "NoDamping", "PlaneStrain", "PlaneStress", "Rayleigh", "Solid",
+    ),
+    "friction": ("Coulomb", "Frictionless", "Tresca"),
+    "impact": ("ComponentReset", "Elastic", "Inelastic", "MassProjection", "Newton", "NoImpact"),
+    "excitation": (
+        "FullSine", "GroundMotion", "HalfSine", "Harmonic", "Rectangular", "Ricker", "Tabulated",
+    ),
+    "ground_motion": ("Record", "motion_info", "read_record", "resampled", "scaled", "scaled_to_pga"),
+    "surfaces": ("AnalyticGap", "ContactSurface", "HalfSpace", "Touching"),
+    "system": ("Load", "SemiDiscreteSystem"),
+    # contract
+    "step": ("Certificate", "ContactProblem", "Report", "State", "StepProblem", "StepResult"),
+    # schemes
+    "schemes.zienkiewicz_wood_taylor": ("ZienkiewiczWoodTaylor",),
+    "schemes.ss22": ("SS22",),
+    "schemes.linear_multistep": ("LinearMultistep",),
+    # solvers
+    "solvers.condensed": ("Condensed",),
+    "solvers.active_set": ("ActiveSet",),
+    "solvers.hildreth": ("Hildreth",),
+    "solvers.mprgp": ("ProjectedCG",),
+    # the loop and what listens to it
+    "march": ("march", "static_equilibrium"),
+    "simulate": ("Solution", "simulate"),
+    "recorders": ("Contact", "Energy", "Probe"),
+    "cross_check": ("CrossChecked", "cross_check"),
+    "verify": ("energy_balance", "kkt_residual"),
+    "modal": ("lowest_frequency",),
+}
+_HOME = {name: module for module, names in _CONTENTS.items() for name in names}
+__all__ = ["__version__", *sorted(_HOME)]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'vi_contact' has no attribute '{name}'")
+    return getattr(import_module(f"vi_contact.{_HOME[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -1,0 +1,142 @@
+"""The command line ``vi-contact``: parses and prints, nothing else."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from . import __version__
+from .errors import ViContactError
+
+_DESCRIPTION = """Dynamic unilateral contact of elastic structures: exact non-penetration, a closed energy ledger and a
+certificate for every time step. Run under "mpirun -n N" for any number of ranks."""
+
+
+def parser() -> argparse.ArgumentParser:
+    """All commands and options."""
+    top = argparse.ArgumentParser(prog="vi-contact", description=_DESCRIPTION)
+    top.add_argument("--version", action="version", version=f"vi-contact {__version__}")
+    commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    wall = commands.add_parser(
+        "wall",
+        help="a wall beside the ground, shaken (seed 000, Figs. 2-5)",
+        description="The wall of seed 000: clamped at its base, its right side may touch the ground. Without --motion "
+        "a harmonic acceleration at half the first natural frequency shakes it for 400 steps.",
+    )
+    add_wall_arguments(wall)
+    wall.set_defaults(run=_wall)
+    motion = commands.add_parser("motion", help="ground motion files").add_subparsers(
+        dest="action", required=True, metavar="ACTION"
+    )
+    info = motion.add_parser("info", help="what a record file holds: units, peaks, intensity, duration")
+    info.add_argument("file", help="PEER AT2, USGS SMC or two columns t, a")
+    info.add_argument("--units", help="m/s2, cm/s2, gal, g, ...: required where the file does not say")
+    info.add_argument("--dt", type=float, help="time step [s], where the file does not say")
+    info.set_defaults(run=_motion_info)
+    return top
+
+
+def add_wall_arguments(wall: argparse.ArgumentParser) -> None:
+    """The options of ``vi-contact wall`` (the demo takes the same)."""
+    wall.add_argument("--case", default="a", help="a: 3 contact points, b: 11, face: whole side, bilateral, free (default a)")
+    shake = wall.add_argument_group("ground motion")
+    shake.add_argument("--motion", metavar="FILE", help="horizontal record: PEER AT2, USGS SMC or two columns")
+    shake.add_argument("--vertical", metavar="FILE", help="vertical record, beside --motion")
+    shake.add_argument("--units", help="units of two-column files: m/s2, cm/s2, gal, g, ...")
+    shake.add_argument("--scale", type=float, default=1.0, help="factor on the record, or on the harmonic's 1 m/s2")
+    shake.add_argument("--pga", type=float, metavar="A", help="scale the records to this peak [m/s2] instead")
+    shake.add_argument("--resample", type=float, metavar="DT", help="resample the records to this step [s], band-limited")
+    step = wall.add_argument_group("step")
+    step.add_argument("--solver", default="condensed", help="condensed, hildreth, volume, volume-reference")
+    step.add_argument("--scheme", default="zwt", help="zwt (Zienkiewicz-Wood-Taylor), ss22, newmark")
+    step.add_argument("--impact", default="inelastic", help="inelastic, elastic, none, or a restitution number in [0, 1]")
+    step.add_argument("--projection", action="store_true", help="impact as an M-orthogonal impulse, not a component reset")
+    step.add_argument("--gravity", action="store_true", help="a gravity stage with contact active comes first")
+    step.add_argument("--dt", type=float, help="time step [s] (default 1/20 of the first natural period)")
+    step.add_argument("--steps", type=int, help="number of steps (default 400, or the whole record)")
+    step.add_argument("--cross-check", action="store_true", help="solve every step by the other route too and compare")
+    mesh = wall.add_argument_group("mesh")
+    mesh.add_argument("--divisions", type=int, nargs=2, metavar=("NX", "NY"), help="elements across and up (default 8 12)")
+    mesh.add_argument("--size", type=float, metavar="H", help="element size [m] of an unstructured mesh instead")
+    mesh.add_argument("--triangles", action="store_true", help="triangles instead of quadrilaterals")
+    output = wall.add_argument_group("output")
+    output.add_argument("--out", default="results/wall", metavar="DIR", help="output folder (default results/wall)")
+    output.add_argument("--fields-every", type=int, default=10, metavar="K", help="steps between ParaView frames, 0: none")
+    output.add_argument("--restart", action="store_true", help="continue the run in --out from its checkpoint")
+    output.add_argument("--quiet", action="store_true", help="no progress line")
+
+
+def _impact(name: str, projection: bool) -> Any:
+    from .errors import InputError
+    from .impact import ComponentReset, Elastic, Inelastic, MassProjection, Newton, NoImpact
+
+    reading = MassProjection() if projection else ComponentReset()
+    if name == "none":
+        return NoImpact()
+    if name in ("inelastic", "elastic"):
+        return Inelastic(reading) if name == "inelastic" else Elastic(reading)
+    try:
+        return Newton(float(name), reading)
+    except ValueError as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"unknown impact law '{name}': give inelastic, elastic, none or a restitution in [0, 1]") from None
+
+
+def _wall(options: argparse.Namespace) -> str:
+    from mpi4py import MPI
+
+    from .models.wall import Wall
+    from .models.wall_run import WallRun, run_wall
+
+    divisions = (8, 12) if options.divisions is None else tuple(options.divisions)
+    run = WallRun(
+        case=options.case,
+        wall=Wall(divisions=divisions, size=options.size, triangles=options.triangles),
+        motion=options.motion,
+        vertical=options.vertical,
+        units=options.units,
+        scale=options.scale,
+        pga=options.pga,
+        resample=options.resample,
+        solver=options.solver,
+        scheme=options.scheme,
+        impact=_impact(options.impact, options.projection),
+        gravity=options.gravity,
+        dt=options.dt,
+        steps=options.steps,
+        cross_check=options.cross_check,
+        fields_every=options.fields_every,
+        restart=options.restart,
+    )
+    out = Path(options.out)
+    solution = run_wall(run, MPI.COMM_WORLD, out, progress=not options.quiet)
+    return f"{solution.summary()}\noutput: {out}" if MPI.COMM_WORLD.rank == 0 else ""
+
+
+def _motion_info(options: argparse.Namespace) -> str:
+    from .ground_motion import motion_info
+
+    return motion_info(options.file, options.units, dt=options.dt)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs a command; prints its text, or one sentence on standard error and returns 1."""
+    options = parser().parse_args(arguments)
+    try:
+        text = options.run(options)
+    except ViContactError as error:
+        if _rank() == 0:
+            print(f"vi-contact: {error}", file=sys.stderr, flush=True)
+        return 1
+    if text:
+        print(text)
+    return 0
+
+
+def _rank() -> int:
+    """This process's rank, without importing MPI for commands that do not use it."""
+    return sys.modules["mpi4py.MPI"].COMM_WORLD.rank if "mpi4py.MPI" in sys.modules else 0

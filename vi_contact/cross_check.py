@@ -1,0 +1,125 @@
+"""Independent routes to the same step, compared step by step from the same state (design idea 4).
+
+Whole runs of an energy-growing scheme may drift apart by round-off; single steps from one state must not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .algebra import Array
+from .march import march
+from .step import ContactProblem, EffectiveMatrix, PreparedSolver, Scheme, Solver, State, StepProblem, StepResult
+from .surfaces import ContactSurface
+
+
+@dataclass
+class Disagreement:
+    """Largest differences between a solver and the primary one so far, with the largest values they compare to."""
+
+    method: str = ""
+    x: float = 0.0
+    r_n: float = 0.0
+    x_ref: float = 0.0
+    r_ref: float = 0.0
+    iterations: int = 0
+    steps: int = 0
+
+    @property
+    def relative_u(self) -> float:
+        """max |x - x'| / max |x| over all unknowns and steps."""
+        return self.x / self.x_ref if self.x_ref else self.x
+
+    @property
+    def relative_r_n(self) -> float:
+        """max |r_n - r_n'| / max |r_n| over all conditions and steps."""
+        return self.r_n / self.r_ref if self.r_ref else self.r_n
+
+    @property
+    def worst(self) -> float:
+        """The larger of both."""
+        return max(self.relative_u, self.relative_r_n)
+
+
+@dataclass
+class CrossChecked:
+    """A solver that also asks others at every step and remembers how far they are off; returns the primary's answer."""
+
+    primary: Solver
+    others: Sequence[Solver]
+    found: list[Disagreement] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.found = [Disagreement() for _ in self.others]
+
+    def check(self, problem: ContactProblem) -> None:
+        """Every solver must be able to take the problem."""
+        for solver in (self.primary, *self.others):
+            solver.check(problem)
+
+    def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> PreparedCrossCheck:
+        """All solvers prepared on the same matrix."""
+        return PreparedCrossCheck(self, A, surface, scale)
+
+    def report(self) -> Mapping[str, Mapping[str, float]]:
+        """method -> relative differences in u and r_n, iterations per step: what summary.json shows."""
+        return {
+            one.method: {
+                "u": one.relative_u,
+                "r_n": one.relative_r_n,
+                "iterations_per_step": one.iterations / max(one.steps, 1),
+            }
+            for one in self.found
+        }
+
+    @property
+    def worst(self) -> float:
+        """The largest relative difference of any solver in u or r_n."""
+        return max((one.worst for one in self.found), default=0.0)
+
+
+class PreparedCrossCheck:
+    """See CrossChecked."""
+
+    def __init__(self, settings: CrossChecked, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> None:
+        self._settings, self._surface = settings, surface
+        self._primary: PreparedSolver = settings.primary.prepare(A, surface, scale)
+        self._others: list[PreparedSolver] = [solver.prepare(A, surface, scale) for solver in settings.others]
+
+    def solve(self, step: StepProblem) -> StepResult:
+        result = self._primary.solve(step)
+        for solver, found in zip(self._others, self._settings.found, strict=True):
+            self._compare(result, solver.solve(step), found)
+        return result
+
+    def _compare(self, result: StepResult, other: StepResult, found: Disagreement) -> None:
+        dx, x_ref = self._surface.comm.max(np.array([_max_abs(other.x - result.x), _max_abs(result.x)]))
+        found.method = other.method
+        found.x, found.x_ref = max(found.x, dx), max(found.x_ref, x_ref)
+        found.r_n = max(found.r_n, _max_abs(other.r_n - result.r_n))
+        found.r_ref = max(found.r_ref, _max_abs(result.r_n))
+        found.iterations += other.iterations
+        found.steps += 1
+
+
+def _max_abs(x: Array) -> float:
+    return float(np.max(np.abs(x), initial=0.0))
+
+
+def cross_check(
+    problem: ContactProblem,
+    *,
+    scheme: Scheme,
+    solvers: Sequence[Solver],
+    dt: float,
+    steps: int,
+    state: State | None = None,
+) -> CrossChecked:
+    """Marches with the first solver and compares the others with it at every step; see ``worst`` and ``report()``."""
+    checked = CrossChecked(solvers[0], tuple(solvers[1:]))
+    for _ in march(problem, scheme=scheme, solver=checked, dt=dt, steps=steps, state=state):
+        pass
+    return checked

@@ -1,0 +1,166 @@
+"""One run of the wall, from options to an output folder with histories, fields and figures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ..cross_check import CrossChecked
+from ..errors import InputError
+from ..excitation import Excitation, GroundMotion, Harmonic
+from ..fem.fields import XDMF
+from ..ground_motion import Record, read_record, resampled, scaled, scaled_to_pga
+from ..impact import Inelastic
+from ..march import static_equilibrium
+from ..plotting import plot_certificate, plot_contact, plot_energy, plot_excitation, plot_points
+from ..recorders import Contact, Energy, Probe
+from ..schemes.linear_multistep import LinearMultistep
+from ..schemes.ss22 import SS22
+from ..schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
+from ..simulate import Solution, simulate
+from ..solvers.condensed import Condensed
+from ..solvers.hildreth import Hildreth
+from ..solvers.volume import OneFactorisation, Volume
+from ..step import ContactProblem, ImpactLaw, Scheme, Solver, State
+from .wall import CASES, Wall, WallModel, build
+
+SCHEMES: dict[str, Scheme] = {
+    "zwt": ZienkiewiczWoodTaylor(phi=0.5),
+    "ss22": SS22(),
+    "newmark": LinearMultistep.newmark(),
+}
+SOLVERS: dict[str, Solver] = {
+    "condensed": Condensed(),
+    "hildreth": Condensed(Hildreth()),
+    "volume": Volume(method=OneFactorisation()),
+    "volume-reference": Volume(),
+}
+
+
+@dataclass(frozen=True)
+class WallRun:
+    """Options of a run. ``motion``: a record file; without one the harmonic of Fig. 3 shakes the wall for 400 steps."""
+
+    case: str = "a"
+    wall: Wall = field(default_factory=Wall)
+    motion: str | None = None
+    vertical: str | None = None
+    units: str | None = None
+    scale: float = 1.0
+    pga: float | None = None
+    resample: float | None = None
+    solver: str = "condensed"
+    scheme: str = "zwt"
+    impact: ImpactLaw = field(default_factory=Inelastic)
+    gravity: bool = False
+    dt: float | None = None
+    steps: int | None = None
+    cross_check: bool = False
+    fields_every: int = 10
+    restart: bool = False
+
+    def __post_init__(self) -> None:
+        for name, given, known in (
+            ("case", self.case, (*CASES, "face")), ("solver", self.solver, SOLVERS), ("scheme", self.scheme, SCHEMES),
+        ):
+            if given not in known:
+                raise InputError(f"unknown {name} '{given}': choose one of {', '.join(known)}")
+        if self.fields_every < 0:
+            raise InputError(f"fields_every is {self.fields_every}: give a number of steps, or 0 for no fields")
+
+
+def run_wall(run: WallRun, comm: Any, out: str | Path, *, progress: bool = True) -> Solution:
+    """Builds the wall, marches, and writes the run folder ``out``; the solution's summary is for printing."""
+    horizontal, vertical = (_record(run, path) for path in (run.motion, run.vertical))
+    model = build(run.wall, comm, weight=run.gravity)
+    excitation = _excitations(run, model, horizontal, vertical)
+    dt = run.dt if run.dt is not None else model.time_step()
+    problem = model.problem(run.case, excitation=excitation, impact=run.impact)
+    solver, checked = _solvers(run)
+    solution = simulate(
+        problem,
+        scheme=SCHEMES[run.scheme],
+        solver=solver,
+        dt=dt,
+        steps=_steps(run, dt, excitation),
+        record=(Energy(), Contact(), Probe(model.probes())),
+        fields=XDMF(every=run.fields_every) if run.fields_every else None,
+        out=out,
+        state=_start(run, problem),
+        escalation=(SOLVERS["volume-reference"], SOLVERS["hildreth"]),
+        cross_check=checked,
+        restart=run.restart,
+        progress=progress,
+    )
+    if comm.rank == 0:
+        draw(solution, run, problem, Path(out))
+    comm.Barrier()
+    return solution
+
+
+def _record(run: WallRun, path: str | None) -> Record | None:
+    """The record of a file, in m/s², scaled and resampled as asked."""
+    if path is None:
+        return None
+    record = read_record(path, run.units)
+    record = scaled(record, factor=run.scale) if run.pga is None else scaled_to_pga(record, run.pga)
+    return record if run.resample is None else resampled(record, run.resample)
+
+
+def _excitations(
+    run: WallRun, model: WallModel, horizontal: Record | None, vertical: Record | None
+) -> Sequence[Excitation]:
+    found: list[Excitation] = []
+    if horizontal is not None:
+        found.append(GroundMotion(horizontal, direction=(1.0, 0.0)))
+    if vertical is not None:
+        found.append(GroundMotion(vertical, direction=(0.0, 1.0)))
+    if not found:
+        harmonic: Harmonic = model.harmonic(run.scale)
+        found.append(harmonic)
+    return found
+
+
+def _steps(run: WallRun, dt: float, excitation: Sequence[Excitation]) -> int:
+    """As asked; else the whole record, or the seed's 400 steps."""
+    if run.steps is not None:
+        return run.steps
+    duration = max(one.duration for one in excitation)
+    return 400 if duration == float("inf") or dt <= 0.0 else int(duration / dt) + 1
+
+
+def _solvers(run: WallRun) -> tuple[Solver, CrossChecked | None]:
+    """The solver; with ``cross_check`` the other route accompanies every step."""
+    solver = SOLVERS[run.solver]
+    if not run.cross_check:
+        return solver, None
+    other = "condensed" if run.solver.startswith("volume") else "volume-reference"
+    checked = CrossChecked(solver, (SOLVERS[other],))
+    return checked, checked
+
+
+def _start(run: WallRun, problem: ContactProblem) -> State | None:
+    """The gravity stage with contact active, when the wall has weight."""
+    return static_equilibrium(problem, solver=SOLVERS[run.solver]) if run.gravity else None
+
+
+def draw(solution: Solution, run: WallRun, problem: ContactProblem, out: Path) -> None:
+    """The figures of a run."""
+    history = solution.history
+    contact = [str(number) for number in CASES.get(run.case, ())] if run.case != "free" else []
+    labels = [name[4:] for name in history if name.startswith("u_x_")]
+    titles = {
+        "a": "Wall, three possible contact points (Fig. 4)",
+        "b": "Wall, eleven possible contact points (Fig. 5)",
+        "bilateral": "Wall, eleven points held on the ground",
+        "free": "Wall without contact",
+    }
+    title = titles.get(run.case, "Wall, whole side in possible contact")
+    plot_excitation(history, out / "excitation.png")
+    plot_points(history, labels, out / "displacements.png", title=title, unilateral=contact)
+    plot_energy(history, out / "energy.png")
+    plot_certificate(history, out / "certificate.png")
+    if problem.surface.count:
+        plot_contact(history, out / "contact.png", position=problem.surface.points[:, 1], axis_label="height [m]")

@@ -1,0 +1,168 @@
+"""Pictures of recorded histories, saved as PNG on rank 0 (matplotlib is imported late and draws off screen)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .algebra import Array
+
+History = Mapping[str, Array]
+_UNITS = ((1.0, "m"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm"))
+
+
+def _pyplot() -> Any:
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    plt.rcParams.update({"axes.grid": True, "grid.alpha": 0.3, "axes.spines.top": False, "axes.spines.right": False})
+    return plt
+
+
+def length_unit(size: float) -> tuple[float, str]:
+    """(metres per unit, name) so that a length of this size has one to three digits before the point."""
+    for metres, name in _UNITS:
+        if size >= metres:
+            return metres, name
+    return _UNITS[-1] if size > 0.0 else _UNITS[0]
+
+
+def _scaled(values: Array, unit: str) -> tuple[Array, str]:
+    """Values over the power of 1000 that fits their size, and the unit with its prefix."""
+    size = float(np.nanmax(np.abs(values), initial=0.0))
+    for factor, prefix in ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n")):
+        if size >= factor:
+            return values / factor, prefix + unit
+    return values, unit
+
+
+def _save(figure: Any, path: str | Path) -> Path:
+    figure.savefig(path, dpi=130)
+    _pyplot().close(figure)
+    return Path(path)
+
+
+def plot_points(
+    history: History, labels: Sequence[str], path: str | Path, *, title: str, component: str = "x",
+    unilateral: Sequence[str] = (), reference: History | None = None,
+) -> Path:
+    """One panel per point: displacement against time, as Figs. 4 and 5 of seed 000.
+
+    unilateral: labels of contact points, drawn with their bound at zero. reference: another run, drawn in grey.
+    """
+    plt = _pyplot()
+    names = [f"u_{component}_{label}" for label in labels]
+    size = max(float(np.max(np.abs(history[name]), initial=0.0)) for name in names)
+    metres, unit = length_unit(size)
+    figure, axes = plt.subplots(
+        len(names), 1, sharex=True, sharey=True, figsize=(9, 1.5 * len(names) + 1.2), constrained_layout=True
+    )
+    for axis, name, label in zip(np.atleast_1d(axes), names, labels, strict=True):
+        if reference is not None:
+            axis.plot(reference["t"], reference[name] / metres, color="0.65", lw=0.8, label="no contact")
+        axis.plot(history["t"], history[name] / metres, color="black", lw=0.9, label="unilateral")
+        kind = "free point"
+        if label in unilateral:
+            kind = "contact point"
+            axis.axhline(0.0, color="tab:red", lw=0.8, ls="--")
+        axis.set_ylabel(f"$u_{component}$ [{unit}]")
+        axis.set_title(f"point {label} ({kind})", fontsize=9, loc="left")
+    if reference is not None:
+        np.atleast_1d(axes)[0].legend(fontsize=8, loc="upper right")
+    np.atleast_1d(axes)[-1].set_xlabel("time [s]")
+    figure.suptitle(title)
+    return _save(figure, path)
+
+
+def plot_excitation(history: History, path: str | Path, *, title: str = "Ground acceleration") -> Path:
+    """The ground acceleration components that the run used (Fig. 3)."""
+    plt = _pyplot()
+    figure, axis = plt.subplots(figsize=(9, 3), constrained_layout=True)
+    for component in "xyz":
+        values = history.get(f"a_g_{component}")
+        if values is not None and np.any(values):
+            axis.plot(history["t"], values, lw=0.9, label=f"$a_{{g,{component}}}$")
+    if axis.lines:
+        axis.legend()
+    axis.set(xlabel="time [s]", ylabel="acceleration [m/s²]", title=title)
+    return _save(figure, path)
+
+
+_LEDGER = (
+    ("work_input", "input work", "black", "-"),
+    ("energy_kinetic", "kinetic", "tab:blue", "-"),
+    ("energy_strain", "strain", "tab:orange", "-"),
+    ("loss_damping", "damping", "tab:purple", "-"),
+    ("loss_contact", "contact work", "tab:red", "-"),
+    ("loss_impact", "impact loss", "tab:green", "-"),
+    ("loss_algorithmic", "algorithmic", "tab:brown", ":"),
+)
+
+
+def plot_energy(history: History, path: str | Path, *, title: str = "Energy ledger") -> Path:
+    """The ledger's terms, and its defect relative to the largest of them."""
+    plt = _pyplot()
+    figure, (top, bottom) = plt.subplots(
+        2, 1, sharex=True, figsize=(9, 6), height_ratios=(3, 1), constrained_layout=True
+    )
+    present = [entry for entry in _LEDGER if entry[0] in history]
+    size = np.array([max(float(np.max(np.abs(history[name]), initial=0.0)) for name, *_ in present)])
+    shown, unit = _scaled(size, "J")
+    factor = shown[0] / size[0] if size[0] else 1.0
+    for name, label, colour, style in present:
+        if np.any(history[name]):
+            top.plot(history["t"], history[name] * factor, color=colour, ls=style, lw=1.0, label=label)
+    top.set(ylabel=f"energy, cumulative work [{unit}]", title=title)
+    top.legend(fontsize=8, ncol=2)
+    defect = np.abs(history["energy_defect"]) / (size[0] or 1.0)
+    _log(bottom, history["t"], defect)
+    bottom.axhline(1e-10, color="tab:red", ls="--", lw=0.8)
+    bottom.set(xlabel="time [s]", ylabel="|defect| / largest term [-]")
+    return _save(figure, path)
+
+
+def plot_certificate(history: History, path: str | Path, *, tolerance: float = 1e-9) -> Path:
+    """Certificate of every step, and iterations of the solver."""
+    plt = _pyplot()
+    figure, (top, bottom) = plt.subplots(2, 1, sharex=True, figsize=(9, 5), constrained_layout=True)
+    t = history["t"][1:]
+    _log(top, t, history["certificate"][1:])
+    top.axhline(tolerance, color="tab:red", ls="--", lw=0.8, label=f"tolerance {tolerance:g}")
+    top.legend(fontsize=8)
+    top.set(ylabel="certificate (worst residual) [-]", title="Certificate of every step")
+    bottom.step(t, history["iterations"][1:], where="mid", lw=0.8, color="black")
+    bottom.set(xlabel="time [s]", ylabel="iterations [-]")
+    return _save(figure, path)
+
+
+def _log(axis: Any, t: Array, values: Array) -> None:
+    """Semilogarithmic points; exact zeros are drawn at the bottom, at 1e-18."""
+    axis.semilogy(t, np.maximum(values, 1e-18), ".", ms=2, color="black")
+
+
+def plot_contact(history: History, path: str | Path, *, position: Array, axis_label: str = "position [m]") -> Path:
+    """Map of the contact pressure over position and time, and the uplift ratio. ``position``: (m,) of the points."""
+    plt = _pyplot()
+    figure, (top, bottom) = plt.subplots(
+        2, 1, sharex=True, figsize=(9, 6), height_ratios=(3, 1), constrained_layout=True
+    )
+    order = np.argsort(position)
+    pressure, unit = _scaled(np.atleast_2d(history["pressure"])[:, order], "Pa")
+    colours = plt.get_cmap("magma_r").copy()
+    colours.set_under("white")
+    top_pressure = float(np.max(pressure, initial=0.0)) or 1.0
+    image = top.pcolormesh(
+        history["t"], position[order], pressure.T, cmap=colours, vmin=1e-9 * top_pressure, vmax=top_pressure,
+        shading="nearest", rasterized=True,
+    )
+    top.grid(False)
+    figure.colorbar(image, ax=top, label=f"contact pressure [{unit}] (white: open)")
+    top.set(ylabel=axis_label, title="Contact pressure")
+    bottom.plot(history["t"], history["contact_uplift"], color="black", lw=0.9)
+    bottom.set(xlabel="time [s]", ylabel="uplift ratio [-]", ylim=(-0.05, 1.05))
+    return _save(figure, path)
