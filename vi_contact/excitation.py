@@ -1,0 +1,281 @@
+"""What shakes the body: scalar ground accelerations a(t) [m/s²] along a fixed direction.
+
+An excitation is a frozen value with `acceleration(t)` (a float), `direction` (a tuple of d components) and `duration`
+(the time [s] after which it is zero, or negligible, for good); called, it returns the vector a(t) · direction of shape
+(d,). The direction is used as given, never normalised: (1, 0.5) shakes the second axis half as much. The vector is the
+acceleration of the ground; in the frame that moves with the ground it loads the body with -M r a(t). Horizontal and
+vertical motion together are a sequence of excitations.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from numbers import Real
+from typing import Protocol
+
+import numpy as np
+
+from .algebra import Array
+from .errors import InputError
+from .ground_motion import Record
+
+
+class Excitation(Protocol):
+    """The contract of every excitation."""
+
+    @property
+    def direction(self) -> tuple[float, ...]:
+        """Components of the direction, one per space dimension, not all zero."""
+        ...
+
+    @property
+    def duration(self) -> float:
+        """Time [s] after which the acceleration stays zero or negligible; infinite if it never does."""
+        ...
+
+    def acceleration(self, t: float) -> float:
+        """Acceleration [m/s²] at time t [s], positive along the direction."""
+        ...
+
+    def __call__(self, t: float) -> Array:
+        """The vector acceleration(t) · direction [m/s²], shape (d,)."""
+        ...
+
+
+def _vector(self: Excitation, t: float) -> Array:
+    """The vector acceleration(t) · direction [m/s²], shape (d,)."""
+    return self.acceleration(t) * np.array(self.direction)
+
+
+@dataclass(frozen=True)
+class Harmonic:
+    """a(t) = amplitude · sin(2 pi frequency t + phase), for ever (seed 000 Fig. 3).
+
+    amplitude [m/s²]; frequency [Hz] > 0; phase [rad]. Raises InputError for values out of range or not finite.
+    """
+
+    amplitude: float
+    frequency: float
+    phase: float = 0.0
+    direction: tuple[float, ...] = (1.0, 0.0)
+
+    def __post_init__(self) -> None:
+        _check(self, finite=("amplitude", "phase"), positive=("frequency",))
+
+    @property
+    def duration(self) -> float:
+        """Infinite."""
+        return math.inf
+
+    def acceleration(self, t: float) -> float:
+        """amplitude · sin(2 pi frequency t + phase) [m/s²]."""
+        return self.amplitude * math.sin(2.0 * math.pi * self.frequency * t + self.phase)
+
+    __call__ = _vector
+
+
+@dataclass(frozen=True)
+class Ricker:
+    """a(t) = amplitude · (1 - 2 x) exp(-x), x = (pi frequency (t - peak_time))² (seismic.md 1.5).
+
+    amplitude [m/s²], the peak; frequency [Hz] > 0, where the spectrum peaks; delay [s] >= 0, the time of the peak, by
+    default 1.5 / frequency, which makes |a(0)| < 1e-8 |amplitude|; a smaller one starts with a jump. Velocity and
+    displacement both return to zero. Raises InputError for values out of range or not finite.
+    """
+
+    amplitude: float
+    frequency: float
+    delay: float | None = None
+    direction: tuple[float, ...] = (1.0, 0.0)
+
+    def __post_init__(self) -> None:
+        _check(self, finite=("amplitude",), positive=("frequency",))
+        if not isinstance(self.peak_time, Real) or not math.isfinite(self.peak_time) or self.peak_time < 0:
+            raise InputError(f"Ricker: delay is {self.delay!r}; give zero or a positive finite time in seconds")
+
+    @property
+    def peak_time(self) -> float:
+        """Time of the peak [s]: the delay, or 1.5 / frequency when none was given."""
+        return 1.5 / self.frequency if self.delay is None else self.delay
+
+    @property
+    def duration(self) -> float:
+        """peak_time + 1.5 / frequency [s]: beyond it |a| < 1e-8 |amplitude|."""
+        return self.peak_time + 1.5 / self.frequency
+
+    def acceleration(self, t: float) -> float:
+        """amplitude · (1 - 2 x) exp(-x) [m/s²]."""
+        x = (math.pi * self.frequency * (t - self.peak_time)) ** 2
+        return self.amplitude * (1.0 - 2.0 * x) * math.exp(-x)
+
+    __call__ = _vector
+
+
+@dataclass(frozen=True)
+class HalfSine:
+    """a(t) = amplitude · sin(pi t / duration) for 0 <= t < duration [s], zero elsewhere.
+
+    Raises InputError unless amplitude [m/s²] is finite and duration > 0.
+    """
+
+    amplitude: float
+    duration: float
+    direction: tuple[float, ...] = (1.0, 0.0)
+
+    def __post_init__(self) -> None:
+        _check(self, finite=("amplitude",), positive=("duration",))
+
+    def acceleration(self, t: float) -> float:
+        """amplitude · sin(pi t / duration) [m/s²] inside the pulse."""
+        return self.amplitude * math.sin(math.pi * t / self.duration) if 0.0 <= t < self.duration else 0.0
+
+    __call__ = _vector
+
+
+@dataclass(frozen=True)
+class FullSine:
+    """a(t) = amplitude · sin(2 pi t / duration) for 0 <= t < duration [s], zero elsewhere; the velocity ends at zero.
+
+    Raises InputError unless amplitude [m/s²] is finite and duration > 0.
+    """
+
+    amplitude: float
+    duration: float
+    direction: tuple[float, ...] = (1.0, 0.0)
+
+    def __post_init__(self) -> None:
+        _check(self, finite=("amplitude",), positive=("duration",))
+
+    def acceleration(self, t: float) -> float:
+        """amplitude · sin(2 pi t / duration) [m/s²] inside the pulse."""
+        return self.amplitude * math.sin(2.0 * math.pi * t / self.duration) if 0.0 <= t < self.duration else 0.0
+
+    __call__ = _vector
+
+
+@dataclass(frozen=True)
+class Rectangular:
+    """a(t) = amplitude for 0 <= t < duration [s], zero elsewhere (verification.md V2.7).
+
+    The value at a jump is the one after it. Raises InputError unless amplitude [m/s²] is finite and duration > 0.
+    """
+
+    amplitude: float
+    duration: float
+    direction: tuple[float, ...] = (1.0, 0.0)
+
+    def __post_init__(self) -> None:
+        _check(self, finite=("amplitude",), positive=("duration",))
+
+    def acceleration(self, t: float) -> float:
+        """amplitude [m/s²] inside the pulse."""
+        return self.amplitude if 0.0 <= t < self.duration else 0.0
+
+    __call__ = _vector
+
+
+@dataclass(frozen=True)
+class Tabulated:
+    """Accelerations [m/s²] at given times [s], straight lines between them, zero before the first and after the last.
+
+    times: strictly increasing, at least two; values: as many. Both are kept as tuples. Raises InputError for lengths
+    that differ, times that do not increase, NaN or infinite entries.
+    """
+
+    times: Sequence[float]
+    values: Sequence[float]
+    direction: tuple[float, ...] = (1.0, 0.0)
+
+    def __post_init__(self) -> None:
+        _check(self)
+        for name in ("times", "values"):
+            object.__setattr__(self, name, _finite_tuple("Tabulated", name, getattr(self, name)))
+        if len(self.times) != len(self.values) or len(self.times) < 2:
+            raise InputError(f"Tabulated: {len(self.times)} times and {len(self.values)} values; "
+                             "give one value per time and at least two of each")
+        for k, (before, after) in enumerate(pairwise(self.times)):
+            if after <= before:
+                raise InputError(f"Tabulated: times[{k + 1}] = {after!r} does not come after times[{k}] = {before!r}; "
+                                 "give strictly increasing times")
+
+    @property
+    def duration(self) -> float:
+        """The last time [s]."""
+        return self.times[-1]
+
+    def acceleration(self, t: float) -> float:
+        """Linear interpolation [m/s²]; the values at both end times are included."""
+        times, values = self.times, self.values
+        if not times[0] <= t <= times[-1]:
+            return 0.0
+        k = min(bisect_right(times, t), len(times) - 1)
+        w = (t - times[k - 1]) / (times[k] - times[k - 1])
+        return (1.0 - w) * values[k - 1] + w * values[k]
+
+    __call__ = _vector
+
+
+@dataclass(frozen=True)
+class GroundMotion:
+    """A recorded motion: a(t) = scale · (straight lines between the samples of `record`, sample k at k · dt).
+
+    Zero before the first and after the last sample. scale: a factor; for a peak use `scaled_to_pga(record, pga)`.
+    Raises InputError unless scale is finite. Solve with a time step no longer than the record's, or resample it first.
+    """
+
+    record: Record
+    direction: tuple[float, ...] = (1.0, 0.0)
+    scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.record, Record):
+            raise InputError(f"GroundMotion: record is {self.record!r}; pass a Record, such as read_record(path)")
+        _check(self, finite=("scale",))
+
+    @property
+    def duration(self) -> float:
+        """Time of the last sample [s]."""
+        return self.record.duration
+
+    def acceleration(self, t: float) -> float:
+        """scale · linear interpolation between the two samples around t [m/s²]."""
+        record = self.record
+        if not 0.0 <= t <= record.duration:
+            return 0.0
+        position = t / record.dt
+        k = min(int(position), record.acceleration.size - 2)
+        w = position - k
+        return self.scale * float((1.0 - w) * record.acceleration[k] + w * record.acceleration[k + 1])
+
+    __call__ = _vector
+
+
+def _check(excitation: Excitation, *, finite: tuple[str, ...] = (), positive: tuple[str, ...] = ()) -> None:
+    """Raise InputError for a bad number or direction; turn the direction into a tuple of floats."""
+    owner = type(excitation).__name__
+    for name in finite + positive:
+        value = getattr(excitation, name)
+        if not isinstance(value, Real) or not math.isfinite(value):
+            raise InputError(f"{owner}: {name} is {value!r}; give a finite number")
+        if name in positive and value <= 0:
+            raise InputError(f"{owner}: {name} is {value!r}; give a number above zero")
+    direction = _finite_tuple(owner, "direction", excitation.direction)
+    if not 1 <= len(direction) <= 3 or not any(direction):
+        raise InputError(f"{owner}: direction is {direction!r}; give one to three components, not all zero")
+    object.__setattr__(excitation, "direction", direction)
+
+
+def _finite_tuple(owner: str, name: str, values: Sequence[float]) -> tuple[float, ...]:
+    """`values` as a tuple of floats; InputError naming the first entry that is not a finite number."""
+    try:
+        result = tuple(float(value) for value in values)
+    except (TypeError, ValueError):
+        raise InputError(f"{owner}: {name} is {values!r}; give a sequence of numbers") from None
+    for k, value in enumerate(result):
+        if not math.isfinite(value):
+            raise InputError(f"{owner}: {name}[{k}] is {value!r}; give finite numbers")
+    return result

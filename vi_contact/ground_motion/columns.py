@@ -1,0 +1,103 @@
+"""Plain columns: time [s] and acceleration, or acceleration alone with the time step given by the caller.
+
+Lines starting with "#" and empty lines are skipped; columns are separated by blanks, commas or semicolons. A header
+that ends in `*** Begin data ***` is skipped too. The units are never guessed.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+
+from ..algebra import Array
+from ..errors import InputError
+from .at2 import begin_data
+from .record import UNITS, Record, file_dt, file_units
+from .text import TextFile
+
+JITTER = 1e-6
+"""Relative difference between time steps that still counts as rounding."""
+
+
+def read(text: TextFile, units: str | None = None, dt: float | None = None, resample_dt: float | None = None) -> Record:
+    """The record of a column file; `units` is required, `dt` too when there is no time column.
+
+    Uneven times are refused unless resample_dt [s] is given: then straight lines between the samples are read off at
+    resample_dt, or at the nearest whole part of it that is not longer than the usual step, so that reading does not
+    alias. The first time of the file becomes t = 0.
+    Raises InputError naming file and line for missing units, ragged rows, words that are not numbers, times that do
+    not increase, uneven times.
+    """
+    name = file_units(text.path, None, units)
+    lines, table = _table(text)
+    notes: tuple[str, ...] = ()
+    if table.shape[1] == 1:
+        step, samples = file_dt(text.path, None, dt), table[:, 0]
+    else:
+        times, samples = table[:, 0], table[:, 1]
+        uneven = _uneven_line(text, lines, times)
+        if uneven is None:
+            step = file_dt(text.path, (times[-1] - times[0]) / (times.size - 1), dt)
+        else:
+            step, samples = _evened(uneven, times, samples, resample_dt)
+            notes += (f"uneven times interpolated linearly to a step of {step:g} s",)
+        if times[0] != 0.0:
+            notes += (f"the first time in the file is {times[0]:g} s and is t = 0 here",)
+    comments = tuple(line.lstrip("# ").rstrip() for line in text.lines if line.startswith("#"))
+    return Record(acceleration=UNITS[name] * samples, dt=step, title=comments[0] if comments else "", source=text.path,
+                  format="columns", units=name, sha256=text.sha256, notes=comments + notes)
+
+
+def follow_begin_data(text: TextFile) -> bool:
+    """Whether times and accelerations, and not rows of accelerations, follow a `*** Begin data ***` line."""
+    start = begin_data(text)
+    if start is None:
+        return False
+    rows = [text.numbers(index) for index in range(start, len(text.lines)) if text.lines[index].strip()]
+    times = [row[0] for row in rows]
+    return all(len(row) == 2 for row in rows) and all(after > before >= 0.0 for before, after in pairwise(times))
+
+
+def _table(text: TextFile) -> tuple[list[int], Array]:
+    """Line index of every row and the rows, shape (n, 1) or (n, 2), n >= 2."""
+    lines, rows = [], []
+    for index in range(begin_data(text) or 0, len(text.lines)):
+        line = text.lines[index].strip()
+        if line and not line.startswith("#"):
+            lines.append(index)
+            rows.append(text.numbers(index))
+            if len(rows[-1]) not in (1, 2) or len(rows[-1]) != len(rows[0]):
+                raise InputError(f"{text.at(index)}: {len(rows[-1])} columns instead of {min(len(rows[0]), 2)}; "
+                                 "give time and acceleration, or acceleration alone")
+    if len(rows) < 2:
+        raise InputError(f"{text.path}: {len(rows)} samples is no record; give at least two")
+    return lines, np.array(rows)
+
+
+def _uneven_line(text: TextFile, lines: list[int], times: Array) -> str | None:
+    """None for equal steps, else the beginning of a sentence about the first step unlike the others."""
+    steps = np.diff(times)
+    usual = float(np.median(steps))
+    backward = steps <= 0.0
+    if np.any(backward):
+        k = int(np.argmax(backward)) + 1
+        raise InputError(f"{text.at(lines[k])}: time {times[k]:g} s does not come after {times[k - 1]:g} s; "
+                         "sort the rows and remove repeated times")
+    odd = np.abs(steps - usual) > JITTER * usual
+    if not np.any(odd):
+        return None
+    k = int(np.argmax(odd)) + 1
+    return f"{text.at(lines[k])}: the step to time {times[k]:.9g} s is {steps[k - 1]:.9g} s, others {usual:.9g} s"
+
+
+def _evened(sentence: str, times: Array, samples: Array, resample_dt: float | None) -> tuple[float, Array]:
+    """Step and samples on an equal grid; InputError with the sentence when no resampling was asked for."""
+    if resample_dt is None:
+        raise InputError(f"{sentence}; pass resample_dt= to interpolate, or correct the time")
+    if not resample_dt > 0.0 or not math.isfinite(resample_dt):
+        raise InputError(f"resample_dt is {resample_dt!r}; give a positive number of seconds")
+    step = resample_dt / math.ceil(resample_dt / float(np.median(np.diff(times))) * (1.0 - JITTER))
+    count = int((times[-1] - times[0]) / step * (1.0 + 1e-12)) + 1
+    return step, np.interp(times[0] + step * np.arange(count), times, samples)

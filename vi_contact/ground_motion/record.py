@@ -1,0 +1,106 @@
+"""One component of a recorded ground motion, and the units its file may be written in."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from numbers import Real
+
+import numpy as np
+
+from ..algebra import Array
+from ..errors import InputError
+
+STANDARD_GRAVITY = 9.80665
+"""Standard gravity [m/s²], the g of every record file."""
+
+UNITS = {"m/s2": 1.0, "cm/s2": 0.01, "gal": 0.01, "g": STANDARD_GRAVITY, "mm/s2": 0.001, "in/s2": 0.0254,
+         "ft/s2": 0.3048}
+"""Accepted units of acceleration and their size in m/s²."""
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """Equally spaced accelerations. Sample k is the acceleration at t = k · dt: the first sample is at t = 0.
+
+    acceleration: shape (n,), n >= 2 [m/s²], copied and made read-only; dt: time step [s] > 0; title; source: path of
+    the file; format: name of its format; units: of the file, before conversion to m/s²; sha256: of the file's bytes;
+    notes: what the file says about station and processing, then every change made since, one line each.
+    Between samples the acceleration is a straight line. Two records are equal only if they are the same object.
+    Raises InputError for NaN or infinite samples, fewer than two of them, or a time step that is not positive.
+    """
+
+    acceleration: Array
+    dt: float
+    title: str = ""
+    source: str = ""
+    format: str = ""
+    units: str = "m/s2"
+    sha256: str = ""
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        samples = np.array(self.acceleration, dtype=float)
+        if samples.ndim != 1 or samples.size < 2:
+            raise InputError(f"{self._name}: acceleration has shape {samples.shape}; give a row of two or more")
+        if not np.all(np.isfinite(samples)):
+            first = int(np.argmin(np.isfinite(samples)))
+            raise InputError(f"{self._name}: sample {first} is {samples[first]}; give finite accelerations")
+        if not isinstance(self.dt, Real) or not math.isfinite(self.dt) or self.dt <= 0:
+            raise InputError(f"{self._name}: the time step is {self.dt!r}; give a positive number of seconds")
+        samples.flags.writeable = False
+        object.__setattr__(self, "acceleration", samples)
+
+    @property
+    def _name(self) -> str:
+        return self.source or "Record"
+
+    @property
+    def times(self) -> Array:
+        """k · dt [s], shape (n,)."""
+        return self.dt * np.arange(self.acceleration.size)
+
+    @property
+    def duration(self) -> float:
+        """Time of the last sample, (n - 1) · dt [s]."""
+        return (self.acceleration.size - 1) * self.dt
+
+
+def canonical_units(source: str, units: str) -> str:
+    """The key of UNITS that `units` spells ("CM/SEC/SEC", "(g)", "cm/s^2"); InputError if it is no acceleration."""
+    text = units.lower().strip(" ()[].,;").replace("²", "2").replace("^", "").replace("**", "")
+    text = re.sub(r"\s", "", text).replace("sec", "s").replace("/s/s", "/s2")
+    if text not in UNITS:
+        raise InputError(f"{source}: {units!r} is not a unit of acceleration known here; use a file of accelerations "
+                         f"in one of {', '.join(UNITS)}")
+    return text
+
+
+def file_units(source: str, stated: str | None, given: str | None) -> str:
+    """Units, as a key of UNITS, of a file that states `stated` (or nothing) when the caller says `given` (or nothing).
+
+    Raises InputError when neither is known, one is not an acceleration, or the two contradict each other.
+    """
+    names = [canonical_units(source, units) for units in (stated, given) if units is not None]
+    if not names:
+        raise InputError(f"{source}: the file does not state its units; pass units= as one of {', '.join(UNITS)}")
+    if len({UNITS[name] for name in names}) > 1:
+        raise InputError(f"{source}: the file states its units as {names[0]} but units={given!r} was passed; "
+                         "leave units out or correct the file")
+    return names[0]
+
+
+def file_dt(source: str, stated: float | None, given: float | None) -> float:
+    """The time step [s] of a file that states `stated` (or nothing) when the caller says `given` (or nothing).
+
+    Raises InputError when neither is known or they differ by more than one part in a million.
+    """
+    if stated is None:
+        if given is None:
+            raise InputError(f"{source}: the file does not state its time step; pass dt= in seconds")
+        return given
+    if given is not None and not math.isclose(stated, given, rel_tol=1e-6):
+        raise InputError(f"{source}: the file states a time step of {stated:g} s but dt={given!r} was passed; "
+                         "leave dt out or correct the file")
+    return stated
