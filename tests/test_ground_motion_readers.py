@@ -228,6 +228,11 @@ def test_units_of_columns_are_never_guessed(tmp_path):
         read_record(write(tmp_path, columns(TIMES, VALUES)))
 
 
+def test_an_unknown_format_is_refused_at_its_first_line(tmp_path):
+    with pytest.raises(InputError, match="line 1: 'EVENT_NAME:' is not a number"):
+        read_record(write(tmp_path, "EVENT_NAME: X\nUNITS: cm/s^2\n1.0\n2.0\n"))
+
+
 def test_one_column_needs_the_time_step(tmp_path):
     path = write(tmp_path, "\n".join(map(str, VALUES)))
     with pytest.raises(InputError, match="pass dt="):

@@ -30,8 +30,8 @@ def read(text: TextFile, units: str | None = None, dt: float | None = None, resa
     Raises InputError naming file and line for missing units, ragged rows, words that are not numbers, times that do
     not increase, uneven times.
     """
-    name = file_units(text.path, None, units)
     lines, table = _table(text)
+    name = file_units(text.path, None, units)
     notes: tuple[str, ...] = ()
     if table.shape[1] == 1:
         step, samples = file_dt(text.path, None, dt), table[:, 0]
