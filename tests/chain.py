@@ -1,0 +1,111 @@
+"""A spring-mass chain with walls at its ends: the smallest contact problem, shared by tests that need no finite elements.
+
+Masses sit at X = 1, 2, …, n [m]; spring i joins mass i - 1 to mass i, spring 1 joins mass 1 to the ground (clamped) or is
+absent (floating). The wall on the right bounds u_n <= gap; the wall on the left bounds -u_1 <= left_gap, so that its
+contact direction is -1 and the change of basis is not the identity. Everything runs on one process (SerialAlgebra).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from vi_contact.algebra import Array, SerialAlgebra, SerialComm, SerialMatrix
+from vi_contact.errors import InputError
+from vi_contact.step import ContactProblem
+from vi_contact.surfaces import ContactSurface
+from vi_contact.system import Load, SemiDiscreteSystem
+
+
+@dataclass(frozen=True)
+class ChainSpace:
+    """Unknown i is the displacement of mass i at X = i + 1."""
+
+    unknowns: int
+    dimension: int = 1
+
+    @property
+    def ids(self) -> Any:
+        return np.arange(self.unknowns)
+
+    def find_nodes(self, points: Array) -> Any:
+        nodes = np.rint(np.asarray(points, dtype=float)[:, 0]).astype(int) - 1
+        if np.any((nodes < 0) | (nodes >= self.unknowns)):
+            raise InputError(f"points {points} are not all on the chain: give a point of the body")
+        return nodes
+
+    def sample(self, u: Array, nodes: Any, t: float, derivative: int = 0) -> Array:
+        return np.asarray(u)[nodes][:, None]
+
+
+def chain_system(
+    n: int = 5,
+    *,
+    mass: float = 2.0,
+    stiffness: float = 1.0e3,
+    damping: float = 0.0,
+    consistent: bool = False,
+    floating: bool = False,
+    constant: float = 0.0,
+    u0: Array | None = None,
+    v0: Array | None = None,
+) -> SemiDiscreteSystem:
+    """n masses [kg] and springs [N/m], C = damping * K [s], a constant force [N] on the last mass.
+
+    ``consistent``: mass/6 times tridiag(1, 4, 1), which component resets of velocities see (V9.6); lumped by default.
+    """
+    k = np.full(n, 2.0)
+    k[-1] = 1.0
+    if floating:
+        k[0] -= 1.0
+    off = np.full(n - 1, -1.0)
+    K = stiffness * sp.diags([off, k, off], [-1, 0, 1])
+    side = np.full(n - 1, mass / 6.0)
+    M = sp.diags([side, np.full(n, 4.0 * mass / 6.0), side], [-1, 0, 1]) if consistent else sp.diags([np.full(n, mass)], [0])
+    force = np.zeros(n)
+    force[-1] = constant
+    return SemiDiscreteSystem(
+        algebra=SerialAlgebra(),
+        M=SerialMatrix(M),
+        C=SerialMatrix(damping * K) if damping else None,
+        K=SerialMatrix(K),
+        load=Load(force),
+        influence=np.ones((n, 1)),
+        u0=np.zeros(n) if u0 is None else np.asarray(u0, dtype=float),
+        v0=np.zeros(n) if v0 is None else np.asarray(v0, dtype=float),
+        space=ChainSpace(n),
+        floating=floating,
+    )
+
+
+def chain_surface(n: int, *, gap: float = 0.0, left_gap: float | None = None, weight: float = 0.5) -> ContactSurface:
+    """The wall on the right of mass n and, when ``left_gap`` is given, the wall on the left of mass 1 (condition 1)."""
+    ends = [n - 1] if left_gap is None else [n - 1, 0]
+    direction = np.ones(n)
+    if left_gap is not None:
+        direction[0] = -1.0
+    m = len(ends)
+    return ContactSurface(
+        comm=SerialComm(),
+        points=np.array(ends, dtype=float)[:, None] + 1.0,
+        normals=direction[ends][:, None],
+        weights=np.full(m, weight),
+        gap0=np.array([gap, left_gap][:m], dtype=float),
+        bilateral=np.zeros(m, dtype=bool),
+        compliance=np.zeros(m),
+        owned=np.array(ends, dtype=np.int64),
+        slots=np.arange(m),
+        tangents=np.zeros((m, 0), dtype=np.int64),
+        basis=None if left_gap is None else SerialMatrix(sp.diags([direction], [0])),
+    )
+
+
+def chain_problem(
+    n: int = 5, *, gap: float = 0.0, left_gap: float | None = None, impact: Any = None, excitation: Any = (), **system: Any
+) -> ContactProblem:
+    """The chain between its walls; other keywords go to ``chain_system``."""
+    surface = chain_surface(n, gap=gap, left_gap=left_gap)
+    return ContactProblem(chain_system(n, **system), surface, impact=impact, excitation=excitation)
