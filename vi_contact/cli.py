@@ -73,7 +73,7 @@ def _impact(name: str, projection: bool) -> Any:
     from .errors import InputError
     from .impact import ComponentReset, Elastic, Inelastic, MassProjection, Newton, NoImpact
 
-    reading = MassProjection() if projection else ComponentReset()
+    reading: Any = MassProjection() if projection else ComponentReset()
     if name == "none":
         return NoImpact()
     if name in ("inelastic", "elastic"):
@@ -92,10 +92,10 @@ def _wall(options: argparse.Namespace) -> str:
     from .models.wall import Wall
     from .models.wall_run import WallRun, run_wall
 
-    divisions = (8, 12) if options.divisions is None else tuple(options.divisions)
+    nx, ny = options.divisions or (8, 12)
     run = WallRun(
         case=options.case,
-        wall=Wall(divisions=divisions, size=options.size, triangles=options.triangles),
+        wall=Wall(divisions=(nx, ny), size=options.size, triangles=options.triangles),
         motion=options.motion,
         vertical=options.vertical,
         units=options.units,

@@ -20,21 +20,10 @@ import numpy as np
 
 from .algebra import Algebra, Array, Factor, Mask, Matrix
 from .errors import InputError
-from .friction import Frictionless
+from .excitation import Excitation
+from .friction import FrictionLaw, Frictionless
 from .surfaces import ContactSurface
 from .system import SemiDiscreteSystem
-
-
-class Excitation(Protocol):
-    """A ground acceleration: a scalar history [m/s²] along a direction."""
-
-    direction: tuple[float, ...]
-
-    def acceleration(self, t: float) -> float: ...
-
-
-class FrictionLaw(Protocol):
-    """A friction law (friction.py)."""
 
 
 @dataclass(frozen=True)

@@ -194,8 +194,8 @@ def _initial(space: FemSpace, name: str, value: Initial) -> Array:
     """Initial values on the free unknowns."""
     if value is None:
         return np.zeros(len(space.ids))
-    field = (lambda points, t: value(points)) if callable(value) else value
-    return space.restrict(evaluate(name, field, space.points, 0.0))
+    values = value(space.points) if callable(value) else np.tile(np.asarray(value, dtype=float), (len(space.points), 1))
+    return space.restrict(evaluate(name, lambda points, t: values, space.points, 0.0))
 
 
 def floats(space: FemSpace) -> bool:

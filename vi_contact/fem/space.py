@@ -43,7 +43,8 @@ class FemSpace:
         self.prescribed = prescribed
         self.held = np.zeros((owned, self.dimension), dtype=bool)
         for condition in prescribed:
-            self.held[np.ix_(self.facet_blocks(condition.facets.indices), self._components(condition))] = True
+            blocks = self.facet_blocks(condition.facets.indices)
+            self.held[blocks[:, None], self._components(condition)] = True
         self.free: Mask = ~self.held.ravel()
         ids = self.nodes[:, None] * self.dimension + np.arange(self.dimension)
         self.ids: Indices = ids.ravel()[self.free]

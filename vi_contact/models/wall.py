@@ -53,7 +53,9 @@ class Wall:
     def mesh(self) -> WallMesh:
         """The Gmsh description; a ``size`` replaces the exact divisions."""
         divisions = None if self.size is not None else self.divisions
-        return WallMesh(self.height, self.width, divisions=divisions, size=self.size, triangles=self.triangles)
+        return WallMesh(
+            height=self.height, width=self.width, divisions=divisions, size=self.size, triangles=self.triangles
+        )
 
     def point(self, number: int) -> tuple[float, float]:
         """Coordinates of the seed's boundary points 1..40, anticlockwise from the right side above the base.
