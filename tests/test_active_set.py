@@ -43,28 +43,43 @@ def test_a_cycle_of_the_plain_method_is_broken(q):
         guess = np.array([bool(bits & 1), bool(bits & 2), bool(bits & 4)])
         result = ActiveSet().solve(LCP(CYCLING, q, unilateral), guess=guess)
         assert result.r == pytest.approx(exact, abs=1e-12)
-        assert result.iterations <= 3 + 8  # once round the cycle, and the fallback visits no set twice
-    assert 1.0 in ActiveSet().solve(LCP(CYCLING, q, unilateral)).history  # the fallback moved a single row
+        assert result.iterations <= 4 + 3  # once round the cycle, then about a row at a time
 
 
 def test_many_cycling_blocks_at_once():
-    """Ten cycling problems side by side, weakly coupled: no set of full exchange solves them together."""
+    """Ten cycling problems side by side, weakly coupled; the fallback needs fewer changes than there are rows."""
     rng = np.random.default_rng(4)
     G = np.kron(np.eye(10), CYCLING) + 1e-4 * spd(rng, 30)
     q = np.tile([2.0, 1.0, -3.0], 10)
     assert len(set(full_exchange(G, q, q < 0.0, 200))) < 20
     result = ActiveSet().solve(LCP(G, q, np.zeros(30, dtype=bool)))
     assert result.residual <= 1e-13
+    assert 3 <= result.iterations <= 30
 
 
-def test_the_exponential_example_of_murtys_rule_is_not_exponential():
-    """Fathi (1979): M = L Lᵀ with ones on and twos below the diagonal, q = -1; Murty's rule alone takes 2^m pivots."""
+def test_a_worst_case_of_pivoting_is_harmless():
+    """Fathi (Math. Program. 17, 1979): G = L Lᵀ with ones on and twos below the diagonal, q = -1: 2^m pivots for Lemke
+    and Murty; r = (1, 0, …, 0)."""
     for m in (8, 16, 24):
         L = np.eye(m) + 2.0 * np.tril(np.ones((m, m)), -1)
         result = ActiveSet().solve(LCP(L @ L.T, -np.ones(m), np.zeros(m, dtype=bool)))
         exact = np.eye(m)[0]
         assert np.abs(result.r - exact).max() <= 1e-12
-        assert result.iterations <= 4 * m
+        assert result.iterations <= m
+
+
+def test_an_ill_conditioned_problem_does_not_wander():
+    """Condition 1e10, m = 60: full exchange by itself goes through hundreds of sets without a cycle (761 in one of
+    these); with patience, at most twice as many changes as rows."""
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        Q = np.linalg.qr(rng.normal(size=(60, 60)))[0]
+        G = (Q * np.logspace(0.0, -10.0, 60)) @ Q.T
+        for bilateral in (np.zeros(60, dtype=bool), np.arange(60) < 6):
+            problem = LCP(0.5 * (G + G.T), rng.normal(size=60), bilateral)
+            result = ActiveSet().solve(problem)
+            assert result.iterations <= 120
+            assert problem.residual(result.r) <= 1e-9
 
 
 @pytest.mark.parametrize("kind", range(len(KINDS)), ids=[kind.__name__ for kind in KINDS])
@@ -109,7 +124,7 @@ def test_grazing_rows_do_not_flip_for_ever():
         assert ActiveSet().solve(degenerate(rng, 12)).iterations <= 6
 
 
-def test_refinement_keeps_an_ill_conditioned_answer_certified():
+def test_an_ill_conditioned_answer_is_certified():
     """Hilbert matrix, condition 1.5e10: the residual stays at rounding level although r itself has six digits."""
     G = 1.0 / (1.0 + np.add.outer(np.arange(8.0), np.arange(8.0)))
     r = np.ones(8)
@@ -122,6 +137,8 @@ def test_failure_tells_what_happened_and_what_to_do():
     problem = LCP(CYCLING, np.array([2.0, 1.0, -3.0]), np.zeros(3, dtype=bool))
     with pytest.raises(StepFailure, match=r"ActiveSet.*after 2 iterations with residual .*raise max_iterations"):
         ActiveSet(max_iterations=2).solve(problem)
+    with pytest.raises(StepFailure, match="after 3 iterations"):  # in the fallback
+        ActiveSet(max_iterations=3).solve(problem)
     G = 1.0 / (1.0 + np.add.outer(np.arange(8.0), np.arange(8.0)))
     with pytest.raises(StepFailure, match="ill-conditioned"):
         ActiveSet(tolerance=1e-18).solve(LCP(G, -np.linspace(1.0, 2.0, 8), np.zeros(8, dtype=bool)))

@@ -57,6 +57,17 @@ def test_only_applications_of_G_are_needed():
     assert result.iterations < operator.count <= 2 * result.iterations + 4
 
 
+def test_the_residual_is_the_true_one():
+    """After hundreds of recursive updates (condition 1e8) it is that of q + G r, evaluated anew."""
+    Q = np.linalg.qr(np.random.default_rng(3).normal(size=(60, 60)))[0]
+    G = (Q * np.logspace(0.0, -8.0, 60)) @ Q.T
+    problem = LCP(0.5 * (G + G.T), np.random.default_rng(4).normal(size=60), np.zeros(60, dtype=bool))
+    result = ProjectedCG().solve(problem)
+    assert result.iterations >= 200
+    assert problem.residual(result.r) == pytest.approx(result.residual, rel=0.2)
+    assert result.residual <= 1e-10
+
+
 def test_history_falls_to_the_tolerance_relative_to_zero_reaction():
     problem = generic(np.random.default_rng(1), 12)
     result = ProjectedCG().solve(problem)

@@ -6,10 +6,11 @@ the semismooth Newton method for  r = max(0, r - c w)  of Hintermüller, Ito and
 the first guess r or w is zero in every row, so that c drops out. The same iteration is Newton-min and full exchange.
 
 It ends in at most m changes for M-matrices but may cycle for others from m = 3 on (Ben Gharbia and Gilbert, Math.
-Program. 134, 2012). Once a set comes back, only the wrong row of highest index changes sides (Murty's rule, finite for
-P-matrices) until fewer signs are wrong than ever before; then full exchange is tried again. The count of wrong signs
-can drop at most m times, so the whole is finite: block principal pivoting of Júdice and Pires (Comput. Oper. Res. 21,
-1994).
+Program. 134, 2012), or wander when G is ill-conditioned. When a set comes back, or the count of wrong signs has not
+fallen below its minimum for PATIENCE changes, the method of Lawson and Hanson (Solving Least Squares Problems, 1974,
+ch. 23, there for least squares) takes over: it admits one row at a time and keeps r >= 0, so that ½ rᵀG r + qᵀr falls
+at every set it completes. No such set can return: it ends, in practice after about as many changes as there are rows.
+(Murty's single exchanges, the other finite fallback, took up to 1000 changes where this one took 150.)
 """
 
 from __future__ import annotations
@@ -19,7 +20,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import lapack
 
-from .lcp import EPS, LCP, Array, LCPResult, Mask, check_guess, cholesky, failure, largest, scaled_dense
+from .lcp import LCP, Array, LCPResult, Mask, check_guess, cholesky, failure, scaled_dense
+
+PATIENCE = 10  # Júdice and Pires, Comput. Oper. Res. 21, 1994
 
 
 @dataclass(frozen=True)
@@ -76,29 +79,49 @@ class PreparedActiveSet:
         """The r and w of the first set without wrong signs, and how many rows changed sides in each change."""
         history: list[float] = []
         seen: set[bytes] = set()
-        fewest, single = gap.size + 1, False
+        fewest, patience = gap.size + 1, PATIENCE
         while True:
             r, w = self._on_set(active, gap)
             wrong = self._wrong(active, r, w)
             count = int(np.count_nonzero(wrong))
             if count == 0:
                 return *self._cut(r, w, gap), tuple(history)
-            if len(history) == self.method.max_iterations:
-                raise failure(
-                    self.method,
-                    iterations=len(history),
-                    residual=self._scaled.complementarity(r, w) / self._scaled.violation(gap),
-                    advice=f"{count} rows have a wrong sign; reduce the time step or raise max_iterations",
-                )
-            if count < fewest:
-                fewest, single = count, False
-            elif active.tobytes() in seen:
-                single = True
+            fewest, patience = (count, PATIENCE) if count < fewest else (fewest, patience - 1)
+            if patience == 0 or active.tobytes() in seen:
+                return *self._descend(self._positive(r), gap, history), tuple(history)
             seen.add(active.tobytes())
-            if single:
-                wrong[: np.flatnonzero(wrong)[-1]] = False
-            history.append(1.0 if single else float(count))
+            self._count(history, count, r, w, gap)
             active = active ^ wrong
+
+    def _descend(self, r: Array, gap: Array, history: list[float]) -> tuple[Array, Array]:
+        """Lawson–Hanson from an admissible r; adds to ``history``."""
+        active = (r > 0.0) | self._scaled.bilateral
+        while True:
+            target, w = self._on_set(active, gap)
+            leaving = active & ~self._scaled.bilateral & (target < 0.0)
+            if leaving.any():  # go only as far as the first reaction that vanishes
+                share = np.full(r.size, np.inf)
+                share[leaving] = r[leaving] / (r[leaving] - target[leaving])
+                change: Mask = share == share.min()
+                r = self._positive(np.where(change, 0.0, r + share.min() * (target - r)))
+            else:
+                r = target
+                if not self._wrong(active, r, w).any():
+                    return r, w
+                change = np.arange(r.size) == np.argmin(np.where(active, np.inf, w))
+            self._count(history, int(np.count_nonzero(change)), r, w, gap)
+            active = active ^ change
+
+    def _count(self, history: list[float], rows: int, r: Array, w: Array, gap: Array) -> None:
+        """Record a change of the set, or raise StepFailure when there have been too many."""
+        if len(history) == self.method.max_iterations:
+            raise failure(
+                self.method,
+                iterations=len(history),
+                residual=self._scaled.complementarity(r, w) / self._scaled.violation(gap),
+                advice="reduce the time step, or raise max_iterations",
+            )
+        history.append(float(rows))
 
     def _on_set(self, active: Mask, gap: Array) -> tuple[Array, Array]:
         if self._factor.key != active.tobytes():
@@ -110,14 +133,14 @@ class PreparedActiveSet:
         wrong: Mask = np.where(active, r, w) < -self._scaled.rounding(r)
         return wrong & ~self._scaled.bilateral if self._scaled.any_bilateral else wrong
 
+    def _positive(self, r: Array) -> Array:
+        cut: Array = np.maximum(r, 0.0)
+        return np.where(self._scaled.bilateral, r, cut) if self._scaled.any_bilateral else cut
+
     def _cut(self, r: Array, w: Array, gap: Array) -> tuple[Array, Array]:
         """Cut reactions that are negative by rounding, so that r >= 0 holds exactly."""
-        clipped = np.maximum(r, 0.0)
-        if self._scaled.any_bilateral:
-            clipped = np.where(self._scaled.bilateral, r, clipped)
-        if (clipped != r).any():
-            r, w = clipped, gap + self._scaled.matrix @ clipped
-        return r, w
+        cut = self._positive(r)
+        return (cut, gap + self._scaled.matrix @ cut) if (cut != r).any() else (r, w)
 
 
 class _Factor:
@@ -130,18 +153,14 @@ class _Factor:
         self._lower = cholesky(self._rows[:, self._index]) if self._index.size else None
 
     def solve(self, gap: Array) -> tuple[Array, Array]:
-        """r (m,) with r = 0 off the set, and w = gap + G r, refined once where w on the set is not yet zero."""
+        """r (m,) with r = 0 off the set, and w = gap + G r.
+
+        No iterative refinement: the residual of Cholesky is at rounding level already (measured gain below a factor 2
+        for conditions up to 1e10).
+        """
         r = np.zeros(gap.size)
         if self._lower is None:
             return r, gap.copy()
-        own = -gap[self._index]
-        part, _ = lapack.dpotrs(self._lower, own, lower=1)
-        w = gap + part @ self._rows
-        error = w[self._index]
-        if largest(error) > 4.0 * EPS * largest(own):
-            better = part - lapack.dpotrs(self._lower, error, lower=1)[0]
-            w_better = gap + better @ self._rows
-            if largest(w_better[self._index]) < largest(error):
-                part, w = better, w_better
+        part, _ = lapack.dpotrs(self._lower, -gap[self._index], lower=1)
         r[self._index] = part
-        return r, w
+        return r, gap + part @ self._rows

@@ -78,10 +78,11 @@ class LCP:
 
 @dataclass(frozen=True)
 class LCPResult:
-    """What a method returns: never an uncertified guess (StepFailure is raised instead).
+    """What a method returns when it has reached its tolerance or the limit that rounding sets (else StepFailure).
 
-    ``r`` (m,) with r >= 0 exactly in unilateral rows; ``active`` (m,) boolean: r > 0, or bilateral; ``residual`` as in
-    LCP.residual; ``method`` the settings that made it. Each method tells what ``iterations`` and ``history`` count.
+    ``r`` (m,) with r >= 0 exactly in unilateral rows; ``active`` (m,) boolean: r > 0, or bilateral, where a grazing row
+    (r = w = 0 but for rounding) may be either; ``residual`` as in LCP.residual; ``method`` the settings that
+    made it. Each method tells what ``iterations`` and ``history`` count.
     """
 
     r: Array
