@@ -12,7 +12,8 @@ from . import __version__
 from .errors import ViContactError
 
 _DESCRIPTION = """Dynamic unilateral contact of elastic structures: exact non-penetration, a closed energy ledger and a
-certificate for every time step. Run under "mpirun -n N" for any number of ranks."""
+certificate for every time step. Run under "mpirun -n N" for any number of ranks. Options -vi_contact_volume_... go to
+PETSc (for example -vi_contact_volume_snes_monitor)."""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -41,7 +42,9 @@ def parser() -> argparse.ArgumentParser:
 
 def add_wall_arguments(wall: argparse.ArgumentParser) -> None:
     """The options of ``vi-contact wall`` (the demo takes the same)."""
-    wall.add_argument("--case", default="a", help="a: 3 contact points, b: 11, face: whole side, bilateral, free (default a)")
+    wall.add_argument(
+        "--case", help="a: 3 contact points, b: 11, face: whole side, bilateral, free (default: a and b, in DIR/a and DIR/b)"
+    )
     shake = wall.add_argument_group("ground motion")
     shake.add_argument("--motion", metavar="FILE", help="horizontal record: PEER AT2, USGS SMC or two columns")
     shake.add_argument("--vertical", metavar="FILE", help="vertical record, beside --motion")
@@ -89,12 +92,20 @@ def _impact(name: str, projection: bool) -> Any:
 def _wall(options: argparse.Namespace) -> str:
     from mpi4py import MPI
 
+    cases = {options.case: Path(options.out)} if options.case else {case: Path(options.out) / case for case in "ab"}
+    texts = [_wall_case(options, case, out) for case, out in cases.items()]
+    return "\n\n".join(texts) if MPI.COMM_WORLD.rank == 0 else ""
+
+
+def _wall_case(options: argparse.Namespace, case: str, out: Path) -> str:
+    from mpi4py import MPI
+
     from .models.wall import Wall
     from .models.wall_run import WallRun, run_wall
 
     nx, ny = options.divisions or (8, 12)
     run = WallRun(
-        case=options.case,
+        case=case,
         wall=Wall(divisions=(nx, ny), size=options.size, triangles=options.triangles),
         motion=options.motion,
         vertical=options.vertical,
@@ -112,9 +123,8 @@ def _wall(options: argparse.Namespace) -> str:
         fields_every=options.fields_every,
         restart=options.restart,
     )
-    out = Path(options.out)
     solution = run_wall(run, MPI.COMM_WORLD, out, progress=not options.quiet)
-    return f"{solution.summary()}\noutput: {out}" if MPI.COMM_WORLD.rank == 0 else ""
+    return f"Wall, case {case}\n{solution.summary()}\noutput: {out}"
 
 
 def _motion_info(options: argparse.Namespace) -> str:
@@ -123,9 +133,32 @@ def _motion_info(options: argparse.Namespace) -> str:
     return motion_info(options.file, options.units, dt=options.dt)
 
 
+def split_petsc(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
+    """(our own arguments, PETSc options): the latter are ``-vi_contact_... [value]``, the prefixes of our PETSc objects."""
+    own: list[str] = []
+    petsc: list[str] = []
+    taking = False
+    for argument in arguments:
+        if argument.startswith("-vi_contact_"):
+            petsc.append(argument)
+            taking = True
+        elif taking and not argument.startswith("-"):
+            petsc.append(argument)
+            taking = False
+        else:
+            own.append(argument)
+            taking = False
+    return own, petsc
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs a command; prints its text, or one sentence on standard error and returns 1."""
-    options = parser().parse_args(arguments)
+    own, petsc = split_petsc(sys.argv[1:] if arguments is None else arguments)
+    options = parser().parse_args(own)
+    if petsc:
+        import petsc4py
+
+        petsc4py.init(["vi-contact", *petsc])
     try:
         text = options.run(options)
     except ViContactError as error:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from ..algebra import Array
 from ..cross_check import CrossChecked
 from ..errors import InputError
 from ..excitation import Excitation, GroundMotion, Harmonic
@@ -24,6 +25,7 @@ from ..solvers.condensed import Condensed
 from ..solvers.hildreth import Hildreth
 from ..solvers.volume import OneFactorisation, Volume
 from ..step import ContactProblem, ImpactLaw, Scheme, Solver, State
+from ..surfaces import ContactSurface
 from .wall import CASES, Wall, WallModel, build
 
 SCHEMES: dict[str, Scheme] = {
@@ -36,6 +38,13 @@ SOLVERS: dict[str, Solver] = {
     "hildreth": Condensed(Hildreth()),
     "volume": Volume(method=OneFactorisation()),
     "volume-reference": Volume(),
+}
+TITLES = {
+    "a": "Wall, three possible contact points (Fig. 4)",
+    "b": "Wall, eleven possible contact points (Fig. 5)",
+    "bilateral": "Wall, eleven points held on the ground",
+    "free": "Wall without contact",
+    "face": "Wall, whole side in possible contact",
 }
 
 
@@ -95,7 +104,7 @@ def run_wall(run: WallRun, comm: Any, out: str | Path, *, progress: bool = True)
         progress=progress,
     )
     if comm.rank == 0:
-        draw(solution, run, problem, Path(out))
+        draw(solution.history, run.case, problem.surface, Path(out))
     comm.Barrier()
     return solution
 
@@ -146,21 +155,24 @@ def _start(run: WallRun, problem: ContactProblem) -> State | None:
     return static_equilibrium(problem, solver=SOLVERS[run.solver]) if run.gravity else None
 
 
-def draw(solution: Solution, run: WallRun, problem: ContactProblem, out: Path) -> None:
-    """The figures of a run."""
-    history = solution.history
-    contact = [str(number) for number in CASES.get(run.case, ())] if run.case != "free" else []
-    labels = [name[4:] for name in history if name.startswith("u_x_")]
-    titles = {
-        "a": "Wall, three possible contact points (Fig. 4)",
-        "b": "Wall, eleven possible contact points (Fig. 5)",
-        "bilateral": "Wall, eleven points held on the ground",
-        "free": "Wall without contact",
-    }
-    title = titles.get(run.case, "Wall, whole side in possible contact")
+def draw(
+    history: Mapping[str, Array],
+    case: str,
+    surface: ContactSurface,
+    out: Path,
+    *,
+    title: str | None = None,
+    reference: Mapping[str, Array] | None = None,
+) -> None:
+    """The figures of a run; ``reference``: the history of the linear wall, drawn in grey."""
+    contact = [] if case == "free" else [str(number) for number in CASES.get(case, range(1, 13))]
+    labels = [name.removeprefix("u_x_") for name in history if name.startswith("u_x_")]
     plot_excitation(history, out / "excitation.png")
-    plot_points(history, labels, out / "displacements.png", title=title, unilateral=contact)
+    plot_points(
+        history, labels, out / "displacements.png",
+        title=title or TITLES[case], unilateral=contact, reference=reference,
+    )
     plot_energy(history, out / "energy.png")
     plot_certificate(history, out / "certificate.png")
-    if problem.surface.count:
-        plot_contact(history, out / "contact.png", position=problem.surface.points[:, 1], axis_label="height [m]")
+    if surface.count:
+        plot_contact(history, out / "contact.png", position=surface.points[:, 1], axis_label="height [m]")
