@@ -1,0 +1,118 @@
+"""Distributed meshes with named groups, read from a file or built in memory by a Gmsh script.
+
+Rank 0 reads and checks (vi_contact.meshes.extract), all ranks get the mesh or the same InputError. Groups are recognised on
+each rank by the vertices of their members, numbered as in the input, so a facet may be in as many groups as it likes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from dolfinx.mesh import Mesh
+from mpi4py import MPI
+
+from vi_contact.errors import InputError
+from vi_contact.fem import compat
+from vi_contact.fem.compat import Indices
+from vi_contact.meshes.checks import contains
+from vi_contact.meshes.extract import MeshArrays, arrays_from_file, arrays_from_script
+from vi_contact.meshes.gmsh_session import MeshScript
+
+_TENSOR_ORDER = {"quadrilateral": [0, 1, 3, 2], "hexahedron": [0, 1, 3, 2, 4, 5, 7, 6]}
+"""DOLFINx's vertices in Gmsh's numbering, where the two differ."""
+
+
+@dataclass(frozen=True, eq=False)
+class Facets:
+    """A named part of the boundary (or of an inner surface): local facets of this rank, ghosts included, ascending."""
+
+    name: str
+    indices: Indices
+    mesh: Mesh = field(repr=False)
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """A named part of the body: local cells of this rank, ghosts included, ascending."""
+
+    name: str
+    indices: Indices
+    mesh: Mesh = field(repr=False)
+
+
+class Tags(dict[str, Any]):
+    """The groups of a mesh by name: `Cells` or `Facets`, the same names on all ranks. A missing name is an InputError."""
+
+    def __missing__(self, name: str) -> Any:
+        facets = [key for key, group in self.items() if isinstance(group, Facets)]
+        cells = [key for key, group in self.items() if isinstance(group, Cells)]
+        raise InputError(
+            f"mesh has no boundary group '{name}'; it has {', '.join(facets) or 'none'} (and cell groups {', '.join(cells)}):"
+            " name it in Gmsh as a physical group"
+        )
+
+
+def read_mesh(path: str | Path, comm: MPI.Comm) -> tuple[Mesh, Tags]:
+    """Read a first-order mesh of intervals, triangles, quadrilaterals, tetrahedra or hexahedra and its physical groups.
+
+    Coordinates in metres; any file format Gmsh reads. Raises InputError, the same on every rank, if the file is missing or
+    holds no usable mesh (all reasons: `vi_contact.meshes.extract.extract`). Collective.
+    """
+    return _distribute(comm, lambda: arrays_from_file(path))
+
+
+def build_mesh(mesh: MeshScript, comm: MPI.Comm) -> tuple[Mesh, Tags]:
+    """The mesh of a script of the folder meshes (or of anything with `build(gmsh)`), without a file. Raises like `read_mesh`."""
+    return _distribute(comm, lambda: arrays_from_script(mesh))
+
+
+def node_numbers(mesh: Mesh) -> npt.NDArray[np.int64]:
+    """Input number of every local geometry node (owned, then ghosts): its place, from 0, among the used nodes of the file."""
+    return np.asarray(mesh.geometry.input_global_indices, dtype=np.int64)
+
+
+def _distribute(comm: MPI.Comm, produce: Callable[[], MeshArrays]) -> tuple[Mesh, Tags]:
+    arrays = _on_root(comm, produce)
+    vertices = arrays.cells[:, _TENSOR_ORDER.get(arrays.cell, slice(None))]
+    mesh = compat.create_mesh(comm, arrays.cell, vertices, arrays.points)
+    tags = Tags()
+    original = np.asarray(mesh.topology.original_cell_index, dtype=np.int64)
+    for name, mask in arrays.cell_groups.items():
+        tags[name] = Cells(name, np.flatnonzero(mask[original]).astype(np.int32), mesh)
+    facets = _facet_vertices(mesh)
+    for name, rows in arrays.facet_groups.items():
+        tags[name] = Facets(name, np.flatnonzero(contains(rows, facets)).astype(np.int32), mesh)
+    return mesh, tags
+
+
+def _on_root(comm: MPI.Comm, produce: Callable[[], MeshArrays]) -> MeshArrays:
+    """The arrays on rank 0; on the others the groups, without points and cells. What rank 0 raises, all ranks raise."""
+    arrays: MeshArrays | None = None
+    outcome: Any = None
+    if comm.rank == 0:
+        try:
+            arrays = produce()
+            no_points, no_cells = arrays.points[:0], arrays.cells[:0]
+            outcome = MeshArrays(arrays.cell, no_points, no_cells, arrays.cell_groups, arrays.facet_groups)
+        except Exception as error:  # also a defect of ours: the others must not wait for ever
+            outcome = error if isinstance(error, InputError) else RuntimeError(f"rank 0 failed to make the mesh: {error!r}")
+            if outcome is not error:
+                outcome.__cause__ = error
+    outcome = comm.bcast(outcome)
+    if isinstance(outcome, Exception):
+        raise outcome
+    return outcome if arrays is None else arrays
+
+
+def _facet_vertices(mesh: Mesh) -> npt.NDArray[np.int64]:
+    """Vertices of every local facet in input numbers, (n_facets, n_facet_vertices)."""
+    dim = mesh.topology.dim - 1
+    mesh.topology.create_entities(dim)
+    facets = mesh.topology.index_map(dim)
+    everyone = np.arange(facets.size_local + facets.num_ghosts, dtype=np.int32)
+    return node_numbers(mesh)[compat.entities_to_geometry(mesh, dim, everyone)]

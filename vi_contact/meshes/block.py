@@ -1,0 +1,105 @@
+#!/usr/bin/env python3
+"""A bar, rectangle or box, evenly divided, if wanted bent by a smooth map and turned: the body of most tests.
+
+Physical groups: cells "block"; boundary "left", "right" (x lowest, highest), "bottom", "top" (y), "back", "front" (z, front
+towards the viewer). A bar has the first two, a rectangle four, a box six.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+if not __package__:  # run as a file of the source tree: find the package without installing it
+    sys.path[0] = str(Path(__file__).resolve().parents[2])
+
+from vi_contact.errors import InputError  # noqa: E402
+from vi_contact.meshes.gmsh_session import write  # noqa: E402
+from vi_contact.meshes.grid import Array, add_grid, lattice  # noqa: E402
+
+_SIDES = (("left", "right"), ("bottom", "top"), ("back", "front"))
+
+
+@dataclass(frozen=True, kw_only=True)
+class BlockMesh:
+    """Mesh of a d-dimensional box, d = len(lengths) = 1, 2 or 3.
+
+    A node starts at corner + (i lengths_x/n_x, ...), is moved by `deform`, then turned by `angle` [rad] about the origin (the
+    z axis for a box). `deform` takes and returns points (n, d) [m]. Raises InputError for sizes that make no box.
+    """
+
+    lengths: tuple[float, ...] = (1.0, 1.0)
+    divisions: tuple[int, ...] = (1, 1)
+    simplices: bool = False
+    corner: tuple[float, ...] | None = None
+    deform: Callable[[Array], Array] | None = None
+    angle: float = 0.0
+
+    def __post_init__(self) -> None:
+        check_box(self.lengths, self.divisions)
+        if self.corner is not None and len(self.corner) != len(self.lengths):
+            raise InputError(f"block corner {self.corner} needs {len(self.lengths)} coordinates, one per length")
+        if self.angle and len(self.lengths) == 1:
+            raise InputError("a bar in one dimension cannot be turned: leave the angle out or give two lengths")
+
+    def points(self) -> Array:
+        """All nodes, (n_1+1, ..., n_d+1, d) [m]."""
+        nodes = lattice(self.lengths, self.divisions)
+        if self.corner is not None:
+            nodes = nodes + np.asarray(self.corner)
+        if self.deform is not None:
+            nodes = np.asarray(self.deform(nodes.reshape(-1, nodes.shape[-1]))).reshape(nodes.shape)
+        return _turn(nodes, self.angle)
+
+    def build(self, gmsh: Any) -> None:
+        """Add the block to Gmsh's current model."""
+        add_grid(gmsh, self.points(), simplices=self.simplices, body="block", sides=_SIDES[: len(self.lengths)])
+
+
+def check_box(lengths: Sequence[float], divisions: Sequence[int]) -> None:
+    """Raise InputError unless all lengths [m] are positive and each of 1 to 3 has a positive whole number of divisions."""
+    if not 1 <= len(lengths) <= 3 or len(divisions) != len(lengths):
+        raise InputError(f"lengths {tuple(lengths)} and divisions {tuple(divisions)} must both be 1, 2 or 3 numbers")
+    if not all(math.isfinite(length) and length > 0.0 for length in lengths):
+        raise InputError(f"lengths {tuple(lengths)} must be positive numbers of metres")
+    if not all(n == int(n) and n >= 1 for n in divisions):
+        raise InputError(f"divisions {tuple(divisions)} must be whole numbers of cells, at least 1")
+
+
+def _turn(nodes: Array, angle: float) -> Array:
+    if not angle:
+        return nodes
+    c, s = math.cos(angle), math.sin(angle)
+    turned = nodes.copy()
+    turned[..., 0] = c * nodes[..., 0] - s * nodes[..., 1]
+    turned[..., 1] = s * nodes[..., 0] + c * nodes[..., 1]
+    return turned
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Write a block to a file: `block.py --lengths 2 1 --divisions 4 2 --simplices -o block.msh`."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
+    parser.add_argument("--lengths", type=float, nargs="+", default=[1.0, 1.0], help="one to three lengths [m]")
+    parser.add_argument("--divisions", type=int, nargs="+", default=[1, 1], help="cells along each length")
+    parser.add_argument("--simplices", action="store_true", help="triangles or tetrahedra")
+    parser.add_argument("--angle", type=float, default=0.0, help="rotation about the origin [rad]")
+    parser.add_argument("-o", "--output", default="block.msh")
+    given = parser.parse_args(arguments)
+    try:
+        block = BlockMesh(
+            lengths=tuple(given.lengths), divisions=tuple(given.divisions), simplices=given.simplices, angle=given.angle
+        )
+        write(block, given.output)
+    except InputError as error:
+        sys.exit(str(error))
+
+
+if __name__ == "__main__":
+    main()

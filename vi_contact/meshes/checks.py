@@ -1,0 +1,118 @@
+"""What a mesh must be before a solver sees it: cells with volume, not twisted, not folded; boundary groups made of their sides.
+
+Pure arithmetic on arrays: points (n, d) [m], cells (n_cells, n_vertices) as rows of points, vertices in Gmsh's order. Which way
+round the vertices of a cell run does not matter (finite elements use |det J|); neighbours on the same side of a facet do.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from vi_contact.errors import InputError
+
+Array = npt.NDArray[np.float64]
+Rows = npt.NDArray[np.int64]
+
+_ROUND_OFF = 1024 * np.finfo(float).eps
+
+_CORNERS = {  # a vertex and its d neighbours, right-handed in an unturned cell
+    "interval": [(0, 1)],
+    "triangle": [(0, 1, 2)],
+    "quadrilateral": [(0, 1, 3), (1, 2, 0), (2, 3, 1), (3, 0, 2)],
+    "tetrahedron": [(0, 1, 2, 3)],
+    "hexahedron": [
+        (0, 1, 3, 4), (1, 2, 0, 5), (2, 3, 1, 6), (3, 0, 2, 7),
+        (4, 7, 5, 0), (5, 4, 6, 1), (6, 5, 7, 2), (7, 6, 4, 3),
+    ],
+}  # fmt: skip
+_SIDES = {
+    "interval": [(0,), (1,)],
+    "triangle": [(0, 1), (1, 2), (2, 0)],
+    "quadrilateral": [(0, 1), (1, 2), (2, 3), (3, 0)],
+    "tetrahedron": [(0, 1, 2), (0, 1, 3), (0, 2, 3), (1, 2, 3)],
+    "hexahedron": [(0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)],
+}
+
+
+def check_cells(points: Array, cells: Rows, cell: str, source: str) -> None:
+    """Raise InputError for cells of no volume and for twisted ones (det J of both signs at the corners)."""
+    corners = np.array(_CORNERS[cell])
+    x = points[cells[:, corners]]  # (n_cells, n_corners, 1 + d, d)
+    edges = x[:, :, 1:] - x[:, :, :1]
+    det = np.linalg.det(edges)
+    d = points.shape[1]
+    longest = np.sqrt((edges**2).sum(axis=-1)).max(axis=(1, 2))
+    noise = _ROUND_OFF * np.abs(points).max() * longest ** (d - 1)  # error of det from the rounding of coordinates
+    flat = np.abs(det).min(axis=1) <= noise
+    twisted = ~flat & (det.min(axis=1) < 0.0) & (det.max(axis=1) > 0.0)
+    for bad, what in ((flat, "no volume"), (twisted, "crossing sides")):
+        if bad.any():
+            raise InputError(f"{_count(bad, 'cell')} of {source} {_have(bad)} {what}, {_at(points, cells, bad)}: mesh it again")
+
+
+def check_folds(points: Array, cells: Rows, cell: str, source: str) -> None:
+    """Raise InputError where three cells share a facet or two neighbours lie on the same side of theirs."""
+    d = points.shape[1]
+    sides = cell_sides(cells, cell)
+    owner = np.arange(len(sides)) // len(_SIDES[cell])
+    _, number, count = np.unique(sides, axis=0, return_inverse=True, return_counts=True)
+    number = number.reshape(-1)
+    x = points[sides[:, :d]]
+    if d == 1:
+        normal = np.ones((len(sides), 1))
+    elif d == 2:
+        normal = np.stack([x[:, 1, 1] - x[:, 0, 1], x[:, 0, 0] - x[:, 1, 0]], axis=1)
+    else:
+        normal = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
+    centre = points[cells].mean(axis=1)
+    height = ((centre[owner] - x[:, 0]) * normal).sum(axis=1)
+    balance = np.bincount(number, weights=np.sign(height))
+    wrong = (count > 2) | ((count == 2) & (balance != 0.0))
+    bad = np.zeros(len(cells), dtype=bool)
+    bad[owner[wrong[number]]] = True
+    if bad.any():
+        raise InputError(
+            f"{_count(bad, 'cell')} of {source} {_have(bad)} a neighbour on the same side of a common facet,"
+            f" {_at(points, cells, bad)}: the mesh is folded, mesh it again"
+        )
+
+
+def check_sides(rows: Rows, cells: Rows, cell: str, what: str) -> None:
+    """Raise InputError if one of the facets, given as rows of points, is no side of a cell."""
+    if not len(rows):
+        return
+    missing = ~contains(cell_sides(cells, cell), rows)
+    if missing.any():
+        raise InputError(
+            f"{what} has {_count(missing, 'facet')} that {'is' if missing.sum() == 1 else 'are'} no side of a cell: remove"
+            " duplicate nodes and curves or surfaces that do not bound the named cells"
+        )
+
+
+def cell_sides(cells: Rows, cell: str) -> Rows:
+    """Sides of all cells, cell by cell, each with its vertices in ascending order, (n_cells * n_sides, n_side_vertices)."""
+    sides = np.array(_SIDES[cell])
+    return np.sort(cells[:, sides].reshape(-1, sides.shape[1]), axis=1)
+
+
+def contains(table: Rows, rows: Rows) -> npt.NDArray[np.bool_]:
+    """Which of the rows occur in the table, whatever the order of their members, (len(rows),)."""
+    both = np.sort(np.concatenate([table, rows]), axis=1)
+    _, number = np.unique(both, axis=0, return_inverse=True)
+    number = number.reshape(-1)
+    return np.isin(number[len(table) :], number[: len(table)])
+
+
+def _count(bad: npt.NDArray[np.bool_], what: str) -> str:
+    n = int(bad.sum())
+    return f"{n} {what}" if n == 1 else f"{n} {what}s"
+
+
+def _have(bad: npt.NDArray[np.bool_]) -> str:
+    return "has" if bad.sum() == 1 else "have"
+
+
+def _at(points: Array, cells: Rows, bad: npt.NDArray[np.bool_]) -> str:
+    centre = points[cells[bad.argmax()]].mean(axis=0)
+    return f"first at ({', '.join(f'{c:.6g}' for c in centre)})"

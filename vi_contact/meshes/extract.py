@@ -1,0 +1,193 @@
+"""From Gmsh's current model to plain arrays: nodes renumbered, groups by name, everything a solver could choke on refused.
+
+DOLFINx's own readers fail on node tags that do not start at 1, on facets in two groups and on missing groups (solver notes,
+P21), so nothing of them is used. Vertices stay in Gmsh's order here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from vi_contact.errors import InputError
+from vi_contact.meshes.checks import Array, Rows, check_cells, check_folds, check_sides
+from vi_contact.meshes.gmsh_session import MeshScript, session
+
+Mask = npt.NDArray[np.bool_]
+
+_CELLS = {1: "interval", 2: "triangle", 3: "quadrilateral", 4: "tetrahedron", 5: "hexahedron"}
+_FACET = {1: 15, 2: 1, 3: 1, 4: 2, 5: 3}  # Gmsh's element numbers: cell -> its facet
+
+
+@dataclass(frozen=True, eq=False)
+class MeshArrays:
+    """A mesh without its library.
+
+    `cell` is UFL's name, `points` (n_points, d) are in metres, `cells` (n_cells, n_vertices) rows of points. Groups by name:
+    of cells as masks (n_cells,), of facets as rows of points (n_facets, n_facet_vertices).
+    """
+
+    cell: str
+    points: Array
+    cells: Rows
+    cell_groups: dict[str, Mask]
+    facet_groups: dict[str, Rows]
+
+
+@dataclass(frozen=True, eq=False)
+class _Elements:
+    """Elements of one type: Gmsh's node tags (n, n_vertices) and the entity (n,) that holds each."""
+
+    nodes: Rows
+    entity: Rows
+
+
+def arrays_from_file(path: str | Path) -> MeshArrays:
+    """Read a mesh file of any format Gmsh reads. Raises InputError with one sentence if there is no usable mesh in it."""
+    file = Path(path)
+    if not file.is_file():
+        raise InputError(f"mesh file {file} does not exist: check the path, or write it with a script of the folder meshes")
+    with session(file.stem) as gmsh:
+        try:
+            gmsh.merge(str(file))
+        except Exception as error:  # the only class Gmsh raises
+            raise InputError(f"Gmsh cannot read mesh file {file}: {error}") from error
+        return extract(gmsh, str(file))
+
+
+def arrays_from_script(mesh: MeshScript) -> MeshArrays:
+    """Build a mesh in memory. Raises InputError like `extract`."""
+    with session() as gmsh:
+        mesh.build(gmsh)
+        return extract(gmsh, type(mesh).__name__)
+
+
+def extract(gmsh: Any, source: str) -> MeshArrays:
+    """The mesh of Gmsh's current model; `source` names it in error messages.
+
+    As in Gmsh, the mesh is what the physical groups of the highest dimension hold; without any, all cells are taken, as a
+    group "all". Nodes no cell uses are dropped, the others numbered from 0 in the order of their tags. Raises InputError for
+    a model without cells; mixed or higher-order cells; cells without volume, twisted, or folded over a neighbour; a mesh of
+    triangles or quadrilaterals outside the plane z = 0; named facets that are no sides of cells.
+    """
+    model = gmsh.model
+    d = max((model.mesh.getElementProperties(kind)[1] for kind in model.mesh.getElements()[0]), default=0)
+    body, sides = _named_entities(model, d), _named_entities(model, d - 1)
+    if both := body.keys() & sides.keys():
+        raise InputError(f"{source} calls both cells and facets '{min(both)}': give one of the two groups another name")
+    elements = _elements(model, d, _union(body) or [entity for _, entity in model.getEntities(d)])
+    kind = _first_order(model, elements, d, source)
+    tags, cells = np.unique(elements[kind].nodes, return_inverse=True)
+    points = _points(model, tags, d, source)
+    cells = cells.reshape(elements[kind].nodes.shape).astype(np.int64)
+    kept, position = _without_repeats(cells)
+    cells = cells[kept]
+    check_cells(points, cells, _CELLS[kind], source)
+    check_folds(points, cells, _CELLS[kind], source)
+    cell_groups = {name: np.zeros(len(cells), dtype=bool) for name in body}
+    for name, entities in body.items():
+        cell_groups[name][position[np.isin(elements[kind].entity, entities)]] = True
+    facet_groups = {}
+    for name, entities in sides.items():
+        what = f"boundary group '{name}' of {source}"
+        facet_groups[name] = _facets(model, entities, _FACET[kind], tags, what)
+        check_sides(facet_groups[name], cells, _CELLS[kind], what)
+    return MeshArrays(
+        cell=_CELLS[kind],
+        points=points,
+        cells=cells,
+        cell_groups=cell_groups or {"all": np.ones(len(cells), dtype=bool)},
+        facet_groups={name: rows for name, rows in facet_groups.items() if len(rows)},
+    )
+
+
+def _named_entities(model: Any, dim: int) -> dict[str, list[int]]:
+    """Entities of each physical group of a dimension; a group without a name is called by its number."""
+    groups: dict[str, list[int]] = {}
+    for _, tag in model.getPhysicalGroups(dim) if dim >= 0 else ():
+        name = model.getPhysicalName(dim, tag) or str(tag)
+        groups.setdefault(name, []).extend(int(entity) for entity in model.getEntitiesForPhysicalGroup(dim, tag))
+    return groups
+
+
+def _union(groups: dict[str, list[int]]) -> list[int]:
+    return sorted({entity for entities in groups.values() for entity in entities})
+
+
+def _elements(model: Any, dim: int, entities: Iterable[int]) -> dict[int, _Elements]:
+    """Elements of the entities by Gmsh's element number."""
+    parts: dict[int, list[tuple[Rows, int]]] = {}
+    for entity in entities:
+        kinds, tags, nodes = model.mesh.getElements(dim, entity)
+        for kind, tag, node in zip(kinds, tags, nodes, strict=True):
+            parts.setdefault(int(kind), []).append((np.asarray(node, dtype=np.int64).reshape(len(tag), -1), entity))
+    return {
+        kind: _Elements(
+            np.concatenate([rows for rows, _ in found]), np.concatenate([np.full(len(rows), e) for rows, e in found])
+        )
+        for kind, found in parts.items()
+    }
+
+
+def _first_order(model: Any, elements: dict[int, _Elements], dim: int, source: str) -> int:
+    """The one type of cell there is."""
+    if dim == 0 or not elements:
+        raise InputError(f"{source} has no cells: mesh the geometry in Gmsh before saving it")
+    names = {kind: model.mesh.getElementProperties(kind)[0] for kind in elements}
+    if high := [kind for kind in elements if model.mesh.getElementProperties(kind)[2] > 1]:
+        raise InputError(
+            f"{source} has cells of higher order ({names[high[0]]}), but contact conditions hold between the nodes only for"
+            " first-order cells: mesh it with Mesh.ElementOrder = 1"
+        )
+    if len(elements) > 1:
+        raise InputError(f"{source} mixes cells ({', '.join(sorted(names.values()))}): mesh it with cells of one type")
+    if (kind := next(iter(elements))) not in _CELLS:
+        raise InputError(f"{source} has cells of type {names[kind]}: use {', '.join(_CELLS.values())} cells")
+    return kind
+
+
+def _points(model: Any, used: Rows, d: int, source: str) -> Array:
+    """Coordinates (n, d) of the nodes with the given tags."""
+    tags, coordinates, _ = model.mesh.getNodes()
+    order = np.argsort(tags)
+    place = np.minimum(np.searchsorted(tags, used, sorter=order), len(tags) - 1)
+    if not np.array_equal(tags[order[place]], used):
+        raise InputError(f"{source} has cells on nodes it does not define: write it again from Gmsh")
+    points = np.asarray(coordinates, dtype=np.float64).reshape(-1, 3)[order[place]]
+    if not np.isfinite(points).all():
+        raise InputError(f"{source} has nodes whose coordinates are no numbers: write it again from Gmsh")
+    away = np.abs(points[:, d:]).max(initial=0.0)
+    if away > 1e-9 * np.ptp(points, axis=0).max():
+        plane, missing = ("plane z = 0", "volume") if d == 2 else ("axis y = z = 0", "surface")
+        raise InputError(
+            f"{source} has no cells of dimension {d + 1} and leaves the {plane} by {away:.3g} m: move it there, or name the"
+            f" {missing} as a physical group so that Gmsh saves its cells"
+        )
+    return np.ascontiguousarray(points[:, :d])
+
+
+def _without_repeats(rows: Rows) -> tuple[Rows, Rows]:
+    """Rows kept (first of those with the same members, in order), and for every row its place among the kept ones."""
+    _, first, place = np.unique(np.sort(rows, axis=1), axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    return first[order], rank[place.reshape(-1)]
+
+
+def _facets(model: Any, entities: list[int], kind: int, tags: Rows, what: str) -> Rows:
+    """Facets of a group as rows of points, each once; -1 for nodes that belong to no cell."""
+    found = _elements(model, model.mesh.getElementProperties(kind)[1], entities)
+    if not found:
+        return np.empty((0, 1), dtype=np.int64)
+    if list(found) != [kind]:
+        raise InputError(f"{what} has facets of another type than the sides of its cells: mesh body and boundary together")
+    nodes = found[kind].nodes
+    nodes = nodes[_without_repeats(nodes)[0]]
+    place = np.minimum(np.searchsorted(tags, nodes), len(tags) - 1)
+    return np.where(tags[place] == nodes, place, -1)

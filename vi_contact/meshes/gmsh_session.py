@@ -1,0 +1,109 @@
+"""A quiet, reproducible Gmsh for the length of a with-block, and the two things done in it: build a mesh, write it."""
+
+from __future__ import annotations
+
+import inspect
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Protocol
+
+from vi_contact.errors import InputError
+
+_OPTIONS = {
+    "General.Terminal": 0,
+    "General.NumThreads": 1,  # with the seed: the same mesh every time
+    "Mesh.RandomSeed": 1,
+    "Mesh.ElementOrder": 1,  # from here on: undo what a user's own session may have chosen
+    "Mesh.RecombineAll": 0,
+    "Mesh.RecombinationAlgorithm": 3,  # where a script recombines, no triangle is left behind
+    "Mesh.SubdivisionAlgorithm": 0,
+    "Mesh.MeshSizeFactor": 1,
+    "Mesh.MshFileVersion": 4.1,
+    "Mesh.Binary": 0,
+    "Mesh.SaveAll": 0,
+}
+
+
+class MeshScript(Protocol):
+    """Anything that can put a mesh into Gmsh's current model."""
+
+    def build(self, gmsh: Any) -> None:
+        """Add geometry, named physical groups and first-order cells to the current (empty) model."""
+
+
+@contextmanager
+def session(name: str = "vi_contact") -> Iterator[Any]:
+    """The gmsh module with an empty current model; all traces are removed afterwards.
+
+    A Gmsh the caller has already initialised is borrowed: its models, its current model and its options are left as they
+    were. Raises InputError if Gmsh is not installed.
+    """
+    gmsh = _import()
+    borrowed = _is_initialised(gmsh)
+    if not borrowed:
+        _initialise(gmsh)
+    current = gmsh.model.getCurrent()
+    options = {option: gmsh.option.getNumber(option) for option in _OPTIONS}
+    try:
+        for option, value in _OPTIONS.items():
+            gmsh.option.setNumber(option, value)
+        gmsh.model.add(name)
+        yield gmsh
+    finally:
+        if borrowed:
+            gmsh.model.remove()
+            gmsh.model.setCurrent(current)
+            for option, value in options.items():
+                gmsh.option.setNumber(option, value)
+        else:
+            gmsh.finalize()
+
+
+def write(mesh: MeshScript, path: str | Path) -> None:
+    """Build the mesh and write it to a file in the format Gmsh gives to that suffix (.msh: format 4.1, text)."""
+    target = Path(path)
+    if not target.parent.is_dir():
+        raise InputError(f"cannot write {target}: the folder {target.parent} does not exist, create it first")
+    with session(target.stem) as gmsh:
+        mesh.build(gmsh)
+        gmsh.write(str(target))
+
+
+def _import() -> Any:
+    try:
+        import gmsh
+    except (ImportError, OSError) as error:  # OSError: the module is there, the library is not
+        raise InputError(f"Gmsh's Python module is missing ({error}): install python3-gmsh") from error
+    return gmsh
+
+
+def _initialise(gmsh: Any) -> None:
+    known = inspect.signature(gmsh.initialize).parameters
+    keep_signals = {"interruptible": False} if "interruptible" in known else {}  # or newer Gmsh takes over SIGINT
+    gmsh.initialize([], readConfigFiles=False, **keep_signals)
+
+
+def _is_initialised(gmsh: Any) -> bool:
+    """Gmsh 4.8 (Debian 12) cannot be asked: it lists no model before initialize() and complains after finalize()."""
+    if hasattr(gmsh, "isInitialized"):
+        return bool(gmsh.isInitialized())
+    with _silent_stderr():
+        try:
+            return bool(gmsh.model.list())
+        except Exception:  # the only class Gmsh raises
+            return False
+
+
+@contextmanager
+def _silent_stderr() -> Iterator[None]:
+    """Gmsh writes its complaint from C++, past sys.stderr."""
+    kept, sink = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(sink, 2)
+    try:
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(sink)

@@ -1,0 +1,80 @@
+"""Structured meshes of intervals, rectangles and boxes, node by node: Gmsh's transfinite curves are only exact to 1e-11."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import permutations
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+_SIMPLEX_TYPE = (15, 1, 2, 4)  # Gmsh's numbers of point, line, triangle, tetrahedron
+_BOX_TYPE = (15, 1, 3, 5)  # point, line, quadrangle, hexahedron
+
+
+def lattice(lengths: Sequence[float], divisions: Sequence[int]) -> Array:
+    """Nodes of an evenly divided box with one corner at the origin, (n_1+1, ..., n_d+1, d) [m]."""
+    axes = [length * np.arange(n + 1) / n for length, n in zip(lengths, divisions, strict=True)]
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+
+
+def add_grid(gmsh: Any, nodes: Array, *, simplices: bool, body: str, sides: Sequence[tuple[str, str]]) -> None:
+    """Add a structured mesh to the current model as discrete entities with named physical groups.
+
+    `nodes` (n_1+1, ..., n_d+1, d) are the points of the deformed lattice [m]; `sides[a]` names the two sides on which lattice
+    index a is lowest and highest; `body` names all cells. `simplices` splits every box along its diagonal (Kuhn).
+    """
+    d = nodes.shape[-1]
+    shape = nodes.shape[:-1]
+    tags = 1 + np.arange(np.prod(shape)).reshape(shape, order="F")
+    points = np.zeros((tags.size, 3))
+    points[tags.reshape(-1) - 1, :d] = nodes.reshape(-1, d)
+    model, types = gmsh.model, _SIMPLEX_TYPE if simplices else _BOX_TYPE
+    parts = [(d - 1, tags.take(end, axis=axis), name) for axis, pair in enumerate(sides) for end, name in zip((0, -1), pair)]
+    boundary = [_add_entity(model, dim, name) for dim, _, name in parts]
+    volume = _add_entity(model, d, body, boundary)
+    model.mesh.addNodes(d, volume, np.arange(1, tags.size + 1), points.reshape(-1))
+    for entity, (dim, part, _) in zip([*boundary, volume], [*parts, (d, tags, body)], strict=True):
+        model.mesh.addElementsByType(entity, types[dim], [], _cells(part, simplices).reshape(-1))
+
+
+def _add_entity(model: Any, dim: int, name: str, boundary: Sequence[int] = ()) -> int:
+    entity: int = model.addDiscreteEntity(dim, -1, list(boundary))
+    model.setPhysicalName(dim, model.addPhysicalGroup(dim, [entity]), name)
+    return entity
+
+
+def _cells(tags: npt.NDArray[np.int_], simplices: bool) -> npt.NDArray[np.int_]:
+    """Vertices of every cell of a lattice of node tags, in Gmsh's order, (n_cells, n_vertices)."""
+    d = tags.ndim
+    shapes = _kuhn_simplices(d) if simplices else [_box_corners(d)]
+    count = [n - 1 for n in tags.shape]
+    corner = {o: tags[tuple(slice(i, i + n) for i, n in zip(o, count, strict=True))] for o in np.ndindex(*(2,) * d)}
+    return np.stack([np.stack([corner[o].reshape(-1) for o in shape], axis=-1) for shape in shapes], axis=1).reshape(
+        -1, len(shapes[0])
+    )
+
+
+def _box_corners(d: int) -> list[tuple[int, ...]]:
+    loop = [(0, 0), (1, 0), (1, 1), (0, 1)]
+    return {
+        0: [()],
+        1: [(0,), (1,)],
+        2: list(loop),
+        3: [(*corner, z) for z in (0, 1) for corner in loop],
+    }[d]
+
+
+def _kuhn_simplices(d: int) -> list[list[tuple[int, ...]]]:
+    """The d! simplices walked from corner (0,...,0) to (1,...,1) along the axes in every order, positively oriented."""
+    simplices = []
+    for order in permutations(range(d)):
+        steps = np.eye(d, dtype=int)[list(order)]
+        walk = [tuple(int(c) for c in corner) for corner in np.vstack([np.zeros((1, d), int), steps.cumsum(axis=0)])]
+        if d and np.linalg.det(steps) < 0.0:
+            walk[-1], walk[-2] = walk[-2], walk[-1]
+        simplices.append(walk)
+    return simplices

@@ -1,0 +1,97 @@
+#!/usr/bin/env python3
+"""The wall of seed 000, Fig. 2: a rectangle standing on its base, one-sided supports along its right side.
+
+Physical groups: cells "wall"; boundary "base" (y = 0), "face" (x = width: the contact side), "top", "back" (x = 0). The
+defaults are the mesh of the published example: 8 x 12 cells, 40 boundary nodes 0.75 m apart.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+if not __package__:  # run as a file of the source tree: find the package without installing it
+    sys.path[0] = str(Path(__file__).resolve().parents[2])
+
+from vi_contact.errors import InputError  # noqa: E402
+from vi_contact.meshes.block import check_box  # noqa: E402
+from vi_contact.meshes.gmsh_session import write  # noqa: E402
+from vi_contact.meshes.grid import add_grid, lattice  # noqa: E402
+
+_PUBLISHED = (8, 12)
+
+
+@dataclass(frozen=True, kw_only=True)
+class WallMesh:
+    """Mesh of a wall, height x width [m].
+
+    `divisions` are the exact numbers of cells along width and height; `size` [m] asks for an irregular mesh of about that
+    cell size instead; without either, the 8 x 12 cells of seed 000. `triangles` instead of quadrilaterals. Raises InputError
+    for sizes that make no wall.
+    """
+
+    height: float = 9.0
+    width: float = 6.0
+    divisions: tuple[int, int] | None = None
+    size: float | None = None
+    triangles: bool = False
+
+    def __post_init__(self) -> None:
+        if self.divisions is not None and self.size is not None:
+            raise InputError("a wall takes either divisions or a cell size: leave one of them out")
+        check_box((self.width, self.height), self.divisions or _PUBLISHED)
+        if self.size is not None and not (math.isfinite(self.size) and 0.0 < self.size <= min(self.width, self.height)):
+            raise InputError(f"cell size {self.size} m must be positive and no larger than the wall's sides")
+
+    def build(self, gmsh: Any) -> None:
+        """Add the wall to Gmsh's current model."""
+        if self.size is not None:
+            _build_irregular(self, gmsh, self.size)
+            return
+        nodes = lattice((self.width, self.height), self.divisions or _PUBLISHED)
+        sides = (("back", "face"), ("base", "top"))
+        add_grid(gmsh, nodes, simplices=self.triangles, body="wall", sides=sides)
+
+
+def _build_irregular(wall: WallMesh, gmsh: Any, size: float) -> None:
+    model = gmsh.model
+    corners = ((0.0, 0.0), (wall.width, 0.0), (wall.width, wall.height), (0.0, wall.height))
+    points = [model.geo.addPoint(x, y, 0.0, size) for x, y in corners]
+    curves = [model.geo.addLine(points[i - 1], points[i]) for i in (1, 2, 3, 0)]
+    surface = model.geo.addPlaneSurface([model.geo.addCurveLoop(curves)])
+    model.geo.synchronize()
+    for name, curve in zip(("base", "face", "top", "back"), curves, strict=True):
+        model.setPhysicalName(1, model.addPhysicalGroup(1, [curve]), name)
+    model.setPhysicalName(2, model.addPhysicalGroup(2, [surface]), "wall")
+    if not wall.triangles:
+        model.mesh.setRecombine(2, surface)
+    model.mesh.generate(2)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Write a wall to a file: `wall.py --height 9 --width 6 --divisions 8 12 --triangles -o wall.msh`."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
+    parser.add_argument("--height", type=float, default=9.0, help="[m]")
+    parser.add_argument("--width", type=float, default=6.0, help="[m]")
+    parser.add_argument("--divisions", type=int, nargs=2, help="cells along width and height (default: 8 12)")
+    parser.add_argument("--size", type=float, help="cell size of an irregular mesh [m]")
+    parser.add_argument("--triangles", action="store_true", help="instead of quadrilaterals")
+    parser.add_argument("-o", "--output", default="wall.msh")
+    given = parser.parse_args(arguments)
+    try:
+        divisions = tuple(given.divisions) if given.divisions else None
+        wall = WallMesh(
+            height=given.height, width=given.width, divisions=divisions, size=given.size, triangles=given.triangles
+        )
+        write(wall, given.output)
+    except InputError as error:
+        sys.exit(str(error))
+
+
+if __name__ == "__main__":
+    main()
