@@ -1,0 +1,190 @@
+"""PETSc TAO on the same bounds: minimise ½ xᵀA x - bᵀx subject to x_n <= bound, as a second opinion.
+
+TAO's tolerances and trust regions are absolute (P18), which the scaled step makes harmless; its own convergence tests
+are replaced by ``ScaledStep.verdict``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from petsc4py import PETSc
+
+from ..algebra import Array
+from ..errors import InputError
+from ..step import StepProblem
+from .volume_options import REDUCED_PC, OptionLayers, Options, refuse
+from .volume_reasons import stopped
+from .volume_snes import AssembledJacobian, ReducedNewton, SemismoothNewton, write_bounds
+from .volume_step import ScaledStep
+from .volume_system import BoundedSystem
+
+UNCONSTRAINED = "it ignores bounds, so the body would penetrate"
+OTHER = "it solves another class of problem (it wants constraint functions or a least-squares structure)"
+REFUSED = {
+    "bqpip": "it divides by the distance to both bounds and with an infinite one reports garbage as converged",
+    "gpcg": "on elasticity it needs thousands of iterations and stops short of the solution",
+    **dict.fromkeys(("lmvm", "nls", "ntr", "ntl", "cg", "nm", "owlqn", "bmrm"), UNCONSTRAINED),
+    **dict.fromkeys(("pounders", "brgn", "lcl", "admm", "almm", "ipm", "pdipm", "shell", "python"), OTHER),
+    **dict.fromkeys(("ssils", "ssfls", "asils", "asfls"), f"{OTHER}; SemismoothNewton() is its like in SNES"),
+}
+SOUND = ("tron", "bnls", "bntr", "bntl", "bqnls", "bqnkls", "bqnktr", "bqnktl", "blmvm", "bncg")
+
+
+def tao_options(ranks: int) -> Options:
+    """Defaults for every type: TRON reads plain pc_type, the Newton-Krylov types tao_bnk_pc_type (P18).
+
+    Their own default preconditioner is useless for elasticity. PETSc has no incomplete Cholesky for several ranks.
+    """
+    options: dict[str, object | None] = {
+        "tao_gatol": 0.0,
+        "tao_grtol": 0.0,
+        "tao_gttol": 0.0,
+        "tao_steptol": 0.0,
+        "tao_max_it": 200,
+        "tao_bnk_as_type": "none",
+    }
+    for prefix in ("", "tao_bnk_"):
+        options[f"{prefix}pc_type"] = "icc" if ranks == 1 else "bjacobi"
+        options[f"{prefix}sub_pc_type"] = "icc"
+    return options
+
+
+def check_tao(tao: Any, layers: OptionLayers) -> None:
+    """Refuse types and preconditioners that give wrong answers, also when they come from options."""
+    refuse_type(tao.getType())
+    for key in ("pc_type", "tao_bnk_pc_type"):
+        pc = layers.chosen(key)
+        if pc in REDUCED_PC:
+            refuse(f"{key} {pc} with TAO {tao.getType()}", REDUCED_PC[pc], "use icc, bjacobi or hypre")
+
+
+def refuse_type(kind: str) -> None:
+    """InputError for TAO types that cannot solve the contact problem."""
+    if kind in REFUSED:
+        refuse(f"TAO type {kind}", REFUSED[kind], "use TaoTron(), TaoBnls() or ReducedNewton()")
+    if kind not in SOUND:
+        raise InputError(f"TAO type {kind!r} is not known to solve contact problems: choose one of {', '.join(SOUND)}")
+
+
+class TaoDriver:
+    """A TAO object bound to a scaled step; ``solver`` is the PETSc object."""
+
+    def __init__(self, scaled: ScaledStep, layers: OptionLayers, tao_type: str) -> None:
+        self._scaled, self._layers = scaled, layers
+        self._hessian = AssembledJacobian(scaled.system)
+        self._y, G = self._hessian.mat.createVecs()
+        self._vectors = [self._y, G, self._y.duplicate(), self._y.duplicate()]
+        self.solver = PETSc.TAO().create(scaled.system.comm)
+        self.solver.setOptionsPrefix(layers.prefix)
+        self.solver.setType(tao_type)
+        self.solver.setObjectiveGradient(scaled.objective, G)
+        self.solver.setHessian(self._hessian.evaluate, self._hessian.mat)
+        self.solver.setVariableBounds((self._vectors[2], self._vectors[3]))
+        self.solver.setSolution(self._y)
+        self.solver.setConvergenceTest(Test(scaled))
+        with layers.in_force():
+            self.solver.setFromOptions()
+            check_tao(self.solver, layers)
+
+    def run(self) -> tuple[Array, Array, int]:
+        """(y, F(y), iterations) of the scaled step; PETSc.Error or StepFailure when TAO does not converge."""
+        scaled = self._scaled
+        self._hessian.rescale(scaled.x_ref / scaled.r_ref)
+        self._y.array[:] = np.clip(scaled.start, scaled.lower, scaled.upper)
+        write_bounds(scaled, self._vectors[2], self._vectors[3])
+        with self._layers.in_force():
+            self.solver.solve(self._y)
+        reason, iterations = self.solver.getConvergedReason(), self.solver.getIterationNumber()
+        y = np.array(self._y.array_r)
+        F = scaled.residual(y)
+        if reason <= 0 and not scaled.accepts(y, F):
+            raise stopped(f"TAO {self.solver.getType()}", PETSc.TAO.Reason, reason, iterations, scaled.worst)
+        return y, F, iterations
+
+    def destroy(self) -> None:
+        """Free the PETSc objects; collective."""
+        for item in (self.solver, self._hessian, *self._vectors):
+            item.destroy()
+
+
+class Test:
+    """The TAO convergence test: PETSc's own, which only the user's tolerances switch on, then our verdict."""
+
+    def __init__(self, scaled: ScaledStep) -> None:
+        self._scaled = scaled
+
+    def __call__(self, tao: Any) -> int | None:
+        if tao.getConvergedReason():
+            return None
+        y = tao.getSolution().array_r
+        reason = self._scaled.verdict(y, self._scaled.residual(y))  # TRON overwrites its gradient by the projected one
+        if reason < 0:
+            return int(PETSc.TAO.Reason.DIVERGED_NAN)
+        return int(PETSc.TAO.Reason.CONVERGED_USER) if reason else None
+
+
+@dataclass(frozen=True)
+class TaoTron:
+    """TAO TRON: trust region Newton with projected searches; conjugate gradients with incomplete Cholesky inside."""
+
+    tao_type: ClassVar[str] = "tron"
+
+    def defaults(self, ranks: int) -> Options:
+        """Options before the user's."""
+        return tao_options(ranks)
+
+    def driver(self, scaled: ScaledStep, layers: OptionLayers) -> TaoDriver:
+        """The TAO object."""
+        return TaoDriver(scaled, layers, self.tao_type)
+
+    def start(self, driver: TaoDriver, system: BoundedSystem, step: StepProblem) -> Array:
+        """The guess with the predicted contacts on their bounds."""
+        return system.start(step)
+
+
+@dataclass(frozen=True)
+class TaoBnls(TaoTron):
+    """TAO BNLS: bound-constrained Newton with a line search; conjugate gradients with incomplete Cholesky inside."""
+
+    tao_type: ClassVar[str] = "bnls"
+
+
+@dataclass(frozen=True)
+class Selected:
+    """Any sound solver by PETSc's own name: vinewtonrsls, vinewtonssls or a TAO type.
+
+    bntr, bntl, the quasi-Newton types, blmvm and bncg are experimental and slow for elasticity. InputError, with the
+    reason, for types that ignore bounds, need another structure or are known to report wrong answers as converged.
+    """
+
+    petsc_type: str
+
+    def __post_init__(self) -> None:
+        if self.petsc_type not in SNES_TYPES:
+            refuse_type(self.petsc_type)
+
+    @property
+    def _method(self) -> Any:
+        return SNES_TYPES.get(self.petsc_type, TaoTron)()
+
+    def defaults(self, ranks: int) -> Options:
+        """Options before the user's."""
+        options: Options = self._method.defaults(ranks)
+        return options
+
+    def driver(self, scaled: ScaledStep, layers: OptionLayers) -> Any:
+        """The SNES or TAO object."""
+        if self.petsc_type in SNES_TYPES:
+            return self._method.driver(scaled, layers)
+        return TaoDriver(scaled, layers, self.petsc_type)
+
+    def start(self, driver: Any, system: BoundedSystem, step: StepProblem) -> Array:
+        """The guess with the predicted contacts on their bounds."""
+        return system.start(step)
+
+
+SNES_TYPES: Mapping[str, Any] = {"vinewtonrsls": ReducedNewton, "vinewtonssls": SemismoothNewton}
