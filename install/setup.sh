@@ -19,7 +19,7 @@ vi_mpi_environment() {
   export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
   export OMPI_MCA_rmaps_base_oversubscribe=1 PRTE_MCA_rmaps_default_mapping_policy=:oversubscribe
   export OMPI_MCA_hwloc_base_binding_policy=none PRTE_MCA_hwloc_default_binding_policy=none
-  export OMPI_MCA_mpi_yield_when_idle=1
+  export OMPI_MCA_mpi_yield_when_idle=1 HWLOC_HIDE_ERRORS=2 UCX_LOG_LEVEL=fatal
   export OMPI_MCA_pml=ob1 OMPI_MCA_btl=^openib,ofi,uct,usnic OMPI_MCA_btl_vader_single_copy_mechanism=none
 }
 
@@ -39,38 +39,38 @@ vi_choose_real_petsc() {
   [ ! -d /usr/lib/petscdir/petsc-real ] || export PETSC_DIR=/usr/lib/petscdir/petsc-real
 }
 
+# The listed packages that are not installed, on one line. (No <(…): that needs /proc, which a bare tree may lack.)
 vi_missing_packages() {
-  local wanted
-  mapfile -t wanted < <(grep -v '^#' "$vi_root/install/debian-packages.txt")
-  comm -23 <(printf '%s\n' "${wanted[@]}" | sort -u) \
-    <(dpkg-query -W -f '${db:Status-Status} ${Package}\n' "${wanted[@]}" 2>/dev/null | sed -n 's/^installed //p' | sort -u)
+  local wanted installed package missing=()
+  wanted=$(grep -v '^#' "$vi_root/install/debian-packages.txt")
+  installed=$(dpkg-query -W -f '${db:Status-Status} ${Package} \n' $wanted 2>/dev/null)
+  for package in $wanted; do
+    case $installed in *"installed $package "*) ;; *) missing+=("$package") ;; esac
+  done
+  echo "${missing[*]}"
 }
 
+# apt-get, as root or through sudo; what it says goes to standard output.
 vi_apt() {
-  local command=("${become[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -q -o DPkg::Lock::Timeout=300 -o Acquire::Retries=3)
-  "${command[@]}" update || true  # one broken third-party source must not stop us: the installation tells
-  "${command[@]}" "$@"
+  local become=()
+  [ "$(id -u)" -eq 0 ] || become=(sudo)
+  "${become[@]}" env LC_ALL=C DEBIAN_FRONTEND=noninteractive \
+    apt-get -q -o DPkg::Lock::Timeout=300 -o Acquire::Retries=3 "$@" 2>&1 </dev/null
 }
 
 vi_install_packages() {
-  local missing log become=()
-  mapfile -t missing < <(vi_missing_packages)
-  [ ${#missing[@]} -eq 0 ] && return
-  command -v apt-get >/dev/null || vi_fail "needs Debian 12 or 13 (no apt-get here); missing: ${missing[*]}"
-  if [ "$(id -u)" -ne 0 ]; then
-    if sudo -n true 2>/dev/null; then become=(sudo -n)
-    elif command -v sudo >/dev/null && [ -t 0 ]; then become=(sudo)
-    else vi_fail "missing packages; as root: apt-get install --no-install-recommends ${missing[*]}"
-    fi
-  fi
-  echo "vi_contact: installing ${#missing[@]} Debian packages (once)…" >&2
-  log=$(mktemp)
-  if ! vi_apt install -y --no-install-recommends "${missing[@]}" >"$log" 2>&1; then
-    local why; why=$(grep -m1 '^E:' "$log")
-    rm -f "$log"
-    vi_fail "could not install (offline?) ${missing[*]}: ${why:-apt-get failed}"
-  fi
-  rm -f "$log"
+  local missing said
+  missing=$(vi_missing_packages)
+  [ -n "$missing" ] || return 0
+  command -v apt-get >/dev/null || vi_fail "needs Debian 12 or 13 (there is no apt-get here) with $missing"
+  [ "$(id -u)" -eq 0 ] || sudo -n true 2>/dev/null || { command -v sudo >/dev/null && [ -t 0 ]; } ||
+    vi_fail "packages are missing and sudo cannot be used; as root: apt-get install --no-install-recommends $missing"
+  echo "vi_contact: installing $(wc -w <<<"$missing") Debian packages (once)…" >&2
+  said=$(vi_apt update)  # its status tells nothing: a broken third-party source fails it, being offline does not
+  grep -qE '^(Hit|Get):' <<<"$said" || vi_fail "offline: no Debian mirror answers; missing: $missing"
+  said=$(vi_apt install -y --no-install-recommends $missing)
+  missing=$(vi_missing_packages)
+  [ -z "$missing" ] || vi_fail "could not install $missing: $(grep -m1 '^E:' <<<"$said" || tail -n 1 <<<"$said")"
 }
 
 vi_setup() {

@@ -8,13 +8,14 @@ the meeting is stuck in a collective call the others never made: the run is then
 from __future__ import annotations
 
 import faulthandler
+import functools
 import os
 import shutil
 import tempfile
 import time
 from collections.abc import Generator, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 import pytest
 
@@ -23,36 +24,37 @@ SIZE = int(os.environ.get("OMPI_COMM_WORLD_SIZE", os.environ.get("PMI_SIZE", "1"
 TEST_SECONDS = 600  # a test that takes longer is taken to be stuck
 MEETING_SECONDS = 30  # patience of a rank that has failed: the others are probably waiting for it in a collective call
 
-_meeting: dict[str, Any] = {}  # the communicator, made at first use: pure numpy tests need no MPI
-_stderr = os.fdopen(os.dup(2), "w")  # the real one: pytest captures fd 2 during a test
+_stderr = pytest.StashKey[TextIO]()
+_collection_errors: list[str] = []
 
 
+@functools.cache
 def _comm() -> Any:
-    if not _meeting:
-        from mpi4py import MPI
+    from mpi4py import MPI  # here: pure numpy tests need no MPI
 
-        _meeting["comm"] = MPI.COMM_WORLD.Dup()
-    return _meeting["comm"]
+    return MPI.COMM_WORLD.Dup()
 
 
-def _meet(mine: str, *, where: str, seconds: float) -> list[str]:
+def _meet(config: pytest.Config, mine: str, *, where: str, seconds: float) -> list[str]:
     """The texts of all ranks, in rank order; aborts the run if some rank does not come within `seconds`."""
     comm = _comm()
     request, deadline = comm.Ibarrier(), time.monotonic() + seconds
     while not request.Test():
         if time.monotonic() > deadline:
-            _abort(f"{where}: the other ranks did not arrive within {seconds:.0f} s\n{mine}")
+            _abort(config, f"{where}: the other ranks did not arrive within {seconds:.0f} s\n{mine}")
         time.sleep(1e-3)
     return list(comm.allgather(mine))
 
 
-def _abort(message: str) -> None:
-    print(f"\n[rank {RANK} of {SIZE}] {message}", file=_stderr, flush=True)
+def _abort(config: pytest.Config, message: str) -> None:
+    print(f"\n[rank {RANK} of {SIZE}] {message}", file=config.stash[_stderr], flush=True)
+    time.sleep(1)  # mpirun has to pass it on before it kills
     _comm().Abort(1)
 
 
 @pytest.hookimpl(trylast=True)
 def pytest_configure(config: pytest.Config) -> None:
+    config.stash[_stderr] = os.fdopen(os.dup(2), "w")  # the real one: pytest captures fd 2 during tests
     if RANK:  # rank 0 speaks for all
         config.pluginmanager.unregister(name="terminalreporter")
 
@@ -66,18 +68,23 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         config.hook.pytest_deselected(items=serial)
 
 
+def pytest_collectreport(report: pytest.CollectReport) -> None:
+    if report.failed:
+        _collection_errors.append(report.longreprtext)
+
+
 def pytest_collection_finish(session: pytest.Session) -> None:
     if SIZE == 1:
         return
-    mine = "\n".join([f"{session.testsfailed} errors", *(item.nodeid for item in session.items)])
-    texts = _meet(mine, where="collection", seconds=TEST_SECONDS)
+    mine = "\n".join([*_collection_errors, *(item.nodeid for item in session.items)])
+    texts = _meet(session.config, mine, where="collection", seconds=TEST_SECONDS)
     if any(text != mine for text in texts):
-        _abort(f"ranks collected different tests:\n{mine}")
+        _abort(session.config, f"ranks collected different tests:\n{mine}")
 
 
 @pytest.hookimpl(hookwrapper=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, Any, None]:
-    faulthandler.dump_traceback_later(TEST_SECONDS, exit=True, file=_stderr)
+    faulthandler.dump_traceback_later(TEST_SECONDS, exit=True, file=item.config.stash[_stderr])
     yield
     faulthandler.cancel_dump_traceback_later()
 
@@ -86,19 +93,20 @@ def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, Any, None]:
 def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, Any, None]:
     outcome = yield
     if SIZE > 1:
-        _agree(outcome.get_result())
+        _agree(item.config, outcome.get_result())
 
 
-def _agree(report: pytest.TestReport) -> None:
-    """Make a phase that did not end alike on all ranks a failure on all ranks, told with the first failing rank's text."""
+def _agree(config: pytest.Config, report: pytest.TestReport) -> None:
+    """Make a phase that did not end alike on all ranks a failure on all ranks, told with the failing ranks' texts."""
     failed = report.outcome == "failed"
     mine = report.outcome + ("\n" + report.longreprtext if failed else "")
-    texts = _meet(mine, where=f"{report.nodeid} ({report.when})", seconds=MEETING_SECONDS if failed else TEST_SECONDS)
+    patience = MEETING_SECONDS if failed else TEST_SECONDS
+    texts = _meet(config, mine, where=f"{report.nodeid} ({report.when})", seconds=patience)
     outcomes = [text.split("\n", 1)[0] for text in texts]
     if len(set(outcomes)) > 1 and not failed:
-        told = next((rank for rank, o in enumerate(outcomes) if o == "failed"), RANK)
+        told = [f"[rank {rank}] {text}" for rank, text in enumerate(texts) if outcomes[rank] == "failed"]
         report.outcome = "failed"
-        report.longrepr = f"outcomes of ranks 0..{SIZE - 1}: {', '.join(outcomes)}\n[rank {told}] {texts[told]}"
+        report.longrepr = "\n".join([f"outcomes by rank: {', '.join(outcomes)}", *told])
 
 
 def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
