@@ -1,8 +1,8 @@
 """DOLFINx differs from version to version; every difference this package meets is settled here and nowhere else.
 
-Supported: 0.5 (Debian 12), 0.9 (Debian 13) and 0.11. Nothing else in `fem` asks for the version.
-What changed: dofmaps became two-dimensional arrays and the ghost mode moved into the partitioner (0.6), UFL elements became
-Basix elements and function spaces take tuples (0.7), `create_mesh` swapped two arguments (0.10), the partitioner counts the
+Supported: 0.5 (Debian 12), 0.9 (Debian 13) and 0.11. Nothing else in `fem` asks for the version. What changed:
+dofmaps became two-dimensional arrays and the ghost mode moved into the partitioner (0.6), UFL elements became Basix
+elements and function spaces take tuples (0.7), `create_mesh` swapped two arguments (0.10), the partitioner counts the
 cells of a facet and the geometry has one dofmap per cell type (0.11).
 """
 
@@ -37,9 +37,9 @@ _DOFMAP_PER_CELL_TYPE = VERSION >= (0, 11)
 def create_mesh(comm: MPI.Comm, cell: str, cells: npt.NDArray[np.int64], x: npt.NDArray[np.float64]) -> Mesh:
     """A first-order mesh, distributed by the default graph partitioner (fixed seed), ghosted over shared facets.
 
-    `cell` is a UFL name ("interval", "triangle", "quadrilateral", "tetrahedron", "hexahedron"). `cells`
-    (n_cells, n_vertices) holds rows of `x` in DOLFINx's (tensor-product) vertex order, `x` (n_points, gdim) the points [m]. A rank without
-    input passes arrays of the right width and no rows. Collective.
+    `cell` is a UFL name ("interval", "triangle", "quadrilateral", "tetrahedron", "hexahedron"). `cells` (n_cells,
+    n_vertices) holds rows of `x` in DOLFINx's (tensor-product) vertex order, `x` (n_points, gdim) the points [m]. A
+    rank without input passes arrays of the right width and no rows. Collective.
     """
     gdim = x.shape[1]
     if _BASIX_ELEMENTS:
@@ -61,7 +61,7 @@ def geometry_dofmap(mesh: Mesh) -> Indices:
 
 
 def entities_to_geometry(mesh: Mesh, dim: int, entities: Indices) -> Indices:
-    """Local geometry nodes of each given entity, (n_entities, n_vertices). Builds the connectivity it needs: collective."""
+    """Local geometry nodes of each given entity, (n_entities, n_vertices). Builds connectivity: collective."""
     tdim = mesh.topology.dim
     mesh.topology.create_entities(dim)
     mesh.topology.create_connectivity(dim, tdim)
@@ -72,7 +72,7 @@ def entities_to_geometry(mesh: Mesh, dim: int, entities: Indices) -> Indices:
 
 
 def measure(mesh: Mesh, dim: int, indices: Indices) -> ufl.Measure:
-    """dx (dim = topological dimension) or ds (one less) on some local entities, given sorted; ds ignores inner facets."""
+    """dx (dim = topological dimension) or ds (one less) on some local entities, ascending; ds skips inner facets."""
     kind = "dx" if dim == mesh.topology.dim else "ds"
     tags = meshtags(mesh, dim, np.asarray(indices, dtype=np.int32), np.ones(len(indices), dtype=np.int32))
     return ufl.Measure(kind, domain=mesh, subdomain_data=tags)(1)
@@ -104,7 +104,7 @@ def dof_to_node(space: Any) -> Indices:
 
 
 def _as_table(rows: Any, mesh: Mesh) -> Indices:
-    """First-order cell rows as a two-dimensional array: an AdjacencyList in 0.5, an array since. A rank may have none."""
+    """First-order cell rows as a table: an AdjacencyList in 0.5, an array since. A rank may have none."""
     if isinstance(rows, np.ndarray):
         return rows
     return rows.array.reshape(-1, dolfinx.cpp.mesh.cell_num_vertices(mesh.topology.cell_type))

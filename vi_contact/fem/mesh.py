@@ -1,7 +1,8 @@
 """Distributed meshes with named groups, read from a file or built in memory by a Gmsh script.
 
-Rank 0 reads and checks (vi_contact.meshes.extract), all ranks get the mesh or the same InputError. Groups are recognised on
-each rank by the vertices of their members, numbered as in the input, so a facet may be in as many groups as it likes.
+Rank 0 reads and checks (vi_contact.meshes.extract), all ranks get the mesh or the same InputError. Groups are
+recognised on each rank by the vertices of their members, numbered as in the input, so a facet may be in as many
+groups as it likes.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ _TENSOR_ORDER = {"quadrilateral": [0, 1, 3, 2], "hexahedron": [0, 1, 3, 2, 4, 5,
 
 @dataclass(frozen=True, eq=False)
 class Facets:
-    """A named part of the boundary (or of an inner surface): local facets of this rank, ghosts included, ascending."""
+    """A named part of the boundary or of an inner surface: local facets, ghosts included, ascending."""
 
     name: str
     indices: Indices
@@ -38,7 +39,7 @@ class Facets:
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """A named part of the body: local cells of this rank, ghosts included, ascending."""
+    """A named part of the body: local cells, ghosts included, ascending."""
 
     name: str
     indices: Indices
@@ -46,33 +47,36 @@ class Cells:
 
 
 class Tags(dict[str, Any]):
-    """The groups of a mesh by name: `Cells` or `Facets`, the same names on all ranks. A missing name is an InputError."""
+    """The groups of a mesh by name: `Cells` or `Facets`, the same names on all ranks; InputError for others."""
 
     def __missing__(self, name: str) -> Any:
         facets = [key for key, group in self.items() if isinstance(group, Facets)]
         cells = [key for key, group in self.items() if isinstance(group, Cells)]
         raise InputError(
-            f"mesh has no boundary group '{name}'; it has {', '.join(facets) or 'none'} (and cell groups {', '.join(cells)}):"
-            " name it in Gmsh as a physical group"
+            f"mesh has no boundary group '{name}'; it has {', '.join(facets) or 'none'}"
+            f" (and cell groups {', '.join(cells)}): name it in Gmsh as a physical group"
         )
 
 
 def read_mesh(path: str | Path, comm: MPI.Comm) -> tuple[Mesh, Tags]:
     """Read a first-order mesh of intervals, triangles, quadrilaterals, tetrahedra or hexahedra and its physical groups.
 
-    Coordinates in metres; any file format Gmsh reads. Raises InputError, the same on every rank, if the file is missing or
-    holds no usable mesh (all reasons: `vi_contact.meshes.extract.extract`). Collective.
+    Coordinates in metres; any file format Gmsh reads. Raises InputError, the same on every rank, if the file is
+    missing or holds no usable mesh (all reasons: `vi_contact.meshes.extract.extract`). Collective.
     """
     return _distribute(comm, lambda: arrays_from_file(path))
 
 
 def build_mesh(mesh: MeshScript, comm: MPI.Comm) -> tuple[Mesh, Tags]:
-    """The mesh of a script of the folder meshes (or of anything with `build(gmsh)`), without a file. Raises like `read_mesh`."""
+    """The mesh of a script of the folder meshes, or of anything with `build(gmsh)`, without a file.
+
+    Raises like `read_mesh`. Collective.
+    """
     return _distribute(comm, lambda: arrays_from_script(mesh))
 
 
 def node_numbers(mesh: Mesh) -> npt.NDArray[np.int64]:
-    """Input number of every local geometry node (owned, then ghosts): its place, from 0, among the used nodes of the file."""
+    """Input number, from 0, of every local geometry node (owned, then ghosts): its rank among the nodes in use."""
     return np.asarray(mesh.geometry.input_global_indices, dtype=np.int64)
 
 
@@ -94,18 +98,19 @@ def _on_root(comm: MPI.Comm, produce: Callable[[], MeshArrays]) -> MeshArrays:
     """The arrays on rank 0; on the others the groups, without points and cells. What rank 0 raises, all ranks raise."""
     arrays: MeshArrays | None = None
     outcome: Any = None
+    cause: Exception | None = None
     if comm.rank == 0:
         try:
             arrays = produce()
             no_points, no_cells = arrays.points[:0], arrays.cells[:0]
             outcome = MeshArrays(arrays.cell, no_points, no_cells, arrays.cell_groups, arrays.facet_groups)
-        except Exception as error:  # also a defect of ours: the others must not wait for ever
-            outcome = error if isinstance(error, InputError) else RuntimeError(f"rank 0 failed to make the mesh: {error!r}")
-            if outcome is not error:
-                outcome.__cause__ = error
+        except InputError as error:
+            outcome = error
+        except Exception as error:  # a defect of ours or of a script: the others must not wait for ever
+            outcome, cause = RuntimeError(f"rank 0 has no mesh: {error!r}"), error
     outcome = comm.bcast(outcome)
     if isinstance(outcome, Exception):
-        raise outcome
+        raise outcome from cause
     return outcome if arrays is None else arrays
 
 

@@ -1,6 +1,7 @@
 """Parametric Gmsh scripts, and the way from a Gmsh model to plain arrays. One structure per file.
 
-A mesh is a frozen value with a method `build(gmsh)` that adds geometry, named physical groups and cells to Gmsh's current
-model. `write(mesh, path)` of `gmsh_session` makes a file of it, `fem.build_mesh(mesh, comm)` a distributed mesh without a
-file. Each script also runs by itself: `python3 meshes/wall.py --help`. Lengths in metres, angles in radians.
+A mesh is a frozen value with a method `build(gmsh)` that adds geometry, named physical groups and cells to Gmsh's
+current model. `write(mesh, path)` of `gmsh_session` makes a file of it, `fem.build_mesh(mesh, comm)` a distributed
+mesh without a file. Each script also runs by itself: `python3 meshes/wall.py --help`. Lengths in metres, angles in
+radians.
 """

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """A bar, rectangle or box, evenly divided, if wanted bent by a smooth map and turned: the body of most tests.
 
-Physical groups: cells "block"; boundary "left", "right" (x lowest, highest), "bottom", "top" (y), "back", "front" (z, front
-towards the viewer). A bar has the first two, a rectangle four, a box six.
+Physical groups: cells "block"; boundary "left", "right" (x lowest, highest), "bottom", "top" (y), "back", "front" (z,
+front towards the viewer). A bar has the first two, a rectangle four, a box six.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from typing import Any
 
 import numpy as np
 
-if not __package__:  # run as a file of the source tree: find the package without installing it
+if not __package__:  # run as a file of the source tree, maybe not installed
     sys.path[0] = str(Path(__file__).resolve().parents[2])
 
-from vi_contact.errors import InputError  # noqa: E402
-from vi_contact.meshes.gmsh_session import write  # noqa: E402
-from vi_contact.meshes.grid import Array, add_grid, lattice  # noqa: E402
+from vi_contact.errors import InputError
+from vi_contact.meshes.gmsh_session import write
+from vi_contact.meshes.grid import Array, add_grid, lattice
 
 _SIDES = (("left", "right"), ("bottom", "top"), ("back", "front"))
 
@@ -31,8 +31,9 @@ _SIDES = (("left", "right"), ("bottom", "top"), ("back", "front"))
 class BlockMesh:
     """Mesh of a d-dimensional box, d = len(lengths) = 1, 2 or 3.
 
-    A node starts at corner + (i lengths_x/n_x, ...), is moved by `deform`, then turned by `angle` [rad] about the origin (the
-    z axis for a box). `deform` takes and returns points (n, d) [m]. Raises InputError for sizes that make no box.
+    A node starts at corner + (i lengths_x/n_x, ...), is moved by `deform`, then turned by `angle` [rad] about the
+    origin (the z axis for a box). `deform` takes and returns points (n, d) [m]. Raises InputError for sizes that make
+    no box.
     """
 
     lengths: tuple[float, ...] = (1.0, 1.0)
@@ -64,7 +65,7 @@ class BlockMesh:
 
 
 def check_box(lengths: Sequence[float], divisions: Sequence[int]) -> None:
-    """Raise InputError unless all lengths [m] are positive and each of 1 to 3 has a positive whole number of divisions."""
+    """Raise InputError unless there are 1 to 3 positive lengths [m], each with a positive number of divisions."""
     if not 1 <= len(lengths) <= 3 or len(divisions) != len(lengths):
         raise InputError(f"lengths {tuple(lengths)} and divisions {tuple(divisions)} must both be 1, 2 or 3 numbers")
     if not all(math.isfinite(length) and length > 0.0 for length in lengths):

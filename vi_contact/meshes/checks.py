@@ -1,7 +1,8 @@
-"""What a mesh must be before a solver sees it: cells with volume, not twisted, not folded; boundary groups made of their sides.
+"""What a mesh must be for a solver: cells with volume, neither twisted nor folded; boundary groups of their sides.
 
-Pure arithmetic on arrays: points (n, d) [m], cells (n_cells, n_vertices) as rows of points, vertices in Gmsh's order. Which way
-round the vertices of a cell run does not matter (finite elements use |det J|); neighbours on the same side of a facet do.
+Pure arithmetic on arrays: points (n, d) [m], cells (n_cells, n_vertices) as rows of points, vertices in Gmsh's order.
+Which way round the vertices of a cell run does not matter (finite elements use |det J|); neighbours on the same side
+of a facet do.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ Rows = npt.NDArray[np.int64]
 
 _ROUND_OFF = 1024 * np.finfo(float).eps
 
-_CORNERS = {  # a vertex and its d neighbours, right-handed in an unturned cell
+_CORNERS: dict[str, list[tuple[int, ...]]] = {  # a vertex and its d neighbours, right-handed in an unturned cell
     "interval": [(0, 1)],
     "triangle": [(0, 1, 2)],
     "quadrilateral": [(0, 1, 3), (1, 2, 0), (2, 3, 1), (3, 0, 2)],
@@ -26,7 +27,7 @@ _CORNERS = {  # a vertex and its d neighbours, right-handed in an unturned cell
         (4, 7, 5, 0), (5, 4, 6, 1), (6, 5, 7, 2), (7, 6, 4, 3),
     ],
 }  # fmt: skip
-_SIDES = {
+_SIDES: dict[str, list[tuple[int, ...]]] = {
     "interval": [(0,), (1,)],
     "triangle": [(0, 1), (1, 2), (2, 0)],
     "quadrilateral": [(0, 1), (1, 2), (2, 3), (3, 0)],
@@ -48,7 +49,8 @@ def check_cells(points: Array, cells: Rows, cell: str, source: str) -> None:
     twisted = ~flat & (det.min(axis=1) < 0.0) & (det.max(axis=1) > 0.0)
     for bad, what in ((flat, "no volume"), (twisted, "crossing sides")):
         if bad.any():
-            raise InputError(f"{_count(bad, 'cell')} of {source} {_have(bad)} {what}, {_at(points, cells, bad)}: mesh it again")
+            where = _at(points, cells, bad)
+            raise InputError(f"{_count(bad, 'cell')} of {source} {_have(bad)} {what}, {where}: mesh it again")
 
 
 def check_folds(points: Array, cells: Rows, cell: str, source: str) -> None:
@@ -84,14 +86,15 @@ def check_sides(rows: Rows, cells: Rows, cell: str, what: str) -> None:
         return
     missing = ~contains(cell_sides(cells, cell), rows)
     if missing.any():
+        are = "is" if missing.sum() == 1 else "are"
         raise InputError(
-            f"{what} has {_count(missing, 'facet')} that {'is' if missing.sum() == 1 else 'are'} no side of a cell: remove"
-            " duplicate nodes and curves or surfaces that do not bound the named cells"
+            f"{what} has {_count(missing, 'facet')} that {are} no side of a cell: remove duplicate nodes, and curves or"
+            " surfaces that do not bound the named cells"
         )
 
 
 def cell_sides(cells: Rows, cell: str) -> Rows:
-    """Sides of all cells, cell by cell, each with its vertices in ascending order, (n_cells * n_sides, n_side_vertices)."""
+    """Sides of all cells, cell by cell, vertices of each ascending, (n_cells * n_sides, n_side_vertices)."""
     sides = np.array(_SIDES[cell])
     return np.sort(cells[:, sides].reshape(-1, sides.shape[1]), axis=1)
 

@@ -1,7 +1,7 @@
-"""From Gmsh's current model to plain arrays: nodes renumbered, groups by name, everything a solver could choke on refused.
+"""From Gmsh's current model to plain arrays: nodes renumbered, groups by name, what a solver could choke on refused.
 
-DOLFINx's own readers fail on node tags that do not start at 1, on facets in two groups and on missing groups (solver notes,
-P21), so nothing of them is used. Vertices stay in Gmsh's order here.
+DOLFINx's own readers fail on node tags that do not start at 1, on facets in two groups and on missing groups (solver
+notes, P21), so nothing of them is used. Vertices stay in Gmsh's order here.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ _FACET = {1: 15, 2: 1, 3: 1, 4: 2, 5: 3}  # Gmsh's element numbers: cell -> its 
 class MeshArrays:
     """A mesh without its library.
 
-    `cell` is UFL's name, `points` (n_points, d) are in metres, `cells` (n_cells, n_vertices) rows of points. Groups by name:
-    of cells as masks (n_cells,), of facets as rows of points (n_facets, n_facet_vertices).
+    `cell` is UFL's name, `points` (n_points, d) are in metres, `cells` (n_cells, n_vertices) rows of points. Groups
+    by name: of cells as masks (n_cells,), of facets as rows of points (n_facets, n_facet_vertices).
     """
 
     cell: str
@@ -48,10 +48,10 @@ class _Elements:
 
 
 def arrays_from_file(path: str | Path) -> MeshArrays:
-    """Read a mesh file of any format Gmsh reads. Raises InputError with one sentence if there is no usable mesh in it."""
+    """Read a mesh file of any format Gmsh reads. Raises InputError if it is missing or unreadable, or like `extract`."""
     file = Path(path)
     if not file.is_file():
-        raise InputError(f"mesh file {file} does not exist: check the path, or write it with a script of the folder meshes")
+        raise InputError(f"mesh file {file} does not exist: check the path or write it with a script of folder meshes")
     with session(file.stem) as gmsh:
         try:
             gmsh.merge(str(file))
@@ -70,16 +70,16 @@ def arrays_from_script(mesh: MeshScript) -> MeshArrays:
 def extract(gmsh: Any, source: str) -> MeshArrays:
     """The mesh of Gmsh's current model; `source` names it in error messages.
 
-    As in Gmsh, the mesh is what the physical groups of the highest dimension hold; without any, all cells are taken, as a
-    group "all". Nodes no cell uses are dropped, the others numbered from 0 in the order of their tags. Raises InputError for
-    a model without cells; mixed or higher-order cells; cells without volume, twisted, or folded over a neighbour; a mesh of
-    triangles or quadrilaterals outside the plane z = 0; named facets that are no sides of cells.
+    As in Gmsh, the mesh is what the physical groups of the highest dimension hold; without any, all cells are taken,
+    as a group "all". Nodes no cell uses are dropped, the others numbered from 0 in the order of their tags. Raises
+    InputError for a model without cells; mixed or higher-order cells; cells without volume, twisted, or folded over a
+    neighbour; a mesh of triangles or quadrilaterals outside the plane z = 0; named facets that are no sides of cells.
     """
     model = gmsh.model
     d = max((model.mesh.getElementProperties(kind)[1] for kind in model.mesh.getElements()[0]), default=0)
     body, sides = _named_entities(model, d), _named_entities(model, d - 1)
     if both := body.keys() & sides.keys():
-        raise InputError(f"{source} calls both cells and facets '{min(both)}': give one of the two groups another name")
+        raise InputError(f"{source} calls both cells and facets '{min(both)}': give one of the groups another name")
     elements = _elements(model, d, _union(body) or [entity for _, entity in model.getEntities(d)])
     kind = _first_order(model, elements, d, source)
     tags, cells = np.unique(elements[kind].nodes, return_inverse=True)
@@ -120,7 +120,7 @@ def _union(groups: dict[str, list[int]]) -> list[int]:
 
 
 def _elements(model: Any, dim: int, entities: Iterable[int]) -> dict[int, _Elements]:
-    """Elements of the entities by Gmsh's element number."""
+    """Elements of the entities, by Gmsh's element number."""
     parts: dict[int, list[tuple[Rows, int]]] = {}
     for entity in entities:
         kinds, tags, nodes = model.mesh.getElements(dim, entity)
@@ -141,8 +141,8 @@ def _first_order(model: Any, elements: dict[int, _Elements], dim: int, source: s
     names = {kind: model.mesh.getElementProperties(kind)[0] for kind in elements}
     if high := [kind for kind in elements if model.mesh.getElementProperties(kind)[2] > 1]:
         raise InputError(
-            f"{source} has cells of higher order ({names[high[0]]}), but contact conditions hold between the nodes only for"
-            " first-order cells: mesh it with Mesh.ElementOrder = 1"
+            f"{source} has cells of higher order ({names[high[0]]}), but nodal contact conditions are exact only on"
+            " first-order cells (P1, Q1): mesh it with Mesh.ElementOrder = 1"
         )
     if len(elements) > 1:
         raise InputError(f"{source} mixes cells ({', '.join(sorted(names.values()))}): mesh it with cells of one type")
@@ -165,8 +165,8 @@ def _points(model: Any, used: Rows, d: int, source: str) -> Array:
     if away > 1e-9 * np.ptp(points, axis=0).max():
         plane, missing = ("plane z = 0", "volume") if d == 2 else ("axis y = z = 0", "surface")
         raise InputError(
-            f"{source} has no cells of dimension {d + 1} and leaves the {plane} by {away:.3g} m: move it there, or name the"
-            f" {missing} as a physical group so that Gmsh saves its cells"
+            f"{source} has no cells of dimension {d + 1} and leaves the {plane} by {away:.3g} m: move it there, or name"
+            f" the {missing} as a physical group so that Gmsh saves its cells"
         )
     return np.ascontiguousarray(points[:, :d])
 
@@ -186,7 +186,7 @@ def _facets(model: Any, entities: list[int], kind: int, tags: Rows, what: str) -
     if not found:
         return np.empty((0, 1), dtype=np.int64)
     if list(found) != [kind]:
-        raise InputError(f"{what} has facets of another type than the sides of its cells: mesh body and boundary together")
+        raise InputError(f"{what} has other shapes than the sides of its cells: mesh body and boundary together")
     nodes = found[kind].nodes
     nodes = nodes[_without_repeats(nodes)[0]]
     place = np.minimum(np.searchsorted(tags, nodes), len(tags) - 1)

@@ -37,7 +37,7 @@ class MeshScript(Protocol):
 def session(name: str = "vi_contact") -> Iterator[Any]:
     """The gmsh module with an empty current model; all traces are removed afterwards.
 
-    A Gmsh the caller has already initialised is borrowed: its models, its current model and its options are left as they
+    A Gmsh the caller has already initialised is borrowed: its models, current model and options are left as they
     were. Raises InputError if Gmsh is not installed.
     """
     gmsh = _import()

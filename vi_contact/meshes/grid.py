@@ -1,4 +1,4 @@
-"""Structured meshes of intervals, rectangles and boxes, node by node: Gmsh's transfinite curves are only exact to 1e-11."""
+"""Structured meshes of bars, rectangles and boxes, node by node: Gmsh's transfinite curves are only exact to 1e-11."""
 
 from __future__ import annotations
 
@@ -24,8 +24,9 @@ def lattice(lengths: Sequence[float], divisions: Sequence[int]) -> Array:
 def add_grid(gmsh: Any, nodes: Array, *, simplices: bool, body: str, sides: Sequence[tuple[str, str]]) -> None:
     """Add a structured mesh to the current model as discrete entities with named physical groups.
 
-    `nodes` (n_1+1, ..., n_d+1, d) are the points of the deformed lattice [m]; `sides[a]` names the two sides on which lattice
-    index a is lowest and highest; `body` names all cells. `simplices` splits every box along its diagonal (Kuhn).
+    `nodes` (n_1+1, ..., n_d+1, d) are the points of the deformed lattice [m]; `sides[a]` names the two sides on which
+    lattice index a is lowest and highest; `body` names all cells. `simplices` splits every box along its diagonal
+    (Kuhn).
     """
     d = nodes.shape[-1]
     shape = nodes.shape[:-1]
@@ -33,12 +34,13 @@ def add_grid(gmsh: Any, nodes: Array, *, simplices: bool, body: str, sides: Sequ
     points = np.zeros((tags.size, 3))
     points[tags.reshape(-1) - 1, :d] = nodes.reshape(-1, d)
     model, types = gmsh.model, _SIMPLEX_TYPE if simplices else _BOX_TYPE
-    parts = [(d - 1, tags.take(end, axis=axis), name) for axis, pair in enumerate(sides) for end, name in zip((0, -1), pair)]
-    boundary = [_add_entity(model, dim, name) for dim, _, name in parts]
+    boundary = [_add_entity(model, d - 1, name) for pair in sides for name in pair]
     volume = _add_entity(model, d, body, boundary)
     model.mesh.addNodes(d, volume, np.arange(1, tags.size + 1), points.reshape(-1))
-    for entity, (dim, part, _) in zip([*boundary, volume], [*parts, (d, tags, body)], strict=True):
-        model.mesh.addElementsByType(entity, types[dim], [], _cells(part, simplices).reshape(-1))
+    model.mesh.addElementsByType(volume, types[d], [], _cells(tags, simplices).reshape(-1))
+    faces = [np.take(tags, end, axis=axis) for axis in range(d) for end in (0, -1)]
+    for entity, face in zip(boundary, faces, strict=True):
+        model.mesh.addElementsByType(entity, types[d - 1], [], _cells(np.asarray(face), simplices).reshape(-1))
 
 
 def _add_entity(model: Any, dim: int, name: str, boundary: Sequence[int] = ()) -> int:
@@ -53,19 +55,14 @@ def _cells(tags: npt.NDArray[np.int_], simplices: bool) -> npt.NDArray[np.int_]:
     shapes = _kuhn_simplices(d) if simplices else [_box_corners(d)]
     count = [n - 1 for n in tags.shape]
     corner = {o: tags[tuple(slice(i, i + n) for i, n in zip(o, count, strict=True))] for o in np.ndindex(*(2,) * d)}
-    return np.stack([np.stack([corner[o].reshape(-1) for o in shape], axis=-1) for shape in shapes], axis=1).reshape(
-        -1, len(shapes[0])
-    )
+    cells = np.stack([corner[o].reshape(-1) for shape in shapes for o in shape], axis=-1)
+    return cells.reshape(-1, len(shapes[0]))
 
 
 def _box_corners(d: int) -> list[tuple[int, ...]]:
     loop = [(0, 0), (1, 0), (1, 1), (0, 1)]
-    return {
-        0: [()],
-        1: [(0,), (1,)],
-        2: list(loop),
-        3: [(*corner, z) for z in (0, 1) for corner in loop],
-    }[d]
+    corners: list[list[tuple[int, ...]]] = [[()], [(0,), (1,)], [*loop], [(x, y, z) for z in (0, 1) for x, y in loop]]
+    return corners[d]
 
 
 def _kuhn_simplices(d: int) -> list[list[tuple[int, ...]]]:

@@ -15,13 +15,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-if not __package__:  # run as a file of the source tree: find the package without installing it
+if not __package__:  # run as a file of the source tree, maybe not installed
     sys.path[0] = str(Path(__file__).resolve().parents[2])
 
-from vi_contact.errors import InputError  # noqa: E402
-from vi_contact.meshes.block import check_box  # noqa: E402
-from vi_contact.meshes.gmsh_session import write  # noqa: E402
-from vi_contact.meshes.grid import add_grid, lattice  # noqa: E402
+from vi_contact.errors import InputError
+from vi_contact.meshes.block import check_box
+from vi_contact.meshes.gmsh_session import write
+from vi_contact.meshes.grid import add_grid, lattice
 
 _PUBLISHED = (8, 12)
 
@@ -30,9 +30,9 @@ _PUBLISHED = (8, 12)
 class WallMesh:
     """Mesh of a wall, height x width [m].
 
-    `divisions` are the exact numbers of cells along width and height; `size` [m] asks for an irregular mesh of about that
-    cell size instead; without either, the 8 x 12 cells of seed 000. `triangles` instead of quadrilaterals. Raises InputError
-    for sizes that make no wall.
+    `divisions` are the exact numbers of cells along width and height; `size` [m] asks for an irregular mesh of about
+    that cell size instead; without either, the 8 x 12 cells of seed 000. `triangles` instead of quadrilaterals.
+    Raises InputError for sizes that make no wall.
     """
 
     height: float = 9.0
@@ -84,7 +84,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("-o", "--output", default="wall.msh")
     given = parser.parse_args(arguments)
     try:
-        divisions = tuple(given.divisions) if given.divisions else None
+        divisions = (given.divisions[0], given.divisions[1]) if given.divisions else None
         wall = WallMesh(
             height=given.height, width=given.width, divisions=divisions, size=given.size, triangles=given.triangles
         )
