@@ -31,6 +31,9 @@ vi_cache_environment() {
     mkdir -p "$cache/fenics" || vi_fail "no writable cache directory: set XDG_CACHE_HOME to one"
   fi
   export XDG_CACHE_HOME=$cache
+  find "$cache/fenics" -name '*.c' -mmin +2 | while read -r form; do  # a compilation that was killed: dolfinx would wait
+    [ -e "$form.cached" ] || rm -f "$form"
+  done
   [ -n "${HOME:-}" ] && [ -w "$HOME" ] || export HOME=$cache
 }
 

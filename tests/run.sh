@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # bash tests/run.sh [arguments of pytest…]     the whole suite on 1, 2 and 3 ranks; installs what is missing on Debian 12 or 13
 #   VI_CONTACT_RANKS="1 2"      other numbers of ranks
-#   VI_CONTACT_TIMEOUT=900      seconds each of these runs may take
+#   VI_CONTACT_TIMEOUT=1800     seconds for all of them together
 # Last line: "N passed, N failed, N skipped", summed over the runs.
 set -uo pipefail
 tests=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
@@ -10,26 +10,29 @@ vi_setup
 cd "$vi_root" || exit 1
 
 [ -t 1 ] && colour=auto || colour=no  # mpirun gives its processes a terminal, even when its own output is a file
-passed=0 failed=0 skipped=0 status=0
+seconds=${VI_CONTACT_TIMEOUT:-1800} passed=0 failed=0 skipped=0 status=0 child=
 tally=$(mktemp)
 trap 'rm -f "$tally"' EXIT
-trap 'kill "$child" 2>/dev/null; wait; exit 130' INT TERM
+trap 'kill "$child"; wait; exit 130' INT TERM
 
 run() {  # on $1 ranks, with pytest's arguments
-  local ranks=$1 launch=() code=0 p f s; shift
+  local ranks=$1 launch=() code=0 p=0 f=0 s=0; shift
   [ "$ranks" -eq 1 ] || launch=(mpirun -n "$ranks")
-  echo "== $ranks rank(s)"
   : >"$tally"
-  VI_CONTACT_TALLY=$tally timeout -k 10 "${VI_CONTACT_TIMEOUT:-900}" "${launch[@]}" "$vi_python" -m pytest --color="$colour" "$@" </dev/null &
+  VI_CONTACT_TALLY=$tally timeout -k 10 "$((SECONDS < seconds ? seconds - SECONDS : 1))" \
+    "${launch[@]}" "$vi_python" -m pytest --color="$colour" "$@" </dev/null &
   child=$!
   wait "$child" || code=$?
-  [ "$code" -ne 124 ] || echo "vi_contact: stopped after ${VI_CONTACT_TIMEOUT:-900} s" >&2
-  read -r p f s <"$tally" || { p=0 f=0 s=0; }
-  [ "$code" -eq 0 ] || [ "$f" -gt 0 ] || f=1  # killed or aborted before it could count
+  case $code in 124 | 137) echo "vi_contact: stopped, the $seconds s of VI_CONTACT_TIMEOUT are over" >&2 ;; esac
+  read -r p f s <"$tally"
+  [ "$code" -eq 0 ] || [ "${f:-0}" -gt 0 ] || f=1  # killed or aborted before it could count
   [ "$code" -eq 0 ] || status=1
   passed=$((passed + p)) failed=$((failed + f)) skipped=$((skipped + s))
 }
 
-for ranks in ${VI_CONTACT_RANKS:-1 2 3}; do run "$ranks" "$@"; done
+for ranks in ${VI_CONTACT_RANKS:-1 2 3}; do
+  echo "vi_contact: the suite on $ranks $([ "$ranks" -eq 1 ] && echo rank || echo ranks)"
+  run "$ranks" "$@"
+done
 echo "$passed passed, $failed failed, $skipped skipped"
 exit "$status"

@@ -1,0 +1,48 @@
+# Sourced by .ci/run, as root: a tree of the other Debian release, kept between runs, to run the suite in.
+# A function that cannot do its work returns non-zero and leaves one sentence in $why.
+
+other_release() {
+  case $(. /etc/os-release && echo "${VERSION_CODENAME:-}") in
+    bookworm) release=trixie ;;
+    trixie) release=bookworm ;;
+    *) why="this is neither Debian 12 nor 13"; return 1 ;;
+  esac
+}
+
+# make_tree RELEASE FOLDER: debootstrap from the mirror this machine uses, unless a sound tree is there.
+make_tree() {
+  local release=$1 tree=$2 mirror said
+  if [ ! -e "$tree/complete" ] || [ -n "$(chroot "$tree" /usr/bin/dpkg --audit 2>&1)" ]; then
+    command -v debootstrap >/dev/null || { vi_apt update; vi_apt install -y debootstrap debian-archive-keyring; } >/dev/null
+    command -v debootstrap >/dev/null || { why="debootstrap cannot be installed"; return 1; }
+    mirror=$(apt-get indextargets --format '$(REPO_URI)' 'Created-By: Packages' 'Origin: Debian' 'Label: Debian' | head -n 1)
+    [ -n "$mirror" ] || { why="the apt sources name no Debian mirror"; return 1; }
+    echo "vi_contact: building a tree of Debian $release (once)…"
+    rm -rf --one-file-system "$tree"
+    said=$(timeout 600 debootstrap --variant=minbase --include=ca-certificates,git "$release" "$tree" "$mirror" 2>&1 </dev/null) ||
+      { why="debootstrap failed (offline?): $(tail -n 1 <<<"$said")"; return 1; }
+    apt-config dump | grep -E '^Acquire::(https?::|Check-)' >"$tree/etc/apt/apt.conf.d/99host" # proxies
+    touch "$tree/complete"
+  fi
+  cp /etc/resolv.conf /etc/hosts "$tree/etc/"
+  cp /etc/ssl/certs/ca-certificates.crt "$tree/etc/ssl/certs/" # a house may have certificates of its own
+}
+
+# fill_tree FOLDER: this clone and the packages it asks for.
+fill_tree() {
+  local tree=$1 said
+  rm -rf --one-file-system "$tree/srv/vi_contact"
+  mkdir -p "$tree/srv/vi_contact"
+  tar -C "$root" --exclude=./.venv --exclude=__pycache__ -cf - . | tar -C "$tree/srv/vi_contact" --no-same-owner -xf -
+  said=$(in_tree "$tree" bash -c '. /srv/vi_contact/install/setup.sh; vi_setup' 2>&1) || { why=$(tail -n 1 <<<"$said"); return 1; }
+}
+
+# in_tree FOLDER COMMAND…: in namespaces of its own, so that its mounts and its processes end with it, however it ends.
+# The time it may take is what is left of the budget.
+in_tree() {
+  local tree=$1; shift
+  timeout -k 10 "$(left)" unshare --mount --pid --fork --kill-child bash -c '
+    mount -t proc proc "$0/proc" && mount -t sysfs -o ro sysfs "$0/sys" && mount --rbind /dev "$0/dev" || exit 125
+    mountpoint -q "$0/dev/shm" || { mkdir -p "$0/dev/shm" && mount -t tmpfs tmpfs "$0/dev/shm"; }
+    exec chroot "$0" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LANG=C.UTF-8 CI=true "$@"' "$tree" "$@" </dev/null
+}
