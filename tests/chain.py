@@ -1,8 +1,8 @@
-"""A spring-mass chain with walls at its ends: the smallest contact problem, shared by tests that need no finite elements.
+"""A spring-mass chain with walls at its ends: the smallest contact problem, for tests without finite elements.
 
-Masses sit at X = 1, 2, …, n [m]; spring i joins mass i - 1 to mass i, spring 1 joins mass 1 to the ground (clamped) or is
-absent (floating). The wall on the right bounds u_n <= gap; the wall on the left bounds -u_1 <= left_gap, so that its
-contact direction is -1 and the change of basis is not the identity. Everything runs on one process (SerialAlgebra).
+Masses sit at X = 1, 2, …, n [m]; spring i joins mass i - 1 to mass i, spring 1 joins mass 1 to the ground (clamped)
+or is absent (floating). The wall on the right bounds u_n <= gap; the wall on the left bounds -u_1 <= left_gap, so that
+its contact direction is -1 and the change of basis is not the identity. It runs on one process (SerialAlgebra).
 """
 
 from __future__ import annotations
@@ -64,7 +64,8 @@ def chain_system(
     off = np.full(n - 1, -1.0)
     K = stiffness * sp.diags([off, k, off], [-1, 0, 1])
     side = np.full(n - 1, mass / 6.0)
-    M = sp.diags([side, np.full(n, 4.0 * mass / 6.0), side], [-1, 0, 1]) if consistent else sp.diags([np.full(n, mass)], [0])
+    spread = [side, np.full(n, 4.0 * mass / 6.0), side]
+    M = sp.diags(spread, [-1, 0, 1]) if consistent else sp.diags([np.full(n, mass)], [0])
     force = np.zeros(n)
     force[-1] = constant
     return SemiDiscreteSystem(
@@ -104,7 +105,13 @@ def chain_surface(n: int, *, gap: float = 0.0, left_gap: float | None = None, we
 
 
 def chain_problem(
-    n: int = 5, *, gap: float = 0.0, left_gap: float | None = None, impact: Any = None, excitation: Any = (), **system: Any
+    n: int = 5,
+    *,
+    gap: float = 0.0,
+    left_gap: float | None = None,
+    impact: Any = None,
+    excitation: Any = (),
+    **system: Any,
 ) -> ContactProblem:
     """The chain between its walls; other keywords go to ``chain_system``."""
     surface = chain_surface(n, gap=gap, left_gap=left_gap)

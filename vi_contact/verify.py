@@ -8,6 +8,7 @@ import numpy as np
 
 from .algebra import Array
 from .step import Balance, Certificate, ContactProblem, State, StepProblem, StepResult
+from .system import SemiDiscreteSystem
 
 
 def _ratio(value: float, reference: float) -> float:
@@ -24,7 +25,8 @@ def kkt_residual(step: StepProblem, result: StepResult) -> Certificate:
     residual = Ax - step.b
     residual[surface.owned] += r_n[surface.slots]
     local = [_max_abs(residual), _max_abs(step.b), _max_abs(Ax), _max_abs(x), _max_abs(step.guess)]
-    equilibrium, b_max, Ax_max, x_max, guess_max = surface.comm.max(np.nan_to_num(np.array(local), nan=np.inf, posinf=np.inf))
+    local = list(np.nan_to_num(local, nan=np.inf, posinf=np.inf))
+    equilibrium, b_max, Ax_max, x_max, guess_max = surface.comm.max(np.array(local))
     finite = np.isfinite(step.bound)
     gap = (step.bound - surface.normal_values(x) + surface.compliance * r_n / step.scale)[finite]
     x_ref = max(x_max, guess_max, _max_abs(step.bound[finite]))
@@ -70,27 +72,57 @@ class StepEnergy:
         return self.change - (self.input - self.damping - self.contact - self.algorithmic)
 
 
-def energy_balance(problem: ContactProblem, old: State, new: State, balance: Balance) -> StepEnergy:
+@dataclass(frozen=True)
+class Energies:
+    """M v, K u and the energies of a state [J]. A ledger carries them from step to step: each product is made once."""
+
+    momentum: Array
+    elastic: Array
+    kinetic: float
+    strain: float
+
+    @property
+    def total(self) -> float:
+        """½ vᵀMv + ½ uᵀKu [J]."""
+        return self.kinetic + self.strain
+
+
+def energies(system: SemiDiscreteSystem, u: Array, v: Array) -> Energies:
+    """The energies of displacement u and velocity v: two products."""
+    momentum, elastic = system.M @ v, system.K @ u
+    dot = system.algebra.dot
+    return Energies(momentum, elastic, 0.5 * dot(v, momentum), 0.5 * dot(u, elastic))
+
+
+def energy_balance(
+    problem: ContactProblem,
+    old: State,
+    new: State,
+    balance: Balance,
+    *,
+    before: Energies | None = None,
+    after: Energies | None = None,
+) -> StepEnergy:
     """The ledger of a step before the impact law, for any scheme (verification V9).
 
-    The step satisfied M a + C v + K u = f - B_nᵀ r_n with the averages of ``balance``. Times the increment du = u1 - u0:
+    The step satisfied M a + C v + K u = f - B_nᵀ r_n with the averages of ``balance``. Times the increment du:
         input = f·du,  damping = du·C v,  contact = r_n·B_n du (work lost to the support, stored or dissipated there),
         algorithmic = du·M a - ½(v0 + v1)·M (v1 - v0) + du·K u - ½(u0 + u1)·K du   (0 for the midpoint rule)
-    and change is computed from the energies themselves, so the defect measures the equation of motion.
+    and change is the difference of the energies themselves, so the defect measures the equation of motion.
+    ``before``, ``after``: the energies of both states, when known; one product (two with damping) is left then.
     """
     system, surface = problem.equations, problem.surface
     dot = system.algebra.dot
-    du, dv = new.u - old.u, new.v - old.v
-    mean_u, mean_v = 0.5 * (old.u + new.u), 0.5 * (old.v + new.v)
-    Mdv, Kdu = system.M @ dv, system.K @ du
-    kinetic, strain = dot(mean_v, Mdv), dot(mean_u, Kdu)
-    inertia = dot(du, system.M @ balance.a)
-    stiffness = dot(balance.u, Kdu)
-    contact = float(balance.r_n @ surface.normal_values(du))
+    before = before or energies(system, old.u, old.v)
+    after = after or energies(system, new.u, new.v)
+    du = new.u - old.u
+    Mdv, Kdu = after.momentum - before.momentum, after.elastic - before.elastic
+    inertia = dot(du, system.M @ balance.a) - dot(0.5 * (old.v + new.v), Mdv)
+    stiffness = dot(balance.u - 0.5 * (old.u + new.u), Kdu)
     return StepEnergy(
-        change=kinetic + strain,
+        change=after.total - before.total,
         input=dot(balance.f, du),
         damping=0.0 if system.C is None else dot(du, system.C @ balance.v),
-        contact=contact,
-        algorithmic=inertia - kinetic + stiffness - strain,
+        contact=float(balance.r_n @ surface.normal_values(du)),
+        algorithmic=inertia + stiffness,
     )

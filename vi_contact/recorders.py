@@ -1,0 +1,265 @@
+"""Recorders listen to the loop: each names its columns once and fills a row after every step.
+
+Rows hold numbers (one column of ``history.csv`` each) or arrays (HDF5 only). Values are equal on every rank.
+Displacements and velocities are those of the equations: relative to the ground when an excitation shakes the body.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from .algebra import Array
+from .errors import InputError
+from .step import ContactProblem, Report, State
+from .verify import Energies, energies, energy_balance
+
+Columns = Mapping[str, tuple[str, str]]
+Row = Mapping[str, Any]
+AXES = "xyz"
+
+
+class Steps:
+    """The columns every run has: time, step, solver iterations, certificate, escalation and ground acceleration."""
+
+    def __init__(self, dimension: int) -> None:
+        self._dimension = dimension
+
+    def columns(self) -> Columns:
+        """t, k, iterations, certificate, escalated, a_g_x, …"""
+        axes = AXES[: self._dimension]
+        ground = {f"a_g_{axis}": ("m/s²", f"ground acceleration along {axis} at time t") for axis in axes}
+        return {
+            "t": ("s", "time at the end of the step"),
+            "k": ("-", "number of the step"),
+            "iterations": ("-", "iterations of the solver in this step"),
+            "certificate": ("-", "worst dimensionless residual of the inequality problem of this step"),
+            "escalated": ("-", "1 when the step needed another solver than the first, else 0"),
+        } | ground
+
+    def _row(self, state: State, iterations: int, certificate: float, escalated: bool) -> Row:
+        ground = self._problem.ground_acceleration(state.t)
+        return {
+            "t": state.t,
+            "k": state.k,
+            "iterations": iterations,
+            "certificate": certificate,
+            "escalated": int(escalated),
+        } | {f"a_g_{axis}": float(value) for axis, value in zip(AXES, ground, strict=False)}
+
+    def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
+        """The initial state needed no iterations and no certificate: zeros."""
+        self._problem = problem
+        return self._row(state, 0, 0.0, False)
+
+    def row(self, report: Report) -> Row:
+        return self._row(report.new, report.result.iterations, report.certificate.worst, report.escalated)
+
+
+class Energy:
+    """The energy ledger of the run (verification V9.7), all in joules, works and losses cumulative:
+
+        W_input + E(0) = E(t) + D_damping + D_contact + D_impact + D_algorithmic + defect,   E = ½ vᵀMv + ½ uᵀKu
+
+    D_impact = ½ v⁻ᵀMv⁻ - ½ v⁺ᵀMv⁺ with its sign (V9.6); W_input is the work of loads, inertia loads -M r a_g and
+    prescribed motions. The defect is the work of the residual of the equation of motion, accumulated; its size relative
+    to the largest energy or work is in ``summary.json``. Costs three sparse products a step, one more with damping and
+    one more after an impact.
+    """
+
+    _TERMS = ("work_input", "loss_damping", "loss_contact", "loss_impact", "loss_algorithmic", "energy_defect")
+
+    def columns(self) -> Columns:
+        """energy_kinetic, energy_strain, work_input, loss_*, energy_defect."""
+        return {
+            "energy_kinetic": ("J", "kinetic energy after the impact law, ½ vᵀMv"),
+            "energy_strain": ("J", "strain energy ½ uᵀKu"),
+            "work_input": ("J", "work of loads, ground motion and prescribed motions since the start"),
+            "loss_damping": ("J", "work of viscous damping since the start"),
+            "loss_contact": ("J", "work done on the support by the contact reactions since the start"),
+            "loss_impact": ("J", "kinetic energy taken by the impact law since the start, signed"),
+            "loss_algorithmic": ("J", "numerical dissipation of the time scheme since the start"),
+            "energy_defect": ("J", "what the ledger cannot explain since the start"),
+        }
+
+    def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
+        """Energies of the initial state; works and losses are zero, or those of the run that is continued."""
+        self._problem = problem
+        self._now = energies(problem.equations, state.u, state.v)
+        self._sums = {term: 0.0 if resumed is None else float(resumed[term]) for term in self._TERMS}
+        return self._row()
+
+    def _row(self) -> Row:
+        return {"energy_kinetic": self._now.kinetic, "energy_strain": self._now.strain} | self._sums
+
+    def row(self, report: Report) -> Row:
+        system, new = self._problem.equations, report.new
+        free = energies(system, new.u, report.v_minus)
+        before_impact = replace(new, v=report.v_minus)
+        step = energy_balance(
+            self._problem, report.old, before_impact, report.balance, before=self._now, after=free
+        )
+        self._now = free if new.v is report.v_minus else self._after_impact(free, new.v)
+        impact = free.kinetic - self._now.kinetic
+        losses = (step.input, step.damping, step.contact, impact, step.algorithmic, step.defect)
+        for term, loss in zip(self._TERMS, losses, strict=True):
+            self._sums[term] += loss
+        return self._row()
+
+    def _after_impact(self, free: Energies, v: Array) -> Energies:
+        """The energies with the velocity the impact law left; displacements do not jump."""
+        system = self._problem.equations
+        momentum = system.M @ v
+        return replace(free, momentum=momentum, kinetic=0.5 * system.algebra.dot(v, momentum))
+
+
+class Contact:
+    """What the contact surface does. Reactions are those of the step (mean or end value, as the scheme says).
+
+    gap = gap0 - u_n, plus the shortening of a deformable support; pressure = r_n / weight; the force on the body is
+    -Σ r_n n; its point of action is Σ r_n X / Σ r_n (NaN while the contact is open). Arrays have shape (m,) and the
+    order of ``surface.points``, which is in ``history.h5`` too.
+    """
+
+    def __init__(self) -> None:
+        self._dimension = len(AXES)
+
+    def columns(self) -> Columns:
+        """contact_uplift, contact_resultant, … and the arrays pressure, gap, active. Call ``start`` first."""
+        axes = AXES[: self._dimension]
+        force = {f"contact_force_{a}": ("N", f"contact force on the body along {a}, -Σ r_n n_{a}") for a in axes}
+        place = {f"contact_{a}": ("m", f"{a} of the point of action, Σ r_n {a} / Σ r_n; nan while open") for a in axes}
+        return (
+            {
+                "contact_uplift": ("-", "uplift ratio: share of the contact surface, by weight, that is open"),
+                "contact_active": ("-", "number of closed contact points"),
+                "contact_resultant": ("N", "sum of the normal reactions Σ r_n"),
+            }
+            | force
+            | place
+            | {
+                "contact_min_gap": ("m", "smallest gap; nan without contact points"),
+                "contact_max_pressure": ("Pa", "largest contact pressure; nan without contact points"),
+                "pressure": ("Pa", "contact pressure r_n / weight of every contact point"),
+                "gap": ("m", "gap of every contact point"),
+                "active": ("-", "whether the contact point is closed"),
+            }
+        )
+
+    def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
+        """The initial contact: of a gravity stage, or open."""
+        self._surface = problem.surface
+        self._dimension = problem.surface.points.shape[1]
+        return self._row(state)
+
+    def row(self, report: Report) -> Row:
+        return self._row(report.new)
+
+    def _row(self, state: State) -> Row:
+        surface, r_n = self._surface, state.r_n
+        gap = surface.gap0 - surface.normal_values(state.u) + surface.compliance * r_n
+        pressure = r_n / surface.weights
+        total, resultant = float(surface.weights.sum()), float(r_n.sum())
+        closed = float(surface.weights[state.active].sum())
+        force = 0.0 - r_n @ surface.normals  # not -(…): no negative zeros
+        place = r_n @ surface.points / resultant if resultant else np.full(self._dimension, np.nan)
+        return (
+            {
+                "contact_uplift": 1.0 - closed / total if total else 1.0,
+                "contact_active": int(state.active.sum()),
+                "contact_resultant": resultant,
+            }
+            | {f"contact_force_{axis}": float(value) for axis, value in zip(AXES, force, strict=False)}
+            | {f"contact_{axis}": float(value) for axis, value in zip(AXES, place, strict=False)}
+            | {
+                "contact_min_gap": float(gap.min()) if len(gap) else np.nan,
+                "contact_max_pressure": float(pressure.max()) if len(gap) else np.nan,
+                "pressure": pressure,
+                "gap": gap,
+                "active": state.active,
+            }
+        )
+
+
+@dataclass
+class Probe:
+    """Histories at points of the body, at the node nearest to each: label -> point (d,) [m].
+
+    Columns u_x_<label>, u_y_<label> [m]; with ``velocity`` v_x_<label> [m/s], after the impact law; with
+    ``acceleration`` a_x_<label> [m/s²]: the *absolute* acceleration, the one of the step's equation of motion (velocity
+    jumps of the impact law are not in it) plus the mean ground acceleration of the step; the ground's own in row 0.
+    u and v are relative to the ground when an excitation shakes the body.
+
+    InputError for a label that is not made of letters, digits and underscores, or a point outside the body.
+    """
+
+    points: Mapping[Any, Sequence[float]]
+    velocity: bool = False
+    acceleration: bool = False
+
+    def __post_init__(self) -> None:
+        for label in self.points:
+            if not re.fullmatch(r"\w+", str(label), re.ASCII):
+                raise InputError(f"probe label {label!r}: use letters, digits and underscores, it names columns")
+        if len({len(point) for point in self.points.values()}) > 1:
+            raise InputError("the probe points have different numbers of coordinates: give one per dimension")
+
+    def _quantities(self) -> dict[str, tuple[str, str]]:
+        """Letter -> (unit, meaning) of what is recorded."""
+        found = {"u": ("m", "displacement")}
+        if self.velocity:
+            found["v"] = ("m/s", "velocity after the impact law")
+        if self.acceleration:
+            found["a"] = ("m/s²", "absolute acceleration, mean of the step")
+        return found
+
+    def columns(self) -> Columns:
+        """u_x_<label>, …"""
+        return {
+            f"{letter}_{axis}_{label}": (unit, f"{meaning} along {axis} at point {label}")
+            for letter, (unit, meaning) in self._quantities().items()
+            for label, point in self.points.items()
+            for axis in AXES[: len(point)]
+        }
+
+    def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
+        """Finds the nodes."""
+        self._problem = problem
+        dimension = problem.system.space.dimension
+        points = np.array(list(self.points.values()), dtype=float).reshape(len(self.points), -1)
+        if len(points) and points.shape[1] != dimension:
+            raise InputError(f"a probe point has {points.shape[1]} coordinates: give {dimension}")
+        self._nodes = problem.system.space.find_nodes(points) if len(points) else np.zeros(0, dtype=int)
+        row = self._row(state)
+        if self.acceleration:
+            ground = problem.ground_acceleration(state.t)
+            row |= self._named("a", np.tile(ground, (len(points), 1)))
+        return row
+
+    def row(self, report: Report) -> Row:
+        row = self._row(report.new)
+        if self.acceleration:
+            problem = self._problem
+            ground = 0.5 * (problem.ground_acceleration(report.old.t) + problem.ground_acceleration(report.new.t))
+            row |= self._named("a", self._sample(report.balance.a, report.new.t, 2) + ground)
+        return row
+
+    def _row(self, state: State) -> dict[str, float]:
+        row = self._named("u", self._sample(state.u, state.t, 0))
+        if self.velocity:
+            row |= self._named("v", self._sample(state.v, state.t, 1))
+        return row
+
+    def _sample(self, x: Array, t: float, derivative: int) -> Array:
+        return self._problem.system.space.sample(self._problem.cartesian(x), self._nodes, t, derivative)
+
+    def _named(self, letter: str, values: Array) -> dict[str, float]:
+        return {
+            f"{letter}_{axis}_{label}": float(value)
+            for label, row in zip(self.points, values, strict=True)
+            for axis, value in zip(AXES, row, strict=False)
+        }

@@ -1,0 +1,178 @@
+"""A run under way: the loop over certified steps, with everything that has to happen when it ends, well or badly."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+
+from .algebra import Array
+from .checkpoint import Start
+from .history import Table
+from .march import march
+from .run_log import Progress, versions
+from .solution import Solution, history_facts
+from .step import ContactProblem, Recorder, Report, Scheme, Solver, State, StepResult
+from .writer import Writer
+
+log = logging.getLogger(__name__)
+LINEAR_STEPS = 21  # repetitions of the plain linear step that the step is compared with
+
+
+class Comparison(Protocol):
+    """A cross-check of routes that accompanies the run (cross_check.CrossChecked)."""
+
+    def report(self) -> Mapping[str, Mapping[str, float]]: ...
+
+
+@dataclass(frozen=True)
+class Settings:
+    """The arguments of ``simulate`` that hold for the whole run."""
+
+    problem: ContactProblem
+    scheme: Scheme
+    solver: Solver
+    dt: float
+    escalation: Sequence[Solver]
+    tolerance: float
+    checkpoint_every: int
+    cross_check: Comparison | None
+    progress: bool
+
+    @property
+    def root(self) -> bool:
+        """Whether this is rank 0, the one that speaks."""
+        return self.problem.system.algebra.comm.rank == 0
+
+    def facts(self) -> dict[str, Any]:
+        """What was asked for, for log and summary."""
+        checked = None if self.cross_check is None else getattr(self.solver, "primary", self.solver)
+        return {
+            "scheme": repr(self.scheme),
+            "solver": repr(self.solver if checked is None else checked),
+            "dt": self.dt,
+            "tolerance": self.tolerance,
+            "ranks": self.problem.system.algebra.comm.size,
+            "unknowns": self.problem.system.space.unknowns,
+            "contact_points": self.problem.surface.count,
+        }
+
+
+@dataclass
+class Run:
+    """The state of a run. ``start``: where the whole run began; ``resumed_from``: the step of the checkpoint."""
+
+    settings: Settings
+    recorders: Sequence[Recorder]
+    table: Table
+    state: State
+    start: Start
+    resumed_from: int | None = None
+    last: Report | None = None
+    seconds: list[float] = field(default_factory=list)
+
+    def go(self, steps: int, writer: Writer) -> Solution:
+        """The remaining steps and everything that is written before, during and after them."""
+        begin = time.perf_counter()
+        try:
+            writer.open(self.state)
+            self._tell_start(steps)
+            self._march(steps, writer)
+            self._checkpoint(writer)
+            linear = self._seconds_per_linear_step()
+        except BaseException as error:
+            interrupted = isinstance(error, KeyboardInterrupt)
+            reason = "interrupted by the user" if interrupted else str(error) or type(error).__name__
+            self._rescue(writer, "interrupted" if interrupted else "failed", reason, time.perf_counter() - begin)
+            raise
+        history = self.table.history()
+        facts = self._facts(history, "finished", "", time.perf_counter() - begin) | {"seconds_per_linear_step": linear}
+        writer.close(facts)
+        return Solution(history, self.table.columns, self.state, facts)
+
+    def _march(self, steps: int, writer: Writer) -> None:
+        s = self.settings
+        loop = march(
+            s.problem, scheme=s.scheme, solver=s.solver, dt=s.dt, steps=steps, state=self.state,
+            escalation=s.escalation, tolerance=s.tolerance,
+        )
+        worst, begin = 0.0, time.perf_counter()
+        with Progress(steps, shown=s.progress and s.root) as progress:
+            for state, report in loop:
+                self._keep(state, report, writer)
+                worst = max(worst, report.certificate.worst)
+                if s.root:
+                    progress.step(state.k, state.t, iterations=report.result.iterations, worst=worst)
+                self.seconds.append(time.perf_counter() - begin)
+                begin = time.perf_counter()
+
+    def _keep(self, state: State, report: Report, writer: Writer) -> None:
+        """Everything that is recorded of a step."""
+        if report.escalated and self.settings.root:
+            log.warning("step %d, t = %.6g s: escalated to %s", state.k, state.t, report.result.method)
+        row: dict[str, Any] = {}
+        for recorder in self.recorders:
+            row |= recorder.row(report)
+        writer.append(row)
+        self.table.rows.append(row)  # after the disk: a checkpoint never knows a step that history.csv does not
+        self.state, self.last = state, report
+        writer.frame(state, report.balance.a)
+        if state.k % self.settings.checkpoint_every == 0:
+            self._checkpoint(writer)
+
+    def _checkpoint(self, writer: Writer) -> None:
+        writer.checkpoint(self.state, scheme=self.settings.scheme, dt=self.settings.dt, start=self.start)
+
+    def _rescue(self, writer: Writer, status: str, reason: str, seconds: float) -> None:
+        """Saves what there is. A checkpoint of the last certified step only on one rank: others might not come."""
+        with suppress(Exception):
+            if self.settings.problem.system.algebra.comm.size == 1:
+                self._checkpoint(writer)
+        with suppress(Exception):
+            writer.rescue(self._facts(self.table.history(), status, reason, seconds))
+
+    def _tell_start(self, steps: int) -> None:
+        if not self.settings.root:
+            return
+        log.info("versions: %s", ", ".join(f"{name} {version}" for name, version in versions().items()))
+        for name, value in self.settings.facts().items():
+            log.info("%s: %s", name, value)
+        if self.resumed_from is not None:
+            log.info("continues from the checkpoint of step %d", self.resumed_from)
+        log.info("%d steps to do", steps)
+
+    def _facts(self, history: Mapping[str, Array], status: str, reason: str, seconds: float) -> dict[str, Any]:
+        """The content of summary.json."""
+        cross_check = self.settings.cross_check
+        return (
+            {"status": status, "reason": reason, "versions": versions()}
+            | self.settings.facts()
+            | {"restarted_from_step": self.resumed_from}
+            | history_facts(history)
+            | {
+                "cross_check": None if cross_check is None else cross_check.report(),
+                "seconds": seconds,
+                "seconds_per_step": float(np.median(self.seconds)) if self.seconds else float("nan"),
+                "seconds_per_linear_step": float("nan"),
+            }
+        )
+
+    def _seconds_per_linear_step(self) -> float:
+        """Median time of right-hand side, one back-substitution and update with the same A, from the last state [s]."""
+        if self.last is None:
+            return float("nan")
+        s, old, A = self.settings, self.last.old, self.last.step.A
+        none = np.zeros(s.problem.surface.count)
+        found = []
+        for _ in range(LINEAR_STEPS + 1):
+            begin = time.perf_counter()
+            step = s.scheme.step(s.problem, old, A, s.dt)
+            x = A.factor.solve(step.b)
+            s.scheme.finish(s.problem, old, step, StepResult(x, none, none.astype(bool), 0, "linear"), s.dt)
+            found.append(time.perf_counter() - begin)
+        return float(np.median(found[1:]))  # the first may make the factor, when the solver needed none

@@ -1,0 +1,119 @@
+"""What a run tells while it works: ``run.log`` through the logging module, and progress with the time that is left."""
+
+from __future__ import annotations
+
+import logging
+import platform
+import sys
+import time
+from contextlib import suppress
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import h5py
+import numpy as np
+import scipy
+
+LOGGER = logging.getLogger("vi_contact")
+log = logging.getLogger(__name__)
+SHARE, SECONDS = 0.1, 30.0  # a line in the log for every tenth of the run, or this often
+
+
+class _LogFile(logging.FileHandler):
+    """Keeps the error of a line that could not be written, for the run to raise on all ranks."""
+
+    error: OSError | None = None
+
+    def handleError(self, record: logging.LogRecord) -> None:
+        failure = sys.exc_info()[1]
+        self.error = failure if isinstance(failure, OSError) else None
+
+
+class RunLog:
+    """Everything logged under ``vi_contact`` while it is open goes to the file. Only rank 0 has a path."""
+
+    def __init__(self, path: Path | None, *, append: bool) -> None:
+        self._level = LOGGER.level
+        self._file = None if path is None else _LogFile(path, mode="a" if append else "w", encoding="utf-8")
+        if self._file is not None:
+            self._file.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
+            LOGGER.addHandler(self._file)
+            LOGGER.setLevel(logging.INFO)
+
+    def check(self) -> None:
+        """Raises the OSError of a line that could not be written."""
+        if self._file is not None and self._file.error is not None:
+            error = self._file.error
+            raise OSError(error.errno, error.strerror, self._file.baseFilename)
+
+    def close(self) -> None:
+        """Gives the logger back as it was."""
+        if self._file is not None:
+            LOGGER.removeHandler(self._file)
+            LOGGER.setLevel(self._level)
+            with suppress(OSError):  # the disk is full: check() or the histories have told
+                self._file.close()
+
+
+def versions() -> dict[str, str]:
+    """Version of everything that computes in this process."""
+    from . import __version__
+
+    found = {
+        "vi_contact": __version__,
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "scipy": scipy.__version__,
+        "h5py": h5py.__version__,
+    }
+    for name in ("petsc4py", "mpi4py", "dolfinx"):
+        module = sys.modules.get(name)
+        if module is not None:
+            found[name] = str(module.__version__)
+    return found
+
+
+def clock(seconds: float) -> str:
+    """1:02:03, or 2:03 below an hour."""
+    minutes, second = divmod(int(seconds), 60)
+    hours, minute = divmod(minutes, 60)
+    return f"{hours}:{minute:02d}:{second:02d}" if hours else f"{minute}:{second:02d}"
+
+
+class Progress:
+    """The progress line: tqdm on a terminal; otherwise a line in the log every tenth of the run or every 30 s."""
+
+    def __init__(self, total: int, *, shown: bool) -> None:
+        self._total, self._done = total, 0
+        self._begin = self._told = time.monotonic()
+        self._next = SHARE * total
+        self._bar: Any = None
+        if shown and sys.stderr.isatty():
+            from tqdm import tqdm
+
+            self._bar = tqdm(total=total, unit="step", dynamic_ncols=True)
+
+    def __enter__(self) -> Progress:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._bar is not None:
+            self._bar.close()
+
+    def step(self, k: int, t: float, *, iterations: int, worst: float) -> None:
+        """One more step is done."""
+        self._done += 1
+        if self._bar is not None:
+            self._bar.set_postfix_str(f"t={t:.4g} s, iterations={iterations}, worst={worst:.1e}", refresh=False)
+            self._bar.update()
+        now = time.monotonic()
+        if self._done >= self._next or now - self._told >= SECONDS:
+            self._told, self._next = now, self._done + SHARE * self._total
+            left = (now - self._begin) / self._done * (self._total - self._done)
+            log.info(
+                "step %d, t = %.6g s: %d of %d steps, %d iterations, worst certificate %.1e, %s left",
+                k, t, self._done, self._total, iterations, worst, clock(left),
+            )

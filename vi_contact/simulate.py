@@ -1,0 +1,117 @@
+"""``simulate``: march, listen with recorders, and keep everything in a folder that a crash cannot spoil."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from .checkpoint import Start, read_checkpoint
+from .errors import InputError
+from .history import Table, read_rows
+from .march import TOLERANCE, count_steps, initial_state
+from .output import on_root, run_folder
+from .recorders import Contact, Energy, Row, Steps
+from .run import Comparison, Run, Settings
+from .solution import Solution
+from .step import ContactProblem, Recorder, Scheme, Solver, State
+from .writer import FieldWriter, Writer
+
+__all__ = ["Solution", "simulate"]
+
+
+def simulate(
+    problem: ContactProblem,
+    *,
+    scheme: Scheme,
+    solver: Solver,
+    dt: float,
+    t_end: float | None = None,
+    steps: int | None = None,
+    record: Sequence[Recorder] | None = None,
+    out: str | Path | None = None,
+    state: State | None = None,
+    escalation: Sequence[Solver] = (),
+    tolerance: float = TOLERANCE,
+    checkpoint_every: int = 100,
+    restart: bool | str | Path = False,
+    progress: bool = True,
+    fields: FieldWriter | None = None,
+    cross_check: Comparison | None = None,
+) -> Solution:
+    """Marches to t_end, or for so many steps, and records. Collective; every rank gets the solution.
+
+    Args:
+        record: recorders, (Energy(), Contact()) when None; time, iterations and certificate are always recorded.
+        out: the run folder: history.csv, columns.json, history.h5, summary.json, run.log, checkpoint.npz, fields.xdmf.
+            Without it nothing is written. Output of an earlier run in the folder is replaced, unless ``restart``.
+        state: the initial state, from a gravity stage for example; u0, v0 of the system when None.
+        escalation, tolerance: see ``march``.
+        checkpoint_every: steps between checkpoints.
+        restart: True continues the run in ``out`` from its checkpoint; a path continues the run in that folder.
+            ``steps`` and ``t_end`` are those of the whole run. The result equals the uninterrupted run to the last bit.
+        progress: a progress line on a terminal.
+        fields: fem.XDMF(every=10) for ParaView.
+        cross_check: whose report() goes into the summary.
+    Raises:
+        InputError: before anything is computed or overwritten.
+        StepFailure: a step no solver could certify; ViContactError: the disk refused something. All that was computed
+            is in the folder then, and summary.json says why the run ended.
+    """
+    if checkpoint_every < 1:
+        raise InputError(f"checkpoint_every is {checkpoint_every}: give a number of steps >= 1")
+    if fields is not None and out is None:
+        raise InputError("fields need an output folder: give out, or leave fields away")
+    scheme.check(problem)
+    solver.check(problem)
+    count_steps(dt, steps, t_end)
+    settings = Settings(problem, scheme, solver, dt, escalation, tolerance, checkpoint_every, cross_check, progress)
+    folder = None if out is None else run_folder(problem.system.algebra.comm, out)
+    recorders: list[Any] = [Steps(problem.system.influence.shape[1])]
+    recorders += (Energy(), Contact()) if record is None else record
+    source = _source(restart, folder)
+    if source is None:
+        first = scheme.start(problem, initial_state(problem) if state is None else state, dt)
+        run = Run(settings, recorders, _table(problem, recorders, first), first, Start(first.t, first.k))
+    else:
+        run = _resumed(settings, recorders, source)
+    left = count_steps(dt, steps, t_end, run.start.t) - (run.state.k - run.start.k)
+    continued = source is not None and folder is not None and source.resolve() == folder.resolve()
+    return run.go(max(left, 0), Writer(problem, folder, fields, run.table, continued=continued))
+
+
+def _source(restart: bool | str | Path, folder: Path | None) -> Path | None:
+    """The folder of the run to continue."""
+    if isinstance(restart, bool):
+        if restart and folder is None:
+            raise InputError("restart=True needs out, the folder of the run to continue")
+        return folder if restart else None
+    path = Path(restart)
+    return path.parent if path.suffix == ".npz" else path
+
+
+def _table(
+    problem: ContactProblem, recorders: Sequence[Recorder], state: State, resumed: Mapping[str, Any] | None = None
+) -> Table:
+    """Starts the recorders; the table with the row of the state. InputError when two record the same column."""
+    row: dict[str, Any] = {}
+    columns: dict[str, tuple[str, str]] = {}
+    for recorder in recorders:
+        row |= recorder.start(problem, state, resumed)
+        twice = sorted(set(columns) & set(recorder.columns()))
+        if twice:
+            raise InputError(f"two recorders record '{twice[0]}': leave one of them out")
+        columns |= recorder.columns()
+    return Table(columns, [row])
+
+
+def _resumed(settings: Settings, recorders: Sequence[Recorder], source: Path) -> Run:
+    """The run that the checkpoint in the folder of an earlier run continues."""
+    problem, comm = settings.problem, settings.problem.system.algebra.comm
+    state, start = read_checkpoint(source, problem, scheme=settings.scheme, dt=settings.dt)
+    state = settings.scheme.start(problem, state, settings.dt)
+    template = _table(problem, recorders, state)
+    rows: list[Row] = comm.bcast(on_root(comm, lambda: read_rows(source, template, state.k)))
+    table = _table(problem, recorders, state, rows[-1])
+    table.rows[:] = rows
+    return Run(settings, recorders, table, state, start, resumed_from=state.k)

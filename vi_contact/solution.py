@@ -1,0 +1,131 @@
+"""What a run leaves behind: histories, the final state and a summary in figures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .algebra import Array
+from .output import to_json
+from .recorders import Columns
+from .step import State
+
+_LEDGER = (
+    ("work_input", "input work"),
+    ("energy_kinetic", "kinetic energy"),
+    ("energy_strain", "strain energy"),
+    ("loss_damping", "damping"),
+    ("loss_contact", "contact work"),
+    ("loss_impact", "impact loss"),
+    ("loss_algorithmic", "algorithmic loss"),
+    ("energy_defect", "defect"),
+)
+
+
+@dataclass(frozen=True)
+class Solution:
+    """The result of ``simulate``.
+
+    Attributes:
+        history: column -> values, (rows,) or (rows, m) for arrays; row 0 is the initial state.
+        columns: column -> (unit, meaning).
+        state: the final state, in the rotated basis (``problem.cartesian`` turns it back).
+        facts: what summary.json holds.
+    """
+
+    history: Mapping[str, Array]
+    columns: Columns
+    state: State
+    facts: Mapping[str, Any]
+
+    @property
+    def seconds_per_step(self) -> float:
+        """Median wall time of a step [s]: contact solve, certificate, records and output; nan without steps."""
+        return float(self.facts["seconds_per_step"])
+
+    @property
+    def seconds_per_linear_step(self) -> float:
+        """Median wall time of a plain linear step with the same A [s]: right-hand side, back-substitution, update."""
+        return float(self.facts["seconds_per_linear_step"])
+
+    def to_json(self) -> str:
+        """The content of summary.json."""
+        return to_json(self.facts)
+
+    def summary(self) -> str:
+        """The run in a few lines for people."""
+        return "\n".join(_lines(self.facts))
+
+
+def history_facts(history: Mapping[str, Array]) -> dict[str, Any]:
+    """What the histories say about the run: steps, iterations, worst certificate, energy ledger."""
+    iterations = history["iterations"][1:]
+    facts = {
+        "steps": len(history["t"]) - 1,
+        "t_start": float(history["t"][0]),
+        "t_end": float(history["t"][-1]),
+        "iterations_per_step": {
+            "mean": float(iterations.mean()) if len(iterations) else 0.0,
+            "max": int(iterations.max(initial=0)),
+        },
+        "escalated_steps": int(history["escalated"].sum()),
+        "worst_certificate": float(history["certificate"].max()),
+    }
+    if "contact_uplift" in history:
+        facts["largest_uplift"] = float(history["contact_uplift"].max())
+        facts["steps_in_contact"] = int((history["contact_active"][1:] > 0).sum())
+    return facts | energy_facts(history)
+
+
+def energy_facts(history: Mapping[str, Array]) -> dict[str, Any]:
+    """The ledger at the end [J], and its largest defect relative to the largest energy or input work of the run."""
+    if "energy_defect" not in history:
+        return {}
+    total = history["energy_kinetic"] + history["energy_strain"]
+    size = max(float(total.max()), float(np.abs(history["work_input"]).max()))
+    defect = float(np.abs(history["energy_defect"]).max())
+    ledger = {name: float(history[name][-1]) for name, _ in _LEDGER[:-1]}
+    relative = defect / size if size > 0.0 else defect
+    return {
+        "energy": {"energy_start": float(total[0]), "energy_max": float(total.max())} | ledger
+        | {"energy_defect_joule": float(history["energy_defect"][-1]), "energy_defect": relative},
+        "energy_defect": relative,
+    }
+
+
+def _lines(facts: Mapping[str, Any]) -> list[str]:
+    def line(name: str, value: str) -> str:
+        return f"  {name:<26} {value}"
+
+    iterations = facts["iterations_per_step"]
+    lines = [
+        f"run {facts['status']}: {facts['steps']} steps of {facts['dt']:g} s, "
+        f"t = {facts['t_start']:g} to {facts['t_end']:g} s, on {facts['ranks']} rank(s)",
+        line("scheme", facts["scheme"]),
+        line("solver", facts["solver"]),
+        line("unknowns, contact points", f"{facts['unknowns']}, {facts['contact_points']}"),
+        line("iterations per step", f"{iterations['mean']:.2f} on average, {iterations['max']} at most"),
+        line("worst certificate", f"{facts['worst_certificate']:.2e}"),
+        line("escalated steps", str(facts["escalated_steps"])),
+    ]
+    if "steps_in_contact" in facts:
+        uplift = f"largest uplift {facts['largest_uplift']:.3f}"
+        lines.append(line("steps in contact", f"{facts['steps_in_contact']}, {uplift}"))
+    for method, difference in (facts["cross_check"] or {}).items():
+        values = ", ".join(f"{name} {value:.2e}" for name, value in difference.items())
+        lines.append(line(f"cross-check {method}", values))
+    if "energy" in facts:
+        lines.append("  energy ledger [J]")
+        lines.append(line("  energy at the start", f"{facts['energy']['energy_start']: .6e}"))
+        lines += [line(f"  {title}", f"{facts['energy'][name]: .6e}") for name, title in _LEDGER[:-1]]
+        lines.append(line("  defect, relative", f"{facts['energy_defect']: .2e}"))
+    if np.isfinite(facts["seconds_per_step"]):
+        mean, plain = facts["seconds_per_step"], facts["seconds_per_linear_step"]
+        ratio = f", plain linear step {plain:.3e} s, ratio {mean / plain:.2f}" if np.isfinite(plain) else ""
+        lines.append(line("wall time per step", f"{mean:.3e} s{ratio}"))
+    if facts["reason"]:
+        lines.append(line("reason", facts["reason"]))
+    return lines

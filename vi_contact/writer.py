@@ -1,0 +1,125 @@
+"""Everything a run writes while it works, in one place: histories, fields, checkpoints, log and summary."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from .algebra import Array
+from .checkpoint import Start, write_checkpoint
+from .history import HistoryFiles, Table
+from .output import LOG, SUMMARY, clear, on_root, to_json, write_atomically
+from .recorders import Row
+from .run_log import RunLog
+from .step import ContactProblem, Scheme, State
+
+log = logging.getLogger(__name__)
+
+
+class OpenFields(Protocol):
+    """Writes frames of fields; collective."""
+
+    def write(self, state: State, acceleration: Array) -> None: ...
+
+
+class FieldWriter(Protocol):
+    """Field output (fem.XDMF). ``open`` is collective; ``kept``: step -> time of the rows kept of an earlier run."""
+
+    @property
+    def every(self) -> int: ...
+
+    def open(self, problem: ContactProblem, folder: Path, kept: Mapping[int, float]) -> OpenFields: ...
+
+
+class Writer:
+    """The folder of a run, or none: then nothing is written. Every method but ``rescue`` is collective.
+
+    ``continued``: the folder holds an earlier part of the same run, which is kept; otherwise it is cleared by ``open``.
+    """
+
+    def __init__(
+        self, problem: ContactProblem, folder: Path | None, fields: FieldWriter | None, table: Table, *, continued: bool
+    ) -> None:
+        self._problem, self._folder, self._table, self._continued = problem, folder, table, continued
+        self._settings = fields
+        self._comm = problem.system.algebra.comm
+        self._fields: OpenFields | None = None
+        self._files: HistoryFiles | None = None
+        self._log = RunLog(None, append=False)
+        self._saved = -1
+
+    def open(self, state: State) -> None:
+        """Makes the files and writes the first frame."""
+        folder = self._folder
+        if folder is None:
+            return
+
+        on_root(self._comm, lambda: self._make(folder))
+        if self._settings is not None:
+            kept = {int(row["k"]): float(row["t"]) for row in self._table.rows} if self._continued else {}
+            self._fields = self._settings.open(self._problem, folder, kept)
+            if not self._continued:
+                self._fields.write(state, np.zeros_like(state.u))
+
+    def _make(self, folder: Path) -> None:
+        if not self._continued:
+            clear(folder)
+        self._log = RunLog(folder / LOG, append=self._continued)
+        self._files = HistoryFiles(folder, self._table, self._problem.surface, continued=self._continued)
+
+    def append(self, row: Row) -> None:
+        """A row of the histories onto the disk."""
+        if self._folder is not None:
+            on_root(self._comm, lambda: self._append(row))
+
+    def _append(self, row: Row) -> None:
+        self._log.check()
+        if self._files is not None:
+            self._files.append(row)
+
+    def frame(self, state: State, acceleration: Array) -> None:
+        """A frame of the fields, when one is due."""
+        if self._fields is not None and self._settings is not None and state.k % self._settings.every == 0:
+            self._fields.write(state, acceleration)
+
+    def checkpoint(self, state: State, *, scheme: Scheme, dt: float, start: Start) -> None:
+        """A checkpoint of the state, unless there is one already."""
+        if self._folder is None or self._saved == state.k:
+            return
+        on_root(self._comm, self._sync)
+        write_checkpoint(self._folder, self._problem, state, scheme=scheme, dt=dt, start=start)
+        self._saved = state.k
+        if self._comm.rank == 0:
+            log.info("checkpoint of step %d", state.k)
+
+    def _sync(self) -> None:
+        if self._files is not None:
+            self._files.sync()
+
+    def close(self, facts: Mapping[str, Any]) -> None:
+        """The last version of every file."""
+        on_root(self._comm, lambda: self._close(facts))
+
+    def rescue(self, facts: Mapping[str, Any]) -> None:
+        """The same after a failure: not collective, as other ranks might not come, and no error hides the first one."""
+        with suppress(Exception):
+            self._close(facts)
+
+    def _close(self, facts: Mapping[str, Any]) -> None:
+        if self._folder is None or self._comm.rank != 0:
+            return
+        try:
+            log.info("%s after %d steps %s", facts["status"], facts["steps"], facts["reason"])
+            try:
+                write_atomically(self._folder / SUMMARY, (to_json(facts) + "\n").encode())
+            finally:
+                if self._files is not None:
+                    self._files.close()
+            self._log.check()
+        finally:
+            self._log.close()
