@@ -177,4 +177,4 @@ def after_impact(problem: ContactProblem, scheme: Scheme, old: State, new: State
     target = law.target(impact)
     if np.all(np.isnan(target)):
         return new
-    return scheme.jump(new, law.apply(problem.equations, surface, new.v, target), dt)
+    return scheme.jump(problem, new, law.apply(problem.equations, surface, new.v, target), dt)

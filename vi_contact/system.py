@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -87,7 +87,7 @@ class SemiDiscreteSystem:
     v0: Array
     space: Space
     floating: bool = False
-    _cache: dict[str, object] = field(default_factory=dict, compare=False, repr=False)
+    _cache: dict[str, Any] = field(default_factory=dict, compare=False, repr=False)
 
     @property
     def rows(self) -> int:
@@ -102,18 +102,11 @@ class SemiDiscreteSystem:
         """½ uᵀ K u [J]."""
         return 0.5 * self.algebra.dot(u, self.K @ u)
 
-    def solve_mass(self, b: Array) -> Array:
-        """M⁻¹ b; the factor is made at the first call."""
-        if "mass" not in self._cache:
-            self._cache["mass"] = self.algebra.factor(self.M)
-        return self._cache["mass"].solve(b)  # type: ignore[attr-defined, no-any-return]
-
-    def initial_acceleration(self, t: float, u: Array, v: Array, reaction: Array) -> Array:
-        """M⁻¹ (f(t) - C v - K u - reaction), the acceleration consistent with a state [m/s²]."""
-        force = self.load(t) - self.K @ u - reaction
-        if self.C is not None:
-            force -= self.C @ v
-        return self.solve_mass(force)
+    def kept(self, name: str, make: Callable[[], Any]) -> Any:
+        """What ``make`` returned the first time: factors that live as long as the system."""
+        if name not in self._cache:
+            self._cache[name] = make()
+        return self._cache[name]
 
     def with_load(self, *terms: tuple[Array, Callable[[float], float]]) -> SemiDiscreteSystem:
         """The same system with separable loads vector * history(t) added."""

@@ -8,8 +8,10 @@ Solved for the newest velocity and acceleration and put into M u'' + C u' + K u 
     A = gamma[0]/(mu dt² b[0]) M + a[0]/(dt b[0]) C + K,   x = u(p),   scale = 1
 
 (The text prints -A u on the right of the semi-discrete equation; with A > 0 the sign is +, verification 4.1.)
-Start, and restart after every velocity jump: the past is filled in with constant acceleration, which makes Newmark's
-two-step form reproduce its one-step form exactly and keeps second order for the other members.
+Start, and restart after every velocity jump or change of dt: the past is filled in with the constant acceleration that
+fits the state without the reaction of the collision (schemes.acceleration), which makes Newmark's two-step form reproduce
+its one-step form exactly and keeps second order for the other members. Kept instead, that reaction would act for another
+step, and throw off what the impact law has just stopped.
 Energy: unlike the midpoint form, contact in the acceleration balance at t_p can *gain* energy with hard contact (V9.2);
 the ledger shows it as algorithmic loss of negative sign.
 """
@@ -23,6 +25,10 @@ import numpy as np
 from ..algebra import Array
 from ..errors import InputError
 from ..step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
+from .acceleration import consistent_acceleration
+
+FREQUENCIES = np.logspace(-2.0, 3.0, 61)  # natural frequency times dt, for the stability check
+DAMPING = (0.0, 0.1, 1.0)  # damping ratios, for the stability check
 
 
 @dataclass(frozen=True)
@@ -47,6 +53,11 @@ class LinearMultistep:
             raise InputError(
                 "LinearMultistep coefficients are inconsistent: eq. 11a must be exact for u = 1, t and eq. 11b for u = 1, t, t²"
             )
+        if self.spectral_radius() > 1.0 + 1e-6:
+            raise InputError(
+                f"LinearMultistep a={self.a}, b={self.b}, gamma={self.gamma} is not unconditionally stable: in contact no "
+                "frequency bounds dt (seed 000, section 4), so take other coefficients, for Newmark beta >= gamma/2 >= 1/4"
+            )
 
     def _consistent(self) -> bool:
         level = -np.arange(len(self.a), dtype=float)
@@ -54,6 +65,13 @@ class LinearMultistep:
         defects = (a.sum(), a @ level - b.sum(), gamma.sum(), gamma @ level, gamma @ level**2 - 2.0 * self.mu * b.sum())
         scale = np.abs(a).sum() + np.abs(b).sum() + np.abs(gamma).sum()
         return bool(np.max(np.abs(defects)) <= 1e-12 * scale * len(a) ** 2)
+
+    def spectral_radius(self) -> float:
+        """Largest |z| of the solutions u(p) = z^p of u'' + 2 xi w u' + w² u = 0 over FREQUENCIES w dt and DAMPING xi:
+        roots of gamma(z)/mu + 2 xi w dt a(z) + (w dt)² b(z)."""
+        a, b, gamma = (np.asarray(c, dtype=float) for c in (self.a, self.b, self.gamma))
+        polynomials = [b] + [gamma / (self.mu * w**2) + 2.0 * xi / w * a + b for w in FREQUENCIES for xi in DAMPING]
+        return max(float(np.max(np.abs(np.roots(polynomial)), initial=0.0)) for polynomial in polynomials)
 
     @classmethod
     def newmark(cls, beta: float = 0.25, gamma: float = 0.5) -> LinearMultistep:
@@ -73,17 +91,20 @@ class LinearMultistep:
         return self.gamma[0] / (self.mu * dt**2 * self.b[0])
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
-        """The initial acceleration, and a past of constant acceleration."""
-        if "a_0" in state.memory:
+        """The past, unless the state brings one for this dt."""
+        memory = state.memory
+        if np.array_equal(memory.get("dt", ()), [dt]) and f"a_{len(self.a) - 2}" in memory:
             return state
-        surface = problem.surface
-        reaction = surface.reaction_load(state.r_n, len(state.u))
-        a = problem.equations.initial_acceleration(state.t, state.u, state.v, reaction)
-        return replace(state, memory=self._past(state.u, state.v, a, dt) | {"a_0": a, "v_minus": state.v})
+        return self._restarted(problem, state, dt)
 
-    def jump(self, state: State, v: Array, dt: float) -> State:
-        """After a velocity jump the past is restarted; the acceleration, which the jump does not change, is kept."""
-        return replace(state, v=v, memory=dict(state.memory) | self._past(state.u, v, state.memory["a_0"], dt))
+    def jump(self, problem: ContactProblem, state: State, v: Array, dt: float) -> State:
+        """After a velocity jump the past is that of the new velocity."""
+        return self._restarted(problem, replace(state, v=v), dt)
+
+    def _restarted(self, problem: ContactProblem, state: State, dt: float) -> State:
+        a, reaction = consistent_acceleration(problem, state.t, state.u, state.v)
+        past = self._past(state.u, state.v, a, dt)
+        return replace(state, memory=past | {"a_0": a, "reaction_0": reaction, "dt": np.array([dt])})
 
     def _past(self, u: Array, v: Array, a: Array, dt: float) -> dict[str, Array]:
         """Levels 1..q before (u, v) under constant acceleration a."""
@@ -145,16 +166,17 @@ class LinearMultistep:
         v_known, a_known = self._known(levels, dt)
         v = v_known + self._velocity_factor(dt) * result.x
         a = a_known + self._acceleration_factor(dt) * result.x
-        memory = levels | {"a_0": a, "v_minus": v}
+        reaction = problem.surface.reaction_load(result.r_n, len(v))
+        memory = levels | {"a_0": a, "reaction_0": reaction, "dt": state.memory["dt"]}
         return State(step.t, step.k, result.x, v, result.r_n, result.active, memory)
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
-        """Mean of the equations of motion at both ends of the step (each holds with the velocity before an impact)."""
-        load = problem.equations.load
+        """Mean of the equations of motion at both ends of the step, the old end after its impact."""
+        load, surface = problem.equations.load, problem.surface
         return Balance(
             u=0.5 * (old.u + new.u),
-            v=0.5 * (old.memory["v_minus"] + new.memory["v_minus"]),
+            v=0.5 * (old.v + new.v),
             a=0.5 * (old.memory["a_0"] + new.memory["a_0"]),
             f=0.5 * (load(old.t) + load(new.t)),
-            r_n=0.5 * (old.r_n + new.r_n),
+            r_n=0.5 * (surface.normal_values(old.memory["reaction_0"]) + new.r_n),
         )

@@ -40,7 +40,7 @@ class SS22:
         """Self-starting: nothing to prepare."""
         return state
 
-    def jump(self, state: State, v: Array, dt: float) -> State:
+    def jump(self, problem: ContactProblem, state: State, v: Array, dt: float) -> State:
         """A velocity jump needs no restart."""
         return replace(state, v=v)
 

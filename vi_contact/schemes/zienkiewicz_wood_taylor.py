@@ -38,7 +38,7 @@ class ZienkiewiczWoodTaylor:
         """Self-starting: nothing to prepare."""
         return state
 
-    def jump(self, state: State, v: Array, dt: float) -> State:
+    def jump(self, problem: ContactProblem, state: State, v: Array, dt: float) -> State:
         """A velocity jump needs no restart."""
         return replace(state, v=v)
 
