@@ -61,7 +61,7 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
         top = solution.history["u_x_12"]
         numbers |= {
             f"{case}_top_min": top.min(), f"{case}_top_max": top.max(), f"{case}_cross_check": routes.worst,
-            f"{case}_certificate": solution.worst_certificate, f"{case}_energy_defect": solution.energy_defect,
+            f"{case}_certificate": solution.facts["worst_certificate"], f"{case}_energy_defect": solution.facts["energy_defect"],
         }
         if comm.rank == 0:
             print(f"\nCase {case}. {title}\n{solution.summary()}")

@@ -9,6 +9,11 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
+# Functions that share their module's name are bound here, before somebody imports the module and takes the name.
+from .cross_check import cross_check  # noqa: F401
+from .march import march  # noqa: F401
+from .simulate import simulate  # noqa: F401
+
 __version__ = "0.1.0"
 
 _CONTENTS = {
