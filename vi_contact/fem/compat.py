@@ -34,6 +34,7 @@ _DOFMAP_PER_CELL_TYPE = VERSION >= (0, 11)
 
 # Meshes ---------------------------------------------------------------------------------------------------------------
 
+
 def create_mesh(comm: MPI.Comm, cell: str, cells: npt.NDArray[np.int64], x: npt.NDArray[np.float64]) -> Mesh:
     """A first-order mesh, distributed by the default graph partitioner (fixed seed), ghosted over shared facets.
 
@@ -80,6 +81,7 @@ def measure(mesh: Mesh, dim: int, indices: Indices) -> ufl.Measure:
 
 # Function spaces ------------------------------------------------------------------------------------------------------
 
+
 def scalar_space(mesh: Mesh) -> Any:
     """Continuous P1 or Q1 functions on the mesh."""
     return fem.functionspace(mesh, ("Lagrange", 1)) if _BASIX_ELEMENTS else fem.FunctionSpace(mesh, ("Lagrange", 1))
@@ -111,6 +113,7 @@ def _as_table(rows: Any, mesh: Mesh) -> Indices:
 
 
 # Assembly -------------------------------------------------------------------------------------------------------------
+
 
 def compile_form(ufl_form: ufl.Form) -> Any:
     """Generate, compile and load the code of a variational form; collective, cached on disk by its signature."""

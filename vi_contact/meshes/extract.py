@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial import cKDTree
 
 from vi_contact.errors import InputError
 from vi_contact.meshes.checks import Array, Rows, check_cells, check_folds, check_sides
@@ -48,10 +49,12 @@ class _Elements:
 
 
 def arrays_from_file(path: str | Path) -> MeshArrays:
-    """Read a mesh file of any format Gmsh reads. Raises InputError if it is missing or unreadable, or like `extract`."""
+    """Read a mesh file of any format Gmsh reads. InputError if missing or unreadable, and like `extract`."""
     file = Path(path)
     if not file.is_file():
         raise InputError(f"mesh file {file} does not exist: check the path or write it with a script of folder meshes")
+    if file.stat().st_size == 0:
+        raise InputError(f"mesh file {file} is empty: write it again")
     with session(file.stem) as gmsh:
         try:
             gmsh.merge(str(file))
@@ -83,7 +86,7 @@ def extract(gmsh: Any, source: str) -> MeshArrays:
     elements = _elements(model, d, _union(body) or [entity for _, entity in model.getEntities(d)])
     kind = _first_order(model, elements, d, source)
     tags, cells = np.unique(elements[kind].nodes, return_inverse=True)
-    points = _points(model, tags, d, source)
+    points = _flat(_coordinates(model, tags, source), d, source)
     cells = cells.reshape(elements[kind].nodes.shape).astype(np.int64)
     kept, position = _without_repeats(cells)
     cells = cells[kept]
@@ -95,7 +98,7 @@ def extract(gmsh: Any, source: str) -> MeshArrays:
     facet_groups = {}
     for name, entities in sides.items():
         what = f"boundary group '{name}' of {source}"
-        facet_groups[name] = _facets(model, entities, _FACET[kind], tags, what)
+        facet_groups[name] = _facets(model, entities, _FACET[kind], tags, points, what)
         check_sides(facet_groups[name], cells, _CELLS[kind], what)
     return MeshArrays(
         cell=_CELLS[kind],
@@ -151,16 +154,21 @@ def _first_order(model: Any, elements: dict[int, _Elements], dim: int, source: s
     return kind
 
 
-def _points(model: Any, used: Rows, d: int, source: str) -> Array:
-    """Coordinates (n, d) of the nodes with the given tags."""
-    tags, coordinates, _ = model.mesh.getNodes()
-    order = np.argsort(tags)
-    place = np.minimum(np.searchsorted(tags, used, sorter=order), len(tags) - 1)
-    if not np.array_equal(tags[order[place]], used):
+def _coordinates(model: Any, tags: Rows, source: str) -> Array:
+    """Coordinates (n, 3) of the nodes with the given tags, which may start anywhere and have holes."""
+    known, coordinates, _ = model.mesh.getNodes()
+    order = np.argsort(known)
+    place = order[np.minimum(np.searchsorted(known, tags, sorter=order), len(known) - 1)]
+    if not np.array_equal(known[place], tags):
         raise InputError(f"{source} has cells on nodes it does not define: write it again from Gmsh")
-    points = np.asarray(coordinates, dtype=np.float64).reshape(-1, 3)[order[place]]
+    points: Array = np.asarray(coordinates, dtype=np.float64).reshape(-1, 3)[place]
     if not np.isfinite(points).all():
         raise InputError(f"{source} has nodes whose coordinates are no numbers: write it again from Gmsh")
+    return points
+
+
+def _flat(points: Array, d: int, source: str) -> Array:
+    """The first d coordinates; the others must be zero."""
     away = np.abs(points[:, d:]).max(initial=0.0)
     if away > 1e-9 * np.ptp(points, axis=0).max():
         plane, missing = ("plane z = 0", "volume") if d == 2 else ("axis y = z = 0", "surface")
@@ -180,14 +188,27 @@ def _without_repeats(rows: Rows) -> tuple[Rows, Rows]:
     return first[order], rank[place.reshape(-1)]
 
 
-def _facets(model: Any, entities: list[int], kind: int, tags: Rows, what: str) -> Rows:
-    """Facets of a group as rows of points, each once; -1 for nodes that belong to no cell."""
+def _facets(model: Any, entities: list[int], kind: int, tags: Rows, points: Array, what: str) -> Rows:
+    """Facets of a group as rows of points, each once; -1 for nodes that are at no point.
+
+    OpenCASCADE may copy a curve or surface when it bounds a body with it, and the named original is then meshed by
+    itself, with nodes at the places of the body's (dolfinx#2456). Such a node stands for the one point at its place.
+    """
     found = _elements(model, model.mesh.getElementProperties(kind)[1], entities)
     if not found:
         return np.empty((0, 1), dtype=np.int64)
     if list(found) != [kind]:
-        raise InputError(f"{what} has other shapes than the sides of its cells: mesh body and boundary together")
+        raise InputError(f"{what} is not of the shapes of the cells' sides: mesh body and boundary together")
     nodes = found[kind].nodes
-    nodes = nodes[_without_repeats(nodes)[0]]
     place = np.minimum(np.searchsorted(tags, nodes), len(tags) - 1)
-    return np.where(tags[place] == nodes, place, -1)
+    rows = np.where(tags[place] == nodes, place, -1)
+    if (rows < 0).any():
+        rows[rows < 0] = _at_same_place(_coordinates(model, nodes[rows < 0], what)[:, : points.shape[1]], points)
+    return rows[_without_repeats(rows)[0]]
+
+
+def _at_same_place(places: Array, points: Array) -> Rows:
+    """For each place the one point there, -1 if there is none or more than one (two bodies in touch)."""
+    tolerance = 1e-10 * np.ptp(points, axis=0).max()
+    distance, nearest = cKDTree(points).query(places, k=2)
+    return np.where((distance[:, 0] <= tolerance) & (distance[:, 1] > tolerance), nearest[:, 0], -1)

@@ -74,7 +74,7 @@ def write(mesh: MeshScript, path: str | Path) -> None:
 def _import() -> Any:
     try:
         import gmsh
-    except (ImportError, OSError) as error:  # OSError: the module is there, the library is not
+    except (ImportError, OSError) as error:  # OSError: the module is there, its library is not
         raise InputError(f"Gmsh's Python module is missing ({error}): install python3-gmsh") from error
     return gmsh
 
