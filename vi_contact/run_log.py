@@ -31,15 +31,22 @@ class _LogFile(logging.FileHandler):
 
 
 class RunLog:
-    """Everything logged under ``vi_contact`` while it is open goes to the file. Only rank 0 has a path."""
+    """Everything logged under ``vi_contact`` while it is open goes to the file, and warnings to the terminal.
+
+    Only rank 0 has a path. The root logger is left out: form compilers make it print every line.
+    """
 
     def __init__(self, path: Path | None, *, append: bool) -> None:
-        self._level = LOGGER.level
+        self._before = LOGGER.level, LOGGER.propagate
         self._file = None if path is None else _LogFile(path, mode="a" if append else "w", encoding="utf-8")
+        self._terminal = logging.StreamHandler()
+        self._terminal.setLevel(logging.WARNING)
         if self._file is not None:
             self._file.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
             LOGGER.addHandler(self._file)
+            LOGGER.addHandler(self._terminal)
             LOGGER.setLevel(logging.INFO)
+            LOGGER.propagate = False
 
     def check(self) -> None:
         """Raises the OSError of a line that could not be written."""
@@ -51,7 +58,9 @@ class RunLog:
         """Gives the logger back as it was."""
         if self._file is not None:
             LOGGER.removeHandler(self._file)
-            LOGGER.setLevel(self._level)
+            LOGGER.removeHandler(self._terminal)
+            LOGGER.setLevel(self._before[0])
+            LOGGER.propagate = self._before[1]
             with suppress(OSError):  # the disk is full: check() or the histories have told
                 self._file.close()
 

@@ -90,8 +90,13 @@ class Energies:
 def energies(system: SemiDiscreteSystem, u: Array, v: Array) -> Energies:
     """The energies of displacement u and velocity v: two products."""
     momentum, elastic = system.M @ v, system.K @ u
-    dot = system.algebra.dot
-    return Energies(momentum, elastic, 0.5 * dot(v, momentum), 0.5 * dot(u, elastic))
+    kinetic, strain = 0.5 * _dots(system, (v, momentum), (u, elastic))
+    return Energies(momentum, elastic, float(kinetic), float(strain))
+
+
+def _dots(system: SemiDiscreteSystem, *pairs: tuple[Array, Array]) -> Array:
+    """Inner products with one reduction for all."""
+    return system.algebra.comm.sum(np.array([x @ y for x, y in pairs]))
 
 
 def energy_balance(
@@ -112,17 +117,21 @@ def energy_balance(
     ``before``, ``after``: the energies of both states, when known; one product (two with damping) is left then.
     """
     system, surface = problem.equations, problem.surface
-    dot = system.algebra.dot
     before = before or energies(system, old.u, old.v)
     after = after or energies(system, new.u, new.v)
     du = new.u - old.u
-    Mdv, Kdu = after.momentum - before.momentum, after.elastic - before.elastic
-    inertia = dot(du, system.M @ balance.a) - dot(0.5 * (old.v + new.v), Mdv)
-    stiffness = dot(balance.u - 0.5 * (old.u + new.u), Kdu)
+    work, inertia, kinetic, stiffness, damping = _dots(
+        system,
+        (du, balance.f),
+        (du, system.M @ balance.a),
+        (0.5 * (old.v + new.v), after.momentum - before.momentum),
+        (balance.u - 0.5 * (old.u + new.u), after.elastic - before.elastic),
+        (du, np.zeros_like(du) if system.C is None else system.C @ balance.v),
+    )
     return StepEnergy(
         change=after.total - before.total,
-        input=dot(balance.f, du),
-        damping=0.0 if system.C is None else dot(du, system.C @ balance.v),
+        input=float(work),
+        damping=float(damping),
         contact=float(balance.r_n @ surface.normal_values(du)),
-        algorithmic=inertia + stiffness,
+        algorithmic=float(inertia - kinetic + stiffness),
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Mapping
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -58,8 +59,7 @@ class Writer:
         folder = self._folder
         if folder is None:
             return
-
-        on_root(self._comm, lambda: self._make(folder))
+        on_root(self._comm, partial(self._make, folder))
         if self._settings is not None:
             kept = {int(row["k"]): float(row["t"]) for row in self._table.rows} if self._continued else {}
             self._fields = self._settings.open(self._problem, folder, kept)

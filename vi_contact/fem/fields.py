@@ -1,0 +1,209 @@
+"""Fields for ParaView: ``fields.xdmf`` and one HDF5 file per frame, in the node and cell order of the input mesh.
+
+Every file is replaced as a whole and the index names only frames that are complete, so that ParaView can open it at any
+moment, also while the run goes on or after it was killed. Nothing in the files depends on the number of ranks.
+
+Per node: u [m], v [m/s] and a [m/s²] as 3-vectors along the axes, relative to the ground when an excitation shakes the
+body (a: of the step's equation of motion, without the jumps of an impact law; zero in the first frame);
+contact_pressure [Pa]; contact_status: 0 not a contact node, 1 open, 2 closed. Per cell: von_mises [Pa].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+from xml.sax.saxutils import quoteattr
+
+import h5py
+import numpy as np
+
+from ..algebra import Array, Indices
+from ..errors import InputError
+from ..output import FIELDS, FIELDS_INDEX, hdf5_image, on_root, write_atomically
+from ..step import ContactProblem, State
+from . import compat
+from .mesh import node_numbers
+from .space import FemSpace
+from .stress import VonMises
+
+_VTK_ORDER = {"Quadrilateral": [0, 1, 3, 2], "Hexahedron": [0, 1, 3, 2, 4, 5, 7, 6]}
+"""DOLFINx's vertices in VTK's order, where the two differ."""
+
+_CELLS = {
+    (1, 2): "Polyline", (2, 3): "Triangle", (2, 4): "Quadrilateral", (3, 4): "Tetrahedron", (3, 8): "Hexahedron"
+}
+"""XDMF's name of a cell by its dimension and number of vertices."""
+
+_VECTORS = ("u", "v", "a")
+
+
+@dataclass(frozen=True)
+class XDMF:
+    """A frame every so many steps, and one of the initial state. InputError unless ``every`` >= 1."""
+
+    every: int = 10
+
+    def __post_init__(self) -> None:
+        if self.every < 1:
+            raise InputError(f"XDMF every is {self.every}: give a number of steps >= 1")
+
+    def open(self, problem: ContactProblem, folder: Path, kept: Mapping[int, float]) -> Frames:
+        """Writes the mesh; goes on after the frames of ``kept`` (step -> time) that are in the folder. Collective."""
+        if not isinstance(problem.system.space, FemSpace) or problem.system.space.forms is None:
+            raise InputError("XDMF needs a system made by fem.assemble")
+        return Frames(problem, folder, kept)
+
+
+class Frames:
+    """The open field output of a run."""
+
+    def __init__(self, problem: ContactProblem, folder: Path, kept: Mapping[int, float]) -> None:
+        space = problem.system.space
+        assert isinstance(space, FemSpace)
+        self._problem, self._space, self._folder = problem, space, folder
+        self._von_mises = VonMises(space.forms)
+        self._contact_nodes = self._nodes_of_conditions()
+        self._type, mine = _cells(space.mesh)
+        original = np.asarray(space.mesh.topology.original_cell_index, dtype=np.int64)
+        self._cell_numbers = _whole(space, original[: len(mine)])
+        self._node_numbers = _whole(space, space.nodes)
+        points = self._by_node(_three(space.points))
+        cells = self._by_cell(mine)
+        self._shape = (len(points), *cells.shape)
+        on_root(space.comm, partial(self._start, points, cells, kept))
+
+    def _nodes_of_conditions(self) -> Indices:
+        """Node number of each contact condition (m,): that of the unknown it bounds."""
+        surface = self._problem.surface
+        numbers = np.zeros(surface.count)
+        numbers[surface.slots] = self._space.ids[surface.owned] // self._space.dimension
+        return np.rint(surface.comm.sum(numbers)).astype(np.int64)
+
+    def _by_node(self, owned: Any) -> Any:
+        """Rows of owned nodes, on rank 0 as rows of all nodes in input order; none elsewhere."""
+        return _ordered(_whole(self._space, owned), self._node_numbers)
+
+    def _by_cell(self, owned: Any) -> Any:
+        return _ordered(_whole(self._space, owned), self._cell_numbers)
+
+    def _start(self, points: Array, cells: Array, kept: Mapping[int, float]) -> None:
+        """Rank 0: the mesh, the index of the frames that are kept, and then no others."""
+        folder = self._folder / FIELDS
+        folder.mkdir(exist_ok=True)
+
+        def fill(file: h5py.File) -> None:
+            file["points"], file["cells"] = points, cells
+
+        write_atomically(folder / "mesh.h5", hdf5_image(fill))
+        self._frames = [(k, t) for k, t in sorted(kept.items()) if (self._folder / _name(k)).is_file()]
+        if self._frames:
+            self._write_index()
+        known = {self._folder / _name(k) for k, _ in self._frames}
+        for path in folder.glob("frame_*.h5"):
+            if path not in known:
+                path.unlink()
+
+    def write(self, state: State, acceleration: Array) -> None:
+        """A frame of the state and the acceleration of its step, both in the rotated basis. Collective."""
+        problem, space = self._problem, self._space
+        moving = [
+            space.expand(problem.cartesian(x), state.t, derivative)
+            for derivative, x in enumerate((state.u, state.v, acceleration))
+        ]
+        stress = self._by_cell(self._von_mises(moving[0]))
+        vectors = self._by_node(np.hstack([_three(nodal) for nodal in moving]))
+        on_root(space.comm, partial(self._write, state, vectors, stress))
+
+    def _write(self, state: State, vectors: Array, stress: Array) -> None:
+        pressure, status = self._contact(state)
+
+        def fill(file: h5py.File) -> None:
+            for i, name in enumerate(_VECTORS):
+                file[name] = vectors[:, 3 * i : 3 * i + 3]
+            file["von_mises"], file["contact_pressure"], file["contact_status"] = stress, pressure, status
+
+        write_atomically(self._folder / _name(state.k), hdf5_image(fill))
+        self._frames.append((state.k, state.t))
+        self._write_index()
+
+    def _contact(self, state: State) -> tuple[Array, Any]:
+        """Contact pressure and status of all nodes."""
+        pressure, status = np.zeros(self._shape[0]), np.zeros(self._shape[0], dtype=np.int32)
+        np.add.at(pressure, self._contact_nodes, state.r_n / self._problem.surface.weights)
+        np.maximum.at(status, self._contact_nodes, np.where(state.active, 2, 1))
+        return pressure, status
+
+    def _write_index(self) -> None:
+        """fields.xdmf with all complete frames."""
+        frames = "".join(self._grid(k, t) for k, t in self._frames)
+        text = (
+            '<?xml version="1.0"?>\n<Xdmf Version="3.0"><Domain>\n'
+            f'<Grid Name="frames" GridType="Collection" CollectionType="Temporal">\n{frames}</Grid>\n</Domain></Xdmf>\n'
+        )
+        write_atomically(self._folder / FIELDS_INDEX, text.encode())
+
+    def _grid(self, k: int, t: float) -> str:
+        nodes, cells, corners = self._shape
+        mesh = f"{FIELDS}/mesh.h5"
+        frame = _name(k)
+        attributes = [_attribute(name, "Vector", "Node", _item((nodes, 3), f"{frame}:/{name}")) for name in _VECTORS]
+        for name, center, count, kind in (
+            ("contact_pressure", "Node", nodes, "Float"),
+            ("contact_status", "Node", nodes, "Int"),
+            ("von_mises", "Cell", cells, "Float"),
+        ):
+            attributes.append(_attribute(name, "Scalar", center, _item((count,), f"{frame}:/{name}", kind)))
+        return (
+            f'<Grid Name="step {k}" GridType="Uniform"><Time Value="{t!r}"/>\n'
+            f'<Topology TopologyType="{self._type}" NumberOfElements="{cells}" NodesPerElement="{corners}">'
+            f'{_item((cells, corners), f"{mesh}:/cells", "Int", 8)}</Topology>\n'
+            f'<Geometry GeometryType="XYZ">{_item((nodes, 3), f"{mesh}:/points")}</Geometry>\n'
+            f'{"".join(attributes)}</Grid>\n'
+        )
+
+
+def _name(k: int) -> str:
+    return f"{FIELDS}/frame_{k:06d}.h5"
+
+
+def _item(shape: tuple[int, ...], where: str, kind: str = "Float", precision: int | None = None) -> str:
+    """A DataItem in an HDF5 file."""
+    size = precision or {"Float": 8, "Int": 4}[kind]
+    dimensions = " ".join(map(str, shape))
+    number = f'NumberType="{kind}" Precision="{size}"'
+    return f'<DataItem Dimensions="{dimensions}" {number} Format="HDF">{where}</DataItem>'
+
+
+def _attribute(name: str, kind: str, center: str, item: str) -> str:
+    return f'<Attribute Name={quoteattr(name)} AttributeType="{kind}" Center="{center}">{item}</Attribute>\n'
+
+
+def _three(nodal: Array) -> Array:
+    """Rows (k, d) with zeros for the missing axes, (k, 3)."""
+    padded = np.zeros((len(nodal), 3))
+    padded[:, : nodal.shape[1]] = nodal
+    return padded
+
+
+def _cells(mesh: Any) -> tuple[str, Indices]:
+    """XDMF's name of the cells, and the nodes of the owned ones by their input numbers, in the order of VTK."""
+    dim = mesh.topology.dim
+    vertices = node_numbers(mesh)[compat.geometry_dofmap(mesh)][: mesh.topology.index_map(dim).size_local]
+    kind = _CELLS[dim, vertices.shape[1]]
+    return kind, vertices[:, _VTK_ORDER.get(kind, slice(None))]
+
+
+def _whole(space: FemSpace, owned: Any) -> Any:
+    """Rows of all ranks one after the other on rank 0, no rows elsewhere. Collective."""
+    parts = space.comm.gather(owned)
+    return owned[:0] if parts is None else np.concatenate(parts)
+
+
+def _ordered(rows: Any, numbers: Indices) -> Any:
+    """rows[i] goes to place numbers[i]."""
+    placed = np.empty_like(rows)
+    placed[numbers] = rows
+    return placed
