@@ -1,14 +1,17 @@
 """Post-impact velocity laws (seed 000, section 4: inelastic collision, velocity reversal, "any other type").
 
 After each step a law says which normal velocity every contact condition shall have, and a reading says how the
-velocity vector is given it:
+velocity vector v is given it:
 
 * ``ComponentReset`` sets the components, as the seed does. With a consistent mass this is not an impulse: its energy
   change ½ v⁻ᵀMv⁻ - ½ v⁺ᵀMv⁺ may have either sign and the ledger books it with its sign (verification V9.6).
 * ``MassProjection`` applies the impulse on the contact unknowns that produces them, the M-orthogonal projection
-  v⁺ = v⁻ + M⁻¹Bᵀ(B M⁻¹Bᵀ)⁻¹(target - B v⁻); identical for lumped masses, never gains energy for 0 <= e <= 1.
+  v⁺ = v⁻ + M⁻¹Bᵀ(B M⁻¹Bᵀ)⁻¹(target - B v⁻); identical for lumped masses. It takes ½ (v⁻ - v⁺)ᵀM(v⁻ - v⁺) for target 0.
 
-Restitution here is a nodal law; on a fine mesh it has no macroscopic effect.
+A law sees the velocity before the contact (the old state's) and the one the step left. Restitution refers to the
+former: what the step leaves of the approach depends on when in the step the gap closed. The step's contact work and the
+impact loss are therefore to be read together: what the step took beyond the collision, the law gives back. Restitution
+here is a nodal law; on a fine mesh it has no macroscopic effect.
 """
 
 from __future__ import annotations
@@ -18,11 +21,38 @@ from typing import Protocol
 
 import numpy as np
 
-from .algebra import Array, Indices
+from .algebra import Array, Indices, Mask
 from .errors import InputError
-from .step import Impact
 from .surfaces import ContactSurface
 from .system import SemiDiscreteSystem
+
+
+@dataclass(frozen=True)
+class Impact:
+    """What an impact law is told of the m conditions.
+
+    Attributes:
+        before: normal velocities before the step [m/s], > 0 towards the obstacle.
+        v_n: normal velocities that the step left [m/s].
+        active: which are closed. closing: which have just closed.
+    """
+
+    before: Array
+    v_n: Array
+    active: Mask
+    closing: Mask
+
+
+class ImpactLaw(Protocol):
+    """Post-impact velocity law: one of this file, or the user's own object with these two methods."""
+
+    def target(self, impact: Impact) -> Array:
+        """Normal velocities (m,) after the impact; NaN where the law leaves the velocity alone."""
+        ...
+
+    def apply(self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array) -> Array:
+        """The velocity vector that has these normal velocities."""
+        ...
 
 
 class Reading(Protocol):
@@ -96,7 +126,10 @@ class Inelastic:
 
 @dataclass(frozen=True)
 class Newton:
-    """Newton's law v_n⁺ = -e v_n⁻ on points that have just closed; points that stay closed are left to the step."""
+    """Newton's law v_n⁺ = -e v_n⁻ on points that have just closed; points that stay closed are left to the step.
+
+    v_n⁻ is the velocity of approach before the step: a single mass rebounds with e times its speed at every dt.
+    """
 
     e: float
     reading: Reading = field(default_factory=ComponentReset)
@@ -106,7 +139,7 @@ class Newton:
             raise InputError(f"restitution coefficient e is {self.e}: give a number from 0 (inelastic) to 1 (elastic)")
 
     def target(self, impact: Impact) -> Array:
-        return np.where(impact.closing, -self.e * impact.v_n, np.nan)
+        return np.where(impact.closing, -self.e * np.maximum(impact.before, 0.0), np.nan)
 
     def apply(self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array) -> Array:
         return self.reading(system, surface, v, target)

@@ -7,11 +7,11 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from .errors import InputError, StepFailure
+from .impact import Impact
 from .step import (
     Certificate,
     ContactProblem,
     EffectiveMatrix,
-    Impact,
     PreparedSolver,
     Report,
     Scheme,
@@ -87,7 +87,9 @@ def initial_state(problem: ContactProblem, t: float = 0.0) -> State:
     return State(t, 0, system.u0.copy(), system.v0.copy(), none, surface.bilateral.copy())
 
 
-def static_equilibrium(problem: ContactProblem, *, solver: Solver, t: float = 0.0, tolerance: float = TOLERANCE) -> State:
+def static_equilibrium(
+    problem: ContactProblem, *, solver: Solver, t: float = 0.0, tolerance: float = TOLERANCE
+) -> State:
     """The gravity stage: K u = f(t) - B_nᵀ r_n with contact active, without excitation; the state it leaves has v = 0,
     keeps stresses, reactions and contact set, and is the start of the dynamic stage.
 
@@ -96,8 +98,8 @@ def static_equilibrium(problem: ContactProblem, *, solver: Solver, t: float = 0.
     system = problem.static_load
     if system.floating:
         raise InputError(
-            "the body floats in the static stage: no prescribed displacement holds its rigid motion; clamp a part of it, "
-            "or skip the gravity stage and start the dynamics from rest"
+            "the body floats in the static stage: no prescribed displacement holds its rigid motion; clamp a part of "
+            "it, or skip the gravity stage and start the dynamics from rest"
         )
     start = initial_state(problem, t)
     A = EffectiveMatrix(system.algebra.combine([(1.0, system.K)]), system.algebra)
@@ -122,11 +124,14 @@ def count_steps(dt: float, steps: int | None, t_end: float | None, t0: float = 0
         raise InputError(f"dt is {dt}: give a positive time step in seconds")
     if (steps is None) == (t_end is None):
         raise InputError("give either steps or t_end, and not both")
-    if steps is None:
-        steps = int(np.ceil((t_end - t0) / dt * (1.0 - 1e-12)))  # type: ignore[operator]
-    if steps < 0:
-        raise InputError(f"the run has {steps} steps: give t_end after the start, or steps >= 0")
-    return steps
+    wanted = steps if t_end is None else (t_end - t0) / dt
+    if wanted is None or not np.isfinite(wanted) or wanted < 0:
+        raise InputError(f"the run has {wanted} steps: give a finite t_end after the start, or steps >= 0")
+    if t_end is not None:
+        return int(np.ceil(wanted * (1.0 - 1e-12)))
+    if int(wanted) != wanted:
+        raise InputError(f"steps is {steps}: give a whole number of steps, or t_end in seconds")
+    return int(wanted)
 
 
 def march(
@@ -143,8 +148,8 @@ def march(
 ) -> Iterator[tuple[State, Report]]:
     """Yields (state, report) after every certified step.
 
-    A step whose certificate exceeds ``tolerance`` goes to the solvers of ``escalation`` in turn, then raises StepFailure
-    with step, time, residuals and advice. ``state`` continues from a static stage or a checkpoint.
+    A step whose certificate exceeds ``tolerance`` goes to the solvers of ``escalation`` in turn, then raises
+    StepFailure with step, time, residuals and advice. ``state`` continues from a static stage or a checkpoint.
     """
     state = initial_state(problem) if state is None else state
     steps = count_steps(dt, steps, t_end, state.t)
@@ -173,7 +178,7 @@ def after_impact(problem: ContactProblem, scheme: Scheme, old: State, new: State
     active = new.active & solid
     if not active.any():
         return new
-    impact = Impact(surface.normal_values(new.v), active, active & ~old.active)
+    impact = Impact(surface.normal_values(old.v), surface.normal_values(new.v), active, active & ~old.active)
     target = law.target(impact)
     if np.all(np.isnan(target)):
         return new

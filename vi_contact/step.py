@@ -22,29 +22,9 @@ from .algebra import Algebra, Array, Factor, Mask, Matrix
 from .errors import InputError
 from .excitation import Excitation
 from .friction import FrictionLaw, Frictionless
+from .impact import ImpactLaw
 from .surfaces import ContactSurface
 from .system import SemiDiscreteSystem
-
-
-@dataclass(frozen=True)
-class Impact:
-    """What an impact law is told: normal velocities of all m conditions [m/s], which are closed, which have just closed."""
-
-    v_n: Array
-    active: Mask
-    closing: Mask
-
-
-class ImpactLaw(Protocol):
-    """Post-impact velocity law: impact.py, or the user's own object with these two methods."""
-
-    def target(self, impact: Impact) -> Array:
-        """Normal velocities (m,) after the impact; NaN where the law leaves the velocity alone."""
-        ...
-
-    def apply(self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array) -> Array:
-        """The velocity vector that has these normal velocities."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -181,7 +161,9 @@ class Scheme(Protocol):
     def jump(self, problem: ContactProblem, state: State, v: Array, dt: float) -> State: ...
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix: ...
     def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem: ...
-    def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State: ...
+    def finish(
+        self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float
+    ) -> State: ...
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance: ...
 
 
@@ -238,7 +220,9 @@ class Recorder(Protocol):
     """Listens to the loop. ``columns`` names what ``row`` returns each step: name -> (unit, meaning)."""
 
     def columns(self) -> Mapping[str, tuple[str, str]]: ...
-    def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Mapping[str, Any]:
+    def start(
+        self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
+    ) -> Mapping[str, Any]:
         """The row of the initial state; ``resumed`` is the last row of the run that a restart continues."""
         ...
 

@@ -3,7 +3,7 @@
     M a + C v + K u = f(t) - B_nᵀ r_n,    0 <= r_n  ⊥  -a_n >= 0    on resting points (gap and v_n zero)
 
 Points that are open, or that move towards or off the obstacle, carry no reaction: the one a collision made in the step
-before is spent. Springs carry theirs, (u_n - gap0)/compliance. The same small problem as a step, with M in the place of A.
+before is spent. Springs carry theirs, (u_n - gap0)/compliance. The same small problem as a step, with M in place of A.
 """
 
 from __future__ import annotations

@@ -8,10 +8,10 @@ Solved for the newest velocity and acceleration and put into M u'' + C u' + K u 
     A = gamma[0]/(mu dt² b[0]) M + a[0]/(dt b[0]) C + K,   x = u(p),   scale = 1
 
 (The text prints -A u on the right of the semi-discrete equation; with A > 0 the sign is +, verification 4.1.)
-Start, and restart after every velocity jump or change of dt: the past is filled in with the constant acceleration that
-fits the state without the reaction of the collision (schemes.acceleration), which makes Newmark's two-step form reproduce
-its one-step form exactly and keeps second order for the other members. Kept instead, that reaction would act for another
-step, and throw off what the impact law has just stopped.
+Start, and restart after every velocity jump or change of dt: the past is filled in with the constant acceleration
+that fits the state without the reaction of the collision (schemes.acceleration), which makes Newmark's two-step form
+reproduce its one-step form exactly and keeps second order for the other members. Kept instead, that reaction would act
+for another step, and throw off what the impact law has just stopped.
 Energy: unlike the midpoint form, contact in the acceleration balance at t_p can *gain* energy with hard contact (V9.2);
 the ledger shows it as algorithmic loss of negative sign.
 """
@@ -46,17 +46,20 @@ class LinearMultistep:
     def __post_init__(self) -> None:
         q = len(self.a) - 1
         if q < 1 or len(self.b) != q + 1 or len(self.gamma) != q + 1:
-            raise InputError("LinearMultistep a, b and gamma must have the same length q + 1 >= 2 (levels p, p-1, ..., p-q)")
+            raise InputError("LinearMultistep a, b and gamma must have the same length q + 1 >= 2 (levels p, ..., p-q)")
         if self.b[0] == 0.0 or self.mu == 0.0 or self.gamma[0] == 0.0:
-            raise InputError("LinearMultistep needs b[0], gamma[0] and mu different from zero: only implicit members can hold contact")
+            raise InputError(
+                "LinearMultistep needs b[0], gamma[0] and mu other than zero: only implicit members can hold contact"
+            )
         if not self._consistent():
             raise InputError(
-                "LinearMultistep coefficients are inconsistent: eq. 11a must be exact for u = 1, t and eq. 11b for u = 1, t, t²"
+                "LinearMultistep coefficients are inconsistent: "
+                "eq. 11a must be exact for u = 1, t and eq. 11b for u = 1, t, t²"
             )
         if self.spectral_radius() > 1.0 + 1e-6:
             raise InputError(
-                f"LinearMultistep a={self.a}, b={self.b}, gamma={self.gamma} is not unconditionally stable: in contact no "
-                "frequency bounds dt (seed 000, section 4), so take other coefficients, for Newmark beta >= gamma/2 >= 1/4"
+                f"LinearMultistep a={self.a}, b={self.b}, gamma={self.gamma} is not unconditionally stable: contact "
+                "has no highest frequency to choose dt by; take other coefficients, for Newmark beta >= gamma/2 >= 1/4"
             )
 
     def _consistent(self) -> bool:

@@ -5,14 +5,16 @@
     u1 = u0 + dt v0 + ½ dt² alpha,   v1 = v0 + dt alpha,   gap(u1) >= 0
 
 In x = u1:  A = 2/(theta2 dt²) M + 2 theta1/(theta2 dt) C + K,  scale = 1/theta2.
-Same amplification as Newmark(beta = theta2/2, gamma = theta1): unconditionally stable for theta2 >= theta1 >= ½, order 2
-at theta1 = ½. Energy: as the midpoint rule (V9.1) at theta1 = theta2 = ½; dissipates for theta1 > ½.
+Same amplification as Newmark(beta = theta2/2, gamma = theta1): unconditionally stable for theta2 >= theta1 >= ½,
+order 2 at theta1 = ½. Energy: as the midpoint rule (V9.1) at theta1 = theta2 = ½; dissipates for theta1 > ½.
 Source: verification 4.1 (Zienkiewicz, Wood and Taylor, reference 25 of seed 000).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+
+import numpy as np
 
 from ..algebra import Array
 from ..errors import InputError
@@ -27,7 +29,7 @@ class SS22:
     theta2: float = 0.5
 
     def __post_init__(self) -> None:
-        if not self.theta2 >= self.theta1 >= 0.5:
+        if not np.inf > self.theta2 >= self.theta1 >= 0.5:
             raise InputError(
                 f"SS22 weights theta1={self.theta1}, theta2={self.theta2}: give theta2 >= theta1 >= 0.5, "
                 "the unconditionally stable range"
