@@ -25,6 +25,7 @@ from vi_contact import fem  # noqa: E402
 from vi_contact.models import wall as wall_model  # noqa: E402
 from vi_contact.models.wall_run import draw  # noqa: E402
 from vi_contact.solvers.volume import Volume  # noqa: E402
+from vi_contact.solvers.volume_snes import ReducedNewton  # noqa: E402
 
 # Parameters ----------------------------------------------------------------------------------------------------------
 WALL = wall_model.Wall(height=9.0, width=6.0, thickness=0.20, divisions=(8, 12))  # [m]
@@ -52,7 +53,7 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
 
     for case, title in CASES.items():
         problem = model.problem(case, excitation=shaking, impact=vc.Inelastic())
-        routes = vc.CrossChecked(vc.Condensed(), [Volume()])  # two independent routes to every step
+        routes = vc.CrossChecked(vc.Condensed(), [Volume(method=ReducedNewton())])  # two independent routes to every step
         solution = vc.simulate(
             problem, scheme=vc.ZienkiewiczWoodTaylor(phi=0.5), solver=routes, dt=dt, steps=steps,
             record=(vc.Energy(), vc.Contact(), vc.Probe(model.probes())),

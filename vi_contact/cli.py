@@ -53,7 +53,10 @@ def add_wall_arguments(wall: argparse.ArgumentParser) -> None:
     shake.add_argument("--pga", type=float, metavar="A", help="scale the records to this peak [m/s2] instead")
     shake.add_argument("--resample", type=float, metavar="DT", help="resample the records to this step [s], band-limited")
     step = wall.add_argument_group("step")
-    step.add_argument("--solver", default="condensed", help="condensed, hildreth, volume, volume-reference")
+    step.add_argument(
+        "--solver", default="condensed",
+        help="condensed (default), hildreth, projected-cg, volume, volume-reference, semismooth, tron, bnls"
+    )
     step.add_argument("--scheme", default="zwt", help="zwt (Zienkiewicz-Wood-Taylor), ss22, newmark")
     step.add_argument("--impact", default="inelastic", help="inelastic, elastic, none, or a restitution number in [0, 1]")
     step.add_argument("--projection", action="store_true", help="impact as an M-orthogonal impulse, not a component reset")

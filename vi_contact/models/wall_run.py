@@ -23,7 +23,11 @@ from ..schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from ..simulate import Solution, simulate
 from ..solvers.condensed import Condensed
 from ..solvers.hildreth import Hildreth
-from ..solvers.volume import OneFactorisation, Volume
+from ..solvers.mprgp import ProjectedCG
+from ..solvers.volume import Volume
+from ..solvers.volume_factorised import OneFactorisation
+from ..solvers.volume_snes import ReducedNewton, SemismoothNewton
+from ..solvers.volume_tao import TaoBnls, TaoTron
 from ..step import ContactProblem, ImpactLaw, Scheme, Solver, State
 from ..surfaces import ContactSurface
 from .wall import CASES, Wall, WallModel, build
@@ -36,8 +40,12 @@ SCHEMES: dict[str, Scheme] = {
 SOLVERS: dict[str, Solver] = {
     "condensed": Condensed(),
     "hildreth": Condensed(Hildreth()),
+    "projected-cg": Condensed(ProjectedCG()),
     "volume": Volume(method=OneFactorisation()),
-    "volume-reference": Volume(),
+    "volume-reference": Volume(method=ReducedNewton()),  # factorises every reduced matrix anew: shares only A and b
+    "semismooth": Volume(method=SemismoothNewton()),
+    "tron": Volume(method=TaoTron()),
+    "bnls": Volume(method=TaoBnls()),
 }
 TITLES = {
     "a": "Wall, three possible contact points (Fig. 4)",
