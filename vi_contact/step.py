@@ -200,8 +200,9 @@ class Certificate:
 
     equilibrium: |A x - b + B_nᵀ r_n|_max / max(|b|_max, |A x|_max).
     penetration: max(-gap, 0) / x_ref;  tension: max(-r_n, 0) / r_ref.
-    complementarity: max |min(r_n / r_ref, gap / x_ref)|; on bilateral rows |gap| / x_ref.
-    x_ref = max(|x|, |guess|, finite |bound|), r_ref = max(|b|, |r_n|), maxima over all unknowns.
+    complementarity: max |gap| / x_ref over active and bilateral conditions, max |r_n| / r_ref over the others: the set
+    that the impact law will see is certified too.
+    x_ref = max(|x|, |guess|), r_ref = max(|b|, |r_n|), maxima over all unknowns: a wide gap blunts no residual.
     """
 
     equilibrium: float

@@ -11,45 +11,31 @@ from .step import Balance, Certificate, ContactProblem, State, StepProblem, Step
 from .system import SemiDiscreteSystem
 
 
-def _ratio(value: float, reference: float) -> float:
-    """value/reference, with 0/0 = 0 (nothing happens, nothing is wrong)."""
-    if reference > 0.0 or np.isnan(reference):
-        return value / reference
-    return 0.0 if value == 0.0 else float("inf")
-
-
 def kkt_residual(step: StepProblem, result: StepResult) -> Certificate:
     """The certificate of a step: how well (x, r_n) satisfies the inequality problem. Definitions: ``Certificate``."""
     surface, x, r_n = step.surface, result.x, result.r_n
     Ax = step.A @ x
     residual = Ax - step.b
     residual[surface.owned] += r_n[surface.slots]
-    local = [_max_abs(residual), _max_abs(step.b), _max_abs(Ax), _max_abs(x), _max_abs(step.guess)]
-    local = list(np.nan_to_num(local, nan=np.inf, posinf=np.inf))
-    equilibrium, b_max, Ax_max, x_max, guess_max = surface.comm.max(np.array(local))
-    finite = np.isfinite(step.bound)
-    gap = (step.bound - surface.normal_values(x) + surface.compliance * r_n / step.scale)[finite]
-    x_ref = max(x_max, guess_max, _max_abs(step.bound[finite]))
-    r_ref = max(b_max, _max_abs(r_n))
-    held = surface.bilateral[finite]
-    r = np.where(held, 0.0, r_n[finite])
-    loose = r_n[~finite]
+    local = np.array([_max_abs(residual), _max_abs(step.b), _max_abs(Ax), _max_abs(x), _max_abs(step.guess)])
+    local[np.isnan(local)] = np.inf
+    residual_max, b_max, Ax_max, x_max, guess_max = surface.comm.max(local)
+    gap = step.bound - surface.normal_values(x) + surface.compliance * r_n / step.scale
+    gap = _over(gap, max(x_max, guess_max))
+    r = _over(r_n, max(b_max, _max_abs(r_n)))
+    free = ~surface.bilateral
     return Certificate(
-        equilibrium=_ratio(equilibrium, max(b_max, Ax_max)),
-        penetration=_ratio(_max_abs(np.where(held, 0.0, np.minimum(gap, 0.0))), x_ref),
-        tension=_ratio(_max_abs(np.minimum(r, 0.0)), r_ref),
-        complementarity=max(
-            _complementarity(r, gap, r_ref, x_ref, held),
-            _ratio(_max_abs(loose), r_ref),
-        ),
+        equilibrium=_max_abs(_over(np.array([residual_max]), max(b_max, Ax_max))),
+        penetration=_max_abs(np.minimum(gap[free], 0.0)),
+        tension=_max_abs(np.minimum(r[free], 0.0)),
+        complementarity=_max_abs(np.where(result.active | surface.bilateral, gap, r)),
     )
 
 
-def _complementarity(r: Array, gap: Array, r_ref: float, x_ref: float, held: Array) -> float:
-    """max |min(r/r_ref, gap/x_ref)|, and |gap|/x_ref on bilateral rows."""
-    scaled_gap = np.array([_ratio(abs(g), x_ref) * np.sign(g) for g in gap]) if x_ref == 0.0 else gap / x_ref
-    scaled_r = r / r_ref if r_ref > 0.0 else r
-    return _max_abs(np.where(held, scaled_gap, np.minimum(scaled_r, scaled_gap)))
+def _over(values: Array, reference: float) -> Array:
+    """values/reference, with 0/0 = 0 (nothing happens, nothing is wrong); NaN stays NaN."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(values == 0.0, 0.0, values / np.float64(reference))
 
 
 def _max_abs(x: Array) -> float:
