@@ -20,7 +20,7 @@ vi_mpi_environment() {
   export OMPI_MCA_rmaps_base_oversubscribe=1 PRTE_MCA_rmaps_default_mapping_policy=:oversubscribe
   export OMPI_MCA_hwloc_base_binding_policy=none PRTE_MCA_hwloc_default_binding_policy=none
   export OMPI_MCA_mpi_yield_when_idle=1 HWLOC_HIDE_ERRORS=2 UCX_LOG_LEVEL=fatal
-  export OMPI_MCA_pml=ob1 OMPI_MCA_btl=^openib,ofi,uct,usnic OMPI_MCA_btl_vader_single_copy_mechanism=none
+  export OMPI_MCA_pml=ob1 OMPI_MCA_btl=^tcp,openib,ofi,uct,usnic OMPI_MCA_btl_vader_single_copy_mechanism=none
 }
 
 # dolfinx keeps compiled forms, and matplotlib its fonts, under ~/.cache: elsewhere when there is no such place.
@@ -46,9 +46,9 @@ vi_choose_real_petsc() {
 vi_missing_packages() {
   local wanted installed package missing=()
   wanted=$(grep -v '^#' "$vi_root/install/debian-packages.txt")
-  installed=$(dpkg-query -W -f '${db:Status-Status} ${Package} \n' $wanted 2>/dev/null)
+  installed=$(dpkg-query -W -f '=${db:Status-Status} ${Package}=\n' $wanted 2>/dev/null)
   for package in $wanted; do
-    case $installed in *"installed $package "*) ;; *) missing+=("$package") ;; esac
+    case $installed in *"=installed $package="*) ;; *) missing+=("$package") ;; esac
   done
   echo "${missing[*]}"
 }

@@ -1,8 +1,8 @@
 """One verdict for all ranks: the suite under mpirun fails as a whole, reports once, and never hangs.
 
 Ranks meet after collection and after every phase (setup, call, teardown) of every test, on a communicator of their own.
-A phase that failed on one rank is failed on all, so that all go on with the same next test. A rank that does not come to
-the meeting is stuck in a collective call the others never made: the run is then aborted with the reports known.
+A phase that failed on one rank is failed on all, so that all go on with the same next test. A rank that does not come
+to the meeting is stuck in a collective call the others never made: the run is then aborted with the reports known.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# bash tests/lint.sh     ruff and mypy, in the versions of pyproject.toml's extra "lint", from PyPI into .venv
+# bash tests/lint.sh     ruff and mypy in the versions of install/lint-requirements.txt, from PyPI, in .venv/lint
 set -uo pipefail
 tests=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 . "$tests/../install/setup.sh"
@@ -7,16 +7,23 @@ vi_setup
 cd "$vi_root" || exit 1
 unset PYTHONPATH  # the checkers read files: they import nothing of ours
 
-wanted=$("$vi_python" -c 'import tomllib
-print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]["lint"])')
-if [ "$(cat .venv/.lint 2>/dev/null)" != "$wanted" ] || ! .venv/bin/python -c "" 2>/dev/null; then
-  echo "vi_contact: installing $wanted into .venv (once)…" >&2
-  said=$({ .venv/bin/python -c "" 2>/dev/null || "$vi_python" -m venv --clear --system-site-packages .venv; } 2>&1 &&
-    .venv/bin/python -m pip install -q $wanted 2>&1) || vi_fail "could not install $wanted (offline?): $(tail -n 1 <<<"$said")"
-  echo "$wanted" >.venv/.lint
+# numpy only for its types: the oldest we support, on every release the same, never imported (hence the foreign version)
+numpy="--only-binary=:all: --no-deps --python-version 3.11 numpy==1.24.2"
+
+venv=.venv/lint
+wanted="$(cat install/lint-requirements.txt) $numpy"
+install_checkers() {
+  "$vi_python" -m venv --clear $venv &&
+    $venv/bin/pip install -r install/lint-requirements.txt &&
+    $venv/bin/pip install --target $venv/lib/python3*/site-packages $numpy
+}
+if [ "$(cat $venv/installed 2>/dev/null)" != "$wanted" ] || ! $venv/bin/python -c "" 2>/dev/null; then
+  echo "vi_contact: installing ruff and mypy into $venv (once)…" >&2
+  said=$(install_checkers 2>&1) || vi_fail "could not install ruff and mypy (offline?): $(tail -n 1 <<<"$said")"
+  echo "$wanted" >$venv/installed
 fi
 
 status=0
-.venv/bin/python -m ruff check --quiet . || status=1
-.venv/bin/python -m mypy --no-error-summary || status=1
+$venv/bin/ruff check --quiet --output-format concise . || status=1
+$venv/bin/mypy --no-error-summary || status=1
 exit "$status"

@@ -8,7 +8,10 @@ from typing import Any
 
 import pytest
 
-MINIMUM = {"numpy": (1, 24), "scipy": (1, 10), "h5py": (3, 7), "dolfinx": (0, 5), "petsc4py": (3, 18), "mpi4py": (3, 1), "gmsh": (4, 8)}
+MINIMUM = {
+    "numpy": (1, 24), "scipy": (1, 10), "h5py": (3, 7), "matplotlib": (3, 6), "tqdm": (4, 64),
+    "dolfinx": (0, 5), "petsc4py": (3, 18), "mpi4py": (3, 1), "gmsh": (4, 8),
+}
 
 
 def test_interpreter_is_recent_enough() -> None:
