@@ -124,7 +124,7 @@ def shaken_wall(
     foot = turned((lengths[0] + gap * metre, 0.0), angle)
     ground = HalfSpace(point=tuple(foot), normal=tuple(turned((-1.0, 0.0), angle)))
     points = None if contacts is None else [turned((lengths[0], y * metre), angle) for y in contacts]
-    surface = contact_surface(system, tags["right"], obstacle=ground, points=points, thickness=0.2 * metre)
+    surface = contact_surface(system, tags["right"], obstacle=ground, points=points)
     if springs is not None:
         surface = surface.on_springs(springs / metre**2)
     shake = Harmonic(3.0 * metre, 14.0, direction=tuple(turned((1.0, 0.0), angle)))

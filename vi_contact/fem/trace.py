@@ -28,17 +28,15 @@ def contact_surface(
     *,
     obstacle: Obstacle | None = None,
     points: Sequence[Sequence[float]] | None = None,
-    thickness: float = 1.0,
 ) -> ContactSurface:
     """The contact conditions of a boundary part, or only of the listed points of it (seed 000's case a).
 
-    Nodal weights are ∫ phi_i, nodal normals the direction of ∫ phi_i n over the facets. Nodes of the facets that are
+    Nodal weights are ∫ phi_i times the section's thickness (so that r_n / weights is in Pa), nodal normals the direction of ∫ phi_i n over the facets. Nodes of the facets that are
     clamped in every component (where the boundary meets a clamped part) are left out.
 
     Args:
         obstacle: Touching() by default, HalfSpace, AnalyticGap or the user's own.
         points: (k, d) coordinates; each stands for the nearest node of the facets. The order is kept.
-        thickness: of the section [m], so that pressure = r_n / weights is in Pa.
     Raises:
         InputError: no contact nodes, a listed point that is clamped or not on the facets, a contact direction that is
             partly prescribed, initial penetration.
@@ -57,7 +55,7 @@ def contact_surface(
         comm=space.comm,
         points=nodes.points,
         normals=directions,
-        weights=nodes.weights * thickness,
+        weights=nodes.weights * space.forms.section.thickness,
         gap0=gap,
         bilateral=np.zeros(count, dtype=bool),
         compliance=np.zeros(count),

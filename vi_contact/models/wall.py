@@ -93,15 +93,13 @@ class WallModel:
         """The contact conditions of a case of CASES, or of the whole side for "face"."""
         ground = HalfSpace(point=(self.wall.width, 0.0), normal=(-1.0, 0.0))
         if case == "face":
-            return contact_surface(self.system, self.face, obstacle=ground, thickness=self.wall.thickness)
+            return contact_surface(self.system, self.face, obstacle=ground)
         if case not in CASES:
             raise InputError(f"unknown case '{case}': choose one of {', '.join(CASES)}")
         if case == "free":
             return empty_surface(MpiComm(self.mesh.comm), 2)
         points = [self.wall.point(number) for number in CASES[case]]
-        surface = contact_surface(
-            self.system, self.face, obstacle=ground, points=points, thickness=self.wall.thickness
-        )
+        surface = contact_surface(self.system, self.face, obstacle=ground, points=points)
         return surface.held() if case == "bilateral" else surface
 
     def problem(
