@@ -1,0 +1,156 @@
+#!/usr/bin/env python3
+"""What a unilateral step costs, as a multiple of a plain linear step with the same matrix, in one run.
+
+    python3 benchmarks/step_cost.py [--sizes 1e3 2e3 2e4 2e5] [--steps 60] [--json FILE]
+
+The wall of seed 000 with its whole right side in possible contact, harmonic motion, Zienkiewicz-Wood-Taylor step, impact
+rule and certificate on, no records. A linear step is right-hand side, one back-substitution and update. All figures are
+medians and means over the steps that have contact, one thread, one rank. The run stops at the wanted number of steps
+after the first contact.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import resource
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ[name] = "1"
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+import numpy as np  # noqa: E402
+from mpi4py import MPI  # noqa: E402
+
+import vi_contact as vc  # noqa: E402
+from vi_contact.march import initial_state  # noqa: E402
+from vi_contact.models.wall import Wall, build  # noqa: E402
+from vi_contact.solvers.volume import Volume  # noqa: E402
+from vi_contact.solvers.volume_factorised import OneFactorisation  # noqa: E402
+from vi_contact.solvers.volume_snes import ReducedNewton  # noqa: E402
+
+SCHEME = vc.ZienkiewiczWoodTaylor(phi=0.5)
+DIVISIONS = {1e3: (18, 27), 2e3: (26, 39), 2e4: (82, 123), 2e5: (167, 600)}  # up to 600 contact points
+ROUTES: dict[str, Any] = {
+    "condensed": vc.Condensed(),
+    "volume, one factorisation": Volume(method=OneFactorisation()),
+    "volume, reference": Volume(method=ReducedNewton()),
+}
+SLOW = {"volume, reference": 1e5}  # not run at or above this size
+
+
+def memory() -> float:
+    """Largest resident memory of the process so far [MB]."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+
+
+def timed(work: Callable[[], Any]) -> tuple[float, Any]:
+    """(seconds, result)."""
+    start = time.perf_counter()
+    result = work()
+    return time.perf_counter() - start, result
+
+
+def linear_steps(problem: vc.ContactProblem, A: Any, dt: float, count: int) -> list[float]:
+    """Seconds of plain linear steps with the same matrix."""
+    surface = problem.surface
+    open_ = vc.StepResult(np.zeros(0), np.zeros(surface.count), np.zeros(surface.count, dtype=bool), 0, "linear")
+    state, seconds = initial_state(problem), []
+    for _ in range(count):
+        start = time.perf_counter()
+        step = SCHEME.step(problem, state, A, dt)
+        x = A.factor.solve(step.b)
+        state = SCHEME.finish(problem, state, step, vc.StepResult(x, open_.r_n, open_.active, 0, "linear"), dt)
+        seconds.append(time.perf_counter() - start)
+    return seconds
+
+
+def unilateral_steps(problem: vc.ContactProblem, solver: Any, dt: float, count: int) -> dict[str, Any]:
+    """Marches until ``count`` steps with contact are timed."""
+    loop = vc.march(problem, scheme=SCHEME, solver=solver, dt=dt, steps=100 * count)
+    set_up, _ = timed(lambda: next(loop))
+    seconds, iterations, worst, active = [], [], 0.0, []
+    while len(seconds) < count:
+        spent, (_, report) = timed(lambda: next(loop))
+        worst = max(worst, report.certificate.worst)
+        if report.new.active.any():
+            seconds.append(spent)
+            iterations.append(report.result.iterations)
+            active.append(int(report.new.active.sum()))
+    return {
+        "set_up_seconds": set_up, "median_ms": 1e3 * float(np.median(seconds)), "mean_ms": 1e3 * float(np.mean(seconds)),
+        "iterations": float(np.mean(iterations)), "active": float(np.mean(active)), "certificate": worst,
+        "peak_memory_MB": memory(),
+    }
+
+
+def measure(size: float, steps: int) -> dict[str, Any]:
+    """One size: the linear step and every route."""
+    model = build(Wall(divisions=DIVISIONS[size]), MPI.COMM_WORLD)
+    problem = model.problem("face")
+    dt = model.time_step()
+    A = SCHEME.effective_matrix(problem, dt)
+    factorisation, _ = timed(lambda: A.factor)
+    linear = linear_steps(problem, A, dt, max(20, steps // 2))
+    row: dict[str, Any] = {
+        "unknowns": model.system.space.unknowns, "contact_points": problem.surface.count,
+        "factorisation_seconds": factorisation, "linear_ms": 1e3 * float(np.median(linear)), "routes": {},
+    }
+    for name, solver in ROUTES.items():
+        if size < SLOW.get(name, np.inf):
+            found = unilateral_steps(problem, solver, dt, steps)
+            for key in ("median", "mean"):
+                found[f"{key}_ratio"] = found[f"{key}_ms"] / row["linear_ms"]
+            row["routes"][name] = found
+            print(line(row, name, found), flush=True)
+    return row
+
+
+HEADER = (
+    f"{'unknowns':>9} {'points':>6} {'linear ms':>9}  {'route':<26} {'ms median':>9} {'ms mean':>8} {'ratio':>6} {'mean':>6} "
+    f"{'iter':>5} {'active':>6} {'set-up s':>8} {'MB':>6} {'certificate':>11}"
+)
+
+
+def line(row: dict[str, Any], name: str, found: dict[str, Any]) -> str:
+    """One row of the table."""
+    return (
+        f"{row['unknowns']:>9} {row['contact_points']:>6} {row['linear_ms']:>9.3f}  {name:<26} {found['median_ms']:>9.3f} "
+        f"{found['mean_ms']:>8.3f} {found['median_ratio']:>6.2f} {found['mean_ratio']:>6.2f} {found['iterations']:>5.2f} "
+        f"{found['active']:>6.1f} {found['set_up_seconds']:>8.2f} {found['peak_memory_MB']:>6.0f} {found['certificate']:>11.1e}"
+    )
+
+
+def seed_wall(steps: int = 400) -> float:
+    """Seconds of the seed's 400-step wall, mesh to last step, after imports."""
+    def run() -> None:
+        model = build(Wall(), MPI.COMM_WORLD)
+        for _ in vc.march(
+            model.problem("b"), scheme=SCHEME, solver=vc.Condensed(), dt=model.time_step(), steps=steps
+        ):
+            pass
+    return timed(run)[0]
+
+
+def main() -> None:
+    """Prints the table and writes it with --json."""
+    arguments = argparse.ArgumentParser(description=__doc__.split("\n")[0] if __doc__ else None)
+    arguments.add_argument("--sizes", type=float, nargs="+", default=list(DIVISIONS), choices=list(DIVISIONS))
+    arguments.add_argument("--steps", type=int, default=60, help="steps with contact that are timed")
+    arguments.add_argument("--json", metavar="FILE")
+    options = arguments.parse_args()
+    seconds = seed_wall()
+    print(f"the seed's wall, 400 steps, mesh to last step: {seconds:.2f} s\n\n{HEADER}", flush=True)
+    rows = [measure(size, options.steps) for size in options.sizes]
+    if options.json:
+        Path(options.json).write_text(json.dumps({"seed_wall_seconds": seconds, "rows": rows}, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()
