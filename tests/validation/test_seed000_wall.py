@@ -31,6 +31,7 @@ from vi_contact.verify import energy_balance
 POINTS = (12, 6, 7, 26)  # columns of the reference table: top of the contact side, two of its points, the opposite side
 ROWS = (10, 20, 40, 100, 200, 400)
 SCHEME = ZienkiewiczWoodTaylor(phi=0.5)
+one_rank = pytest.mark.serial  # whole marches, slow on several ranks; the last test of this file shows that ranks do not matter
 
 
 @dataclass(frozen=True)
@@ -133,7 +134,7 @@ CASES = {
 @pytest.mark.parametrize("case", CASES)
 def test_v4_1_displacements(case):
     """u12 at six steps, minima and maxima of u12, u6, u7, u26 [1e-6 m]; a printed 0 is exactly 0."""
-    found = history(case[:1] if "proj" in case else case, projection="proj" in case)
+    found = history("a", projection=True) if case == "a, M-projection" else history(case)
     rows, extremes = CASES[case]
     u = 1e6 * found.u
     for k, text in zip(ROWS, rows.split(), strict=True):
@@ -214,6 +215,7 @@ def sweeps(D: Array, z: Array, v: Array) -> tuple[Array, int]:
     return v, count
 
 
+@one_rank
 @pytest.mark.parametrize("case, mean", [("a", 5.7), ("b", 20.7)])
 def test_v4_1_sweeps_of_the_seeds_own_method(case, mean):
     """Projected Gauss-Seidel on D~, z~ from the last displacements gives the same u_N, in 5.7 or 20.7 sweeps in the mean.
@@ -233,6 +235,7 @@ def test_v4_1_sweeps_of_the_seeds_own_method(case, mean):
     assert np.mean(counts) == pytest.approx(mean, abs=0.5)
 
 
+@one_rank
 @pytest.mark.parametrize("case", ["a", "b"])
 @pytest.mark.parametrize("primal", [True, False])
 def test_statement_8_hildreth_needs_few_sweeps(case, primal):
@@ -277,9 +280,9 @@ def test_v4_0_condensed_matrix_is_the_schur_complement(case):
 def test_v4_0_primal_dual_and_active_set_agree(case):
     """(46, 49), (42) and the active set give the same (u_N, S_N) to 1e-10 at every step."""
     solvers = (Condensed(), Condensed(Hildreth(primal=True)), Condensed(Hildreth(primal=False)))
-    checked = cross_check(problem(case), scheme=SCHEME, solvers=solvers, dt=model().time_step(), steps=150)
+    checked = cross_check(problem(case), scheme=SCHEME, solvers=solvers, dt=model().time_step(), steps=60)
     assert checked.worst < 1e-10
-    assert all(found.r_ref > 0.0 and found.steps == 150 for found in checked.found)
+    assert all(found.r_ref > 0.0 and found.steps == 60 for found in checked.found)
 
 
 # The statements about Figs. 4 and 5 -----------------------------------------------------------------------------------
@@ -321,7 +324,7 @@ def test_statement_5_energy_is_lost_in_contact_only(projection):
     shaken = follow(problem("a", reading=reading), dt=dt, steps=37)
     impact = problem("a", reading=reading).impact
     quiet = model().problem("a", excitation=(), impact=impact)
-    found = follow(quiet, dt=dt, steps=300, state=shaken.state)
+    found = follow(quiet, dt=dt, steps=150, state=shaken.state)
     before = np.concatenate([[shaken.energy[-1]], found.energy[:-1]])
     change, touching = found.energy - before, found.active.any(axis=1)
     assert touching.sum() > 20 and (~touching).sum() > 20
@@ -338,11 +341,12 @@ def test_statement_5_energy_is_lost_in_contact_only(projection):
 def test_statement_6_positive_homogeneity(case):
     """2.5 times the ground acceleration gives 2.5 times every displacement and the same contact sets."""
     base = history(case)
-    found = follow(problem(case, a0=2.5), dt=model().time_step())
-    assert np.array_equal(found.active, base.active)
-    assert np.abs(found.u - 2.5 * base.u).max() < 2e-12 * np.abs(found.u).max()
+    found = follow(problem(case, a0=2.5), dt=model().time_step(), steps=150)
+    assert np.array_equal(found.active, base.active[:150]) and found.active.any()
+    assert np.abs(found.u - 2.5 * base.u[:150]).max() < 2e-12 * np.abs(found.u).max()
 
 
+@one_rank
 def test_density_read_as_a_tenth_only_scales():
     """rho = 0.24 instead of 2.4 kN s²/m⁴ with f = f1/2 and dt = 1/(40 f): every displacement is exactly a tenth."""
     light = Wall(material=LinearElastic(E=2.0e10, nu=0.0, rho=240.0))
@@ -360,6 +364,7 @@ OTHER = {
 }
 
 
+@one_rank
 @pytest.mark.parametrize("other", OTHER)
 @pytest.mark.parametrize("case", ["free", "b"])
 def test_other_discretisations(case, other):
@@ -370,6 +375,7 @@ def test_other_discretisations(case, other):
     assert np.all(np.abs(found.max(axis=0) - base.max(axis=0)) < 0.1 * size)
 
 
+@one_rank
 @pytest.mark.parametrize("other", ["finer", "finer triangles"])
 def test_other_discretisations_of_isolated_contact_points(other):
     """Case a: minima within 10 % of the largest displacement, on the finer meshes.
