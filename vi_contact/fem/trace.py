@@ -31,8 +31,9 @@ def contact_surface(
 ) -> ContactSurface:
     """The contact conditions of a boundary part, or only of the listed points of it (seed 000's case a).
 
-    Nodal weights are ∫ phi_i times the section's thickness (so that r_n / weights is in Pa), nodal normals the direction of ∫ phi_i n over the facets. Nodes of the facets that are
-    clamped in every component (where the boundary meets a clamped part) are left out.
+    Nodal weights are ∫ phi_i times the section's thickness (so that r_n / weights is in Pa), nodal normals the
+    direction of ∫ phi_i n over the facets. Nodes of the facets that are clamped in every component (where the boundary
+    meets a clamped part) are left out.
 
     Args:
         obstacle: Touching() by default, HalfSpace, AnalyticGap or the user's own.
