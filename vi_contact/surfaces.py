@@ -62,9 +62,10 @@ class HalfSpace:
     def _check(self, points: Array, normals: Array) -> None:
         if points.shape[1] != len(self.normal):
             raise InputError(
-                f"HalfSpace has {len(self.normal)} components but the body has {points.shape[1]}: give one per dimension"
+                f"HalfSpace has {len(self.normal)} components but the body has {points.shape[1]}: "
+                "give one per dimension"
             )
-        if len(points) and np.any(normals @ self.unit_normal > 0.0):
+        if len(points) and np.any(normals @ self.unit_normal > 1e-9):  # a side at right angles may touch with its edge
             raise InputError(
                 f"HalfSpace normal {self.normal} points away from the body: turn its sign, "
                 "it must point out of the obstacle towards the contact boundary"
@@ -91,7 +92,9 @@ class AnalyticGap:
     def gap(self, points: Array, normals: Array) -> Array:
         gap = np.asarray(self.function(points), dtype=float)
         if gap.shape != (len(points),):
-            raise InputError(f"AnalyticGap returned shape {gap.shape} for {len(points)} points: return one gap per point")
+            raise InputError(
+                f"AnalyticGap returned shape {gap.shape} for {len(points)} points: return one gap per point"
+            )
         return gap
 
 
