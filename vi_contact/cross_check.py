@@ -65,14 +65,18 @@ class CrossChecked:
         return PreparedCrossCheck(self, A, surface, scale)
 
     def report(self) -> Mapping[str, Mapping[str, float]]:
-        """method -> relative differences in u and r_n, iterations per step: what summary.json shows."""
+        """method -> relative differences in u and r_n, iterations per step: what summary.json shows.
+
+        A name that comes again gets a number.
+        """
+        names = [one.method for one in self.found]
         return {
-            one.method: {
+            name if names.count(name) == 1 else f"{name} #{rank}": {
                 "u": one.relative_u,
                 "r_n": one.relative_r_n,
                 "iterations_per_step": one.iterations / max(one.steps, 1),
             }
-            for one in self.found
+            for rank, (name, one) in enumerate(zip(names, self.found, strict=True), start=1)
         }
 
     @property
