@@ -16,13 +16,13 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..algebra import Array
-from ..errors import InputError
+from ..errors import InputError, StepFailure
 from ..friction import Frictionless
 from ..step import ContactProblem, EffectiveMatrix, StepProblem, StepResult
 from ..surfaces import ContactSurface
 from .volume_factorised import OneFactorisation
 from .volume_options import OptionLayers, Options
-from .volume_reasons import raised
+from .volume_reasons import raised, stopped
 from .volume_snes import ReducedNewton, SemismoothNewton
 from .volume_step import ScaledStep
 from .volume_system import BoundedSystem
@@ -35,9 +35,10 @@ class Driver(Protocol):
     """A PETSc solver bound to a ScaledStep."""
 
     solver: Any
+    reasons: type
 
-    def run(self) -> tuple[Array, Array, int]:
-        """(y, F(y), iterations) of the scaled step; StepFailure or PETSc.Error."""
+    def run(self) -> tuple[Array, Array, int, int]:
+        """(y, F(y), PETSc's reason, iterations) of the scaled step."""
         ...
 
     def destroy(self) -> None: ...
@@ -87,19 +88,18 @@ class Volume:
 class PreparedVolume:
     """A PETSc solver bound to A; ``snes`` or ``tao`` is the PETSc object. ``close`` frees it.
 
-    Without ``close`` PETSc frees it some time after the last reference, on several ranks at the next ``prepare``:
-    destruction is collective, and Python's is not.
+    Without ``close`` it is freed at the first ``prepare`` after its last reference: destruction is collective, and
+    Python's is not, so petsc4py only puts it aside.
     """
 
     def __init__(self, settings: Volume, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> None:
         self._system = BoundedSystem(A, surface, scale)
-        if surface.comm.size > 1:
-            PETSc.garbage_cleanup(self._system.comm)
+        PETSc.garbage_cleanup(self._system.comm)
         self._method = settings.method
         defaults = settings.method.defaults(surface.comm.size)
         self._layers = OptionLayers(settings.prefix, defaults, settings.petsc_options)
         self._scaled = ScaledStep(self._system, settings.tolerance)
-        self._name = f"Volume({type(settings.method).__name__})"
+        self._name = f"Volume({getattr(settings.method, 'petsc_type', type(settings.method).__name__)})"
         self._driver: Driver | None = self._make()
 
     def _make(self) -> Driver:
@@ -132,10 +132,15 @@ class PreparedVolume:
             self._driver = self._make()
         try:
             self._scaled.set(step, self._method.start(self._driver, self._system, step))
-            y, F, iterations = self._driver.run()
+            y, F, reason, iterations = self._driver.run()
         except PETSc.Error as error:
             self.close()  # its state is unknown; the next step gets a new one
             raise raised(self._name, error) from error
+        except StepFailure:  # from one of our callbacks
+            self.close()
+            raise
+        if reason <= 0 and not self._scaled.accepts(y, F):
+            raise stopped(self._name, self._driver.reasons, reason, iterations, self._scaled.worst)
         return self._result(y, F, iterations)
 
     def _result(self, y: Array, F: Array, iterations: int) -> StepResult:

@@ -27,7 +27,7 @@ ADVICE = {
     "DIVERGED_FNORM_NAN": "check the load, the guess and the bound of this step for NaN",
     "DIVERGED_NAN": "check the load, the guess and the bound of this step for NaN",
 }
-GENERAL_ADVICE = "try a smaller dt, another method (ReducedNewton is the most robust), or a larger iteration limit"
+GENERAL_ADVICE = "check that the body is held, try a smaller dt, another method, or a larger iteration limit"
 
 
 def name_of(reasons: type, reason: int) -> str:
@@ -47,6 +47,10 @@ def stopped(method: str, reasons: type, reason: int, iterations: int, worst: flo
 
 
 def raised(method: str, error: Any) -> StepFailure:
-    """The failure of a PETSc call that raised; error 76 is an external package, mostly a singular factorisation."""
-    text = " ".join(str(error).split())
-    return StepFailure(f"{method} stopped with PETSc error {getattr(error, 'ierr', '?')} ({text}): {GENERAL_ADVICE}")
+    """The failure of a PETSc call that raised. Of PETSc's trace the last line says what is wrong."""
+    lines = [line.split("] ", 1)[-1].strip() for line in str(error).splitlines()]
+    code = getattr(error, "ierr", "unknown")
+    return StepFailure(
+        f"{method} stopped with PETSc error {code} ({lines[-1] if lines else error}): "
+        "check that A is positive definite and that load, guess and bound are finite, or try another method"
+    )

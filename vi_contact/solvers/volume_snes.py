@@ -8,8 +8,10 @@ route but A and b.
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Callable
 from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any, Protocol
 
 import numpy as np
@@ -18,7 +20,6 @@ from petsc4py import PETSc
 from ..algebra import Array
 from ..step import StepProblem
 from .volume_options import OptionLayers, Options, check_reduced, check_semismooth
-from .volume_reasons import raised, stopped
 from .volume_step import ScaledStep
 from .volume_system import BoundedSystem
 
@@ -49,8 +50,16 @@ class Jacobian(Protocol):
     def destroy(self) -> None: ...
 
 
+class Preconditioner(Protocol):
+    """A PETSc preconditioner in Python."""
+
+    def apply(self, pc: Any, r: Any, y: Any) -> None: ...
+
+
 class SnesDriver:
     """A SNES object bound to a scaled step; ``solver`` is the PETSc object."""
+
+    reasons = PETSc.SNES.ConvergedReason
 
     def __init__(
         self,
@@ -60,7 +69,7 @@ class SnesDriver:
         *,
         snes_type: str,
         check: Callable[[Any, OptionLayers], None],
-        inverse: object | None = None,
+        inverse: Preconditioner | None = None,
     ) -> None:
         self._scaled, self._layers, self._jacobian = scaled, layers, jacobian
         self._y, self._F = jacobian.mat.createVecs()
@@ -68,32 +77,29 @@ class SnesDriver:
         self.solver = PETSc.SNES().create(scaled.system.comm)
         self.solver.setOptionsPrefix(layers.prefix)
         self.solver.setType(snes_type)  # before the convergence test, which it would overwrite (P7)
-        self.solver.setFunction(scaled.function, self._F)
-        self.solver.setJacobian(jacobian.evaluate, jacobian.mat)
+        self._test = Test(scaled)
+        self.solver.setFunction(weakly(scaled.function), self._F)
+        self.solver.setJacobian(weakly(jacobian.evaluate), jacobian.mat)
         self.solver.setVariableBounds(self._lower, self._upper)
-        self.solver.setConvergenceTest(Test(scaled))
+        self.solver.setConvergenceTest(weakly(self._test.reason))
         if inverse is not None:
             self.solver.ksp.setType("preonly")
             self.solver.ksp.pc.setType("python")
-            self.solver.ksp.pc.setPythonContext(inverse)
+            self.solver.ksp.pc.setPythonContext(SimpleNamespace(apply=weakly(inverse.apply)))
         with layers.in_force():
             self.solver.setFromOptions()
             check(self.solver, layers)
 
-    def run(self) -> tuple[Array, Array, int]:
-        """(y, F(y), iterations) of the scaled step; PETSc.Error or StepFailure when SNES does not converge."""
-        scaled = self._scaled
+    def run(self) -> tuple[Array, Array, int, int]:
+        """(y, F(y), PETSc's reason, iterations) of the scaled step."""
+        scaled, snes = self._scaled, self.solver
         self._jacobian.rescale(scaled.x_ref / scaled.r_ref)
         self._y.array[:] = scaled.start
         write_bounds(scaled, self._lower, self._upper)
         with self._layers.in_force():
-            self.solver.solve(None, self._y)
-        reason, iterations = self.solver.getConvergedReason(), self.solver.getIterationNumber()
+            snes.solve(None, self._y)
         y, F = np.array(self._y.array_r), np.array(self._F.array_r)
-        if reason <= 0 and not scaled.accepts(y, F):
-            reasons = PETSc.SNES.ConvergedReason
-            raise stopped(f"SNES {self.solver.getType()}", reasons, reason, iterations, scaled.worst)
-        return y, F, iterations
+        return y, F, snes.getConvergedReason(), snes.getIterationNumber()
 
     def destroy(self) -> None:
         """Free the PETSc objects; collective."""
@@ -107,7 +113,8 @@ class Test:
     def __init__(self, scaled: ScaledStep) -> None:
         self._scaled, self._first = scaled, 0.0
 
-    def __call__(self, snes: Any, iteration: int, norms: tuple[float, float, float]) -> int:
+    def reason(self, snes: Any, iteration: int, norms: tuple[float, float, float]) -> int:
+        """PETSc's reason to stop, 0 to go on."""
         reason = self._scaled.verdict(snes.getSolution().array_r, snes.getFunction()[0].array_r)
         if reason:
             return reason
@@ -119,6 +126,22 @@ class Test:
         if iteration and norms[2] < rtol * self._first:
             return int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_RELATIVE)
         return 0
+
+
+def weakly(method: Callable[..., Any]) -> Callable[..., Any]:
+    """The bound method without keeping its object alive: what PETSc may hold.
+
+    petsc4py frees a solver late and all at once; whatever PETSc object only its callbacks kept alive would then be lost
+    to the clean-up and never be freed.
+    """
+    reference = weakref.WeakMethod(method)
+
+    def call(*arguments: Any) -> Any:
+        alive = reference()
+        assert alive is not None, "a PETSc solver outlived its driver"
+        return alive(*arguments)
+
+    return call
 
 
 def write_bounds(scaled: ScaledStep, lower: Any, upper: Any) -> None:

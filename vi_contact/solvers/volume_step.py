@@ -20,10 +20,7 @@ ROUND_OFF = 1e-14  # backward error |A z - b| / (|A| |z| + |b|), largest entries
 
 
 class ScaledStep:
-    """F(y) = (A x_ref y - b) / r_ref with bounds on y, for the step set last.
-
-    It knows no PETSc object, so that a solver whose callbacks refer to it is freed with its last reference.
-    """
+    """F(y) = (A x_ref y - b) / r_ref with bounds on y, for the step set last."""
 
     def __init__(self, system: BoundedSystem, tolerance: float) -> None:
         self.system, self.tolerance = system, tolerance
@@ -42,8 +39,8 @@ class ScaledStep:
         self.x_ref, self.r_ref = _power_of_two(max(z_max, bound_max)), _power_of_two(b_max)
         self.lower, self.upper = lower / self.x_ref, upper / self.x_ref
         self.start = start / self.x_ref
-        self._b_max = b_max / self.r_ref
-        self._last = np.inf
+        self._b_max, self._bound_max = b_max / self.r_ref, bound_max / self.x_ref
+        self._worst = np.inf
 
     def _along(self, b: Array, b_max: float) -> float:
         """Size of the minimiser of ½ zᵀA z - bᵀz along b: the size of z when nothing else is known."""
@@ -59,7 +56,8 @@ class ScaledStep:
 
     def function(self, _solver: Any, y: Any, F: Any) -> None:
         """F(y) as a PETSc callback (SNES function, TAO gradient)."""
-        F.array[:] = self.residual(y.array_r)
+        self.last = self.residual(y.array_r)
+        F.array[:] = self.last
 
     def objective(self, _solver: Any, y: Any, G: Any) -> float:
         """½ y·Hy - y·b/r_ref and its gradient F(y), for TAO; H = A x_ref / r_ref."""
@@ -75,21 +73,23 @@ class ScaledStep:
         return np.asarray((self.upper[i] - y[i] < -F[i]) | (self.lower[i] == self.upper[i]))
 
     def errors(self, y: Array, F: Array) -> tuple[float, float, float]:
-        """Largest |F| off the active set and largest |gap| on it, as fractions of |b| and |y|; backward error of F."""
-        i = self.system.bounded
+        """Largest |F| off the active set and largest |gap| on it, relative as in the certificate; backward error of F."""
+        system, i = self.system, self.system.bounded
         active = self.active(y, F)
         gap = (self.upper[i] - y[i])[active]
         force = F.copy()
         force[i[active]] = 0.0
-        Ay = F + self.b / self.r_ref
-        local = (_max_abs(force), _max_abs(gap), _max_abs(y), _max_abs(Ay), float(np.isnan(F).any()))
-        force_max, gap_max, y_max, Ay_max, broken = self.system.max(*local)
+        force[system.feet] += force[system.rows :]  # the body feels what is left over on its springs
+        Ax = F + self.b / self.r_ref
+        Ax[system.feet] += F[system.rows :]
+        local = (_max_abs(force), _max_abs(gap), _max_abs(y), _max_abs(Ax[: system.rows]), float(np.isnan(F).any()))
+        force_max, gap_max, y_max, Ax_max, broken = system.max(*local)
         if broken:
             return np.nan, np.nan, np.nan
         size = self._norm * y_max * self.x_ref / self.r_ref + self._b_max
         return (
-            _fraction(force_max, max(self._b_max, Ay_max)),
-            _fraction(gap_max, max(y_max, 1.0)),
+            _fraction(force_max, max(self._b_max, Ax_max)),
+            _fraction(gap_max, max(y_max, self._bound_max)),
             _fraction(force_max, size),
         )
 
@@ -101,24 +101,24 @@ class ScaledStep:
         force, gap, backward = self.errors(y, F)
         if np.isnan(force):
             return int(PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN)
-        worst, last = max(force, gap), self._last
-        self._last = worst
+        worst, before = max(force, gap), self._worst
+        self._worst = worst
         if backward <= ROUND_OFF and worst <= self.tolerance and gap <= ROUND_OFF:
             return int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_ABS)
-        if 0.5 * last < worst <= self.tolerance and np.isfinite(last):
+        if 0.5 * before < worst <= self.tolerance and np.isfinite(before):
             return int(PETSc.SNES.ConvergedReason.CONVERGED_SNORM_RELATIVE)
         return 0
 
     def accepts(self, y: Array, F: Array) -> bool:
         """True below the tolerance: a solver whose line search fails at the floor of round-off is done, not diverged."""
         force, gap, _ = self.errors(y, F)
-        self._last = max(force, gap)
-        return self._last <= self.tolerance
+        self._worst = max(force, gap)
+        return self._worst <= self.tolerance
 
     @property
     def worst(self) -> float:
         """The larger error found last."""
-        return self._last
+        return self._worst
 
 
 def _power_of_two(value: float) -> float:

@@ -17,40 +17,37 @@ from ..algebra import Array
 from ..errors import InputError
 from ..step import StepProblem
 from .volume_options import REDUCED_PC, OptionLayers, Options, refuse
-from .volume_reasons import stopped
-from .volume_snes import AssembledJacobian, ReducedNewton, SemismoothNewton, write_bounds
+from .volume_snes import AssembledJacobian, ReducedNewton, SemismoothNewton, SnesDriver, weakly, write_bounds
 from .volume_step import ScaledStep
 from .volume_system import BoundedSystem
 
 UNCONSTRAINED = "it ignores bounds, so the body would penetrate"
 OTHER = "it solves another class of problem (it wants constraint functions or a least-squares structure)"
 REFUSED = {
-    "bqpip": "it divides by the distance to both bounds and with an infinite one reports garbage as converged",
+    "bqpip": "it needs two finite bounds on every unknown and otherwise reports garbage as converged",
     "gpcg": "on elasticity it needs thousands of iterations and stops short of the solution",
     **dict.fromkeys(("lmvm", "nls", "ntr", "ntl", "cg", "nm", "owlqn", "bmrm"), UNCONSTRAINED),
     **dict.fromkeys(("pounders", "brgn", "lcl", "admm", "almm", "ipm", "pdipm", "shell", "python"), OTHER),
     **dict.fromkeys(("ssils", "ssfls", "asils", "asfls"), f"{OTHER}; SemismoothNewton() is its like in SNES"),
 }
 SOUND = ("tron", "bnls", "bntr", "bntl", "bqnls", "bqnkls", "bqnktr", "bqnktl", "blmvm", "bncg")
+FULL_NEWTON = ("bnls", "bntr", "bntl")
+FIRST_ORDER = ("bqnls", "bqnkls", "bqnktr", "bqnktl", "blmvm", "bncg")
 
 
-def tao_options(ranks: int) -> Options:
-    """Defaults for every type: TRON reads plain pc_type, the Newton-Krylov types tao_bnk_pc_type (P18).
-
-    Their own default preconditioner is useless for elasticity. PETSc has no incomplete Cholesky for several ranks.
-    """
-    options: dict[str, object | None] = {
+def tao_options(ranks: int, kind: str) -> Options:
+    """Defaults: TRON reads plain pc_type, the Newton-Krylov types tao_bnk_pc_type (P18), where the quasi-Newton types
+    want their own. PETSc has no incomplete Cholesky for several ranks."""
+    prefix = "tao_bnk_" if kind in FULL_NEWTON else ""
+    return {
         "tao_gatol": 0.0,
         "tao_grtol": 0.0,
         "tao_gttol": 0.0,
         "tao_steptol": 0.0,
-        "tao_max_it": 200,
-        "tao_bnk_as_type": "none",
+        "tao_max_it": 5000 if kind in FIRST_ORDER else 200,
+        f"{prefix}pc_type": "icc" if ranks == 1 else "bjacobi",
+        f"{prefix}sub_pc_type": "icc",
     }
-    for prefix in ("", "tao_bnk_"):
-        options[f"{prefix}pc_type"] = "icc" if ranks == 1 else "bjacobi"
-        options[f"{prefix}sub_pc_type"] = "icc"
-    return options
 
 
 def check_tao(tao: Any, layers: OptionLayers) -> None:
@@ -73,6 +70,8 @@ def refuse_type(kind: str) -> None:
 class TaoDriver:
     """A TAO object bound to a scaled step; ``solver`` is the PETSc object."""
 
+    reasons = PETSc.TAO.Reason
+
     def __init__(self, scaled: ScaledStep, layers: OptionLayers, tao_type: str) -> None:
         self._scaled, self._layers = scaled, layers
         self._hessian = AssembledJacobian(scaled.system)
@@ -81,29 +80,26 @@ class TaoDriver:
         self.solver = PETSc.TAO().create(scaled.system.comm)
         self.solver.setOptionsPrefix(layers.prefix)
         self.solver.setType(tao_type)
-        self.solver.setObjectiveGradient(scaled.objective, G)
-        self.solver.setHessian(self._hessian.evaluate, self._hessian.mat)
+        self._test = Test(scaled)
+        self.solver.setObjectiveGradient(weakly(scaled.objective), G)
+        self.solver.setHessian(weakly(self._hessian.evaluate), self._hessian.mat)
         self.solver.setVariableBounds((self._vectors[2], self._vectors[3]))
         self.solver.setSolution(self._y)
-        self.solver.setConvergenceTest(Test(scaled))
+        self.solver.setConvergenceTest(weakly(self._test.reason))
         with layers.in_force():
             self.solver.setFromOptions()
             check_tao(self.solver, layers)
 
-    def run(self) -> tuple[Array, Array, int]:
-        """(y, F(y), iterations) of the scaled step; PETSc.Error or StepFailure when TAO does not converge."""
-        scaled = self._scaled
+    def run(self) -> tuple[Array, Array, int, int]:
+        """(y, F(y), PETSc's reason, iterations) of the scaled step."""
+        scaled, tao = self._scaled, self.solver
         self._hessian.rescale(scaled.x_ref / scaled.r_ref)
         self._y.array[:] = np.clip(scaled.start, scaled.lower, scaled.upper)
         write_bounds(scaled, self._vectors[2], self._vectors[3])
         with self._layers.in_force():
-            self.solver.solve(self._y)
-        reason, iterations = self.solver.getConvergedReason(), self.solver.getIterationNumber()
+            tao.solve(self._y)
         y = np.array(self._y.array_r)
-        F = scaled.residual(y)
-        if reason <= 0 and not scaled.accepts(y, F):
-            raise stopped(f"TAO {self.solver.getType()}", PETSc.TAO.Reason, reason, iterations, scaled.worst)
-        return y, F, iterations
+        return y, scaled.residual(y), tao.getConvergedReason(), tao.getIterationNumber()
 
     def destroy(self) -> None:
         """Free the PETSc objects; collective."""
@@ -117,7 +113,8 @@ class Test:
     def __init__(self, scaled: ScaledStep) -> None:
         self._scaled = scaled
 
-    def __call__(self, tao: Any) -> int | None:
+    def reason(self, tao: Any) -> int | None:
+        """PETSc's reason to stop, None to go on."""
         if tao.getConvergedReason():
             return None
         y = tao.getSolution().array_r
@@ -135,7 +132,7 @@ class TaoTron:
 
     def defaults(self, ranks: int) -> Options:
         """Options before the user's."""
-        return tao_options(ranks)
+        return tao_options(ranks, self.tao_type)
 
     def driver(self, scaled: ScaledStep, layers: OptionLayers) -> TaoDriver:
         """The TAO object."""
@@ -167,19 +164,16 @@ class Selected:
         if self.petsc_type not in SNES_TYPES:
             refuse_type(self.petsc_type)
 
-    @property
-    def _method(self) -> Any:
-        return SNES_TYPES.get(self.petsc_type, TaoTron)()
-
     def defaults(self, ranks: int) -> Options:
         """Options before the user's."""
-        options: Options = self._method.defaults(ranks)
-        return options
+        if self.petsc_type in SNES_TYPES:
+            return SNES_TYPES[self.petsc_type].defaults(ranks)
+        return tao_options(ranks, self.petsc_type)
 
-    def driver(self, scaled: ScaledStep, layers: OptionLayers) -> Any:
+    def driver(self, scaled: ScaledStep, layers: OptionLayers) -> SnesDriver | TaoDriver:
         """The SNES or TAO object."""
         if self.petsc_type in SNES_TYPES:
-            return self._method.driver(scaled, layers)
+            return SNES_TYPES[self.petsc_type].driver(scaled, layers)
         return TaoDriver(scaled, layers, self.petsc_type)
 
     def start(self, driver: Any, system: BoundedSystem, step: StepProblem) -> Array:
@@ -187,4 +181,7 @@ class Selected:
         return system.start(step)
 
 
-SNES_TYPES: Mapping[str, Any] = {"vinewtonrsls": ReducedNewton, "vinewtonssls": SemismoothNewton}
+SNES_TYPES: Mapping[str, ReducedNewton | SemismoothNewton] = {
+    "vinewtonrsls": ReducedNewton(),
+    "vinewtonssls": SemismoothNewton(),
+}
