@@ -139,33 +139,49 @@ def _snapped(directions: Array) -> Array:
     return np.asarray(snapped / np.linalg.norm(snapped, axis=1)[:, None])
 
 
+def _refuse_prescribed(nodes: _Nodes, directions: Array) -> None:
+    """InputError, on all ranks, for a node whose contact direction is partly prescribed."""
+    for slot in np.flatnonzero(np.any(nodes.held & (directions != 0.0), axis=1)):
+        at = ", ".join(f"{x:g}" for x in nodes.points[slot])
+        raise InputError(
+            f"contact node ({at}) is also prescribed along its contact direction: "
+            "free that component or leave the node out of the contact surface"
+        )
+
+
+def _block(frame: Array) -> tuple[int, Array]:
+    """(c, Q): a nodal frame with the contact direction in column c, so that component c becomes the normal unknown.
+
+    c is the direction's largest component. Axes at right angles to the direction keep their own columns: these are the
+    components that may be prescribed.
+    """
+    d = len(frame)
+    direction = frame[:, 0]
+    normal = int(np.argmax(np.abs(direction)))
+    others = [c for c in range(d) if c != normal]
+    block = np.empty((d, d))
+    block[:, normal] = direction
+    if np.count_nonzero(direction) == 1:
+        block[:, others] = np.eye(d)[:, others]
+    else:
+        others.sort(key=lambda c: abs(direction[c]))  # the first tangent is made of the axis least aligned
+        block[:, others] = frame[:, 1:]
+    return normal, block
+
+
 def _basis(space: FemSpace, nodes: _Nodes, directions: Array) -> tuple[Indices, Indices, Indices, PetscMatrix | None]:
     """(owned, slots, tangents, T): which unknowns of û are normal and tangential, and the matrix u = T û."""
     d = space.dimension
+    _refuse_prescribed(nodes, directions)
     frames = nodal_frames(directions)
-    main = np.argmax(np.abs(directions), axis=1)
     where = space._where(nodes.numbers)
     owned, slots, tangents, blocks = [], [], [], []
     for slot in np.flatnonzero(where >= 0):
-        normal = main[slot]
-        held = nodes.held[slot]
-        if np.any(held & (directions[slot] != 0.0)):
-            at = ", ".join(f"{x:g}" for x in nodes.points[slot])
-            raise InputError(
-                f"contact node ({at}) is also prescribed along its contact direction: "
-                "free that component or leave the node out of the contact surface"
-            )
-        others = [c for c in range(d) if c != normal]
-        block = np.empty((d, d))
-        block[:, normal] = frames[slot, :, 0]
-        if np.count_nonzero(directions[slot]) == 1:
-            block[:, others] = np.eye(d)[:, others]
-        else:
-            block[:, others] = frames[slot, :, 1:]
+        normal, block = _block(frames[slot])
         index = space.free_index[where[slot] * d + np.arange(d)]
         owned.append(index[normal])
         slots.append(slot)
-        tangents.append(index[others])
+        tangents.append(np.delete(index, normal))
         blocks.append((index, block))
     turned = any(not np.array_equal(block, np.eye(d)) for _, block in blocks)
     turned = bool(space.comm.max(np.array([float(turned)]))[0])
@@ -183,9 +199,9 @@ def _rotation(space: FemSpace, blocks: list[tuple[Indices, Array]]) -> PetscMatr
     plain = np.ones(rows, dtype=bool)
     for index, block in blocks:
         free = index >= 0
-        rotated = index[free]
-        plain[rotated] = False
-        T.setValues(start + rotated, start + rotated, np.ascontiguousarray(block[np.ix_(free, free)]))
+        plain[index[free]] = False
+        rotated = (start + index[free]).astype(PETSc.IntType)
+        T.setValues(rotated, rotated, np.ascontiguousarray(block[np.ix_(free, free)]))
     for row in np.flatnonzero(plain):
         T.setValue(start + row, start + row, 1.0)
     T.assemble()
