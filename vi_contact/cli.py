@@ -50,7 +50,7 @@ def add_wall_arguments(wall: argparse.ArgumentParser) -> None:
     shake.add_argument("--vertical", metavar="FILE", help="vertical record, beside --motion")
     shake.add_argument("--units", help="units of two-column files: m/s2, cm/s2, gal, g, ...")
     shake.add_argument("--scale", type=float, default=1.0, help="factor on the record, or on the harmonic's 1 m/s2")
-    shake.add_argument("--pga", type=float, metavar="A", help="scale the records to this peak [m/s2] instead")
+    shake.add_argument("--pga", type=float, metavar="A", help="scale to this peak [m/s2] instead: one factor, from the horizontal record, on both")
     shake.add_argument("--resample", type=float, metavar="DT", help="resample the records to this step [s], band-limited")
     step = wall.add_argument_group("step")
     step.add_argument(

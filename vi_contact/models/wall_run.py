@@ -12,7 +12,7 @@ from ..cross_check import CrossChecked
 from ..errors import InputError
 from ..excitation import Excitation, GroundMotion, Harmonic
 from ..fem.fields import XDMF
-from ..ground_motion import Record, read_record, resampled, scaled, scaled_to_pga
+from ..ground_motion import Record, pga, read_record, resampled, scaled, scaled_to_pga
 from ..impact import Inelastic
 from ..march import static_equilibrium
 from ..plotting import plot_certificate, plot_contact, plot_energy, plot_excitation, plot_points
@@ -90,7 +90,7 @@ class WallRun:
 
 def run_wall(run: WallRun, comm: Any, out: str | Path, *, progress: bool = True) -> Solution:
     """Builds the wall, marches, and writes the run folder ``out``; the solution's summary is for printing."""
-    horizontal, vertical = (_record(run, path) for path in (run.motion, run.vertical))
+    horizontal, vertical = _records(run)
     model = build(run.wall, comm, weight=run.gravity)
     excitation = _excitations(run, model, horizontal, vertical)
     dt = run.dt if run.dt is not None else model.time_step()
@@ -117,13 +117,17 @@ def run_wall(run: WallRun, comm: Any, out: str | Path, *, progress: bool = True)
     return solution
 
 
-def _record(run: WallRun, path: str | None) -> Record | None:
-    """The record of a file, in m/s², scaled and resampled as asked."""
-    if path is None:
-        return None
-    record = read_record(path, run.units)
-    record = scaled(record, factor=run.scale) if run.pga is None else scaled_to_pga(record, run.pga)
-    return record if run.resample is None else resampled(record, run.resample)
+def _records(run: WallRun) -> list[Record | None]:
+    """(horizontal, vertical) records in m/s², resampled and scaled as asked; both by the same factor, which brings the
+    first one that is given to the wanted peak."""
+    raw = [None if path is None else read_record(path, run.units) for path in (run.motion, run.vertical)]
+    if run.resample is not None:
+        raw = [None if one is None else resampled(one, run.resample) for one in raw]
+    first = next((one for one in raw if one is not None), None)
+    factor = run.scale
+    if run.pga is not None and first is not None:
+        factor = pga(scaled_to_pga(first, run.pga)) / pga(first)
+    return [None if one is None else scaled(one, factor=factor) for one in raw]
 
 
 def _excitations(
