@@ -140,7 +140,10 @@ class PreparedVolume:
             self.close()
             raise
         if reason <= 0 and not self._scaled.accepts(y, F):
-            raise stopped(self._name, self._driver.reasons, reason, iterations, self._scaled.worst)
+            failure = stopped(self._name, self._driver.reasons, reason, iterations, self._scaled.worst)
+            if np.isnan(self._scaled.worst):
+                self.close()  # VINEWTONSSLS leaves its own residual installed and would call itself without end
+            raise failure
         return self._result(y, F, iterations)
 
     def _result(self, y: Array, F: Array, iterations: int) -> StepResult:

@@ -7,15 +7,17 @@ as long as a solve runs and are taken out afterwards: two solvers with one prefi
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
 from petsc4py import PETSc
 
 from ..errors import InputError
+from .volume_reasons import last_line
 
 Options = Mapping[str, object | None]
+DIRECT = ("lu", "cholesky")
 
 
 class OptionLayers:
@@ -23,16 +25,30 @@ class OptionLayers:
 
     def __init__(self, prefix: str, defaults: Options, own: Options) -> None:
         self.prefix = prefix
-        self._values = {**defaults, **{key.lstrip("-"): value for key, value in own.items()}}
+        self._defaults, self._own = defaults, {key.lstrip("-"): value for key, value in own.items()}
+
+    def apply(self, solver: Any, check: Callable[[Any, OptionLayers], None]) -> None:
+        """Set up a SNES or TAO object from the options; InputError when PETSc or ``check`` does not take them."""
+        with self.in_force():
+            try:
+                solver.setFromOptions()
+            except PETSc.Error as error:
+                raise InputError(
+                    f"PETSc does not accept the options under {self.prefix} ({last_line(error)}): correct or drop them"
+                ) from error
+            check(solver, self)
 
     @contextmanager
     def in_force(self) -> Iterator[None]:
         """Set what the database does not already hold, and take it out at the end."""
         database = PETSc.Options()
-        added = [key for key in self._values if not database.hasName(self.prefix + key)]
+        values = {**self._defaults, **self._own}
+        pc = database.getString(self.prefix + "pc_type", str(values.get("pc_type", "")))
+        if pc not in DIRECT and "pc_factor_mat_solver_type" not in self._own:
+            values.pop("pc_factor_mat_solver_type", None)  # the default is for our own direct solver
+        added = [key for key in values if not database.hasName(self.prefix + key)]
         for key in added:
-            value = self._values[key]
-            database.setValue(self.prefix + key, "" if value is None else value)
+            database.setValue(self.prefix + key, "" if values[key] is None else values[key])
         try:
             yield
         finally:
@@ -55,7 +71,6 @@ REDUCED_PC = {
     "mg": f"{NEEDS_MODES}, so its grid transfers no longer fit",
     "fieldsplit": "its field numbers belong to the whole field and select wrong rows of the reduced matrix",
 }
-DIRECT = ("lu", "cholesky")
 SYMMETRIC_KSP = ("cg", "pipecg", "groppcg", "cgne", "cr", "minres", "symmlq", "nash", "stcg", "gltr", "chebyshev")
 
 

@@ -47,10 +47,13 @@ def stopped(method: str, reasons: type, reason: int, iterations: int, worst: flo
 
 
 def raised(method: str, error: Any) -> StepFailure:
-    """The failure of a PETSc call that raised. Of PETSc's trace the last line says what is wrong."""
-    lines = [line.split("] ", 1)[-1].strip() for line in str(error).splitlines()]
-    code = getattr(error, "ierr", "unknown")
+    """The failure of a PETSc call that raised."""
     return StepFailure(
-        f"{method} stopped with PETSc error {code} ({lines[-1] if lines else error}): "
+        f"{method} stopped with PETSc error {getattr(error, 'ierr', 'unknown')} ({last_line(error)}): "
         "check that A is positive definite and that load, guess and bound are finite, or try another method"
     )
+
+
+def last_line(error: Any) -> str:
+    """What is wrong, which PETSc tells at the end of its trace."""
+    return str(error).splitlines()[-1].split("] ", 1)[-1].strip()

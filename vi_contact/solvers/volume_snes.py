@@ -86,9 +86,7 @@ class SnesDriver:
             self.solver.ksp.setType("preonly")
             self.solver.ksp.pc.setType("python")
             self.solver.ksp.pc.setPythonContext(SimpleNamespace(apply=weakly(inverse.apply)))
-        with layers.in_force():
-            self.solver.setFromOptions()
-            check(self.solver, layers)
+        layers.apply(self.solver, check)
 
     def run(self) -> tuple[Array, Array, int, int]:
         """(y, F(y), PETSc's reason, iterations) of the scaled step."""

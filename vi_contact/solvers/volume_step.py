@@ -39,7 +39,7 @@ class ScaledStep:
         self.x_ref, self.r_ref = _power_of_two(max(z_max, bound_max)), _power_of_two(b_max)
         self.lower, self.upper = lower / self.x_ref, upper / self.x_ref
         self.start = start / self.x_ref
-        self._b_max, self._bound_max = b_max / self.r_ref, bound_max / self.x_ref
+        self._b_max = b_max / self.r_ref
         self._worst = np.inf
 
     def _along(self, b: Array, b_max: float) -> float:
@@ -89,7 +89,7 @@ class ScaledStep:
         size = self._norm * y_max * self.x_ref / self.r_ref + self._b_max
         return (
             _fraction(force_max, max(self._b_max, Ax_max)),
-            _fraction(gap_max, max(y_max, self._bound_max)),
+            _fraction(gap_max, y_max),
             _fraction(force_max, size),
         )
 

@@ -86,9 +86,7 @@ class TaoDriver:
         self.solver.setVariableBounds((self._vectors[2], self._vectors[3]))
         self.solver.setSolution(self._y)
         self.solver.setConvergenceTest(weakly(self._test.reason))
-        with layers.in_force():
-            self.solver.setFromOptions()
-            check_tao(self.solver, layers)
+        layers.apply(self.solver, check_tao)
 
     def run(self) -> tuple[Array, Array, int, int]:
         """(y, F(y), PETSc's reason, iterations) of the scaled step."""

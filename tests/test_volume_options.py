@@ -1,0 +1,301 @@
+"""The volume route as PETSc users meet it: options, refusals, failures in words, and nothing left behind."""
+
+from __future__ import annotations
+
+import gc
+import weakref
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+pytest.importorskip("petsc4py")
+
+from petsc4py import PETSc
+from volume_cases import Case, case, pushed_block
+
+from vi_contact.errors import InputError, StepFailure
+from vi_contact.friction import Coulomb, Frictionless
+from vi_contact.solvers.volume import OneFactorisation, ReducedNewton, Selected, SemismoothNewton, TaoBnls, TaoTron, Volume
+from vi_contact.verify import kkt_residual
+
+METHODS = (ReducedNewton(), OneFactorisation(), SemismoothNewton(), TaoTron(), TaoBnls())
+PREFIX = "vi_contact_volume_"
+
+
+@pytest.fixture(params=[pytest.param(False, marks=pytest.mark.serial, id="scipy"), pytest.param(True, id="petsc")])
+def pushed(request: pytest.FixtureRequest) -> Case:
+    if request.param:
+        pytest.importorskip("mpi4py")
+    return pushed_block(parallel=request.param)
+
+
+@pytest.fixture
+def database() -> Iterator[Any]:
+    """PETSc's options, as the command line fills them; restored afterwards."""
+    options = PETSc.Options()
+    before = options.getAll()
+    yield options
+    for key in set(options.getAll()) - set(before):
+        options.delValue(key)
+
+
+def prepare(c: Case, volume: Volume) -> Any:
+    return volume.prepare(c.step.A, c.step.surface, c.step.scale)
+
+
+def frictional(c: Case, friction: Any) -> Any:
+    """What check() looks at."""
+
+    class Problem:
+        pass
+
+    problem = Problem()
+    problem.friction = friction  # type: ignore[attr-defined]
+    return problem
+
+
+def test_friction_is_refused(pushed: Case) -> None:
+    Volume().check(frictional(pushed, Frictionless()))
+    with pytest.raises(InputError, match=r"would ignore Coulomb\(mu=0.3\).*condensed"):
+        Volume().check(frictional(pushed, Coulomb(mu=0.3)))
+
+
+@pytest.mark.parametrize("tolerance", [0.0, -1e-9, 1.0, float("nan")])
+@pytest.mark.serial
+def test_tolerance_must_be_a_relative_error(tolerance: float) -> None:
+    with pytest.raises(InputError, match="tolerance"):
+        Volume(tolerance=tolerance)
+
+
+@pytest.mark.parametrize(
+    ("petsc_type", "reason"),
+    [
+        ("bqpip", "reports garbage as converged"),
+        ("gpcg", "thousands of iterations"),
+        ("nls", "ignores bounds"),
+        ("lmvm", "ignores bounds"),
+        ("pounders", "another class of problem"),
+        ("asils", "SemismoothNewton"),
+        ("newtonls", "choose one of"),
+    ],
+)
+@pytest.mark.serial
+def test_unsound_types_are_refused_with_the_reason(petsc_type: str, reason: str) -> None:
+    """P18, solver notes 3c: bqpip returned a relative error of 5e10 as converged."""
+    with pytest.raises(InputError, match=reason):
+        Selected(petsc_type)
+
+
+REFUSED = [
+    (ReducedNewton(), {"pc_type": "gamg"}, "rigid modes"),
+    (ReducedNewton(), {"pc_type": "fieldsplit"}, "wrong rows"),
+    (ReducedNewton(), {"pc_type": "mg"}, "grid transfers"),
+    (ReducedNewton(), {"pc_type": "icc"}, "does not solve the system"),
+    (ReducedNewton(), {"pc_type": "nothere"}, "does not accept the options"),
+    (ReducedNewton(), {"snes_type": "newtonls"}, "set up for vinewtonrsls"),
+    (ReducedNewton(), {"snes_type": "vinewtonssls"}, "set up for vinewtonrsls"),
+    (OneFactorisation(), {"pc_type": "cholesky"}, "never assembled"),
+    (SemismoothNewton(), {"pc_type": "cholesky"}, "not symmetric"),
+    (SemismoothNewton(), {"ksp_type": "cg", "pc_type": "jacobi"}, "not symmetric"),
+    (SemismoothNewton(), {"pc_type": "ilu"}, "does not solve the system"),
+    (TaoTron(), {"pc_type": "gamg"}, "rigid modes"),
+    (TaoBnls(), {"tao_bnk_pc_type": "gamg"}, "rigid modes"),
+    (TaoTron(), {"tao_type": "bqpip"}, "garbage"),
+    (TaoTron(), {"tao_type": "lmvm"}, "ignores bounds"),
+]
+
+
+@pytest.mark.parametrize(("method", "options", "reason"), REFUSED)
+def test_unsound_options_are_refused(pushed: Case, method: Any, options: dict[str, str], reason: str) -> None:
+    """P5, P6, P8, P18."""
+    with pytest.raises(InputError, match=reason):
+        prepare(pushed, Volume(method=method, petsc_options=options))
+
+
+@pytest.mark.parametrize(("method", "options", "reason"), REFUSED[::4])
+def test_unsound_options_of_the_command_line_are_refused(
+    pushed: Case, database: Any, method: Any, options: dict[str, str], reason: str
+) -> None:
+    for key, value in options.items():
+        database[PREFIX + key] = value
+    with pytest.raises(InputError, match=reason):
+        prepare(pushed, Volume(method=method))
+
+
+@pytest.mark.parametrize("kind", ["cp", "none", "bt"])
+def test_line_searches(pushed: Case, kind: str) -> None:
+    """P20: PETSc before 3.23 forgets the bounds in the slope of `cp`."""
+    volume = Volume(method=ReducedNewton(), petsc_options={"snes_linesearch_type": kind})
+    if kind == "cp" and PETSc.Sys.getVersion() < (3, 23, 0):
+        with pytest.raises(InputError, match=r"before 3\.23"):
+            prepare(pushed, volume)
+    else:
+        assert kkt_residual(pushed.step, prepare(pushed, volume).solve(pushed.step)).worst <= 1e-9
+
+
+@pytest.mark.parametrize("pc", ["jacobi", "bjacobi", "hypre"])
+def test_iterative_linear_solver(pushed: Case, pc: str) -> None:
+    """Solver notes: hypre and block Jacobi survive changes of the active set."""
+    options = {"ksp_type": "cg", "pc_type": pc, "ksp_rtol": 1e-8}
+    prepared = prepare(pushed, Volume(method=ReducedNewton(), petsc_options=options))
+    assert kkt_residual(pushed.step, prepared.solve(pushed.step)).worst <= 1e-9
+    assert (prepared.snes.ksp.getType(), prepared.snes.ksp.pc.getType()) == ("cg", pc)
+
+
+@pytest.mark.parametrize("ksp", ["gmres", "cg"])
+def test_krylov_methods_on_the_one_factorisation(pushed: Case, ksp: str) -> None:
+    """The shell matrices multiply too, and their preconditioner is the exact inverse."""
+    prepared = prepare(pushed, Volume(petsc_options={"ksp_type": ksp, "ksp_rtol": 1e-12}))
+    assert kkt_residual(pushed.step, prepared.solve(pushed.step)).worst <= 1e-12
+    assert 0 < prepared.snes.getLinearSolveIterations() <= 2 * prepared.snes.getIterationNumber()
+
+
+def test_petsc_objects_are_reachable(pushed: Case) -> None:
+    for method in METHODS:
+        prepared = prepare(pushed, Volume(method=method))
+        result = prepared.solve(pushed.step)
+        solver = prepared.tao if prepared.snes is None else prepared.snes
+        assert solver.getIterationNumber() == result.iterations
+        assert solver.getOptionsPrefix() == PREFIX
+        prepared.close()
+        assert prepared.snes is None and prepared.tao is None
+
+
+def test_option_layers(pushed: Case, database: Any) -> None:
+    """Defaults, then the settings, then the command line; ours are gone from the database after every call."""
+    before = database.getAll()
+    assert prepare(pushed, Volume()).snes.getTolerances()[3] == 100
+    assert prepare(pushed, Volume(petsc_options={"-snes_max_it": 7})).snes.getTolerances()[3] == 7
+    database[PREFIX + "snes_max_it"] = 9
+    prepared = prepare(pushed, Volume(petsc_options={"snes_max_it": 7}))
+    assert prepared.snes.getTolerances()[3] == 9
+    prepared.solve(pushed.step)
+    assert database.getAll() == {**before, PREFIX + "snes_max_it": "9"}
+
+
+def test_prefix(pushed: Case, database: Any) -> None:
+    database["mine_snes_max_it"] = 9
+    assert prepare(pushed, Volume(prefix="mine_")).snes.getTolerances()[3] == 9
+    assert prepare(pushed, Volume()).snes.getTolerances()[3] == 100
+
+
+@pytest.mark.serial
+def test_monitor_option(capfd: pytest.CaptureFixture[str]) -> None:
+    c = pushed_block()
+    prepare(c, Volume(petsc_options={"snes_monitor": None})).solve(c.step)
+    assert "SNES Function norm" in capfd.readouterr().out
+
+
+@pytest.mark.parametrize("key", ["snes_rtol", "snes_atol"])
+def test_the_users_tolerance_stops_earlier(pushed: Case, key: str) -> None:
+    """A tolerance given by the user counts relative to |b|; the certificate then says what it cost."""
+    prepared = prepare(pushed, Volume(method=SemismoothNewton(), petsc_options={key: 1e-3}))
+    early = prepared.solve(pushed.step)
+    full = prepare(pushed, Volume(method=SemismoothNewton())).solve(pushed.step)
+    assert early.iterations < full.iterations
+    assert 1e-9 < kkt_residual(pushed.step, early).worst < 1e-2
+
+
+def test_tao_tolerance_of_the_user(pushed: Case) -> None:
+    early = prepare(pushed, Volume(method=TaoTron(), petsc_options={"tao_gatol": 1e-4})).solve(pushed.step)
+    full = prepare(pushed, Volume(method=TaoTron())).solve(pushed.step)
+    assert early.iterations < full.iterations
+
+
+@pytest.mark.parametrize("method", [ReducedNewton(), SemismoothNewton(), TaoTron(), TaoBnls()])
+def test_iteration_limit_is_a_failure_in_words(pushed: Case, method: Any) -> None:
+    """The text has PETSc's reason, iterations, residual and advice; the same solver can go on afterwards."""
+    volume = Volume(method=method, petsc_options={"snes_max_it": 1, "tao_max_it": 1})
+    prepared = prepare(pushed, volume)
+    with pytest.raises(StepFailure, match=rf"{type(method).__name__}\) stopped after 1 iterations with relative residual "
+                       r"\d.*DIVERGED_MAX_?ITS? \(the iteration limit was reached\): check that"):
+        prepared.solve(pushed.step)
+    away = replace(pushed.step, b=np.zeros_like(pushed.step.b))
+    assert prepared.solve(away).iterations == 0
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_nan_load_is_a_failure(pushed: Case, method: Any) -> None:
+    prepared = prepare(pushed, Volume(method=method))
+    with pytest.raises(StepFailure, match="not a number|Inf or NaN"):
+        prepared.solve(replace(pushed.step, b=pushed.step.b * np.nan))
+    assert kkt_residual(pushed.step, prepared.solve(pushed.step)).worst <= 1e-9
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_nan_bound_is_refused(pushed: Case, method: Any) -> None:
+    with pytest.raises(InputError, match="bound .* contains NaN"):
+        prepare(pushed, Volume(method=method)).solve(replace(pushed.step, bound=pushed.step.bound * np.nan))
+
+
+def test_petsc_errors_are_failures_and_leave_a_usable_solver(pushed: Case, database: Any) -> None:
+    prepared = prepare(pushed, Volume(method=ReducedNewton()))
+    database[PREFIX + "pc_factor_mat_solver_type"] = "nothere"
+    with pytest.raises(StepFailure, match="PETSc error 92 .*nothere"):
+        prepared.solve(pushed.step)
+    database.delValue(PREFIX + "pc_factor_mat_solver_type")
+    assert kkt_residual(pushed.step, prepared.solve(pushed.step)).worst <= 1e-9
+
+
+@pytest.mark.parametrize("method", [ReducedNewton(), SemismoothNewton(), TaoTron(), TaoBnls()])
+def test_a_body_that_flies_away_is_a_failure(method: Any) -> None:
+    """P11: a floating chain pulled off its wall has no equilibrium, and PETSc may report none of it as an error."""
+    n = 20
+    stiffness = sp.diags([-np.ones(n - 1), np.r_[1.0, 2.0 * np.ones(n - 2), 1.0], -np.ones(n - 1)], [-1, 0, 1]).tocsr()
+    load = np.zeros(n)
+    load[3] = -1.0
+    c = case(stiffness, np.array([n - 1]), load, np.array([0.1]), parallel=bool(pytest.importorskip("mpi4py")))
+    with pytest.raises(StepFailure, match="check that"):
+        prepare(c, Volume(method=method)).solve(c.step)
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("predicted", [True, False])
+def test_indefinite_matrix_on_the_one_factorisation(predicted: bool) -> None:
+    """A failure inside the preconditioner, before or within SNES, comes out as a StepFailure of ours."""
+    A = sp.csr_matrix(np.array([[1.0, 2.0, 0.1], [2.0, 1.0, 0.1], [0.1, 0.1, 1.0]]))
+    c = case(A, np.array([0, 1]), np.array([4.0, 4.0, 1.0]), np.array([1.0, 1.0]))
+    with pytest.raises(StepFailure, match="not positive definite"):
+        prepare(c, Volume()).solve(replace(c.step, active=np.array([predicted, predicted])))
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_solvers_are_freed(pushed: Case, method: Any) -> None:
+    """Dropped solvers are gone at the next prepare, without help of the cycle collector; closed ones at once."""
+    gc.collect()
+    gc.disable()
+    try:
+        volume = Volume(method=method)
+        alive = []
+        for closed in (False, True):
+            prepared = prepare(pushed, volume)
+            prepared.solve(pushed.step)
+            alive.append(weakref.ref(prepared._scaled))
+            if closed:
+                prepared.close()
+            del prepared
+        prepare(pushed, volume)
+        assert [reference() for reference in alive] == [None, None]
+    finally:
+        gc.enable()
+
+
+def test_a_closed_solver_opens_again(pushed: Case) -> None:
+    for method in METHODS:
+        prepared = prepare(pushed, Volume(method=method))
+        first = prepared.solve(pushed.step)
+        prepared.close()
+        assert np.array_equal(prepared.solve(pushed.step).x, first.x)
+
+
+def test_methods_do_not_disturb_the_matrix(pushed: Case) -> None:
+    """P8: VINEWTONSSLS overwrites its Jacobian; A must not be it."""
+    x = np.arange(1.0, 1.0 + len(pushed.step.b))
+    before = pushed.step.A @ x
+    for method in METHODS:
+        prepare(pushed, Volume(method=method)).solve(pushed.step)
+        assert np.array_equal(pushed.step.A @ x, before)
