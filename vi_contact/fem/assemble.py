@@ -1,6 +1,6 @@
 """Assembles the semi-discrete system of a linear elastic body: M u'' + C u' + K u = f(t) (seed 000 eqs. 7-10a).
 
-    sigma = lambda_eff tr(eps) I + 2 mu eps,   M = ∫ rho u·v,   K = ∫ sigma(u):eps(v),   C = alpha M + beta K (per material)
+    sigma = lambda_eff tr(eps) I + 2 mu eps,   M = ∫ rho u·v,   K = ∫ sigma(u):eps(v),   C = alpha M + beta K
 
 integrated over the mesh times the section's thickness. Prescribed displacements are eliminated: u = P u_free + U(t),
 so M, C, K are Pᵀ(·)P and the load gets -Pᵀ(K U + C U' + M U'').
@@ -128,9 +128,11 @@ def cell_materials(mesh: Any, material: Materials) -> list[tuple[Any, LinearElas
     covered = np.zeros(count, dtype=bool)
     for cells, _ in material:
         covered[cells.indices] = True
-    missing = mesh.comm.allreduce(int((~covered).sum()))
+    missing = mesh.comm.allreduce(int((~covered[: cell_map.size_local]).sum()))
     if missing:
-        raise InputError(f"{missing} cells have no material: give a (cells, material) pair for every cell group of the mesh")
+        raise InputError(
+            f"{missing} cells have no material: give a (cells, material) pair for every cell group of the mesh"
+        )
     return [(cells.indices, one) for cells, one in material]
 
 
@@ -143,9 +145,9 @@ def assemble_loads(space: FemSpace, section: Section, loads: tuple[Any, ...], fu
         integrate = _integrator(space, section, load)
         name = type(load).__name__
         if load.history is not None:
-            separable.append((integrate(evaluate(name, load.value, space.points, 0.0)), load.history))
+            separable.append((integrate(evaluate(name, load.value, space.points, 0.0, space.comm)), load.history))
         elif is_constant(load):
-            constant += integrate(evaluate(name, load.value, space.points, 0.0))
+            constant += integrate(evaluate(name, load.value, space.points, 0.0, space.comm))
         else:
             general.append(_field_load(space, name, load.value, integrate))
     if any(condition.moves for condition in space.prescribed):
@@ -153,8 +155,10 @@ def assemble_loads(space: FemSpace, section: Section, loads: tuple[Any, ...], fu
     return Load(constant, tuple(separable), tuple(general))
 
 
-def _field_load(space: FemSpace, name: str, value: Any, integrate: Callable[[Array], Array]) -> Callable[[float], Array]:
-    return lambda t: integrate(evaluate(name, value, space.points, t))
+def _field_load(
+    space: FemSpace, name: str, value: Any, integrate: Callable[[Array], Array]
+) -> Callable[[float], Array]:
+    return lambda t: integrate(evaluate(name, value, space.points, t, space.comm))
 
 
 def _integrator(space: FemSpace, section: Section, load: Traction | BodyForce) -> Callable[[Array], Array]:
@@ -194,14 +198,15 @@ def _initial(space: FemSpace, name: str, value: Initial) -> Array:
     """Initial values on the free unknowns."""
     if value is None:
         return np.zeros(len(space.ids))
-    values = value(space.points) if callable(value) else np.tile(np.asarray(value, dtype=float), (len(space.points), 1))
-    return space.restrict(evaluate(name, lambda points, t: values, space.points, 0.0))
+    field: Any = (lambda points, t: value(points)) if callable(value) else value
+    return space.restrict(evaluate(name, field, space.points, 0.0, space.comm))
 
 
 def floats(space: FemSpace) -> bool:
     """Whether a rigid motion of the whole body leaves every prescribed component at rest.
 
-    The Gram matrix of the rigid modes on the prescribed components is singular exactly then (scaled by the body's size).
+    The Gram matrix of the rigid modes on the prescribed components is singular exactly then (scaled by the body's
+    size).
     """
     d = space.dimension
     middle = space.comm.sum(np.append(space.points.sum(axis=0), len(space.points)))

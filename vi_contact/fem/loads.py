@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..algebra import Array
+from ..algebra import Array, Comm
 from ..errors import InputError
 from .mesh import Facets
 
@@ -20,19 +20,29 @@ Field = Callable[[Array, float], Array]
 Value = tuple[float, ...] | Field
 
 
-def evaluate(name: str, value: Value, points: Array, t: float) -> Array:
-    """The value at the points, shape (k, d); InputError for NaN or a wrong shape."""
-    if callable(value):
+def evaluate(name: str, value: Value, points: Array, t: float, comm: Comm) -> Array:
+    """The value at this rank's points, shape (k, d); collective. InputError, on all ranks, for NaN or a wrong shape."""
+    if len(points) == 0:
+        result = np.zeros_like(points)  # users' functions need not cope with no points
+    elif callable(value):
         result = np.asarray(value(points, t), dtype=float)
     else:
         result = np.tile(np.asarray(value, dtype=float), (len(points), 1))
-    if result.shape != points.shape:
-        raise InputError(
-            f"{name} returned shape {result.shape} for {len(points)} points: return {points.shape[1]} components per point"
-        )
-    if not np.all(np.isfinite(result)):
-        raise InputError(f"{name} contains NaN or infinite values at t = {t:g} s: check its function or data")
+    defect = _defect(name, result, points, t)
+    if comm.max(np.array([float(bool(defect))]))[0]:
+        defects = comm.bcast(comm.gather(defect))
+        raise InputError(next(text for text in defects if text))
     return result
+
+
+def _defect(name: str, result: Array, points: Array, t: float) -> str:
+    """What is wrong with values at points, or nothing."""
+    if result.shape != points.shape:
+        shape = f"shape {result.shape} for {len(points)} points"
+        return f"{name} returned {shape}: return {points.shape[1]} components per point"
+    if not np.all(np.isfinite(result)):
+        return f"{name} contains NaN or infinite values at t = {t:g} s: check its function or data"
+    return ""
 
 
 def _zero(points: Array, t: float) -> Array:

@@ -41,10 +41,13 @@ class FemSpace:
         self.points = self.all_points[:owned]
         self.size = self._size()
         self.prescribed = prescribed
+        self._where_held = [
+            (self.facet_blocks(condition.facets.indices)[:, None], self._components(condition))
+            for condition in prescribed
+        ]
         self.held = np.zeros((owned, self.dimension), dtype=bool)
-        for condition in prescribed:
-            blocks = self.facet_blocks(condition.facets.indices)
-            self.held[blocks[:, None], self._components(condition)] = True
+        for entries in self._where_held:
+            self.held[entries] = True
         self.free: Mask = ~self.held.ravel()
         ids = self.nodes[:, None] * self.dimension + np.arange(self.dimension)
         self.ids: Indices = ids.ravel()[self.free]
@@ -63,7 +66,9 @@ class FemSpace:
         components = range(self.dimension) if condition.components is None else condition.components
         for c in components:
             if not 0 <= c < self.dimension:
-                raise InputError(f"prescribed component {c} does not exist: give numbers from 0 to {self.dimension - 1}")
+                raise InputError(
+                    f"prescribed component {c} does not exist: give numbers from 0 to {self.dimension - 1}"
+                )
         return list(components)
 
     def facet_blocks(self, facets: Any) -> Indices:
@@ -85,15 +90,18 @@ class FemSpace:
     # Vectors ---------------------------------------------------------------------------------------------------------
 
     def prescribed_values(self, t: float, derivative: int = 0) -> Array:
-        """Full owned vector of U(x, t) or its time derivative; zero on free components."""
+        """Full owned vector of U(x, t) or its time derivative; zero on free components.
+
+        Where conditions meet, the later one counts.
+        """
         values = np.zeros((len(self.nodes), self.dimension))
-        for condition in self.prescribed:
+        for condition, (blocks, components) in zip(self.prescribed, self._where_held, strict=True):
+            values[blocks, components] = 0.0
             if condition.moves:
-                blocks = self.facet_blocks(condition.facets.indices)
                 name = f"prescribed motion on '{condition.facets.name}'"
-                motion = evaluate(name, condition.motions[derivative], self.points[blocks], t)
-                for c in self._components(condition):
-                    values[blocks, c] = motion[:, c]
+                points = self.points[blocks[:, 0]]
+                motion = evaluate(name, condition.motions[derivative], points, t, self.comm)
+                values[blocks, components] = motion[:, components]
         return values.ravel()
 
     def expand(self, u: Array, t: float, derivative: int = 0) -> Array:

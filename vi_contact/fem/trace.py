@@ -121,12 +121,15 @@ def _listed(space: FemSpace, nodes: _Nodes, points: Sequence[Sequence[float]], n
         where = ", ".join(f"{c:g}" for c in x)
         if distance[row] > 0.05 * space.size:
             raise InputError(
-                f"contact point ({where}) is {distance[row]:.3g} m away from boundary group '{name}': give a point on it"
+                f"contact point ({where}) is {distance[row]:.3g} m away from boundary group '{name}': "
+                "give a point on it"
             )
         if nodes.held[row].all():
             raise InputError(f"contact point ({where}) is also clamped: leave it out, or clamp less")
         if row in rows:
-            raise InputError(f"contact point ({where}) is listed twice (nearest node {nodes.numbers[row]}): list each once")
+            raise InputError(
+                f"contact point ({where}) is listed twice (nearest node {nodes.numbers[row]}): list each once"
+            )
         rows.append(row)
     if not rows:
         raise InputError(f"no contact nodes: the list of contact points on '{name}' is empty")
