@@ -1,14 +1,15 @@
 """Finite element problems that several tests share, small enough for any number of ranks.
 
-Everything here takes the communicator, so that a test can solve the same problem on all ranks together (COMM_WORLD) and on
-each rank alone (COMM_SELF) and compare. Fields and matrices come back in the numbering of the mesh's input, equal on all ranks.
+Everything here takes the communicator, so that a test can solve the same problem on all ranks together (COMM_WORLD)
+and on each rank alone (COMM_SELF) and compare. Fields and matrices come back in the numbering of the mesh's input,
+equal on all ranks.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import cos, pi, sin, sqrt
+from math import cos, sin, sqrt
 from typing import Any
 
 import numpy as np
@@ -94,7 +95,7 @@ def run(
     problem: ContactProblem, *, dt: float, steps: int, scheme: Scheme | None = None, solver: Solver | None = None,
     state: State | None = None, nodes: Array | None = None,
 ) -> Run:
-    """March and keep Cartesian displacements of the nodes (all by default), reactions and contact sets of every step."""
+    """March, keeping Cartesian displacements of nodes (all by default), reactions and contact sets of every step."""
     system = problem.system
     if nodes is None:
         nodes = np.arange(len(field(system, system.u0)[0]))
@@ -134,7 +135,9 @@ def shaken_wall(
 WALL_DT = 1.0 / (40.0 * 14.0)
 
 
-def thrown_box(comm: Any, *, simplices: bool = False, angle: float = 0.0, divisions: tuple[int, ...] = (3, 2, 3)) -> ContactProblem:
+def thrown_box(
+    comm: Any, *, simplices: bool = False, angle: float = 0.0, divisions: tuple[int, ...] = (3, 2, 3)
+) -> ContactProblem:
     """A soft box in three dimensions, thrown obliquely onto a plane that may be inclined about the z axis."""
     material = LinearElastic(E=1.0e6, nu=0.3, rho=1000.0)
     mesh, tags = block(comm, lengths=(1.5, 1.0, 1.2), divisions=divisions, simplices=simplices, angle=angle)
@@ -151,12 +154,14 @@ def thrown_box(comm: Any, *, simplices: bool = False, angle: float = 0.0, divisi
 BOX_DT = 1.0e-3
 
 
-def held_by(tags: Any, name: str, motion: Callable[[Array], Array], components: tuple[int, ...] | None = None) -> Prescribed:
-    """A displacement constant in time on a named boundary."""
-    return Prescribed(tags[name], displacement=lambda x, t: motion(x), components=components)
+def held_by(tags: Any, name: str, motion: Callable[[Array], Array], *components: int) -> Prescribed:
+    """A displacement constant in time on a named boundary, in all components or in the given ones."""
+    return Prescribed(tags[name], displacement=lambda x, t: motion(x), components=components or None)
 
 
-def signorini_field(points: Array, *, x0: float = 1.0 / 7.0, shear: float = 0.4, nu: float = 0.3, a: float = 1.0) -> Array:
+def signorini_field(
+    points: Array, *, x0: float = 1.0 / 7.0, shear: float = 0.4, nu: float = 0.3, a: float = 1.0
+) -> Array:
     """Displacement (k, 2) of V2.2: plane strain, body y > 0, contact on y = 0 for x < x0, open for x > x0.
 
     With p + iq = √z, z = x - x0 + iy: Z = ia√z, Z~ = (2/3) ia z√z, 2 mu u_x = ½(kappa - 1) Re Z~ - y Im Z and

@@ -1,7 +1,7 @@
 """V4: the wall of seed 000 (first example, Figs. 2-5) against the reference numbers and the statements of its figures.
 
-Reference (REF): an independent script, Q1 8 x 12, consistent mass, mid-step load; displacements printed to 1e-11 m in rows
-and 1e-9 m in minima and maxima. Every number is compared at its printed precision.
+Reference (REF): an independent script, Q1 8 x 12, consistent mass, mid-step load; displacements printed to 1e-11 m in
+rows and 1e-9 m in minima and maxima. Every number is compared at its printed precision.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 from fem_problems import dense, spread
+from mpi4py import MPI
 
 from vi_contact.algebra import Array, Mask
 from vi_contact.cross_check import cross_check
@@ -31,7 +31,7 @@ from vi_contact.verify import energy_balance
 POINTS = (12, 6, 7, 26)  # columns of the reference table: top of the contact side, two of its points, the opposite side
 ROWS = (10, 20, 40, 100, 200, 400)
 SCHEME = ZienkiewiczWoodTaylor(phi=0.5)
-one_rank = pytest.mark.serial  # whole marches, slow on several ranks; the last test of this file shows that ranks do not matter
+one_rank = pytest.mark.serial  # whole marches, slow on several ranks; the last test here shows that these do not matter
 
 
 @dataclass(frozen=True)
@@ -218,7 +218,7 @@ def sweeps(D: Array, z: Array, v: Array) -> tuple[Array, int]:
 @one_rank
 @pytest.mark.parametrize("case, mean", [("a", 5.7), ("b", 20.7)])
 def test_v4_1_sweeps_of_the_seeds_own_method(case, mean):
-    """Projected Gauss-Seidel on D~, z~ from the last displacements gives the same u_N, in 5.7 or 20.7 sweeps in the mean.
+    """Projected Gauss-Seidel on D~, z~ from the last displacements gives the same u_N, in 5.7 or 20.7 sweeps (mean).
 
     REF does not say what the change of a sweep was compared with; other sensible choices move the mean by up to 1.2 in
     case b (and by 0.2 in case a). Half a sweep is allowed here: found are 5.69 and 21.16.
@@ -251,7 +251,7 @@ def test_statement_8_hildreth_needs_few_sweeps(case, primal):
 
 @pytest.mark.parametrize("case", ["a", "b"])
 def test_v4_0_condensed_matrix_is_the_schur_complement(case):
-    """D~ = K_cc - K_ci K_ii^-1 K_ic of the dense effective matrix, symmetric to 1e-12, positive definite; G is its inverse.
+    """D~ = K_cc - K_ci K_ii^-1 K_ic of the dense effective matrix, symmetric to 1e-12 and positive definite.
 
     And z~ = F_c - K_ci K_ii^-1 F_i is what the unconstrained solution gives, D~ (A^-1 F)_c.
     """
@@ -307,7 +307,7 @@ def test_statement_2_contact_points_never_penetrate(case):
 
 
 def test_statements_3_and_4_cases_differ():
-    """Case b: the whole side is one-sided, point 26 moves to +9. Peaks to the right: 22.4 against 0; to the left alike."""
+    """Case b: the whole side is one-sided, point 26 moves to +9. Peaks to the right: 22.4 against 0; left: alike."""
     a, b = history("a").u * 1e6, history("b").u * 1e6
     assert history("b").contact.max(axis=0).tolist() == [0.0] * 11
     assert b[:, 3].max() > 9.0
@@ -380,8 +380,8 @@ def test_other_discretisations(case, other):
 def test_other_discretisations_of_isolated_contact_points(other):
     """Case a: minima within 10 % of the largest displacement, on the finer meshes.
 
-    A point contact has no limit in two dimensions (its compliance grows with log 1/h, the mass that a reset stops shrinks
-    with h²), so case a belongs to its mesh: triangles of the coarse mesh are off by 17 %, maxima by up to 14 %.
+    A point contact has no limit in two dimensions (its compliance grows with log 1/h, the mass that a reset stops
+    shrinks with h²), so case a belongs to its mesh: triangles of the coarse mesh are off by 17 %, maxima by up to 14 %.
     """
     found, base = history("a", wall=OTHER[other]).u, history("a").u
     assert np.all(np.abs(found.min(axis=0) - base.min(axis=0)) < 0.1 * np.abs(base).max(axis=0))
