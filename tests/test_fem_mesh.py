@@ -75,6 +75,23 @@ def test_nodes_keep_their_input_numbers(script, comm):
     assert np.array_equal(np.sort(np.concatenate(comm.allgather(owned))), np.arange(len(points)))
 
 
+def test_a_mesh_is_distributed_and_numbered_the_same_every_time(comm):
+    script = BlockMesh(lengths=(1.0, 2.0), divisions=(13, 17), simplices=True)
+    (one, tags), (two, again) = fem.build_mesh(script, comm), fem.build_mesh(script, comm)
+    assert np.array_equal(fem.node_numbers(one), fem.node_numbers(two))
+    assert np.array_equal(compat.geometry_dofmap(one), compat.geometry_dofmap(two))
+    assert all(np.array_equal(tags[name].indices, again[name].indices) for name in tags)
+    shares = comm.allgather(one.topology.index_map(2).size_local)
+    assert max(shares) - min(shares) <= 2
+
+
+def test_there_may_be_more_ranks_than_cells(comm):
+    """A rank without cells takes part in everything."""
+    mesh, tags = fem.build_mesh(BlockMesh(), comm)
+    assert sizes(tags) == {"block": 1.0, "left": 1.0, "right": 1.0, "bottom": 1.0, "top": 1.0}
+    assert comm.allreduce(len(compat.dof_to_node(compat.vector_space(mesh)))) == 4
+
+
 # Files ----------------------------------------------------------------------------------------------------------------
 
 

@@ -1,9 +1,9 @@
 """DOLFINx differs from version to version; every difference this package meets is settled here and nowhere else.
 
 Supported: 0.5 (Debian 12), 0.9 (Debian 13) and 0.11. Nothing else in `fem` asks for the version. What changed:
-dofmaps became two-dimensional arrays and the ghost mode moved into the partitioner (0.6), UFL elements became Basix
-elements and function spaces take tuples (0.7), `create_mesh` swapped two arguments (0.10), the partitioner counts the
-cells of a facet and the geometry has one dofmap per cell type (0.11).
+dofmaps became two-dimensional arrays and the ghost mode went to the partitioner (0.6), UFL elements became Basix
+elements and function spaces take tuples (0.7), `create_mesh` swapped two arguments (0.10), the geometry has one dofmap
+per cell type (0.11).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import ufl
 from dolfinx.fem import petsc as fem_petsc
-from dolfinx.mesh import GhostMode, Mesh, create_cell_partitioner, meshtags
+from dolfinx.mesh import GhostMode, Mesh, meshtags
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -28,30 +28,38 @@ VERSION: tuple[int, ...] = tuple(int(part) for part in dolfinx.__version__.split
 """DOLFINx's (major, minor)."""
 
 _BASIX_ELEMENTS = VERSION >= (0, 7)
-_COUNTED_FACETS = VERSION >= (0, 10)
 _DOFMAP_PER_CELL_TYPE = VERSION >= (0, 11)
 
 
 # Meshes ---------------------------------------------------------------------------------------------------------------
 
 
-def create_mesh(comm: MPI.Comm, cell: str, cells: npt.NDArray[np.int64], x: npt.NDArray[np.float64]) -> Mesh:
-    """A first-order mesh, distributed by the default graph partitioner (fixed seed), ghosted over shared facets.
+def create_mesh(
+    comm: MPI.Comm,
+    cell: str,
+    cells: npt.NDArray[np.int64],
+    x: npt.NDArray[np.float64],
+    destinations: tuple[Indices, Indices],
+) -> Mesh:
+    """A first-order mesh, distributed as told.
 
-    `cell` is a UFL name ("interval", "triangle", "quadrilateral", "tetrahedron", "hexahedron"). `cells` (n_cells,
-    n_vertices) holds rows of `x` in DOLFINx's (tensor-product) vertex order, `x` (n_points, gdim) the points [m]. A
-    rank without input passes arrays of the right width and no rows. Collective.
+    `cell` is a UFL name ("interval", "triangle", "quadrilateral", "tetrahedron", "hexahedron"). `cells`
+    (n_cells, n_vertices) holds rows of `x` in DOLFINx's (tensor-product) vertex order, `x` (n_points, gdim) the points
+    [m], `destinations` the ranks each cell goes to, its owner first, and the offsets of the cells in that list. A rank
+    without input passes arrays of the right width and no rows. Collective.
     """
+
+    def told(*_: Any) -> Any:  # the arguments of a partitioner changed twice, what it returns did not
+        return dolfinx.cpp.graph.AdjacencyList_int32(*destinations)
+
     gdim = x.shape[1]
     if _BASIX_ELEMENTS:
         import basix.ufl
 
-        cells_per_facet = (2,) if _COUNTED_FACETS else ()
-        partitioner = create_cell_partitioner(GhostMode.shared_facet, *cells_per_facet)
         domain = ufl.Mesh(basix.ufl.element("Lagrange", cell, 1, shape=(gdim,)))
-        return _mesh.create_mesh(comm, cells=cells, x=x, e=domain, partitioner=partitioner)
+        return _mesh.create_mesh(comm, cells=cells, x=x, e=domain, partitioner=told)
     domain = ufl.Mesh(ufl.VectorElement("Lagrange", ufl.Cell(cell, geometric_dimension=gdim), 1))
-    return _mesh.create_mesh(comm, cells, x, domain, ghost_mode=GhostMode.shared_facet)
+    return _mesh.create_mesh(comm, cells, x, domain, ghost_mode=GhostMode.shared_facet, partitioner=told)
 
 
 def geometry_dofmap(mesh: Mesh) -> Indices:
@@ -63,10 +71,13 @@ def geometry_dofmap(mesh: Mesh) -> Indices:
 
 def entities_to_geometry(mesh: Mesh, dim: int, entities: Indices) -> Indices:
     """Local geometry nodes of each given entity, (n_entities, n_vertices). Builds connectivity: collective."""
-    tdim = mesh.topology.dim
+    tdim, cell = mesh.topology.dim, mesh.topology.cell_type
     mesh.topology.create_entities(dim)
     mesh.topology.create_connectivity(dim, tdim)
     mesh.topology.create_connectivity(tdim, dim)
+    if not len(entities):  # 0.9 divides by their number
+        entity = dolfinx.cpp.mesh.cell_entity_type(cell, dim, 0)
+        return np.empty((0, dolfinx.cpp.mesh.cell_num_vertices(entity)), dtype=np.int32)
     if _BASIX_ELEMENTS:
         return _mesh.entities_to_geometry(mesh, dim, entities)
     return dolfinx.cpp.mesh.entities_to_geometry(mesh._mesh, dim, entities, False)

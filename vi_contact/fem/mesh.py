@@ -20,12 +20,16 @@ from mpi4py import MPI
 from vi_contact.errors import InputError
 from vi_contact.fem import compat
 from vi_contact.fem.compat import Indices
-from vi_contact.meshes.checks import contains
 from vi_contact.meshes.extract import MeshArrays, arrays_from_file, arrays_from_script
 from vi_contact.meshes.gmsh_session import MeshScript
+from vi_contact.meshes.partition import destinations
+from vi_contact.meshes.rows import found_in, number_alike
 
 _TENSOR_ORDER = {"quadrilateral": [0, 1, 3, 2], "hexahedron": [0, 1, 3, 2, 4, 5, 7, 6]}
 """DOLFINx's vertices in Gmsh's numbering, where the two differ."""
+
+_NOWHERE = (np.zeros(0, dtype=np.int32), np.zeros(1, dtype=np.int32))
+"""Destinations of no cells."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,14 +87,15 @@ def node_numbers(mesh: Mesh) -> npt.NDArray[np.int64]:
 def _distribute(comm: MPI.Comm, produce: Callable[[], MeshArrays]) -> tuple[Mesh, Tags]:
     arrays = _on_root(comm, produce)
     vertices = arrays.cells[:, _TENSOR_ORDER.get(arrays.cell, slice(None))]
-    mesh = compat.create_mesh(comm, arrays.cell, vertices, arrays.points)
+    where = destinations(arrays.points, arrays.cells, arrays.cell, comm.size) if comm.rank == 0 else _NOWHERE
+    mesh = compat.create_mesh(comm, arrays.cell, vertices, arrays.points, where)
     tags = Tags()
     original = np.asarray(mesh.topology.original_cell_index, dtype=np.int64)
     for name, mask in arrays.cell_groups.items():
         tags[name] = Cells(name, np.flatnonzero(mask[original]).astype(np.int32), mesh)
-    facets = _facet_vertices(mesh)
-    for name, rows in arrays.facet_groups.items():
-        tags[name] = Facets(name, np.flatnonzero(contains(rows, facets)).astype(np.int32), mesh)
+    facets, *named = number_alike(_facet_vertices(mesh), *arrays.facet_groups.values())
+    for name, numbers in zip(arrays.facet_groups, named, strict=True):
+        tags[name] = Facets(name, np.flatnonzero(found_in(facets, numbers)).astype(np.int32), mesh)
     return mesh, tags
 
 

@@ -11,10 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from vi_contact.errors import InputError
+from vi_contact.meshes.rows import Rows, cell_sides, found_in, number_alike
 
 Array = npt.NDArray[np.float64]
-Rows = npt.NDArray[np.int64]
-
 _ROUND_OFF = 1024 * np.finfo(float).eps
 
 _CORNERS: dict[str, list[tuple[int, ...]]] = {  # a vertex and its d neighbours, right-handed in an unturned cell
@@ -27,13 +26,6 @@ _CORNERS: dict[str, list[tuple[int, ...]]] = {  # a vertex and its d neighbours,
         (4, 7, 5, 0), (5, 4, 6, 1), (6, 5, 7, 2), (7, 6, 4, 3),
     ],
 }  # fmt: skip
-_SIDES: dict[str, list[tuple[int, ...]]] = {
-    "interval": [(0,), (1,)],
-    "triangle": [(0, 1), (1, 2), (2, 0)],
-    "quadrilateral": [(0, 1), (1, 2), (2, 3), (3, 0)],
-    "tetrahedron": [(0, 1, 2), (0, 1, 3), (0, 2, 3), (1, 2, 3)],
-    "hexahedron": [(0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)],
-}
 
 
 def check_cells(points: Array, cells: Rows, cell: str, source: str) -> None:
@@ -55,21 +47,11 @@ def check_cells(points: Array, cells: Rows, cell: str, source: str) -> None:
 
 def check_folds(points: Array, cells: Rows, cell: str, source: str) -> None:
     """Raise InputError where three cells share a facet or two neighbours lie on the same side of theirs."""
-    d = points.shape[1]
-    sides = cell_sides(cells, cell)
-    owner = np.arange(len(sides)) // len(_SIDES[cell])
-    _, number, count = np.unique(sides, axis=0, return_inverse=True, return_counts=True)
-    number = number.reshape(-1)
-    x = points[sides[:, :d]]
-    if d == 1:
-        normal = np.ones((len(sides), 1))
-    elif d == 2:
-        normal = np.stack([x[:, 1, 1] - x[:, 0, 1], x[:, 0, 0] - x[:, 1, 0]], axis=1)
-    else:
-        normal = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
-    centre = points[cells].mean(axis=1)
-    height = ((centre[owner] - x[:, 0]) * normal).sum(axis=1)
-    balance = np.bincount(number, weights=np.sign(height))
+    sides, owner = cell_sides(cells, cell)
+    (number,) = number_alike(sides)
+    x = points[sides[:, : points.shape[1]]]
+    height = ((points[cells].mean(axis=1)[owner] - x[:, 0]) * _normals(x)).sum(axis=1)
+    count, balance = np.bincount(number), np.bincount(number, weights=np.sign(height))
     wrong = (count > 2) | ((count == 2) & (balance != 0.0))
     bad = np.zeros(len(cells), dtype=bool)
     bad[owner[wrong[number]]] = True
@@ -80,31 +62,27 @@ def check_folds(points: Array, cells: Rows, cell: str, source: str) -> None:
         )
 
 
-def check_sides(rows: Rows, cells: Rows, cell: str, what: str) -> None:
-    """Raise InputError if one of the facets, given as rows of points, is no side of a cell."""
-    if not len(rows):
-        return
-    missing = ~contains(cell_sides(cells, cell), rows)
-    if missing.any():
-        are = "is" if missing.sum() == 1 else "are"
-        raise InputError(
-            f"{what} has {_count(missing, 'facet')} that {are} no side of a cell: remove duplicate nodes, and curves or"
-            " surfaces that do not bound the named cells"
-        )
+def check_sides(groups: dict[str, Rows], cells: Rows, cell: str, source: str) -> None:
+    """Raise InputError if a facet of a group, given as rows of points, is no side of a cell."""
+    sides, *named = number_alike(cell_sides(cells, cell)[0], *groups.values())
+    for name, numbers in zip(groups, named, strict=True):
+        missing = ~found_in(numbers, sides)
+        if missing.any():
+            are = "is" if missing.sum() == 1 else "are"
+            raise InputError(
+                f"boundary group '{name}' of {source} has {_count(missing, 'facet')} that {are} no side of a cell:"
+                " remove duplicate nodes, and curves or surfaces that do not bound the named cells"
+            )
 
 
-def cell_sides(cells: Rows, cell: str) -> Rows:
-    """Sides of all cells, cell by cell, vertices of each ascending, (n_cells * n_sides, n_side_vertices)."""
-    sides = np.array(_SIDES[cell])
-    return np.sort(cells[:, sides].reshape(-1, sides.shape[1]), axis=1)
-
-
-def contains(table: Rows, rows: Rows) -> npt.NDArray[np.bool_]:
-    """Which of the rows occur in the table, whatever the order of their members, (len(rows),)."""
-    both = np.sort(np.concatenate([table, rows]), axis=1)
-    _, number = np.unique(both, axis=0, return_inverse=True)
-    number = number.reshape(-1)
-    return np.isin(number[len(table) :], number[: len(table)])
+def _normals(x: Array) -> Array:
+    """Normals of facets through their first d vertices, (n, d, d) -> (n, d), of any length and direction."""
+    d = x.shape[-1]
+    if d == 1:
+        return np.ones((len(x), 1))
+    if d == 2:
+        return np.stack([x[:, 1, 1] - x[:, 0, 1], x[:, 0, 0] - x[:, 1, 0]], axis=1)
+    return np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
 
 
 def _count(bad: npt.NDArray[np.bool_], what: str) -> str:

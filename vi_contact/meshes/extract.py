@@ -16,8 +16,9 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from vi_contact.errors import InputError
-from vi_contact.meshes.checks import Array, Rows, check_cells, check_folds, check_sides
+from vi_contact.meshes.checks import Array, check_cells, check_folds, check_sides
 from vi_contact.meshes.gmsh_session import MeshScript, session
+from vi_contact.meshes.rows import Rows, number_alike
 
 Mask = npt.NDArray[np.bool_]
 
@@ -98,14 +99,16 @@ def extract(gmsh: Any, source: str) -> MeshArrays:
     facet_groups = {}
     for name, entities in sides.items():
         what = f"boundary group '{name}' of {source}"
-        facet_groups[name] = _facets(model, entities, _FACET[kind], tags, points, what)
-        check_sides(facet_groups[name], cells, _CELLS[kind], what)
+        facets = _facets(model, entities, _FACET[kind], tags, points, what)
+        if len(facets):
+            facet_groups[name] = facets
+    check_sides(facet_groups, cells, _CELLS[kind], source)
     return MeshArrays(
         cell=_CELLS[kind],
         points=points,
         cells=cells,
         cell_groups=cell_groups or {"all": np.ones(len(cells), dtype=bool)},
-        facet_groups={name: rows for name, rows in facet_groups.items() if len(rows)},
+        facet_groups=facet_groups,
     )
 
 
@@ -181,11 +184,11 @@ def _flat(points: Array, d: int, source: str) -> Array:
 
 def _without_repeats(rows: Rows) -> tuple[Rows, Rows]:
     """Rows kept (first of those with the same members, in order), and for every row its place among the kept ones."""
-    _, first, place = np.unique(np.sort(rows, axis=1), axis=0, return_index=True, return_inverse=True)
+    _, first, place = np.unique(number_alike(rows)[0], return_index=True, return_inverse=True)
     order = np.argsort(first)
     rank = np.empty_like(order)
     rank[order] = np.arange(len(order))
-    return first[order], rank[place.reshape(-1)]
+    return first[order], rank[place]
 
 
 def _facets(model: Any, entities: list[int], kind: int, tags: Rows, points: Array, what: str) -> Rows:

@@ -1,0 +1,45 @@
+"""Rows of vertices: the sides of cells, and which rows have the same members."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+Rows = npt.NDArray[np.int64]
+
+_SIDES: dict[str, list[tuple[int, ...]]] = {
+    "interval": [(0,), (1,)],
+    "triangle": [(0, 1), (1, 2), (2, 0)],
+    "quadrilateral": [(0, 1), (1, 2), (2, 3), (3, 0)],
+    "tetrahedron": [(0, 1, 2), (0, 1, 3), (0, 2, 3), (1, 2, 3)],
+    "hexahedron": [(0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)],
+}
+
+
+def cell_sides(cells: Rows, cell: str) -> tuple[Rows, Rows]:
+    """Sides of all cells, vertices ascending, (n_cells * n_sides, n_side_vertices), and the cell of each side."""
+    sides = np.array(_SIDES[cell])
+    rows = np.sort(cells[:, sides].reshape(-1, sides.shape[1]), axis=1)
+    return rows, np.repeat(np.arange(len(cells)), len(sides))
+
+
+def number_alike(*tables: Rows) -> list[Rows]:
+    """A number for every row of tables of one width: rows have equal numbers if they have equal members, in any order.
+
+    Members are at least -1. Much faster than np.unique(axis=0).
+    """
+    rows = np.sort(np.concatenate(tables), axis=1) + 1
+    if not len(rows):
+        return [np.zeros(0, dtype=np.int64) for _ in tables]
+    base = int(rows.max()) + 1
+    numbers = rows[:, 0]
+    for column in rows.T[1:]:
+        numbers = np.unique(numbers * base + column, return_inverse=True)[1]
+    return np.split(numbers.astype(np.int64), np.cumsum([len(table) for table in tables])[:-1])
+
+
+def found_in(numbers: Rows, among: Rows) -> npt.NDArray[np.bool_]:
+    """Which of the numbers (>= 0) occur among the others."""
+    known = np.zeros(max(numbers.max(initial=0), among.max(initial=0)) + 1, dtype=bool)
+    known[among] = True
+    return known[numbers]
