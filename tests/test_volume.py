@@ -137,6 +137,33 @@ def test_wrong_prediction_is_corrected(parallel: bool, method: Any) -> None:
     agree(c, solve(c, method), exact)
 
 
+class CountingFactor:
+    """A factor that counts its back-substitutions."""
+
+    def __init__(self, factor: Any) -> None:
+        self._factor, self.solves = factor, 0
+        self.solve_units = factor.solve_units
+
+    def solve(self, b: Any) -> Any:
+        self.solves += 1
+        return self._factor.solve(b)
+
+
+@pytest.mark.parametrize(("limit", "solves"), [(10**6, (1, 1)), (0, (4, 2))])
+def test_back_substitutions_of_a_step(parallel: bool, limit: int, solves: tuple[int, int]) -> None:
+    """Solver notes 1b: one for the whole step, however the contact set changes; one more for each set where W is not kept.
+
+    From a wrong set: the free solution, that set, two changes. At the solution: the free solution and its set.
+    """
+    c = pushed_block(parallel=parallel)
+    counting = c.step.A.__dict__["factor"] = CountingFactor(c.step.A.factor)
+    prepared = Volume(method=OneFactorisation(limit=limit)).prepare(c.step.A, c.step.surface, c.step.scale)
+    first = prepared.solve(replace(c.step, active=~c.exact().active))
+    assert first.iterations == 2 and counting.solves == solves[0]
+    prepared.solve(c.starting_at(first))
+    assert counting.solves == sum(solves)
+
+
 def test_one_solver_many_steps(parallel: bool, method: Any) -> None:
     """Loads that differ by orders of magnitude and in their contact sets, one prepared solver."""
     c = pushed_block(parallel=parallel)
