@@ -1,0 +1,280 @@
+"""Checkpoint and restart: the straight run to the last bit on the same number of ranks, to 1e-10 on another."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from chain import chain_problem
+
+from vi_contact.errors import InputError
+from vi_contact.excitation import Harmonic
+from vi_contact.impact import Inelastic, MassProjection
+from vi_contact.recorders import Contact, Energy, Probe
+from vi_contact.schemes.linear_multistep import LinearMultistep
+from vi_contact.schemes.ss22 import SS22
+from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
+from vi_contact.simulate import Solution, simulate
+from vi_contact.solvers.condensed import Condensed
+from vi_contact.step import ContactProblem, State
+
+FILES = ("history.csv", "columns.json")
+NEWMARK = LinearMultistep.newmark(beta=0.3025, gamma=0.6)
+
+
+def chain(**more: Any) -> ContactProblem:
+    """The shaken, damped chain between two walls."""
+    settings: dict[str, Any] = {
+        "gap": 1e-3, "left_gap": 2e-3, "excitation": Harmonic(3.0, 2.0, direction=(1.0,)),
+        "impact": Inelastic(), "consistent": True, "damping": 1e-4,
+    }
+    return chain_problem(5, **(settings | more))
+
+
+def run(out: Path | None, steps: int = 250, *, problem: ContactProblem | None = None, **more: Any) -> Solution:
+    """A run of the chain with all recorders."""
+    settings: dict[str, Any] = {
+        "scheme": ZienkiewiczWoodTaylor(), "solver": Condensed(), "dt": 5e-3,
+        "record": [Energy(), Contact(), Probe({12: (5.0,)}, velocity=True, acceleration=True)], "checkpoint_every": 50,
+    }
+    return simulate(problem or chain(), steps=steps, out=out, **(settings | more))
+
+
+def difference(one: State, other: State) -> float:
+    """Largest relative difference of u, v, r_n and memory; infinite when time, step or contact set differ."""
+    if (one.t, one.k) != (other.t, other.k) or not np.array_equal(one.active, other.active):
+        return float("inf")
+    pairs = [(one.u, other.u), (one.v, other.v), (one.r_n, other.r_n)]
+    pairs += [(one.memory[name], other.memory[name]) for name in other.memory]
+    return max(float(np.max(np.abs(a - b), initial=0.0)) / (np.max(np.abs(b), initial=0.0) or 1.0) for a, b in pairs)
+
+
+def equal_files(one: Path, other: Path) -> bool:
+    """Whether two folders hold the same histories to the last bit."""
+    if any((one / name).read_bytes() != (other / name).read_bytes() for name in FILES):
+        return False
+    with h5py.File(one / "history.h5") as a, h5py.File(other / "history.h5") as b:
+        return set(a) == set(b) and all(
+            np.array_equal(a[name][()], b[name][()], equal_nan=name != "active") for name in a if name != "contact"
+        )
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("scheme", [ZienkiewiczWoodTaylor(0.5), SS22(), NEWMARK], ids=repr)
+@pytest.mark.parametrize("impact", [Inelastic(), Inelastic(MassProjection())], ids=["reset", "projection"])
+def test_restart_to_the_last_bit(tmp_path: Path, scheme: Any, impact: Any) -> None:
+    """A run continued from its checkpoint has the state and the histories of the straight run, byte for byte."""
+    problem = chain(impact=impact)
+    straight = run(tmp_path / "straight", problem=problem, scheme=scheme)
+    run(tmp_path / "parts", 130, problem=problem, scheme=scheme)
+    parts = run(tmp_path / "parts", problem=problem, scheme=scheme, restart=True)
+    assert difference(parts.state, straight.state) == 0.0
+    assert equal_files(tmp_path / "parts", tmp_path / "straight")
+    assert straight.history["loss_impact"][-1] != 0.0 and straight.history["loss_contact"][-1] > 0.0
+
+
+@pytest.mark.serial
+def test_restart_from_before_the_last_row(tmp_path: Path) -> None:
+    """Steps after the checkpoint are dropped and computed again."""
+    run(tmp_path, 100)
+    kept = (tmp_path / "checkpoint.npz").read_bytes()
+    run(tmp_path, 130, restart=True)
+    (tmp_path / "checkpoint.npz").write_bytes(kept)
+    run(tmp_path, restart=True)
+    run(tmp_path / "straight")
+    assert equal_files(tmp_path, tmp_path / "straight")
+
+
+@pytest.mark.serial
+def test_restart_into_another_folder(tmp_path: Path) -> None:
+    """The old folder stays as it was, the new one holds the whole history; so does a solution without a folder."""
+    run(tmp_path / "old", 120)
+    before = {path: path.read_bytes() for path in (tmp_path / "old").iterdir()}
+    run(tmp_path / "new", restart=tmp_path / "old")
+    alone = run(None, restart=str(tmp_path / "old" / "checkpoint.npz"))
+    straight = run(tmp_path / "straight")
+    assert {path: path.read_bytes() for path in (tmp_path / "old").iterdir()} == before
+    assert equal_files(tmp_path / "new", tmp_path / "straight")
+    assert difference(alone.state, straight.state) == 0.0 and len(alone.history["t"]) == 251
+
+
+@pytest.mark.serial
+def test_restart_of_a_finished_run(tmp_path: Path) -> None:
+    """Nothing is left to do: the same solution. t_end counts from the start of the whole run, to the step."""
+    done = run(tmp_path, 400)
+    again = run(tmp_path, None, t_end=400 * 5e-3, restart=True)
+    assert again.state.k == 400 and difference(again.state, done.state) == 0.0
+    longer = run(tmp_path, None, t_end=410 * 5e-3, restart=True)
+    assert longer.state.k == 410 and len(longer.history["t"]) == 411
+
+
+@pytest.mark.serial
+def test_start_with_a_step_number(tmp_path: Path) -> None:
+    """A run that began at another step and time restarts like any other."""
+    start = replace(run(None, 20).state, memory={})
+    straight = run(None, 100, state=start)
+    run(tmp_path, 60, state=start)
+    parts = run(tmp_path, 100, restart=True)
+    assert parts.state.k == 120 and difference(parts.state, straight.state) == 0.0
+
+
+@pytest.mark.serial
+def test_what_cannot_be_continued_is_told(tmp_path: Path) -> None:
+    """Another dt, scheme or problem, other recorders, no checkpoint: one sentence, and nothing is touched."""
+    run(tmp_path, 60)
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    wrong: list[tuple[str, dict[str, Any]]] = [
+        ("dt = 0.005 but this one has 0.01", {"dt": 1e-2}),
+        ("scheme = ZienkiewiczWoodTaylor.phi=0.5. but", {"scheme": SS22()}),
+        ("contact points = 2 but this one has 1", {"problem": chain(left_gap=None)}),
+        ("holds other columns", {"record": [Energy()]}),
+    ]
+    for words, arguments in wrong:
+        with pytest.raises(InputError, match=words):
+            run(tmp_path, restart=True, **arguments)
+    with pytest.raises(InputError, match="there is no checkpoint '.*nowhere/checkpoint.npz' to restart from"):
+        run(tmp_path, restart=tmp_path / "nowhere")
+    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("damage", ["cut", "flipped", "empty", "other"])
+def test_damaged_checkpoint_is_told(tmp_path: Path, damage: str) -> None:
+    """Cut, with a flipped bit, empty, or not a checkpoint: one sentence."""
+    run(tmp_path, 60)
+    path = tmp_path / "checkpoint.npz"
+    data = bytearray(path.read_bytes())
+    if damage == "flipped":
+        place = data.find(run(tmp_path, 60, restart=True).state.u.tobytes())
+        data[place] ^= 1
+    path.write_bytes({"cut": data[: len(data) // 2], "flipped": data, "empty": b"", "other": b"not a zip"}[damage])
+    with pytest.raises(InputError, match=r"the checkpoint '.*checkpoint.npz' is damaged \(.*\): start a new run"):
+        run(tmp_path, restart=True)
+
+
+KILLED = """
+import sys
+sys.path.insert(0, {tests!r})
+from test_checkpoint import run
+from pathlib import Path
+run(Path({out!r}), 10**6, checkpoint_every=10)
+"""
+
+
+@pytest.mark.serial
+def test_kill_9(tmp_path: Path) -> None:
+    """kill -9 in full flight: every row written is whole, the checkpoint is, and the run goes on to the last bit."""
+    tests, package = str(Path(__file__).parent), str(Path(__file__).parents[1])
+    code = KILLED.format(tests=tests, out=str(tmp_path / "killed"))
+    child = subprocess.Popen([sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": package})
+    csv, deadline = tmp_path / "killed" / "history.csv", time.monotonic() + 60
+    while not csv.is_file() or csv.read_bytes().count(b"\n") < 150:
+        assert child.poll() is None and time.monotonic() < deadline
+        time.sleep(0.01)
+    child.send_signal(signal.SIGKILL)
+    child.wait()
+    rows = np.genfromtxt(csv, delimiter=",", names=True)
+    assert rows["k"].tolist() == list(range(len(rows))) and len(rows) > 140
+    steps = len(rows) + 20
+    run(tmp_path / "killed", steps, restart=True)
+    run(tmp_path / "straight", steps)
+    assert equal_files(tmp_path / "killed", tmp_path / "straight")
+
+
+# Any number of ranks --------------------------------------------------------------------------------------------------
+
+
+def wall(comm: Any) -> ContactProblem:
+    """A wall whose contact frames are turned, small enough for any number of ranks."""
+    from fem_problems import shaken_wall
+
+    return shaken_wall(comm, angle=0.3, gap=1e-7)
+
+
+def run_wall(
+    comm: Any, out: Path | None, steps: int, *, problem: ContactProblem | None = None, **more: Any
+) -> Solution:
+    """The wall with all recorders."""
+    record = [Energy(), Contact(), Probe({7: (5.0, 4.0)}, velocity=True)]
+    settings: dict[str, Any] = {"scheme": NEWMARK, "solver": Condensed(), "dt": 1.0 / 560.0, "record": record}
+    return simulate(problem or wall(comm), steps=steps, out=out, **(settings | more))
+
+
+def reproducible(problem: ContactProblem) -> ContactProblem:
+    """The problem with a factor on every rank: MUMPS adds contributions of several ranks in the order they arrive, so
+    that not even two solves with one of its factors agree to the last bit."""
+    from petsc4py import PETSc
+
+    from vi_contact.fem.petsc_algebra import PetscAlgebra, as_petsc
+
+    class Redundant:
+        def __init__(self, matrix: Any) -> None:
+            self._pc = PETSc.PC().create(matrix.comm)
+            self._pc.setOptionsPrefix("test_checkpoint_")
+            options = PETSc.Options("test_checkpoint_")
+            for name, value in (
+                ("pc_type", "redundant"), ("redundant_ksp_type", "preonly"), ("redundant_pc_type", "cholesky"),
+                ("redundant_pc_factor_mat_solver_type", "mumps"),
+            ):
+                options[name] = value
+            self._pc.setOperators(matrix)
+            self._pc.setFromOptions()
+            self._b, self._x = matrix.createVecs()
+
+        def solve(self, b: Any) -> Any:
+            self._b.array[:] = b
+            self._pc.apply(self._b, self._x)
+            return np.array(self._x.array_r)
+
+        def solve_units(self, owned: Any, slots: Any, m: int) -> Any:
+            units = np.zeros((self._x.getLocalSize(), m))
+            units[owned, slots] = 1.0
+            return np.column_stack([self.solve(unit) for unit in units.T])
+
+    class Reproducible(PetscAlgebra):
+        def factor(self, A: Any) -> Any:
+            return Redundant(as_petsc(A).mat)
+
+    return replace(problem, system=replace(problem.system, algebra=Reproducible(problem.system.algebra.comm.mpi)))
+
+
+def test_restart_on_the_same_ranks(comm: Any, shared_tmp: Path) -> None:
+    """On several ranks too the restart is the straight run to the last bit, as far as the factorisation is."""
+    pytest.importorskip("dolfinx")
+    problem = wall(comm) if comm.size == 1 else reproducible(wall(comm))
+    straight = run_wall(comm, shared_tmp / "straight", 60, problem=problem)
+    run_wall(comm, shared_tmp / "parts", 33, problem=problem)
+    parts = run_wall(comm, shared_tmp / "parts", 60, problem=problem, restart=True)
+    assert straight.history["contact_active"].max() > 0
+    for name, values in straight.history.items():
+        assert np.array_equal(parts.history[name], values, equal_nan=values.dtype != bool), name
+    assert difference(parts.state, straight.state) == 0.0
+
+
+def test_restart_on_another_number_of_ranks(comm: Any, shared_tmp: Path) -> None:
+    """A checkpoint of one rank goes on on all of them, and one of all of them on one: the histories agree to 1e-10."""
+    pytest.importorskip("dolfinx")
+    from mpi4py import MPI
+
+    alone = run_wall(MPI.COMM_SELF, shared_tmp / "alone" if comm.rank == 0 else None, 60)
+    if comm.rank == 0:
+        run_wall(MPI.COMM_SELF, shared_tmp / "one", 31)
+    comm.Barrier()
+    spread = run_wall(comm, shared_tmp / "one", 60, restart=True)
+    run_wall(comm, shared_tmp / "all", 31)
+    gathered = run_wall(MPI.COMM_SELF, None, 60, restart=shared_tmp / "all")
+    for name, values in alone.history.items():
+        if name in ("certificate", "energy_defect", "loss_algorithmic"):
+            continue  # round-off themselves
+        size = np.nanmax(np.abs(values)) or 1.0
+        for other in (spread, gathered):
+            assert np.allclose(other.history[name], values, rtol=0.0, atol=1e-10 * size, equal_nan=True), name

@@ -1,0 +1,300 @@
+"""The run folder: formats other programs read, sentences when the disk refuses, whole files at any moment."""
+
+from __future__ import annotations
+
+import errno
+import json
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from chain import chain_problem
+
+from vi_contact import history as history_module
+from vi_contact.algebra import SerialComm
+from vi_contact.errors import InputError, ViContactError
+from vi_contact.excitation import Harmonic
+from vi_contact.history import HistoryFiles, Table, read_rows
+from vi_contact.output import hdf5_image, on_root, run_folder, sentence, to_json, write_all, write_atomically
+from vi_contact.recorders import Contact, Energy, Probe
+from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
+from vi_contact.simulate import Solution, simulate
+from vi_contact.solvers.condensed import Condensed
+
+
+def run(out: Path | None, steps: int = 30, **more: Any) -> Solution:
+    """The shaken chain between two walls, with a probe at its end."""
+    shake = Harmonic(3.0, 2.0, direction=(1.0,))
+    problem = chain_problem(5, gap=1e-3, left_gap=2e-3, excitation=shake, consistent=True)
+    settings: dict[str, Any] = {"scheme": ZienkiewiczWoodTaylor(), "solver": Condensed(), "dt": 5e-3}
+    record = [Energy(), Contact(), Probe({12: (5.0,)})]
+    return simulate(problem, steps=steps, record=record, out=out, **(settings | more))
+
+
+# What other programs read --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.serial
+def test_csv_to_the_last_bit(tmp_path: Path) -> None:
+    """history.csv: first column t, one line per step, read by numpy with names, equal to the history to the last bit."""
+    solution = run(tmp_path / "new" / "folder")
+    path = tmp_path / "new" / "folder" / "history.csv"
+    header = path.read_text().splitlines()[0].split(",")
+    rows = np.genfromtxt(path, delimiter=",", names=True)
+    assert header[:2] == ["t", "k"] and header[-1] == "u_x_12" and tuple(header) == rows.dtype.names
+    assert len(rows) == 31
+    numbers = [name for name, values in solution.history.items() if values.ndim == 1]
+    assert header == numbers
+    for name in numbers:
+        assert np.array_equal(rows[name], solution.history[name], equal_nan=True), name
+    assert np.isnan(rows["contact_x"]).any() and not np.isnan(rows["contact_x"]).all()
+
+
+@pytest.mark.serial
+def test_units_are_documented(tmp_path: Path) -> None:
+    """Every column has a unit and a meaning, in columns.json and as attributes in history.h5, which holds arrays too."""
+    solution = run(tmp_path)
+    columns = json.loads((tmp_path / "columns.json").read_text())
+    assert list(columns) == list(solution.columns) and all(one["unit"] and one["meaning"] for one in columns.values())
+    assert columns["u_x_12"]["unit"] == "m" and columns["pressure"]["unit"] == "Pa" and columns["t"]["unit"] == "s"
+    with h5py.File(tmp_path / "history.h5") as file:
+        assert set(file) == set(columns) | {"contact"}
+        for name, one in columns.items():
+            assert np.array_equal(file[name][()], solution.history[name], equal_nan=True), name
+            assert dict(file[name].attrs) == one
+        assert file["pressure"].shape == (31, 2) and file["active"].dtype == bool
+        assert file["contact/points"][()].tolist() == [[5.0], [1.0]]
+        assert file["contact/normals"][()].tolist() == [[1.0], [-1.0]]
+        assert file["contact/weights"][()].tolist() == [0.5, 0.5]
+        assert file["contact/gap0"][()].tolist() == [1e-3, 2e-3]
+    assert not (tmp_path / "history.journal").exists()
+
+
+@pytest.mark.serial
+def test_new_run_replaces_the_old_one(tmp_path: Path) -> None:
+    """Nothing of an earlier run in the folder is taken for the new one's, foreign files stay."""
+    run(tmp_path, 60, checkpoint_every=10)
+    (tmp_path / "mine.txt").write_text("keep")
+    solution = run(tmp_path, 5)
+    assert len((tmp_path / "history.csv").read_text().splitlines()) == 7
+    with h5py.File(tmp_path / "history.h5") as file:
+        assert file["k"][()].tolist() == solution.history["k"].tolist()
+    assert json.loads((tmp_path / "summary.json").read_text())["steps"] == 5
+    assert (tmp_path / "mine.txt").read_text() == "keep"
+
+
+@pytest.mark.serial
+def test_strict_json() -> None:
+    """NaN and infinity become null, numpy values plain ones."""
+    facts = {"a": np.float64(0.1), "b": float("nan"), "c": {"d": np.inf}, "e": np.arange(2), "f": np.bool_(True)}
+    text = to_json(facts)
+    assert json.loads(text) == {"a": 0.1, "b": None, "c": {"d": None}, "e": [0, 1], "f": True}
+
+
+# The disk refuses ----------------------------------------------------------------------------------------------------
+
+
+def test_every_rank_gets_the_sentence(comm: Any) -> None:
+    """What fails on rank 0 is raised on every rank, as one sentence; nobody waits."""
+    from vi_contact.fem.petsc_algebra import MpiComm
+
+    ranks = MpiComm(comm)
+
+    def full() -> None:
+        raise OSError(errno.ENOSPC, "No space left on device", "history.csv")
+
+    def wrong() -> None:
+        raise InputError("the checkpoint is damaged")
+
+    def broken() -> None:
+        raise ZeroDivisionError("a defect")
+
+    with pytest.raises(ViContactError, match="the disk is full: 'history.csv' could not be written"):
+        on_root(ranks, full)
+    with pytest.raises(InputError, match="the checkpoint is damaged"):
+        on_root(ranks, wrong)
+    with pytest.raises(ZeroDivisionError if comm.rank == 0 else ViContactError, match="a defect"):
+        on_root(ranks, broken)
+    assert on_root(ranks, lambda: 5) == (5 if comm.rank == 0 else None)
+
+
+@pytest.mark.serial
+def test_sentences() -> None:
+    """One sentence each: path, reason, remedy."""
+    known = ((errno.ENOSPC, "the disk is full"), (errno.EACCES, "permissions"), (errno.EIO, "read or written"))
+    for number, words in known:
+        text = sentence(OSError(number, "reason", "a/history.csv"))
+        assert words in text and "'a/history.csv'" in text and "\n" not in text and not text.endswith(".")
+
+
+@pytest.mark.serial
+def test_unwritable_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Told before any work: not a folder, or one that takes no file (mocked, as root may write anywhere)."""
+    (tmp_path / "file").write_text("")
+    asked: list[int] = []
+    monkeypatch.setattr("vi_contact.run.march", lambda *_, **__: asked.append(1) or iter(()))
+    with pytest.raises(InputError, match=r"output folder '.*file' cannot be written \(File exists\): choose another"):
+        run(tmp_path / "file")
+    with pytest.raises(InputError, match=r"output folder '.*below' cannot be written \(Not a directory\)"):
+        run(tmp_path / "file" / "below")
+
+    def refuse(*_: Any) -> None:
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    monkeypatch.setattr("vi_contact.output.write_all", refuse)
+    with pytest.raises(InputError, match=r"cannot be written \(Permission denied\)"):
+        run(tmp_path / "closed")
+    assert asked == []
+
+
+@pytest.mark.serial
+def test_full_disk_from_the_start(tmp_path: Path) -> None:
+    """history.csv on a full device: one sentence, no traceback of HDF5, nothing computed."""
+    (tmp_path / "history.csv").symlink_to("/dev/full")
+    with pytest.raises(ViContactError, match=r"the disk is full: '.*history.csv' could not be written"):
+        run(tmp_path)
+
+
+@pytest.mark.serial
+def test_full_log(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """run.log on a full device is told like any other file."""
+    (tmp_path / "run.log").symlink_to("/dev/full")
+    with pytest.raises(ViContactError, match=r"the disk is full: '.*run.log'"):
+        run(tmp_path)
+    assert capsys.readouterr().err == ""
+
+
+class Disk:
+    """Room for so many bytes, then ENOSPC after writing what fits; other writes go through."""
+
+    def __init__(self, room: int) -> None:
+        self.room = room
+
+    def __call__(self, file: Any, data: bytes) -> None:
+        fits = min(len(data), self.room)
+        self.room -= fits
+        file.write(data[:fits])
+        if fits < len(data):
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("room", [9000, 9100, 9200, 12345])
+def test_disk_fills_up_during_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, room: int) -> None:
+    """The run stops with a sentence; every line before is whole, and the restart equals the straight run."""
+    disk = Disk(room)
+    monkeypatch.setattr(history_module, "write_all", disk)
+    with pytest.raises(ViContactError, match="the disk is full"):
+        run(tmp_path, 200, checkpoint_every=10)
+    monkeypatch.setattr(history_module, "write_all", write_all)
+    lines = (tmp_path / "history.csv").read_text().splitlines(keepends=True)
+    assert 10 < len(lines) < 200
+    assert all(line.endswith("\n") and line.count(",") == lines[0].count(",") for line in lines)
+    found = json.loads((tmp_path / "summary.json").read_text())
+    assert found["status"] == "failed" and "the disk is full" in found["reason"]
+    assert found["steps"] == len(lines) - 2
+    again, straight = run(tmp_path, 200, restart=True), run(None, 200)
+    assert np.array_equal(again.state.u, straight.state.u)
+    assert np.array_equal(again.history["pressure"], straight.history["pressure"])
+
+
+@pytest.mark.serial
+def test_whole_files_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An atomic write that fails leaves the old content and no litter."""
+    path = tmp_path / "checkpoint.npz"
+    write_atomically(path, b"old")
+    monkeypatch.setattr("vi_contact.output.write_all", Disk(2))
+    with pytest.raises(OSError, match="No space left") as caught:
+        write_atomically(path, b"new content")
+    assert caught.value.filename == str(path)
+    assert path.read_bytes() == b"old" and list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.serial
+def test_partial_writes_are_continued() -> None:
+    """A raw file may take less than it is given."""
+
+    class Slow:
+        taken = b""
+
+        def write(self, data: memoryview) -> int:
+            self.taken += bytes(data[:3])
+            return len(data[:3])
+
+    file = Slow()
+    write_all(file, b"0123456789")
+    assert file.taken == b"0123456789"
+
+
+@pytest.mark.serial
+def test_run_folder_leaves_no_trace(tmp_path: Path) -> None:
+    """The trial file is gone again."""
+    assert list(run_folder(SerialComm(), tmp_path / "a" / "b").iterdir()) == []
+
+
+# Histories on disk ---------------------------------------------------------------------------------------------------
+
+
+def table(rows: int) -> Table:
+    """A table with a number and two arrays."""
+    columns = {"t": ("s", "time"), "k": ("-", "step"), "p": ("Pa", "two"), "on": ("-", "mask")}
+    made = [{"t": 0.1 * k, "k": k, "p": np.array([k, 1.0 / 3.0]), "on": np.array([k % 2 == 0])} for k in range(rows)]
+    return Table(columns, made)
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("cut", [0, 5])
+def test_arrays_survive_in_the_journal(tmp_path: Path, cut: int) -> None:
+    """Rows that history.h5 does not have yet come from the journal, but for a record the crash cut short."""
+    surface = chain_problem(2).surface
+    full = table(8)
+    growing = Table(full.columns, full.rows[:1])
+    files = HistoryFiles(tmp_path, growing, surface)
+    for row in full.rows[1:]:
+        files.append(row)
+        growing.rows.append(row)
+        if row["k"] == 3:
+            files.save()
+    journal = tmp_path / "history.journal"
+    journal.write_bytes(journal.read_bytes()[: journal.stat().st_size - cut])
+    template = Table(full.columns, full.rows[:1])
+    if cut:
+        with pytest.raises(InputError, match="does not hold p, on of step 7"):
+            read_rows(tmp_path, template, 7)
+    last = 6 if cut else 7
+    rows = read_rows(tmp_path, template, last)
+    assert [row["k"] for row in rows] == list(range(last + 1)) and isinstance(rows[0]["k"], int)
+    for row, wanted in zip(rows, full.rows, strict=False):
+        assert row["t"] == wanted["t"] and row["on"].dtype == bool
+        assert np.array_equal(row["p"], wanted["p"]) and np.array_equal(row["on"], wanted["on"])
+    files.close()
+    assert not journal.exists()
+
+
+@pytest.mark.serial
+def test_damaged_histories_are_told(tmp_path: Path) -> None:
+    """Missing, other columns, damaged line, too short: one sentence each."""
+    files = HistoryFiles(tmp_path, table(5), chain_problem(2).surface)
+    files.close()
+    template, path = Table(table(1).columns, table(1).rows), tmp_path / "history.csv"
+    good = path.read_text()
+    for text, words in (
+        (None, "is missing"),
+        (good.replace("t,k", "t,kk"), "holds other columns"),
+        (good.replace("0.2,2", "0.2,two"), "line 4 of '.*' is damaged"),
+        ("\n".join(good.splitlines()[:4]), "does not reach step 4"),
+        ("", "holds other columns"),
+    ):
+        path.unlink() if text is None else path.write_text(text)
+        with pytest.raises(InputError, match=words):
+            read_rows(tmp_path, template, 4)
+
+
+@pytest.mark.serial
+def test_hdf5_in_memory(tmp_path: Path) -> None:
+    """The image is a file like any other."""
+    (tmp_path / "a.h5").write_bytes(hdf5_image(lambda file: file.create_dataset("x", data=np.arange(1000.0))))
+    with h5py.File(tmp_path / "a.h5") as file:
+        assert np.array_equal(file["x"][()], np.arange(1000.0))
