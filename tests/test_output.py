@@ -38,7 +38,7 @@ def run(out: Path | None, steps: int = 30, **more: Any) -> Solution:
 
 @pytest.mark.serial
 def test_csv_to_the_last_bit(tmp_path: Path) -> None:
-    """history.csv: first column t, one line per step, read by numpy with names, equal to the history to the last bit."""
+    """history.csv: first column t, a line per step, read by numpy with names, equal to the history to the last bit."""
     solution = run(tmp_path / "new" / "folder")
     path = tmp_path / "new" / "folder" / "history.csv"
     header = path.read_text().splitlines()[0].split(",")
@@ -54,7 +54,7 @@ def test_csv_to_the_last_bit(tmp_path: Path) -> None:
 
 @pytest.mark.serial
 def test_units_are_documented(tmp_path: Path) -> None:
-    """Every column has a unit and a meaning, in columns.json and as attributes in history.h5, which holds arrays too."""
+    """Every column has a unit and a meaning, in columns.json and as attributes in history.h5, which has arrays too."""
     solution = run(tmp_path)
     columns = json.loads((tmp_path / "columns.json").read_text())
     assert list(columns) == list(solution.columns) and all(one["unit"] and one["meaning"] for one in columns.values())

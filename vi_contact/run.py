@@ -121,7 +121,7 @@ class Run:
         writer.append(row)
         self.table.rows.append(row)  # after the disk: a checkpoint never knows a step that history.csv does not
         self.state, self.last = state, report
-        writer.frame(state, report.balance.a)
+        writer.frame(report)
         if state.k % self.settings.checkpoint_every == 0:
             self._checkpoint(writer)
 

@@ -17,7 +17,7 @@ from .history import HistoryFiles, Table
 from .output import LOG, SUMMARY, clear, on_root, to_json, write_atomically
 from .recorders import Row
 from .run_log import RunLog
-from .step import ContactProblem, Scheme, State
+from .step import ContactProblem, Report, Scheme, State
 
 log = logging.getLogger(__name__)
 
@@ -82,10 +82,10 @@ class Writer:
         if self._files is not None:
             self._files.append(row)
 
-    def frame(self, state: State, acceleration: Array) -> None:
+    def frame(self, report: Report) -> None:
         """A frame of the fields, when one is due."""
-        if self._fields is not None and self._settings is not None and state.k % self._settings.every == 0:
-            self._fields.write(state, acceleration)
+        if self._fields is not None and self._settings is not None and report.new.k % self._settings.every == 0:
+            self._fields.write(report.new, report.balance.a)
 
     def checkpoint(self, state: State, *, scheme: Scheme, dt: float, start: Start) -> None:
         """A checkpoint of the state, unless there is one already."""
