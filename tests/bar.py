@@ -1,7 +1,7 @@
 """A bar of P1 elements whose foot may touch a wall: exact solutions (V1.1–V1.3) without finite element packages.
 
-Node i sits at x = i L/n; the foot x = 0 may touch a wall below it, so its contact direction is -1 and the change of basis
-is not the identity. u is positive upwards, area 1. The top x = L is free, or clamped and then not among the unknowns.
+Node i sits at x = i L/n; the foot x = 0 may touch a wall below it, so its contact direction is -1 and the change of
+basis is not the identity. u is positive upwards, area 1. The top x = L is free, or clamped and then not an unknown.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from vi_contact.system import Load, SemiDiscreteSystem
 
 
 def bar_matrices(n: int, *, length: float, E: float, rho: float, lumped: bool = False) -> tuple[Any, Any]:
-    """(M, K) of n + 1 nodes: rho h/6 tridiag(1, 4, 1) (or its row sums) and E/h tridiag(-1, 2, -1), halved at the ends."""
+    """(M, K) of n + 1 nodes: rho h/6 tridiag(1, 4, 1) or its row sums, E/h tridiag(-1, 2, -1), halved at the ends."""
     h = length / n
     ends = np.full(n + 1, 2.0)
     ends[[0, -1]] = 1.0
@@ -103,7 +103,9 @@ def period_three(n: int = 100, **more: Any) -> ContactProblem:
     return bar(n, length=1.0, E=1.0, clamped=True, u0=lambda x: 0.5 * (1.0 - x), **more)
 
 
-def run(problem: ContactProblem, scheme: Any, *, dt: float, steps: int, solver: Any = None, **more: Any) -> Iterator[Report]:
+def run(
+    problem: ContactProblem, scheme: Any, *, dt: float, steps: int, solver: Any = None, **more: Any
+) -> Iterator[Report]:
     """The reports of a march, with the condensed solver unless told otherwise."""
     for _, report in march(problem, scheme=scheme, solver=solver or Condensed(), dt=dt, steps=steps, **more):
         yield report

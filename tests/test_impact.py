@@ -122,7 +122,7 @@ def test_single_mass_rebounds_with_e_times_its_speed(scheme, gap, e):
 
 @pytest.mark.parametrize("scheme", SCHEMES, ids=lambda s: type(s).__name__)
 def test_inelastic_mass_stays_where_it_was_stopped(scheme):
-    """Pressed on by a constant force it rests, and the wall carries that force: 7 N in every step after the collision."""
+    """Pressed on by a constant force it rests, and the wall carries that force: 7 N in every step afterwards."""
     problem = chain_problem(1, gap=0.05, stiffness=1e-9, mass=3.0, v0=[1.0], constant=7.0, impact=Inelastic())
     reports = list(run(problem, scheme, dt=0.1, steps=6))
     assert reports[0].new.v[0] == 0.0

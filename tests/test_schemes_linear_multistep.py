@@ -1,7 +1,8 @@
-"""Multistep operators: Newmark in one-step form, coefficients, order, stability, restart, energy identity (V4.1, V9.2)."""
+"""Multistep operators: Newmark in one-step form, coefficients, order, stability, restart, energy (V4.1, V9.2)."""
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import replace
 
 import numpy as np
@@ -25,7 +26,8 @@ DISSIPATIVE = LinearMultistep.newmark(0.3025, 0.6)
 
 def test_V41_trapezoidal_rule():
     """V4.1: a = (½, 0, -½), b = (¼, ½, ¼), gamma = (1, -2, 1), mu = 1."""
-    assert NEWMARK == LinearMultistep(a=(0.5, 0.0, -0.5), b=(0.25, 0.5, 0.25), gamma=(1.0, -2.0, 1.0), mu=1.0)
+    written = LinearMultistep(a=(0.5, 0.0, -0.5), b=(0.25, 0.5, 0.25), gamma=(1.0, -2.0, 1.0), mu=1.0)
+    assert LinearMultistep.newmark() == LinearMultistep.newmark(0.25, 0.5) == written
 
 
 def test_V41_effective_matrix():
@@ -101,9 +103,8 @@ def test_V41_newmark_in_its_one_step_form(beta, gamma):
 def test_V41_trapezoidal_rule_is_the_midpoint_rule_for_constant_loads():
     """V4.1: Newmark(¼, ½) and Zienkiewicz-Wood-Taylor(½) in (u, v) to 1e-10, with damping and a constant load."""
     problem = oscillators(4, damping=0.02, constant=3.0)
-    for one, other in zip(
-        run(problem, NEWMARK, dt=0.05, steps=300), run(problem, ZienkiewiczWoodTaylor(), dt=0.05, steps=300), strict=True
-    ):
+    midpoint = run(problem, ZienkiewiczWoodTaylor(), dt=0.05, steps=300)
+    for one, other in zip(run(problem, NEWMARK, dt=0.05, steps=300), midpoint, strict=True):
         assert np.abs(one.new.u - other.new.u).max() <= 1e-10 * 0.5
         assert np.abs(one.new.v - other.new.v).max() <= 1e-10 * 2.0
 
@@ -196,8 +197,8 @@ def test_V92_krenks_energy_identity_with_contact(beta, gamma):
 
 
 def test_V92_hard_contact_in_the_acceleration_balance_gains_energy():
-    """1.7, the negative result: V1.1 at Courant number one ends with 10.9 E0 and pressure oscillations of 2.3; V1.2 with
-    some two hundred E0 after five periods. A limitation of the method, not to be repaired silently."""
+    """1.7, the negative result: V1.1 at Courant number one ends with 10.9 E0 and pressure oscillations of 2.3; V1.2
+    with some two hundred E0 after five periods. A limitation of the method, not to be repaired silently."""
     problem, worst = thrown(), 0.0
     for report in run(problem, NEWMARK, dt=1 / 300, steps=450):
         if 0.6 < report.new.t < 1.067:
@@ -205,9 +206,8 @@ def test_V92_hard_contact_in_the_acceleration_balance_gains_energy():
     assert energy(problem, report.new) / 500.0 == pytest.approx(10.9, abs=0.1)
     assert worst == pytest.approx(2.3, abs=0.05)
     problem = bouncing()
-    for report in run(problem, NEWMARK, dt=1 / 300, steps=8000):
-        pass
-    assert energy(problem, report.new) / 500.0 > 100.0
+    last = deque(run(problem, NEWMARK, dt=1 / 300, steps=8000), maxlen=1)[0]
+    assert energy(problem, last.new) / 500.0 > 100.0
 
 
 def test_inelastic_impact_stops_the_gain():

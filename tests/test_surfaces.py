@@ -75,7 +75,7 @@ def test_nodal_frames_are_orthonormal(d):
     n /= np.linalg.norm(n, axis=1)[:, None]
     frames = nodal_frames(n)
     np.testing.assert_array_equal(frames[:, :, 0], n)
-    np.testing.assert_allclose(np.einsum("kij,kil->kjl", frames, frames), np.tile(np.eye(d), (len(n), 1, 1)), atol=1e-14)
+    np.testing.assert_allclose(frames.transpose(0, 2, 1) @ frames, np.tile(np.eye(d), (len(n), 1, 1)), atol=1e-14)
     if d > 1:
         np.testing.assert_allclose(np.linalg.det(frames), 1.0, rtol=1e-14)  # right-handed
 

@@ -1,0 +1,95 @@
+"""Independent solvers agree step by step; a wrong one is found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pytest
+from bar import run, thrown
+from chain import chain_problem
+from shaken import SHAKE, shaken
+
+from vi_contact.cross_check import CrossChecked, cross_check
+from vi_contact.errors import InputError
+from vi_contact.friction import Tresca
+from vi_contact.impact import Inelastic
+from vi_contact.schemes.linear_multistep import LinearMultistep
+from vi_contact.schemes.ss22 import SS22
+from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
+from vi_contact.solvers.active_set import ActiveSet
+from vi_contact.solvers.condensed import Condensed
+from vi_contact.solvers.hildreth import Hildreth
+from vi_contact.solvers.mprgp import ProjectedCG
+
+pytestmark = pytest.mark.serial
+HALF = ZienkiewiczWoodTaylor()
+METHODS = [Condensed(), Condensed(Hildreth()), Condensed(Hildreth(primal=False)), Condensed(ProjectedCG())]
+
+
+def between_walls(**more: Any) -> Any:
+    return chain_problem(5, gap=0.02, left_gap=0.01, stiffness=2e4, excitation=SHAKE, impact=Inelastic(), **more)
+
+
+@pytest.mark.parametrize("scheme", [HALF, SS22(0.6, 0.7), LinearMultistep.newmark()], ids=lambda s: type(s).__name__)
+@pytest.mark.parametrize("floating", [False, True])
+def test_methods_agree_to_1e9(scheme, floating):
+    """Active set, Hildreth primal and dual, projected CG on the applied operator: u and r_n of every step to 1e-9."""
+    checked = cross_check(between_walls(floating=floating), scheme=scheme, solvers=METHODS, dt=5e-3, steps=200)
+    assert 0.0 < checked.worst <= 1e-9
+    assert all(one.steps == 200 and one.r_ref > 1.0 for one in checked.found)
+
+
+def test_report_names_every_method():
+    checked = cross_check(shaken(), scheme=HALF, solvers=METHODS, dt=5e-3, steps=60)
+    assert list(checked.report()) == ["condensed Hildreth #1", "condensed Hildreth #2", "condensed ProjectedCG"]
+    for entry in checked.report().values():
+        assert entry["u"] <= 1e-9 and entry["r_n"] <= 1e-9 and 0.0 < entry["iterations_per_step"] < 10.0
+
+
+def test_it_returns_the_primary_answer():
+    plain = list(run(shaken(), HALF, dt=5e-3, steps=60))
+    checked = list(run(shaken(), HALF, dt=5e-3, steps=60, solver=CrossChecked(Condensed(), [Condensed(Hildreth())])))
+    np.testing.assert_array_equal(checked[-1].new.u, plain[-1].new.u)
+
+
+@dataclass(frozen=True)
+class Off:
+    """Condensed, with answers that are wrong by fixed factors."""
+
+    u: float
+    r: float
+
+    def check(self, problem: Any) -> None:
+        """Takes everything."""
+
+    def prepare(self, A: Any, surface: Any, scale: float) -> Any:
+        prepared, off = Condensed().prepare(A, surface, scale), self
+
+        class Prepared:
+            def solve(self, step: Any) -> Any:
+                result = prepared.solve(step)
+                return replace(result, x=result.x * off.u, r_n=result.r_n * off.r, method="off", iterations=2)
+
+        return Prepared()
+
+
+def test_differences_are_measured_at_their_size():
+    checked = cross_check(shaken(), scheme=HALF, solvers=[Condensed(), Off(1.001, 1.25)], dt=5e-3, steps=60)
+    entry = checked.report()["off"]
+    assert entry["u"] == pytest.approx(1e-3, rel=1e-9) and entry["r_n"] == pytest.approx(0.25, rel=1e-9)
+    assert entry["iterations_per_step"] == 2.0
+    assert checked.worst == entry["r_n"]
+
+
+def test_no_contact_and_no_steps():
+    flying = cross_check(thrown(10), scheme=HALF, solvers=METHODS[:2], dt=0.01, steps=5)
+    assert flying.worst == 0.0 and flying.found[0].r_ref == 0.0
+    assert cross_check(thrown(10), scheme=HALF, solvers=METHODS[:2], dt=0.01, steps=0).worst == 0.0
+
+
+def test_every_solver_must_take_the_problem():
+    problem = replace(shaken(), friction=Tresca(1.0))
+    with pytest.raises(InputError, match="Tresca"):
+        cross_check(problem, scheme=HALF, solvers=[Off(1.0, 1.0), Condensed(ActiveSet())], dt=5e-3, steps=1)
