@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -163,9 +164,9 @@ def march(
             certified = CertifiedSolver(problem, A, step.scale, [solver, *escalation], tolerance)
         result, certificate, escalated = certified.solve(step)
         free = scheme.finish(problem, state, step, result, dt)
-        balance = scheme.balance(problem, state, free, dt)
         new = after_impact(problem, scheme, state, free, dt)
-        yield new, Report(state, new, free.v, step, result, certificate, balance, escalated)
+        averages = partial(scheme.balance, problem, state, free, dt)
+        yield new, Report(state, new, free.v, step, result, certificate, averages, escalated)
         state = new
 
 

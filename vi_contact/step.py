@@ -11,7 +11,7 @@ Vectors are arrays of owned unknowns in the rotated basis; contact arrays have s
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Protocol
@@ -190,8 +190,13 @@ class Report:
     step: StepProblem
     result: StepResult
     certificate: Certificate
-    balance: Balance
+    averages: Callable[[], Balance]
     escalated: bool
+
+    @cached_property
+    def balance(self) -> Balance:
+        """The equation of motion that the step satisfied; made when somebody asks."""
+        return self.averages()
 
 
 @dataclass(frozen=True)

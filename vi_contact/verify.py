@@ -39,7 +39,7 @@ def _over(values: Array, reference: float) -> Array:
 
 
 def _max_abs(x: Array) -> float:
-    return float(np.max(np.abs(x))) if len(x) else 0.0
+    return max(float(x.max()), -float(x.min())) if len(x) else 0.0  # half the time of max |x|; NaN stays NaN
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ from .active_set import ActiveSet
 from .lcp import LCPResult
 from .mprgp import ProjectedCG
 
-STORED_ENTRIES = 2_000_000  # of A⁻¹E over all ranks (16 MB): beyond it a second back-substitution is cheaper
+STORED_ENTRIES = 200_000  # of A⁻¹E over all ranks: beyond it a second back-substitution is cheaper than the product
 
 
 class SmallMethod(Protocol):
