@@ -28,15 +28,37 @@ from vi_contact.meshes.block import BlockMesh
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.step import ContactProblem, Scheme, Solver, State
-from vi_contact.surfaces import HalfSpace
+from vi_contact.surfaces import HalfSpace, empty_surface
 from vi_contact.system import SemiDiscreteSystem
 
 CONCRETE = LinearElastic(E=2.0e10, nu=0.2, rho=2400.0)
+BODIES = {
+    "bar": {"lengths": (2.0,), "divisions": (7,)},
+    "quadrilaterals": {"lengths": (2.0, 1.5), "divisions": (5, 4)},
+    "triangles": {"lengths": (2.0, 1.5), "divisions": (5, 4), "simplices": True, "angle": 0.4},
+    "hexahedra": {"lengths": (2.0, 1.5, 1.2), "divisions": (3, 2, 3)},
+    "tetrahedra": {"lengths": (2.0, 1.5, 1.2), "divisions": (3, 2, 3), "simplices": True, "angle": 0.4},
+}
 
 
 def block(comm: Any, **spec: Any) -> tuple[Any, Any]:
     """(mesh, tags) of a BlockMesh."""
     return build_mesh(BlockMesh(**spec), comm)
+
+
+def linear(system: SemiDiscreteSystem, **data: Any) -> ContactProblem:
+    """A system without contact."""
+    return ContactProblem(system, empty_surface(system.space.comm, system.space.dimension), **data)
+
+
+def nodal(system: SemiDiscreteSystem, function: Callable[[Array], Array]) -> Array:
+    """A field at the nodes as a vector of free unknowns."""
+    return np.asarray(system.space.restrict(np.asarray(function(system.space.points))))
+
+
+def resultant(system: SemiDiscreteSystem, load: Array) -> Array:
+    """Sum of the nodal forces (d,) of a system without prescribed components."""
+    return system.space.comm.sum(load.reshape(-1, system.space.dimension).sum(axis=0))
 
 
 def max_over_ranks(comm: Any, values: Array) -> float:
