@@ -157,6 +157,28 @@ def test_full_disk_from_the_start(tmp_path: Path) -> None:
         run(tmp_path)
 
 
+def test_full_disk_on_all_ranks(comm: Any, shared_tmp: Path) -> None:
+    """Every rank stops with the same sentence, whichever file the disk refuses first."""
+    pytest.importorskip("dolfinx")
+    from fem_problems import shaken_wall
+
+    from vi_contact.fem.fields import XDMF
+
+    wall = shaken_wall(comm)
+    for name in ("history.csv", "run.log"):
+        if comm.rank == 0:
+            (shared_tmp / name).symlink_to("/dev/full")
+        comm.Barrier()
+        with pytest.raises(ViContactError, match=f"the disk is full: '.*{name}'"):
+            simulate(
+                wall, scheme=ZienkiewiczWoodTaylor(), solver=Condensed(), dt=1e-3, steps=5, out=shared_tmp,
+                fields=XDMF(every=1),
+            )
+        comm.Barrier()
+        if comm.rank == 0:
+            (shared_tmp / name).unlink()
+
+
 @pytest.mark.serial
 def test_full_log(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """run.log on a full device is told like any other file."""

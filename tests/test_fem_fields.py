@@ -1,0 +1,286 @@
+"""Field output: stresses against closed forms, frames in the input's order on any number of ranks, always readable."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from math import cos, pi, sin, sqrt
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("dolfinx")
+
+import h5py
+from fem_problems import CONCRETE, block, field, shaken_wall, turned
+
+from vi_contact.errors import InputError
+from vi_contact.fem.assemble import assemble
+from vi_contact.fem.fields import XDMF
+from vi_contact.fem.loads import Prescribed
+from vi_contact.fem.stress import VonMises
+from vi_contact.fem.trace import contact_surface
+from vi_contact.materials import LinearElastic, PlaneStrain, PlaneStress, Section
+from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
+from vi_contact.simulate import Solution, simulate
+from vi_contact.solvers.condensed import Condensed
+from vi_contact.step import ContactProblem
+from vi_contact.surfaces import empty_surface
+
+DT = 1.0 / 560.0
+RUBBER = LinearElastic(E=3.0e6, nu=0.3, rho=1000.0)
+
+
+def run(problem: ContactProblem, out: Path | None, steps: int = 12, every: int = 5, **more: Any) -> Solution:
+    """A run with fields."""
+    fields = None if out is None else XDMF(every=every)
+    return simulate(
+        problem, scheme=ZienkiewiczWoodTaylor(), solver=Condensed(), dt=DT, steps=steps, out=out, fields=fields, **more
+    )
+
+
+def frames(folder: Path) -> list[dict[str, Any]]:
+    """What a reader of XDMF finds: for every grid its time and the arrays that its data items point to."""
+    found = []
+    for grid in ET.parse(folder / "fields.xdmf").getroot().iter("Grid"):
+        if grid.get("GridType") != "Uniform":
+            continue
+        arrays = {"t": float(grid.find("Time").get("Value")), "type": grid.find("Topology").get("TopologyType")}
+        arrays["cells"] = read(folder, grid.find("Topology/DataItem"))
+        arrays["points"] = read(folder, grid.find("Geometry/DataItem"))
+        for attribute in grid.findall("Attribute"):
+            arrays[attribute.get("Name")] = read(folder, attribute.find("DataItem"))
+            rows = len(arrays["cells" if attribute.get("Center") == "Cell" else "points"])
+            assert len(arrays[attribute.get("Name")]) == rows
+        found.append(arrays)
+    return found
+
+
+def read(folder: Path, item: Any) -> Any:
+    """The array of a data item, whose description must be that of the dataset."""
+    file, path = item.text.split(":")
+    with h5py.File(folder / file, "r") as opened:
+        dataset = opened[path]
+        assert " ".join(map(str, dataset.shape)) == item.get("Dimensions")
+        assert dataset.dtype.itemsize == int(item.get("Precision"))
+        assert {"f": "Float", "i": "Int"}[dataset.dtype.kind] == item.get("NumberType")
+        return dataset[()]
+
+
+def measure(points: Any, cells: Any) -> Any:
+    """Area or volume of cells in VTK's order, by the divergence theorem over its faces; a wrong order gives another."""
+    x = points[cells]
+    if np.ptp(points[:, 2]) == 0.0:
+        after = np.roll(x, -1, axis=1)
+        return 0.5 * np.sum(x[..., 0] * after[..., 1] - x[..., 1] * after[..., 0], axis=1)
+    faces = [(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)]
+    if cells.shape[1] == 8:
+        squares = [(0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)]
+        faces = [triangle for a, b, c, d in squares for triangle in ((a, b, c), (a, c, d))]
+    return sum(np.einsum("ij,ij->i", np.cross(x[:, a], x[:, b]), x[:, c]) / 6.0 for a, b, c in faces)
+
+
+# Stresses ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("section", [PlaneStrain(), PlaneStrain(0.25), PlaneStress(0.2), PlaneStress()], ids=repr)
+@pytest.mark.parametrize("simplices", [False, True])
+def test_von_mises_of_uniform_plane_stress_and_strain(comm: Any, section: Section, simplices: bool) -> None:
+    """sigma_v² = s_x² + s_y² + s_z² - s_x s_y - s_y s_z - s_z s_x + 3 s_xy², with Hooke's law written out."""
+    mesh, _ = block(comm, lengths=(2.0, 1.0), divisions=(3, 2), simplices=simplices, angle=0.4)
+    system = assemble(mesh, RUBBER, section=section)
+    gradient = np.array([[1e-3, 4e-4], [-2e-4, 2.5e-3]])
+    stress = VonMises(system.space.forms)(system.space.points @ gradient.T)
+    e_x, e_y, e_xy = gradient[0, 0], gradient[1, 1], 0.5 * (gradient[0, 1] + gradient[1, 0])
+    E, nu = RUBBER.E, RUBBER.nu
+    if isinstance(section, PlaneStress):
+        s_x, s_y, s_z = E / (1 - nu**2) * (e_x + nu * e_y), E / (1 - nu**2) * (e_y + nu * e_x), 0.0
+    else:
+        factor = E / ((1 + nu) * (1 - 2 * nu))
+        s_x, s_y = factor * ((1 - nu) * e_x + nu * e_y), factor * ((1 - nu) * e_y + nu * e_x)
+        s_z = nu * (s_x + s_y)
+    s_xy = E / (1 + nu) * e_xy
+    exact = sqrt(s_x**2 + s_y**2 + s_z**2 - s_x * s_y - s_y * s_z - s_z * s_x + 3 * s_xy**2)
+    assert len(stress) == mesh.topology.index_map(2).size_local
+    assert stress == pytest.approx(exact, rel=1e-12)
+
+
+@pytest.mark.parametrize("simplices", [False, True])
+def test_von_mises_in_three_dimensions(comm: Any, simplices: bool) -> None:
+    """Pure shear gamma in x, y: √3 G gamma. A pressure has none."""
+    mesh, _ = block(comm, lengths=(1.0, 1.0, 2.0), divisions=(2, 2, 2), simplices=simplices)
+    system = assemble(mesh, RUBBER)
+    von_mises, x = VonMises(system.space.forms), system.space.points
+    shear = np.column_stack([1e-3 * x[:, 1], 0.0 * x[:, 0], 0.0 * x[:, 0]])
+    assert von_mises(shear) == pytest.approx(sqrt(3.0) * RUBBER.shear_modulus * 1e-3, rel=1e-12)
+    assert np.all(von_mises(1e-3 * x) < 1e-9 * RUBBER.E * 1e-3)
+
+
+def test_von_mises_of_bending_is_a_cell_mean(comm: Any) -> None:
+    """u = (x y, 0), nu = 0, E = 1, plane stress: sigma_x = y, sigma_xy = x/2, so the mean of √(y² + 3 x²/4)."""
+    mesh, _ = block(comm, lengths=(1.0, 1.0), divisions=(1, 2), corner=(0.0, 1.0))
+    system = assemble(mesh, LinearElastic(E=1.0, nu=0.0, rho=1.0), section=PlaneStress())
+    x, y = system.space.points.T
+    stress = VonMises(system.space.forms)(np.column_stack([x * y, 0.0 * x]))
+    numbers = np.asarray(mesh.topology.original_cell_index)[: len(stress)]
+    values = [value for _, value in sorted(sum(comm.allgather(list(zip(numbers, stress, strict=True))), []))]
+    points, weights = np.polynomial.legendre.leggauss(20)
+    s, w = 0.5 * (points + 1.0), 0.5 * weights
+    for value, low in zip(values, (1.0, 1.5), strict=True):
+        mean = sum(
+            a * b * sqrt((low + 0.5 * t) ** 2 + 3.0 * (0.5 * r) ** 2)
+            for r, a in zip(s, w, strict=True) for t, b in zip(s, w, strict=True)
+        )
+        assert value == pytest.approx(mean, rel=2e-3)  # two Gauss points per axis
+
+
+# Frames --------------------------------------------------------------------------------------------------------------
+
+
+def test_frames_hold_the_run(comm: Any, shared_tmp: Path) -> None:
+    """Frames at steps 0, 18, 36 with the displacement, velocity and contact of a march, turned back to the axes."""
+    problem = shaken_wall(comm, angle=0.3, gap=1e-7)
+    run(problem, shared_tmp, 40, 18)
+    found = frames(shared_tmp)
+    assert [round(frame["t"] / DT) for frame in found] == [0, 18, 36]
+    for frame, steps in zip(found, (0, 18, 36), strict=True):
+        solution = run(problem, None, steps)
+        state = solution.state
+        points, u = field(problem.system, problem.cartesian(state.u))
+        _, v = field(problem.system, problem.cartesian(state.v))
+        assert frame["t"] == state.t
+        for name, exact in (("points", points), ("u", u), ("v", v)):
+            assert np.allclose(frame[name][:, :2], exact, rtol=0.0, atol=1e-10 * np.max(np.abs(exact), initial=1e-300))
+            assert frame[name].shape[1] == 3 and not frame[name][:, 2].any()
+        near = [int(np.argmin(np.linalg.norm(points - x, axis=1))) for x in problem.surface.points]
+        status, pressure = np.zeros(len(points), int), np.zeros(len(points))
+        status[near] = np.where(state.active, 2, 1)
+        pressure[near] = state.r_n / problem.surface.weights
+        assert frame["contact_status"].tolist() == status.tolist()
+        assert np.allclose(frame["contact_pressure"], pressure, rtol=1e-9, atol=1e-9 * pressure.max())
+    assert not found[0]["a"].any() and found[1]["a"].any()
+    assert (found[2]["contact_status"] == 2).any()
+
+
+def test_acceleration_is_that_of_the_step(comm: Any, shared_tmp: Path) -> None:
+    """a = (v_new - v_old)/dt where no impact law changes the velocity."""
+    mesh, tags = block(comm, lengths=(1.0, 2.0), divisions=(2, 3))
+    system = assemble(mesh, RUBBER, clamped=tags["bottom"], initial_velocity=(0.1, 0.0))
+    problem = ContactProblem(system, empty_surface(system.space.comm, 2))
+    run(problem, shared_tmp, 2, 1)
+    _, before, after = frames(shared_tmp)
+    assert np.allclose(after["a"], (after["v"] - before["v"]) / DT, rtol=0.0, atol=1e-9 * np.abs(after["a"]).max())
+
+
+def test_prescribed_motion_is_in_the_fields(comm: Any, shared_tmp: Path) -> None:
+    """Nodes that are moved by hand have their displacement, velocity and acceleration in every frame."""
+    mesh, tags = block(comm, lengths=(1.0, 2.0), divisions=(2, 3))
+    w = 2.0 * pi * 5.0
+    motion = Prescribed(
+        tags["bottom"],
+        displacement=lambda x, t: np.tile([1e-3 * sin(w * t), 0.0], (len(x), 1)),
+        velocity=lambda x, t: np.tile([1e-3 * w * cos(w * t), 0.0], (len(x), 1)),
+        acceleration=lambda x, t: np.tile([-1e-3 * w**2 * sin(w * t), 0.0], (len(x), 1)),
+    )
+    system = assemble(mesh, RUBBER, prescribed=motion, initial_velocity=(1e-3 * w, 0.0))
+    run(ContactProblem(system, empty_surface(system.space.comm, 2)), shared_tmp, 6, 3)
+    last = frames(shared_tmp)[-1]
+    bottom, t = last["points"][:, 1] == 0.0, 6 * DT
+    assert bottom.sum() == 3
+    for name, exact in (("u", sin(w * t)), ("v", w * cos(w * t)), ("a", -(w**2) * sin(w * t))):
+        assert last[name][bottom, 0] == pytest.approx(1e-3 * exact, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("lengths", "divisions", "simplices", "kind"),
+    [
+        ((2.0, 3.0), (2, 3), False, "Quadrilateral"),
+        ((2.0, 3.0), (2, 3), True, "Triangle"),
+        ((2.0, 1.0, 3.0), (2, 1, 3), False, "Hexahedron"),
+        ((2.0, 1.0, 3.0), (2, 1, 3), True, "Tetrahedron"),
+    ],
+)
+def test_cells_in_the_order_of_vtk(
+    comm: Any, shared_tmp: Path, lengths: Any, divisions: Any, simplices: bool, kind: str
+) -> None:
+    """Every cell has its positive area or volume in VTK's vertex order, and they fill the body."""
+    mesh, tags = block(comm, lengths=lengths, divisions=divisions, simplices=simplices)
+    system = assemble(mesh, CONCRETE, clamped=tags["bottom"])
+    problem = ContactProblem(system, contact_surface(system, tags["right"]))
+    run(problem, shared_tmp, 1, 1)
+    frame = frames(shared_tmp)[-1]
+    sizes = np.abs(measure(frame["points"], frame["cells"])) if simplices else measure(frame["points"], frame["cells"])
+    assert frame["type"] == kind
+    assert sizes.min() > 0.0 and sizes.sum() == pytest.approx(np.prod(lengths), rel=1e-12)
+    if not simplices:
+        assert np.allclose(sizes, np.prod(lengths) / len(sizes), rtol=1e-12)
+
+
+def test_files_do_not_depend_on_the_ranks(comm: Any, shared_tmp: Path) -> None:
+    """The frames of all ranks together and of one rank alone: same mesh, same order, fields to 1e-10."""
+    from mpi4py import MPI
+
+    run(shaken_wall(comm, angle=0.3, gap=1e-7), shared_tmp / "all", 36, 12)
+    if comm.rank == 0:
+        run(shaken_wall(MPI.COMM_SELF, angle=0.3, gap=1e-7), shared_tmp / "one", 36, 12)
+    comm.Barrier()
+    for together, alone in zip(frames(shared_tmp / "all"), frames(shared_tmp / "one"), strict=True):
+        assert np.array_equal(together["cells"], alone["cells"]) and np.array_equal(together["points"], alone["points"])
+        for name in ("u", "v", "a", "von_mises", "contact_pressure", "contact_status"):
+            size = np.max(np.abs(alone[name]), initial=0.0)
+            assert np.allclose(together[name], alone[name], rtol=0.0, atol=1e-10 * size), name
+
+
+def test_restart_goes_on_after_the_frames_it_keeps(comm: Any, shared_tmp: Path) -> None:
+    """Frames behind the checkpoint are removed, and the index never names a frame that is not there."""
+    problem = shaken_wall(comm)
+    run(problem, shared_tmp, 12, 2, checkpoint_every=100)
+    late = shared_tmp / "fields" / "frame_000014.h5"
+    if comm.rank == 0:
+        late.write_bytes(b"of a step after the checkpoint")
+    comm.Barrier()
+    run(problem, shared_tmp, 12, 2, restart=True)
+    assert not late.exists() and [round(frame["t"] / DT) for frame in frames(shared_tmp)] == [0, 2, 4, 6, 8, 10, 12]
+    run(problem, shared_tmp, 16, 2, restart=True)
+    assert [round(frame["t"] / DT) for frame in frames(shared_tmp)] == list(range(0, 17, 2))
+    run(problem, shared_tmp, 2, 2)
+    assert [round(frame["t"] / DT) for frame in frames(shared_tmp)] == [0, 2]
+    assert len(list((shared_tmp / "fields").glob("frame_*.h5"))) == 2
+
+
+def test_index_is_readable_after_every_frame(comm: Any, shared_tmp: Path) -> None:
+    """Whatever moment the run is killed at, the index on disk names complete frames only."""
+    seen: list[int] = []
+
+    class Looks:
+        def columns(self) -> dict[str, tuple[str, str]]:
+            return {"looks": ("-", "frames on disk")}
+
+        def start(self, problem: Any, state: Any, resumed: Any = None) -> dict[str, float]:
+            return {"looks": 0.0}
+
+        def row(self, report: Any) -> dict[str, float]:
+            seen.append(len(frames(shared_tmp)))
+            comm.Barrier()
+            return {"looks": 1.0}
+
+    run(shaken_wall(comm), shared_tmp, 6, 2, record=[Looks()])
+    assert seen == [1, 1, 2, 2, 3, 3]
+
+
+def test_bad_settings_are_told(comm: Any, shared_tmp: Path) -> None:
+    """every < 1, and a system without finite elements."""
+    from chain import chain_problem
+
+    with pytest.raises(InputError, match="XDMF every is 0"):
+        XDMF(every=0)
+    if comm.rank == 0:
+        with pytest.raises(InputError, match="XDMF needs a system made by fem.assemble"):
+            run(chain_problem(3), shared_tmp)
+
+
+def test_turned_is_the_rotation_of_the_mesh(comm: Any) -> None:
+    """The angle of the walls above is not zero: their contact frames are turned."""
+    assert shaken_wall(comm, angle=0.3).surface.basis is not None
+    assert np.allclose(shaken_wall(comm, angle=0.3).surface.normals, turned((1.0, 0.0), 0.3))
