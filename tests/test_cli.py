@@ -1,0 +1,122 @@
+"""The command line: explains itself, prints what it finds, and says in one sentence what is wrong."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import vi_contact
+from vi_contact.cli import _impact, main, parser, split_petsc
+from vi_contact.errors import InputError
+from vi_contact.impact import ComponentReset, Inelastic, MassProjection, Newton, NoImpact
+
+pytestmark = pytest.mark.serial
+ROOT = Path(vi_contact.__file__).parent.parent
+
+
+def shell(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """python3 -m vi_contact, as a user calls it."""
+    command = [sys.executable, "-m", "vi_contact", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False)
+
+
+@pytest.fixture
+def record(tmp_path: Path) -> Path:
+    """Two columns t, a: one period of a 2 m/s² sine at 1 Hz."""
+    t = np.arange(101) * 0.01
+    path = tmp_path / "sine.txt"
+    np.savetxt(path, np.column_stack([t, 2.0 * np.sin(2.0 * np.pi * t)]), fmt="%.10e")
+    return path
+
+
+def test_help_explains_itself():
+    done = shell("--help")
+    assert done.returncode == 0 and not done.stderr
+    for word in ("vi-contact", "unilateral contact", "mpirun", "wall", "seed 000", "motion", "ground motion files"):
+        assert word in done.stdout
+
+
+def test_every_command_has_its_own_help():
+    for command in (["wall"], ["motion"], ["motion", "info"]):
+        with pytest.raises(SystemExit) as stopped:
+            main([*command, "--help"])
+        assert stopped.value.code == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"), [([], "COMMAND"), (["bridge"], "invalid choice: 'bridge'"), (["motion"], "ACTION")]
+)
+def test_unknown_commands_show_the_usage(arguments, word):
+    done = shell(*arguments)
+    assert done.returncode == 2 and not done.stdout
+    assert done.stderr.startswith("usage: vi-contact") and word in done.stderr
+
+
+def test_version(capsys):
+    with pytest.raises(SystemExit) as stopped:
+        main(["--version"])
+    assert stopped.value.code == 0
+    assert capsys.readouterr().out == f"vi-contact {vi_contact.__version__}\n"
+
+
+def test_motion_info(record):
+    done = shell("motion", "info", str(record), "--units", "m/s2")
+    assert done.returncode == 0 and not done.stderr
+    lines = {line[:20].strip(): line[20:] for line in done.stdout.splitlines()}
+    assert lines["file"] == str(record) and lines["samples"] == "101" and lines["dt"] == "0.01 s"
+    assert lines["PGA"].startswith("2 m/s2 = 0.2039 g at t = 0.25 s")
+    assert float(lines["PGV"].split()[0]) == pytest.approx(2.0 / np.pi, rel=2e-3)  # (1 - cos) a/w
+    assert float(lines["Arias intensity"].split()[0]) == pytest.approx(np.pi / (2 * 9.80665) * 2.0, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        (["motion", "info", "nowhere.AT2"], "nowhere.AT2: there is no such file"),
+        (["motion", "info", "."], "Is a directory"),
+        (["wall", "--case", "z"], "unknown case 'z': choose one of"),
+        (["wall", "--impact", "soft"], "unknown impact law 'soft'"),
+        (["wall", "--impact", "1.5"], "restitution coefficient e is 1.5"),
+    ],
+)
+def test_errors_are_one_sentence(arguments, word):
+    if arguments[0] == "wall":
+        pytest.importorskip("dolfinx")
+    done = shell(*arguments)
+    assert done.returncode == 1 and not done.stdout
+    assert done.stderr.startswith("vi-contact: ") and done.stderr.count("\n") == 1
+    assert word in done.stderr and "Traceback" not in done.stderr
+
+
+def test_units_must_be_said(record, capsys):
+    assert main(["motion", "info", str(record)]) == 1
+    captured = capsys.readouterr()
+    assert not captured.out and "units" in captured.err and captured.err.count("\n") == 1
+
+
+def test_impact_laws_by_name():
+    assert _impact("none", False) == NoImpact()
+    assert _impact("inelastic", False) == Inelastic(ComponentReset())
+    assert isinstance(_impact("inelastic", True).reading, MassProjection)
+    assert _impact("elastic", False) == Newton(1.0) and _impact("0.25", False) == Newton(0.25)
+    with pytest.raises(InputError, match="give inelastic, elastic, none or a restitution"):
+        _impact("bouncy", False)
+
+
+def test_petsc_options_are_told_from_ours():
+    own, petsc = split_petsc(
+        ["wall", "-vi_contact_volume_snes_monitor", "-vi_contact_volume_snes_rtol", "1e-9", "--case", "b", "--dt", "0.1"]
+    )
+    assert own == ["wall", "--case", "b", "--dt", "0.1"]
+    assert petsc == ["-vi_contact_volume_snes_monitor", "-vi_contact_volume_snes_rtol", "1e-9"]
+    assert split_petsc(["wall", "--out", "x"]) == (["wall", "--out", "x"], [])
+
+
+def test_wall_defaults_are_those_of_the_seed():
+    options = parser().parse_args(["wall"])
+    assert (options.solver, options.scheme, options.impact) == ("condensed", "zwt", "inelastic")
+    assert options.motion is None and not options.gravity and not options.projection and options.dt is None
