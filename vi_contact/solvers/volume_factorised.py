@@ -136,10 +136,11 @@ class OneFactorisation:
     """SNES VINEWTONRSLS on the one factorisation of A. Iterations are back-substitutions after the first.
 
     It starts from the solution on the predicted contact set, so a right prediction costs one back-substitution and no
-    iteration. ``limit``: numbers of W kept on a rank (8 bytes each); beyond it, one more back-substitution is used.
+    iteration. ``limit``: W is kept when its rows x m numbers on a rank are not more (8 bytes each, taken as points come
+    into contact); beyond it every change of the contact set costs a back-substitution.
     """
 
-    limit: int = 50_000_000
+    limit: int = 100_000_000
 
     def defaults(self, ranks: int) -> Options:
         """Options before the user's."""

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
+from scipy.linalg.blas import dgemv
 
-from ..algebra import Array, Indices, Mask
+from ..algebra import Array, Mask
 from ..errors import StepFailure
 from .volume_system import BoundedSystem
 
@@ -13,8 +14,8 @@ from .volume_system import BoundedSystem
 class HeldInverse:
     """Solves A z = r - reactions with z = target on a held set of contact points, by the factor of A alone.
 
-    Columns of W are made when a point is first held. At most ``limit`` numbers of them are kept on a rank; a set with
-    columns beyond that costs a second back-substitution instead of the product with W. G costs m² numbers.
+    Columns of W are made when a point is first held. They are kept when there is room for ``limit`` numbers on every
+    rank; else W is applied as a second back-substitution. G costs m² numbers.
     Springs enter by their compliance only: eliminating w gives back A, and G + compliance/scale.
     """
 
@@ -22,11 +23,9 @@ class HeldInverse:
         self._system = system
         self._factor = system.A.factor
         m = system.surface.count
-        self._capacity = limit // max(system.rows, 1) if system.rows else m
-        self._capacity = -int(system.max(-self._capacity)[0])  # ranks must agree on what is kept
+        keep = system.max(float(m * system.rows))[0] <= limit
+        self._W = np.empty((m if keep else 0, system.rows))  # row j is column j; memory is taken when it is written
         self._known = np.zeros(m, dtype=bool)
-        self._kept: list[tuple[Indices, Array]] = []  # (slots, columns of W)
-        self._stored = np.zeros(m, dtype=bool)
         self._G = np.zeros((m, m))
         self._set, self._cholesky = b"", (np.zeros((0, 0)), False)
 
@@ -42,25 +41,26 @@ class HeldInverse:
         """z - W reaction, with the reaction on ``held`` (m,) that brings its points to ``target`` (m,)."""
         if not held.any():
             return z
-        system = self._system
+        system, n = self._system, self._system.rows
         reaction = np.zeros(len(held))
         reaction[held] = self._solve(held, (system.shared(z[system.bounded]) - target)[held])
-        change = self._respond(reaction)
-        z = z - np.concatenate([change, change[system.feet]])
-        z[system.rows :] -= reaction[system.surface.slots][system.soft] / system.spring
+        x = z[:n] - self._respond(reaction, held)
+        w = z[n:] - z[system.feet] + x[system.feet] - reaction[system.surface.slots][system.soft] / system.spring
+        z = np.concatenate([x, w])
         mine = held[system.surface.slots]
         z[system.bounded[mine]] = target[system.surface.slots][mine]
         return z
 
-    def _respond(self, reaction: Array) -> Array:
-        """W reaction."""
-        surface, rows = self._system.surface, self._system.rows
-        if np.any(reaction[~self._stored]):
-            return self._factor.solve(surface.reaction_load(reaction, rows))
-        x = np.zeros(rows)
-        for slots, columns in self._kept:
-            if reaction[slots].any():
-                x += columns @ reaction[slots]
+    def _respond(self, reaction: Array, held: Mask) -> Array:
+        """W reaction; kept columns are multiplied in runs of neighbours, without copying."""
+        if not len(self._W):
+            return self._factor.solve(self._system.surface.reaction_load(reaction, self._system.rows))
+        x = np.zeros(self._system.rows)
+        if not len(x):
+            return x  # BLAS does not take empty matrices
+        ends = np.flatnonzero(np.diff(np.concatenate([[False], held, [False]])))
+        for first, last in ends.reshape(-1, 2):
+            x = dgemv(1.0, self._W[first:last].T, reaction[first:last], beta=1.0, y=x, overwrite_y=True)
         return x
 
     def _solve(self, held: Mask, gap: Array) -> Array:
@@ -93,6 +93,5 @@ class HeldInverse:
         part[surface.slots] = columns[surface.owned]
         self._G[:, slots] = surface.comm.sum(part)
         self._known |= new
-        if self._stored.sum() + len(slots) <= self._capacity:
-            self._kept.append((slots, columns))
-            self._stored |= new
+        if len(self._W):
+            self._W[slots] = columns.T
