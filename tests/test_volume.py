@@ -1,4 +1,4 @@
-"""The volume route against brute force over all contact sets (design idea 4), for every method, in serial and parallel."""
+"""The volume route against brute force over all contact sets (design idea 4): every method, serial and parallel."""
 
 from __future__ import annotations
 
@@ -14,7 +14,15 @@ pytest.importorskip("petsc4py")
 
 from volume_cases import Case, block, case, pushed_block
 
-from vi_contact.solvers.volume import OneFactorisation, ReducedNewton, Selected, SemismoothNewton, TaoBnls, TaoTron, Volume
+from vi_contact.solvers.volume import (
+    OneFactorisation,
+    ReducedNewton,
+    Selected,
+    SemismoothNewton,
+    TaoBnls,
+    TaoTron,
+    Volume,
+)
 from vi_contact.verify import kkt_residual
 
 METHODS = {
@@ -74,7 +82,7 @@ def test_agrees_with_brute_force(parallel: bool, method: Any, options: dict[str,
 
 @pytest.mark.parametrize("method", [ReducedNewton(), OneFactorisation(), SemismoothNewton()])
 def test_springs_far_from_the_stiffness_of_the_body(parallel: bool, method: Any) -> None:
-    """Springs 1e6 times stiffer and 1e6 times softer than the body; TAO's trust region does not get along with these."""
+    """Springs 1e6 times stiffer and softer than the body; TAO's trust region does not get along with these."""
     c = pushed_block(parallel=parallel, compliance=10.0 ** np.linspace(-6.0, 6.0, M))
     agree(c, solve(c, method), c.exact())
 
@@ -151,7 +159,7 @@ class CountingFactor:
 
 @pytest.mark.parametrize(("limit", "solves"), [(10**6, (1, 1)), (0, (4, 2))])
 def test_back_substitutions_of_a_step(parallel: bool, limit: int, solves: tuple[int, int]) -> None:
-    """Solver notes 1b: one for the whole step, however the contact set changes; one more for each set where W is not kept.
+    """Solver notes 1b: one for the step, however the contact set changes; one more for each set if W is not kept.
 
     From a wrong set: the free solution, that set, two changes. At the solution: the free solution and its set.
     """
@@ -177,7 +185,7 @@ def test_one_solver_many_steps(parallel: bool, method: Any) -> None:
 @pytest.mark.parametrize("force", [1e-6, 1.0, 1e6])
 @pytest.mark.parametrize("length", [1e-6, 1.0, 1e6])
 def test_units_do_not_matter(parallel: bool, method: Any, length: float, force: float) -> None:
-    """V4.1 (6), homogeneity: the same case in other units of length and force gives the same numbers to 1e-9 (P1, P18)."""
+    """V4.1 (6), P1, P18: the same case in other units of length and force gives the same numbers to 1e-9."""
     options = OPTIONS["springs and rigid points"]
     exact = pushed_block(seed=4, **options).exact()
     scaled = {key: value * length / force if key == "compliance" else value for key, value in options.items()}
@@ -187,7 +195,10 @@ def test_units_do_not_matter(parallel: bool, method: Any, length: float, force: 
     assert np.max(np.abs(result.r_n / force - exact.r_n)) <= 1e-9 * np.max(exact.r_n)
 
 
-@pytest.mark.parametrize("petsc_type", ["bntl", "bqnls", "bqnkls", "bqnktr", "bqnktl", "blmvm", "bncg", "vinewtonrsls", "vinewtonssls"])
+SELECTED = ("bntl", "bqnls", "bqnkls", "bqnktr", "bqnktl", "blmvm", "bncg", "vinewtonrsls", "vinewtonssls")
+
+
+@pytest.mark.parametrize("petsc_type", SELECTED)
 def test_selected_types_reach_the_certificate(parallel: bool, petsc_type: str) -> None:
     """Slow or not, what is offered ends below the tolerance of the loop."""
     c = pushed_block(parallel=parallel)

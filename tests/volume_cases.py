@@ -19,7 +19,7 @@ from vi_contact.surfaces import ContactSurface
 
 
 def q1_element(nu: float) -> tuple[Array, Array]:
-    """(stiffness, mass) of a unit square, E = rho = 1, plane strain; nodes counter-clockwise, components interleaved."""
+    """(stiffness, mass) of a unit square, E = rho = 1, plane strain; nodes anticlockwise, components interleaved."""
     D = np.array([[1.0 - nu, nu, 0.0], [nu, 1.0 - nu, 0.0], [0.0, 0.0, 0.5 - nu]]) / ((1.0 + nu) * (1.0 - 2.0 * nu))
     K, M = np.zeros((8, 8)), np.zeros((8, 8))
     corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
@@ -148,7 +148,7 @@ def _parallel(matrix: Any) -> tuple[slice, EffectiveMatrix, Any]:
 def pushed_block(
     nx: int = 5, ny: int = 8, *, length: float = 1.0, force: float = 1.0, seed: int = 0, **options: Any
 ) -> Case:
-    """A dynamic step of the block under loads that close about half of its points; ``length`` and ``force`` are units."""
+    """A dynamic step of the block under loads that close half of its points; ``length`` and ``force`` are units."""
     rng = np.random.default_rng(seed)
     body = block(nx, ny)
     matrix = (body.K + 4.0 * body.M) * (force / length)

@@ -70,7 +70,7 @@ class Volume:
 
     def __post_init__(self) -> None:
         if not 0.0 < self.tolerance < 1.0:
-            raise InputError(f"Volume tolerance is {self.tolerance}: give a relative error between 0 and 1, such as 1e-9")
+            raise InputError(f"Volume tolerance is {self.tolerance}: give a relative error below 1, such as 1e-9")
 
     def check(self, problem: ContactProblem) -> None:
         """InputError for friction: bounds on single unknowns cannot express |r_t| <= threshold."""

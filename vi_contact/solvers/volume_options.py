@@ -65,6 +65,7 @@ def refuse(combination: str, reason: str, remedy: str) -> None:
     raise InputError(f"{combination} is refused because {reason}: {remedy}")
 
 
+NOT_EXACT = "one application of it does not solve the system"
 NEEDS_MODES = "it is built on the whole displacement field, and the reduced matrix has lost its blocks and rigid modes"
 REDUCED_PC = {
     "gamg": f"{NEEDS_MODES} (PETSc 3.18 stops with error 60 as soon as the active set changes)",
@@ -81,7 +82,7 @@ def check_reduced(snes: Any, layers: OptionLayers) -> None:
     if pc in REDUCED_PC:
         refuse(f"pc_type {pc} with vinewtonrsls", REDUCED_PC[pc], "use cholesky with MUMPS, hypre or bjacobi")
     if ksp == "preonly" and pc not in DIRECT:
-        refuse(f"ksp_type preonly with pc_type {pc}", "one application of it does not solve the system", "use ksp_type cg")
+        refuse(f"ksp_type preonly with pc_type {pc}", NOT_EXACT, "use ksp_type cg")
     _check_line_search(layers)
 
 
@@ -90,7 +91,8 @@ def check_own_inverse(snes: Any, layers: OptionLayers) -> None:
     _check_type(snes, "vinewtonrsls", layers)
     pc = snes.ksp.pc.getType()
     if pc != "python":
-        refuse(f"pc_type {pc} with OneFactorisation", "the reduced matrix is never assembled", "use method=ReducedNewton()")
+        reason = "the reduced matrix is never assembled"
+        refuse(f"pc_type {pc} with OneFactorisation", reason, "use method=ReducedNewton()")
     _check_line_search(layers)
 
 
@@ -100,9 +102,10 @@ def check_semismooth(snes: Any, layers: OptionLayers) -> None:
     pc, ksp = snes.ksp.pc.getType(), snes.ksp.getType()
     for kind, name, symmetric in (("pc", pc, ("cholesky", "icc")), ("ksp", ksp, SYMMETRIC_KSP)):
         if name in symmetric:
-            refuse(f"{kind}_type {name} with vinewtonssls", "the semismooth Jacobian is not symmetric", "use lu with preonly")
+            reason = "the semismooth Jacobian is not symmetric"
+            refuse(f"{kind}_type {name} with vinewtonssls", reason, "use lu with preonly")
     if ksp == "preonly" and pc != "lu":
-        refuse(f"ksp_type preonly with pc_type {pc}", "one application of it does not solve the system", "use lu or gmres")
+        refuse(f"ksp_type preonly with pc_type {pc}", NOT_EXACT, "use lu or gmres")
     _check_line_search(layers)
 
 

@@ -73,7 +73,7 @@ class ScaledStep:
         return np.asarray((self.upper[i] - y[i] < -F[i]) | (self.lower[i] == self.upper[i]))
 
     def errors(self, y: Array, F: Array) -> tuple[float, float, float]:
-        """Largest |F| off the active set and largest |gap| on it, relative as in the certificate; backward error of F."""
+        """Largest |F| off the active set and |gap| on it, relative as in the certificate; backward error of F."""
         system, i = self.system, self.system.bounded
         active = self.active(y, F)
         gap = (self.upper[i] - y[i])[active]
@@ -110,7 +110,7 @@ class ScaledStep:
         return 0
 
     def accepts(self, y: Array, F: Array) -> bool:
-        """True below the tolerance: a solver whose line search fails at the floor of round-off is done, not diverged."""
+        """True below the tolerance: a solver whose line search fails at the floor of round-off is done."""
         force, gap, _ = self.errors(y, F)
         self._worst = max(force, gap)
         return self._worst <= self.tolerance

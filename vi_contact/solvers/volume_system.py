@@ -79,7 +79,7 @@ class BoundedSystem:
     def bounds(self, step: StepProblem) -> tuple[Array, Array]:
         """(lower, upper) of the owned unknowns; an infinite bound leaves its point free, bilateral or not."""
         if np.isnan(step.bound).any():
-            raise InputError("the bound of the contact conditions contains NaN: check the gap or the scheme that made it")
+            raise InputError("the bound of the contact conditions contains NaN: check the gap and the time scheme")
         lower, upper = np.full(self.size, -np.inf), np.full(self.size, np.inf)
         bound = step.bound[self.surface.slots]
         upper[self.bounded] = bound
