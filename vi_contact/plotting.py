@@ -1,4 +1,7 @@
-"""Pictures of recorded histories, saved as PNG on rank 0 (matplotlib is imported late and draws off screen)."""
+"""Pictures of recorded histories, saved as PNG on rank 0.
+
+matplotlib is imported late, and its state is left alone: neither the user's backend nor his settings change.
+"""
 
 from __future__ import annotations
 
@@ -12,16 +15,19 @@ from .algebra import Array
 
 History = Mapping[str, Array]
 _UNITS = ((1.0, "m"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm"))
+_STYLE = {"axes.grid": True, "grid.alpha": 0.3, "axes.spines.top": False, "axes.spines.right": False}
 
 
-def _pyplot() -> Any:
+def _panels(rows: int, size: tuple[float, float], **more: Any) -> tuple[Any, Any]:
+    """(figure, array of axes above each other with one time axis)."""
     import matplotlib
+    from matplotlib.figure import Figure
 
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    plt.rcParams.update({"axes.grid": True, "grid.alpha": 0.3, "axes.spines.top": False, "axes.spines.right": False})
-    return plt
+    with matplotlib.rc_context(_STYLE):
+        figure = Figure(figsize=size, layout="constrained")
+        axes = figure.subplots(rows, 1, sharex=True, squeeze=False, **more)[:, 0]
+    axes[-1].set_xlabel("time [s]")
+    return figure, axes
 
 
 def length_unit(size: float) -> tuple[float, str]:
@@ -42,30 +48,33 @@ def _scaled(values: Array, unit: str) -> tuple[Array, str]:
 
 
 def _save(figure: Any, path: str | Path) -> Path:
+    figure.align_ylabels()
     figure.savefig(path, dpi=130)
-    _pyplot().close(figure)
     return Path(path)
 
 
 def plot_points(
-    history: History, labels: Sequence[str], path: str | Path, *, title: str, component: str = "x",
-    unilateral: Sequence[str] = (), reference: History | None = None,
+    history: History,
+    labels: Sequence[str],
+    path: str | Path,
+    *,
+    title: str,
+    component: str = "x",
+    unilateral: Sequence[str] = (),
+    reference: History | None = None,
 ) -> Path:
     """One panel per point: displacement against time, as Figs. 4 and 5 of seed 000.
 
     unilateral: labels of contact points, drawn with their bound at zero. reference: another run, drawn in grey.
     """
-    plt = _pyplot()
     names = [f"u_{component}_{label}" for label in labels]
     size = max(float(np.max(np.abs(history[name]), initial=0.0)) for name in names)
     metres, unit = length_unit(size)
-    figure, axes = plt.subplots(
-        len(names), 1, sharex=True, sharey=True, figsize=(9, 1.5 * len(names) + 1.2), constrained_layout=True
-    )
-    for axis, name, label in zip(np.atleast_1d(axes), names, labels, strict=True):
+    figure, axes = _panels(len(names), (9.0, 1.5 * len(names) + 1.2), sharey=True)
+    for axis, name, label in zip(axes, names, labels, strict=True):
         if reference is not None:
             axis.plot(reference["t"], reference[name] / metres, color="0.65", lw=0.8, label="no contact")
-        axis.plot(history["t"], history[name] / metres, color="black", lw=0.9, label="unilateral")
+        axis.plot(history["t"], history[name] / metres, color="black", lw=0.9, label="with contact")
         kind = "free point"
         if label in unilateral:
             kind = "contact point"
@@ -73,23 +82,21 @@ def plot_points(
         axis.set_ylabel(f"$u_{component}$ [{unit}]")
         axis.set_title(f"point {label} ({kind})", fontsize=9, loc="left")
     if reference is not None:
-        np.atleast_1d(axes)[0].legend(fontsize=8, loc="upper right")
-    np.atleast_1d(axes)[-1].set_xlabel("time [s]")
+        axes[0].legend(fontsize=8, ncol=2, loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
     figure.suptitle(title)
     return _save(figure, path)
 
 
 def plot_excitation(history: History, path: str | Path, *, title: str = "Ground acceleration") -> Path:
     """The ground acceleration components that the run used (Fig. 3)."""
-    plt = _pyplot()
-    figure, axis = plt.subplots(figsize=(9, 3), constrained_layout=True)
+    figure, (axis,) = _panels(1, (9.0, 3.0))
     for component in "xyz":
         values = history.get(f"a_g_{component}")
         if values is not None and np.any(values):
             axis.plot(history["t"], values, lw=0.9, label=f"$a_{{g,{component}}}$")
     if axis.lines:
         axis.legend()
-    axis.set(xlabel="time [s]", ylabel="acceleration [m/s²]", title=title)
+    axis.set(ylabel="acceleration [m/s²]", title=title)
     return _save(figure, path)
 
 
@@ -106,37 +113,33 @@ _LEDGER = (
 
 def plot_energy(history: History, path: str | Path, *, title: str = "Energy ledger") -> Path:
     """The ledger's terms, and its defect relative to the largest of them."""
-    plt = _pyplot()
-    figure, (top, bottom) = plt.subplots(
-        2, 1, sharex=True, figsize=(9, 6), height_ratios=(3, 1), constrained_layout=True
-    )
-    present = [entry for entry in _LEDGER if entry[0] in history]
-    size = np.array([max(float(np.max(np.abs(history[name]), initial=0.0)) for name, *_ in present)])
+    figure, (top, bottom) = _panels(2, (9.0, 6.0), height_ratios=(3, 1))
+    present = [entry for entry in _LEDGER if entry[0] in history and np.any(history[entry[0]])]
+    size = np.array([max((float(np.max(np.abs(history[name]))) for name, *_ in present), default=0.0)])
     shown, unit = _scaled(size, "J")
     factor = shown[0] / size[0] if size[0] else 1.0
     for name, label, colour, style in present:
-        if np.any(history[name]):
-            top.plot(history["t"], history[name] * factor, color=colour, ls=style, lw=1.0, label=label)
+        top.plot(history["t"], history[name] * factor, color=colour, ls=style, lw=1.0, label=label)
+    if present:
+        top.legend(fontsize=8, ncol=2)
     top.set(ylabel=f"energy, cumulative work [{unit}]", title=title)
-    top.legend(fontsize=8, ncol=2)
-    defect = np.abs(history["energy_defect"]) / (size[0] or 1.0)
-    _log(bottom, history["t"], defect)
+    _log(bottom, history["t"], np.abs(history["energy_defect"]) / (size[0] or 1.0))
     bottom.axhline(1e-10, color="tab:red", ls="--", lw=0.8)
-    bottom.set(xlabel="time [s]", ylabel="|defect| / largest term [-]")
+    bottom.set(ylabel="relative defect [-]")
     return _save(figure, path)
 
 
 def plot_certificate(history: History, path: str | Path, *, tolerance: float = 1e-9) -> Path:
     """Certificate of every step, and iterations of the solver."""
-    plt = _pyplot()
-    figure, (top, bottom) = plt.subplots(2, 1, sharex=True, figsize=(9, 5), constrained_layout=True)
+    figure, (top, bottom) = _panels(2, (9.0, 5.0))
     t = history["t"][1:]
     _log(top, t, history["certificate"][1:])
     top.axhline(tolerance, color="tab:red", ls="--", lw=0.8, label=f"tolerance {tolerance:g}")
     top.legend(fontsize=8)
-    top.set(ylabel="certificate (worst residual) [-]", title="Certificate of every step")
+    top.set(ylabel="worst residual [-]", title="Certificate of every step")
     bottom.step(t, history["iterations"][1:], where="mid", lw=0.8, color="black")
-    bottom.set(xlabel="time [s]", ylabel="iterations [-]")
+    bottom.yaxis.get_major_locator().set_params(integer=True)
+    bottom.set(ylabel="iterations [-]")
     return _save(figure, path)
 
 
@@ -146,23 +149,40 @@ def _log(axis: Any, t: Array, values: Array) -> None:
 
 
 def plot_contact(history: History, path: str | Path, *, position: Array, axis_label: str = "position [m]") -> Path:
-    """Map of the contact pressure over position and time, and the uplift ratio. ``position``: (m,) of the points."""
-    plt = _pyplot()
-    figure, (top, bottom) = plt.subplots(
-        2, 1, sharex=True, figsize=(9, 6), height_ratios=(3, 1), constrained_layout=True
-    )
-    order = np.argsort(position)
-    pressure, unit = _scaled(np.atleast_2d(history["pressure"])[:, order], "Pa")
-    colours = plt.get_cmap("magma_r").copy()
-    colours.set_under("white")
-    top_pressure = float(np.max(pressure, initial=0.0)) or 1.0
-    image = top.pcolormesh(
-        history["t"], position[order], pressure.T, cmap=colours, vmin=1e-9 * top_pressure, vmax=top_pressure,
-        shading="nearest", rasterized=True,
-    )
+    """Map of the contact pressure over position and time, and the uplift ratio. ``position``: (m,) of the points.
+
+    Open points are white; held points that pull are blue.
+    """
+    figure, (top, bottom) = _panels(2, (9.0, 6.0), height_ratios=(3, 1))
+    t, order = history["t"], np.argsort(position)
+    pressure, unit = _scaled(np.reshape(history["pressure"], (len(t), -1))[:, order], "Pa")
+    colours, low, high = _pressure_scale(pressure)
     top.grid(False)
-    figure.colorbar(image, ax=top, label=f"contact pressure [{unit}] (white: open)")
+    image = top.pcolormesh(
+        _edges(t), _edges(position[order]), pressure.T, cmap=colours, vmin=low, vmax=high, rasterized=True
+    )
+    meaning = "white: open" if low > 0.0 else "negative: pull"
+    figure.colorbar(image, ax=top, label=f"contact pressure [{unit}] ({meaning})")
     top.set(ylabel=axis_label, title="Contact pressure")
-    bottom.plot(history["t"], history["contact_uplift"], color="black", lw=0.9)
-    bottom.set(xlabel="time [s]", ylabel="uplift ratio [-]", ylim=(-0.05, 1.05))
+    bottom.plot(t, history["contact_uplift"], color="black", lw=0.9)
+    bottom.set(ylabel="uplift ratio [-]", ylim=(-0.05, 1.05))
     return _save(figure, path)
+
+
+def _pressure_scale(pressure: Array) -> tuple[Any, float, float]:
+    """(colours, lowest, highest): from white upwards, or to both sides of white where points are held."""
+    import matplotlib
+
+    size = float(np.max(np.abs(pressure), initial=0.0)) or 1.0
+    if np.any(pressure < 0.0):
+        return matplotlib.colormaps["RdBu_r"], -size, size
+    return matplotlib.colormaps["magma_r"].with_extremes(under="white"), 1e-9 * size, size
+
+
+def _edges(centres: Array) -> Array:
+    """Borders of the cells around the centres; a single cell is as wide as its distance from zero, or one."""
+    if len(centres) == 1:
+        half = 0.5 * (abs(float(centres[0])) or 1.0)
+        return np.array([centres[0] - half, centres[0] + half])
+    middle = 0.5 * (centres[:-1] + centres[1:])
+    return np.concatenate([[2.0 * centres[0] - middle[0]], middle, [2.0 * centres[-1] - middle[-1]]])
