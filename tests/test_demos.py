@@ -1,0 +1,162 @@
+"""The demos and the command line: key numbers, every file they promise, and one sentence for bad input."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import subprocess
+import sys
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from vi_contact.ground_motion import Record, pga, read_record
+
+ROOT = Path(__file__).resolve().parents[1]
+SHARED = Path(os.environ.get("VI_CONTACT_GROUND_MOTIONS", ROOT.parent / "shared" / "ground_motions"))
+FIGURES = ("excitation.png", "displacements.png", "energy.png", "certificate.png", "contact.png")
+SUMMARY = (
+    "versions", "ranks", "unknowns", "contact_points", "steps", "iterations_per_step", "worst_certificate", "cross_check",
+    "energy", "energy_defect", "seconds_per_step", "seconds_per_linear_step",
+)
+
+
+def demo(name: str) -> Any:
+    """The module demos/<name>.py."""
+    spec = spec_from_file_location(f"demo_{name}", ROOT / "demos" / f"{name}.py")
+    assert spec is not None and spec.loader is not None
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def column(folder: Path, name: str) -> np.ndarray:
+    """A column of history.csv."""
+    with open(folder / "history.csv", encoding="utf-8", newline="") as file:
+        return np.array([float(row[name]) for row in csv.DictReader(file)])
+
+
+def check_folder(folder: Path, *, steps: int, frames_every: int) -> dict[str, Any]:
+    """Every promised file is there and whole; returns summary.json."""
+    rows = (folder / "history.csv").read_text(encoding="utf-8").splitlines()
+    assert rows[0].startswith("t,") and len(rows) == steps + 2
+    with h5py.File(folder / "history.h5") as file:
+        assert len(file["t"]) == steps + 1 and file["pressure"].attrs["unit"] == "Pa"
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    assert [key for key in SUMMARY if key not in summary] == []
+    assert summary["status"] == "finished" and summary["steps"] == steps
+    assert 0.0 < summary["seconds_per_linear_step"] and 0.0 < summary["seconds_per_step"]
+    index = (folder / "fields.xdmf").read_text(encoding="utf-8")
+    for k in range(0, steps + 1, frames_every):
+        assert f"fields/frame_{k:06d}.h5:/u" in index and (folder / f"fields/frame_{k:06d}.h5").is_file()
+    for figure in FIGURES:
+        assert (folder / figure).read_bytes().startswith(b"\x89PNG") and (folder / figure).stat().st_size > 5000, figure
+    assert "finished" in (folder / "run.log").read_text(encoding="utf-8")
+    return summary
+
+
+def test_the_wall_demo(comm: Any, shared_tmp: Path) -> None:
+    """V4.1 in its first 40 steps: frequency, dt, the top's displacement at steps 10, 20, 40; both routes agree."""
+    numbers = demo("wall").main(quick=True, out=shared_tmp, progress=False)
+    comm.Barrier()  # rank 0 draws
+    assert numbers["frequency"] == pytest.approx(13.9983, abs=5e-5)
+    assert numbers["dt"] == pytest.approx(1.785929e-3, abs=5e-10)
+    for case, expected in {"a": (-58.38955, -1.74828, -9.18182), "b": (-58.38955, -1.74828, 0.0)}.items():
+        assert 0.0 < numbers[f"{case}_certificate"] <= 1e-9
+        assert 0.0 < numbers[f"{case}_cross_check"] <= 1e-9
+        assert numbers[f"{case}_energy_defect"] <= 1e-10
+        summary = check_folder(shared_tmp / case, steps=40, frames_every=10)
+        assert summary["ranks"] == comm.size and summary["unknowns"] == 216
+        assert summary["contact_points"] == {"a": 3, "b": 11}[case]
+        assert list(summary["cross_check"]) == ["Volume(ReducedNewton)"]
+        top = 1e6 * column(shared_tmp / case, "u_x_12")
+        assert top[[10, 20, 40]] == pytest.approx(expected, abs=5.001e-6)
+        assert (1e6 * numbers[f"{case}_top_min"], 1e6 * numbers[f"{case}_top_max"]) == (top.min(), top.max())
+        assert column(shared_tmp / case, "contact_active").max() > 0
+
+
+def vi_contact(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """The command line, run as a user would."""
+    return subprocess.run(
+        [sys.executable, "-m", "vi_contact", *arguments], cwd=folder, env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True, encoding="utf-8", timeout=300,
+    )
+
+
+def recorded(folder: Path) -> Path:
+    """El Centro 1940 where it is beside the checkout, else a record like it written here."""
+    real = SHARED / "elcentro_1940_ns_peknold.at2"
+    if real.is_file():
+        return real
+    t = 0.02 * np.arange(200)
+    values = 0.3 * np.sin(7.0 * t) * np.exp(-0.5 * t) + 0.01 * np.cos(31.0 * t)
+    path = folder / "record.at2"
+    lines = [" ".join(f"{value:.6f}" for value in values[k : k + 5]) for k in range(0, 200, 5)]
+    path.write_text("PEER\nA MOTION\nACCELERATION TIME SERIES IN UNITS OF G\nNPTS= 200, DT= .02000 SEC\n" + "\n".join(lines))
+    return path
+
+
+@pytest.mark.serial
+def test_the_wall_on_a_record(tmp_path: Path) -> None:
+    """The ground acceleration of the run is the record in m/s², scaled to 5 m/s², sample k at t = k dt."""
+    path = recorded(tmp_path)
+    done = vi_contact(
+        tmp_path, "wall", "--case", "b", "--motion", str(path), "--pga", "5", "--dt", "0.02", "--steps", "50", "--cross-check",
+        "--out", "out/quake", "--fields-every", "25", "--quiet",
+    )
+    assert done.returncode == 0 and done.stderr == "", done.stderr
+    assert "run finished: 50 steps" in done.stdout and "output: out/quake" in done.stdout
+    summary = check_folder(tmp_path / "out" / "quake", steps=50, frames_every=25)
+    assert summary["worst_certificate"] <= 1e-9 and summary["energy_defect"] <= 1e-10
+    (difference,) = summary["cross_check"].values()
+    assert max(difference["u"], difference["r_n"]) <= 1e-9
+    record: Record = read_record(path)
+    expected = record.acceleration[:51] * 5.0 / pga(record)
+    assert column(tmp_path / "out" / "quake", "a_g_x") == pytest.approx(expected, abs=1e-9)
+    assert not column(tmp_path / "out" / "quake", "a_g_y").any()
+    assert column(tmp_path / "out" / "quake", "contact_active").max() == 11
+    assert column(tmp_path / "out" / "quake", "contact_min_gap").min() == 0.0
+
+
+BAD = {
+    "missing record": (["--motion", "none.at2"], ["none.at2", "no such file"]),
+    "record that is no text": (["--motion", "binary.at2"], ["binary.at2", "not a text file"]),
+    "unknown case": (["--case", "c"], ["'c'", "choose one of a, b"]),
+    "unknown solver": (["--solver", "magic"], ["'magic'", "choose one of condensed"]),
+    "folder below a file": (["--case", "a", "--out", "file/run"], ["file/run", "choose another"]),
+    "dt zero": (["--case", "a", "--dt", "0"], ["dt is 0", "positive"]),
+    "restitution above one": (["--case", "a", "--impact", "1.5"], ["1.5", "from 0"]),
+}
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("name", BAD)
+def test_bad_input_is_one_sentence(tmp_path: Path, name: str) -> None:
+    """Exit status 1, one line on standard error that names the thing and the remedy; nothing computed or written."""
+    arguments, words = BAD[name]
+    (tmp_path / "file").write_text("in the way")
+    (tmp_path / "binary.at2").write_bytes(b"\0\1\2")
+    before = sorted(tmp_path.rglob("*"))
+    done = vi_contact(tmp_path, "wall", *arguments)
+    assert done.returncode == 1 and done.stdout == ""
+    assert done.stderr.startswith("vi-contact: ") and done.stderr.count("\n") == 1
+    assert [word for word in words if word not in done.stderr] == []
+    assert sorted(tmp_path.rglob("*")) == before and (tmp_path / "file").read_text() == "in the way"
+
+
+@pytest.mark.serial
+def test_motion_info(tmp_path: Path) -> None:
+    """The command prints what the record file holds."""
+    path = recorded(tmp_path)
+    done = vi_contact(tmp_path, "motion", "info", str(path))
+    assert done.returncode == 0 and done.stderr == ""
+    record = read_record(path)
+    lines = dict(line.split(maxsplit=1) for line in done.stdout.splitlines() if not line.startswith("note"))
+    assert lines["format"] == "PEER AT2" and lines["dt"] == "0.02 s" and lines["sha256"] == record.sha256
+    assert lines["samples"] == str(record.acceleration.size)
+    assert lines["PGA"].startswith(f"{pga(record):.4g} m/s2")

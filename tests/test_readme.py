@@ -1,0 +1,144 @@
+"""The documents: examples run and print what they say, commands exist, links resolve, names and ids are complete."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+import vi_contact
+
+pytestmark = pytest.mark.serial
+ROOT = Path(__file__).resolve().parents[1]
+DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
+
+
+def blocks(document: Path, language: str) -> list[str]:
+    """The fenced blocks of a language."""
+    return re.findall(rf"^```{language}\n(.*?)^```$", document.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+
+
+def run(code: str, folder: Path) -> str:
+    """What the code prints, run by itself in the folder as a user would."""
+    (folder / "example.py").write_text(code, encoding="utf-8")
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONIOENCODING": "utf-8"}
+    done = subprocess.run(
+        [sys.executable, "example.py"], cwd=folder, env=environment, capture_output=True, encoding="utf-8", timeout=300
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def first(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """The folder in which README's first example has run, and what it printed."""
+    folder = tmp_path_factory.mktemp("readme")
+    (code,) = blocks(ROOT / "README.md", "python")
+    return folder, run(code, folder)
+
+
+def test_first_example_prints_what_readme_says(first: tuple[Path, str]) -> None:
+    (printed,) = blocks(ROOT / "README.md", "text")
+    assert first[1] == printed
+
+
+def test_reading_examples_run_on_its_output(first: tuple[Path, str]) -> None:
+    """docs/output.md: rows of 400 steps and the initial state, the same minimum as README prints, a picture."""
+    table, arrays, picture = (run(code, first[0]) for code in blocks(ROOT / "docs" / "output.md", "python"))
+    lowest = re.search(r"top of the wall: (\S+) to", first[1])
+    words = re.fullmatch(r"401 rows, u_x_top in m: (\S+)\n", table)
+    assert lowest and words and f"{1e6 * float(words[1]):.1f}" == lowest[1]
+    assert arrays == "Pa (401, 12) largest at 9 m\n"
+    assert picture == "" and (first[0] / "frame.png").stat().st_size > 5000
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_commands_exist(document: Path) -> None:
+    """Every script that a document calls is there and bash can read it; every demo too."""
+    text = document.read_text(encoding="utf-8")
+    for script in set(re.findall(r"\bbash ([\w./-]+)", text)):
+        subprocess.run(["bash", "-n", str(ROOT / script)], check=True)
+    for demo in set(re.findall(r"\bdemos/run\.sh (?:-n \d+ )?([a-z]\w*)", text)):
+        assert (ROOT / "demos" / f"{demo}.py").is_file(), demo
+    for script in set(re.findall(r"\bpython3 ((?:meshes|demos|benchmarks)/[\w./]+\.py)", text)):
+        assert (ROOT / script).is_file(), script
+
+
+def test_readme_names_the_two_commands() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert "bash demos/run.sh wall" in text and "bash tests/run.sh" in text
+
+
+def anchors(document: Path) -> set[str]:
+    """Anchors of the headings, as GitHub makes them."""
+    headings = re.findall(r"^#+ (.*)$", document.read_text(encoding="utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_relative_links_resolve(document: Path) -> None:
+    text = document.read_text(encoding="utf-8")
+    for target in re.findall(r"\]\(([^)\s]+)\)", text):
+        if re.match(r"[a-z]+:", target):
+            continue
+        path, _, anchor = target.partition("#")
+        there = (document.parent / path).resolve() if path else document
+        assert there.exists(), target
+        assert not anchor or anchor in anchors(there), target
+
+
+def test_every_document_is_linked_from_readme() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    missing = [path.name for path in DOCUMENTS if path.name != "README.md" and f"{path.relative_to(ROOT)})" not in text]
+    assert missing == []
+
+
+def test_figures_are_small_and_used() -> None:
+    text = "".join(document.read_text(encoding="utf-8") for document in DOCUMENTS)
+    for figure in (ROOT / "docs" / "figures").iterdir():
+        assert figure.suffix == ".png" and figure.stat().st_size <= 300_000, figure.name
+        assert figure.name in text
+
+
+@pytest.mark.parametrize("module", ["vi_contact", "vi_contact.fem", "vi_contact.ground_motion", "vi_contact.solvers.volume"])
+def test_every_public_name_is_in_the_table_of_contents(module: str) -> None:
+    listed = set(re.findall(r"`([\w.]+)`", (ROOT / "docs" / "api.md").read_text(encoding="utf-8")))
+    assert set(import_module(module).__all__) - listed == set()
+
+
+def test_the_table_of_contents_has_no_other_names() -> None:
+    """A listed name is public in one of the four modules, or a path that can be imported."""
+    text = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+    names = re.findall(r"`(\w+)`", "".join(re.findall(r"^- (.*?)(?:: |$)", text, re.MULTILINE)))
+    known = {"__version__"}
+    for module in ("vi_contact", "vi_contact.fem", "vi_contact.ground_motion", "vi_contact.solvers.volume"):
+        known |= set(import_module(module).__all__)
+    assert set(names) - known == set()
+    for path in set(re.findall(r"`(vi_contact(?:\.\w+)+)`", text)):
+        module, _, name = path.rpartition(".")
+        if name[0].islower() and not hasattr(import_module(module), name):
+            import_module(path)
+        else:
+            assert hasattr(import_module(module), name), path
+
+
+@pytest.mark.parametrize(("pattern", "document"), [(r"\bV\d+\.\d+[a-z]?\b", "verification.md"), (r"\bP\d{1,2}\b", "petsc.md")])
+def test_every_cited_id_is_explained(pattern: str, document: str) -> None:
+    """What code and tests cite is in the table of ids."""
+    files = [*(ROOT / "vi_contact").rglob("*.py"), *(ROOT / "tests").rglob("*.py"), *(ROOT / "demos").glob("*.py")]
+    here = Path(__file__).name
+    cited = {match for file in files if file.name != here for match in re.findall(pattern, file.read_text(encoding="utf-8"))}
+    text = (ROOT / "docs" / document).read_text(encoding="utf-8")
+    assert cited - set(re.findall(pattern, text)) - {"P0", "P1"} == set()
+
+
+def test_version_is_the_same_everywhere() -> None:
+    version = vi_contact.__version__
+    assert re.search(rf'^version = "{re.escape(version)}"$', (ROOT / "pyproject.toml").read_text(), re.MULTILINE)
+    assert re.search(rf"^version: {re.escape(version)}$", (ROOT / "CITATION.cff").read_text(), re.MULTILINE)
+    assert re.search(r"^## (\S+)", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)[1] == version
