@@ -135,8 +135,10 @@ class PreparedVolume:
             y, F, reason, iterations = self._driver.run()
         except PETSc.Error as error:
             self.close()  # its state is unknown; the next step gets a new one
+            if error.__cause__ is not None:
+                raise error.__cause__ from None  # raised in one of our callbacks; PETSc before 3.22 passes it on
             raise raised(self._name, error) from error
-        except StepFailure:  # from one of our callbacks
+        except StepFailure:
             self.close()
             raise
         if reason <= 0 and not self._scaled.accepts(y, F):
