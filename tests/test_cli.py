@@ -87,9 +87,11 @@ def test_errors_are_one_sentence(arguments, word):
     if arguments[0] == "wall":
         pytest.importorskip("dolfinx")
     done = shell(*arguments)
-    assert done.returncode == 1 and not done.stdout
-    assert done.stderr.startswith("vi-contact: ") and done.stderr.count("\n") == 1
-    assert word in done.stderr and "Traceback" not in done.stderr
+    assert done.returncode == 1 and "Traceback" not in done.stderr
+    said = [line for line in done.stderr.splitlines() if line.startswith("vi-contact: ")]
+    assert len(said) == 1 and word in said[0]
+    if arguments[0] == "motion":  # MPI starts for the wall, and may have remarks of its own
+        assert not done.stdout and done.stderr == said[0] + "\n"
 
 
 def test_units_must_be_said(record, capsys):
