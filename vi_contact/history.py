@@ -3,7 +3,7 @@
 ``history.csv``      one line per step with all numbers, written through at once: a killed run loses nothing.
 ``columns.json``     unit and meaning of every column.
 ``history.h5``       numbers and arrays with units as attributes, and the contact geometry; replaced as a whole
-                     at checkpoints, once it has grown by a tenth, and at the end.
+                     at checkpoints, once it has grown by a quarter, and at the end.
 ``history.journal``  the array columns of the steps since then (float64: k, then the arrays of the row).
 """
 
@@ -25,7 +25,7 @@ from .output import COLUMNS, HISTORY_CSV, HISTORY_H5, JOURNAL, hdf5_image, to_js
 from .recorders import Columns, Row
 from .surfaces import ContactSurface
 
-GROWTH = 1.1  # history.h5 is rewritten when it has grown by this factor: what is written stays proportional to its size
+GROWTH = 1.25  # history.h5 is rewritten when it has grown by this factor: what is written stays in proportion
 
 
 @dataclass
@@ -97,7 +97,9 @@ class HistoryFiles:
             raise OSError(error.errno, error.strerror, file.name) from error
 
     def _line(self, row: Row) -> bytes:
-        return (",".join(repr(_number(row[name])) for name in self._numbers) + "\n").encode()
+        """Whole numbers stay whole, all others are floats that read back to the last bit."""
+        values = [row[name] for name in self._numbers]
+        return (",".join([repr(v if type(v) is int else float(v)) for v in values]) + "\n").encode()
 
     def _record(self, row: Row) -> bytes:
         arrays = [np.asarray(row[name], dtype=float).ravel() for name in self._arrays]
@@ -148,11 +150,6 @@ class HistoryFiles:
             if file is not None:
                 with suppress(OSError):
                     file.close()
-
-
-def _number(value: Any) -> int | float:
-    """Integers stay integers, all else is a float that reads back to the last bit."""
-    return int(value) if isinstance(value, int | np.integer | np.bool_) else float(value)
 
 
 def describe(columns: Columns) -> dict[str, dict[str, str]]:

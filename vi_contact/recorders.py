@@ -46,7 +46,7 @@ class Steps:
         return {
             "t": state.t,
             "k": state.k,
-            "iterations": iterations,
+            "iterations": int(iterations),
             "certificate": certificate,
             "escalated": int(escalated),
         } | {f"a_g_{axis}": float(value) for axis, value in zip(AXES, ground, strict=False)}
