@@ -21,8 +21,8 @@ ROOT = Path(__file__).resolve().parents[1]
 SHARED = Path(os.environ.get("VI_CONTACT_GROUND_MOTIONS", ROOT.parent / "shared" / "ground_motions"))
 FIGURES = ("excitation.png", "displacements.png", "energy.png", "certificate.png", "contact.png")
 SUMMARY = (
-    "versions", "ranks", "unknowns", "contact_points", "steps", "iterations_per_step", "worst_certificate", "cross_check",
-    "energy", "energy_defect", "seconds_per_step", "seconds_per_linear_step",
+    "versions", "ranks", "unknowns", "contact_points", "steps", "iterations_per_step", "worst_certificate",
+    "cross_check", "energy", "energy_defect", "seconds_per_step", "seconds_per_linear_step",
 )
 
 
@@ -50,7 +50,7 @@ def check_folder(folder: Path, *, steps: int, frames_every: int) -> dict[str, An
     summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     assert [key for key in SUMMARY if key not in summary] == []
     assert summary["status"] == "finished" and summary["steps"] == steps
-    assert 0.0 < summary["seconds_per_linear_step"] and 0.0 < summary["seconds_per_step"]
+    assert min(summary["seconds_per_linear_step"], summary["seconds_per_step"]) > 0.0
     index = (folder / "fields.xdmf").read_text(encoding="utf-8")
     for k in range(0, steps + 1, frames_every):
         assert f"fields/frame_{k:06d}.h5:/u" in index and (folder / f"fields/frame_{k:06d}.h5").is_file()
@@ -97,7 +97,8 @@ def recorded(folder: Path) -> Path:
     values = 0.3 * np.sin(7.0 * t) * np.exp(-0.5 * t) + 0.01 * np.cos(31.0 * t)
     path = folder / "record.at2"
     lines = [" ".join(f"{value:.6f}" for value in values[k : k + 5]) for k in range(0, 200, 5)]
-    path.write_text("PEER\nA MOTION\nACCELERATION TIME SERIES IN UNITS OF G\nNPTS= 200, DT= .02000 SEC\n" + "\n".join(lines))
+    header = "PEER\nA MOTION\nACCELERATION TIME SERIES IN UNITS OF G\nNPTS= 200, DT= .02000 SEC\n"
+    path.write_text(header + "\n".join(lines))
     return path
 
 
@@ -106,8 +107,8 @@ def test_the_wall_on_a_record(tmp_path: Path) -> None:
     """The ground acceleration of the run is the record in m/s², scaled to 5 m/s², sample k at t = k dt."""
     path = recorded(tmp_path)
     done = vi_contact(
-        tmp_path, "wall", "--case", "b", "--motion", str(path), "--pga", "5", "--dt", "0.02", "--steps", "50", "--cross-check",
-        "--out", "out/quake", "--fields-every", "25", "--quiet",
+        tmp_path, "wall", "--case", "b", "--motion", str(path), "--pga", "5", "--dt", "0.02", "--steps", "50",
+        "--cross-check", "--out", "out/quake", "--fields-every", "25", "--quiet",
     )
     assert done.returncode == 0 and done.stderr == "", done.stderr
     assert "run finished: 50 steps" in done.stdout and "output: out/quake" in done.stdout

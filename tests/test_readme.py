@@ -15,6 +15,7 @@ import vi_contact
 
 pytestmark = pytest.mark.serial
 ROOT = Path(__file__).resolve().parents[1]
+MODULES = ("vi_contact", "vi_contact.fem", "vi_contact.ground_motion", "vi_contact.solvers.volume")
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
 
 
@@ -55,6 +56,17 @@ def test_reading_examples_run_on_its_output(first: tuple[Path, str]) -> None:
     assert lowest and words and f"{1e6 * float(words[1]):.1f}" == lowest[1]
     assert arrays == "Pa (401, 12) largest at 9 m\n"
     assert picture == "" and (first[0] / "frame.png").stat().st_size > 5000
+
+
+@pytest.mark.parametrize("document", ["records.md", "solvers.md"])
+def test_other_examples_run_on_its_problem(tmp_path: Path, document: str) -> None:
+    """They continue README's example where its problem is ready."""
+    (code,) = blocks(ROOT / "README.md", "python")
+    ready = code[: code.index("solution = ")]
+    samples = "\n".join(f"{0.3 * (-1) ** k:.3f}" for k in range(50))
+    (tmp_path / "elcentro.at2").write_text(f"A motion\nunits of g\nNPTS= 50, DT= .02000 SEC\n{samples}")
+    (example,) = blocks(ROOT / "docs" / document, "python")
+    run(ready + example, tmp_path)
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
@@ -105,7 +117,7 @@ def test_figures_are_small_and_used() -> None:
         assert figure.name in text
 
 
-@pytest.mark.parametrize("module", ["vi_contact", "vi_contact.fem", "vi_contact.ground_motion", "vi_contact.solvers.volume"])
+@pytest.mark.parametrize("module", MODULES)
 def test_every_public_name_is_in_the_table_of_contents(module: str) -> None:
     listed = set(re.findall(r"`([\w.]+)`", (ROOT / "docs" / "api.md").read_text(encoding="utf-8")))
     assert set(import_module(module).__all__) - listed == set()
@@ -116,7 +128,7 @@ def test_the_table_of_contents_has_no_other_names() -> None:
     text = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
     names = re.findall(r"`(\w+)`", "".join(re.findall(r"^- (.*?)(?:: |$)", text, re.MULTILINE)))
     known = {"__version__"}
-    for module in ("vi_contact", "vi_contact.fem", "vi_contact.ground_motion", "vi_contact.solvers.volume"):
+    for module in MODULES:
         known |= set(import_module(module).__all__)
     assert set(names) - known == set()
     for path in set(re.findall(r"`(vi_contact(?:\.\w+)+)`", text)):
@@ -127,14 +139,16 @@ def test_the_table_of_contents_has_no_other_names() -> None:
             assert hasattr(import_module(module), name), path
 
 
-@pytest.mark.parametrize(("pattern", "document"), [(r"\bV\d+\.\d+[a-z]?\b", "verification.md"), (r"\bP\d{1,2}\b", "petsc.md")])
-def test_every_cited_id_is_explained(pattern: str, document: str) -> None:
+IDS = {"verification.md": r"\bV\d+\.\d+[a-z]?\b", "petsc.md": r"\bP[1-9]\d?\b"}
+
+
+@pytest.mark.parametrize("document", IDS)
+def test_every_cited_id_is_explained(document: str) -> None:
     """What code and tests cite is in the table of ids."""
-    files = [*(ROOT / "vi_contact").rglob("*.py"), *(ROOT / "tests").rglob("*.py"), *(ROOT / "demos").glob("*.py")]
-    here = Path(__file__).name
-    cited = {match for file in files if file.name != here for match in re.findall(pattern, file.read_text(encoding="utf-8"))}
-    text = (ROOT / "docs" / document).read_text(encoding="utf-8")
-    assert cited - set(re.findall(pattern, text)) - {"P0", "P1"} == set()
+    files = [path for folder in ("vi_contact", "tests", "demos") for path in (ROOT / folder).rglob("*.py")]
+    text = "".join(path.read_text(encoding="utf-8") for path in files if path.name != Path(__file__).name)
+    explained = (ROOT / "docs" / document).read_text(encoding="utf-8")
+    assert set(re.findall(IDS[document], text)) - set(re.findall(IDS[document], explained)) == set()
 
 
 def test_version_is_the_same_everywhere() -> None:
