@@ -6,7 +6,7 @@ interpolated at the nodes and then integrated exactly, so a load costs one spars
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,27 +22,33 @@ Value = tuple[float, ...] | Field
 
 def evaluate(name: str, value: Value, points: Array, t: float, comm: Comm) -> Array:
     """The value at this rank's points, shape (k, d); collective. InputError, on all ranks, for NaN or a wrong shape."""
-    if len(points) == 0:
-        result = np.zeros_like(points)  # users' functions need not cope with no points
-    elif callable(value):
-        result = np.asarray(value(points, t), dtype=float)
-    else:
-        result = np.tile(np.asarray(value, dtype=float), (len(points), 1))
-    defect = _defect(name, result, points, t)
-    if comm.max(np.array([float(bool(defect))]))[0]:
-        defects = comm.bcast(comm.gather(defect))
-        raise InputError(next(text for text in defects if text))
+    result, defect = evaluate_here(name, value, points, t)
+    refuse([defect], comm)
     return result
 
 
-def _defect(name: str, result: Array, points: Array, t: float) -> str:
-    """What is wrong with values at points, or nothing."""
+def evaluate_here(name: str, value: Value, points: Array, t: float) -> tuple[Array, str]:
+    """(values at the points, what is wrong with them or an empty text); zeros where something is wrong."""
+    if len(points) == 0:
+        return np.zeros_like(points), ""  # users' functions need not cope with no points
+    if callable(value):
+        result = np.asarray(value(points, t), dtype=float)
+    else:
+        result = np.tile(np.asarray(value, dtype=float), (len(points), 1))
     if result.shape != points.shape:
         shape = f"shape {result.shape} for {len(points)} points"
-        return f"{name} returned {shape}: return {points.shape[1]} components per point"
+        return np.zeros_like(points), f"{name} returned {shape}: return {points.shape[1]} components per point"
     if not np.all(np.isfinite(result)):
-        return f"{name} contains NaN or infinite values at t = {t:g} s: check its function or data"
-    return ""
+        where = f"NaN or infinite values at t = {t:g} s"
+        return np.zeros_like(points), f"{name} contains {where}: check its function or data"
+    return result, ""
+
+
+def refuse(defects: Sequence[str], comm: Comm) -> None:
+    """InputError on all ranks with the first text that is not empty; collective."""
+    if comm.max(np.array([float(any(defects))]))[0]:
+        found = comm.bcast(comm.gather(list(defects)))
+        raise InputError(next(text for texts in found for text in texts if text))
 
 
 def _zero(points: Array, t: float) -> Array:

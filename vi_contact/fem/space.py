@@ -10,7 +10,7 @@ from petsc4py import PETSc
 from ..algebra import Array, Indices, Mask
 from ..errors import InputError
 from . import compat
-from .loads import Prescribed, evaluate
+from .loads import Prescribed, evaluate_here, refuse
 from .mesh import node_numbers
 from .petsc_algebra import MpiComm
 
@@ -95,13 +95,16 @@ class FemSpace:
         Where conditions meet, the later one counts.
         """
         values = np.zeros((len(self.nodes), self.dimension))
+        defects = []
         for condition, (blocks, components) in zip(self.prescribed, self._where_held, strict=True):
             values[blocks, components] = 0.0
             if condition.moves:
                 name = f"prescribed motion on '{condition.facets.name}'"
-                points = self.points[blocks[:, 0]]
-                motion = evaluate(name, condition.motions[derivative], points, t, self.comm)
+                motion, defect = evaluate_here(name, condition.motions[derivative], self.points[blocks[:, 0]], t)
                 values[blocks, components] = motion[:, components]
+                defects.append(defect)
+        if defects:
+            refuse(defects, self.comm)
         return values.ravel()
 
     def expand(self, u: Array, t: float, derivative: int = 0) -> Array:
