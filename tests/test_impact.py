@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from bar import bar, energy, run, thrown
 from chain import chain_problem, chain_surface, chain_system
+from shaken import shaken
 
 from vi_contact.errors import InputError
 from vi_contact.impact import ComponentReset, Elastic, Impact, Inelastic, MassProjection, Newton, NoImpact
@@ -156,6 +157,24 @@ def test_the_users_own_law():
     first = next(run(problem, ZienkiewiczWoodTaylor(), dt=0.1, steps=1))
     assert first.v_minus[0] == pytest.approx(0.0, abs=1e-9)
     assert first.new.v[0] == -1e-3
+
+
+def test_what_a_law_is_told():
+    """Velocities before and after the step, which points are closed, and which were open before."""
+    told: list[Impact] = []
+
+    class Listening(Sticky):
+        def target(self, impact):
+            told.append(impact)
+            return np.full(len(impact.v_n), np.nan)
+
+    problem = shaken(Listening())
+    reports = [report for report in run(problem, ZienkiewiczWoodTaylor(), dt=5e-3, steps=100) if report.new.active.any()]
+    assert len(told) == len(reports)
+    assert 3 < sum(impact.closing[0] for impact in told) < len(told) - 3
+    for impact, report in zip(told, reports, strict=True):
+        assert impact.before[0] == report.old.v[-1] and impact.v_n[0] == report.v_minus[-1] == report.new.v[-1]
+        assert impact.active[0] and impact.closing[0] == (not report.old.active[0])
 
 
 def test_a_law_is_asked_about_solid_contacts_only():

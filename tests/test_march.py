@@ -70,6 +70,8 @@ def test_count_steps_names_what_is_wrong(dt, steps, t_end, word):
 def test_initial_penetration_is_refused():
     with pytest.raises(InputError, match=r"penetrates the obstacle by 0.002 m: reduce it or enlarge the gap"):
         next(run(chain_problem(3, gap=0.01, u0=[0.0, 0.0, 0.012]), HALF, dt=0.1, steps=1))
+    with pytest.raises(InputError, match="penetrates"):
+        next(run(chain_problem(3, gap=0.01, u0=[0.0, 0.0, 0.01 * (1 + 1e-7)]), HALF, dt=0.1, steps=1))
     touching = chain_problem(3, gap=0.01, u0=[0.0, 0.0, 0.01 * (1 + 1e-12)])
     assert len(list(run(touching, HALF, dt=0.1, steps=1))) == 1
 

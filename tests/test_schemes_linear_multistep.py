@@ -167,8 +167,9 @@ def test_consistent_acceleration_with_springs_and_held_points():
     assert consistent_acceleration(springs, 0.0, u, np.zeros(11))[1][0] == pytest.approx(50.0, rel=1e-13)
     assert not consistent_acceleration(springs, 0.0, -u, np.zeros(11))[1].any()
     held = replace(bar(10, gravity=-10.0), surface=problem.surface.held())
-    a, reaction = consistent_acceleration(held, 0.0, np.zeros(11), np.zeros(11))
-    assert a[0] == 0.0 and reaction[0] < -1.0
+    for v in (np.zeros(11), np.ones(11)):  # also while a bad start still moves it
+        a, reaction = consistent_acceleration(held, 0.0, np.zeros(11), v)
+        assert a[0] == 0.0 and reaction[0] < -1.0
     pulled = replace(springs, surface=springs.surface.held())
     assert consistent_acceleration(pulled, 0.0, -u, np.zeros(11))[1][0] == pytest.approx(-50.0, rel=1e-13)
 
