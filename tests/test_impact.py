@@ -169,7 +169,8 @@ def test_what_a_law_is_told():
             return np.full(len(impact.v_n), np.nan)
 
     problem = shaken(Listening())
-    reports = [report for report in run(problem, ZienkiewiczWoodTaylor(), dt=5e-3, steps=100) if report.new.active.any()]
+    steps = run(problem, ZienkiewiczWoodTaylor(), dt=5e-3, steps=100)
+    reports = [report for report in steps if report.new.active.any()]
     assert len(told) == len(reports)
     assert 3 < sum(impact.closing[0] for impact in told) < len(told) - 3
     for impact, report in zip(told, reports, strict=True):
