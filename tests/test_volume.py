@@ -83,7 +83,7 @@ def test_agrees_with_brute_force(parallel: bool, method: Any, options: dict[str,
 @pytest.mark.parametrize("method", [ReducedNewton(), OneFactorisation(), SemismoothNewton()])
 def test_springs_far_from_the_stiffness_of_the_body(parallel: bool, method: Any) -> None:
     """Springs 1e6 times stiffer and softer than the body; TAO's trust region does not get along with these."""
-    c = pushed_block(parallel=parallel, compliance=10.0 ** np.linspace(-6.0, 6.0, M))
+    c = pushed_block(parallel=parallel, seed=0, compliance=10.0 ** np.linspace(-6.0, 6.0, M))
     agree(c, solve(c, method), c.exact())
 
 
@@ -157,17 +157,18 @@ class CountingFactor:
         return self._factor.solve(b)
 
 
-@pytest.mark.parametrize(("limit", "solves"), [(10**6, (1, 1)), (0, (4, 2))])
+@pytest.mark.parametrize(("limit", "solves"), [(10**6, (1, 1)), (0, (3, 2))])
 def test_back_substitutions_of_a_step(parallel: bool, limit: int, solves: tuple[int, int]) -> None:
     """Solver notes 1b: one for the step, however the contact set changes; one more for each set if W is not kept.
 
-    From a wrong set: the free solution, that set, two changes. At the solution: the free solution and its set.
+    From a wrong set: the free solution, the points it takes beyond the bounds, one change. At the solution: the free
+    solution and its set.
     """
     c = pushed_block(parallel=parallel)
     counting = c.step.A.__dict__["factor"] = CountingFactor(c.step.A.factor)
     prepared = Volume(method=OneFactorisation(limit=limit)).prepare(c.step.A, c.step.surface, c.step.scale)
     first = prepared.solve(replace(c.step, active=~c.exact().active))
-    assert first.iterations == 2 and counting.solves == solves[0]
+    assert first.iterations == 1 and counting.solves == solves[0]
     prepared.solve(c.starting_at(first))
     assert counting.solves == sum(solves)
 

@@ -98,7 +98,9 @@ class ReducedInverse:
     def start(self, step: StepProblem) -> Array:
         """z with the predicted contacts held."""
         system = self._scaled.system
-        self._free, self._held = self._inverse.unheld(system.load(step.b)), system.predicted(step)
+        self._free = self._inverse.unheld(system.load(step.b))
+        predicted = system.predicted(step)
+        self._held = self._inverse.better_set(self._free, predicted, step.bound) | (predicted & system.surface.bilateral)
         return self._inverse.hold(self._free, self._held, step.bound)
 
     def apply(self, pc: Any, r: Any, y: Any) -> None:

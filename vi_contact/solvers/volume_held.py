@@ -51,6 +51,19 @@ class HeldInverse:
         z[system.bounded[mine]] = target[system.surface.slots][mine]
         return z
 
+    def better_set(self, z: Array, held: Mask, target: Array) -> Mask:
+        """(m,) The held set if its reactions push and no other point passes its target, else the points that z = A⁻¹ b
+        takes beyond their targets. A start only: asked of the contact points, it costs nothing beside a step."""
+        surface = self._system.surface
+        at = self._system.shared(z[self._system.bounded])
+        if not held.any():
+            return np.asarray(at > target)
+        push = self._solve(held, (at - target)[held])
+        left = (at - target)[~held] - self._G[np.ix_(~held, held)] @ push
+        rounding = 1e-12 * float(np.max(np.abs(at), initial=0.0))
+        pulls = np.any(push[~surface.bilateral[held]] < 0.0)
+        return np.asarray(at > target) if pulls or np.any(left > rounding) else held
+
     def _respond(self, reaction: Array, held: Mask) -> Array:
         """W reaction; kept columns are multiplied in runs of neighbours, without copying."""
         if not len(self._W):
