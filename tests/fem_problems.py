@@ -163,12 +163,12 @@ def thrown_box(
     """A soft box in three dimensions, thrown obliquely onto a plane that may be inclined about the z axis."""
     material = LinearElastic(E=1.0e6, nu=0.3, rho=1000.0)
     mesh, tags = block(comm, lengths=(1.5, 1.0, 1.2), divisions=divisions, simplices=simplices, angle=angle)
-    down = turned((0.0, -1.0), angle)
-    system = assemble(
-        mesh, material,
-        loads=BodyForce((*(9.81e3 * down), 0.0)),
-        initial_velocity=lambda x: np.column_stack([2.0 * np.outer(1.0 + 0.2 * x[:, 2], down), 0.3 * x[:, 0]]),
-    )
+    down, along = turned((0.0, -1.0), angle), turned((1.0, 0.0), angle)
+
+    def throw(x: Array) -> Array:
+        return np.column_stack([2.0 * np.outer(1.0 + 0.2 * x[:, 2], down), 0.3 * x[:, :2] @ along])
+
+    system = assemble(mesh, material, loads=BodyForce((*(9.81e3 * down), 0.0)), initial_velocity=throw)
     plane = HalfSpace(point=(*(1e-3 * down), 0.0), normal=(*(-down), 0.0))
     return ContactProblem(system, contact_surface(system, tags["bottom"], obstacle=plane))
 
