@@ -199,11 +199,47 @@ def test_units_do_not_matter(parallel: bool, method: Any, length: float, force: 
 SELECTED = ("bntl", "bqnls", "bqnkls", "bqnktr", "bqnktl", "blmvm", "bncg", "vinewtonrsls", "vinewtonssls")
 
 
+@pytest.mark.parametrize("unit", [1e-6, 1e6])
+def test_units_do_not_matter_when_nothing_gives_the_scale(parallel: bool, method: Any, unit: float) -> None:
+    """P18: from rest and in touch, only A and b tell how large the displacements are."""
+    cases = [pushed_block(parallel=parallel, seed=4, length=length) for length in (1.0, unit)]
+    one, other = (solve(replace(c, step=replace(c.step, bound=np.zeros(M))), method) for c in cases)
+    assert np.max(np.abs(other.x / unit - one.x)) <= 1e-9 * np.max(np.abs(one.x))
+    assert other.iterations == pytest.approx(one.iterations, abs=2)
+
+
+@pytest.mark.parametrize("options", [OPTIONS["rigid"], OPTIONS["springs"]], ids=["rigid", "springs"])
 @pytest.mark.parametrize("petsc_type", SELECTED)
-def test_selected_types_reach_the_certificate(parallel: bool, petsc_type: str) -> None:
+def test_selected_types_reach_the_certificate(parallel: bool, petsc_type: str, options: dict[str, Any]) -> None:
     """Slow or not, what is offered ends below the tolerance of the loop."""
-    c = pushed_block(parallel=parallel)
+    c = pushed_block(parallel=parallel, **options)
     assert kkt_residual(c.step, solve(c, Selected(petsc_type))).worst <= 1e-9
+
+
+def test_a_start_below_the_tolerance_is_still_improved(parallel: bool, method: Any) -> None:
+    """A small residual is not a small error: what can be solved to round-off is, from a guess that is off by 1e-11."""
+    c = pushed_block(parallel=parallel)
+    exact = c.exact()
+    step = c.starting_at(replace(exact, x=exact.x[c.rows] * (1.0 + 1e-11)))
+    result = Volume(method=method).prepare(step.A, step.surface, step.scale).solve(step)
+    assert np.max(np.abs(c.all(result.x) - exact.x)) <= 1e-13 * np.max(np.abs(exact.x))
+
+
+class RoughFactor:
+    """A factor with five correct digits, as from single precision."""
+
+    def __init__(self, factor: Any) -> None:
+        self._factor, self.solve_units = factor, factor.solve_units
+
+    def solve(self, b: Any) -> Any:
+        return self._factor.solve(b) * (1.0 + 1e-5)
+
+
+def test_a_rough_factor_is_refined(parallel: bool) -> None:
+    """The same contact set once more is iterative refinement with the true residual."""
+    c = pushed_block(parallel=parallel)
+    c.step.A.__dict__["factor"] = RoughFactor(c.step.A.factor)
+    agree(c, solve(c, OneFactorisation()), c.exact())
 
 
 def test_held_points_stay_exactly_on_the_bound(parallel: bool) -> None:

@@ -44,7 +44,6 @@ class BoundedSystem:
         self.size = self.rows + len(self.spring)
         self.bounded = surface.owned.copy()
         self.bounded[self.soft] = self.rows + np.arange(len(self.spring))
-        self._stiff = self.spring > A.matrix.diagonal()[self.feet]
 
     @property
     def comm(self) -> Any:
@@ -99,14 +98,8 @@ class BoundedSystem:
         return (step.active | self.surface.bilateral) & np.isfinite(step.bound)
 
     def reactions(self, f: Array) -> Array:
-        """(local) r_n from the residual f = A z - b; meaningful where the bound is active.
-
-        On a spring r_n = k (x_n - w). Where k exceeds the stiffness of the body that difference has lost digits, and
-        b - A x at the body end is the better number.
-        """
-        r = -f[self.bounded]
-        r[self.soft] -= np.where(self._stiff, f[self.feet], 0.0)
-        return r
+        """(local) r_n from the residual f = A z - b; on a spring k (x_n - w). Meaningful where the bound is active."""
+        return np.asarray(-f[self.bounded])
 
     def norm(self) -> float:
         """Upper bound of the largest absolute row sum of A."""

@@ -1,0 +1,91 @@
+"""Parts of the volume route: points held by one factorisation, the system with springs, the measure of its errors."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("petsc4py")
+
+from volume_cases import Case, pushed_block
+
+from vi_contact.solvers.volume import ReducedNewton, Volume
+from vi_contact.solvers.volume_held import HeldInverse
+from vi_contact.solvers.volume_step import ScaledStep
+from vi_contact.solvers.volume_system import BoundedSystem
+from vi_contact.verify import kkt_residual
+
+M = 8
+SPRINGS = {"compliance": np.array([0.3, 0.0] * 4), "scale": 2.0}
+
+
+def system_of(c: Case) -> BoundedSystem:
+    return BoundedSystem(c.step.A, c.step.surface, c.step.scale)
+
+
+def dense(system: BoundedSystem) -> Any:
+    """The enlarged matrix on one process."""
+    return np.column_stack([system.apply(unit) for unit in np.eye(system.size)])
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("options", [{}, SPRINGS], ids=["rigid", "springs"])
+def test_assembled_matrix_is_the_applied_one(options: dict[str, Any]) -> None:
+    system = system_of(pushed_block(**options))
+    A = dense(system)
+    assembled = system.assembled()
+    assert np.array_equal(A, A.T)
+    assert np.max(np.abs(assembled[:, :] - A)) <= 1e-15 * np.max(np.abs(A))
+    assert np.max(np.sum(np.abs(A), axis=1)) <= system.norm()
+
+
+@pytest.mark.parametrize("options", [{}, SPRINGS], ids=["rigid", "springs"])
+def test_assembled_matrix_in_parallel(options: dict[str, Any]) -> None:
+    """The renumbered rows and columns of all ranks multiply like the operator."""
+    pytest.importorskip("mpi4py")
+    system = system_of(pushed_block(parallel=True, **options))
+    assembled = system.assembled()
+    x, y = assembled.createVecs()
+    x.array[:] = np.sin(1.0 + np.arange(system.size) + 10.0 * system.surface.comm.rank)
+    assembled.mult(x, y)
+    assert np.max(np.abs(y.array_r - system.apply(x.array_r)), initial=0.0) <= 1e-13
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("limit", [0, 10**6])
+@pytest.mark.parametrize("options", [{}, SPRINGS], ids=["rigid", "springs"])
+def test_held_points_by_one_factorisation(options: dict[str, Any], limit: int) -> None:
+    """Solver notes 1b against a dense solve with the held rows fixed; the held values are met exactly."""
+    system = system_of(pushed_block(**options))
+    A, inverse, rng = dense(system), HeldInverse(system, limit), np.random.default_rng(1)
+    for held in (np.arange(M) % 3 == 0, np.arange(M) > 2, np.ones(M, dtype=bool), np.zeros(M, dtype=bool)):
+        r, target = rng.normal(size=system.size), rng.normal(size=M)
+        z = inverse.hold(inverse.unheld(r), held, target)
+        fixed = np.zeros(system.size, dtype=bool)
+        fixed[system.bounded[held]] = True
+        exact = np.zeros(system.size)
+        exact[system.bounded[held]] = target[held]
+        exact[~fixed] = np.linalg.solve(A[np.ix_(~fixed, ~fixed)], (r - A @ exact)[~fixed])
+        assert np.max(np.abs(z - exact)) <= 1e-12 * np.max(np.abs(exact))
+        assert np.array_equal(z[system.bounded[held]], target[held])
+
+
+@pytest.mark.parametrize("options", [{}, SPRINGS], ids=["rigid", "springs"])
+def test_error_measure_is_not_looser_than_the_certificate(options: dict[str, Any]) -> None:
+    """Whatever y PETSc stops at, the certificate of the loop is not larger than the error the solver judged by."""
+    pytest.importorskip("mpi4py")
+    c = pushed_block(parallel=True, **options)
+    prepared = Volume(method=ReducedNewton()).prepare(c.step.A, c.step.surface, c.step.scale)
+    system = system_of(c)
+    scaled = ScaledStep(system, 1e-9)
+    scaled.set(c.step, system.start(c.step))
+    prepared._scaled = scaled
+    rng = np.random.default_rng(5)
+    noise = rng.normal(size=(20, len(c.b) + 2 * M))
+    for row in noise:
+        y = np.minimum(np.resize(row, system.size), scaled.upper)
+        F = scaled.residual(y)
+        certificate = kkt_residual(c.step, prepared._result(y, F, 0))
+        assert certificate.worst <= (1.0 + 1e-12) * max(scaled.errors(y, F)[:2])
