@@ -3,8 +3,8 @@
 
     python3 benchmarks/step_cost.py [--sizes 1e3 2e3 2e4 2e5] [--steps 60] [--json FILE]
 
-The wall of seed 000 with its whole right side in possible contact, harmonic motion, Zienkiewicz-Wood-Taylor step, impact
-rule and certificate on, no records. A linear step is right-hand side, one back-substitution and update. All figures are
+The wall of seed 000 with its whole right side in possible contact, harmonic motion, Zienkiewicz-Wood-Taylor step,
+impact rule and certificate on, no records. A linear step is right-hand side, one back-substitution and update. All figures are
 medians and means over the steps that have contact, one thread, one rank. The run stops at the wanted number of steps
 after the first contact.
 """
@@ -75,7 +75,7 @@ class LinearSteps:
 def unilateral_steps(
     problem: vc.ContactProblem, solver: Any, dt: float, count: int, linear: LinearSteps
 ) -> dict[str, Any]:
-    """Marches until ``count`` steps with contact are timed, each beside a linear step: a drift of the machine cancels."""
+    """Times ``count`` steps with contact, each beside a linear step: a drift of the machine cancels."""
     loop = vc.march(problem, scheme=SCHEME, solver=solver, dt=dt, steps=100 * count)
     set_up, _ = timed(lambda: next(loop))
     seconds, plain, iterations, active, worst = [], [], [], [], 0.0
@@ -121,19 +121,25 @@ def measure(size: float, steps: int) -> dict[str, Any]:
     return row
 
 
-HEADER = (
-    f"{'unknowns':>9} {'points':>6} {'linear ms':>9}  {'route':<26} {'ms median':>9} {'ms mean':>8} {'ratio':>6} {'mean':>6} "
-    f"{'iter':>5} {'active':>6} {'set-up s':>8} {'MB':>6} {'certificate':>11}"
+COLUMNS = (  # title, width, format, key
+    ("linear ms", 9, ".3f", "linear_ms"),
+    ("ms median", 9, ".3f", "median_ms"),
+    ("ms mean", 8, ".3f", "mean_ms"),
+    ("ratio", 6, ".2f", "ratio"),
+    ("mean", 6, ".2f", "mean_ratio"),
+    ("iter", 5, ".2f", "iterations"),
+    ("active", 6, ".1f", "active"),
+    ("set-up s", 8, ".2f", "set_up_seconds"),
+    ("MB", 6, ".0f", "peak_memory_MB"),
+    ("certificate", 11, ".1e", "certificate"),
 )
+HEADER = f"{'unknowns':>9} {'points':>6} {'route':<26}" + "".join(f" {title:>{width}}" for title, width, _, _ in COLUMNS)
 
 
 def line(row: dict[str, Any], name: str, found: dict[str, Any]) -> str:
     """One row of the table."""
-    return (
-        f"{row['unknowns']:>9} {row['contact_points']:>6} {found['linear_ms']:>9.3f}  {name:<26} {found['median_ms']:>9.3f} "
-        f"{found['mean_ms']:>8.3f} {found['ratio']:>6.2f} {found['mean_ratio']:>6.2f} {found['iterations']:>5.2f} "
-        f"{found['active']:>6.1f} {found['set_up_seconds']:>8.2f} {found['peak_memory_MB']:>6.0f} {found['certificate']:>11.1e}"
-    )
+    cells = "".join(f" {found[key]:>{width}{form}}" for _, width, form, key in COLUMNS)
+    return f"{row['unknowns']:>9} {row['contact_points']:>6} {name:<26}{cells}"
 
 
 def seed_wall(steps: int = 400) -> float:

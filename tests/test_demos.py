@@ -81,10 +81,11 @@ def test_the_wall_demo(comm: Any, shared_tmp: Path) -> None:
 
 
 def vi_contact(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """The command line, run as a user would."""
+    """The command line in the scripts' environment, in which MPI keeps its remarks to itself."""
+    quiet = f'. "{ROOT}/install/setup.sh"; vi_clean_environment; vi_mpi_environment; exec "$0" "$@"'
     return subprocess.run(
-        [sys.executable, "-m", "vi_contact", *arguments], cwd=folder, env=os.environ | {"PYTHONPATH": str(ROOT)},
-        capture_output=True, encoding="utf-8", timeout=300,
+        ["bash", "-c", quiet, sys.executable, "-m", "vi_contact", *arguments],
+        cwd=folder, capture_output=True, encoding="utf-8", timeout=300,
     )
 
 
@@ -110,7 +111,7 @@ def test_the_wall_on_a_record(tmp_path: Path) -> None:
         tmp_path, "wall", "--case", "b", "--motion", str(path), "--pga", "5", "--dt", "0.02", "--steps", "50",
         "--cross-check", "--out", "out/quake", "--fields-every", "25", "--quiet",
     )
-    assert done.returncode == 0 and done.stderr == "", done.stderr
+    assert (done.returncode, done.stderr) == (0, "")
     assert "run finished: 50 steps" in done.stdout and "output: out/quake" in done.stdout
     summary = check_folder(tmp_path / "out" / "quake", steps=50, frames_every=25)
     assert summary["worst_certificate"] <= 1e-9 and summary["energy_defect"] <= 1e-10
@@ -131,7 +132,6 @@ BAD = {
     "unknown solver": (["--solver", "magic"], ["'magic'", "choose one of condensed"]),
     "folder below a file": (["--case", "a", "--out", "file/run"], ["file/run", "choose another"]),
     "dt zero": (["--case", "a", "--dt", "0"], ["dt is 0", "positive"]),
-    "restitution above one": (["--case", "a", "--impact", "1.5"], ["1.5", "from 0"]),
 }
 
 
@@ -148,16 +148,3 @@ def test_bad_input_is_one_sentence(tmp_path: Path, name: str) -> None:
     assert done.stderr.startswith("vi-contact: ") and done.stderr.count("\n") == 1
     assert [word for word in words if word not in done.stderr] == []
     assert sorted(tmp_path.rglob("*")) == before and (tmp_path / "file").read_text() == "in the way"
-
-
-@pytest.mark.serial
-def test_motion_info(tmp_path: Path) -> None:
-    """The command prints what the record file holds."""
-    path = recorded(tmp_path)
-    done = vi_contact(tmp_path, "motion", "info", str(path))
-    assert done.returncode == 0 and done.stderr == ""
-    record = read_record(path)
-    lines = dict(line.split(maxsplit=1) for line in done.stdout.splitlines() if not line.startswith("note"))
-    assert lines["format"] == "PEER AT2" and lines["dt"] == "0.02 s" and lines["sha256"] == record.sha256
-    assert lines["samples"] == str(record.acceleration.size)
-    assert lines["PGA"].startswith(f"{pga(record):.4g} m/s2")

@@ -43,34 +43,34 @@ def parser() -> argparse.ArgumentParser:
 def add_wall_arguments(wall: argparse.ArgumentParser) -> None:
     """The options of ``vi-contact wall`` (the demo takes the same)."""
     wall.add_argument(
-        "--case", help="a: 3 contact points, b: 11, face: whole side, bilateral, free (default: a and b, in DIR/a and DIR/b)"
+        "--case", help="a: 3 contact points, b: 11, face: whole side, bilateral, free (default: a and b, in DIR/a, DIR/b)"
     )
     shake = wall.add_argument_group("ground motion")
     shake.add_argument("--motion", metavar="FILE", help="horizontal record: PEER AT2, USGS SMC or two columns")
     shake.add_argument("--vertical", metavar="FILE", help="vertical record, beside --motion")
     shake.add_argument("--units", help="units of two-column files: m/s2, cm/s2, gal, g, ...")
     shake.add_argument("--scale", type=float, default=1.0, help="factor on the record, or on the harmonic's 1 m/s2")
-    shake.add_argument("--pga", type=float, metavar="A", help="scale to this peak [m/s2] instead: one factor, from the horizontal record, on both")
-    shake.add_argument("--resample", type=float, metavar="DT", help="resample the records to this step [s], band-limited")
+    shake.add_argument("--pga", type=float, metavar="A", help="scale both to this peak [m/s2] of the first")
+    shake.add_argument("--resample", type=float, metavar="DT", help="resample to this step [s], band-limited")
     step = wall.add_argument_group("step")
     step.add_argument(
         "--solver", default="condensed",
         help="condensed (default), hildreth, projected-cg, volume, volume-reference, semismooth, tron, bnls"
     )
     step.add_argument("--scheme", default="zwt", help="zwt (Zienkiewicz-Wood-Taylor), ss22, newmark")
-    step.add_argument("--impact", default="inelastic", help="inelastic, elastic, none, or a restitution number in [0, 1]")
-    step.add_argument("--projection", action="store_true", help="impact as an M-orthogonal impulse, not a component reset")
+    step.add_argument("--impact", default="inelastic", help="inelastic, elastic, none or a restitution in [0, 1]")
+    step.add_argument("--projection", action="store_true", help="impact as an M-orthogonal impulse, no reset")
     step.add_argument("--gravity", action="store_true", help="a gravity stage with contact active comes first")
     step.add_argument("--dt", type=float, help="time step [s] (default 1/20 of the first natural period)")
     step.add_argument("--steps", type=int, help="number of steps (default 400, or the whole record)")
     step.add_argument("--cross-check", action="store_true", help="solve every step by the other route too and compare")
     mesh = wall.add_argument_group("mesh")
-    mesh.add_argument("--divisions", type=int, nargs=2, metavar=("NX", "NY"), help="elements across and up (default 8 12)")
+    mesh.add_argument("--divisions", type=int, nargs=2, metavar=("NX", "NY"), help="elements across, up (default 8 12)")
     mesh.add_argument("--size", type=float, metavar="H", help="element size [m] of an unstructured mesh instead")
     mesh.add_argument("--triangles", action="store_true", help="triangles instead of quadrilaterals")
     output = wall.add_argument_group("output")
     output.add_argument("--out", default="results/wall", metavar="DIR", help="output folder (default results/wall)")
-    output.add_argument("--fields-every", type=int, default=10, metavar="K", help="steps between ParaView frames, 0: none")
+    output.add_argument("--fields-every", type=int, default=10, metavar="K", help="steps between frames, 0: none")
     output.add_argument("--restart", action="store_true", help="continue the run in --out from its checkpoint")
     output.add_argument("--quiet", action="store_true", help="no progress line")
 
@@ -89,7 +89,8 @@ def _impact(name: str, projection: bool) -> Any:
     except ValueError as error:
         if isinstance(error, InputError):
             raise
-        raise InputError(f"unknown impact law '{name}': give inelastic, elastic, none or a restitution in [0, 1]") from None
+        known = "inelastic, elastic, none or a restitution in [0, 1]"
+        raise InputError(f"unknown impact law '{name}': give {known}") from None
 
 
 def _wall(options: argparse.Namespace) -> str:
@@ -137,7 +138,7 @@ def _motion_info(options: argparse.Namespace) -> str:
 
 
 def split_petsc(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
-    """(our own arguments, PETSc options): the latter are ``-vi_contact_... [value]``, the prefixes of our PETSc objects."""
+    """(our own arguments, PETSc options): the latter are ``-vi_contact_... [value]``, our PETSc prefixes."""
     own: list[str] = []
     petsc: list[str] = []
     taking = False

@@ -12,4 +12,4 @@ class InputError(ViContactError, ValueError):
 
 
 class StepFailure(ViContactError, RuntimeError):
-    """A time step stayed above the certificate tolerance with every method tried; nothing computed before it is lost."""
+    """A time step stayed above the certificate tolerance with every method; nothing computed before it is lost."""

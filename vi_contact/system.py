@@ -26,7 +26,7 @@ class Space(Protocol):
         ...
 
     def sample(self, u: Array, nodes: np.ndarray, t: float, derivative: int = 0) -> Array:
-        """Values (k, d) at the nodes, the same on every rank; derivative 0, 1, 2 says which prescribed motion applies."""
+        """Values (k, d) at the nodes, the same on every rank; derivative 0, 1, 2: of the prescribed motion."""
         ...
 
 

@@ -193,7 +193,7 @@ def test_v4_1_energy_ledger(case):
         assert losses[name] == printed(text), name
     assert losses["input"] == pytest.approx(losses["impact"] + losses["contact"] + losses["end"], rel=1e-12)
     largest = found.energy.max()
-    assert abs(losses["defect"]) < 1e-13 * largest
+    assert abs(losses["defect"]) < 1e-12 * largest  # V9.7 asks for 1e-10
     assert abs(losses["algorithmic"]) < 1e-13 * largest  # phi = 1/2 is the midpoint rule (V9.1)
     assert losses["damping"] == 0.0
 

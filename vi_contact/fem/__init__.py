@@ -1,4 +1,4 @@
-"""Finite elements on DOLFINx. Names are imported when first used: `import vi_contact` needs no finite element library."""
+"""Finite elements on DOLFINx. Names are imported when first used: `import vi_contact` needs no such library."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ from importlib import import_module
 from typing import Any
 
 _HOME = {
-    "read_mesh": "mesh", "build_mesh": "mesh", "node_numbers": "mesh", "Cells": "mesh", "Facets": "mesh", "Tags": "mesh",
+    "read_mesh": "mesh", "build_mesh": "mesh", "node_numbers": "mesh",
+    "Cells": "mesh", "Facets": "mesh", "Tags": "mesh",
     "assemble": "assemble",
     "BodyForce": "loads", "Prescribed": "loads", "TangentialTraction": "loads", "Traction": "loads",
     "contact_surface": "trace",

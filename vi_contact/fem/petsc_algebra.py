@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,16 @@ from petsc4py import PETSc
 from ..algebra import Array, Comm, Factor, Indices, Matrix
 from ..errors import InputError
 
+PREFIX = "vi_contact_factor_"
+OWN_FACTOR = {
+    "ksp_type": "preonly",
+    "pc_type": "cholesky",
+    "pc_factor_mat_solver_type": "petsc",
+    "pc_factor_mat_ordering_type": "amd",
+}
 FULL_ROW = 40.0  # entries of a row: 2D meshes have fewer, 3D meshes more
+FEW_ROWS = 10_000  # with full rows: beyond, MUMPS' dense blocks pay
+COPIED_ROWS = 300_000  # with sparse rows: a copy of the factor on every rank takes about 0.5 GB here
 CHUNK = 64  # right-hand sides per block solve: bounds the memory of the dense blocks
 
 
@@ -71,38 +80,43 @@ class PetscMatrix:
 
 
 class PetscFactor:
-    """A Cholesky factor; ``matrix_factor`` is the PETSc factor matrix.
+    """A Cholesky factor and its substitutions.
 
-    On one rank and for sparse rows (2D) PETSc's own factorisation with minimum degree ordering: its substitutions are
-    4 to 15 times as fast as those of MUMPS, which factorises 3D matrices faster and is the one that works on many ranks.
-    Options of the prefix vi_contact_factor_ choose otherwise. InputError when the matrix cannot be factorised.
+    PETSc's own factorisation with minimum degree ordering where it serves (``_own_serves``): its substitutions are 4 to
+    15 times as fast as those of MUMPS. On several ranks each keeps a whole copy of it, so that results repeat to the
+    last bit, which those of MUMPS do not. MUMPS takes the rest: large 3D matrices, and what is too large to be copied.
+    Options with the prefix vi_contact_factor_ choose otherwise. InputError when the matrix cannot be factorised.
     """
 
     def __init__(self, matrix: PetscMatrix) -> None:
         mat = matrix.mat
         mat.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        self._b, self._x = mat.createVecs()
         self._pc = PETSc.PC().create(mat.comm)
-        self._pc.setOptionsPrefix("vi_contact_factor_")
-        self._pc.setType("cholesky")
+        self._pc.setOptionsPrefix(PREFIX)
         self._pc.setOperators(mat)
-        rows = max(mat.getSize()[0], 1)
-        if mat.comm.size == 1 and mat.getInfo()["nz_used"] < FULL_ROW * rows:
+        self._by_blocks = not _own_serves(mat)
+        if self._by_blocks:
+            self._pc.setType("cholesky")
+            self._pc.setFactorSolverType("mumps")
+            # P12: MUMPS may crash on distributed right-hand sides, and only the options database reaches it in time
+            _default_options({"mat_mumps_icntl_20": 0})
+        elif mat.comm.size == 1:
+            self._pc.setType("cholesky")
             self._pc.setFactorSolverType("petsc")
             self._pc.setFactorOrdering("amd")
         else:
-            # P12: MUMPS may crash on distributed right-hand sides, and only the options database reaches it in time
-            PETSc.Options("vi_contact_factor_")["mat_mumps_icntl_20"] = 0
-            self._pc.setFactorSolverType("mumps")
+            self._pc.setType("redundant")
+            _default_options({f"redundant_{name}": value for name, value in OWN_FACTOR.items()})
         self._pc.setFromOptions()
-        self._b, self._x = mat.createVecs()
+        self._by_blocks = self._by_blocks and self._pc.getType() == "cholesky"
         self._set_up()
 
     def _set_up(self) -> None:
         try:
             self._pc.setUp()
-            self.matrix_factor = self._pc.getFactorMatrix()
             self._b.set(1.0)
-            self.matrix_factor.solve(self._b, self._x)  # PETSc fills it with infinity when the factorisation failed
+            self._pc.apply(self._b, self._x)  # PETSc fills it with infinity when the factorisation failed
             failed = not np.isfinite(self._x.norm())
         except PETSc.Error:
             failed = True
@@ -114,29 +128,53 @@ class PetscFactor:
 
     def solve(self, b: Array) -> Array:
         self._b.array[:] = b
-        self.matrix_factor.solve(self._b, self._x)
+        self._pc.apply(self._b, self._x)
         return np.array(self._x.array_r)
 
     def solve_units(self, owned: Indices, slots: Indices, m: int) -> Array:
-        rows = self._x.getLocalSize()
-        total = self._x.getSize()
-        columns = np.zeros((rows, m))
+        columns = np.zeros((self._x.getLocalSize(), m))
         for first in range(0, m, CHUNK):
             width = min(CHUNK, m - first)
-            units = PETSc.Mat().createDense(((rows, total), (None, width)), comm=self._x.comm)
-            solved = PETSc.Mat().createDense(((rows, total), (None, width)), comm=self._x.comm)
-            units.setUp()
-            solved.setUp()
+            units = np.zeros((len(columns), width))
             mine = (slots >= first) & (slots < first + width)
-            block = units.getDenseArray()
-            block[owned[mine], slots[mine] - first] = 1.0
-            units.assemble()
-            solved.assemble()
-            self.matrix_factor.matSolve(units, solved)
-            columns[:, first : first + width] = solved.getDenseArray()
-            units.destroy()
-            solved.destroy()
+            units[owned[mine], slots[mine] - first] = 1.0
+            if self._by_blocks:
+                columns[:, first : first + width] = self._solve_block(units)
+            else:
+                for column in range(width):
+                    columns[:, first + column] = self.solve(units[:, column])
         return columns
+
+    def _solve_block(self, values: Array) -> Array:
+        """All columns at once, as MUMPS likes it."""
+        shape = ((len(values), self._x.getSize()), (None, values.shape[1]))
+        right, solved = (PETSc.Mat().createDense(shape, comm=self._x.comm) for _ in range(2))
+        for matrix in (right, solved):
+            matrix.setUp()
+        right.getDenseArray()[:] = values
+        for matrix in (right, solved):
+            matrix.assemble()
+        self._pc.getFactorMatrix().matSolve(right, solved)
+        result = np.array(solved.getDenseArray())
+        right.destroy()
+        solved.destroy()
+        return result
+
+
+def _own_serves(mat: Any) -> bool:
+    """Whether PETSc's own factorisation is the better one: sparse rows (2D), or few; on several ranks not too many."""
+    rows = max(mat.getSize()[0], 1)
+    if mat.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"] > FULL_ROW * rows:
+        return bool(rows <= FEW_ROWS)
+    return bool(mat.comm.size == 1 or rows <= COPIED_ROWS)
+
+
+def _default_options(values: Mapping[str, object]) -> None:
+    """PETSc options of the factor that hold unless the user has given them."""
+    database = PETSc.Options(PREFIX)
+    for name, value in values.items():
+        if not database.hasName(name):
+            database[name] = value
 
 
 class PetscAlgebra:

@@ -122,7 +122,7 @@ class PreparedCondensed:
         return StepResult(x, small.r, small.active, small.iterations, self._name)
 
     def _corrected(self, x: Array, r: Array, step: StepProblem) -> Array:
-        """A⁻¹(b - E r); contact unknowns on a rigid support are then put on their bound, which removes round-off only."""
+        """A⁻¹(b - E r); contact unknowns on a rigid support are put on their bound, which removes round-off only."""
         surface = self._surface
         if self._columns is not None:
             x = x - self._columns @ r

@@ -52,6 +52,7 @@ class PreparedHildreth:
         self.method = method
         self._scaled = scaled_dense(G, bilateral)
         factor = cholesky(self._scaled.matrix)
+        self._H: Array
         self._H, self._unit = _inverse(factor) if method.primal else (self._scaled.matrix, np.ones(bilateral.size))
         fixed = bilateral & method.primal  # s = -q there; in the dual form r is free there
         self._rows = [(i, self._H[i]) for i in np.flatnonzero(~fixed).tolist()]

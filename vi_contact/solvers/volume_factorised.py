@@ -100,7 +100,8 @@ class ReducedInverse:
         system = self._scaled.system
         self._free = self._inverse.unheld(system.load(step.b))
         predicted = system.predicted(step)
-        self._held = self._inverse.better_set(self._free, predicted, step.bound) | (predicted & system.surface.bilateral)
+        better = self._inverse.better_set(self._free, predicted, step.bound)
+        self._held = better | (predicted & system.surface.bilateral)
         return self._inverse.hold(self._free, self._held, step.bound)
 
     def apply(self, pc: Any, r: Any, y: Any) -> None:

@@ -1,0 +1,128 @@
+"""The wall model: numbering of its points, its cases, its meshes. The numbers of V4.1 are in validation/test_seed000_wall."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from fem_problems import field, max_over_ranks
+from mpi4py import MPI
+
+from vi_contact.errors import InputError
+from vi_contact.excitation import Harmonic
+from vi_contact.impact import Elastic, Inelastic
+from vi_contact.march import march, static_equilibrium
+from vi_contact.materials import LinearElastic, Rayleigh
+from vi_contact.modal import lowest_frequency
+from vi_contact.models.wall import CASES, STANDARD_GRAVITY, Wall, build
+from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
+from vi_contact.solvers.condensed import Condensed
+
+COMM = MPI.COMM_WORLD
+COARSE = Wall(divisions=(4, 6))
+
+
+def test_forty_points_around_the_boundary():
+    """V4.2, anticlockwise, 0.75 m apart: 12 top right corner, 20 top left, 32 bottom left, 40 bottom right."""
+    wall = Wall()
+    points = np.array([wall.point(number) for number in range(1, 41)])
+    assert [wall.point(n) for n in (12, 20, 32, 40)] == [(6.0, 9.0), (0.0, 9.0), (0.0, 0.0), (6.0, 0.0)]
+    assert [wall.point(n) for n in (1, 4, 26)] == [(6.0, 0.75), (6.0, 3.0), (0.0, 4.5)]
+    assert np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1) == pytest.approx(np.full(40, 0.75))
+    for number in (0, 41, -3):
+        with pytest.raises(InputError, match=f"points 1 to 40 .*, there is no point {number}"):
+            wall.point(number)
+
+
+def test_every_point_is_a_node_of_the_mesh():
+    model = build(Wall(), COMM)
+    points = np.array([model.wall.point(number) for number in range(1, 41)])
+    nodes, _ = field(model.system, model.system.u0)
+    assert nodes[model.system.space.find_nodes(points)] == pytest.approx(points, abs=1e-12)
+    assert len(nodes) == 9 * 13 and model.system.space.unknowns == 2 * 9 * 12
+    assert set(model.probes()) == {"4", "6", "7", "10", "12", "26"}
+
+
+def test_mass_section_and_damping():
+    """rho · width · height · d as the mass, thickness in the contact weights, damping handed on."""
+    wall = Wall(divisions=(4, 6), thickness=0.5, damping=Rayleigh(alpha=0.2, beta=0.0))
+    system = build(wall, COMM).system
+    ones = system.influence[:, 0]
+    free = 1.0 - 1.5 / 9.0 * 2.0 / 3.0  # Mfree: the lowest row of elements keeps a third of its mass
+    assert 2.0 * system.kinetic_energy(ones) == pytest.approx(2400.0 * 6.0 * 9.0 * 0.5 * free, rel=1e-12)
+    assert max_over_ranks(COMM, system.C @ ones - 0.2 * (system.M @ ones)) < 1e-12 * max_over_ranks(
+        COMM, system.C @ ones
+    )
+    assert build(wall, COMM).surface("face").weights.sum() == pytest.approx(0.5 * (9.0 - 0.75), rel=1e-12)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_cases(case):
+    """Contact points in the order of their numbers, along +x, without gap; held in the bilateral case, none when free."""
+    model = build(Wall(), COMM)
+    surface = model.surface(case)
+    expected = [model.wall.point(number) for number in CASES[case]]
+    assert surface.count == len(expected) == {"a": 3, "b": 11, "bilateral": 11, "free": 0}[case]
+    assert surface.points == pytest.approx(np.array(expected).reshape(-1, 2), abs=1e-12)
+    assert np.array_equal(surface.normals, np.tile([1.0, 0.0], (surface.count, 1))) and surface.basis is None
+    assert not surface.gap0.any() and np.all(surface.bilateral == (case == "bilateral"))
+
+
+def test_whole_face_and_unknown_case():
+    model = build(Wall(), COMM)
+    face = model.surface("face")
+    assert face.count == 12 and face.points[:, 1].min() == pytest.approx(0.75)
+    with pytest.raises(InputError, match="unknown case 'c': choose one of a, b, bilateral, free"):
+        model.surface("c")
+
+
+def test_defaults_of_a_problem():
+    """Harmonic at half the first frequency, a fortieth of its period as the time step, the seed's inelastic rule."""
+    model = build(COARSE, COMM)
+    problem = model.problem("a")
+    f1 = lowest_frequency(model.system)
+    assert problem.impact == Inelastic() and problem.excitation == Harmonic(1.0, 0.5 * f1)
+    assert model.time_step() == 1.0 / (20.0 * f1)
+    assert model.harmonic(2.5).amplitude == 2.5
+    other = model.problem("b", excitation=(), impact=Elastic())
+    assert other.excitations == () and other.impact == Elastic()
+
+
+@pytest.mark.parametrize(
+    "wall", [Wall(triangles=True), Wall(size=0.9), Wall(size=0.9, triangles=True), Wall(divisions=(5, 7))]
+)
+def test_other_meshes_are_the_same_wall(wall):
+    """Mass of the whole body (weight of a free-standing copy) and first frequency; irregular meshes included."""
+    model = build(wall, COMM, weight=True)
+    f1 = lowest_frequency(build(Wall(), COMM).system)
+    assert lowest_frequency(model.system) == pytest.approx(f1, rel=0.03)
+    base = static_equilibrium(model.problem("free", excitation=()), solver=Condensed())
+    points, u = field(model.system, base.u)
+    top = u[np.isclose(points[:, 1], 9.0)][:, 1]
+    sag = -2400.0 * STANDARD_GRAVITY * 9.0**2 / (2.0 * 2.0e10)  # nu = 0: a column under its own weight
+    assert top == pytest.approx(np.full(len(top), sag), rel=1e-9)
+    assert model.surface("b").count == 11 or wall.divisions == (5, 7) or wall.size
+
+
+def test_contact_points_closer_than_nodes_are_refused():
+    """Eleven contact points cannot be told apart on six elements."""
+    with pytest.raises(InputError, match="is listed twice"):
+        build(COARSE, COMM).surface("b")
+
+
+def test_gravity_stage_with_contact_then_shaking():
+    """Poisson's ratio 0.2: the weight presses the wall against the ground; the run goes on from there, certified."""
+    wall = Wall(divisions=(4, 6), material=LinearElastic(E=2.0e10, nu=0.2, rho=2400.0))
+    model = build(wall, COMM, weight=True)
+    problem = model.problem("face")
+    start = static_equilibrium(problem, solver=Condensed())
+    assert start.r_n.max() > 0.0 and not start.v.any() and start.t == 0.0
+    assert problem.surface.normal_values(start.u).max() == 0.0
+    quiet = model.problem("face", excitation=())
+    dt = model.time_step()
+    for state, _ in march(quiet, scheme=ZienkiewiczWoodTaylor(), solver=Condensed(), dt=dt, steps=5, state=start):
+        assert max_over_ranks(COMM, state.u - start.u) < 1e-12 * max_over_ranks(COMM, start.u)
+    seen = []
+    for state, report in march(problem, scheme=ZienkiewiczWoodTaylor(), solver=Condensed(), dt=dt, steps=30, state=start):
+        seen.append(state.active.sum())
+        assert report.certificate.worst < 1e-12
+    assert len(set(seen)) > 1
