@@ -4,9 +4,8 @@
     python3 benchmarks/step_cost.py [--sizes 1e3 2e3 2e4 2e5] [--steps 60] [--json FILE]
 
 The wall of seed 000 with its whole right side in possible contact, harmonic motion, Zienkiewicz-Wood-Taylor step,
-impact rule and certificate on, no records. A linear step is right-hand side, one back-substitution and update. All figures are
-medians and means over the steps that have contact, one thread, one rank. The run stops at the wanted number of steps
-after the first contact.
+impact rule and certificate on, no records. A linear step is right-hand side, one back-substitution and update, timed
+beside every unilateral one. Figures are medians and means over the steps that have contact, one thread, one rank.
 """
 
 from __future__ import annotations
@@ -133,7 +132,7 @@ COLUMNS = (  # title, width, format, key
     ("MB", 6, ".0f", "peak_memory_MB"),
     ("certificate", 11, ".1e", "certificate"),
 )
-HEADER = f"{'unknowns':>9} {'points':>6} {'route':<26}" + "".join(f" {title:>{width}}" for title, width, _, _ in COLUMNS)
+HEADER = f"{'unknowns':>9} {'points':>6} {'route':<26}" + "".join(f" {name:>{width}}" for name, width, _, _ in COLUMNS)
 
 
 def line(row: dict[str, Any], name: str, found: dict[str, Any]) -> str:

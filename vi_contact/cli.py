@@ -43,7 +43,7 @@ def parser() -> argparse.ArgumentParser:
 def add_wall_arguments(wall: argparse.ArgumentParser) -> None:
     """The options of ``vi-contact wall`` (the demo takes the same)."""
     wall.add_argument(
-        "--case", help="a: 3 contact points, b: 11, face: whole side, bilateral, free (default: a and b, in DIR/a, DIR/b)"
+        "--case", help="a: 3 points, b: 11, face: whole side, bilateral, free (default: a and b in DIR/a, DIR/b)"
     )
     shake = wall.add_argument_group("ground motion")
     shake.add_argument("--motion", metavar="FILE", help="horizontal record: PEER AT2, USGS SMC or two columns")
