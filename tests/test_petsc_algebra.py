@@ -9,6 +9,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from vi_contact.algebra import Array, SerialAlgebra, SerialMatrix
+from vi_contact.errors import InputError
 from vi_contact.fem.petsc_algebra import CHUNK, MpiComm, PetscAlgebra, PetscMatrix
 
 COMM = MPI.COMM_WORLD
@@ -129,6 +130,16 @@ def test_columns_of_the_inverse(empty_rank, m):
     expected = np.linalg.inv(matrix.toarray())[:, rows]
     found = np.concatenate(COMM.allgather(columns))
     assert np.abs(found - expected).max(initial=0.0) <= 1e-12 * np.abs(expected).max(initial=1.0)
+
+
+@pytest.mark.parametrize("value", [0.0, float("nan")])
+def test_a_matrix_that_cannot_be_factorised(value):
+    """Singular (an unknown without stiffness and mass) or NaN: one sentence, on all ranks."""
+    matrix = spd(4, 1).tolil()
+    matrix[17, :] = matrix[:, 17] = 0.0
+    matrix[17, 17] = value
+    with pytest.raises(InputError, match="the effective matrix cannot be factorised: it is singular or contains NaN"):
+        PetscAlgebra(COMM).factor(distributed(sp.csr_matrix(matrix)))
 
 
 def test_dot_is_the_same_number_on_all_ranks():

@@ -1,4 +1,4 @@
-"""The wall model: numbering of its points, its cases, its meshes. The numbers of V4.1 are in validation/test_seed000_wall."""
+"""The wall model: numbering of its points, its cases, its meshes (numbers: validation/test_seed000_wall.py)."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def test_mass_section_and_damping():
 
 @pytest.mark.parametrize("case", CASES)
 def test_cases(case):
-    """Contact points in the order of their numbers, along +x, without gap; held in the bilateral case, none when free."""
+    """Contact points in the order of their numbers, along +x, no gap; held in the bilateral case, none when free."""
     model = build(Wall(), COMM)
     surface = model.surface(case)
     expected = [model.wall.point(number) for number in CASES[case]]
@@ -78,12 +78,12 @@ def test_whole_face_and_unknown_case():
 def test_defaults_of_a_problem():
     """Harmonic at half the first frequency, a fortieth of its period as the time step, the seed's inelastic rule."""
     model = build(COARSE, COMM)
-    problem = model.problem("a")
+    problem = model.problem("face")
     f1 = lowest_frequency(model.system)
     assert problem.impact == Inelastic() and problem.excitation == Harmonic(1.0, 0.5 * f1)
     assert model.time_step() == 1.0 / (20.0 * f1)
     assert model.harmonic(2.5).amplitude == 2.5
-    other = model.problem("b", excitation=(), impact=Elastic())
+    other = model.problem("free", excitation=(), impact=Elastic())
     assert other.excitations == () and other.impact == Elastic()
 
 
@@ -91,7 +91,7 @@ def test_defaults_of_a_problem():
     "wall", [Wall(triangles=True), Wall(size=0.9), Wall(size=0.9, triangles=True), Wall(divisions=(5, 7))]
 )
 def test_other_meshes_are_the_same_wall(wall):
-    """Mass of the whole body (weight of a free-standing copy) and first frequency; irregular meshes included."""
+    """First frequency within 3 % and the mean sag of the top under its weight within 0.5 %, on irregular meshes too."""
     model = build(wall, COMM, weight=True)
     f1 = lowest_frequency(build(Wall(), COMM).system)
     assert lowest_frequency(model.system) == pytest.approx(f1, rel=0.03)
@@ -99,14 +99,15 @@ def test_other_meshes_are_the_same_wall(wall):
     points, u = field(model.system, base.u)
     top = u[np.isclose(points[:, 1], 9.0)][:, 1]
     sag = -2400.0 * STANDARD_GRAVITY * 9.0**2 / (2.0 * 2.0e10)  # nu = 0: a column under its own weight
-    assert top == pytest.approx(np.full(len(top), sag), rel=1e-9)
-    assert model.surface("b").count == 11 or wall.divisions == (5, 7) or wall.size
+    assert top.mean() == pytest.approx(sag, rel=5e-3)
 
 
-def test_contact_points_closer_than_nodes_are_refused():
-    """Eleven contact points cannot be told apart on six elements."""
-    with pytest.raises(InputError, match="is listed twice"):
+def test_contact_points_need_nodes_near_them():
+    """Eleven contact points on six elements are refused: one by one too far away, or two on one node."""
+    with pytest.raises(InputError, match=r"contact point \(6, 2.25\) is 0.75 m away from boundary group 'face'"):
         build(COARSE, COMM).surface("b")
+    with pytest.raises(InputError, match="is listed twice"):
+        build(Wall(divisions=(4, 9)), COMM).surface("b")
 
 
 def test_gravity_stage_with_contact_then_shaking():
@@ -122,7 +123,8 @@ def test_gravity_stage_with_contact_then_shaking():
     for state, _ in march(quiet, scheme=ZienkiewiczWoodTaylor(), solver=Condensed(), dt=dt, steps=5, state=start):
         assert max_over_ranks(COMM, state.u - start.u) < 1e-12 * max_over_ranks(COMM, start.u)
     seen = []
-    for state, report in march(problem, scheme=ZienkiewiczWoodTaylor(), solver=Condensed(), dt=dt, steps=30, state=start):
+    scheme = ZienkiewiczWoodTaylor()
+    for state, report in march(problem, scheme=scheme, solver=Condensed(), dt=dt, steps=30, state=start):
         seen.append(state.active.sum())
         assert report.certificate.worst < 1e-12
     assert len(set(seen)) > 1
