@@ -45,7 +45,7 @@ class HeldInverse:
         reaction = np.zeros(len(held))
         reaction[held] = self._solve(held, (system.shared(z[system.bounded]) - target)[held])
         x = z[:n] - self._respond(reaction, held)
-        w = z[n:] - z[system.feet] + x[system.feet] - reaction[system.surface.slots][system.soft] / system.spring
+        w = z[n:] - z[system.feet] + x[system.feet]  # held tips are set below
         z = np.concatenate([x, w])
         mine = held[system.surface.slots]
         z[system.bounded[mine]] = target[system.surface.slots][mine]
