@@ -11,6 +11,9 @@ from .step import Balance, Certificate, ContactProblem, State, StepProblem, Step
 from .system import SemiDiscreteSystem
 
 
+ROUNDED = 1e-5  # of |A||x|: see Certificate
+
+
 def kkt_residual(step: StepProblem, result: StepResult) -> Certificate:
     """The certificate of a step: how well (x, r_n) satisfies the inequality problem. Definitions: ``Certificate``."""
     surface, x, r_n = step.surface, result.x, result.r_n
@@ -25,7 +28,7 @@ def kkt_residual(step: StepProblem, result: StepResult) -> Certificate:
     r = _over(r_n, max(b_max, _max_abs(r_n)))
     free = ~surface.bilateral
     return Certificate(
-        equilibrium=_max_abs(_over(np.array([residual_max]), max(b_max, Ax_max))),
+        equilibrium=_max_abs(_over(np.array([residual_max]), max(b_max, Ax_max, ROUNDED * step.A.largest * x_max))),
         penetration=_max_abs(np.minimum(gap[free], 0.0)),
         tension=_max_abs(np.minimum(r[free], 0.0)),
         complementarity=_max_abs(np.where(result.active | surface.bilateral, gap, r)),
