@@ -74,7 +74,7 @@ class LinearSteps:
 def unilateral_steps(
     problem: vc.ContactProblem, solver: Any, dt: float, count: int, linear: LinearSteps
 ) -> dict[str, Any]:
-    """Times ``count`` steps with contact after a third as many to warm up, each beside a linear step: a drift of the machine cancels."""
+    """Times ``count`` steps with contact after a third as many to warm up, each beside a linear step."""
     loop = vc.march(problem, scheme=SCHEME, solver=solver, dt=dt, steps=100 * count)
     set_up, _ = timed(lambda: next(loop))
     seconds, plain, iterations, active, worst = [], [], [], [], 0.0

@@ -27,8 +27,9 @@ from vi_contact.verify import kkt_residual
 
 METHODS = {
     "reduced": ReducedNewton(),
-    "one-factorisation": OneFactorisation(),
-    "second-substitution": OneFactorisation(limit=0),
+    "one-factorisation": OneFactorisation(exchanges=0),
+    "second-substitution": OneFactorisation(exchanges=0, limit=0),
+    "improved-prediction": OneFactorisation(),
     "semismooth": SemismoothNewton(),
     "tron": TaoTron(),
     "bnls": TaoBnls(),
@@ -133,7 +134,7 @@ def test_warm_start_at_the_solution_costs_no_iteration(parallel: bool, method: A
     prepared = Volume(method=method).prepare(c.step.A, c.step.surface, c.step.scale)
     first = prepared.solve(c.step)
     again = prepared.solve(c.starting_at(first))
-    assert first.iterations > 0 and again.iterations == 0
+    assert again.iterations == 0 and (first.iterations > 0 or getattr(method, "exchanges", 0) > 0)
     agree(c, again, c.exact())
 
 
@@ -157,18 +158,17 @@ class CountingFactor:
         return self._factor.solve(b)
 
 
-@pytest.mark.parametrize(("limit", "solves"), [(10**6, (1, 1)), (0, (3, 2))])
+@pytest.mark.parametrize(("limit", "solves"), [(10**6, (1, 1)), (0, (4, 2))])
 def test_back_substitutions_of_a_step(parallel: bool, limit: int, solves: tuple[int, int]) -> None:
     """Solver notes 1b: one for the step, however the contact set changes; one more for each set if W is not kept.
 
-    From a wrong set: the free solution, the points it takes beyond the bounds, one change. At the solution: the free
-    solution and its set.
+    From a wrong set: the free solution, that set, its changes. At the solution: the free solution and its set.
     """
     c = pushed_block(parallel=parallel)
     counting = c.step.A.__dict__["factor"] = CountingFactor(c.step.A.factor)
-    prepared = Volume(method=OneFactorisation(limit=limit)).prepare(c.step.A, c.step.surface, c.step.scale)
+    prepared = Volume(method=OneFactorisation(exchanges=0, limit=limit)).prepare(c.step.A, c.step.surface, c.step.scale)
     first = prepared.solve(replace(c.step, active=~c.exact().active))
-    assert first.iterations == 1 and counting.solves == solves[0]
+    assert first.iterations == 2 and counting.solves == solves[0]
     prepared.solve(c.starting_at(first))
     assert counting.solves == sum(solves)
 

@@ -10,7 +10,6 @@ from .algebra import Array
 from .step import Balance, Certificate, ContactProblem, State, StepProblem, StepResult
 from .system import SemiDiscreteSystem
 
-
 ROUNDED = 1e-5  # of |A||x|: see Certificate
 
 

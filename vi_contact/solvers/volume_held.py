@@ -51,18 +51,34 @@ class HeldInverse:
         z[system.bounded[mine]] = target[system.surface.slots][mine]
         return z
 
-    def better_set(self, z: Array, held: Mask, target: Array) -> Mask:
-        """(m,) The held set if its reactions push and no other point passes its target, else the points that z = A⁻¹ b
-        takes beyond their targets. A start only: asked of the contact points, it costs nothing beside a step."""
+    def better_set(self, z: Array, held: Mask, target: Array, exchanges: int) -> Mask:
+        """(m,) A contact set to start from, for z = A⁻¹ b: ``held`` if its reactions push and no other point passes its
+        target; else the points that z takes beyond their targets, with at most so many exchanges of wrong signs.
+
+        Asked of the contact points alone, it costs little beside a step; SNES decides.
+        """
         surface = self._system.surface
-        at = self._system.shared(z[self._system.bounded])
-        if not held.any():
-            return np.asarray(at > target)
-        push = self._solve(held, (at - target)[held])
-        left = (at - target)[~held] - self._G[np.ix_(~held, held)] @ push
-        rounding = 1e-12 * float(np.max(np.abs(at), initial=0.0))
-        pulls = np.any(push[~surface.bilateral[held]] < 0.0)
-        return np.asarray(at > target) if pulls or np.any(left > rounding) else held
+        excess = self._system.shared(z[self._system.bounded]) - target
+        rounding = 1e-12 * float(np.max(np.abs(excess[np.isfinite(excess)]), initial=0.0))
+        wrong = self._wrong(excess, held, rounding)
+        if not wrong.any():
+            return held
+        held = (excess > 0.0) | (held & surface.bilateral)
+        for _ in range(exchanges):
+            wrong = self._wrong(excess, held, rounding)
+            if not wrong.any():
+                break
+            held = held ^ wrong
+        return held
+
+    def _wrong(self, excess: Array, held: Mask, rounding: float) -> Mask:
+        """(m,) held points whose reaction pulls, and others that pass their target."""
+        wrong = excess > rounding
+        if held.any():
+            push = self._solve(held, excess[held])
+            wrong = excess - self._G[:, held] @ push > rounding
+            wrong[held] = (push < 0.0) & ~self._system.surface.bilateral[held]
+        return wrong
 
     def _respond(self, reaction: Array, held: Mask) -> Array:
         """W reaction; kept columns are multiplied in runs of neighbours, without copying."""
