@@ -17,6 +17,7 @@ from vi_contact.fem.loads import BodyForce, Prescribed, TangentialTraction, Trac
 from vi_contact.march import march
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
+from vi_contact.system import Load
 
 COMM = MPI.COMM_WORLD
 bodies = pytest.mark.parametrize("name", BODIES)
@@ -52,17 +53,18 @@ def test_constant_history_and_function_of_time_are_one_load(kind):
     where = {"facets": tags["top"]} if kind is Traction else {}
     value = np.array([4.0, -9.0])
 
-    def force(t: float, **load: Any) -> Array:
-        return assemble(mesh, CONCRETE, loads=kind(**where, **load)).load(t)
+    def load(**given: Any) -> Load:
+        return assemble(mesh, CONCRETE, loads=kind(**where, **given)).load
 
-    still = force(0.3, value=tuple(value))
-    assert max_over_ranks(COMM, still - force(7.0, value=tuple(value))) == 0.0
+    constant = load(value=tuple(value))
+    still = constant(0.3)
+    assert max_over_ranks(COMM, still - constant(7.0)) == 0.0
+    separable = load(value=tuple(value), history=sin)
+    general = load(value=lambda x, t: sin(t) * np.tile(value, (len(x), 1)))
+    shaped = load(value=lambda x, t: np.tile(value, (len(x), 1)), history=sin)
     for t in (0.0, 0.3, 1.1):
-        separable = force(t, value=tuple(value), history=sin)
-        general = force(t, value=lambda x, t: sin(t) * np.tile(value, (len(x), 1)))
-        shaped = force(t, value=lambda x, t: np.tile(value, (len(x), 1)), history=sin)
         for one in (separable, general, shaped):
-            assert max_over_ranks(COMM, one - sin(t) * still) < 1e-13 * max_over_ranks(COMM, still)
+            assert max_over_ranks(COMM, one(t) - sin(t) * still) < 1e-13 * max_over_ranks(COMM, still)
     both = assemble(mesh, CONCRETE, loads=[kind(**where, value=tuple(value)), kind(**where, value=(1.0, 0.0))])
     assert resultant(both, both.load(0.0)) == pytest.approx(
         resultant(both, still) * (value + [1.0, 0.0]) / value, rel=1e-13
