@@ -122,6 +122,20 @@ def test_bilateral_points_by_both_routes(solver):
     assert checked.worst < 1e-9
 
 
+def test_stiff_springs_tend_to_the_rigid_wall():
+    """Ground of 1e13 to 1e15 Pa/m under the shaken wall, without impact law: the distance to the rigid ground's motion
+    falls as 1/k. (Points on springs have no impacts: the law is for rigid supports.)"""
+
+    def motion(springs: float | None) -> Run:
+        return run(replace(shaken_wall(COMM, springs=springs), impact=None), dt=WALL_DT, steps=24)
+
+    rigid = motion(None)
+    distance = [np.abs(motion(k).u - rigid.u).max() for k in (1e13, 1e14, 1e15)]
+    assert rigid.active.any() and distance[0] < 1e-2 * np.abs(rigid.u).max()
+    assert np.log10(distance[0] / distance[1]) == pytest.approx(1.0, abs=0.05)
+    assert np.log10(distance[1] / distance[2]) == pytest.approx(1.0, abs=0.05)
+
+
 # The same body, written differently -----------------------------------------------------------------------------------
 
 @cache
