@@ -157,7 +157,8 @@ def test_iterative_linear_solver(pushed: Case, pc: str) -> None:
 @pytest.mark.parametrize("ksp", ["gmres", "cg"])
 def test_krylov_methods_on_the_one_factorisation(pushed: Case, ksp: str) -> None:
     """The shell matrices multiply too, and their preconditioner is the exact inverse."""
-    prepared = prepare(pushed, Volume(method=OneFactorisation(exchanges=0), petsc_options={"ksp_type": ksp, "ksp_rtol": 1e-12}))
+    options = {"ksp_type": ksp, "ksp_rtol": 1e-12}
+    prepared = prepare(pushed, Volume(method=OneFactorisation(exchanges=0), petsc_options=options))
     assert kkt_residual(pushed.step, prepared.solve(pushed.step)).worst <= 1e-12
     assert 0 < prepared.snes.getLinearSolveIterations() <= 2 * prepared.snes.getIterationNumber()
 
