@@ -216,7 +216,10 @@ class ReducedNewton:
 
 @dataclass(frozen=True)
 class SemismoothNewton:
-    """SNES VINEWTONSSLS, LU by MUMPS: a diagnostic. Its iterates may penetrate by about 1e-13 of the displacement."""
+    """SNES VINEWTONSSLS, LU by MUMPS: a diagnostic. Its iterates may penetrate by about 1e-13 of the displacement.
+
+    With springs 1e6 times stiffer or softer than the body its line search fails or not, as rounding will have it.
+    """
 
     def defaults(self, ranks: int) -> Options:
         """Options before the user's."""

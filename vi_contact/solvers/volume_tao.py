@@ -124,7 +124,10 @@ class Test:
 
 @dataclass(frozen=True)
 class TaoTron:
-    """TAO TRON: trust region Newton with projected searches; conjugate gradients with incomplete Cholesky inside."""
+    """TAO TRON: trust region Newton with projected searches; conjugate gradients with incomplete Cholesky inside.
+
+    Slow, or a StepFailure, with springs more than about 1e3 times stiffer than the body: they shrink its trust region.
+    """
 
     tao_type: ClassVar[str] = "tron"
 
