@@ -18,7 +18,8 @@ trap 'kill "$child"; wait; exit 130' INT TERM
 
 run() {  # on $1 ranks, with pytest's arguments
   local ranks=$1 launch=() code=0 p=0 f=0 s=0; shift
-  [ "$ranks" -eq 1 ] || launch=(mpirun -n "$ranks")
+  # --capture=sys: a library that calls exit() on one rank takes what pytest has captured from it along
+  [ "$ranks" -eq 1 ] || { launch=(mpirun -n "$ranks"); set -- --capture=sys "$@"; }
   : >"$tally"
   VI_CONTACT_TALLY=$tally timeout -k 10 "$((SECONDS < seconds ? seconds - SECONDS : 1))" \
     "${launch[@]}" "$vi_python" -m pytest --color="$colour" "$@" </dev/null &
