@@ -68,6 +68,7 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
         if comm.rank == 0:
             print(f"\nCase {case}. {title}\n{solution.summary()}")
             draw(solution.history, case, problem.surface, out / case, title=title, reference=linear.history)
+        comm.Barrier()  # nobody leaves before the figures are there
     if comm.rank == 0:
         print(f"\nFigures, histories and ParaView files are in {out}/a and {out}/b.")
     return numbers

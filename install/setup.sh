@@ -19,6 +19,7 @@ vi_mpi_environment() {
   export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
   export OMPI_MCA_rmaps_base_oversubscribe=1 PRTE_MCA_rmaps_default_mapping_policy=:oversubscribe
   export OMPI_MCA_hwloc_base_binding_policy=none PRTE_MCA_hwloc_default_binding_policy=none
+  export OMPI_MCA_ess_singleton_isolated=1  # one rank without mpirun: no daemon to start, none to fail
   export OMPI_MCA_mpi_yield_when_idle=1 HWLOC_HIDE_ERRORS=2 UCX_LOG_LEVEL=fatal
   export OMPI_MCA_pml=ob1 OMPI_MCA_btl=^tcp,openib,ofi,uct,usnic OMPI_MCA_btl_vader_single_copy_mechanism=none
 }

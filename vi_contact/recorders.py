@@ -63,7 +63,7 @@ class Steps:
 class Energy:
     """The energy ledger of the run (verification V9.7), all in joules, works and losses cumulative:
 
-        W_input + E(0) = E(t) + D_damping + D_contact + D_impact + D_algorithmic + defect,   E = ½ vᵀMv + ½ uᵀKu
+        W_input + E(0) = E(t) + D_damping + D_contact + D_impact + D_algorithmic - defect,   E = ½ vᵀMv + ½ uᵀKu
 
     D_impact = ½ v⁻ᵀMv⁻ - ½ v⁺ᵀMv⁺ with its sign (V9.6); W_input is the work of loads, inertia loads -M r a_g and
     prescribed motions. The defect is the work of the residual of the equation of motion, accumulated; its size relative

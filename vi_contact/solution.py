@@ -125,7 +125,8 @@ def _lines(facts: Mapping[str, Any]) -> list[str]:
     if np.isfinite(facts["seconds_per_step"]):
         mean, plain = facts["seconds_per_step"], facts["seconds_per_linear_step"]
         ratio = f", plain linear step {plain:.3e} s, ratio {mean / plain:.2f}" if np.isfinite(plain) else ""
-        lines.append(line("wall time per step", f"{mean:.3e} s{ratio}"))
+        extra = " (with records, output and the cross-check)" if facts["cross_check"] else " (with records and output)"
+        lines.append(line("wall time per step", f"{mean:.3e} s{ratio}{extra}"))
     if facts["reason"]:
         lines.append(line("reason", facts["reason"]))
     return lines

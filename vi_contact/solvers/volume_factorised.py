@@ -138,7 +138,7 @@ class FactorisedDriver(SnesDriver):
 
 @dataclass(frozen=True)
 class OneFactorisation:
-    """SNES VINEWTONRSLS on the one factorisation of A. Iterations are back-substitutions after the first.
+    """SNES VINEWTONRSLS on the one factorisation of A. Iterations are those of SNES.
 
     It starts from the solution on a predicted contact set, so that a right prediction costs one back-substitution and
     no iteration.
