@@ -85,8 +85,8 @@ class WallRun:
             if given not in known:
                 raise InputError(f"unknown {name} '{given}': choose one of {', '.join(known)}")
         if self.motion is None and self.vertical is None:
-            for name, given in (("pga", self.pga), ("units", self.units), ("resample", self.resample)):
-                if given is not None:
+            for name, value in (("pga", self.pga), ("units", self.units), ("resample", self.resample)):
+                if value is not None:
                     raise InputError(f"{name} speaks of a record: give a motion file too, or leave {name} out")
         if self.fields_every < 0:
             raise InputError(f"fields_every is {self.fields_every}: give a number of steps, or 0 for no fields")
