@@ -168,6 +168,8 @@ def test_mass_proportional_damping_is_a_force_per_volume():
         ({"left": (0,), "bottom": (1,)}, False),
         ({"left": (0,), "right": (0,)}, True),
         ({"left": (0, 1)}, False),
+        ({"bottom": (0,), "left": (1,)}, True),  # turns about their common corner
+        ({"bottom": (0,), "left": (1,), "top": (1,)}, False),
     ],
 )
 def test_floating_in_the_plane(sides, floating):
@@ -185,6 +187,7 @@ def test_floating_in_the_plane(sides, floating):
         ({"left": (0,), "bottom": (1,), "back": (2,)}, False),
         ({"bottom": (1,)}, True),
         ({"bottom": (0, 1)}, True),
+        ({"bottom": (0, 2), "left": (1, 2)}, True),  # turns about their common edge
         ({"back": None}, False),
     ],
 )
