@@ -297,7 +297,10 @@ def test_a_closed_solver_opens_again(pushed: Case) -> None:
         prepared = prepare(pushed, Volume(method=method))
         first = prepared.solve(pushed.step)
         prepared.close()
-        assert np.array_equal(prepared.solve(pushed.step).x, first.x)
+        change = np.max(np.abs(prepared.solve(pushed.step).x - first.x), initial=0.0)
+        size = np.max(np.abs(first.x), initial=0.0)
+        change, size = pushed.step.surface.comm.max(np.array([change, size]))
+        assert change <= 1e-11 * size  # not 0: MUMPS on several ranks does not repeat itself to the last bit
 
 
 def test_methods_do_not_disturb_the_matrix(pushed: Case) -> None:
