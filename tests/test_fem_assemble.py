@@ -134,6 +134,8 @@ def test_two_materials_in_series():
     x = points[:, 0]
     expected = np.where(x <= 1.0, 2.0e-3 * x, 2.0e-3 + 0.5e-3 * (x - 1.0))
     assert np.abs(values - np.column_stack([expected, 0.0 * x])).max() < 1e-12 * expected.max()
+    with pytest.raises(InputError, match="6 cells have more than one material"):
+        assemble(mesh, [*halves, halves[0]])
     with pytest.raises(InputError, match="6 cells have no material: give a"):
         assemble(mesh, halves[:1])
 

@@ -120,15 +120,18 @@ class ElasticForms:
 
 
 def cell_materials(mesh: Any, material: Materials) -> list[tuple[Any, LinearElastic]]:
-    """(local cells, material) pairs that cover every local cell; InputError for cells without material."""
+    """(local cells, material) pairs that cover every local cell once; InputError for cells with none or two."""
     cell_map = mesh.topology.index_map(mesh.topology.dim)
     count = cell_map.size_local + cell_map.num_ghosts
     if isinstance(material, LinearElastic):
         return [(np.arange(count), material)]
-    covered = np.zeros(count, dtype=bool)
+    covered = np.zeros(count, dtype=np.int64)
     for cells, _ in material:
-        covered[cells.indices] = True
-    missing = mesh.comm.allreduce(int((~covered[: cell_map.size_local]).sum()))
+        covered[cells.indices] += 1
+    own = covered[: cell_map.size_local]
+    missing, twice = mesh.comm.allreduce(np.array([np.sum(own == 0), np.sum(own > 1)]))
+    if twice:
+        raise InputError(f"{twice} cells have more than one material: cell groups with a material must not overlap")
     if missing:
         raise InputError(
             f"{missing} cells have no material: give a (cells, material) pair for every cell group of the mesh"
