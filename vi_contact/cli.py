@@ -57,7 +57,7 @@ def add_wall_arguments(wall: argparse.ArgumentParser) -> None:
         "--solver", default="condensed",
         help="condensed (default), hildreth, projected-cg, volume, volume-reference, semismooth, tron, bnls"
     )
-    step.add_argument("--scheme", default="zwt", help="zwt (Zienkiewicz-Wood-Taylor), ss22, newmark")
+    step.add_argument("--scheme", default="zwt", help="zwt or zienkiewicz-wood-taylor (default), ss22, newmark")
     step.add_argument("--impact", default="inelastic", help="inelastic, elastic, none or a restitution in [0, 1]")
     step.add_argument("--projection", action="store_true", help="impact as an M-orthogonal impulse, no reset")
     step.add_argument("--gravity", action="store_true", help="a gravity stage with contact active comes first")

@@ -33,6 +33,7 @@ from ..surfaces import ContactSurface
 from .wall import CASES, Wall, WallModel, build
 
 SCHEMES: dict[str, Scheme] = {
+    "zienkiewicz-wood-taylor": ZienkiewiczWoodTaylor(phi=0.5),
     "zwt": ZienkiewiczWoodTaylor(phi=0.5),
     "ss22": SS22(),
     "newmark": LinearMultistep.newmark(),
