@@ -16,13 +16,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..algebra import Array
 from ..errors import InputError
 from ..step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
+from .single_step import SingleStep
 
 
 @dataclass(frozen=True)
-class SS22:
+class SS22(SingleStep):
     """See the module's equations. InputError unless theta2 >= theta1 >= ½ (else only conditionally stable)."""
 
     theta1: float = 0.5
@@ -34,17 +34,6 @@ class SS22:
                 f"SS22 weights theta1={self.theta1}, theta2={self.theta2}: give theta2 >= theta1 >= 0.5, "
                 "the unconditionally stable range"
             )
-
-    def check(self, problem: ContactProblem) -> None:
-        """Works with every contact problem."""
-
-    def start(self, problem: ContactProblem, state: State, dt: float) -> State:
-        """Self-starting: nothing to prepare."""
-        return state
-
-    def jump(self, problem: ContactProblem, state: State, v: Array, dt: float) -> State:
-        """A velocity jump needs no restart."""
-        return replace(state, v=v)
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
         """A = 2/(theta2 dt²) M + 2 theta1/(theta2 dt) C + K."""

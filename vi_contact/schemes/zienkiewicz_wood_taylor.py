@@ -19,10 +19,11 @@ from dataclasses import dataclass, replace
 from ..algebra import Array
 from ..errors import InputError
 from ..step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
+from .single_step import SingleStep
 
 
 @dataclass(frozen=True)
-class ZienkiewiczWoodTaylor:
+class ZienkiewiczWoodTaylor(SingleStep):
     """See the module's equations. ``phi`` in [½, 1]: InputError below ½, where the step is unstable."""
 
     phi: float = 0.5
@@ -30,17 +31,6 @@ class ZienkiewiczWoodTaylor:
     def __post_init__(self) -> None:
         if not 0.5 <= self.phi <= 1.0:
             raise InputError(f"ZienkiewiczWoodTaylor phi is {self.phi}: give a weight from 0.5 to 1, less is unstable")
-
-    def check(self, problem: ContactProblem) -> None:
-        """Works with every contact problem."""
-
-    def start(self, problem: ContactProblem, state: State, dt: float) -> State:
-        """Self-starting: nothing to prepare."""
-        return state
-
-    def jump(self, problem: ContactProblem, state: State, v: Array, dt: float) -> State:
-        """A velocity jump needs no restart."""
-        return replace(state, v=v)
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
         """A = M/(phi dt)² + C/(phi dt) + K."""
