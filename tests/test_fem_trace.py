@@ -280,3 +280,13 @@ def test_system_of_another_kind():
     _, tags = body()
     with pytest.raises(InputError, match="contact_surface needs a system made by fem.assemble"):
         contact_surface(chain_system(3), tags["bottom"])
+
+
+def test_a_listed_point_between_nodes_is_told(caplog: pytest.LogCaptureFixture) -> None:
+    """It stands for the nearest node, and rank 0 says how far that is; a point on a node is not mentioned."""
+    mesh, tags = block(COMM, lengths=(2.0, 1.0), divisions=(8, 4))
+    system = assemble(mesh, CONCRETE, clamped=tags["bottom"])
+    surface = contact_surface(system, tags["right"], points=[(2.0, 0.5), (2.0, 0.98)])
+    assert np.allclose(surface.points, [(2.0, 0.5), (2.0, 1.0)])
+    told = [record.getMessage() for record in caplog.records if "nearest node" in record.getMessage()]
+    assert told == (["contact point (2, 0.98) stands for the nearest node, 0.02 m away"] if COMM.rank == 0 else [])

@@ -124,6 +124,8 @@ def _listed(space: FemSpace, nodes: _Nodes, points: Sequence[Sequence[float]], n
                 f"contact point ({where}) is {distance[row]:.3g} m away from boundary group '{name}': "
                 "give a point on it"
             )
+        if distance[row] > 1e-6 * space.size and space.comm.rank == 0:
+            log.warning("contact point (%s) stands for the nearest node, %.3g m away", where, distance[row])
         if nodes.held[row].all():
             raise InputError(f"contact point ({where}) is also clamped: leave it out, or clamp less")
         if row in rows:
