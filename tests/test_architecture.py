@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import os
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -117,7 +118,10 @@ print(sorted({"petsc4py", "dolfinx", "ufl", "basix", "mpi4py", "gmsh", "matplotl
 def test_core_runs_without_finite_elements():
     """``import vi_contact``, schemes, condensed solver and impact laws import none of the heavy packages."""
     script = SMALL_RUN.replace("TESTS", repr(str(Path(__file__).parent)))
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, cwd=ROOT.parent, check=False)
+    command = [sys.executable, "-c", script]  # env: see shell() in test_cli.py
+    done = subprocess.run(
+        command, capture_output=True, text=True, cwd=ROOT.parent, check=False, env=dict(os.environ)
+    )
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip() == "[]"
 

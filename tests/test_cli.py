@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -21,7 +22,9 @@ ROOT = Path(vi_contact.__file__).parent.parent
 def shell(*arguments: str) -> subprocess.CompletedProcess[str]:
     """python3 -m vi_contact, as a user calls it."""
     command = [sys.executable, "-m", "vi_contact", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False)
+    # env: without what MPI, started in this process, has put into the C environment; a child that inherits it
+    # takes itself for this process, and may end without a word
+    return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False, env=dict(os.environ))
 
 
 @pytest.fixture

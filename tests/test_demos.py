@@ -86,6 +86,7 @@ def vi_contact(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str
     return subprocess.run(
         ["bash", "-c", quiet, sys.executable, "-m", "vi_contact", *arguments],
         cwd=folder, capture_output=True, encoding="utf-8", timeout=300,
+        env=dict(os.environ),  # see shell() in test_cli.py
     )
 
 

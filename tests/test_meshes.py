@@ -1,6 +1,7 @@
 """Gmsh scripts: exact nodes, named groups, the same mesh every time, and no traces in the user's Gmsh."""
 
 import math
+import os
 import signal
 import subprocess
 import sys
@@ -201,7 +202,8 @@ def test_a_written_mesh_reads_back_the_same_and_is_written_the_same_every_time(m
 
 
 def run(*arguments, cwd):
-    return subprocess.run([sys.executable, *map(str, arguments)], cwd=cwd, capture_output=True, text=True, timeout=120)
+    command = [sys.executable, *map(str, arguments)]  # env: see shell() in test_cli.py
+    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=120, env=dict(os.environ))
 
 
 def test_wall_script_runs_through_the_link_without_installation(tmp_path):
