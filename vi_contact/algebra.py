@@ -21,6 +21,11 @@ Mask = NDArray[np.bool_]
 Indices = NDArray[np.int64]
 
 
+def max_abs(x: Array) -> float:
+    """max |x| over the entries given, 0 for none; NaN stays NaN. Half the time of forming |x|."""
+    return max(float(x.max()), -float(x.min())) if len(x) else 0.0
+
+
 class Comm(Protocol):
     """The few collective operations the package needs."""
 

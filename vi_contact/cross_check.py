@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .algebra import Array
+from .algebra import max_abs
 from .march import march
 from .step import ContactProblem, EffectiveMatrix, PreparedSolver, Scheme, Solver, State, StepProblem, StepResult
 from .surfaces import ContactSurface
@@ -100,17 +100,13 @@ class PreparedCrossCheck:
         return result
 
     def _compare(self, result: StepResult, other: StepResult, found: Disagreement) -> None:
-        dx, x_ref = self._surface.comm.max(np.array([_max_abs(other.x - result.x), _max_abs(result.x)]))
+        dx, x_ref = self._surface.comm.max(np.array([max_abs(other.x - result.x), max_abs(result.x)]))
         found.method = other.method
         found.x, found.x_ref = max(found.x, dx), max(found.x_ref, x_ref)
-        found.r_n = max(found.r_n, _max_abs(other.r_n - result.r_n))
-        found.r_ref = max(found.r_ref, _max_abs(result.r_n))
+        found.r_n = max(found.r_n, max_abs(other.r_n - result.r_n))
+        found.r_ref = max(found.r_ref, max_abs(result.r_n))
         found.iterations += other.iterations
         found.steps += 1
-
-
-def _max_abs(x: Array) -> float:
-    return float(np.max(np.abs(x), initial=0.0))
 
 
 def cross_check(

@@ -56,7 +56,7 @@ class ContactProblem:
     @cached_property
     def equations(self) -> SemiDiscreteSystem:
         """The system in the rotated basis, with the inertia loads -M r a_g(t) of the excitations; schemes see this."""
-        system = self.system if self.surface.basis is None else self.system.in_basis(self.surface.basis)
+        system = self.static_load
         inertia = []
         for excitation in self.excitations:
             rigid = system.influence @ np.asarray(excitation.direction, dtype=float)
