@@ -94,3 +94,12 @@ def project(r_t: Array, limit: Array) -> Array:
 def _check(law: str, meaning: str, value: float) -> None:
     if not isinstance(value, Real) or not math.isfinite(value) or value < 0:
         raise InputError(f"{law}: {meaning} is {value!r}; give zero or a positive finite number")
+
+
+def refuse_friction(solver: str, law: FrictionLaw) -> None:
+    """InputError unless the law is Frictionless: a solver that only enforces bounds would silently drop it."""
+    if not isinstance(law, Frictionless):
+        raise InputError(
+            f"{solver} only enforces bounds and would ignore {law}: use Frictionless() here, "
+            "no solver of this version carries friction, neither a condensed nor a volume one"
+        )

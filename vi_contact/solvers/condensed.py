@@ -19,8 +19,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..algebra import Array, Mask
-from ..errors import InputError
-from ..friction import Frictionless
+from ..friction import refuse_friction
 from ..step import ContactProblem, EffectiveMatrix, StepProblem, StepResult
 from ..surfaces import ContactSurface
 from .active_set import ActiveSet
@@ -47,20 +46,11 @@ class Condensed:
 
     def check(self, problem: ContactProblem) -> None:
         """InputError when the problem has friction."""
-        refuse_friction("Condensed", problem)
+        refuse_friction("Condensed", problem.friction)
 
     def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> PreparedCondensed:
         """Factorises A and condenses it; once per time step size."""
         return PreparedCondensed(self, A, surface, scale)
-
-
-def refuse_friction(solver: str, problem: ContactProblem) -> None:
-    """InputError: a bounds-only solver would silently drop the friction law."""
-    if not isinstance(problem.friction, Frictionless):
-        raise InputError(
-            f"{solver} only enforces bounds and would ignore {problem.friction}: "
-            "use Frictionless() here, frictional solvers are not part of this version"
-        )
 
 
 class AppliedDelassus:

@@ -17,7 +17,7 @@ from petsc4py import PETSc
 
 from ..algebra import Array
 from ..errors import InputError, StepFailure
-from ..friction import Frictionless
+from ..friction import refuse_friction
 from ..step import ContactProblem, EffectiveMatrix, StepProblem, StepResult
 from ..surfaces import ContactSurface
 from .volume_factorised import OneFactorisation
@@ -74,11 +74,7 @@ class Volume:
 
     def check(self, problem: ContactProblem) -> None:
         """InputError for friction: bounds on single unknowns cannot express |r_t| <= threshold."""
-        if not isinstance(problem.friction, Frictionless):
-            raise InputError(
-                f"Volume only enforces bounds on normal displacements and would ignore {problem.friction}: use "
-                "Frictionless() here; the route for friction is the condensed one, where reactions are the unknowns"
-            )
+        refuse_friction("Volume", problem.friction)
 
     def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> PreparedVolume:
         """The solver for one effective matrix; collective. InputError for options that cannot work."""

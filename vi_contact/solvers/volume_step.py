@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from ..algebra import Array, Mask
+from ..algebra import Array, Mask, max_abs
 from ..step import StepProblem
 from .volume_system import BoundedSystem
 
@@ -31,11 +31,11 @@ class ScaledStep:
         system = self.system
         self.b = system.load(step.b)
         lower, upper = system.bounds(step)
-        z_max, bound_max, b_max = system.max(_max_abs(start), _max_abs(upper[np.isfinite(upper)]), _max_abs(self.b))
+        z_max, bound_max, b_max = system.max(max_abs(start), max_abs(upper[np.isfinite(upper)]), max_abs(self.b))
         if z_max == 0.0:
             z_max = self._along(self.b, b_max)
         if b_max == 0.0:
-            b_max = float(system.max(_max_abs(system.apply(start)))[0])
+            b_max = float(system.max(max_abs(system.apply(start)))[0])
         self.x_ref, self.r_ref = _power_of_two(max(z_max, bound_max)), _power_of_two(b_max)
         self.lower, self.upper = lower / self.x_ref, upper / self.x_ref
         self.start = start / self.x_ref
@@ -82,7 +82,7 @@ class ScaledStep:
         force[system.feet] += force[system.rows :]  # the body feels what is left over on its springs
         Ax = F + self.b / self.r_ref
         Ax[system.feet] += F[system.rows :]
-        local = (_max_abs(force), _max_abs(gap), _max_abs(y), _max_abs(Ax[: system.rows]), float(np.isnan(F).any()))
+        local = (max_abs(force), max_abs(gap), max_abs(y), max_abs(Ax[: system.rows]), float(np.isnan(F).any()))
         force_max, gap_max, y_max, Ax_max, broken = system.max(*local)
         if broken:
             return np.nan, np.nan, np.nan
@@ -128,7 +128,3 @@ def _power_of_two(value: float) -> float:
 
 def _fraction(value: float, reference: float) -> float:
     return value / reference if reference > 0.0 else value
-
-
-def _max_abs(values: Array) -> float:
-    return float(np.max(np.abs(values), initial=0.0))
