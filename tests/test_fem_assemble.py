@@ -14,10 +14,11 @@ from vi_contact.fem import compat
 from vi_contact.fem.assemble import assemble
 from vi_contact.fem.loads import BodyForce, Prescribed, Traction
 from vi_contact.fem.mesh import Cells
-from vi_contact.march import march, static_equilibrium
+from vi_contact.march import march
 from vi_contact.materials import LinearElastic, MassProportional, PlaneStrain, PlaneStress, Rayleigh
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
+from vi_contact.static import static_equilibrium
 from vi_contact.system import SemiDiscreteSystem
 
 COMM = MPI.COMM_WORLD

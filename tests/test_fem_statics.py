@@ -13,10 +13,11 @@ from vi_contact.algebra import Array
 from vi_contact.fem.assemble import assemble
 from vi_contact.fem.loads import BodyForce, Prescribed, Traction
 from vi_contact.fem.trace import contact_surface
-from vi_contact.march import march, static_equilibrium
+from vi_contact.march import march
 from vi_contact.materials import LinearElastic, PlaneStress
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
+from vi_contact.static import static_equilibrium
 from vi_contact.step import ContactProblem, State
 from vi_contact.surfaces import ContactSurface, HalfSpace
 

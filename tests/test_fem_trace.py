@@ -16,8 +16,8 @@ from vi_contact.fem.assemble import assemble
 from vi_contact.fem.loads import BodyForce, Prescribed
 from vi_contact.fem.mesh import Facets
 from vi_contact.fem.trace import contact_surface
-from vi_contact.march import initial_state
 from vi_contact.materials import PlaneStress
+from vi_contact.static import initial_state
 from vi_contact.step import ContactProblem
 from vi_contact.surfaces import AnalyticGap, HalfSpace, Touching
 

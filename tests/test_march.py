@@ -16,11 +16,12 @@ from vi_contact.algebra import SerialMatrix
 from vi_contact.errors import InputError, StepFailure
 from vi_contact.friction import Coulomb
 from vi_contact.impact import Elastic, Inelastic
-from vi_contact.march import count_steps, static_equilibrium
+from vi_contact.march import count_steps
 from vi_contact.schemes.linear_multistep import LinearMultistep
 from vi_contact.schemes.ss22 import SS22
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
+from vi_contact.static import static_equilibrium
 from vi_contact.step import ContactProblem, State, StepResult
 
 pytestmark = pytest.mark.serial

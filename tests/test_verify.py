@@ -13,10 +13,10 @@ from shaken import changes, shaken
 
 from vi_contact.algebra import SerialMatrix
 from vi_contact.impact import ComponentReset, Elastic, Inelastic, MassProjection, Newton
-from vi_contact.march import initial_state
 from vi_contact.schemes.linear_multistep import LinearMultistep
 from vi_contact.schemes.ss22 import SS22
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
+from vi_contact.static import initial_state
 from vi_contact.step import EffectiveMatrix, Report, StepProblem, StepResult
 from vi_contact.verify import energies, energy_balance, kkt_residual
 

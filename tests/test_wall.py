@@ -10,12 +10,13 @@ from mpi4py import MPI
 from vi_contact.errors import InputError
 from vi_contact.excitation import Harmonic
 from vi_contact.impact import Elastic, Inelastic
-from vi_contact.march import march, static_equilibrium
+from vi_contact.march import march
 from vi_contact.materials import LinearElastic, Rayleigh
 from vi_contact.modal import lowest_frequency
 from vi_contact.models.wall import CASES, STANDARD_GRAVITY, Wall, build
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
+from vi_contact.static import static_equilibrium
 
 COMM = MPI.COMM_WORLD
 COARSE = Wall(divisions=(4, 6))

@@ -42,7 +42,8 @@ _CONTENTS = {
     "solvers.hildreth": ("Hildreth",),
     "solvers.mprgp": ("ProjectedCG",),
     # the loop and what listens to it
-    "march": ("march", "static_equilibrium"),
+    "march": ("march",),
+    "static": ("static_equilibrium",),
     "simulate": ("Solution", "simulate"),
     "recorders": ("Contact", "Energy", "Probe"),
     "cross_check": ("CrossChecked", "cross_check"),

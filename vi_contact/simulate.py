@@ -6,14 +6,16 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from .certified import TOLERANCE
 from .checkpoint import Start, read_checkpoint
 from .errors import InputError
 from .history import Table, read_rows
-from .march import TOLERANCE, count_steps, initial_state
+from .march import count_steps
 from .output import on_root, run_folder
 from .recorders import Contact, Energy, Row, Steps
 from .run import Comparison, Run, Settings
 from .solution import Solution
+from .static import initial_state
 from .step import ContactProblem, Recorder, Scheme, Solver, State
 from .writer import FieldWriter, Writer
 

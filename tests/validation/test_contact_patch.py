@@ -29,10 +29,10 @@ from vi_contact.algebra import Array
 from vi_contact.fem.assemble import assemble
 from vi_contact.fem.loads import Prescribed, Traction
 from vi_contact.fem.trace import contact_surface
-from vi_contact.march import static_equilibrium
 from vi_contact.materials import LinearElastic
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.volume import ReducedNewton, Volume
+from vi_contact.static import static_equilibrium
 from vi_contact.step import ContactProblem, State
 from vi_contact.surfaces import HalfSpace
 

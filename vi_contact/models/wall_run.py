@@ -14,7 +14,6 @@ from ..excitation import Excitation, GroundMotion, Harmonic
 from ..fem.fields import XDMF
 from ..ground_motion import Record, pga, read_record, resampled, scaled, scaled_to_pga
 from ..impact import Inelastic
-from ..march import static_equilibrium
 from ..plotting import plot_certificate, plot_contact, plot_energy, plot_excitation, plot_points
 from ..recorders import Contact, Energy, Probe
 from ..schemes.linear_multistep import LinearMultistep
@@ -28,6 +27,7 @@ from ..solvers.volume import Volume
 from ..solvers.volume_factorised import OneFactorisation
 from ..solvers.volume_snes import ReducedNewton, SemismoothNewton
 from ..solvers.volume_tao import TaoBnls, TaoTron
+from ..static import static_equilibrium
 from ..step import ContactProblem, ImpactLaw, Scheme, Solver, State
 from ..surfaces import ContactSurface
 from .wall import CASES, Wall, WallModel, build

@@ -1,0 +1,61 @@
+"""Steps that are certified or refused: a solver, the methods to escalate to, and the certificate of every answer."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from .errors import StepFailure
+from .step import Certificate, ContactProblem, EffectiveMatrix, PreparedSolver, Solver, StepProblem, StepResult
+from .verify import kkt_residual
+
+TOLERANCE = 1e-9
+
+
+class CertifiedSolver:
+    """A solver and the methods to escalate to, all bound to one effective matrix; nothing uncertified leaves it."""
+
+    def __init__(
+        self, problem: ContactProblem, A: EffectiveMatrix, scale: float, solvers: Sequence[Solver], tolerance: float
+    ) -> None:
+        for solver in solvers:
+            solver.check(problem)
+        self._surface, self._A, self._scale = problem.surface, A, scale
+        self._solvers, self._tolerance = solvers, tolerance
+        self._prepared: dict[int, PreparedSolver] = {}
+        self._get(0)
+
+    def _get(self, rank: int) -> PreparedSolver:
+        """The solver of that rank of escalation, prepared when first needed."""
+        if rank not in self._prepared:
+            self._prepared[rank] = self._solvers[rank].prepare(self._A, self._surface, self._scale)
+        return self._prepared[rank]
+
+    def _refuse_nan(self, step: StepProblem) -> None:
+        """A NaN would spread silently through every solver; asked of all ranks, so that all stop."""
+        bad = float(not np.isfinite(np.sum(step.b)))
+        if self._surface.comm.max(np.array([bad]))[0]:
+            raise StepFailure(
+                f"the load of step {step.k} at t = {step.t:.6g} s contains NaN or infinite values: "
+                "check the excitation, the tractions and the initial data"
+            )
+
+    def solve(self, step: StepProblem) -> tuple[StepResult, Certificate, bool]:
+        """(result, certificate, escalated) of the first method below tolerance; StepFailure when there is none."""
+        self._refuse_nan(step)
+        tried = []
+        for rank in range(len(self._solvers)):
+            try:
+                result = self._get(rank).solve(step)
+            except StepFailure as failure:
+                tried.append(str(failure))
+                continue
+            certificate = kkt_residual(step, result)
+            if certificate.worst <= self._tolerance:
+                return result, certificate, rank > 0
+            tried.append(f"{result.method}: {certificate}")
+        raise StepFailure(
+            f"step {step.k} at t = {step.t:.6g} s stayed above the certificate tolerance {self._tolerance:g} "
+            f"({'; '.join(tried)}): try a smaller dt, another solver, or check the data of this time"
+        )
