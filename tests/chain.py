@@ -31,6 +31,10 @@ class ChainSpace:
     def ids(self) -> Any:
         return np.arange(self.unknowns)
 
+    @property
+    def coordinates(self) -> Array:
+        return np.arange(1.0, self.unknowns + 1.0)[:, None]
+
     def find_nodes(self, points: Array) -> Any:
         nodes = np.rint(np.asarray(points, dtype=float)[:, 0]).astype(int) - 1
         if np.any((nodes < 0) | (nodes >= self.unknowns)):

@@ -72,6 +72,18 @@ class Algebra(Protocol):
         """Tᵀ K T."""
         ...
 
+    def diagonal(self, values: Array) -> Matrix:
+        """The diagonal matrix of the owned values."""
+        ...
+
+    def held(self, A: Matrix, mask: Mask) -> Matrix:
+        """A with the rows and columns of the masked unknowns replaced by those of the identity."""
+        ...
+
+    def handing_over(self, M: Matrix, rows: Mask, donors: Mask, weight: Array) -> Matrix:
+        """P of v = P v: masked rows i hold M_ij/weight_i over the unknowns j of ``donors``, others the identity."""
+        ...
+
     def factor(self, A: Matrix) -> Factor: ...
     def dot(self, x: Array, y: Array) -> float: ...
 
@@ -143,6 +155,19 @@ class SerialAlgebra:
     def congruence(self, T: Matrix, K: Matrix) -> Matrix:
         basis = serial(T).csr
         return SerialMatrix(basis.T @ serial(K).csr @ basis)
+
+    def diagonal(self, values: Array) -> Matrix:
+        return SerialMatrix(sp.diags([values], [0]))
+
+    def held(self, A: Matrix, mask: Mask) -> Matrix:
+        free = sp.diags([(~mask).astype(float)], [0])
+        return SerialMatrix(free @ serial(A).csr @ free + sp.diags([mask.astype(float)], [0]))
+
+    def handing_over(self, M: Matrix, rows: Mask, donors: Mask, weight: Array) -> Matrix:
+        share = np.divide(1.0, weight, out=np.zeros(len(rows)), where=rows)
+        taken = sp.diags([share], [0]) @ serial(M).csr @ sp.diags([donors.astype(float)], [0])
+        taken.eliminate_zeros()
+        return SerialMatrix(taken + sp.diags([(~rows).astype(float)], [0]))
 
     def factor(self, A: Matrix) -> Factor:
         return SerialFactor(serial(A))

@@ -2,11 +2,13 @@
 
 Every time scheme turns a step into the same one-step problem, and every solver solves it:
 
-    A x = b - B_nᵀ r_n,    0 <= r_n  ⊥  bound - B_n x + compliance r_n / scale >= 0
+    A x = b - B_nᵀ r_n - B_tᵀ r_t,    0 <= r_n  ⊥  bound - B_n x + compliance r_n / scale >= 0
+    |r_t| <= limit(r_n),    r_t = limit(r_n) slip/|slip| where slip = B_t x - slip0 is not zero
 
 (bilateral rows: equality and r_n of either sign). A is constant as long as dt is, so it is factorised once.
-``r_n`` is ``scale`` times the mean reaction of the step in newtons; ``compliance`` is zero on a rigid support.
-Vectors are arrays of owned unknowns in the rotated basis; contact arrays have shape (m,) and are equal on all ranks.
+``r_n`` and ``r_t`` are ``scale`` times the reactions of the step in newtons, those of the body on its support;
+``compliance`` is zero on a rigid support. Vectors are arrays of owned unknowns in the rotated basis; contact arrays
+have shape (m,) or, tangential ones, (m, d - 1), and are equal on all ranks; r_t is None without friction.
 """
 
 from __future__ import annotations
@@ -23,6 +25,7 @@ from .errors import InputError
 from .excitation import Excitation
 from .friction import FrictionLaw, Frictionless
 from .impact import ImpactLaw
+from .mass import MassLaw
 from .surfaces import ContactSurface
 from .system import SemiDiscreteSystem
 
@@ -31,7 +34,8 @@ from .system import SemiDiscreteSystem
 class ContactProblem:
     """A semi-discrete system, a contact surface, what shakes it and how it rubs and rebounds.
 
-    The system is turned into the surface's nodal frames once, here. ``impact=None`` leaves velocities alone.
+    The system is turned into the surface's nodal frames once, here. ``impact=None`` leaves velocities alone;
+    ``mass=None`` leaves the choice of the mass matrix to the time scheme.
     """
 
     system: SemiDiscreteSystem
@@ -39,6 +43,7 @@ class ContactProblem:
     friction: FrictionLaw = field(default_factory=Frictionless)
     impact: ImpactLaw | None = None
     excitation: Excitation | Sequence[Excitation] = ()
+    mass: MassLaw | None = None
 
     def __post_init__(self) -> None:
         for excitation in self.excitations:
@@ -57,6 +62,8 @@ class ContactProblem:
     def equations(self) -> SemiDiscreteSystem:
         """The system in the rotated basis, with the inertia loads -M r a_g(t) of the excitations; schemes see this."""
         system = self.static_load
+        if self.mass is not None:
+            system = self.mass.apply(system, self.surface, tangential=self.frictional)
         inertia = []
         for excitation in self.excitations:
             rigid = system.influence @ np.asarray(excitation.direction, dtype=float)
@@ -67,6 +74,15 @@ class ContactProblem:
     def static_load(self) -> SemiDiscreteSystem:
         """The rotated system without excitation: the gravity stage."""
         return self.system if self.surface.basis is None else self.system.in_basis(self.surface.basis)
+
+    @property
+    def frictional(self) -> bool:
+        """Whether tangential reactions can occur at all."""
+        return not isinstance(self.friction, Frictionless)
+
+    def slip_origin(self, u: Array) -> Array | None:
+        """B_t u, where the slip of a step that starts from u is zero; None without friction."""
+        return self.surface.tangential_values(u) if self.frictional else None
 
     def cartesian(self, x: Array) -> Array:
         """T x: unknowns in the rotated basis back to the system's own."""
@@ -84,8 +100,8 @@ class ContactProblem:
 class State:
     """Displacement, velocity and contact at time t = t_k, in the rotated basis.
 
-    ``r_n`` [N] is the reaction of the step that led here (mean or end value, as the scheme says); ``memory`` holds what
-    a multistep scheme carries besides u and v.
+    ``r_n``, ``r_t`` [N] are the reactions of the step that led here (mean or end values, as the scheme says);
+    ``memory`` holds what a scheme carries besides u and v.
     """
 
     t: float
@@ -95,6 +111,7 @@ class State:
     r_n: Array
     active: Mask
     memory: Mapping[str, Array] = field(default_factory=dict)
+    r_t: Array | None = None
 
 
 class EffectiveMatrix:
@@ -132,24 +149,29 @@ class StepProblem:
     active: Mask
     t: float
     k: int
+    friction: FrictionLaw = field(default_factory=Frictionless)
+    slip0: Array | None = None
 
 
 @dataclass(frozen=True)
 class StepResult:
-    """x, r_n and the active set; iterations count changes of the active set, sweeps or Newton steps (method says)."""
+    """x, reactions, active set; iterations count changes of the active set, sweeps or Newton steps (method says)."""
 
     x: Array
     r_n: Array
     active: Mask
     iterations: int
     method: str
+    r_t: Array | None = None
 
 
 @dataclass(frozen=True)
 class Balance:
-    """The equation of motion that the step satisfied, M a + C v + K u = f - B_nᵀ r_n, with the scheme's own averages.
+    """The equation of motion that the step satisfied, with the scheme's own averages:
 
-    Multiplying it by the displacement increment gives the energy ledger of any scheme (verify.ledger).
+        M a + C v + K u = f - B_nᵀ r_n - B_tᵀ r_t
+
+    Multiplying it by the displacement increment gives the energy ledger of any scheme (verify.energy_balance).
     """
 
     u: Array
@@ -157,10 +179,17 @@ class Balance:
     a: Array
     f: Array
     r_n: Array
+    r_t: Array | None = None
 
 
 class Scheme(Protocol):
-    """A time scheme: turns a state into a StepProblem and its solution into the next state."""
+    """A time scheme: turns a state into a StepProblem and its solution into the next state.
+
+    ``mass``: the mass matrix it takes when the problem does not say which.
+    """
+
+    @property
+    def mass(self) -> MassLaw: ...
 
     def check(self, problem: ContactProblem) -> None: ...
     def start(self, problem: ContactProblem, state: State, dt: float) -> State: ...
@@ -183,7 +212,9 @@ class Solver(Protocol):
     """Settings of a one-step solver; ``prepare`` does the work that is shared by all steps with the same A."""
 
     def check(self, problem: ContactProblem) -> None: ...
-    def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> PreparedSolver: ...
+    def prepare(
+        self, A: EffectiveMatrix, surface: ContactSurface, scale: float, friction: FrictionLaw = ...
+    ) -> PreparedSolver: ...
 
 
 @dataclass(frozen=True)
@@ -215,6 +246,9 @@ class Certificate:
     penetration: max(-gap, 0) / x_ref;  tension: max(-r_n, 0) / r_ref.
     complementarity: max |gap| / x_ref over active and bilateral conditions, max |r_n| / r_ref over the others: the set
     that the impact law will see is certified too.
+    cone: max(|r_t| - limit(r_n), 0) / r_ref;  dissipation: max (limit |slip| - r_t·slip) / (r_ref x_ref), the maximum
+    dissipation that Coulomb's and Tresca's law ask for: it is 0 where the slip or the limit is, or where r_t lies
+    along the slip on the edge of the cone. Both are 0 without friction.
     x_ref = max(|x|, |guess|), r_ref = max(|b|, |r_n|), maxima over all unknowns: a wide gap blunts no residual.
     """
 
@@ -222,11 +256,15 @@ class Certificate:
     penetration: float
     tension: float
     complementarity: float
+    cone: float = 0.0
+    dissipation: float = 0.0
 
     @property
     def worst(self) -> float:
         """The largest residual; NaN counts as infinite."""
-        values = (self.equilibrium, self.penetration, self.tension, self.complementarity)
+        values = (
+            self.equilibrium, self.penetration, self.tension, self.complementarity, self.cone, self.dissipation
+        )
         return float("inf") if any(np.isnan(values)) else max(values)
 
 

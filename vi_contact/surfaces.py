@@ -110,7 +110,7 @@ class ContactSurface:
         bilateral: (m,) True where the point is held on the obstacle (u_n = gap0, reaction of either sign).
         compliance: (m,) of the support [m/N]; 0 is rigid (springs, remark after seed 000 eq. 6).
         owned: indices in û of the normal unknowns this rank owns; slots: their rows among the m conditions.
-        tangents: (len(owned), d-1) indices in û of the tangential unknowns of the same points.
+        tangents: (len(owned), d-1) indices in û of the tangential unknowns of the same points; -1 where prescribed.
         basis: T with u = T û, or None when the nodal frames already point along the axes.
     """
 
@@ -137,10 +137,19 @@ class ContactSurface:
         values[self.slots] = x[self.owned]
         return self.comm.sum(values)
 
-    def reaction_load(self, r_n: Array, rows: int) -> Array:
-        """B_nᵀ r_n: the owned part of the contact reaction on the unknowns [N]."""
+    def tangential_values(self, x: Array) -> Array:
+        """B_t x on every rank, shape (m, d - 1)."""
+        values = np.zeros((self.count, self.tangents.shape[1]))
+        values[self.slots] = np.where(self.tangents >= 0, x[self.tangents], 0.0)
+        return self.comm.sum(values)
+
+    def reaction_load(self, r_n: Array, rows: int, r_t: Array | None = None) -> Array:
+        """B_nᵀ r_n + B_tᵀ r_t: the owned part of the contact reaction on the unknowns [N]."""
         load = np.zeros(rows)
         load[self.owned] = r_n[self.slots]
+        if r_t is not None:
+            free = self.tangents >= 0
+            load[self.tangents[free]] = r_t[self.slots][free]
         return load
 
     def held(self) -> ContactSurface:

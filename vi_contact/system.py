@@ -8,18 +8,23 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from .algebra import Algebra, Array, Matrix
+from .algebra import Algebra, Array, Mask, Matrix
 
 
 class Space(Protocol):
     """What the unknowns mean: how an owned vector of unknowns becomes displacements of points.
 
-    ``ids`` are the rank-independent numbers of the owned unknowns, used by checkpoints.
+    ``ids`` are the rank-independent numbers of the owned unknowns, used by checkpoints; ``coordinates`` (rows, d) the
+    positions of their nodes [m].
     """
 
     dimension: int
-    ids: np.ndarray
     unknowns: int
+
+    @property
+    def ids(self) -> np.ndarray: ...
+    @property
+    def coordinates(self) -> Array: ...
 
     def find_nodes(self, points: Array) -> np.ndarray:
         """Node numbers nearest to the points (k, d); InputError for a point outside the body."""
@@ -74,6 +79,7 @@ class SemiDiscreteSystem:
         influence: (n, d) rigid unit translation in each direction, for the inertia load -M r a_g(t).
         u0, v0: initial displacement [m] and velocity [m/s].
         space: what the unknowns mean.
+        massless: unknowns without inertia (rows and columns of M are zero), None when there are none.
         floating: True when some rigid motion is not held by prescribed displacements (static stages refuse it).
     """
 
@@ -87,6 +93,7 @@ class SemiDiscreteSystem:
     v0: Array
     space: Space
     floating: bool = False
+    massless: Mask | None = None
     _cache: dict[str, Any] = field(default_factory=dict, compare=False, repr=False)
 
     @property

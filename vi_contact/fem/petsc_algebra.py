@@ -9,7 +9,7 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from ..algebra import Array, Comm, Factor, Indices, Matrix
+from ..algebra import Array, Factor, Indices, Mask, Matrix
 from ..errors import InputError
 
 PREFIX = "vi_contact_factor_"
@@ -181,7 +181,7 @@ class PetscAlgebra:
     """PETSc matrices on one communicator."""
 
     def __init__(self, comm: Any) -> None:
-        self.comm: Comm = MpiComm(comm)
+        self.comm = MpiComm(comm)
 
     def combine(self, terms: Sequence[tuple[float, Matrix]]) -> Matrix:
         total = None
@@ -199,6 +199,42 @@ class PetscAlgebra:
 
     def congruence(self, T: Matrix, K: Matrix) -> Matrix:
         return PetscMatrix(as_petsc(K).mat.PtAP(as_petsc(T).mat))
+
+    def diagonal(self, values: Array) -> Matrix:
+        size = (len(values), None)
+        mat = PETSc.Mat().createAIJ((size, size), nnz=(1, 0), comm=self.comm.mpi)
+        first = mat.getOwnershipRange()[0]
+        for row, value in enumerate(values):
+            mat.setValue(first + row, first + row, value)
+        mat.assemble()
+        return PetscMatrix(mat)
+
+    def held(self, A: Matrix, mask: Mask) -> Matrix:
+        mat = as_petsc(A).mat.copy()
+        rows = (mat.getOwnershipRange()[0] + np.flatnonzero(mask)).astype(PETSc.IntType)
+        mat.zeroRowsColumns(rows, diag=1.0)
+        return PetscMatrix(mat)
+
+    def handing_over(self, M: Matrix, rows: Mask, donors: Mask, weight: Array) -> Matrix:
+        mat, mpi = as_petsc(M).mat, self.comm.mpi
+        first = mat.getOwnershipRange()[0]
+        excluded = np.concatenate(mpi.allgather(first + np.flatnonzero(~donors)))
+        taken = {}
+        for row in np.flatnonzero(rows):
+            columns, values = mat.getRow(first + row)
+            kept = (values != 0.0) & ~np.isin(columns, excluded)
+            taken[row] = (columns[kept].astype(PETSc.IntType), values[kept] / weight[row])
+        width = max((len(columns) for columns, _ in taken.values()), default=1)
+        size = (len(rows), None)
+        P = PETSc.Mat().createAIJ((size, size), nnz=(max(width, 1), width), comm=mpi)
+        P.setUp()
+        for row in range(len(rows)):
+            if row in taken:
+                P.setValues(first + row, *taken[row])
+            else:
+                P.setValue(first + row, first + row, 1.0)
+        P.assemble()
+        return PetscMatrix(P)
 
     def factor(self, A: Matrix) -> Factor:
         return PetscFactor(as_petsc(A))

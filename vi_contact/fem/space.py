@@ -87,6 +87,11 @@ class FemSpace:
         P.assemble()
         return P
 
+    @property
+    def coordinates(self) -> Array:
+        """Positions (rows, d) of the nodes of the free unknowns [m]."""
+        return np.asarray(np.repeat(self.points, self.dimension, axis=0)[self.free])
+
     # Vectors ---------------------------------------------------------------------------------------------------------
 
     def prescribed_values(self, t: float, derivative: int = 0) -> Array:

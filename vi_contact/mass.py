@@ -1,0 +1,150 @@
+"""Which mass matrix the equations of motion use: the consistent one, or one without inertia at the contact nodes.
+
+With mass at the contact nodes every closure is an impact of that mass: forces ring and, with contact in the
+acceleration balance, energy grows. Without it the contact unknowns follow the body statically (Khenous, Laborde and
+Renard 2008; Hager, Hüeber and Wohlmuth 2008), the semi-discrete problem has a unique energy-conserving solution, and
+contact forces are those of the waves alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from .algebra import Array, Mask
+from .errors import InputError
+from .surfaces import ContactSurface
+from .system import SemiDiscreteSystem
+
+LARGEST_CORRECTION = 0.5  # of a node's lumped mass: beyond, the mesh is too coarse to move mass about
+NOTHING = 1e-10  # of a node's own mass: neighbours with less cannot carry it
+
+
+class MassLaw(Protocol):
+    """Turns the system, in the rotated basis, into one with the wanted mass matrix."""
+
+    def apply(
+        self, system: SemiDiscreteSystem, surface: ContactSurface, *, tangential: bool
+    ) -> SemiDiscreteSystem: ...
+
+
+@dataclass(frozen=True)
+class ConsistentMass:
+    """M as assembled. The choice of seed 000; impact laws need it, for without mass there is nothing to rebound."""
+
+    def apply(self, system: SemiDiscreteSystem, surface: ContactSurface, *, tangential: bool) -> SemiDiscreteSystem:
+        return system
+
+
+@dataclass(frozen=True)
+class Redistributed:
+    """Massless normal unknowns of all contact nodes; with friction (``tangential``) massless tangential ones too.
+
+    M* = Pᵀ M_l P + D with M_l = (1 - lumping) M + lumping diag(row sums of M). P gives every contact node the velocity
+    of its neighbours behind the surface, weighted with their entries of M: it hands the node's mass to them, keeps
+    every translation as it is, and makes M* positive semidefinite by construction. The diagonal D, a polynomial of
+    degree 2 in the coordinates times the nodal mass and of the order of the mesh size over the body's size, then
+    restores what the shift by one element changed: the mass matrix of rigid motions (total mass, centre of mass, all
+    moments and products of inertia), in 1D mass, centre and second moment.
+
+    ``lumping`` 0.4 balances the dispersion of mesh and time step: consistent mass sends high frequencies ahead of
+    the wave, lumped mass leaves them behind (table in docs/schemes.md). InputError for lumping outside [0, 1], a
+    contact node with no material behind it, or a mesh too coarse to hold the inertia.
+    """
+
+    lumping: float = 0.4
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.lumping <= 1.0:
+            raise InputError(f"lumping is {self.lumping}: give a share from 0 (consistent) to 1 (lumped)")
+
+    def apply(self, system: SemiDiscreteSystem, surface: ContactSurface, *, tangential: bool) -> SemiDiscreteSystem:
+        if surface.count == 0:
+            return system
+        massless, contact = _contact_unknowns(system, surface, tangential)
+        nodal = _row_sums(system)
+        algebra = system.algebra
+        bulk = algebra.combine([(1.0 - self.lumping, system.M), (self.lumping, algebra.diagonal(nodal))])
+        moved = _handed_over(replace(system, M=bulk, _cache={}), massless, contact, nodal)
+        correction = _inertia_correction(system, moved, ~contact, nodal)
+        M = algebra.combine([(1.0, moved.M), (1.0, algebra.diagonal(correction))])
+        return replace(system, M=M, massless=massless, _cache={})
+
+
+def _contact_unknowns(system: SemiDiscreteSystem, surface: ContactSurface, tangential: bool) -> tuple[Mask, Mask]:
+    """(massless unknowns, all unknowns of contact nodes)."""
+    contact = np.zeros(system.rows, dtype=bool)
+    contact[surface.owned] = True
+    massless = contact.copy()
+    contact[surface.tangents[surface.tangents >= 0]] = True
+    return (contact.copy() if tangential else massless), contact
+
+
+def _row_sums(system: SemiDiscreteSystem) -> Array:
+    """Lumped mass of every unknown, in any nodal frames: sum over directions c of r_c (M r_c)."""
+    return np.asarray(sum(r * (system.M @ r) for r in system.influence.T))
+
+
+def _handed_over(system: SemiDiscreteSystem, massless: Mask, contact: Mask, nodal: Array) -> SemiDiscreteSystem:
+    """The system with PᵀMP: contact nodes hand their mass inwards, those without inner neighbours to the next ones."""
+    levels: list[tuple[Mask, Mask, Array]] = []
+    left, donors = massless.copy(), ~contact
+    comm = system.algebra.comm
+    while comm.max(np.array([float(left.any())]))[0]:
+        weight = np.asarray(sum(r * (system.M @ (donors * r)) for r in system.influence.T))
+        ready = left & (weight > NOTHING * nodal)
+        if not comm.max(np.array([float(ready.any())]))[0]:
+            raise InputError(
+                "the mass of some contact nodes has nowhere to go, no node behind them carries any: refine the mesh "
+                "across the body, or give the problem mass=ConsistentMass()"
+            )
+        levels.append((ready, donors.copy(), weight))
+        left, donors = left & ~ready, ready
+    M = system.M
+    for ready, donors, weight in reversed(levels):
+        M = system.algebra.congruence(system.algebra.handing_over(M, ready, donors, weight), M)
+    return replace(system, M=M)
+
+
+def _motions(system: SemiDiscreteSystem, x: Array) -> Array:
+    """Rigid motions (rows, modes) in the nodal frames, x (rows, d) from the middle; in 1D also the uniform stretch."""
+    d = system.influence.shape[1]
+    modes = list(system.influence.T)
+    if d == 1:
+        modes.append(system.influence[:, 0] * x[:, 0])
+    for i in range(d):
+        for j in range(i + 1, d):
+            modes.append(system.influence[:, j] * x[:, i] - system.influence[:, i] * x[:, j])
+    return np.column_stack(modes)
+
+
+def _inertia_correction(system: SemiDiscreteSystem, moved: SemiDiscreteSystem, inner: Mask, nodal: Array) -> Array:
+    """D: smallest nodal masses p(x) nodal_i on inner unknowns, p of degree 2 for each direction, such that
+    Rᵀ(M* + D)R = RᵀMR for the rigid motions R."""
+    comm, d = system.algebra.comm, system.influence.shape[1]
+    points = system.space.coordinates
+    high = comm.max(np.max(points, axis=0, initial=-np.inf))
+    low = -comm.max(np.max(-points, axis=0, initial=-np.inf))
+    x = (points - 0.5 * (low + high)) / max(float(np.max(high - low)), np.finfo(float).tiny)
+    R = _motions(system, x)
+    upper = np.triu_indices(R.shape[1])
+    powers = [np.ones(len(x)), *x.T] + [x[:, i] * x[:, j] for i in range(d) for j in range(i, d)]
+    shapes = [inner * nodal * p * np.abs(r) for p in powers for r in system.influence.T]
+    wanted = R.T @ _applied(system, R) - R.T @ _applied(moved, R)
+    effect = [(R.T @ (shape[:, None] * R))[upper] for shape in shapes]
+    packed = comm.sum(np.column_stack([wanted[upper], *effect]))
+    coefficients = np.linalg.lstsq(packed[:, 1:], packed[:, 0], rcond=1e-10)[0]
+    correction = np.asarray(np.column_stack(shapes) @ coefficients)
+    largest = float(comm.max(np.array([np.max(np.abs(correction[inner]) / nodal[inner], initial=0.0)]))[0])
+    if largest > LARGEST_CORRECTION:
+        raise InputError(
+            f"the mesh is too coarse for redistributed mass, keeping the inertia would change nodal masses by "
+            f"{100 * largest:.0f} %: refine it, or give the problem mass=ConsistentMass()"
+        )
+    return correction
+
+
+def _applied(system: SemiDiscreteSystem, columns: Array) -> Array:
+    return np.column_stack([system.M @ column for column in columns.T])

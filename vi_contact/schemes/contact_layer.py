@@ -1,0 +1,48 @@
+"""The massless contact layer: contact unknowns without inertia are in equilibrium with the body at every time.
+
+    (K u)_c + r = f_c(t),    0 <= r_n  ⊥  gap0 - u_n >= 0    with the inner unknowns as they are
+
+Initial data rarely know that. Kept as they are, what is missing in this equation would swing on in the contact layer
+from step to step for ever, so schemes put it right once, at the start; the energy this takes is of the order of the
+mesh size, and the history starts after it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..certified import TOLERANCE, CertifiedSolver
+from ..solvers.condensed import Condensed
+from ..step import ContactProblem, EffectiveMatrix, State, StepProblem
+
+
+def relaxed(problem: ContactProblem, state: State) -> State:
+    """The state with its massless unknowns in equilibrium, and the reactions that belong to it."""
+    system, surface = problem.equations, problem.surface
+    inner = np.ones(system.rows, dtype=bool) if system.massless is None else ~system.massless
+    load = system.load(state.t) - system.K @ (inner * state.u)
+    A = system.kept("contact layer", lambda: EffectiveMatrix(system.algebra.held(system.K, inner), system.algebra))
+    step = StepProblem(
+        A=A,
+        b=np.where(inner, state.u, load),
+        bound=surface.gap0,
+        surface=surface,
+        scale=1.0,
+        guess=state.u,
+        active=state.active,
+        t=state.t,
+        k=state.k,
+        friction=problem.friction,
+        slip0=problem.slip_origin(state.u),
+    )
+    result, _, _ = CertifiedSolver(problem, A, 1.0, [Condensed()], TOLERANCE).solve(step)
+    u = np.where(inner, state.u, result.x)
+    return replace(state, u=u, r_n=result.r_n, r_t=result.r_t, active=result.active)
+
+
+def at_rest_between(problem: ContactProblem, old: State, u: np.ndarray, v: np.ndarray, dt: float) -> np.ndarray:
+    """v, with the mean velocity of the step on massless unknowns: they have no momentum that a scheme could carry on."""
+    massless = problem.equations.massless
+    return v if massless is None else np.where(massless, (u - old.u) / dt, v)

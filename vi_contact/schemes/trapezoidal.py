@@ -1,0 +1,99 @@
+"""The trapezoidal rule on redistributed mass: the default for dynamic contact.
+
+    (u1 - u0)/dt = ½ (v0 + v1)
+    M (v1 - v0)/dt + C (u1 - u0)/dt + ½ K (u0 + u1) = ½ (f0 + f1) - ½ B_nᵀ(r0 + r1) - ½ B_tᵀ(r0 + r1)
+    0 <= r1_n  ⊥  gap0 - B_n u1 >= 0,    |r1_t| <= limit(r1_n) along B_t (u1 - u0)
+
+In x = u1:  A = 4/dt² M + 2/dt C + K,  b = 4/dt² M (u0 + dt v0) + 2/dt C u0 - K u0 + f0 + f1 - Bᵀr0,  scale = 1, r the
+reaction at the end of the step. M is without inertia at the contact nodes (mass.Redistributed): their rows are in
+equilibrium at both ends of the step.
+
+Order 2 while nothing opens or closes; unconditionally stable. Energy (V9.4): changes by work of loads and damping and
+by the contact work ½ (r1 g0 - r0 g1), of either sign and of order dt per event: quasi-conservative, contact forces do
+not ring. On consistent mass this is Newmark(¼, ½), which gains energy in every impact (V9.2); it runs there with a
+warning. Source: Khenous, Laborde and Renard, Eur. J. Mech. A 27 (2008) 918-932.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+from ..mass import MassLaw, Redistributed
+from ..step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
+from .contact_layer import at_rest_between, relaxed
+from .guard import contact_in_the_balance, needs_no_impact_law
+
+
+@dataclass(frozen=True)
+class Trapezoidal:
+    """See the module's equations. ``mass``: the mass matrix for problems that do not name one."""
+
+    mass: MassLaw = field(default_factory=Redistributed)
+
+    def check(self, problem: ContactProblem) -> None:
+        """InputError for an impact law on massless contact nodes; warns when they have mass."""
+        needs_no_impact_law(problem)
+        contact_in_the_balance("Trapezoidal()", problem)
+
+    def start(self, problem: ContactProblem, state: State, dt: float) -> State:
+        """The contact layer in equilibrium; once, not on restarts and changes of dt."""
+        if "force" in state.memory:
+            return state
+        state = state if problem.equations.massless is None else relaxed(problem, state)
+        return self._with_force(problem, state)
+
+    def _with_force(self, problem: ContactProblem, state: State) -> State:
+        """Keeps f - K u - Bᵀr of the state: the next step starts with it."""
+        system = problem.equations
+        reaction = problem.surface.reaction_load(state.r_n, system.rows, state.r_t)
+        return replace(state, memory={"force": system.load(state.t) - system.K @ state.u - reaction})
+
+    def jump(self, problem: ContactProblem, state: State, v: object, dt: float) -> State:
+        """The new velocity; forces do not depend on it."""
+        return replace(state, v=v)  # type: ignore[arg-type]
+
+    def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
+        """A = 4/dt² M + 2/dt C + K."""
+        system = problem.equations
+        terms = [(4.0 / dt**2, system.M), (1.0, system.K)]
+        if system.C is not None:
+            terms.append((2.0 / dt, system.C))
+        return EffectiveMatrix(system.algebra.combine(terms), system.algebra)
+
+    def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem:
+        """b of the module's equations."""
+        system = problem.equations
+        b = state.memory["force"] + system.load(state.t + dt) + system.M @ (4.0 / dt**2 * (state.u + dt * state.v))
+        if system.C is not None:
+            b += system.C @ (2.0 / dt * state.u)
+        return StepProblem(
+            A=A,
+            b=b,
+            bound=problem.surface.gap0,
+            surface=problem.surface,
+            scale=1.0,
+            guess=state.u + dt * state.v,
+            active=state.active,
+            t=state.t + dt,
+            k=state.k + 1,
+            friction=problem.friction,
+            slip0=problem.slip_origin(state.u),
+        )
+
+    def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
+        """v1 = 2 (u1 - u0)/dt - v0; massless unknowns get the mean velocity of the step."""
+        v = at_rest_between(problem, state, result.x, 2.0 / dt * (result.x - state.u) - state.v, dt)
+        new = State(step.t, step.k, result.x, v, result.r_n, result.active, r_t=result.r_t)
+        return self._with_force(problem, new)
+
+    def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
+        """Means of both ends."""
+        load = problem.equations.load
+        return Balance(
+            u=0.5 * (old.u + new.u),
+            v=(new.u - old.u) / dt,
+            a=(new.v - old.v) / dt,
+            f=0.5 * (load(old.t) + load(new.t)),
+            r_n=0.5 * (old.r_n + new.r_n),
+            r_t=None if new.r_t is None or old.r_t is None else 0.5 * (old.r_t + new.r_t),
+        )
