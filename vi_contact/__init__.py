@@ -28,11 +28,13 @@ _CONTENTS = {
         "FullSine", "GroundMotion", "HalfSine", "Harmonic", "Rectangular", "Ricker", "Tabulated",
     ),
     "ground_motion": ("Record", "motion_info", "read_record", "resampled", "scaled", "scaled_to_pga"),
+    "mass": ("ConsistentMass", "Redistributed"),
     "surfaces": ("AnalyticGap", "ContactSurface", "HalfSpace", "Touching"),
     "system": ("Load", "SemiDiscreteSystem"),
     # contract
     "step": ("Certificate", "ContactProblem", "Report", "State", "StepProblem", "StepResult"),
     # schemes
+    "schemes.trapezoidal": ("Trapezoidal",),
     "schemes.zienkiewicz_wood_taylor": ("ZienkiewiczWoodTaylor",),
     "schemes.ss22": ("SS22",),
     "schemes.linear_multistep": ("LinearMultistep",),

@@ -65,8 +65,8 @@ class Factor(Protocol):
 class Algebra(Protocol):
     """Makes matrices out of matrices. ``symmetric`` operators only: M, C, K and their combinations."""
 
-    comm: Comm
-
+    @property
+    def comm(self) -> Comm: ...
     def combine(self, terms: Sequence[tuple[float, Matrix]]) -> Matrix: ...
     def congruence(self, T: Matrix, K: Matrix) -> Matrix:
         """Tᵀ K T."""

@@ -106,6 +106,7 @@ _LEDGER = (
     ("energy_strain", "strain", "tab:orange", "-"),
     ("loss_damping", "damping", "tab:purple", "-"),
     ("loss_contact", "contact work", "tab:red", "-"),
+    ("loss_friction", "friction", "tab:cyan", "-"),
     ("loss_impact", "impact loss", "tab:green", "-"),
     ("loss_algorithmic", "algorithmic", "tab:brown", ":"),
 )

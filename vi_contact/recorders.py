@@ -63,7 +63,8 @@ class Steps:
 class Energy:
     """The energy ledger of the run (verification V9.7), all in joules, works and losses cumulative:
 
-        W_input + E(0) = E(t) + D_damping + D_contact + D_impact + D_algorithmic - defect,   E = ½ vᵀMv + ½ uᵀKu
+        W_input + E(0) = E(t) + D_damping + D_contact + D_friction + D_impact + D_algorithmic - defect
+        E = ½ vᵀMv + ½ uᵀKu
 
     D_impact = ½ v⁻ᵀMv⁻ - ½ v⁺ᵀMv⁺ with its sign (V9.6); W_input is the work of loads, inertia loads -M r a_g and
     prescribed motions. The defect is the work of the residual of the equation of motion, accumulated; its size relative
@@ -71,7 +72,10 @@ class Energy:
     one more after an impact.
     """
 
-    _TERMS = ("work_input", "loss_damping", "loss_contact", "loss_impact", "loss_algorithmic", "energy_defect")
+    _TERMS = (
+        "work_input", "loss_damping", "loss_contact", "loss_friction", "loss_impact", "loss_algorithmic",
+        "energy_defect",
+    )
 
     def columns(self) -> Columns:
         """energy_kinetic, energy_strain, work_input, loss_*, energy_defect."""
@@ -81,6 +85,7 @@ class Energy:
             "work_input": ("J", "work of loads, ground motion and prescribed motions since the start"),
             "loss_damping": ("J", "work of viscous damping since the start"),
             "loss_contact": ("J", "work done on the support by the contact reactions since the start"),
+            "loss_friction": ("J", "work of friction since the start"),
             "loss_impact": ("J", "kinetic energy taken by the impact law since the start, signed"),
             "loss_algorithmic": ("J", "numerical dissipation of the time scheme since the start"),
             "energy_defect": ("J", "what the ledger cannot explain since the start"),
@@ -105,7 +110,7 @@ class Energy:
         )
         self._now = free if new.v is report.v_minus else self._after_impact(free, new.v)
         impact = free.kinetic - self._now.kinetic
-        losses = (step.input, step.damping, step.contact, impact, step.algorithmic, step.defect)
+        losses = (step.input, step.damping, step.contact, step.friction, impact, step.algorithmic, step.defect)
         for term, loss in zip(self._TERMS, losses, strict=True):
             self._sums[term] += loss
         return self._row()

@@ -19,6 +19,7 @@ _LEDGER = (
     ("energy_strain", "strain energy"),
     ("loss_damping", "damping"),
     ("loss_contact", "contact work"),
+    ("loss_friction", "friction work"),
     ("loss_impact", "impact loss"),
     ("loss_algorithmic", "algorithmic loss"),
     ("energy_defect", "defect"),

@@ -18,20 +18,37 @@ def kkt_residual(step: StepProblem, result: StepResult) -> Certificate:
     surface, x, r_n = step.surface, result.x, result.r_n
     Ax = step.A @ x
     residual = Ax - step.b
-    residual[surface.owned] += r_n[surface.slots]
+    residual += surface.reaction_load(r_n, len(x), result.r_t)
     local = np.array([max_abs(residual), max_abs(step.b), max_abs(Ax), max_abs(x), max_abs(step.guess)])
     local[np.isnan(local)] = np.inf
     residual_max, b_max, Ax_max, x_max, guess_max = surface.comm.max(local)
     gap = step.bound - surface.normal_values(x) + surface.compliance * r_n / step.scale
     gap = _over(gap, max(x_max, guess_max))
-    r = _over(r_n, max(b_max, max_abs(r_n)))
+    r_ref = max(b_max, max_abs(r_n))
+    r = _over(r_n, r_ref)
     free = ~surface.bilateral
+    cone, dissipation = _friction_residuals(step, result, max(x_max, guess_max), r_ref)
     return Certificate(
         equilibrium=max_abs(_over(np.array([residual_max]), max(b_max, Ax_max, ROUNDED * step.A.largest * x_max))),
         penetration=max_abs(np.minimum(gap[free], 0.0)),
         tension=max_abs(np.minimum(r[free], 0.0)),
         complementarity=max_abs(np.where(result.active | surface.bilateral, gap, r)),
+        cone=cone,
+        dissipation=dissipation,
     )
+
+
+def _friction_residuals(step: StepProblem, result: StepResult, x_ref: float, r_ref: float) -> tuple[float, float]:
+    """(cone, dissipation) of ``Certificate``; zero without friction."""
+    if step.slip0 is None:
+        return 0.0, 0.0
+    surface = step.surface
+    r_t = np.zeros_like(step.slip0) if result.r_t is None else result.r_t
+    slip = surface.tangential_values(result.x) - step.slip0
+    limit = step.friction.limit(result.r_n, surface.weights, step.scale)
+    outside = np.maximum(np.linalg.norm(r_t, axis=1) - limit, 0.0)
+    missing = limit * np.linalg.norm(slip, axis=1) - np.sum(r_t * slip, axis=1)
+    return max_abs(_over(outside, r_ref)), max_abs(_over(missing, r_ref * x_ref))
 
 
 def _over(values: Array, reference: float) -> Array:
@@ -42,18 +59,19 @@ def _over(values: Array, reference: float) -> Array:
 
 @dataclass(frozen=True)
 class StepEnergy:
-    """Where the energy of one step went [J]: change = input - damping - contact - algorithmic + defect."""
+    """Where the energy of one step went [J]: change = input - damping - contact - friction - algorithmic + defect."""
 
     change: float
     input: float
     damping: float
     contact: float
+    friction: float
     algorithmic: float
 
     @property
     def defect(self) -> float:
         """What the ledger cannot explain; round-off when the equation of motion was satisfied."""
-        return self.change - (self.input - self.damping - self.contact - self.algorithmic)
+        return self.change - (self.input - self.damping - self.contact - self.friction - self.algorithmic)
 
 
 @dataclass(frozen=True)
@@ -94,8 +112,10 @@ def energy_balance(
 ) -> StepEnergy:
     """The ledger of a step before the impact law, for any scheme (verification V9).
 
-    The step satisfied M a + C v + K u = f - B_nᵀ r_n with the averages of ``balance``. Times the increment du:
+    The step satisfied M a + C v + K u = f - B_nᵀ r_n - B_tᵀ r_t with the averages of ``balance``. Times the increment
+    du:
         input = f·du,  damping = du·C v,  contact = r_n·B_n du (work lost to the support, stored or dissipated there),
+        friction = r_t·B_t du,
         algorithmic = du·M a - ½(v0 + v1)·M (v1 - v0) + du·K u - ½(u0 + u1)·K du   (0 for the midpoint rule)
     and change is the difference of the energies themselves, so the defect measures the equation of motion.
     ``before``, ``after``: the energies of both states, when known; one product (two with damping) is left then.
@@ -117,5 +137,6 @@ def energy_balance(
         input=float(work),
         damping=float(damping),
         contact=float(balance.r_n @ surface.normal_values(du)),
+        friction=0.0 if balance.r_t is None else float(np.sum(balance.r_t * surface.tangential_values(du))),
         algorithmic=float(inertia - kinetic + stiffness),
     )

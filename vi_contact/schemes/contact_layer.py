@@ -43,6 +43,6 @@ def relaxed(problem: ContactProblem, state: State) -> State:
 
 
 def at_rest_between(problem: ContactProblem, old: State, u: np.ndarray, v: np.ndarray, dt: float) -> np.ndarray:
-    """v, with the mean velocity of the step on massless unknowns: they have no momentum that a scheme could carry on."""
+    """v, with the mean velocity of the step on massless unknowns: they have no momentum to carry on."""
     massless = problem.equations.massless
     return v if massless is None else np.where(massless, (u - old.u) / dt, v)

@@ -24,8 +24,10 @@ import numpy as np
 
 from ..algebra import Array
 from ..errors import InputError
+from ..mass import MassLaw, Redistributed
 from ..step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
 from .acceleration import consistent_acceleration
+from .guard import contact_in_the_balance, needs_no_impact_law
 
 FREQUENCIES = np.logspace(-2.0, 3.0, 61)  # natural frequency times dt, for the stability check
 DAMPING = (0.0, 0.1, 1.0)  # damping ratios, for the stability check
@@ -84,8 +86,15 @@ class LinearMultistep:
         b = (beta, 0.5 + gamma - 2.0 * beta, 0.5 - gamma + beta)
         return cls(a=(gamma, 1.0 - 2.0 * gamma, gamma - 1.0), b=b, gamma=(1.0, -2.0, 1.0))
 
+    @property
+    def mass(self) -> MassLaw:
+        """Contact stands in the acceleration balance: without mass at the contact nodes it cannot create energy."""
+        return Redistributed()
+
     def check(self, problem: ContactProblem) -> None:
-        """Works with every contact problem."""
+        """InputError for an impact law on massless contact nodes; warns when they have mass."""
+        needs_no_impact_law(problem)
+        contact_in_the_balance(repr(self), problem)
 
     def _velocity_factor(self, dt: float) -> float:
         return self.a[0] / (dt * self.b[0])
@@ -161,6 +170,8 @@ class LinearMultistep:
             active=state.active,
             t=state.t + dt,
             k=state.k + 1,
+            friction=problem.friction,
+            slip0=problem.slip_origin(state.u),
         )
 
     def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:

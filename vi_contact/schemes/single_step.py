@@ -5,14 +5,22 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ..algebra import Array
-from ..step import ContactProblem, State
+from ..mass import ConsistentMass, MassLaw
+from ..step import ContactProblem, State, StepProblem, StepResult
+from .guard import needs_mass
 
 
 class SingleStep:
     """Self-starting, and not disturbed by velocity jumps: that is why seed 000 chose such a scheme."""
 
+    @property
+    def mass(self) -> MassLaw:
+        """Contact here is an impulse within the step: the contact nodes need their mass."""
+        return ConsistentMass()
+
     def check(self, problem: ContactProblem) -> None:
-        """Works with every contact problem."""
+        """InputError for massless contact nodes."""
+        needs_mass(type(self).__name__, problem)
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
         """Nothing to prepare."""
@@ -21,3 +29,11 @@ class SingleStep:
     def jump(self, problem: ContactProblem, state: State, v: Array, dt: float) -> State:
         """The new velocity, and nothing to restart."""
         return replace(state, v=v)
+
+
+def stepped(state: State, step: StepProblem, result: StepResult, u: Array, v: Array) -> State:
+    """The state after the step, with the mean reactions r/scale."""
+    r_t = None if result.r_t is None else result.r_t / step.scale
+    return replace(
+        state, t=step.t, k=step.k, u=u, v=v, r_n=result.r_n / step.scale, r_t=r_t, active=result.active
+    )

@@ -1,7 +1,7 @@
 """SS22, the single-step form of the Zienkiewicz-Wood-Taylor method with two general weights theta1, theta2.
 
     u(tau) = u0 + v0 tau + ½ alpha tau²,  weighted residual with mean values of tau/dt (theta1) and (tau/dt)² (theta2):
-    (M + theta1 dt C + ½ theta2 dt² K) alpha = f(t0 + theta1 dt) - C v0 - K (u0 + theta1 dt v0) - B_nᵀ r̄_n
+    (M + theta1 dt C + ½ theta2 dt² K) alpha = f(t0 + theta1 dt) - C v0 - K (u0 + theta1 dt v0) - B_nᵀ r̄_n - B_tᵀ r̄_t
     u1 = u0 + dt v0 + ½ dt² alpha,   v1 = v0 + dt alpha,   gap(u1) >= 0
 
 In x = u1:  A = 2/(theta2 dt²) M + 2 theta1/(theta2 dt) C + K,  scale = 1/theta2.
@@ -12,13 +12,13 @@ Source: verification 4.1 (Zienkiewicz, Wood and Taylor, reference 25 of seed 000
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..errors import InputError
 from ..step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
-from .single_step import SingleStep
+from .single_step import SingleStep, stepped
 
 
 @dataclass(frozen=True)
@@ -60,14 +60,14 @@ class SS22(SingleStep):
             active=state.active,
             t=state.t + dt,
             k=state.k + 1,
+            friction=problem.friction,
+            slip0=problem.slip_origin(state.u),
         )
 
     def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
         """alpha = 2 (u1 - u0 - dt v0)/dt², v1 = v0 + dt alpha."""
         v = state.v + 2.0 * (result.x - step.guess) / dt
-        return replace(
-            state, t=step.t, k=step.k, u=result.x, v=v, r_n=result.r_n / step.scale, active=result.active
-        )
+        return stepped(state, step, result, result.x, v)
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
         """Averages of the residual equation."""
@@ -78,4 +78,5 @@ class SS22(SingleStep):
             a=alpha,
             f=problem.equations.load(old.t + self.theta1 * dt),
             r_n=new.r_n,
+            r_t=new.r_t,
         )

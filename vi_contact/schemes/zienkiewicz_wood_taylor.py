@@ -14,12 +14,12 @@ midpoint rule, SS22(½, ½) and Newmark(¼, ½) in (u, v). No accelerations are 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from ..algebra import Array
 from ..errors import InputError
 from ..step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
-from .single_step import SingleStep
+from .single_step import SingleStep, stepped
 
 
 @dataclass(frozen=True)
@@ -62,14 +62,14 @@ class ZienkiewiczWoodTaylor(SingleStep):
             active=state.active,
             t=state.t + dt,
             k=state.k + 1,
+            friction=problem.friction,
+            slip0=problem.slip_origin(state.u),
         )
 
     def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
         """v1 = v0 + ((u1 - u0)/dt - v0)/phi."""
         v = state.v + ((result.x - state.u) / dt - state.v) / self.phi
-        return replace(
-            state, t=step.t, k=step.k, u=result.x, v=v, r_n=result.r_n / step.scale, active=result.active
-        )
+        return stepped(state, step, result, result.x, v)
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
         """Averages of the equation above."""
@@ -79,4 +79,5 @@ class ZienkiewiczWoodTaylor(SingleStep):
             a=(new.v - old.v) / dt,
             f=self._load(problem, old, dt),
             r_n=new.r_n,
+            r_t=new.r_t,
         )

@@ -1,0 +1,25 @@
+"""What a run uses when its user leaves time scheme or mass matrix open."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ..impact import NoImpact
+from ..mass import ConsistentMass
+from ..step import ContactProblem, Scheme
+from .trapezoidal import Trapezoidal
+from .zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
+
+
+def completed(problem: ContactProblem, scheme: Scheme | None) -> tuple[ContactProblem, Scheme]:
+    """The problem with a mass matrix and the scheme to run it with.
+
+    Without a scheme: the trapezoidal rule on redistributed mass; with an impact law, or with mass at the contact nodes
+    asked for, the Zienkiewicz-Wood-Taylor step at phi = ½, which never gains energy. Without a mass: the scheme's own
+    choice.
+    """
+    if scheme is None:
+        lawless = problem.impact is None or isinstance(problem.impact, NoImpact)
+        massive = problem.mass is not None and isinstance(problem.mass, ConsistentMass)
+        scheme = Trapezoidal() if lawless and not massive else ZienkiewiczWoodTaylor()
+    return (problem if problem.mass is not None else replace(problem, mass=scheme.mass)), scheme
