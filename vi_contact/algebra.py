@@ -72,8 +72,8 @@ class Algebra(Protocol):
         """Tᵀ K T."""
         ...
 
-    def diagonal(self, values: Array) -> Matrix:
-        """The diagonal matrix of the owned values."""
+    def local(self, rows: Indices, columns: Indices, values: Array, n: int) -> Matrix:
+        """The matrix of given entries between unknowns of the same rank, which owns n; entries given twice add up."""
         ...
 
     def held(self, A: Matrix, mask: Mask) -> Matrix:
@@ -156,8 +156,8 @@ class SerialAlgebra:
         basis = serial(T).csr
         return SerialMatrix(basis.T @ serial(K).csr @ basis)
 
-    def diagonal(self, values: Array) -> Matrix:
-        return SerialMatrix(sp.diags([values], [0]))
+    def local(self, rows: Indices, columns: Indices, values: Array, n: int) -> Matrix:
+        return SerialMatrix(sp.coo_matrix((values, (rows, columns)), shape=(n, n)))
 
     def held(self, A: Matrix, mask: Mask) -> Matrix:
         free = sp.diags([(~mask).astype(float)], [0])

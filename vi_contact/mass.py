@@ -8,12 +8,13 @@ contact forces are those of the waves alone.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 
-from .algebra import Array, Mask
+from .algebra import Array, Indices, Mask, Matrix, max_abs
 from .errors import InputError
 from .surfaces import ContactSurface
 from .system import SemiDiscreteSystem
@@ -44,10 +45,10 @@ class Redistributed:
 
     M* = Pᵀ M_l P + D with M_l = (1 - lumping) M + lumping diag(row sums of M). P gives every contact node the velocity
     of its neighbours behind the surface, weighted with their entries of M: it hands the node's mass to them, keeps
-    every translation as it is, and makes M* positive semidefinite by construction. The diagonal D, a polynomial of
-    degree 2 in the coordinates times the nodal mass and of the order of the mesh size over the body's size, then
-    restores what the shift by one element changed: the mass matrix of rigid motions (total mass, centre of mass, all
-    moments and products of inertia), in 1D mass, centre and second moment.
+    every translation as it is, and makes M* positive semidefinite by construction. The nodal masses D, polynomials of
+    degree 2 in the coordinates times those of M and of the order of (mesh size / body size)², then restore what the
+    shift by one element changed: the mass matrix of rigid motions (total mass, centre of mass, all moments and products
+    of inertia), in 1D mass, centre and second moment.
 
     ``lumping`` 0.4 balances the dispersion of mesh and time step: consistent mass sends high frequencies ahead of
     the wave, lumped mass leaves them behind (table in docs/schemes.md). InputError for lumping outside [0, 1], a
@@ -66,10 +67,12 @@ class Redistributed:
         massless, contact = _contact_unknowns(system, surface, tangential)
         nodal = _row_sums(system)
         algebra = system.algebra
-        bulk = algebra.combine([(1.0 - self.lumping, system.M), (self.lumping, algebra.diagonal(nodal))])
-        moved = _handed_over(replace(system, M=bulk, _cache={}), massless, contact, nodal)
+        every = np.arange(system.rows)
+        lumped = algebra.local(every, every, nodal, system.rows)
+        bulk = algebra.combine([(1.0 - self.lumping, system.M), (self.lumping, lumped)])
+        moved = _handed_over(system, bulk, massless, contact, nodal)
         correction = _inertia_correction(system, moved, ~contact, nodal)
-        M = algebra.combine([(1.0, moved.M), (1.0, algebra.diagonal(correction))])
+        M = algebra.combine([(1.0, moved), (1.0, correction)])
         return replace(system, M=M, massless=massless, _cache={})
 
 
@@ -87,8 +90,8 @@ def _row_sums(system: SemiDiscreteSystem) -> Array:
     return np.asarray(sum(r * (system.M @ r) for r in system.influence.T))
 
 
-def _handed_over(system: SemiDiscreteSystem, massless: Mask, contact: Mask, nodal: Array) -> SemiDiscreteSystem:
-    """The system with PᵀMP: contact nodes hand their mass inwards, those without inner neighbours to the next ones."""
+def _handed_over(system: SemiDiscreteSystem, bulk: Matrix, massless: Mask, contact: Mask, nodal: Array) -> Matrix:
+    """Pᵀ bulk P: contact nodes hand their mass inwards, those without inner neighbours to contact nodes that have."""
     levels: list[tuple[Mask, Mask, Array]] = []
     left, donors = massless.copy(), ~contact
     comm = system.algebra.comm
@@ -102,10 +105,9 @@ def _handed_over(system: SemiDiscreteSystem, massless: Mask, contact: Mask, noda
             )
         levels.append((ready, donors.copy(), weight))
         left, donors = left & ~ready, ready
-    M = system.M
     for ready, donors, weight in reversed(levels):
-        M = system.algebra.congruence(system.algebra.handing_over(M, ready, donors, weight), M)
-    return replace(system, M=M)
+        bulk = system.algebra.congruence(system.algebra.handing_over(system.M, ready, donors, weight), bulk)
+    return bulk
 
 
 def _motions(system: SemiDiscreteSystem, x: Array) -> Array:
@@ -120,9 +122,9 @@ def _motions(system: SemiDiscreteSystem, x: Array) -> Array:
     return np.column_stack(modes)
 
 
-def _inertia_correction(system: SemiDiscreteSystem, moved: SemiDiscreteSystem, inner: Mask, nodal: Array) -> Array:
-    """D: smallest nodal masses p(x) nodal_i on inner unknowns, p of degree 2 for each direction, such that
-    Rᵀ(M* + D)R = RᵀMR for the rigid motions R."""
+def _inertia_correction(system: SemiDiscreteSystem, moved: Matrix, inner: Mask, nodal: Array) -> Matrix:
+    """D: smallest nodal masses m_i p(x_i) on inner nodes, p a symmetric (d, d) matrix of polynomials of degree 2, such
+    that Rᵀ(M* + D)R = RᵀMR for the rigid motions R."""
     comm, d = system.algebra.comm, system.influence.shape[1]
     points = system.space.coordinates
     high = comm.max(np.max(points, axis=0, initial=-np.inf))
@@ -130,21 +132,41 @@ def _inertia_correction(system: SemiDiscreteSystem, moved: SemiDiscreteSystem, i
     x = (points - 0.5 * (low + high)) / max(float(np.max(high - low)), np.finfo(float).tiny)
     R = _motions(system, x)
     upper = np.triu_indices(R.shape[1])
+    wanted = R.T @ np.column_stack([system.M @ mode - moved @ mode for mode in R.T])
     powers = [np.ones(len(x)), *x.T] + [x[:, i] * x[:, j] for i in range(d) for j in range(i, d)]
-    shapes = [inner * nodal * p * np.abs(r) for p in powers for r in system.influence.T]
-    wanted = R.T @ _applied(system, R) - R.T @ _applied(moved, R)
-    effect = [(R.T @ (shape[:, None] * R))[upper] for shape in shapes]
-    packed = comm.sum(np.column_stack([wanted[upper], *effect]))
-    coefficients = np.linalg.lstsq(packed[:, 1:], packed[:, 0], rcond=1e-10)[0]
-    correction = np.asarray(np.column_stack(shapes) @ coefficients)
-    largest = float(comm.max(np.array([np.max(np.abs(correction[inner]) / nodal[inner], initial=0.0)]))[0])
+    pairs = list(_pairs_of_components(system, inner))
+    effects = []
+    for i, j in pairs:
+        for power in powers:
+            block = R[i].T @ ((nodal[i] * power[i])[:, None] * R[j])
+            effects.append((0.5 * (block + block.T))[upper])
+    packed = comm.sum(np.column_stack([wanted[upper], *effects]))
+    coefficients = np.linalg.lstsq(packed[:, 1:], packed[:, 0], rcond=1e-10)[0].reshape(len(pairs), len(powers))
+    shares = [np.column_stack(powers)[i] @ c for (i, _), c in zip(pairs, coefficients, strict=True)]
+    _refuse_coarse(float(comm.max(np.array([max(max_abs(share) for share in shares)]))[0]))
+    i, j = (np.concatenate([pair[side] for pair in pairs]) for side in (0, 1))
+    value = 0.5 * np.concatenate(shares) * nodal[i]
+    both = np.concatenate([i, j]), np.concatenate([j, i])
+    return system.algebra.local(*both, np.tile(value, 2), system.rows)
+
+
+def _pairs_of_components(system: SemiDiscreteSystem, inner: Mask) -> Iterator[tuple[Indices, Indices]]:
+    """(unknowns of direction c, unknowns of direction e) of the inner nodes that have both, for c <= e."""
+    d = system.influence.shape[1]
+    mine = np.flatnonzero(inner)
+    numbers, component = np.divmod(np.asarray(system.space.ids)[mine], d)
+    nodes, place = np.unique(numbers, return_inverse=True)
+    table = np.full((len(nodes), d), -1, dtype=np.int64)
+    table[place, component] = mine
+    for c in range(d):
+        for e in range(c, d):
+            full = (table[:, c] >= 0) & (table[:, e] >= 0)
+            yield table[full, c], table[full, e]
+
+
+def _refuse_coarse(largest: float) -> None:
     if largest > LARGEST_CORRECTION:
         raise InputError(
             f"the mesh is too coarse for redistributed mass, keeping the inertia would change nodal masses by "
             f"{100 * largest:.0f} %: refine it, or give the problem mass=ConsistentMass()"
         )
-    return correction
-
-
-def _applied(system: SemiDiscreteSystem, columns: Array) -> Array:
-    return np.column_stack([system.M @ column for column in columns.T])

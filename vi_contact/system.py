@@ -14,7 +14,7 @@ from .algebra import Algebra, Array, Mask, Matrix
 class Space(Protocol):
     """What the unknowns mean: how an owned vector of unknowns becomes displacements of points.
 
-    ``ids`` are the rank-independent numbers of the owned unknowns, used by checkpoints; ``coordinates`` (rows, d) the
+    ``ids`` are rank-independent numbers of the owned unknowns, node * dimension + component; ``coordinates`` (rows, d) the
     positions of their nodes [m].
     """
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -200,12 +201,12 @@ class PetscAlgebra:
     def congruence(self, T: Matrix, K: Matrix) -> Matrix:
         return PetscMatrix(as_petsc(K).mat.PtAP(as_petsc(T).mat))
 
-    def diagonal(self, values: Array) -> Matrix:
-        size = (len(values), None)
-        mat = PETSc.Mat().createAIJ((size, size), nnz=(1, 0), comm=self.comm.mpi)
-        first = mat.getOwnershipRange()[0]
-        for row, value in enumerate(values):
-            mat.setValue(first + row, first + row, value)
+    def local(self, rows: Indices, columns: Indices, values: Array, n: int) -> Matrix:
+        entries = sp.csr_matrix((values, (rows, columns)), shape=(n, n))
+        first = int(self.comm.mpi.exscan(n) or 0)
+        kind = PETSc.IntType
+        csr = (entries.indptr.astype(kind), (first + entries.indices).astype(kind), entries.data)
+        mat = PETSc.Mat().createAIJ(((n, None), (n, None)), csr=csr, comm=self.comm.mpi)
         mat.assemble()
         return PetscMatrix(mat)
 

@@ -1,0 +1,138 @@
+"""Redistributed mass: no inertia at the contact nodes, the inertia of the body untouched (V9.4)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from bar import bar, thrown
+from chain import chain_problem
+from fem_problems import BODIES, CONCRETE, block, dense, spread, turned
+from mpi4py import MPI
+
+from vi_contact.errors import InputError
+from vi_contact.fem.assemble import assemble
+from vi_contact.fem.trace import contact_surface
+from vi_contact.friction import Coulomb
+from vi_contact.impact import Inelastic
+from vi_contact.march import march
+from vi_contact.mass import ConsistentMass, Redistributed
+from vi_contact.schemes.trapezoidal import Trapezoidal
+from vi_contact.solvers.condensed import Condensed
+from vi_contact.step import ContactProblem
+from vi_contact.surfaces import Touching
+
+FINER = BODIES | {
+    "bar": {"lengths": (2.0,), "divisions": (12,)},
+    "hexahedra": {"lengths": (2.0, 1.5, 1.2), "divisions": (7, 4, 4)},
+    "tetrahedra": {"lengths": (2.0, 1.5, 1.2), "divisions": (7, 4, 4), "simplices": True, "angle": 0.4},
+}
+
+
+def problem(name: str, comm: Any = MPI.COMM_WORLD, side: str = "left", **data: Any) -> ContactProblem:
+    """A free body of every cell type with one side in possible contact."""
+    mesh, tags = block(comm, **FINER[name])
+    system = assemble(mesh, CONCRETE)
+    return ContactProblem(system, contact_surface(system, tags[side], obstacle=Touching()), **data)
+
+
+def inertia(problem: ContactProblem) -> np.ndarray:
+    """RᵀMR of the rigid motions about the origin, in 1D of translation and uniform stretch, with M of the equations."""
+    system = problem.equations
+    x, d = system.space.coordinates, problem.system.influence.shape[1]
+    plain = problem.system.influence
+    modes = [plain[:, c] for c in range(d)]
+    modes += [plain[:, 0] * x[:, 0]] if d == 1 else []
+    modes += [plain[:, j] * x[:, i] - plain[:, i] * x[:, j] for i in range(d) for j in range(i + 1, d)]
+    basis = problem.surface.basis
+    R = np.column_stack([mode if basis is None else basis.transpose_apply(mode) for mode in modes])
+    MR = np.column_stack([system.M @ mode for mode in R.T])
+    return np.asarray(system.algebra.comm.sum(R.T @ MR))
+
+
+@pytest.mark.parametrize("friction", [None, Coulomb(0.3)])
+@pytest.mark.parametrize("name", FINER)
+def test_mass_centre_and_inertia_are_kept(name: str, friction: Any) -> None:
+    """Total mass, centre of mass and every moment of inertia to round-off, in 1D, 2D, 3D, straight and turned."""
+    more = {} if friction is None else {"friction": friction}
+    before, after = inertia(problem(name, **more)), inertia(problem(name, mass=Redistributed(), **more))
+    assert np.abs(after - before).max() <= 1e-12 * np.abs(before).max()
+    moved = replace(problem(name, **more), mass=Redistributed(lumping=1.0))
+    assert np.abs(inertia(moved) - before).max() <= 1e-12 * np.abs(before).max()
+
+
+@pytest.mark.parametrize("friction", [None, Coulomb(0.3)])
+@pytest.mark.parametrize("name", ["bar", "quadrilaterals", "triangles", "tetrahedra"])
+def test_only_the_contact_nodes_lose_their_mass(name: str, friction: Any) -> None:
+    """Rows and columns of the normal unknowns (with friction of the tangential ones too) are zero; the rest of M* is
+    positive definite, so that every velocity that carries momentum costs energy."""
+    more = {} if friction is None else {"friction": friction}
+    given = problem(name, mass=Redistributed(), **more)
+    system = given.equations
+    ids = np.asarray(system.space.ids)
+    M = dense(MPI.COMM_WORLD, system, system.M)
+    wanted = np.zeros(system.rows, dtype=bool)
+    wanted[given.surface.owned] = True
+    if friction is not None:
+        wanted[given.surface.tangents.ravel()] = True
+    assert np.array_equal(system.massless, wanted)
+    massless = spread(MPI.COMM_WORLD, ids, wanted.astype(float))[np.sort(np.concatenate(MPI.COMM_WORLD.allgather(ids)))]
+    none = massless.astype(bool)
+    assert none.sum() == given.surface.count * (1 if friction is None else given.system.influence.shape[1])
+    assert not M[none].any() and not M[:, none].any()
+    assert np.allclose(M, M.T, rtol=0.0, atol=1e-14 * np.abs(M).max())
+    assert np.linalg.eigvalsh(M[np.ix_(~none, ~none)])[0] > 0.0
+
+
+def test_the_matrix_is_the_same_on_all_ranks() -> None:
+    """Entry by entry, turned triangles."""
+    parallel = problem("triangles", mass=Redistributed())
+    alone = problem("triangles", MPI.COMM_SELF, mass=Redistributed())
+    M = dense(MPI.COMM_WORLD, parallel.equations, parallel.equations.M)
+    reference = dense(MPI.COMM_SELF, alone.equations, alone.equations.M)
+    assert np.abs(M - reference).max() <= 1e-13 * np.abs(reference).max()
+
+
+def test_two_sides_that_meet_in_a_corner() -> None:
+    """A triangle whose nodes all touch has no neighbour behind: its mass goes on through the next contact node."""
+    mesh, tags = block(MPI.COMM_WORLD, lengths=(2.0, 1.5), divisions=(5, 4), simplices=True, angle=0.4)
+    system = assemble(mesh, CONCRETE)
+    both = replace(tags["left"], indices=np.union1d(tags["left"].indices, tags["top"].indices))
+    plain = ContactProblem(system, contact_surface(system, both, obstacle=Touching()))
+    moved = replace(plain, mass=Redistributed())
+    assert moved.equations.algebra.comm.sum(np.array([float(moved.equations.massless.sum())]))[0] == plain.surface.count
+    assert np.abs(inertia(moved) - inertia(plain)).max() <= 1e-12 * np.abs(inertia(plain)).max()
+
+
+def test_the_default_leaves_the_mass_alone() -> None:
+    """ConsistentMass is M as assembled; a problem without contact has nothing to redistribute."""
+    given = thrown(10)
+    same = replace(given, mass=ConsistentMass()).equations
+    assert same.massless is None
+    assert np.array_equal(same.M.csr.toarray(), given.equations.M.csr.toarray())
+
+
+def test_translation_of_the_whole_body_feels_the_whole_mass() -> None:
+    """The inertia load -M* r a_g has the resultant of -M r a_g: shaken and free, every body moves with the ground."""
+    given = problem("tetrahedra", mass=Redistributed(), impact=None)
+    turn = turned([1.0, 0.0], 0.4)
+    direction = np.array([*turn, 0.0])
+    system = given.equations
+    force = system.M @ (system.influence @ direction)
+    total = system.algebra.comm.sum(system.influence.T @ force)
+    assert total == pytest.approx(2400.0 * 2.0 * 1.5 * 1.2 * direction, rel=1e-12, abs=1e-9)
+
+
+def test_refusals() -> None:
+    """One sentence each: lumping out of range, a mass with nowhere to go, a mesh too coarse, an impact law."""
+    with pytest.raises(InputError, match="lumping is 1.5: give a share"):
+        Redistributed(1.5)
+    with pytest.raises(InputError, match="nowhere to go.*ConsistentMass"):
+        _ = replace(chain_problem(4), mass=Redistributed()).equations  # lumped masses know no neighbours
+    with pytest.raises(InputError, match="too coarse for redistributed mass.*refine"):
+        _ = bar(2, mass=Redistributed()).equations
+    given = thrown(10, mass=Redistributed(), impact=Inelastic())
+    with pytest.raises(InputError, match="acts on the mass of contact nodes.*leave the law out"):
+        next(march(given, scheme=Trapezoidal(), solver=Condensed(), dt=0.01, steps=1))
