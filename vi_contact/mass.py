@@ -8,7 +8,7 @@ contact forces are those of the waves alone.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -50,6 +50,8 @@ class Redistributed:
     shift by one element changed: the mass matrix of rigid motions (total mass, centre of mass, all moments and products
     of inertia), in 1D mass, centre and second moment.
 
+    Damping sees the same velocities, C* = PᵀCP: a force on massless unknowns that depends on their rate would ring.
+
     ``lumping`` 0.4 balances the dispersion of mesh and time step: consistent mass sends high frequencies ahead of
     the wave, lumped mass leaves them behind (table in docs/schemes.md). InputError for lumping outside [0, 1], a
     contact node with no material behind it, or a mesh too coarse to hold the inertia.
@@ -70,10 +72,11 @@ class Redistributed:
         every = np.arange(system.rows)
         lumped = algebra.local(every, every, nodal, system.rows)
         bulk = algebra.combine([(1.0 - self.lumping, system.M), (self.lumping, lumped)])
-        moved = _handed_over(system, bulk, massless, contact, nodal)
+        moved, C = _handed_over(system, [bulk, system.C], massless, contact, nodal)
+        assert moved is not None
         correction = _inertia_correction(system, moved, ~contact, nodal)
         M = algebra.combine([(1.0, moved), (1.0, correction)])
-        return replace(system, M=M, massless=massless, _cache={})
+        return replace(system, M=M, C=C, massless=massless, _cache={})
 
 
 def _contact_unknowns(system: SemiDiscreteSystem, surface: ContactSurface, tangential: bool) -> tuple[Mask, Mask]:
@@ -90,8 +93,10 @@ def _row_sums(system: SemiDiscreteSystem) -> Array:
     return np.asarray(sum(r * (system.M @ r) for r in system.influence.T))
 
 
-def _handed_over(system: SemiDiscreteSystem, bulk: Matrix, massless: Mask, contact: Mask, nodal: Array) -> Matrix:
-    """Pᵀ bulk P: contact nodes hand their mass inwards, those without inner neighbours to contact nodes that have."""
+def _handed_over(
+    system: SemiDiscreteSystem, matrices: Sequence[Matrix | None], massless: Mask, contact: Mask, nodal: Array
+) -> list[Matrix | None]:
+    """Pᵀ A P of each: contact nodes hand over inwards, those without inner neighbours to contact nodes that have."""
     levels: list[tuple[Mask, Mask, Array]] = []
     left, donors = massless.copy(), ~contact
     comm = system.algebra.comm
@@ -105,9 +110,11 @@ def _handed_over(system: SemiDiscreteSystem, bulk: Matrix, massless: Mask, conta
             )
         levels.append((ready, donors.copy(), weight))
         left, donors = left & ~ready, ready
+    moved = list(matrices)
     for ready, donors, weight in reversed(levels):
-        bulk = system.algebra.congruence(system.algebra.handing_over(system.M, ready, donors, weight), bulk)
-    return bulk
+        P = system.algebra.handing_over(system.M, ready, donors, weight)
+        moved = [None if A is None else system.algebra.congruence(P, A) for A in moved]
+    return moved
 
 
 def _motions(system: SemiDiscreteSystem, x: Array) -> Array:
