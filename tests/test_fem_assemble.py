@@ -200,13 +200,6 @@ def test_floating_in_space(sides, floating):
     assert system.floating is floating
 
 
-def test_floating_body_is_refused_by_the_static_stage():
-    mesh, tags = block(COMM, lengths=(2.0, 1.0), divisions=(2, 3))
-    problem = linear(assemble(mesh, CONCRETE, prescribed=Prescribed(tags["left"], components=(0,))))
-    with pytest.raises(InputError, match="the body floats in the static stage: .* clamp a part of it"):
-        static_equilibrium(problem, solver=Condensed())
-
-
 def test_static_stage_is_the_start_of_an_equilibrium():
     """A clamped block under its weight, without contact: the dynamic stage that continues stays still."""
     mesh, tags = block(COMM, lengths=(1.0, 2.0), divisions=(3, 5))

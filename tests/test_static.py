@@ -1,0 +1,236 @@
+"""Equilibrium of bodies that contact alone holds (semi-coercive problems), and what has none."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from bar import bar
+from chain import chain_problem
+from fem_problems import CONCRETE, block, field, held_by, linear, max_over_ranks, turned
+from mpi4py import MPI
+
+from vi_contact.algebra import Array
+from vi_contact.errors import InputError
+from vi_contact.fem.assemble import assemble
+from vi_contact.fem.loads import BodyForce, Prescribed, Traction
+from vi_contact.fem.trace import contact_surface
+from vi_contact.march import march
+from vi_contact.materials import LinearElastic
+from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
+from vi_contact.solvers.condensed import Condensed
+from vi_contact.solvers.mprgp import ProjectedCG
+from vi_contact.solvers.volume import ReducedNewton, Volume
+from vi_contact.static import static_equilibrium
+from vi_contact.step import ContactProblem, State
+from vi_contact.surfaces import HalfSpace
+
+COMM = MPI.COMM_WORLD
+G = 9.80665
+COLUMN = LinearElastic(E=2.0e10, nu=0.0, rho=2400.0)
+solvers = pytest.mark.parametrize(
+    "solver", [Condensed(), Condensed(ProjectedCG()), Volume(method=ReducedNewton())], ids=["dense", "cg", "volume"]
+)
+
+
+def standing(
+    *, material: LinearElastic = CONCRETE, lengths: tuple[float, ...] = (1.0, 3.0),
+    divisions: tuple[int, ...] = (4, 10), gap: float = 0.0, angle: float = 0.0, push: float = 0.0,
+    points: list[tuple[float, ...]] | None = None, held: bool = False, start: tuple[float, ...] | None = None,
+    up: bool = False, simplices: bool = False,
+) -> ContactProblem:
+    """A block on the ground under its weight; ``push`` [Pa] along x on its top, ``held``: u_x = 0 at its bottom."""
+    d = len(lengths)
+    mesh, tags = block(COMM, lengths=lengths, divisions=divisions, angle=angle, simplices=simplices)
+    normal = np.zeros(d)
+    normal[:2] = turned((0.0, 1.0), angle)
+    weight = material.rho * G * (normal if up else -normal)
+    along = np.eye(d)[0]
+    system = assemble(
+        mesh, material, loads=(BodyForce(tuple(weight)), Traction(tags["top"], tuple(push * along))),
+        prescribed=Prescribed(tags["bottom"], components=(0,)) if held else (), initial_displacement=start,
+    )
+    assert system.floating
+    ground = HalfSpace(point=tuple(-gap * normal), normal=tuple(normal))
+    return ContactProblem(system, contact_surface(system, tags["bottom"], obstacle=ground, points=points))
+
+
+def weight_of(problem: ContactProblem) -> float:
+    """Of the block [N], from its own load vector: the vertical resultant."""
+    load = problem.system.load(0.0)
+    return float(np.abs(COMM.allreduce(load @ problem.system.influence[:, 1])))
+
+
+def unbalanced(problem: ContactProblem, state: State) -> float:
+    """The largest nodal K u + B_nᵀ r_n - f over the largest nodal load."""
+    system = problem.static_load
+    residual = system.K @ state.u + problem.surface.reaction_load(state.r_n, system.rows) - system.load(state.t)
+    return max_over_ranks(COMM, residual) / max_over_ranks(COMM, system.load(state.t))
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("gap", [0.0, 0.1])
+def test_bar_stands_on_its_foot(gap):
+    """Linear elements are exact at the nodes: u = -gap - rho g (L x - x²/2) / E, r = rho g L."""
+    problem = bar(10, gravity=10.0, gap=gap)
+    state = static_equilibrium(problem, solver=Condensed())
+    x = np.linspace(0.0, 10.0, 11)
+    assert state.r_n[0] == pytest.approx(100.0, rel=1e-12)
+    exact = -gap - 10.0 * (10.0 * x - x**2 / 2.0) / 900.0
+    np.testing.assert_allclose(problem.cartesian(state.u), exact, rtol=1e-11, atol=1e-13)
+    assert not state.v.any() and state.active.all()
+
+
+@pytest.mark.serial
+def test_chain_floats_onto_one_of_two_walls():
+    """Pushed by 3 N, the loose chain crosses a gap of 50 mm and rests on the right wall without strain."""
+    problem = chain_problem(5, floating=True, constant=3.0, gap=0.05, left_gap=0.01)
+    state = static_equilibrium(problem, solver=Condensed())
+    np.testing.assert_allclose(state.r_n, [3.0, 0.0], rtol=1e-10)
+    np.testing.assert_allclose(problem.cartesian(state.u), 0.05, rtol=1e-11)
+    with pytest.raises(InputError, match="no static equilibrium: its loads carry it off along"):
+        static_equilibrium(chain_problem(5, floating=True, constant=-3.0), solver=Condensed())
+
+
+@solvers
+@pytest.mark.parametrize("gap", [0.0, 1.0e-3])
+def test_v2_1_standing_column_presses_uniformly(gap, solver):
+    """No lateral contraction: sigma_yy = -rho g (H - y) in every fibre, p = rho g H at every node, to 1e-10; the
+    settlement of the top is rho g H² / 2E (nodally exact). Free to slide, the column keeps its place. A fall
+    of a hundred settlements costs a digit."""
+    problem = standing(material=COLUMN, gap=gap, start=(2.0e-4, 0.0))
+    state = static_equilibrium(problem, solver=solver)
+    pressure = 2400.0 * G * 3.0
+    assert state.r_n / problem.surface.weights == pytest.approx(np.full(5, pressure), rel=1e-9)
+    assert state.r_n.sum() == pytest.approx(pressure, rel=1e-9 if gap else 1e-10)
+    points, u = field(problem.system, problem.cartesian(state.u))
+    y = points[:, 1]
+    sag = 2400.0 * G * (3.0 * y - y**2 / 2.0) / 2.0e10
+    assert np.abs(u[:, 1] + gap + sag).max() < 1e-9 * (sag.max() + gap)
+    assert np.abs(u[:, 0] - 2.0e-4).max() < 1e-9 * (2.0e-4 + gap)
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [
+        {"angle": 0.5},
+        {"simplices": True},
+        {"lengths": (0.3, 6.0), "divisions": (4, 60)},
+        {"lengths": (1.0, 1.5, 0.7), "divisions": (3, 4, 2)},
+        {"lengths": (1.0, 1.5, 0.7), "divisions": (3, 4, 2), "simplices": True, "angle": 0.3},
+    ],
+    ids=["turned", "triangles", "slender", "hexahedra", "tetrahedra"],
+)
+def test_reactions_carry_the_weight(shape):
+    """Σ r_n = weight to 1e-10, every node balanced; the dynamic stage that continues from there stays still."""
+    problem = standing(**shape)
+    state = static_equilibrium(problem, solver=Condensed())
+    push = problem.surface.normals.T @ state.r_n
+    load = problem.system.load(0.0).reshape(-1, problem.system.space.dimension)
+    assert push == pytest.approx(COMM.allreduce(load.sum(axis=0)), abs=1e-10 * state.r_n.sum())
+    assert unbalanced(problem, state) < 1e-9 and state.active.any()
+    sag = max_over_ranks(COMM, state.u)
+    for new, _ in march(
+        problem, scheme=ZienkiewiczWoodTaylor(), solver=Condensed(), dt=1e-3, steps=5, state=state
+    ):
+        assert max_over_ranks(COMM, new.u - state.u) < 1e-9 * sag
+
+
+def test_free_motions_keep_their_place():
+    """On level ground nothing drives a block sideways: the M-weighted mean of u_x and, in 3D, of the spin stay zero
+    but for rounding, which a mode without stiffness sees magnified by K / eps M = 1e6 in every iteration."""
+    for shape in ({}, {"lengths": (1.0, 1.5, 0.7), "divisions": (3, 4, 2)}):
+        problem = standing(**shape)
+        state = static_equilibrium(problem, solver=Condensed())
+        system, points = problem.system, problem.system.space.points
+        motions = [system.influence[:, i] for i in range(points.shape[1]) if i != 1]
+        if points.shape[1] == 3:
+            motions.append(system.space.restrict(np.column_stack([points[:, 2], 0.0 * points[:, 0], -points[:, 0]])))
+        size = system.algebra.dot(motions[0], system.M @ np.abs(state.u))
+        for motion in motions:
+            assert abs(system.algebra.dot(motion, system.M @ state.u)) < 1e-8 * size
+
+
+@pytest.mark.parametrize("push", [0.0, 5.0e3, -9.0e3])
+def test_two_corners_share_the_weight_like_a_beam(push):
+    """Only the base corners touch (u_x held at the base): r = W/2 ± T H / L, T = push · L on the top at height H."""
+    problem = standing(points=[(0.0, 0.0), (1.0, 0.0)], held=True, push=push)
+    state = static_equilibrium(problem, solver=Condensed())
+    weight, moment = 2400.0 * G * 3.0, push * 3.0
+    assert state.active.all()
+    assert state.r_n == pytest.approx([weight / 2.0 - moment, weight / 2.0 + moment], rel=1e-10)
+
+
+def test_partly_lifted_base_balances_moments():
+    """Pushed beyond the kern the base opens: Σ r_n = W, Σ r_n x = W L/2 + T H, no tension anywhere."""
+    problem = standing(held=True, push=8.0e3, divisions=(12, 20))
+    state = static_equilibrium(problem, solver=Condensed())
+    weight, moment = 2400.0 * G * 3.0, 8.0e3 * 3.0
+    assert 0 < state.active.sum() < 13 and state.r_n.min() == 0.0
+    assert state.r_n.sum() == pytest.approx(weight, rel=1e-10)
+    assert state.r_n @ problem.surface.points[:, 0] == pytest.approx(weight / 2.0 + moment, rel=1e-9)
+
+
+def test_springs_settle_by_the_weight():
+    """On springs of modulus k [Pa/m] a column without contraction settles by p / k, soft or stiff."""
+    for modulus in (1.0e6, 1.0e9, 1.0e12):
+        problem = standing(material=COLUMN)
+        problem = ContactProblem(problem.system, problem.surface.on_springs(modulus))
+        state = static_equilibrium(problem, solver=Condensed())
+        pressure = 2400.0 * G * 3.0
+        assert problem.surface.normal_values(state.u) == pytest.approx(np.full(5, pressure / modulus), rel=1e-7)
+        assert state.r_n.sum() == pytest.approx(pressure, rel=1e-7)
+
+
+def test_balanced_loads_need_no_support():
+    """Pulled at both ends with p, without any contact: u = p x / E about the middle."""
+    mesh, tags = block(COMM, lengths=(2.0, 1.0), divisions=(4, 2))
+    pull = [Traction(tags["right"], (1.0e6, 0.0)), Traction(tags["left"], (-1.0e6, 0.0))]
+    problem = linear(assemble(mesh, COLUMN, loads=pull))
+    state = static_equilibrium(problem, solver=Condensed())
+    points, u = field(problem.system, state.u)
+    assert np.abs(u[:, 0] - 1.0e6 / 2.0e10 * (points[:, 0] - 1.0)).max() < 1e-9 * 5e-5
+    assert np.abs(u[:, 1]).max() < 1e-9 * 5e-5
+
+
+@pytest.mark.parametrize(
+    ("case", "way"),
+    [
+        ({"up": True}, r"\(0, 1\)"),
+        ({"push": 1.0}, r"\(1, .*\)"),  # 1 Pa on the top of a block that is free to slide: its weight is 70 kPa
+        ({"push": 1.3e4, "held": True}, r"\(1, "),  # T H > W L / 2: it tips over
+        ({"points": [(0.0, 0.0), (0.25, 0.0)], "held": True}, r"\(1, -0.17\)"),  # supported on the left quarter only
+        ({"push": -20.0, "lengths": (1.0, 1.5, 0.7), "divisions": (3, 4, 2)}, r"\(-1, .*\)"),
+    ],
+    ids=["lifted", "pushed", "tipped", "ledge", "pushed in 3D"],
+)
+@pytest.mark.parametrize("gap", [0.0, 1.0e-3])
+def test_no_equilibrium_is_refused(case, way, gap):
+    problem = standing(gap=gap, **case)
+    with pytest.raises(InputError, match="no static equilibrium: its loads carry it off along " + way):
+        static_equilibrium(problem, solver=Condensed())
+
+
+def test_floating_without_contact_is_refused():
+    mesh, tags = block(COMM, lengths=(2.0, 1.0), divisions=(2, 3))
+    weight = BodyForce((0.0, -CONCRETE.rho * G))
+    problem = linear(assemble(mesh, CONCRETE, loads=weight, prescribed=Prescribed(tags["left"], components=(0,))))
+    with pytest.raises(InputError, match=r"along \(0, -1\) and neither contact nor a prescribed displacement stops"):
+        static_equilibrium(problem, solver=Condensed())
+
+
+def test_pressed_by_a_moving_side_and_its_weight():
+    """Rollers move the left side by 1 mm to the right; the block follows as a whole and rests on its base."""
+    mesh, tags = block(COMM, lengths=(2.0, 1.0), divisions=(4, 2))
+
+    def shift(x: Array) -> Array:
+        return 0.0 * x + 1e-3
+
+    system = assemble(
+        mesh, COLUMN, prescribed=held_by(tags, "left", shift, 0), loads=BodyForce((0.0, -COLUMN.rho * G))
+    )
+    ground = HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))
+    problem = ContactProblem(system, contact_surface(system, tags["bottom"], obstacle=ground))
+    state = static_equilibrium(problem, solver=Condensed())
+    _, u = field(system, state.u)
+    assert np.abs(u[:, 0] - 1e-3).max() < 1e-12
+    assert state.r_n.sum() == pytest.approx(2.0 * COLUMN.rho * G, rel=1e-9)
