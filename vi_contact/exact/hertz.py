@@ -1,0 +1,160 @@
+"""Hertz contact of smooth bodies, and the quasi-static impact of a sphere (verification V2.3, V3.3).
+
+Bodies of moduli E_i, nu_i and radii R_i touch without friction, with E* and R from
+
+    1/E* = sum over i of (1 - nu_i²)/E_i,   1/R = sum over i of 1/R_i.
+
+Pressures are positive in compression; lengths [m], pressures and moduli [Pa], forces [N], or any consistent units.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..algebra import Array
+from ..errors import InputError
+from .numbers import check
+
+
+def contact_modulus(*bodies: tuple[float, float]) -> float:
+    """E* [Pa] of one or two bodies (E [Pa], nu); leave out a rigid body.
+
+    Raises InputError for no body, E <= 0 or nu outside (-1, 1/2].
+    """
+    for E, nu in bodies:
+        if not (E > 0.0 and math.isfinite(E) and -1.0 < nu <= 0.5):
+            raise InputError(f"contact_modulus: E = {E!r}, nu = {nu!r}; give E > 0 and -1 < nu <= 1/2")
+    if not bodies:
+        raise InputError("contact_modulus: no elastic body; give the (E, nu) of one or two")
+    return 1.0 / sum((1.0 - nu**2) / E for E, nu in bodies)
+
+
+def contact_radius(*radii: float) -> float:
+    """R [m] of one or two bodies; leave out a plane, give a hollow one a negative radius.
+
+    Raises InputError unless the sum of 1/radius is finite and positive.
+    """
+    if any(radius == 0.0 for radius in radii) or not 0.0 < sum(1.0 / radius for radius in radii) < math.inf:
+        raise InputError(f"contact_radius: {radii} leave no gap that grows away from the contact; "
+                         "give radii whose sum of 1/radius is positive")
+    return 1.0 / sum(1.0 / radius for radius in radii)
+
+
+@dataclass(frozen=True)
+class HertzLine:
+    """Parallel cylinders pressed with `force` P per unit of length (plane strain; V2.3):
+
+        a = sqrt(4 P R/(pi E*)),   p0 = 2 P/(pi a) = sqrt(P E*/(pi R)),   p = p0 sqrt(1 - x²/a²)
+
+    The approach of half-planes is not defined (logarithmic). force [N/m], modulus E* [Pa], radius R [m]. Raises
+    InputError unless all are finite and positive.
+    """
+
+    force: float
+    modulus: float
+    radius: float
+
+    def __post_init__(self) -> None:
+        check(self, positive=("force", "modulus", "radius"))
+
+    @property
+    def half_width(self) -> float:
+        """a [m]: contact on |x| < a."""
+        return math.sqrt(4.0 * self.force * self.radius / (math.pi * self.modulus))
+
+    @property
+    def peak(self) -> float:
+        """p0 [Pa]."""
+        return 2.0 * self.force / (math.pi * self.half_width)
+
+    def pressure(self, x: ArrayLike) -> Array:
+        """p(x) [Pa] at the distance x from the centre line, 0 outside the contact."""
+        return _ellipse(self.peak, self.half_width, x)
+
+
+@dataclass(frozen=True)
+class HertzPoint:
+    """Spheres pressed with `force` F (V2.3):
+
+        a = (3 F R/(4 E*))^(1/3),   p0 = 3 F/(2 pi a²),   p = p0 sqrt(1 - r²/a²),
+        approach = a²/R,   F = (4/3) E* sqrt(R) approach^(3/2)
+
+    force [N], modulus E* [Pa], radius R [m]. Raises InputError unless all are finite and positive.
+    """
+
+    force: float
+    modulus: float
+    radius: float
+
+    def __post_init__(self) -> None:
+        check(self, positive=("force", "modulus", "radius"))
+
+    @classmethod
+    def from_approach(cls, approach: float, *, modulus: float, radius: float) -> HertzPoint:
+        """The contact of spheres whose distant points have come nearer by `approach` [m]."""
+        if not approach > 0.0:
+            raise InputError(f"HertzPoint: the approach is {approach!r}; give a number above zero")
+        return cls(4.0 / 3.0 * modulus * math.sqrt(radius) * approach**1.5, modulus, radius)
+
+    @property
+    def contact_radius(self) -> float:
+        """a [m]: contact on r < a."""
+        return math.cbrt(0.75 * self.force * self.radius / self.modulus)
+
+    @property
+    def peak(self) -> float:
+        """p0 [Pa]."""
+        return 1.5 * self.force / (math.pi * self.contact_radius**2)
+
+    @property
+    def approach(self) -> float:
+        """Approach of distant points [m]."""
+        return self.contact_radius**2 / self.radius
+
+    def pressure(self, r: ArrayLike) -> Array:
+        """p(r) [Pa] at the distance r from the axis, 0 outside the contact."""
+        return _ellipse(self.peak, self.contact_radius, r)
+
+
+@dataclass(frozen=True)
+class HertzImpact:
+    """A mass m with velocity v strikes through a Hertz spring, m d'' = -(4/3) E* sqrt(R) d^(3/2) (quasi-static; V3.3):
+
+        d_max = (15 m v²/(16 E* sqrt(R)))^(2/5),   duration = 4 sqrt(pi) Gamma(2/5)/(5 Gamma(9/10)) d_max/v
+
+    (factor 2.9433). It rebounds with v: waves in the bodies are left out. mass [kg], speed v [m/s], modulus E* [Pa],
+    radius R [m]. Raises InputError unless all are finite and positive.
+    """
+
+    mass: float
+    speed: float
+    modulus: float
+    radius: float
+
+    def __post_init__(self) -> None:
+        check(self, positive=("mass", "speed", "modulus", "radius"))
+
+    @property
+    def approach(self) -> float:
+        """d_max [m]."""
+        return (15.0 * self.mass * self.speed**2 / (16.0 * self.modulus * math.sqrt(self.radius))) ** 0.4
+
+    @property
+    def duration(self) -> float:
+        """Length of the contact [s]."""
+        factor = 0.8 * math.sqrt(math.pi) * math.gamma(0.4) / math.gamma(0.9)
+        return factor * self.approach / self.speed
+
+    @property
+    def deepest(self) -> HertzPoint:
+        """The contact at d_max: its force is F_max, its contact_radius a_max."""
+        return HertzPoint.from_approach(self.approach, modulus=self.modulus, radius=self.radius)
+
+
+def _ellipse(peak: float, half_axis: float, x: ArrayLike) -> Array:
+    """peak · sqrt(1 - (x/half_axis)²), 0 outside."""
+    return peak * np.sqrt(np.maximum(1.0 - (np.asarray(x, dtype=float) / half_axis) ** 2, 0.0))

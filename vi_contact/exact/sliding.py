@@ -1,0 +1,103 @@
+"""A rigid block on a moving base with Coulomb friction (Newmark's sliding block; verification V3.2).
+
+    u'' = -a(t) - mu g sgn(u')   while it slides,   u' = 0 stays while |a| <= mu g
+
+u [m] is the displacement of the block relative to the base, a [m/s²] the horizontal acceleration of the base.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..algebra import Array
+from ..errors import InputError
+from .numbers import check
+
+
+@dataclass(frozen=True)
+class SlidingBlock:
+    """mu >= 0 on a level base, gravity g [m/s²]. Raises InputError for values out of range."""
+
+    mu: float
+    gravity: float = 9.81
+
+    def __post_init__(self) -> None:
+        check(self, positive=("gravity",), not_negative=("mu",))
+
+    @property
+    def onset_acceleration(self) -> float:
+        """mu g [m/s²]."""
+        return self.mu * self.gravity
+
+    def slip(self, acceleration: float, duration: float) -> float:
+        """Final |u| [m] of a rectangular pulse a for t1: ½ a t1² (a/(mu g) - 1), 0 if |a| <= mu g.
+
+        acceleration a [m/s²], duration t1 [s]. Infinite without friction.
+        """
+        a = abs(acceleration)
+        if a <= self.onset_acceleration:
+            return 0.0
+        return 0.5 * a * duration**2 * (a / self.onset_acceleration - 1.0) if self.mu else math.inf
+
+    def stop_time(self, acceleration: float, duration: float) -> float:
+        """When the block slides no more [s]: t1 a/(mu g), 0 if |a| <= mu g."""
+        a = abs(acceleration)
+        if a <= self.onset_acceleration:
+            return 0.0
+        return duration * a / self.onset_acceleration if self.mu else math.inf
+
+    def history(self, times: ArrayLike, acceleration: ArrayLike) -> tuple[Array, Array]:
+        """(u, u') at `times`, from rest, for an acceleration that is linear between them; exact to round-off.
+
+        times [s], not decreasing, a time given twice is a jump; acceleration [m/s²]; all of shape (n,). Raises
+        InputError when the shapes differ, a number is not finite or the times decrease.
+        """
+        t, a = np.asarray(times, dtype=float), np.asarray(acceleration, dtype=float)
+        if t.ndim != 1 or t.shape != a.shape or not np.isfinite([t, a]).all() or np.any(np.diff(t) < 0.0):
+            raise InputError(f"SlidingBlock: {t.shape} times and {a.shape} accelerations; give one finite value for "
+                             "each time, times not decreasing")
+        u, v = np.zeros_like(t), np.zeros_like(t)
+        for n in range(len(t) - 1):
+            u[n + 1], v[n + 1] = self._interval(u[n], v[n], a[n], a[n + 1], t[n + 1] - t[n])
+        return u, v
+
+    def _interval(self, u: float, v: float, a: float, a_end: float, length: float) -> tuple[float, float]:
+        """(u, u') after an interval [s] in which the acceleration goes linearly from a to a_end."""
+        slope = (a_end - a) / length if length > 0.0 else 0.0
+        while length > 0.0:
+            sign = math.copysign(1.0, v) if v else self._onset(a, slope)
+            if sign == 0.0:  # sticks until |a| reaches mu g, if it does
+                wait = (math.copysign(self.onset_acceleration, slope) - a) / slope if slope else math.inf
+                if wait >= length:
+                    break
+                a, length = math.copysign(self.onset_acceleration, slope), length - wait
+                continue
+            push = -a - sign * self.onset_acceleration
+            step = min(length, _stop(sign * v, sign * push, -sign * slope))
+            u += step * (v + step * (0.5 * push - slope * step / 6.0))
+            v = 0.0 if step < length else v + step * (push - 0.5 * slope * step)
+            a, length = a + slope * step, length - step
+        return u, v
+
+    def _onset(self, a: float, slope: float) -> float:
+        """Direction in which a block at rest starts to slide: 1, -1, or 0 if it sticks."""
+        side = math.copysign(1.0, a)  # of ±0 too, for a block without friction
+        slides = abs(a) > self.onset_acceleration or (abs(a) == self.onset_acceleration and side * slope > 0.0)
+        return -side if slides else 0.0
+
+
+def _stop(v: float, push: float, jerk: float) -> float:
+    """First s > 0 at which v + push s + jerk s²/2, positive before, is zero; infinite if it stays positive."""
+    disc = push * push - 2.0 * jerk * v
+    if disc < 0.0:
+        return math.inf
+    root = math.sqrt(disc)
+    if v == 0.0:  # push >= 0
+        return -2.0 * push / jerk if jerk < 0.0 else math.inf
+    if push < 0.0:
+        return 2.0 * v / (root - push)
+    return (-push - root) / jerk if jerk < 0.0 else math.inf
