@@ -1,8 +1,9 @@
 """Checkpoints: the state of a run in numbers that do not depend on the ranks, so that any number of them can go on.
 
-``checkpoint.npz`` holds t, k, u, v, r_n, active and the scheme's memory, vectors in the order of ``space.ids`` (the
-rotated basis has the same numbers as the system's own), and a description of the run that must not change. The file is
-replaced as a whole: after a crash it is the last complete one.
+``checkpoint.npz`` holds t, k, u, v, the reactions, active and the scheme's memory, vectors in the order of
+``space.ids`` (the rotated basis has the same numbers as the system's own), the base steps done, and a description of
+the run that must not change. It is of the end of a base step, never from inside a halved one, so that a restart takes
+the steps of the straight run. The file is replaced as a whole: after a crash it is the last complete one.
 """
 
 from __future__ import annotations
@@ -19,37 +20,54 @@ import numpy as np
 from .errors import InputError
 from .output import CHECKPOINT, on_root, write_atomically
 from .step import ContactProblem, Scheme, State
+from .time_steps import TimeSteps, described
 
 Arrays = dict[str, Any]
 
 
 @dataclass(frozen=True)
-class Start:
-    """Where the whole run began; ``steps`` and ``t_end`` of a restart count from here."""
+class Place:
+    """The end of a base step, where a run can be left and continued.
 
-    t: float
-    k: int
+    t_start, k_start: of the state the whole run began with; ``steps`` and ``t_end`` of a restart count from there.
+    base: base steps done since then; halved: attempts thrown away since then.
+    """
+
+    state: State
+    t_start: float
+    k_start: int
+    base: int = 0
+    halved: int = 0
+
+    @classmethod
+    def first(cls, state: State) -> Place:
+        """The beginning of a run."""
+        return cls(state, state.t, state.k)
+
+    @property
+    def number(self) -> int:
+        """Number of the base step, counted on from the k of the first state."""
+        return self.k_start + self.base
 
 
-def describe(problem: ContactProblem, scheme: Scheme, dt: float) -> dict[str, Any]:
+def describe(problem: ContactProblem, scheme: Scheme, dt: TimeSteps) -> dict[str, Any]:
     """What a restart must have in common with the run it continues."""
     return {
         "unknowns": problem.system.space.unknowns,
         "contact points": problem.surface.count,
-        "dt": dt,
+        "dt": described(dt),
         "scheme": repr(scheme),
     }
 
 
-def write_checkpoint(
-    folder: Path, problem: ContactProblem, state: State, *, scheme: Scheme, dt: float, start: Start
-) -> None:
+def write_checkpoint(folder: Path, problem: ContactProblem, place: Place, *, scheme: Scheme, dt: TimeSteps) -> None:
     """Replaces the checkpoint in the folder. Collective; ViContactError on all ranks when the disk refuses it."""
+    state = place.state
     vectors, same = _split(problem, state)
     gathered = problem.system.algebra.comm.gather((problem.system.space.ids, vectors))
     about = json.dumps(
         {"run": describe(problem, scheme, dt), "vectors": sorted(vectors), "t": state.t, "k": state.k,
-         "t_start": start.t, "k_start": start.k}
+         "t_start": place.t_start, "k_start": place.k_start, "base": place.base, "halved": place.halved}
     )  # json keeps floats to the last bit
 
     def write() -> None:
@@ -67,7 +85,7 @@ def _split(problem: ContactProblem, state: State) -> tuple[Arrays, Arrays]:
     """(arrays of owned unknowns, arrays that are the same on every rank)."""
     comm = problem.system.algebra.comm
     vectors: Arrays = {"u": state.u, "v": state.v}
-    same: Arrays = {"r_n": state.r_n, "active": state.active}
+    same: Arrays = {"r_n": state.r_n, "active": state.active} | ({} if state.r_t is None else {"r_t": state.r_t})
     for name in sorted(state.memory):
         array = np.asarray(state.memory[name])
         foreign = float(array.shape != state.u.shape)
@@ -76,10 +94,10 @@ def _split(problem: ContactProblem, state: State) -> tuple[Arrays, Arrays]:
     return vectors, same
 
 
-def read_checkpoint(folder: Path, problem: ContactProblem, *, scheme: Scheme, dt: float) -> tuple[State, Start]:
-    """The state a run left, on the ranks of this one, and where that run began. Collective.
+def read_checkpoint(folder: Path, problem: ContactProblem, *, scheme: Scheme, dt: TimeSteps) -> Place:
+    """Where a run was left, with the state on the ranks of this one. Collective.
 
-    InputError when the checkpoint is missing, damaged, or of another problem, dt or scheme.
+    InputError when the checkpoint is missing, damaged, or of another problem, dt (or plan of them) or scheme.
     """
     file = folder / CHECKPOINT
     comm = problem.system.algebra.comm
@@ -90,8 +108,9 @@ def read_checkpoint(folder: Path, problem: ContactProblem, *, scheme: Scheme, dt
         arrays[name] = arrays[name][mine]
     prefix = "memory_"
     memory = {name.removeprefix(prefix): array for name, array in arrays.items() if name.startswith(prefix)}
-    state = State(about["t"], about["k"], arrays["u"], arrays["v"], arrays["r_n"], arrays["active"], memory)
-    return state, Start(about["t_start"], about["k_start"])
+    contact = {name: arrays.get(name) for name in ("r_n", "active", "r_t")}
+    state = State(about["t"], about["k"], arrays["u"], arrays["v"], memory=memory, **contact)
+    return Place(state, about["t_start"], about["k_start"], about["base"], about["halved"])
 
 
 def _places(problem: ContactProblem) -> Any:
@@ -110,7 +129,7 @@ def _read(file: Path, wanted: dict[str, Any]) -> tuple[dict[str, Any], Arrays]:
         with np.load(file, allow_pickle=False) as stored:
             arrays = {name: stored[name] for name in stored.files}
         about = json.loads(str(arrays.pop("about")))
-        run = about["run"]
+        run, _ = about["run"], about["base"]
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
         raise InputError(f"the checkpoint '{file}' is damaged ({error}): start a new run") from error
     for name, value in wanted.items():

@@ -8,26 +8,10 @@ from functools import partial
 import numpy as np
 
 from .certified import TOLERANCE, CertifiedSolver
-from .errors import InputError
 from .impact import Impact
 from .static import initial_state
-from .step import ContactProblem, Report, Scheme, Solver, State
-
-
-def count_steps(dt: float, steps: int | None, t_end: float | None, t0: float = 0.0) -> int:
-    """The number of steps from ``steps`` or ``t_end``; InputError when dt, steps or t_end make no sense."""
-    if not np.isfinite(dt) or dt <= 0.0:
-        raise InputError(f"dt is {dt}: give a positive time step in seconds")
-    if (steps is None) == (t_end is None):
-        raise InputError("give either steps or t_end, and not both")
-    wanted = steps if t_end is None else (t_end - t0) / dt
-    if wanted is None or not np.isfinite(wanted) or wanted < 0:
-        raise InputError(f"the run has {wanted} steps: give a finite t_end after the start, or steps >= 0")
-    if t_end is not None:
-        return int(np.ceil(wanted * (1.0 - 1e-12)))
-    if int(wanted) != wanted:
-        raise InputError(f"steps is {steps}: give a whole number of steps, or t_end in seconds")
-    return int(wanted)
+from .step import ContactProblem, EffectiveMatrix, Report, Scheme, Solver, State
+from .time_steps import Course, TimeSteps, course
 
 
 def march(
@@ -35,7 +19,7 @@ def march(
     *,
     scheme: Scheme,
     solver: Solver,
-    dt: float,
+    dt: TimeSteps,
     steps: int | None = None,
     t_end: float | None = None,
     state: State | None = None,
@@ -44,25 +28,105 @@ def march(
 ) -> Iterator[tuple[State, Report]]:
     """Yields (state, report) after every certified step.
 
+    ``dt`` [s] is constant, or a Schedule, or HalvedAtImpact. ``steps`` and ``t_end`` count base steps: the halves of
+    a halved step are yielded one by one, and ``state.k`` counts them, but they are one of the ``steps``.
     A step whose certificate exceeds ``tolerance`` goes to the solvers of ``escalation`` in turn, then raises
     StepFailure with step, time, residuals and advice. ``state`` continues from a static stage or a checkpoint.
     """
     state = initial_state(problem) if state is None else state
-    steps = count_steps(dt, steps, t_end, state.t)
-    scheme.check(problem)
-    A = scheme.effective_matrix(problem, dt)
-    state = scheme.start(problem, state, dt)
-    certified: CertifiedSolver | None = None
-    for _ in range(steps):
+    plan = course(dt, steps, t_end, state.t)
+    solvers = [solver, *escalation]
+    yield from March(problem, scheme=scheme, solvers=solvers, course=plan, state=state, tolerance=tolerance)
+
+
+class March:
+    """The loop along a course, with its books.
+
+    Attributes, at the time a step is handed out:
+        base: base steps done. ended: whether this step ended one, so that a restart may begin here.
+        dt: the length of this step [s]. halved: attempts that were thrown away.
+    """
+
+    def __init__(
+        self,
+        problem: ContactProblem,
+        *,
+        scheme: Scheme,
+        solvers: Sequence[Solver],
+        course: Course,
+        state: State,
+        tolerance: float,
+        base: int = 0,
+        halved: int = 0,
+    ) -> None:
+        scheme.check(problem)
+        self._problem, self._scheme, self._course = problem, scheme, course
+        self._solvers = _Solvers(problem, scheme, solvers, tolerance)
+        self._state = state
+        self.base, self.halved, self.ended, self.dt = base, halved, True, float("nan")
+
+    def __iter__(self) -> Iterator[tuple[State, Report]]:
+        while self.base < self._course.steps:
+            dt = self._course.dt(self.base)
+            self._solvers.keep([dt / 2**level for level in range(self._course.halvings + 1)])
+            self._state, self.dt = self._restarted(dt), dt
+            levels = [0]  # how often the parts of the base step that are left were halved
+            while levels:
+                level = levels.pop()
+                report = self._attempt(dt / 2**level, final=level == self._course.halvings)
+                if report is None:
+                    self.halved += 1
+                    levels += [level + 1, level + 1]
+                    continue
+                self._state, self.dt, self.ended = report.new, dt / 2**level, not levels
+                self.base += self.ended
+                yield report.new, report
+
+    def _restarted(self, dt: float) -> State:
+        """The state, with a past for this dt."""
+        return self._state if dt == self.dt else self._scheme.start(self._problem, self._state, dt)
+
+    def _attempt(self, dt: float, *, final: bool) -> Report | None:
+        """A step of dt; None when it closes a point and is to be halved: nothing has happened then."""
+        problem, scheme, state = self._problem, self._scheme, self._restarted(dt)
+        A = self._solvers.matrix(dt)
         step = scheme.step(problem, state, A, dt)
-        if certified is None:
-            certified = CertifiedSolver(problem, A, step.scale, [solver, *escalation], tolerance)
-        result, certificate, escalated = certified.solve(step)
+        result, certificate, escalated = self._solvers.get(dt, step.scale).solve(step)
+        if not final and np.any(result.active & ~state.active):
+            return None
         free = scheme.finish(problem, state, step, result, dt)
         new = after_impact(problem, scheme, state, free, dt)
         averages = partial(scheme.balance, problem, state, free, dt)
-        yield new, Report(state, new, free.v, step, result, certificate, averages, escalated)
-        state = new
+        return Report(state, new, free.v, step, result, certificate, averages, escalated)
+
+
+class _Solvers:
+    """One effective matrix and certified solver for every dt in use."""
+
+    def __init__(
+        self, problem: ContactProblem, scheme: Scheme, solvers: Sequence[Solver], tolerance: float
+    ) -> None:
+        self._problem, self._scheme, self._settings, self._tolerance = problem, scheme, solvers, tolerance
+        self._matrices: dict[float, EffectiveMatrix] = {}
+        self._solvers: dict[float, CertifiedSolver] = {}
+
+    def keep(self, sizes: Sequence[float]) -> None:
+        """Frees the factors of every other dt."""
+        self._matrices = {dt: A for dt, A in self._matrices.items() if dt in sizes}
+        self._solvers = {dt: solver for dt, solver in self._solvers.items() if dt in sizes}
+
+    def matrix(self, dt: float) -> EffectiveMatrix:
+        """A, made when first needed."""
+        if dt not in self._matrices:
+            self._matrices[dt] = self._scheme.effective_matrix(self._problem, dt)
+        return self._matrices[dt]
+
+    def get(self, dt: float, scale: float) -> CertifiedSolver:
+        """The solver, prepared when first needed."""
+        if dt not in self._solvers:
+            A = self.matrix(dt)
+            self._solvers[dt] = CertifiedSolver(self._problem, A, scale, self._settings, self._tolerance)
+        return self._solvers[dt]
 
 
 def after_impact(problem: ContactProblem, scheme: Scheme, old: State, new: State, dt: float) -> State:

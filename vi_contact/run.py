@@ -6,18 +6,19 @@ import logging
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
 
 from .algebra import Array
-from .checkpoint import Start
+from .checkpoint import Place
 from .history import Table
-from .march import march
+from .march import March
 from .run_log import Progress, versions
 from .solution import Solution, history_facts
 from .step import ContactProblem, Recorder, Report, Scheme, Solver, State, StepResult
+from .time_steps import Course, TimeSteps, described
 from .writer import Writer
 
 log = logging.getLogger(__name__)
@@ -37,7 +38,7 @@ class Settings:
     problem: ContactProblem
     scheme: Scheme
     solver: Solver
-    dt: float
+    dt: TimeSteps
     escalation: Sequence[Solver]
     tolerance: float
     checkpoint_every: int
@@ -55,7 +56,7 @@ class Settings:
         return {
             "scheme": repr(self.scheme),
             "solver": repr(self.solver if checked is None else checked),
-            "dt": self.dt,
+            "dt": described(self.dt),
             "tolerance": self.tolerance,
             "ranks": self.problem.system.algebra.comm.size,
             "unknowns": self.problem.system.space.unknowns,
@@ -65,24 +66,32 @@ class Settings:
 
 @dataclass
 class Run:
-    """The state of a run. ``start``: where the whole run began; ``resumed_from``: the step of the checkpoint."""
+    """The state of a run. ``place``: the end of the last base step; ``resumed_from``: the step of the checkpoint."""
 
     settings: Settings
     recorders: Sequence[Recorder]
     table: Table
-    state: State
-    start: Start
+    course: Course
+    place: Place
     resumed_from: int | None = None
     last: Report | None = None
+    dt: float = float("nan")
+    halved: int = 0
     seconds: list[float] = field(default_factory=list)
 
-    def go(self, steps: int, writer: Writer) -> Solution:
+    @property
+    def left(self) -> int:
+        """Base steps to do."""
+        return max(self.course.steps - self.place.base, 0)
+
+    def go(self, writer: Writer) -> Solution:
         """The remaining steps and everything that is written before, during and after them."""
         begin = time.perf_counter()
+        self.halved = self.place.halved
         try:
-            writer.open(self.state)
-            self._tell_start(steps)
-            self._march(steps, writer)
+            writer.open(self.place.state)
+            self._tell_start()
+            self._march(writer)
             self._checkpoint(writer)
             linear = self._seconds_per_linear_step()
         except BaseException as error:
@@ -93,26 +102,30 @@ class Run:
         history = self.table.history()
         facts = self._facts(history, "finished", "", time.perf_counter() - begin) | {"seconds_per_linear_step": linear}
         writer.close(facts)
-        return Solution(history, self.table.columns, self.state, facts)
+        return Solution(history, self.table.columns, self.place.state, facts)
 
-    def _march(self, steps: int, writer: Writer) -> None:
-        s = self.settings
-        loop = march(
-            s.problem, scheme=s.scheme, solver=s.solver, dt=s.dt, steps=steps, state=self.state,
-            escalation=s.escalation, tolerance=s.tolerance,
+    def _march(self, writer: Writer) -> None:
+        s, place = self.settings, self.place
+        loop = March(
+            s.problem, scheme=s.scheme, solvers=[s.solver, *s.escalation], course=self.course, state=place.state,
+            tolerance=s.tolerance, base=place.base, halved=place.halved,
         )
         worst, begin = 0.0, time.perf_counter()
-        with Progress(steps, shown=s.progress and s.root) as progress:
+        with Progress(self.left, shown=s.progress and s.root) as progress:
             for state, report in loop:
                 self._keep(state, report, writer)
+                self.dt, self.halved = loop.dt, loop.halved
                 worst = max(worst, report.certificate.worst)
-                if s.root:
-                    progress.step(state.k, state.t, iterations=report.result.iterations, worst=worst)
+                if loop.ended:
+                    self.place = replace(place, state=state, base=loop.base, halved=loop.halved)
+                    self._end_base_step(report, writer)
+                    if s.root:
+                        progress.step(state.k, state.t, iterations=report.result.iterations, worst=worst)
                 self.seconds.append(time.perf_counter() - begin)
                 begin = time.perf_counter()
 
     def _keep(self, state: State, report: Report, writer: Writer) -> None:
-        """Everything that is recorded of a step."""
+        """Everything that is recorded of a step, be it a base step or a part of one."""
         if report.escalated and self.settings.root:
             log.warning("step %d, t = %.6g s: escalated to %s", state.k, state.t, report.result.method)
         row: dict[str, Any] = {}
@@ -120,23 +133,26 @@ class Run:
             row |= recorder.row(report)
         writer.append(row)
         self.table.rows.append(row)  # after the disk: a checkpoint never knows a step that history.csv does not
-        self.state, self.last = state, report
-        writer.frame(report)
-        if state.k % self.settings.checkpoint_every == 0:
+        self.last = report
+
+    def _end_base_step(self, report: Report, writer: Writer) -> None:
+        """What happens between base steps only."""
+        writer.frame(report, self.place.number)
+        if self.place.number % self.settings.checkpoint_every == 0:
             self._checkpoint(writer)
 
     def _checkpoint(self, writer: Writer) -> None:
-        writer.checkpoint(self.state, scheme=self.settings.scheme, dt=self.settings.dt, start=self.start)
+        writer.checkpoint(self.place, scheme=self.settings.scheme, dt=self.settings.dt)
 
     def _rescue(self, writer: Writer, status: str, reason: str, seconds: float) -> None:
-        """Saves what there is. A checkpoint of the last certified step only on one rank: others might not come."""
+        """Saves what there is. A checkpoint of the last base step only on one rank: others might not come."""
         with suppress(Exception):
             if self.settings.problem.system.algebra.comm.size == 1:
                 self._checkpoint(writer)
         with suppress(Exception):
             writer.rescue(self._facts(self.table.history(), status, reason, seconds))
 
-    def _tell_start(self, steps: int) -> None:
+    def _tell_start(self) -> None:
         if not self.settings.root:
             return
         log.info("versions: %s", ", ".join(f"{name} {version}" for name, version in versions().items()))
@@ -144,7 +160,7 @@ class Run:
             log.info("%s: %s", name, value)
         if self.resumed_from is not None:
             log.info("continues from the checkpoint of step %d", self.resumed_from)
-        log.info("%d steps to do", steps)
+        log.info("%d steps to do", self.left)
 
     def _facts(self, history: Mapping[str, Array], status: str, reason: str, seconds: float) -> dict[str, Any]:
         """The content of summary.json."""
@@ -155,6 +171,8 @@ class Run:
             | {"restarted_from_step": self.resumed_from}
             | history_facts(history)
             | {
+                "base_steps": self.place.base,
+                "halved_steps": self.halved,
                 "cross_check": None if cross_check is None else cross_check.report(),
                 "seconds": seconds,
                 "seconds_per_step": float(np.median(self.seconds)) if self.seconds else float("nan"),
@@ -166,13 +184,13 @@ class Run:
         """Median time of right-hand side, one back-substitution and update with the same A, from the last state [s]."""
         if self.last is None:
             return float("nan")
-        s, old, A = self.settings, self.last.old, self.last.step.A
+        s, dt, old, A = self.settings, self.dt, self.last.old, self.last.step.A
         none = np.zeros(s.problem.surface.count)
         found = []
         for _ in range(LINEAR_STEPS + 1):
             begin = time.perf_counter()
-            step = s.scheme.step(s.problem, old, A, s.dt)
+            step = s.scheme.step(s.problem, old, A, dt)
             x = A.factor.solve(step.b)
-            s.scheme.finish(s.problem, old, step, StepResult(x, none, none.astype(bool), 0, "linear"), s.dt)
+            s.scheme.finish(s.problem, old, step, StepResult(x, none, none.astype(bool), 0, "linear"), dt)
             found.append(time.perf_counter() - begin)
         return float(np.median(found[1:]))  # the first may make the factor, when the solver needed none

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from .certified import TOLERANCE
-from .checkpoint import Start, read_checkpoint
+from .checkpoint import Place, read_checkpoint
 from .errors import InputError
 from .history import Table, read_rows
-from .march import count_steps
 from .output import on_root, run_folder
 from .recorders import Contact, Energy, Row, Steps
 from .run import Comparison, Run, Settings
 from .solution import Solution
 from .static import initial_state
 from .step import ContactProblem, Recorder, Scheme, Solver, State
+from .time_steps import TimeSteps, course
 from .writer import FieldWriter, Writer
 
 __all__ = ["Solution", "simulate"]
@@ -27,7 +28,7 @@ def simulate(
     *,
     scheme: Scheme,
     solver: Solver,
-    dt: float,
+    dt: TimeSteps,
     t_end: float | None = None,
     steps: int | None = None,
     record: Sequence[Recorder] | None = None,
@@ -44,12 +45,13 @@ def simulate(
     """Marches to t_end, or for so many steps, and records. Collective; every rank gets the solution.
 
     Args:
+        dt: time step [s], or a plan: Schedule, HalvedAtImpact. ``steps``, t_end and checkpoint_every count base steps.
         record: recorders, (Energy(), Contact()) when None; time, iterations and certificate are always recorded.
         out: the run folder: history.csv, columns.json, history.h5, summary.json, run.log, checkpoint.npz, fields.xdmf.
             Without it nothing is written. Output of an earlier run in the folder is replaced, unless ``restart``.
         state: the initial state, from a gravity stage for example; u0, v0 of the system when None.
         escalation, tolerance: see ``march``.
-        checkpoint_every: steps between checkpoints.
+        checkpoint_every: base steps between checkpoints.
         restart: True continues the run in ``out`` from its checkpoint; a path continues the run in that folder.
             ``steps`` and ``t_end`` are those of the whole run. On as many ranks the result is the uninterrupted run's
             to the last bit, unless MUMPS factorises on several ranks (large matrices: it adds up in order of arrival).
@@ -67,20 +69,24 @@ def simulate(
         raise InputError("fields need an output folder: give out, or leave fields away")
     scheme.check(problem)
     solver.check(problem)
-    count_steps(dt, steps, t_end)
+    course(dt, steps, t_end, 0.0 if state is None else state.t)
     settings = Settings(problem, scheme, solver, dt, escalation, tolerance, checkpoint_every, cross_check, progress)
     folder = None if out is None else run_folder(problem.system.algebra.comm, out)
     recorders: list[Any] = [Steps(problem.system.influence.shape[1])]
     recorders += (Energy(), Contact()) if record is None else record
     source = _source(restart, folder)
     if source is None:
-        first = scheme.start(problem, initial_state(problem) if state is None else state, dt)
-        run = Run(settings, recorders, _table(problem, recorders, first), first, Start(first.t, first.k))
+        place = Place.first(initial_state(problem) if state is None else state)
     else:
-        run = _resumed(settings, recorders, source)
-    left = count_steps(dt, steps, t_end, run.start.t) - (run.state.k - run.start.k)
+        place = read_checkpoint(source, problem, scheme=scheme, dt=dt)
+    plan = course(dt, steps, t_end, place.t_start)
+    place = replace(place, state=scheme.start(problem, place.state, plan.dt(place.base)))
+    table = _table(problem, recorders, place.state)
+    if source is not None:
+        _continue(table, problem, recorders, place.state, source)
+    run = Run(settings, recorders, table, plan, place, None if source is None else place.state.k)
     continued = source is not None and folder is not None and source.resolve() == folder.resolve()
-    return run.go(max(left, 0), Writer(problem, folder, fields, run.table, continued=continued))
+    return run.go(Writer(problem, folder, fields, run.table, continued=continued))
 
 
 def _source(restart: bool | str | Path, folder: Path | None) -> Path | None:
@@ -108,13 +114,11 @@ def _table(
     return Table(columns, [row])
 
 
-def _resumed(settings: Settings, recorders: Sequence[Recorder], source: Path) -> Run:
-    """The run that the checkpoint in the folder of an earlier run continues."""
-    problem, comm = settings.problem, settings.problem.system.algebra.comm
-    state, start = read_checkpoint(source, problem, scheme=settings.scheme, dt=settings.dt)
-    state = settings.scheme.start(problem, state, settings.dt)
-    template = _table(problem, recorders, state)
-    rows: list[Row] = comm.bcast(on_root(comm, lambda: read_rows(source, template, state.k)))
-    table = _table(problem, recorders, state, rows[-1])
+def _continue(
+    table: Table, problem: ContactProblem, recorders: Sequence[Recorder], state: State, source: Path
+) -> None:
+    """Puts the rows of an earlier run into the table; the recorders go on from the last one."""
+    comm = problem.system.algebra.comm
+    rows: list[Row] = comm.bcast(on_root(comm, lambda: read_rows(source, table, state.k)))
+    _table(problem, recorders, state, rows[-1])
     table.rows[:] = rows
-    return Run(settings, recorders, table, state, start, resumed_from=state.k)

@@ -103,7 +103,7 @@ def _lines(facts: Mapping[str, Any]) -> list[str]:
 
     iterations = facts["iterations_per_step"]
     lines = [
-        f"run {facts['status']}: {facts['steps']} steps of {facts['dt']:g} s, "
+        f"run {facts['status']}: {_steps(facts)}, "
         f"t = {facts['t_start']:g} to {facts['t_end']:g} s, on {facts['ranks']} rank(s)",
         line("scheme", facts["scheme"]),
         line("solver", facts["solver"]),
@@ -112,6 +112,8 @@ def _lines(facts: Mapping[str, Any]) -> list[str]:
         line("worst certificate", f"{facts['worst_certificate']:.2e}"),
         line("escalated steps", str(facts["escalated_steps"])),
     ]
+    if facts["halved_steps"]:
+        lines.append(line("halved steps", str(facts["halved_steps"])))
     if "steps_in_contact" in facts:
         uplift = f"largest uplift {facts['largest_uplift']:.3f}"
         lines.append(line("steps in contact", f"{facts['steps_in_contact']}, {uplift}"))
@@ -131,3 +133,11 @@ def _lines(facts: Mapping[str, Any]) -> list[str]:
     if facts["reason"]:
         lines.append(line("reason", facts["reason"]))
     return lines
+
+
+def _steps(facts: Mapping[str, Any]) -> str:
+    """How many steps of what length."""
+    steps, dt = facts["steps"], facts["dt"]
+    if not isinstance(dt, str):
+        return f"{steps} steps of {dt:g} s"
+    return f"{steps} steps ({facts['base_steps']} base steps of {dt})"

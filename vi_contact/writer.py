@@ -12,12 +12,13 @@ from typing import Any, Protocol
 import numpy as np
 
 from .algebra import Array
-from .checkpoint import Start, write_checkpoint
+from .checkpoint import Place, write_checkpoint
 from .history import HistoryFiles, Table
 from .output import LOG, SUMMARY, clear, on_root, to_json, write_atomically
 from .recorders import Row
 from .run_log import RunLog
 from .step import ContactProblem, Report, Scheme, State
+from .time_steps import TimeSteps
 
 log = logging.getLogger(__name__)
 
@@ -82,20 +83,21 @@ class Writer:
         if self._files is not None:
             self._files.append(row)
 
-    def frame(self, report: Report) -> None:
-        """A frame of the fields, when one is due."""
-        if self._fields is not None and self._settings is not None and report.new.k % self._settings.every == 0:
+    def frame(self, report: Report, number: int) -> None:
+        """A frame of the fields at the end of a base step, when one is due by its number."""
+        if self._fields is not None and self._settings is not None and number % self._settings.every == 0:
             self._fields.write(report.new, report.balance.a)
 
-    def checkpoint(self, state: State, *, scheme: Scheme, dt: float, start: Start) -> None:
-        """A checkpoint of the state, unless there is one already."""
-        if self._folder is None or self._saved == state.k:
+    def checkpoint(self, place: Place, *, scheme: Scheme, dt: TimeSteps) -> None:
+        """A checkpoint of this place, unless there is one already."""
+        k = place.state.k
+        if self._folder is None or self._saved == k:
             return
         on_root(self._comm, self._sync)
-        write_checkpoint(self._folder, self._problem, state, scheme=scheme, dt=dt, start=start)
-        self._saved = state.k
+        write_checkpoint(self._folder, self._problem, place, scheme=scheme, dt=dt)
+        self._saved = k
         if self._comm.rank == 0:
-            log.info("checkpoint of step %d", state.k)
+            log.info("checkpoint of step %d", k)
 
     def _sync(self) -> None:
         if self._files is not None:

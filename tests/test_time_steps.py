@@ -1,0 +1,502 @@
+"""Changing dt in a run: plans, what they count, energy across changes, halving at impact, restart to the last bit."""
+
+from __future__ import annotations
+
+import weakref
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from math import inf
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bar import run, thrown
+from chain import chain_problem
+from shaken import changes, shaken
+from test_checkpoint import chain, difference, equal_files, run_wall, wall
+from test_checkpoint import run as run_chain
+
+from vi_contact.errors import InputError, StepFailure
+from vi_contact.impact import Inelastic, MassProjection
+from vi_contact.march import March
+from vi_contact.mass import ConsistentMass, Redistributed
+from vi_contact.recorders import Energy
+from vi_contact.schemes.linear_multistep import LinearMultistep
+from vi_contact.schemes.ss22 import SS22
+from vi_contact.schemes.trapezoidal import Trapezoidal
+from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
+from vi_contact.simulate import simulate
+from vi_contact.solvers.condensed import Condensed
+from vi_contact.static import initial_state
+from vi_contact.step import ContactProblem, Report
+from vi_contact.time_steps import Course, HalvedAtImpact, Schedule, course
+
+serial = pytest.mark.serial
+HALF, NEWMARK, DISSIPATIVE = ZienkiewiczWoodTaylor(), LinearMultistep.newmark(), LinearMultistep.newmark(0.3025, 0.6)
+SCHEMES = [HALF, SS22(), NEWMARK]
+THREE = Schedule(((4e-3, 0.2), (1e-3, 0.3), (2.5e-3, inf)))
+LONG = Schedule(((4e-3, 0.4), (1e-3, 0.6), (2.5e-3, inf)))  # contacts open and close in every piece
+
+
+# plans
+
+
+@serial
+@pytest.mark.parametrize(
+    ("dt", "steps", "t_end", "t0", "expected"),
+    [
+        (0.1, 7, None, 0.0, 7),
+        (0.1, 0, None, 0.0, 0),
+        (0.1, None, 0.3, 0.0, 3),  # not 4: 0.3/0.1 is a little more than 3
+        (0.1, None, 0.31, 0.0, 4),
+        (0.1, None, 1.0, 0.4, 6),
+        (0.1, None, 0.0, 0.0, 0),
+        (0.1, None, -0.5, -1.0, 5),
+    ],
+)
+def test_steps_of_a_constant_dt(dt, steps, t_end, t0, expected):
+    assert course(dt, steps, t_end, t0) == Course(((dt, expected),))
+    assert course(HalvedAtImpact(dt, 4), steps, t_end, t0) == Course(((dt, expected),), 4)
+    assert course(Schedule(((dt, inf),)), steps, t_end, t0) == Course(((dt, expected),))
+
+
+@serial
+@pytest.mark.parametrize(
+    ("steps", "t_end", "t0", "parts"),
+    [
+        (None, 0.4, 0.0, ((4e-3, 50), (1e-3, 100), (2.5e-3, 40))),
+        (None, 0.25, 0.0, ((4e-3, 50), (1e-3, 50))),
+        (120, None, 0.0, ((4e-3, 50), (1e-3, 70))),
+        (160, None, 0.0, ((4e-3, 50), (1e-3, 100), (2.5e-3, 10))),
+        (None, 0.3, 0.0, ((4e-3, 50), (1e-3, 100))),
+        (110, None, 0.2, ((4e-3, 0), (1e-3, 100), (2.5e-3, 10))),
+        (None, 0.4, 0.1999, ((4e-3, 1), (1e-3, 97), (2.5e-3, 40))),  # on from 0.2039: 97 steps reach 0.3
+        (None, 0.4, 0.2 - 1e-12, ((4e-3, 0), (1e-3, 100), (2.5e-3, 41))),  # round-off adds no step to a piece
+    ],
+)
+def test_steps_of_a_schedule(steps, t_end, t0, parts):
+    """A piece ends with the first step that reaches its time."""
+    found = course(THREE, steps, t_end, t0)
+    assert found.parts == parts and found.steps == sum(count for _, count in parts)
+    sizes = [dt for dt, count in parts for _ in range(count)]
+    assert [found.dt(base) for base in range(found.steps)] == sizes and found.dt(found.steps + 5) == sizes[-1]
+
+
+@serial
+@pytest.mark.parametrize(
+    ("dt", "steps", "t_end", "word"),
+    [
+        (0.0, 5, None, "dt is 0.0"),
+        (-1.0, 5, None, "positive time step"),
+        (np.nan, 5, None, "positive time step"),
+        (np.inf, 5, None, "positive time step"),
+        ("0.1", 5, None, "positive time step in seconds, a Schedule or HalvedAtImpact"),
+        (0.1, 5, 0.5, "not both"),
+        (0.1, None, None, "either steps or t_end"),
+        (0.1, -1, None, "steps is -1"),
+        (0.1, None, -0.5, "t_end after the start"),
+        (0.1, None, np.nan, "finite t_end"),
+        (0.1, None, np.inf, "finite t_end"),
+        (1e-300, None, 1e300, "infinitely many steps"),
+        (0.1, 2.5, None, "whole number of steps"),
+        (Schedule(((0.1, 1.0), (0.2, 2.0))), None, 2.5, "last piece of the Schedule ends at 2 s, before t_end = 2.5 s"),
+        (Schedule(((0.1, 1.0), (0.2, 2.0))), 17, None, "ends at 2 s, before the 2 steps that are left"),
+        (HalvedAtImpact(Schedule(((0.1, 1.0),))), 11, None, "ends at 1 s, before the 1 steps that are left: end it"),
+    ],
+)
+def test_nonsense_is_named(dt, steps, t_end, word):
+    with pytest.raises(InputError, match=word):
+        course(dt, steps, t_end)
+    with pytest.raises(InputError, match=word):
+        run_chain(None, steps, t_end=t_end, dt=dt)
+
+
+@serial
+@pytest.mark.parametrize(
+    ("make", "word"),
+    [
+        (lambda: Schedule(()), "Schedule has no pieces: give at least one"),
+        (lambda: Schedule(((0.1, 1.0), (0.0, 2.0))), "dt is 0.0: give a positive time step"),
+        (lambda: Schedule(((0.1, 1.0), (0.2, 1.0))), "until 1 s does not end after 1 s: give increasing times"),
+        (lambda: Schedule(((0.1, inf), (0.2, inf))), "until inf s does not end after inf s"),
+        (lambda: Schedule(((0.1, np.nan),)), "until nan s does not end"),
+        (lambda: Schedule((0.1, 0.2)), r"Schedule pieces are \(0.1, 0.2\): give pairs"),
+        (lambda: Schedule(((0.1, "late"),)), "give pairs"),
+        (lambda: Schedule(0.1), "give pairs"),
+        (lambda: HalvedAtImpact(-0.1), "dt is -0.1: give a positive"),
+        (lambda: HalvedAtImpact(0.1, -1), "halvings is -1: give a whole number from 0 to 20"),
+        (lambda: HalvedAtImpact(0.1, 21), "halvings is 21: give a whole number from 0 to 20"),
+        (lambda: HalvedAtImpact(0.1, 2.5), "halvings is 2.5: give a whole number"),
+        (lambda: HalvedAtImpact(HalvedAtImpact(0.1)), "positive time step in seconds, a Schedule"),
+    ],
+)
+def test_nonsense_plans_are_refused(make, word):
+    with pytest.raises(InputError, match=word):
+        make()
+
+
+@serial
+def test_plans_say_the_same_whatever_numbers_they_are_given():
+    """repr is what a checkpoint compares."""
+    plain = HalvedAtImpact(Schedule(((1e-3, 1.0), (1.0, inf))), 2)
+    other = HalvedAtImpact(Schedule([[np.float64(1e-3), 1], (1, np.inf)]), np.int64(2))  # type: ignore[arg-type]
+    assert plain == other and repr(plain) == repr(other)
+    assert repr(plain) == "HalvedAtImpact(dt=Schedule(pieces=((0.001, 1.0), (1.0, inf))), halvings=2)"
+
+
+# schedules
+
+
+@serial
+@pytest.mark.parametrize("scheme", [*SCHEMES, DISSIPATIVE], ids=repr)
+def test_a_schedule_is_runs_one_after_the_other(scheme):
+    """To the last bit: each piece goes on from the state that the one before has left."""
+    problem = shaken(Inelastic())
+    whole = list(run(problem, scheme, dt=LONG, steps=480))
+    state, parts = None, []
+    for dt, steps in ((4e-3, 100), (1e-3, 200), (2.5e-3, 180)):
+        parts += list(run(problem, scheme, dt=dt, steps=steps, state=state))
+        state = parts[-1].new
+    assert min(changes(whole[:100]), changes(whole[100:300]), changes(whole[300:])) >= 1
+    for one, other in zip(whole, parts, strict=True):
+        assert difference(one.new, other.new) == 0.0
+    assert whole[-1].new.k == 480 and whole[-1].new.t == pytest.approx(1.05, rel=1e-12)
+
+
+def with_mass_of(scheme: Any) -> ContactProblem:
+    """A thrown bar for the trapezoidal rule, whose contact nodes have no mass; the chain, an impact law for others."""
+    if isinstance(scheme, Trapezoidal):
+        return thrown(30, mass=Redistributed())
+    return replace(shaken(Inelastic()), mass=ConsistentMass())
+
+
+@serial
+@pytest.mark.parametrize("plan", [LONG, HalvedAtImpact(LONG, 3), HalvedAtImpact(5e-3, 4)], ids=repr)
+@pytest.mark.parametrize("scheme", [*SCHEMES, Trapezoidal()], ids=repr)
+def test_ledger_closes_across_changes(scheme, plan):
+    """V9.7: a change of dt changes neither u nor v, and no energy appears or is lost between two steps."""
+    problem = with_mass_of(scheme)
+    reports = list(run(problem, scheme, dt=plan, steps=600))
+    sizes = [report.new.t - report.old.t for report in reports]
+    assert sum(abs(b / a - 1.0) > 0.1 for a, b in pairwise(sizes)) >= 2 and changes(reports) >= 2
+    for one, two in pairwise(reports):
+        assert np.array_equal(two.old.u, one.new.u) and np.array_equal(two.old.v, one.new.v)
+        assert two.old.t == one.new.t and two.new.k == two.old.k + 1
+    solution = simulate(problem, scheme=scheme, solver=Condensed(), dt=plan, steps=600, record=[Energy()])
+    assert solution.facts["energy_defect"] < 1e-10 and solution.history["certificate"].max() < 1e-9
+
+
+def linear_error(scheme: Any, dt: float) -> float:
+    """max |u - exact| / max |u| at t = 1 s of a free vibration, dt changed to dt/2 at 0.3 s and to 2 dt at 0.6 s."""
+    problem = chain_problem(4, gap=1e3, stiffness=50.0, u0=[0.1, -0.2, 0.3, 0.1], v0=[1.0, 0.0, -1.0, 0.5])
+    plan = Schedule(((dt, 0.3), (0.5 * dt, 0.6), (2.0 * dt, inf)))
+    *_, last = run(problem, scheme, dt=plan, t_end=1.0, steps=None)
+    system = problem.equations
+    M, K = system.M.csr.toarray(), system.K.csr.toarray()
+    squares, modes = np.linalg.eigh(K / M[0, 0])  # lumped: M is a multiple of the unit matrix
+    w = np.sqrt(squares)
+    t, u0, v0 = last.new.t, modes.T @ system.u0, modes.T @ system.v0
+    exact = modes @ (np.cos(w * t) * u0 + np.sin(w * t) / w * v0)
+    assert t == pytest.approx(1.0, rel=1e-12)
+    return float(np.max(np.abs(last.new.u - exact)) / np.max(np.abs(exact)))
+
+
+@serial
+@pytest.mark.parametrize(
+    ("scheme", "order"),
+    [(HALF, 2), (SS22(), 2), (NEWMARK, 2), (Trapezoidal(), 2), (ZienkiewiczWoodTaylor(1.0), 1), (DISSIPATIVE, 1)],
+    ids=repr,
+)
+def test_order_with_a_change_in_mid_run(scheme, order):
+    """Against the modes in closed form: the order of the scheme, as without changes (V8.5 without a mesh)."""
+    errors = [linear_error(scheme, dt) for dt in (5e-3, 2.5e-3, 1.25e-3)]
+    for coarse, fine in pairwise(errors):
+        assert np.log2(coarse / fine) == pytest.approx(order, abs=0.1)
+
+
+# one matrix for every dt
+
+
+@dataclass(frozen=True)
+class Counted(ZienkiewiczWoodTaylor):
+    """Remembers the dt of every effective matrix it made, and the matrices as long as somebody else keeps them."""
+
+    made: list[tuple[float, Any]] = field(default_factory=list)
+
+    def effective_matrix(self, problem, dt):
+        A = super().effective_matrix(problem, dt)
+        self.made.append((dt, weakref.ref(A)))
+        return A
+
+    @property
+    def sizes(self) -> list[float]:
+        return [dt for dt, _ in self.made]
+
+    @property
+    def alive(self) -> set[float]:
+        return {dt for dt, A in self.made if A() is not None}
+
+
+@serial
+def test_one_matrix_for_every_dt_of_a_halved_run():
+    """Flipping between few dts factorises each of them once; what is never needed is never made."""
+    scheme, problem = Counted(), shaken(Inelastic())
+    reports = list(run(problem, scheme, dt=HalvedAtImpact(5e-3, 3), steps=300))
+    assert changes(reports) >= 8
+    assert scheme.sizes == [5e-3, 2.5e-3, 1.25e-3, 0.625e-3]
+    calm = Counted()
+    list(run(replace(problem, excitation=()), calm, dt=HalvedAtImpact(5e-3, 3), steps=20))
+    assert calm.sizes == [5e-3]
+
+
+@serial
+def test_factors_of_pieces_that_are_over_are_freed():
+    """A plan of ten pieces keeps one matrix (and that of the last report), with halves those of the piece."""
+    sizes = [1e-3 * (1.0 + 0.1 * i) for i in range(10)]
+    times = np.cumsum([5.0 * dt for dt in sizes])
+    plan = Schedule(tuple(zip(sizes, times, strict=True)))
+    scheme = Counted()
+    for i, _ in enumerate(run(shaken(), scheme, dt=plan, steps=50)):
+        assert scheme.alive == {sizes[i // 5]} and scheme.sizes == sizes[: i // 5 + 1]
+    halved, dyadic = Counted(), Schedule(((4e-3, 0.4), (2e-3, inf)))
+    alive = [set(halved.alive) for _ in run(shaken(), halved, dt=HalvedAtImpact(dyadic, 2), steps=200)]
+    assert alive[-1] == {2e-3, 1e-3, 0.5e-3} and {4e-3, 2e-3, 1e-3} in alive
+    assert halved.sizes == [4e-3, 2e-3, 1e-3, 0.5e-3]  # shared by both pieces
+
+
+# halving at impact
+
+
+def closes(report: Report) -> bool:
+    return bool(np.any(report.new.active & ~report.old.active))
+
+
+@serial
+@pytest.mark.parametrize("scheme", SCHEMES, ids=repr)
+def test_every_closure_happens_in_a_shortest_step(scheme):
+    """Base steps end where they did; only steps of dt/8 close a contact; their times fit together."""
+    dt, halvings = 4e-3, 3
+    reports = list(run(shaken(Inelastic()), scheme, dt=HalvedAtImpact(dt, halvings), steps=500))
+    sizes = np.array([report.new.t - report.old.t for report in reports])
+    levels = np.rint(np.log2(dt / sizes))
+    assert np.allclose(sizes, dt / 2.0**levels, rtol=1e-9) and set(levels) == {0, 1, 2, 3}
+    closing = [closes(report) for report in reports]
+    assert sum(closing) >= 4 and set(levels[closing]) == {halvings}
+    assert [report.new.k for report in reports] == list(range(1, len(reports) + 1))
+    base = np.cumsum(2.0**-levels)
+    assert base[-1] == 500 and set(np.arange(1, 501)) <= set(base)  # every base step ends; nothing is skipped
+    assert all(report.certificate.worst <= 1e-9 for report in reports)
+
+
+@serial
+@pytest.mark.parametrize("scheme", SCHEMES, ids=repr)
+def test_rejected_attempts_leave_no_trace(scheme):
+    """Given the accepted sizes as a constant dt each, the run is the same to the last bit."""
+    problem = shaken(Inelastic(MassProjection()))
+    reports = list(run(problem, scheme, dt=HalvedAtImpact(5e-3, 2), steps=60))
+    first = next(i for i, report in enumerate(reports) if report.new.t - report.old.t < 4e-3)
+    state = reports[first - 1].new
+    for report in reports[first : first + 6]:
+        dt = 5e-3 / 2 ** round(np.log2(5e-3 / (report.new.t - report.old.t)))
+        (again,) = run(problem, scheme, dt=dt, steps=1, state=state)
+        assert difference(again.new, report.new) == 0.0
+        state = again.new
+
+
+@serial
+@pytest.mark.parametrize("scheme", SCHEMES, ids=repr)
+def test_no_halvings_is_the_constant_dt(scheme):
+    plain = list(run(shaken(Inelastic()), scheme, dt=5e-3, steps=100))
+    for plan in (HalvedAtImpact(5e-3, 0), Schedule(((5e-3, inf),)), Schedule(((5e-3, 0.2), (5e-3, inf)))):
+        for one, other in zip(plain, run(shaken(Inelastic()), scheme, dt=plan, steps=100), strict=True):
+            assert difference(one.new, other.new) == 0.0
+
+
+@serial
+def test_resting_and_held_contacts_are_not_halved():
+    """Only points that were open close: a bilateral point never does, one that rests on its wall does not again."""
+    problem = shaken(gap=0.0, excitation=(), constant=3.0)
+    resting = replace(next(run(problem, HALF, dt=1e-3, steps=1)).new, active=np.ones(1, dtype=bool))
+    assert len(list(run(problem, HALF, dt=HalvedAtImpact(1e-3), steps=20, state=resting))) == 20
+    held = replace(shaken(gap=0.0), surface=shaken(gap=0.0).surface.held())
+    assert len(list(run(held, HALF, dt=HalvedAtImpact(5e-3), steps=50))) == 50
+
+
+@serial
+@pytest.mark.parametrize(("halvings", "dt"), [(0, 0.0125), (2, 0.0125), (4, 0.0125), (2, 0.006)])
+def test_time_of_the_first_contact_of_the_thrown_bar(halvings, dt):
+    """V1.1: at t = 1/2 exactly, found to dt/2**halvings; the steps before it are those without halving."""
+    dt *= 1.01  # 1/2 is not at the end of a step
+    for report in run(thrown(20), HALF, dt=HalvedAtImpact(dt, halvings), steps=120):
+        if report.new.active.any():
+            break
+    assert 0.5 <= report.new.t <= 0.5 + dt / 2**halvings
+    assert report.old.t <= 0.5
+
+
+@serial
+def test_contact_work_of_the_thrown_bar_falls_with_halving():
+    """V9.1: the first closure loses its reaction times the gap before it, which halving makes smaller."""
+    lost, dt = [], 0.5 / 44.9  # the bar arrives at 0.9 of a step, 0.15 of a quarter, 0.025 after the last sixteenth
+    for halvings in (0, 2, 4):
+        reports = run(thrown(100), HALF, dt=HalvedAtImpact(dt, halvings), steps=100)
+        report = next(report for report in reports if report.new.active.any())
+        gap = 5.0 + report.old.u[0] * -1.0  # u_n = -u of the foot
+        work = float(report.balance.r_n @ (report.new.u[:1] - report.old.u[:1]))
+        assert work == pytest.approx(report.new.r_n[0] * gap, rel=1e-12) and work > 0.0
+        lost.append(gap)
+    np.testing.assert_allclose(lost, 10.0 * dt * np.array([0.9, 0.15, 0.025]), rtol=1e-6)
+
+
+@serial
+def test_a_step_that_fails_in_a_half_says_where():
+    """A load that turns into NaN within a halved step."""
+    problem = shaken(Inelastic())
+    reports = list(run(problem, HALF, dt=HalvedAtImpact(5e-3), steps=60))
+    bad = next(report for report in reports if closes(report))
+    broken = problem.system.with_load((np.ones(6), lambda t: np.nan if t > bad.old.t else 0.0))
+    with pytest.raises(StepFailure, match="contains NaN"):
+        list(run(replace(problem, system=broken), HALF, dt=HalvedAtImpact(5e-3), steps=60))
+
+
+# simulate: counting, files, restart
+
+
+@serial
+def test_what_a_run_counts(tmp_path: Path):
+    """Base steps in steps and t_end, accepted steps in rows and k, attempts thrown away on their own."""
+    plan = HalvedAtImpact(5e-3, 3)
+    solution = run_chain(tmp_path, 300, dt=plan)
+    facts, rows = solution.facts, len(solution.history["t"]) - 1
+    assert facts["base_steps"] == 300 and facts["steps"] == rows == solution.state.k > 300
+    assert facts["halved_steps"] == rows - 300 > 10  # every attempt thrown away makes one step more
+    assert solution.history["k"].tolist() == list(range(rows + 1))
+    assert facts["dt"] == repr(plan) and facts["t_end"] == pytest.approx(1.5, rel=1e-12)
+    assert facts["seconds_per_step"] > facts["seconds_per_linear_step"] > 0.0
+    text, log = solution.summary(), (tmp_path / "run.log").read_text()
+    assert f"{rows} steps (300 base steps of HalvedAtImpact(dt=0.005, halvings=3))" in text
+    assert any(line.split() == ["halved", "steps", str(rows - 300)] for line in text.splitlines())
+    assert "300 of 300 steps" in log and log.count(" left") == 10 and "300 steps to do" in log
+    assert difference(run_chain(None, None, t_end=1.5, dt=plan).state, solution.state) == 0.0
+    plain = run_chain(None, 300)
+    assert plain.facts["halved_steps"] == 0 and plain.facts["base_steps"] == 300 and "halved" not in plain.summary()
+
+
+PLANS = [THREE, HalvedAtImpact(5e-3, 3), HalvedAtImpact(Schedule(((5e-3, 0.31), (2.5e-3, 0.4), (4e-3, inf))), 2)]
+
+
+@serial
+@pytest.mark.parametrize("plan", PLANS, ids=repr)
+@pytest.mark.parametrize("scheme", [HALF, NEWMARK, DISSIPATIVE], ids=repr)
+def test_restart_with_a_plan_to_the_last_bit(tmp_path: Path, scheme: Any, plan: Any):
+    """From checkpoints here and there, also right after halved steps: state and files of the straight run."""
+    straight = run_chain(tmp_path / "straight", 200, scheme=scheme, dt=plan)
+    loop = March(
+        chain(), scheme=scheme, solvers=[Condensed()], course=course(plan, 199, None), state=initial_state(chain()),
+        tolerance=1e-9,
+    )
+    halved = [loop.base for _ in loop if loop.ended and loop.dt < course(plan, 199, None).dt(loop.base - 1)]
+    assert bool(halved) == isinstance(plan, HalvedAtImpact)
+    stops = sorted({50, 75, 101, 150, *halved[:2]})
+    for stop in stops:
+        run_chain(tmp_path / "parts", stop, scheme=scheme, dt=plan, restart=stop != stops[0])
+    parts = run_chain(tmp_path / "parts", 200, scheme=scheme, dt=plan, restart=True)
+    assert difference(parts.state, straight.state) == 0.0
+    assert equal_files(tmp_path / "parts", tmp_path / "straight")
+    for name in ("base_steps", "halved_steps", "steps"):
+        assert parts.facts[name] == straight.facts[name]
+
+
+class Stop(Exception):
+    """The end of a run by force."""
+
+
+@dataclass
+class StopsAt:
+    """A recorder that raises at row k."""
+
+    k: int
+
+    def columns(self) -> dict[str, tuple[str, str]]:
+        return {"one": ("-", "always one")}
+
+    def start(self, problem: Any, state: Any, resumed: Any = None) -> dict[str, float]:
+        return {"one": 1.0}
+
+    def row(self, report: Report) -> dict[str, float]:
+        if report.new.k == self.k:
+            raise Stop
+        return {"one": 1.0}
+
+
+@serial
+@pytest.mark.parametrize("scheme", [HALF, DISSIPATIVE], ids=repr)
+def test_a_run_that_stops_inside_a_halved_step_goes_on_from_the_base_step_before(tmp_path: Path, scheme: Any):
+    """Rows of the unfinished base step are in history.csv, and are computed again, to the last bit."""
+    plan = HalvedAtImpact(5e-3, 3)
+
+    def go(folder: str, k: int, **more: Any) -> Any:
+        return run_chain(tmp_path / folder, 150, scheme=scheme, dt=plan, record=[Energy(), StopsAt(k)], **more)
+
+    straight = go("straight", -1)
+    sizes = np.diff(straight.history["t"])
+    inside = int(np.flatnonzero(sizes < 0.9 * sizes[-1])[2]) + 2  # row after the third short step
+    first = int(np.flatnonzero(sizes < 0.9 * sizes[-1])[0])  # steps before the first halved one
+    with pytest.raises(Stop):
+        go("parts", inside)
+    rows = (tmp_path / "parts" / "history.csv").read_bytes().count(b"\n") - 1
+    assert rows == inside > first + 1
+    resumed = go("parts", -1, restart=True)
+    assert resumed.facts["restarted_from_step"] == first
+    assert difference(resumed.state, straight.state) == 0.0
+    assert equal_files(tmp_path / "parts", tmp_path / "straight")
+    assert resumed.facts["halved_steps"] == straight.facts["halved_steps"]
+
+
+@serial
+def test_checkpoints_are_of_base_steps_only(tmp_path: Path):
+    """One after every tenth base step, and the last; none in between."""
+    solution = run_chain(tmp_path, 60, dt=HalvedAtImpact(5e-3, 3), checkpoint_every=10)
+    lines = [line for line in (tmp_path / "run.log").read_text().splitlines() if "checkpoint of step" in line]
+    steps = [int(line.rsplit(" ", 1)[1]) for line in lines]
+    ends = [int(np.argmin(np.abs(solution.history["t"] - 0.05 * i))) for i in range(1, 7)]
+    assert steps == ends and steps[-1] > 60
+
+
+@serial
+def test_another_plan_is_refused(tmp_path: Path):
+    plan = HalvedAtImpact(5e-3, 3)
+    run_chain(tmp_path, 60, dt=plan)
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    wrong: list[tuple[Any, str]] = [
+        (5e-3, r"of a run with dt = HalvedAtImpact\(dt=0.005, halvings=3\) but this one has 0.005: restart the same"),
+        (HalvedAtImpact(5e-3, 2), r"but this one has HalvedAtImpact\(dt=0.005, halvings=2\): restart the same run"),
+        (Schedule(((5e-3, inf),)), r"this one has Schedule\(pieces=\(\(0.005, inf\),\)\): restart the same run"),
+    ]
+    for other, words in wrong:
+        with pytest.raises(InputError, match=words):
+            run_chain(tmp_path, dt=other, restart=True)
+    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+# any number of ranks
+
+
+@pytest.mark.parametrize("solver", ["condensed", "volume"])
+def test_halved_wall_on_any_number_of_ranks(comm: Any, shared_tmp: Path, solver: str):
+    """All ranks halve the same steps; the restart is the straight run to the last bit, with factors of four dts."""
+    pytest.importorskip("dolfinx")
+    from vi_contact.solvers.volume import Volume
+
+    more = {"dt": HalvedAtImpact(Schedule(((1.0 / 280.0, 0.1), (1.0 / 560.0, inf))), 2), "scheme": HALF}
+    more["solver"] = Condensed() if solver == "condensed" else Volume()
+    problem = wall(comm)
+    straight = run_wall(comm, shared_tmp / "straight", 60, problem=problem, **more)
+    assert straight.facts["halved_steps"] > 0 and straight.facts["worst_certificate"] <= 1e-9
+    assert straight.facts["energy_defect"] < 1e-10
+    run_wall(comm, shared_tmp / "parts", 33, problem=problem, **more)
+    parts = run_wall(comm, shared_tmp / "parts", 60, problem=problem, restart=True, **more)
+    if solver == "condensed":
+        assert difference(parts.state, straight.state) == 0.0
+    assert parts.facts["halved_steps"] == straight.facts["halved_steps"]

@@ -1,0 +1,147 @@
+"""How long the steps of a run are: a constant dt [s], a ``Schedule`` of them, or a step halved where contact closes.
+
+Changing dt changes neither u nor v, and so no energy. A scheme that carries its past, like LinearMultistep, restarts it
+from u and v (``Scheme.start``). ``steps``, ``t_end``, ``checkpoint_every`` and progress count *base steps*: those
+of the plan, whether they were halved or not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import ceil, inf, isfinite
+from numbers import Integral, Real
+from typing import Any
+
+from .errors import InputError
+
+HALVINGS = 20  # at most: a millionth of the base step
+SLACK = 1e-6  # of a step: round-off of the times t + dt + … of a run does not add a step to a piece
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """Pieces (dt [s], until [s]): steps of dt until that time; the last piece is usually (dt, math.inf).
+
+    A piece ends with the first step that reaches its time, be it not a whole number of steps long.
+    InputError for no pieces, dt that is not positive, or times that do not increase.
+    """
+
+    pieces: tuple[tuple[float, float], ...]
+
+    def __post_init__(self) -> None:
+        before, pieces = -inf, []
+        for piece in _pairs(self.pieces):
+            dt, until = _positive(piece[0]), piece[1]
+            if not until > before:
+                raise InputError(f"Schedule: the piece until {until:g} s does not end after {before:g} s: give "
+                                 "increasing times, math.inf for the last one only")
+            pieces.append((dt, until))
+            before = until
+        object.__setattr__(self, "pieces", tuple(pieces))
+
+
+@dataclass(frozen=True)
+class HalvedAtImpact:
+    """Steps of ``dt`` [s], or of a Schedule; one that closes an open contact point is discarded and done as two halves.
+
+    These may be halved again, down to dt/2**halvings, the resolution of the time of an impact. Every accepted part is a
+    certified step like any other. At most one matrix is factorised for each of the halvings + 1 lengths of a piece.
+    InputError for dt that is not positive, and unless halvings is a whole number from 0 to 20.
+    """
+
+    dt: float | Schedule
+    halvings: int = 3
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.dt, Schedule):
+            object.__setattr__(self, "dt", _positive(self.dt))
+        if not isinstance(self.halvings, Integral) or not 0 <= self.halvings <= HALVINGS:
+            raise InputError(f"HalvedAtImpact halvings is {self.halvings!r}: give a whole number from 0 to {HALVINGS}")
+        object.__setattr__(self, "halvings", int(self.halvings))
+
+
+TimeSteps = float | Schedule | HalvedAtImpact
+
+
+def described(plan: TimeSteps) -> float | str:
+    """For checkpoint and summary: a constant dt as the number it is, a plan in words."""
+    return repr(plan) if isinstance(plan, Schedule | HalvedAtImpact) else plan
+
+
+@dataclass(frozen=True)
+class Course:
+    """The base steps of one run: parts (dt, number of steps), and how often each may be halved."""
+
+    parts: tuple[tuple[float, int], ...]
+    halvings: int = 0
+
+    @property
+    def steps(self) -> int:
+        """The number of base steps."""
+        return sum(steps for _, steps in self.parts)
+
+    def dt(self, base: int) -> float:
+        """Length of a base step, counted from 0; beyond the end, of the last one."""
+        for dt, steps in self.parts:
+            if base < steps:
+                return dt
+            base -= steps
+        return self.parts[-1][0]
+
+
+def course(plan: TimeSteps, steps: int | None, t_end: float | None, t0: float = 0.0) -> Course:
+    """The base steps from t0 to t_end, or so many; InputError when plan, steps or t_end make no sense.
+
+    Counted from the times of the plan, not from those of the run, whose round-off accumulates: a restart, which
+    builds it from the same t0, has the same course.
+    """
+    halvings = plan.halvings if isinstance(plan, HalvedAtImpact) else 0
+    dt = plan.dt if isinstance(plan, HalvedAtImpact) else plan
+    pieces = dt.pieces if isinstance(dt, Schedule) else ((_positive(dt), inf),)
+    left = _wanted(steps, t_end, t0)
+    parts: list[tuple[float, int]] = []
+    t = t0
+    for size, until in pieces:
+        last = t_end is not None and t_end <= until
+        wanted = (t_end - t) / size if last and t_end is not None else (until - t) / size - SLACK
+        whole = max(ceil(wanted * (1.0 - 1e-12)), 0) if isfinite(wanted) else left
+        if min(whole, left) == inf:
+            raise InputError(f"the run to t_end = {t_end:g} s has infinitely many steps: give a larger dt")
+        done = int(min(whole, left))
+        if done or not parts:
+            parts.append((size, done))
+        t, left = t + done * size, 0 if last else left - done
+        if left == 0:
+            return Course(tuple(parts), halvings)
+    end = f"t_end = {t_end:g} s" if t_end is not None else f"the {left:g} steps that are left"
+    raise InputError(f"the last piece of the Schedule ends at {pieces[-1][1]:g} s, before {end}: end it at math.inf")
+
+
+def _wanted(steps: int | None, t_end: float | None, t0: float) -> float:
+    """At most so many steps, infinite when t_end counts."""
+    if (steps is None) == (t_end is None):
+        raise InputError("give either steps or t_end, and not both")
+    if t_end is not None:
+        if not isfinite(t_end) or t_end < t0:
+            raise InputError(f"the run goes from {t0:g} s to t_end = {t_end:g} s: give a finite t_end after the start")
+        return inf
+    if steps is None or not isfinite(steps) or steps < 0 or int(steps) != steps:
+        raise InputError(f"steps is {steps}: give a whole number of steps >= 0, or t_end in seconds")
+    return int(steps)
+
+
+def _positive(dt: Any) -> float:
+    if not isinstance(dt, Real) or not isfinite(dt) or dt <= 0.0:
+        raise InputError(f"dt is {dt}: give a positive time step in seconds, a Schedule or HalvedAtImpact")
+    return float(dt)
+
+
+def _pairs(pieces: Any) -> list[tuple[Any, float]]:
+    """The pieces as pairs; InputError when they are something else."""
+    try:
+        pairs = [(dt, float(until)) for dt, until in pieces]
+    except (TypeError, ValueError):
+        raise InputError(f"Schedule pieces are {pieces!r}: give pairs ((dt, until), …) in seconds") from None
+    if not pairs:
+        raise InputError("Schedule has no pieces: give at least one (dt, until), (dt, math.inf) for a constant dt")
+    return pairs
