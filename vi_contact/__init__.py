@@ -45,6 +45,7 @@ _CONTENTS = {
     "solvers.mprgp": ("ProjectedCG",),
     # the loop and what listens to it
     "march": ("march",),
+    "time_steps": ("HalvedAtImpact", "Schedule"),
     "static": ("static_equilibrium",),
     "simulate": ("Solution", "simulate"),
     "recorders": ("Contact", "Energy", "Probe"),
