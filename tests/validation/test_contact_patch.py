@@ -11,8 +11,8 @@ direction:
   smaller than p weight_i by the cosine of half the angle between neighbouring facets, so that r_n / weight is p only up
   to O(h²) there.
 
-Rigid motions are held by exact displacements of some other side (whose nodes are then no contact nodes): the static
-stage refuses a body that contact alone holds.
+Rigid motions are held by exact displacements of some other side (whose nodes are then no contact nodes). Bodies that
+contact alone holds: test_static.py.
 """
 
 from __future__ import annotations

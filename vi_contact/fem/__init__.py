@@ -11,6 +11,7 @@ _HOME = {
     "assemble": "assemble",
     "BodyForce": "loads", "Prescribed": "loads", "TangentialTraction": "loads", "Traction": "loads",
     "contact_surface": "trace",
+    "geometric_stiffness": "gravity",
     "XDMF": "fields",
 }
 """Public name -> module of this folder it lives in."""

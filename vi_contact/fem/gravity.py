@@ -1,0 +1,80 @@
+"""Second-order effect of a static load: the geometric stiffness of its stresses (P-Delta, restoring moment of gravity).
+
+In first-order statics a block that has tilted about its corner by theta still has its weight at the lever arm b. The
+arm b - h theta of the tilted block, hence uplift that ends in overturning, needs the work of the initial stresses
+sigma0 on the second-order part of the strains,
+
+    E_ij = ½ (u_i,j + u_j,i + u_k,i u_k,j)   ->   ½ uᵀ K_G u = ½ ∫ sigma0_ij u_k,i u_k,j dx
+
+(Bathe, Finite Element Procedures, sect. 6.3; Zienkiewicz and Taylor, The Finite Element Method 2, initial stress
+matrix). For a rotation u = theta x (.) in the plane that is ½ theta² ∫ tr sigma0, and by the virial theorem, exact for
+the finite element solution because x itself is a displacement of the space, ∫ tr sigma0 = Σ f·x - Σ r·x: for a block
+on level ground minus m g times the height h_c of its centre of mass, so that the energy changes by -½ m g h_c theta².
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import ufl
+
+from ..algebra import Array
+from ..errors import InputError
+from ..step import ContactProblem, State
+from ..system import Load, SemiDiscreteSystem
+from . import compat
+from .petsc_algebra import PetscMatrix
+from .space import FemSpace
+
+
+def geometric_stiffness(problem: ContactProblem, state: State) -> SemiDiscreteSystem:
+    """The problem's system linearised about a static state: K + K_G instead of K, f + K_G u0 instead of f.
+
+    The state stays an equilibrium with the same reactions, and motions about it feel the geometric stiffness of its
+    stresses: (K + K_G) u = f + K_G u0 - B_nᵀ r_n - B_tᵀ r_t. Use it as ``dataclasses.replace(problem, system=...)`` and
+    start from the same state. Damping keeps the K it was made of. sigma0 is that of the state for good: when contact
+    moves to a corner the stresses change, their mean does not (reactions at y = 0 add nothing to Σ r·x).
+
+    Args:
+        problem: its system made by ``fem.assemble``.
+        state: of ``static_equilibrium``; u in the problem's basis, as all states.
+    Raises:
+        InputError: a system that fem.assemble did not make.
+    """
+    system, space = problem.system, problem.system.space
+    if not isinstance(space, FemSpace):
+        raise InputError("geometric_stiffness needs a system made by fem.assemble")
+    u0 = problem.cartesian(state.u)
+    full = initial_stress_matrix(space, space.expand(u0, state.t))
+    reduced = PetscMatrix(full.PtAP(space.selection))
+    load = replace(system.load, constant=system.load.constant + reduced @ u0)
+    if any(condition.moves for condition in space.prescribed):
+        load = _with_prescribed(space, PetscMatrix(full), load, state.t)
+    K = system.algebra.combine([(1.0, system.K), (1.0, reduced)])
+    return replace(system, K=K, load=load, _cache={})
+
+
+def initial_stress_matrix(space: FemSpace, nodal: Array) -> Any:
+    """K_G (PETSc, all unknowns) [N/m] of the stresses of nodal displacements (owned nodes, d) [m].
+
+    Of a rotation the integrand is tr sigma0, a polynomial once multiplied by the Jacobian: exact on distorted cells too.
+    """
+    forms = space.forms
+    u0 = compat.function(space.V)
+    u0.x.array[: nodal.size] = nodal.ravel()
+    u0.x.scatter_forward()
+    u, v = ufl.TrialFunction(space.V), ufl.TestFunction(space.V)
+    sigma = forms.stress(u0)
+    form = ufl.inner(ufl.dot(ufl.grad(u), sigma), ufl.grad(v)) * ufl.dx
+    return compat.assemble_matrix(compat.compile_form(form))
+
+
+def _with_prescribed(space: FemSpace, full: PetscMatrix, load: Load, t0: float) -> Load:
+    """The load and the pull of prescribed displacements on the new part: -Pᵀ K_G (U(t) - U(t0))."""
+    start = space.prescribed_values(t0)
+
+    def pull(t: float) -> Array:
+        return -(full @ (space.prescribed_values(t) - start))[space.free]
+
+    return replace(load, general=(*load.general, pull))
