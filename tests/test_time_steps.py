@@ -350,6 +350,21 @@ def test_contact_work_of_the_thrown_bar_falls_with_halving():
 
 
 @serial
+def test_means_over_arrival_times_of_the_thrown_bar():
+    """The table in docs/schemes.md: delay [dt] and work lost [J] of the first closure, halvings 0, 1, 2, 3."""
+    delay, lost = np.zeros(4), np.zeros(4)
+    for halvings in range(4):
+        for i in range(16):
+            dt = 0.5 / (44.0 + (i + 1.0 / np.pi) / 16.0)
+            reports = run(thrown(100), HALF, dt=HalvedAtImpact(dt, halvings), steps=100)
+            first = next(report for report in reports if report.new.active.any())
+            delay[halvings] += (first.new.t - 0.5) / dt / 16.0
+            lost[halvings] += float(first.balance.r_n @ (first.new.u - first.old.u)[:1]) / 16.0
+    np.testing.assert_allclose(delay, [0.511, 0.261, 0.136, 0.0739], rtol=5e-3)
+    np.testing.assert_allclose(lost, [5.71, 2.98, 1.74, 1.28], rtol=5e-3)
+
+
+@serial
 def test_a_step_that_fails_in_a_half_says_where():
     """A load that turns into NaN within a halved step."""
     problem = shaken(Inelastic())
