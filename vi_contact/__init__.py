@@ -31,6 +31,15 @@ _CONTENTS = {
     "mass": ("ConsistentMass", "Redistributed"),
     "surfaces": ("AnalyticGap", "ContactSurface", "HalfSpace", "Touching"),
     "system": ("Load", "SemiDiscreteSystem"),
+    # exact solutions to compare with
+    "exact.bar": ("PeriodicBar", "ThrownBar"),
+    "exact.bouncing_bar": ("BouncingBar",),
+    "exact.two_bars": ("TwoBars",),
+    "exact.columns": ("ObliqueImpact", "ShearColumn"),
+    "exact.hertz": ("HertzImpact", "HertzLine", "HertzPoint", "contact_modulus", "contact_radius"),
+    "exact.punch": ("RoundPunch", "StripPunch"),
+    "exact.housner": ("HousnerBlock",),
+    "exact.sliding": ("SlidingBlock",),
     # contract
     "step": ("Certificate", "ContactProblem", "Report", "State", "StepProblem", "StepResult"),
     # schemes
