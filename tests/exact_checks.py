@@ -26,7 +26,7 @@ def wave_defect(u: Field, *, length: float, c: float, until: float, force: float
 def derivative_defect(u: Field, rate: Field, *, x: Array, t: Array, h: tuple[float, float]) -> float:
     """Largest difference of `rate` and the central difference of u with the step (dx, dt) = h; one of them is 0.
 
-    x and t random; points where the rate jumps within the step are left out, but most must remain.
+    Points where the rate jumps within the step are left out, but most of the (x, t) must remain.
     """
     before, after = rate(x - h[0], t - h[1]), rate(x + h[0], t + h[1])
     mean = 0.5 * (before + after)
@@ -36,7 +36,9 @@ def derivative_defect(u: Field, rate: Field, *, x: Array, t: Array, h: tuple[flo
     return np.abs(slope - mean)[smooth].max()
 
 
-def energies(u: Field, v: Field, strain: Field, *, length: float, E: float, rho: float, t: Array, g: float = 0.0) -> Array:
+def energies(
+    u: Field, v: Field, strain: Field, *, length: float, E: float, rho: float, t: Array, g: float = 0.0
+) -> Array:
     """Kinetic, strain and weight energy at the times t by the midpoint rule on 20000 cells; u = 0 is the zero level."""
     x = (np.arange(20000) + 0.5)[:, np.newaxis] * length / 20000
     return length * (0.5 * rho * v(x, t) ** 2 + 0.5 * E * strain(x, t) ** 2 + rho * g * u(x, t)).mean(axis=0)

@@ -49,7 +49,7 @@ def test_thrown_bar_is_a_free_bar_under_its_contact_force():
     [(ThrownBar(), 10.0, 900.0, 1.0, 2.0), (STEEL, 0.2, 2e11, 8000.0, 2e-4), (PeriodicBar(), 1.0, 1.0, 1.0, 7.0)],
 )
 def test_bar_obeys_its_equations(bar, length, E, rho, until):
-    """V1.1, V1.3: wave equation, derivatives, force = -E strain at the foot, non-penetration, complementarity, energy."""
+    """V1.1, V1.3: wave equation, derivatives, force = -E strain at the foot, complementarity, energy."""
     c = (E / rho) ** 0.5
     x, t = length * (0.1 + 0.8 * RANDOM.random(2000)), until * (0.1 + 0.8 * RANDOM.random(2000))
     top = np.abs(bar.displacement(x, t)).max()
