@@ -134,7 +134,7 @@ def test_unwritable_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     """Told before any work: not a folder, or one that takes no file (mocked, as root may write anywhere)."""
     (tmp_path / "file").write_text("")
     asked: list[int] = []
-    monkeypatch.setattr("vi_contact.run.march", lambda *_, **__: asked.append(1) or iter(()))
+    monkeypatch.setattr("vi_contact.run.March", lambda *_, **__: asked.append(1) or iter(()))
     with pytest.raises(InputError, match=r"output folder '.*file' cannot be written \(File exists\): choose another"):
         run(tmp_path / "file")
     with pytest.raises(InputError, match=r"output folder '.*below' cannot be written \(Not a directory\)"):
