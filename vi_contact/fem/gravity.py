@@ -58,7 +58,7 @@ def geometric_stiffness(problem: ContactProblem, state: State) -> SemiDiscreteSy
 def initial_stress_matrix(space: FemSpace, nodal: Array) -> Any:
     """K_G (PETSc, all unknowns) [N/m] of the stresses of nodal displacements (owned nodes, d) [m].
 
-    Of a rotation the integrand is tr sigma0, a polynomial once multiplied by the Jacobian: exact on distorted cells too.
+    Of a rotation the integrand is tr sigma0, a polynomial once multiplied by the Jacobian: exact on all cells.
     """
     forms = space.forms
     u0 = compat.function(space.V)
