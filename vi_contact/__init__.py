@@ -43,9 +43,15 @@ _CONTENTS = {
     # contract
     "step": ("Certificate", "ContactProblem", "Report", "State", "StepProblem", "StepResult"),
     # schemes
+    "schemes.choice": ("completed",),
     "schemes.trapezoidal": ("Trapezoidal",),
     "schemes.zienkiewicz_wood_taylor": ("ZienkiewiczWoodTaylor",),
     "schemes.ss22": ("SS22",),
+    "schemes.midpoint": ("Midpoint",),
+    "schemes.newmark": ("Newmark",),
+    "schemes.hht": ("HHT",),
+    "schemes.generalised_alpha": ("GeneralisedAlpha",),
+    "schemes.houbolt": ("Houbolt",),
     "schemes.linear_multistep": ("LinearMultistep",),
     # solvers
     "solvers.condensed": ("Condensed",),

@@ -3,17 +3,19 @@
     sum_r a[r] u(p-r)     = dt    sum_r b[r] u'(p-r)          (11a)
     sum_r gamma[r] u(p-r) = mu dt² sum_r b[r] u''(p-r)        (11b)     r = 0..q, b[0] != 0
 
-Solved for the newest velocity and acceleration and put into M u'' + C u' + K u = f - B_nᵀ r_n at t_p:
+Solved for the newest velocity and acceleration and put into M u'' + C u' + K u = f - B_nᵀ r_n - B_tᵀ r_t at t_p:
 
-    A = gamma[0]/(mu dt² b[0]) M + a[0]/(dt b[0]) C + K,   x = u(p),   scale = 1
+    A = gamma[0]/(mu dt² b[0]) M + a[0]/(dt b[0]) C + K,   x = u(p),   scale = 1,   |r_t| <= limit(r_n) along B_t du
 
 (The text prints -A u on the right of the semi-discrete equation; with A > 0 the sign is +, verification 4.1.)
-Start, and restart after every velocity jump or change of dt: the past is filled in with the constant acceleration
-that fits the state without the reaction of the collision (schemes.acceleration), which makes Newmark's two-step form
-reproduce its one-step form exactly and keeps second order for the other members. Kept instead, that reaction would act
-for another step, and throw off what the impact law has just stopped.
-Energy: unlike the midpoint form, contact in the acceleration balance at t_p can *gain* energy with hard contact (V9.2);
-the ledger shows it as algorithmic loss of negative sign.
+Start, and restart after every velocity jump or change of dt: the past is filled in with constant acceleration, which
+makes Newmark's two-step form reproduce its one-step form exactly and keeps second order for the other members. After a
+jump it is the one that fits the state without the reaction of the collision (schemes.acceleration): kept, that would
+act for another step, and throw off what the impact law has just stopped. A change of dt keeps acceleration and reaction.
+Unknowns without mass (mass.Redistributed) have no acceleration and the mean velocity of the step.
+Energy: the ledger closes with the means of both ends (V9.7). Unlike the midpoint form, contact in the acceleration
+balance at t_p can *gain* energy on consistent mass (V9.2), booked as algorithmic or contact loss of negative sign.
+Impulses: those over a contact with free flight before and after are the change of momentum (V9.8).
 """
 
 from __future__ import annotations
@@ -26,7 +28,8 @@ from ..algebra import Array
 from ..errors import InputError
 from ..mass import MassLaw, Redistributed
 from ..step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
-from .acceleration import consistent_acceleration
+from .acceleration import consistent_acceleration, without_inertia
+from .contact_layer import at_rest_between, relaxed
 from .guard import contact_in_the_balance, needs_no_impact_law
 
 FREQUENCIES = np.logspace(-2.0, 3.0, 61)  # natural frequency times dt, for the stability check
@@ -103,20 +106,26 @@ class LinearMultistep:
         return self.gamma[0] / (self.mu * dt**2 * self.b[0])
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
-        """The past, unless the state brings one for this dt."""
+        """The past, unless the state brings one for this dt; the contact layer in equilibrium, once."""
         memory = state.memory
-        if np.array_equal(memory.get("dt", ()), [dt]) and f"a_{len(self.a) - 2}" in memory:
+        if not np.array_equal(memory.get("t", ()), [state.t]):
+            state = state if problem.equations.massless is None else relaxed(problem, state)
+            return self._restarted(problem, state, dt)
+        if np.array_equal(memory["dt"], [dt]) and f"a_{len(self.a) - 2}" in memory:
             return state
-        return self._restarted(problem, state, dt)
+        return self._with_past(state, memory["a_0"], memory["reaction_0"], dt)
 
     def jump(self, problem: ContactProblem, state: State, v: Array, dt: float) -> State:
         """After a velocity jump the past is that of the new velocity."""
         return self._restarted(problem, replace(state, v=v), dt)
 
     def _restarted(self, problem: ContactProblem, state: State, dt: float) -> State:
-        a, reaction = consistent_acceleration(problem, state.t, state.u, state.v)
+        return self._with_past(state, *consistent_acceleration(problem, state, dt), dt)
+
+    def _with_past(self, state: State, a: Array, reaction: Array, dt: float) -> State:
         past = self._past(state.u, state.v, a, dt)
-        return replace(state, memory=past | {"a_0": a, "reaction_0": reaction, "dt": np.array([dt])})
+        newest = {"a_0": a, "reaction_0": reaction, "dt": np.array([dt]), "t": np.array([state.t])}
+        return replace(state, memory=past | newest)
 
     def _past(self, u: Array, v: Array, a: Array, dt: float) -> dict[str, Array]:
         """Levels 1..q before (u, v) under constant acceleration a."""
@@ -179,18 +188,20 @@ class LinearMultistep:
         levels = self._levels(state)
         v_known, a_known = self._known(levels, dt)
         v = v_known + self._velocity_factor(dt) * result.x
-        a = a_known + self._acceleration_factor(dt) * result.x
-        reaction = problem.surface.reaction_load(result.r_n, len(v))
-        memory = levels | {"a_0": a, "reaction_0": reaction, "dt": state.memory["dt"]}
-        return State(step.t, step.k, result.x, v, result.r_n, result.active, memory)
+        v = at_rest_between(problem, state, result.x, v, dt)
+        a = without_inertia(problem, a_known + self._acceleration_factor(dt) * result.x)
+        reaction = problem.surface.reaction_load(result.r_n, len(v), result.r_t)
+        newest = {"a_0": a, "reaction_0": reaction, "dt": state.memory["dt"], "t": np.array([step.t])}
+        return State(step.t, step.k, result.x, v, result.r_n, result.active, levels | newest, result.r_t)
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
         """Mean of the equations of motion at both ends of the step, the old end after its impact."""
-        load, surface = problem.equations.load, problem.surface
+        load, surface, r0 = problem.equations.load, problem.surface, old.memory["reaction_0"]
         return Balance(
             u=0.5 * (old.u + new.u),
             v=0.5 * (old.v + new.v),
             a=0.5 * (old.memory["a_0"] + new.memory["a_0"]),
             f=0.5 * (load(old.t) + load(new.t)),
-            r_n=0.5 * (surface.normal_values(old.memory["reaction_0"]) + new.r_n),
+            r_n=0.5 * (surface.normal_values(r0) + new.r_n),
+            r_t=None if new.r_t is None else 0.5 * (surface.tangential_values(r0) + new.r_t),
         )

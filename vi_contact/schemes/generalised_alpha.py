@@ -1,0 +1,196 @@
+"""The generalised-alpha method of Chung and Hulbert, the core of HHT and Newmark too.
+
+    u1 = u0 + dt v0 + dt² ((½ - beta) a0 + beta a1),    v1 = v0 + dt ((1 - gamma) a0 + gamma a1)
+    M a_m + C v_f + K u_f = (1 - alpha_f) f1 + alpha_f f0 - B_nᵀ r_n,f - B_tᵀ r_t,f
+    a_m = (1 - alpha_m) a1 + alpha_m a0,    (u, v, r_n, r_t)_f = (1 - alpha_f) (…)1 + alpha_f (…)0
+    0 <= r_n1  ⊥  gap0 - B_n u1 >= 0,    |r_t1| <= limit(r_n1) along B_t (u1 - u0)
+
+Divided by 1 - alpha_f, in x = u1:  A = (1 - alpha_m)/((1 - alpha_f) beta dt²) M + gamma/(beta dt) C + K,  scale = 1,
+r the reaction at the end of the step.
+
+Order 2 at gamma = ½ - alpha_m + alpha_f, else 1. Unconditionally stable for alpha_m <= alpha_f <= ½,
+gamma >= ½ - alpha_m + alpha_f and beta >= gamma/2, all that is accepted. ``spectral_radius(rho_inf)``: the members of
+order 2 with amplification rho_inf at infinite frequency and the least damping of low ones,
+alpha_m = (2 rho - 1)/(1 + rho), alpha_f = rho/(1 + rho), beta = ¼ (1 - alpha_m + alpha_f)².
+
+Start, and restart after every velocity jump: the acceleration that fits (schemes.acceleration). Unknowns without mass
+(mass.Redistributed) have no acceleration, the mean velocity of the step, and are in equilibrium at its ends.
+Energy: the ledger closes with the weights of the equation above (V9.7), its algorithmic part is the damping of high
+frequencies. Contact forces stand in the balance of forces: on consistent mass their work creates energy when contacts
+open (V9.2), which the damping of high frequencies does not make up for; on redistributed mass it does not.
+Impulses (V9.8): sum of dt r_n,f over a contact with free flight before and after is the change of momentum; in single
+steps it is not, unless the member is Newmark.
+Source: Chung and Hulbert, J. Appl. Mech. 60 (1993) 371-375.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..algebra import Array
+from ..errors import InputError
+from ..mass import MassLaw, Redistributed
+from ..step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
+from .acceleration import consistent_acceleration, without_inertia
+from .contact_layer import at_rest_between, relaxed
+from .guard import contact_in_the_balance, needs_no_impact_law
+
+SLACK = 1e-12  # round-off in the conditions of stability
+
+
+@dataclass(frozen=True)
+class Weights:
+    """The four numbers of the module's equations. InputError unless unconditionally stable."""
+
+    alpha_m: float
+    alpha_f: float
+    beta: float
+    gamma: float
+
+    def __post_init__(self) -> None:
+        least = 0.5 - self.alpha_m + self.alpha_f
+        stable = self.alpha_m <= self.alpha_f + SLACK and self.alpha_f <= 0.5 + SLACK and self.gamma >= least - SLACK
+        if not (stable and np.inf > self.beta >= 0.5 * self.gamma - SLACK and np.isfinite(least + self.gamma)):
+            raise InputError(
+                f"alpha_m={self.alpha_m:g}, alpha_f={self.alpha_f:g}, beta={self.beta:g}, gamma={self.gamma:g} are not "
+                "unconditionally stable, and contact has no highest frequency to choose dt by: give alpha_m <= alpha_f "
+                "<= 1/2, gamma >= 1/2 - alpha_m + alpha_f, beta >= gamma/2"
+            )
+
+
+class AlphaStep:
+    """The step of the module's equations, with the weights of a member. Its memory is "a" (the acceleration),
+    "reaction" (Bᵀr at the same end) and "of" (alpha_m, alpha_f and t they belong to)."""
+
+    @property
+    def weights(self) -> Weights:
+        """alpha_m, alpha_f, beta, gamma of the member."""
+        raise TypeError(f"{type(self).__name__} has no weights")
+
+    @property
+    def mass(self) -> MassLaw:
+        """Contact stands in the balance of forces: without mass at the contact nodes it cannot create energy."""
+        return Redistributed()
+
+    def check(self, problem: ContactProblem) -> None:
+        """InputError for an impact law on massless contact nodes; warns when they have mass."""
+        needs_no_impact_law(problem)
+        contact_in_the_balance(repr(self), problem)
+
+    def _mark(self, t: float) -> Array:
+        return np.array([self.weights.alpha_m, self.weights.alpha_f, t])
+
+    def start(self, problem: ContactProblem, state: State, dt: float) -> State:
+        """The contact layer in equilibrium and the acceleration; once, not on restarts and changes of dt."""
+        if np.array_equal(state.memory.get("of", ()), self._mark(state.t)):
+            return state
+        state = state if problem.equations.massless is None else relaxed(problem, state)
+        return self._restarted(problem, state, dt)
+
+    def jump(self, problem: ContactProblem, state: State, v: Array, dt: float) -> State:
+        """The acceleration that fits the new velocity."""
+        return self._restarted(problem, replace(state, v=v), dt)
+
+    def _restarted(self, problem: ContactProblem, state: State, dt: float) -> State:
+        a, reaction = consistent_acceleration(problem, state, dt)
+        return replace(state, memory={"a": a, "reaction": reaction, "of": self._mark(state.t)})
+
+    def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
+        """A of the module's equations."""
+        system, w = problem.equations, self.weights
+        inertia = (1.0 - w.alpha_m) / ((1.0 - w.alpha_f) * w.beta * dt**2)
+        terms = [(inertia, system.M), (1.0, system.K)]
+        if system.C is not None:
+            terms.append((w.gamma / (w.beta * dt), system.C))
+        return EffectiveMatrix(system.algebra.combine(terms), system.algebra)
+
+    def _known(self, state: State, dt: float) -> tuple[Array, Array]:
+        """(v1, a1) for u1 = 0."""
+        w, a0 = self.weights, state.memory["a"]
+        a = (w.beta - 0.5) / w.beta * a0 - (state.u + dt * state.v) / (w.beta * dt**2)
+        return state.v + dt * ((1.0 - w.gamma) * a0 + w.gamma * a), a
+
+    def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem:
+        """b = f1 - C v1 - (M a_m - alpha_f (f0 - C v0 - K u0 - Bᵀr0))/(1 - alpha_f), all for u1 = 0."""
+        system, w = problem.equations, self.weights
+        v, a = self._known(state, dt)
+        b = system.load(state.t + dt)
+        b -= system.M @ (((1.0 - w.alpha_m) * a + w.alpha_m * state.memory["a"]) / (1.0 - w.alpha_f))
+        if w.alpha_f != 0.0:
+            ratio = w.alpha_f / (1.0 - w.alpha_f)
+            b += ratio * (system.load(state.t) - system.K @ state.u - state.memory["reaction"])
+            v = v + ratio * state.v
+        if system.C is not None:
+            b -= system.C @ v
+        return StepProblem(
+            A=A,
+            b=b,
+            bound=problem.surface.gap0,
+            surface=problem.surface,
+            scale=1.0,
+            guess=state.u + dt * state.v,
+            active=state.active,
+            t=state.t + dt,
+            k=state.k + 1,
+            friction=problem.friction,
+            slip0=problem.slip_origin(state.u),
+        )
+
+    def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
+        """a1 and v1 from u1; massless unknowns get none and the mean velocity of the step."""
+        w = self.weights
+        v, a = self._known(state, dt)
+        v += w.gamma / (w.beta * dt) * result.x
+        a += result.x / (w.beta * dt**2)
+        reaction = problem.surface.reaction_load(result.r_n, len(v), result.r_t)
+        memory = {"a": without_inertia(problem, a), "reaction": reaction, "of": self._mark(step.t)}
+        v = at_rest_between(problem, state, result.x, v, dt)
+        return State(step.t, step.k, result.x, v, result.r_n, result.active, memory, result.r_t)
+
+    def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
+        """The step's own equation of motion."""
+        return weighted(problem, old, new, self.weights.alpha_m, self.weights.alpha_f)
+
+
+def weighted(problem: ContactProblem, old: State, new: State, m: float, f: float) -> Balance:
+    """(1 - m) and m of the accelerations, (1 - f) and f of everything else at the ends of a step."""
+    load, surface, r0 = problem.equations.load, problem.surface, old.memory["reaction"]
+    return Balance(
+        u=(1.0 - f) * new.u + f * old.u,
+        v=(1.0 - f) * new.v + f * old.v,
+        a=(1.0 - m) * new.memory["a"] + m * old.memory["a"],
+        f=(1.0 - f) * load(new.t) + f * load(old.t),
+        r_n=(1.0 - f) * new.r_n + f * surface.normal_values(r0),
+        r_t=None if new.r_t is None else (1.0 - f) * new.r_t + f * surface.tangential_values(r0),
+    )
+
+
+@dataclass(frozen=True)
+class GeneralisedAlpha(AlphaStep):
+    """See the module's equations; take ``GeneralisedAlpha.spectral_radius(rho_inf)``. InputError unless stable."""
+
+    alpha_m: float
+    alpha_f: float
+    beta: float
+    gamma: float
+
+    def __post_init__(self) -> None:
+        _ = self.weights
+
+    @property
+    def weights(self) -> Weights:
+        """As given."""
+        return Weights(self.alpha_m, self.alpha_f, self.beta, self.gamma)
+
+    @classmethod
+    def spectral_radius(cls, rho_inf: float = 0.8) -> GeneralisedAlpha:
+        """The member of order 2 with this amplification at infinite frequency, 0 (all damped) to 1 (nothing damped)."""
+        if not 0.0 <= rho_inf <= 1.0:
+            raise InputError(
+                f"rho_inf is {rho_inf}: give the amplification at infinite frequency, from 0 to 1 (no damping)"
+            )
+        alpha_m, alpha_f = (2.0 * rho_inf - 1.0) / (1.0 + rho_inf), rho_inf / (1.0 + rho_inf)
+        apart = alpha_f - alpha_m
+        return cls(alpha_m, alpha_f, beta=0.25 * (1.0 + apart) ** 2, gamma=0.5 + apart)

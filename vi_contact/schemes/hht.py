@@ -1,0 +1,33 @@
+"""The method of Hilber, Hughes and Taylor: Newmark's step with the forces, but not the inertia, taken before its end.
+
+    M a1 + C v_f + K u_f = (1 + alpha) f1 - alpha f0 - B_nᵀ r_n,f - B_tᵀ r_t,f,    (…)_f = (1 + alpha) (…)1 - alpha (…)0
+    beta = ¼ (1 - alpha)²,    gamma = ½ - alpha;    contact and friction conditions at the end of the step
+
+Generalised-alpha with alpha_m = 0, alpha_f = -alpha (see there for equations, restart, energy V9.7 and impulses V9.8).
+Order 2, unconditionally stable for -1/3 <= alpha <= 0; amplification (1 + alpha)/(1 - alpha) at infinite frequency: 1
+at alpha = 0, which is Newmark(¼, ½), and ½ at -1/3.
+Source: Hilber, Hughes and Taylor, Earthquake Eng. Struct. Dyn. 5 (1977) 283-292.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..errors import InputError
+from .generalised_alpha import AlphaStep, Weights
+
+
+@dataclass(frozen=True)
+class HHT(AlphaStep):
+    """See the module's equations. InputError unless -1/3 <= alpha <= 0."""
+
+    alpha: float = -0.1
+
+    def __post_init__(self) -> None:
+        if not -1.0 / 3.0 <= self.alpha <= 0.0:
+            raise InputError(f"HHT alpha is {self.alpha}: give a number from -1/3 to 0, others are not stable")
+
+    @property
+    def weights(self) -> Weights:
+        """As a generalised-alpha member."""
+        return Weights(0.0, -self.alpha, 0.25 * (1.0 - self.alpha) ** 2, 0.5 - self.alpha)
