@@ -16,6 +16,7 @@ from chain import ChainSpace
 
 from vi_contact.algebra import Array, SerialAlgebra, SerialComm, SerialMatrix
 from vi_contact.march import march
+from vi_contact.mass import ConsistentMass
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.step import ContactProblem, Report, State
 from vi_contact.surfaces import ContactSurface
@@ -48,7 +49,8 @@ def bar(
     lumped: bool = False,
     **problem: Any,
 ) -> ContactProblem:
-    """The bar over its wall, by default that of V1.1; C = damping * K [s]; other keywords go to ContactProblem."""
+    """The bar over its wall, by default that of V1.1; C = damping * K [s]; consistent mass unless told
+    otherwise; other keywords go to ContactProblem."""
     M, K = bar_matrices(n, length=length, E=E, rho=rho, lumped=lumped)
     rows = n if clamped else n + 1
     x = np.linspace(0.0, length, n + 1)[:rows]
@@ -66,7 +68,7 @@ def bar(
         space=ChainSpace(rows),
         floating=not clamped,
     )
-    return ContactProblem(system, foot(rows, gap), **problem)
+    return ContactProblem(system, foot(rows, gap), **({"mass": ConsistentMass()} | problem))
 
 
 def foot(rows: int, gap: float) -> ContactSurface:

@@ -15,6 +15,7 @@ import scipy.sparse as sp
 
 from vi_contact.algebra import Array, SerialAlgebra, SerialComm, SerialMatrix
 from vi_contact.errors import InputError
+from vi_contact.mass import ConsistentMass
 from vi_contact.step import ContactProblem
 from vi_contact.surfaces import ContactSurface
 from vi_contact.system import Load, SemiDiscreteSystem
@@ -119,4 +120,6 @@ def chain_problem(
 ) -> ContactProblem:
     """The chain between its walls; other keywords go to ``chain_system``."""
     surface = chain_surface(n, gap=gap, left_gap=left_gap)
-    return ContactProblem(chain_system(n, **system), surface, impact=impact, excitation=excitation)
+    return ContactProblem(
+        chain_system(n, **system), surface, impact=impact, excitation=excitation, mass=ConsistentMass()
+    )

@@ -23,6 +23,7 @@ from vi_contact.fem.petsc_algebra import as_petsc
 from vi_contact.fem.trace import contact_surface
 from vi_contact.impact import Inelastic
 from vi_contact.march import march
+from vi_contact.mass import ConsistentMass
 from vi_contact.materials import LinearElastic, PlaneStress
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
@@ -151,7 +152,7 @@ def shaken_wall(
     if springs is not None:
         surface = surface.on_springs(springs / metre**2)
     shake = Harmonic(3.0 * metre, 14.0, direction=tuple(turned((1.0, 0.0), angle)))
-    return ContactProblem(system, surface, impact=Inelastic(), excitation=shake)
+    return ContactProblem(system, surface, impact=Inelastic(), excitation=shake, mass=ConsistentMass())
 
 
 WALL_DT = 1.0 / (40.0 * 14.0)
@@ -170,7 +171,8 @@ def thrown_box(
 
     system = assemble(mesh, material, loads=BodyForce((*(9.81e3 * down), 0.0)), initial_velocity=throw)
     plane = HalfSpace(point=(*(1e-3 * down), 0.0), normal=(*(-down), 0.0))
-    return ContactProblem(system, contact_surface(system, tags["bottom"], obstacle=plane))
+    surface = contact_surface(system, tags["bottom"], obstacle=plane)
+    return ContactProblem(system, surface, mass=ConsistentMass())
 
 
 BOX_DT = 1.0e-3

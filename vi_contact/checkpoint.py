@@ -57,6 +57,7 @@ def describe(problem: ContactProblem, scheme: Scheme, dt: TimeSteps) -> dict[str
         "contact points": problem.surface.count,
         "dt": described(dt),
         "scheme": repr(scheme),
+        "mass": repr(problem.mass),
     }
 
 

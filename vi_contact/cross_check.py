@@ -112,7 +112,7 @@ class PreparedCrossCheck:
 def cross_check(
     problem: ContactProblem,
     *,
-    scheme: Scheme,
+    scheme: Scheme | None = None,
     solvers: Sequence[Solver],
     dt: float,
     steps: int,

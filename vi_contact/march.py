@@ -9,6 +9,8 @@ import numpy as np
 
 from .certified import TOLERANCE, CertifiedSolver
 from .impact import Impact
+from .schemes.choice import completed
+from .solvers.condensed import Condensed
 from .static import initial_state
 from .step import ContactProblem, EffectiveMatrix, Report, Scheme, Solver, State
 from .time_steps import Course, TimeSteps, course
@@ -17,8 +19,8 @@ from .time_steps import Course, TimeSteps, course
 def march(
     problem: ContactProblem,
     *,
-    scheme: Scheme,
-    solver: Solver,
+    scheme: Scheme | None = None,
+    solver: Solver | None = None,
     dt: TimeSteps,
     steps: int | None = None,
     t_end: float | None = None,
@@ -28,14 +30,18 @@ def march(
 ) -> Iterator[tuple[State, Report]]:
     """Yields (state, report) after every certified step.
 
+    ``scheme`` None, and the mass matrix of a problem that does not name one: see ``schemes.choice.completed``, whose
+    problem is ``report.problem``. ``solver`` None is Condensed().
+
     ``dt`` [s] is constant, or a Schedule, or HalvedAtImpact. ``steps`` and ``t_end`` count base steps: the halves of
     a halved step are yielded one by one, and ``state.k`` counts them, but they are one of the ``steps``.
     A step whose certificate exceeds ``tolerance`` goes to the solvers of ``escalation`` in turn, then raises
     StepFailure with step, time, residuals and advice. ``state`` continues from a static stage or a checkpoint.
     """
+    problem, scheme = completed(problem, scheme)
     state = initial_state(problem) if state is None else state
     plan = course(dt, steps, t_end, state.t)
-    solvers = [solver, *escalation]
+    solvers = [solver or Condensed(), *escalation]
     yield from March(problem, scheme=scheme, solvers=solvers, course=plan, state=state, tolerance=tolerance)
 
 
@@ -97,7 +103,7 @@ class March:
         free = scheme.finish(problem, state, step, result, dt)
         new = after_impact(problem, scheme, state, free, dt)
         averages = partial(scheme.balance, problem, state, free, dt)
-        return Report(state, new, free.v, step, result, certificate, averages, escalated)
+        return Report(problem, state, new, free.v, step, result, certificate, averages, escalated)
 
 
 class _Solvers:

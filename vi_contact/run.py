@@ -55,6 +55,7 @@ class Settings:
         checked = None if self.cross_check is None else getattr(self.solver, "primary", self.solver)
         return {
             "scheme": repr(self.scheme),
+            "mass": repr(self.problem.mass),
             "solver": repr(self.solver if checked is None else checked),
             "dt": described(self.dt),
             "tolerance": self.tolerance,

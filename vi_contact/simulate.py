@@ -14,7 +14,9 @@ from .history import Table, read_rows
 from .output import on_root, run_folder
 from .recorders import Contact, Energy, Row, Steps
 from .run import Comparison, Run, Settings
+from .schemes.choice import completed
 from .solution import Solution
+from .solvers.condensed import Condensed
 from .static import initial_state
 from .step import ContactProblem, Recorder, Scheme, Solver, State
 from .time_steps import TimeSteps, course
@@ -26,8 +28,8 @@ __all__ = ["Solution", "simulate"]
 def simulate(
     problem: ContactProblem,
     *,
-    scheme: Scheme,
-    solver: Solver,
+    scheme: Scheme | None = None,
+    solver: Solver | None = None,
     dt: TimeSteps,
     t_end: float | None = None,
     steps: int | None = None,
@@ -45,6 +47,9 @@ def simulate(
     """Marches to t_end, or for so many steps, and records. Collective; every rank gets the solution.
 
     Args:
+        scheme: None is the trapezoidal rule on redistributed mass, with an impact law the Zienkiewicz-Wood-Taylor step;
+            a problem that names no mass matrix gets the one of the scheme (``schemes.choice.completed``).
+        solver: Condensed() when None.
         dt: time step [s], or a plan: Schedule, HalvedAtImpact. ``steps``, t_end and checkpoint_every count base steps.
         record: recorders, (Energy(), Contact()) when None; time, iterations and certificate are always recorded.
         out: the run folder: history.csv, columns.json, history.h5, summary.json, run.log, checkpoint.npz, fields.xdmf.
@@ -67,6 +72,8 @@ def simulate(
         raise InputError(f"checkpoint_every is {checkpoint_every}: give a number of steps >= 1")
     if fields is not None and out is None:
         raise InputError("fields need an output folder: give out, or leave fields away")
+    problem, scheme = completed(problem, scheme)
+    solver = solver or Condensed()
     scheme.check(problem)
     solver.check(problem)
     course(dt, steps, t_end, 0.0 if state is None else state.t)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from textwrap import shorten
 from typing import Any
 
 import numpy as np
@@ -77,6 +78,7 @@ def history_facts(history: Mapping[str, Array]) -> dict[str, Any]:
     }
     if "contact_uplift" in history:
         facts["largest_uplift"] = float(history["contact_uplift"].max())
+        facts["smallest_gap"] = float(np.fmin.reduce(history["contact_min_gap"]))  # negative: gap drift of the scheme
         facts["steps_in_contact"] = int((history["contact_active"][1:] > 0).sum())
     return facts | energy_facts(history)
 
@@ -106,7 +108,8 @@ def _lines(facts: Mapping[str, Any]) -> list[str]:
         f"run {facts['status']}: {_steps(facts)}, "
         f"t = {facts['t_start']:g} to {facts['t_end']:g} s, on {facts['ranks']} rank(s)",
         line("scheme", facts["scheme"]),
-        line("solver", facts["solver"]),
+        line("mass matrix", facts["mass"]),
+        line("solver", shorten(facts["solver"], 88, placeholder=" …")),
         line("unknowns, contact points", f"{facts['unknowns']}, {facts['contact_points']}"),
         line("iterations per step", f"{iterations['mean']:.2f} on average, {iterations['max']} at most"),
         line("worst certificate", f"{facts['worst_certificate']:.2e}"),
@@ -117,6 +120,7 @@ def _lines(facts: Mapping[str, Any]) -> list[str]:
     if "steps_in_contact" in facts:
         uplift = f"largest uplift {facts['largest_uplift']:.3f}"
         lines.append(line("steps in contact", f"{facts['steps_in_contact']}, {uplift}"))
+        lines.append(line("smallest gap", f"{facts['smallest_gap']:.3e} m"))
     for method, difference in (facts["cross_check"] or {}).items():
         values = ", ".join(f"{name} {value:.2e}" for name, value in difference.items())
         lines.append(line(f"cross-check {method}", values))

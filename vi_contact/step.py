@@ -217,8 +217,12 @@ class Solver(Protocol):
 
 @dataclass(frozen=True)
 class Report:
-    """What happened in one step, for recorders. ``new.v`` is after the impact law, ``v_minus`` before it."""
+    """What happened in one step, for recorders. ``new.v`` is after the impact law, ``v_minus`` before it.
 
+    ``problem`` is the one that was solved, with the mass matrix that the scheme chose when none was given.
+    """
+
+    problem: ContactProblem
     old: State
     new: State
     v_minus: Array
@@ -244,9 +248,10 @@ class Certificate:
     penetration: max(-gap, 0) / x_ref;  tension: max(-r_n, 0) / r_ref.
     complementarity: max |gap| / x_ref over active and bilateral conditions, max |r_n| / r_ref over the others: the set
     that the impact law will see is certified too.
-    cone: max(|r_t| - limit(r_n), 0) / r_ref;  dissipation: max (limit |slip| - r_t·slip) / (r_ref x_ref), the maximum
+    cone: max(|r_t| - limit(r_n), 0) / t_ref;  dissipation: max (limit |slip| - r_t·slip) / (t_ref s_ref), the maximum
     dissipation that Coulomb's and Tresca's law ask for: it is 0 where the slip or the limit is, or where r_t lies
-    along the slip on the edge of the cone. Both are 0 without friction.
+    along the slip on the edge of the cone. t_ref = max(limit, |r_t|, 1e-5 r_ref), s_ref = max(|slip|, 1e-5 x_ref): a
+    step slides a small part of the way and rubs with a small part of the inertia. Both are 0 without friction.
     x_ref = max(|x|, |guess|), r_ref = max(|b|, |r_n|), maxima over all unknowns: a wide gap blunts no residual.
     """
 
