@@ -80,7 +80,7 @@ def test_foreign_packages_stay_at_home():
 def test_the_walk_sees_what_it_should():
     """Known imports of known files; every name of the tables exists."""
     assert {(".step", False), (".certified", False), ("numpy", False)} <= set(imports("march"))
-    assert {(".solvers.lcp", False), (".friction", False)} <= set(imports("solvers.condensed"))
+    assert {(".solvers.lcp", False), (".friction", False)} <= set(imports("solvers.friction_small"))
     assert ("matplotlib.figure", True) in set(imports("plotting"))
     assert ("petsc4py", False) in set(imports("fem.petsc_algebra"))
     assert rank("step") == 1 and rank("schemes.ss22") == rank("certified") == WORKER and rank("models.wall") == 3

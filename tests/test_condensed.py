@@ -193,8 +193,9 @@ def test_results_tell_method_and_iterations():
     assert kkt_residual(step, prepared.solve(step)).worst <= 1e-14
 
 
-def test_friction_is_refused_not_ignored():
-    with pytest.raises(InputError, match=r"Condensed only enforces bounds and would ignore Coulomb\(mu=0.3\): use"):
+def test_friction_that_cannot_act_is_refused_not_ignored():
+    """A chain moves in one dimension only."""
+    with pytest.raises(InputError, match=r"Condensed would ignore Coulomb\(mu=0.3\): a body in one dimension"):
         Condensed().check(replace(shaken(), friction=Coulomb(0.3)))
     Condensed().check(replace(shaken(), friction=Frictionless()))
 

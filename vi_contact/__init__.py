@@ -58,6 +58,9 @@ _CONTENTS = {
     "solvers.active_set": ("ActiveSet",),
     "solvers.hildreth": ("Hildreth",),
     "solvers.mprgp": ("ProjectedCG",),
+    "solvers.friction_newton": ("FrictionNewton",),
+    "solvers.nsgs": ("NSGS",),
+    "solvers.fixed_point": ("FixedPoint",),
     # the loop and what listens to it
     "march": ("march",),
     "time_steps": ("HalvedAtImpact", "Schedule"),

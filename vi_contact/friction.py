@@ -4,8 +4,9 @@ With r_n >= 0 the normal reaction of a contact node and r_t its tangential react
 
     |r_t| <= limit,      r_t along the slip rate when |r_t| = limit        (seed 003, friction threshold F)
 
-and differs only in `limit`. Reactions are forces [N] for displacement schemes and impulses [N s] for velocity schemes;
-`scale` (1 or the time step [s]) is the factor between the two, so that a stress times a nodal weight becomes either.
+and differs only in `limit`, which is affine in the pressure: limit = cohesion + slope max(r_n, 0). Reactions are forces
+[N] for displacement schemes and impulses [N s] for velocity schemes; `scale` (1 or the time step [s]) is the factor
+between the two, so that a stress times a nodal weight becomes either.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from numbers import Real
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -32,6 +33,10 @@ class FrictionLaw(Protocol):
         """
         ...
 
+    def slope(self, weights: Array) -> Array:
+        """d limit / d r_n of each node under pressure, shape (n,); limit does not grow with tension."""
+        ...
+
 
 @dataclass(frozen=True)
 class Frictionless:
@@ -41,39 +46,53 @@ class Frictionless:
         """Zeros, shape (n,)."""
         return np.zeros_like(r_n, dtype=float)
 
+    def slope(self, weights: Array) -> Array:
+        """Zeros, shape (n,)."""
+        return np.zeros(len(weights))
+
 
 @dataclass(frozen=True)
 class Tresca:
     """A given threshold [Pa] >= 0, acting whether or not the node touches: limit = threshold · weight · scale.
 
-    Raises InputError when the threshold is negative or not a finite number.
+    ``threshold``: a number, or one per contact point (then kept as a tuple). Raises InputError when one is negative or
+    not a finite number, and, when used, for a wrong count.
     """
 
-    threshold: float
+    threshold: float | Array | tuple[float, ...]
 
     def __post_init__(self) -> None:
-        _check("Tresca", "the threshold [Pa]", self.threshold)
+        object.__setattr__(self, "threshold", _checked("Tresca", "the threshold [Pa]", self.threshold))
 
     def limit(self, r_n: Array, weights: Array, scale: float) -> Array:
         """threshold · weights · scale, shape (n,)."""
-        return self.threshold * np.asarray(weights, dtype=float) * scale
+        return _nodal("Tresca", "threshold", self.threshold, len(weights)) * np.asarray(weights, dtype=float) * scale
+
+    def slope(self, weights: Array) -> Array:
+        """Zeros, shape (n,)."""
+        return np.zeros(len(weights))
 
 
 @dataclass(frozen=True)
 class Coulomb:
     """Dry friction with coefficient mu >= 0: limit = mu · r_n, zero for an open node.
 
-    Raises InputError when mu is negative or not a finite number.
+    ``mu``: a number, or one per contact point (then kept as a tuple). Raises InputError when one is negative or not a
+    finite number, and, when used, for a wrong count.
     """
 
-    mu: float
+    mu: float | Array | tuple[float, ...]
 
     def __post_init__(self) -> None:
-        _check("Coulomb", "the friction coefficient mu", self.mu)
+        object.__setattr__(self, "mu", _checked("Coulomb", "the friction coefficient mu", self.mu))
 
     def limit(self, r_n: Array, weights: Array, scale: float) -> Array:
-        """mu · max(r_n, 0), shape (n,): a tension left over in an unconverged iterate gives no friction."""
-        return self.mu * np.maximum(r_n, 0.0)
+        """mu · max(r_n, 0), shape (n,): the tension of a held point, or of an unconverged iterate, rubs on nothing."""
+        return _nodal("Coulomb", "mu", self.mu, len(r_n)) * np.maximum(r_n, 0.0)
+
+    def slope(self, weights: Array) -> Array:
+        """mu, shape (n,)."""
+        return _nodal("Coulomb", "mu", self.mu, len(weights)) * np.ones(len(weights))
 
 
 def project(r_t: Array, limit: Array) -> Array:
@@ -91,15 +110,29 @@ def project(r_t: Array, limit: Array) -> Array:
     return r_t * factor[:, np.newaxis]
 
 
-def _check(law: str, meaning: str, value: float) -> None:
-    if not isinstance(value, Real) or not math.isfinite(value) or value < 0:
-        raise InputError(f"{law}: {meaning} is {value!r}; give zero or a positive finite number")
+def _checked(law: str, meaning: str, value: Any) -> Any:
+    """The value, or those of a field as a tuple (frozen, comparable)."""
+    field = isinstance(value, (tuple, list, np.ndarray)) and np.ndim(value) == 1
+    for one in value if field else [value]:
+        if not isinstance(one, Real) or not math.isfinite(one) or one < 0:
+            raise InputError(f"{law}: {meaning} is {one!r}; give zero or a positive finite number, or one per point")
+    return tuple(float(one) for one in value) if field else value
+
+
+def _nodal(law: str, name: str, value: Any, count: int) -> Array:
+    """The value as an array that broadcasts over the nodes."""
+    if isinstance(value, tuple) and len(value) != count:
+        raise InputError(
+            f"{law}: {name} has {len(value)} values but there are {count} contact points: give one number, or one "
+            "per contact point in the order of surface.points"
+        )
+    return np.asarray(value, dtype=float)
 
 
 def refuse_friction(solver: str, law: FrictionLaw) -> None:
     """InputError unless the law is Frictionless: a solver that only enforces bounds would silently drop it."""
     if not isinstance(law, Frictionless):
         raise InputError(
-            f"{solver} only enforces bounds and would ignore {law}: use Frictionless() here, "
-            "no solver of this version carries friction, neither a condensed nor a volume one"
+            f"{solver} only enforces bounds and would ignore {law}: use Condensed(), the condensed route carries "
+            "friction, or Frictionless() here"
         )

@@ -10,7 +10,7 @@ from .algebra import Array, max_abs
 from .step import Balance, Certificate, ContactProblem, State, StepProblem, StepResult
 from .system import SemiDiscreteSystem
 
-ROUNDED = 1e-5  # of |A||x|: see Certificate
+ROUNDED = 1e-5  # of |A||x|, and of what friction is compared with: see Certificate
 
 
 def kkt_residual(step: StepProblem, result: StepResult) -> Certificate:
@@ -46,9 +46,11 @@ def _friction_residuals(step: StepProblem, result: StepResult, x_ref: float, r_r
     r_t = np.zeros_like(step.slip0) if result.r_t is None else result.r_t
     slip = surface.tangential_values(result.x) - step.slip0
     limit = step.friction.limit(result.r_n, surface.weights, step.scale)
-    outside = np.maximum(np.linalg.norm(r_t, axis=1) - limit, 0.0)
-    missing = limit * np.linalg.norm(slip, axis=1) - np.sum(r_t * slip, axis=1)
-    return max_abs(_over(outside, r_ref)), max_abs(_over(missing, r_ref * x_ref))
+    size, way = np.linalg.norm(r_t, axis=1), np.linalg.norm(slip, axis=1)
+    missing = limit * way - np.sum(r_t * slip, axis=1)
+    t_ref = max(max_abs(limit), max_abs(size), ROUNDED * r_ref)
+    s_ref = max(max_abs(way), ROUNDED * x_ref)
+    return max_abs(_over(np.maximum(size - limit, 0.0), t_ref)), max_abs(_over(missing, t_ref * s_ref))
 
 
 def _over(values: Array, reference: float) -> Array:

@@ -9,6 +9,7 @@ With the one factorisation of A and the unit vectors E of the normal unknowns:
     x = A⁻¹ (b - E r)                  one more back-substitution, or a dense product with the stored A⁻¹E
 
 A step costs one back-substitution, the small problem and the correction, whatever the number of contact changes.
+With friction the tangential unknowns of the contact points are kept too: friction_condensed.py.
 """
 
 from __future__ import annotations
@@ -19,10 +20,13 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..algebra import Array, Mask
-from ..friction import refuse_friction
+from ..errors import InputError
 from ..step import ContactProblem, EffectiveMatrix, StepProblem, StepResult
 from ..surfaces import ContactSurface
 from .active_set import ActiveSet
+from .friction_condensed import CondensedFriction
+from .friction_newton import FrictionNewton
+from .friction_small import FrictionMethod
 from .lcp import LCPResult
 from .mprgp import ProjectedCG
 
@@ -37,16 +41,24 @@ class SmallMethod(Protocol):
 
 @dataclass(frozen=True)
 class Condensed:
-    """Boundary condensation with a method for the small problem; frictionless contact, any number of ranks.
+    """Boundary condensation with a method for the small problem; with or without friction, any number of ranks.
 
-    ``ProjectedCG`` never forms G: each of its products is a back-substitution, for contact sets too large to store.
+    ``method`` solves it without friction. ``ProjectedCG`` never forms G: each of its products is a back-substitution,
+    for contact sets too large to store. ``friction_method`` solves it with friction: FrictionNewton, NSGS or
+    FixedPoint, which all form G.
     """
 
     method: SmallMethod = field(default_factory=ActiveSet)
+    friction_method: FrictionMethod = field(default_factory=FrictionNewton)
 
     def check(self, problem: ContactProblem) -> None:
-        """InputError when the problem has friction."""
-        refuse_friction("Condensed", problem.friction)
+        """InputError for friction without a tangential direction, or of a wrong number of values."""
+        surface = problem.surface
+        if problem.frictional and surface.tangents.shape[1] == 0:
+            raise InputError(
+                f"Condensed would ignore {problem.friction}: a body in one dimension cannot slide, use Frictionless()"
+            )
+        problem.friction.limit(np.zeros(surface.count), surface.weights, 1.0)
 
     def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> PreparedCondensed:
         """Factorises A and condenses it; once per time step size."""
@@ -57,19 +69,20 @@ class AppliedDelassus:
     """G as an operator: each product is one back-substitution. Nothing of size rows x m is stored."""
 
     def __init__(self, A: EffectiveMatrix, surface: ContactSurface, extra: Array) -> None:
-        self._A, self._surface, self._extra = A, surface, extra
+        self._A, self._surface, self.extra = A, surface, extra
         self.shape = (surface.count, surface.count)
 
     def __matmul__(self, r: Array) -> Array:
         x = self._A.factor.solve(self._surface.reaction_load(r, self._A.matrix.rows))
-        return self._surface.normal_values(x) + self._extra * r
+        return self._surface.normal_values(x) + self.extra * r
 
 
 class PreparedCondensed:
     """The condensed problem of one A. ``delassus`` and ``schur`` are G and D~ (dense, equal on all ranks)."""
 
     def __init__(self, settings: Condensed, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> None:
-        self._A, self._surface = A, surface
+        self._settings, self._A, self._surface = settings, A, surface
+        self._friction: CondensedFriction | None = None
         self._columns: Array | None = None
         self._rigid = surface.compliance == 0.0
         self._name = f"condensed {type(settings.method).__name__}"
@@ -106,18 +119,43 @@ class PreparedCondensed:
         if self._surface.count == 0:
             none = np.zeros(0)
             return StepResult(x, none, none.astype(bool), 0, "linear")
+        if step.slip0 is not None:
+            return self._with_friction(step, x)
         small: LCPResult = self._small.solve(step.bound - self._surface.normal_values(x), step.active)
         if small.r.any():
             x = self._corrected(x, small.r, step)
         return StepResult(x, small.r, small.active, small.iterations, self._name)
 
-    def _corrected(self, x: Array, r: Array, step: StepProblem) -> Array:
-        """A⁻¹(b - E r); contact unknowns on a rigid support are put on their bound, which removes round-off only."""
+    @property
+    def friction(self) -> CondensedFriction:
+        """The small problem with friction, made at the first step that has some."""
+        if self._friction is None:
+            normal = self.delassus
+            if isinstance(normal, AppliedDelassus):
+                normal = self._form(normal.extra)
+            method, keep = self._settings.friction_method, self._columns is not None
+            self._friction = CondensedFriction(method, self._A, self._surface, normal, keep=keep)
+        return self._friction
+
+    def _with_friction(self, step: StepProblem, x: Array) -> StepResult:
+        """The step with tangential reactions."""
+        small = self.friction.solve(step, x)
+        r_n, r_t = small.r[:, 0].copy(), small.r[:, 1:].copy()
+        if small.r.any():
+            x = self._corrected(x, r_n, step, r_t)
+            self.friction.held(x, step, small)
+        name = f"condensed {type(self._settings.friction_method).__name__}"
+        return StepResult(x, r_n, small.active, small.iterations, name, r_t=r_t)
+
+    def _corrected(self, x: Array, r: Array, step: StepProblem, r_t: Array | None = None) -> Array:
+        """A⁻¹(b - E r_n - F r_t); unknowns on a rigid support are put on their bound, which removes round-off only."""
         surface = self._surface
-        if self._columns is not None:
+        if self._columns is None:
+            x = self._A.factor.solve(step.b - surface.reaction_load(r, len(x), r_t))
+        elif r_t is None:
             x = x - self._columns @ r
         else:
-            x = self._A.factor.solve(step.b - surface.reaction_load(r, len(x)))
+            x = x - self._columns @ r - self.friction.columns @ r_t.ravel()
         closed = ((r != 0.0) & self._rigid)[surface.slots]
         x[surface.owned[closed]] = step.bound[surface.slots[closed]]
         return x

@@ -1,0 +1,70 @@
+"""Coulomb's law as a sequence of Tresca problems: s <- limit(r_n(s)), the classical fixed point.
+
+Every problem with the threshold s given is convex and has one solution; the map is a contraction for small friction
+(Nečas, Jarušek and Haslinger, Boll. Unione Mat. Ital. 17-B, 1980; Haslinger, Hlaváček and Nečas, Handbook of Numerical
+Analysis IV, 1996). Its observed factor is in the result.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .friction_newton import FrictionNewton
+from .friction_small import Blocks, FrictionMethod, FrictionResult, observed_contraction
+from .lcp import Array, Mask, largest
+
+
+@dataclass(frozen=True)
+class FixedPoint:
+    """Settings. ``tolerance``: change of the thresholds relative to the largest; ``tresca``: method for each problem.
+
+    In the result ``iterations`` counts Tresca problems and ``history`` the relative change of the thresholds in each;
+    ``contraction(result)`` is the mean factor between them.
+    """
+
+    tolerance: float = 1e-12
+    max_iterations: int = 200
+    tresca: FrictionMethod = field(default_factory=FrictionNewton)
+
+    def prepare(self, G: Array, bilateral: Mask) -> PreparedFixedPoint:
+        """Check and scale G (m d, m d)."""
+        return PreparedFixedPoint(self, G, bilateral)
+
+
+class PreparedFixedPoint:
+    """One G, many right-hand sides."""
+
+    def __init__(self, method: FixedPoint, G: Array, bilateral: Mask) -> None:
+        self.method = method
+        self.blocks = Blocks(G, bilateral)
+        self._tresca = method.tresca.prepare(G, bilateral)
+
+    def solve(self, q: Array, cohesion: Array, slope: Array, guess: Array | Mask | None = None) -> FrictionResult:
+        """See PreparedFriction."""
+        step = self.blocks.step(q, cohesion, slope)
+        constant = np.zeros_like(slope)
+        limit = cohesion
+        history: list[float] = []
+        found = self._tresca.solve(q, limit, constant, guess)
+        while len(history) < self.method.max_iterations:
+            new = cohesion + slope * np.maximum(found.r[:, 0], 0.0)
+            change, size = largest(new - limit), max(largest(new), largest(limit))
+            if change <= self.method.tolerance * size:
+                break
+            history.append(change / size)
+            limit = new
+            found = self._tresca.solve(q, limit, constant, found.r)
+        return step.result(
+            found.r / self.blocks.scale,
+            iterations=len(history) + 1,
+            method=self.method,
+            tolerance=100.0 * self.method.tolerance,
+            history=tuple(history),
+        )
+
+
+def contraction(result: FrictionResult) -> float:
+    """Observed factor between successive changes of the thresholds; NaN when there were fewer than two."""
+    return observed_contraction(result.history)

@@ -1,0 +1,183 @@
+"""Semismooth Newton for contact with friction: the default. In 2D it is an active-set method and ends exactly.
+
+With y = r - w of the last iterate every node is open (y_n <= 0) or closed, and sticks (|y_t| <= limit) or slips along
+n = y_t/|y_t|. The next iterate solves the linear problem of these states, Newton's step for the natural map (2) of
+friction_small.py with the limit of the augmented reaction max(y_n, 0) (Alart and Curnier 1991; Hüeber, Stadler and
+Wohlmuth, SIAM J. Sci. Comput. 30, 2008):
+
+    open   r_n = 0                        closed   w_n = 0
+    stick  w_t = 0                        slip     r_t = limit(r_n) n + eta t,   t·w_t + (|y_t| - limit)/limit eta = 0
+
+eta is the turn of the slip direction, t perpendicular to n: in 2D there is none, the problem is piecewise linear, and
+the iterate of the right states is exact. The factors of the last sets of states are kept, so that a step whose states
+are those of a step before costs triangular solves only; they change no digit of the answer.
+
+Newton may cycle. Then Gauss-Seidel sweeps (nsgs.py) lead to a better start, and it goes on from there.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.linalg import lapack
+
+from .friction_small import Blocks, FrictionResult, Step
+from .lcp import Array, Mask
+from .nsgs import sweeps
+
+KEPT = 8  # factors
+ATTEMPTS = 8  # of Newton, with twice the sweeps before each
+FIRST_SWEEPS = 10
+
+
+@dataclass(frozen=True)
+class FrictionNewton:
+    """Settings. ``tolerance``: residual above which the answer is refused; ``max_iterations`` of Newton in a row.
+
+    In the result ``iterations`` counts linear solves and fallback sweeps (0: no contact), ``history`` the residual
+    after each linear solve.
+    """
+
+    tolerance: float = 1e-11
+    max_iterations: int = 30
+
+    def prepare(self, G: Array, bilateral: Mask) -> PreparedNewton:
+        """Check and scale G (m d, m d)."""
+        return PreparedNewton(self, G, bilateral)
+
+
+class PreparedNewton:
+    """One G, many right-hand sides. The answer depends on these alone, not on steps before."""
+
+    def __init__(self, method: FrictionNewton, G: Array, bilateral: Mask) -> None:
+        self.method = method
+        self.blocks = Blocks(G, bilateral)
+        self._kept: OrderedDict[bytes, tuple[Any, Any, Any]] = OrderedDict()
+
+    def solve(self, q: Array, cohesion: Array, slope: Array, guess: Array | Mask | None = None) -> FrictionResult:
+        """See PreparedFriction."""
+        step = self.blocks.step(q, cohesion, slope)
+        history: list[float] = []
+        r, swept = np.zeros_like(step.q), 0
+        y = _start(step, guess)
+        for attempt in range(ATTEMPTS if step.unit > 0.0 else 0):
+            r, done = self._newton(step, y, history)
+            if done or attempt == ATTEMPTS - 1:
+                break
+            number = FIRST_SWEEPS * 2**attempt
+            r, swept = sweeps(step, step.admissible(r), number), swept + number
+            y = r - step.w(r)
+        return step.result(
+            r,
+            iterations=len(history) + swept,
+            method=self.method,
+            tolerance=self.method.tolerance,
+            history=tuple(history),
+        )
+
+    def _newton(self, step: Step, y: Array, history: list[float]) -> tuple[Array, bool]:
+        """The best iterate, and whether it solves the problem to rounding or to the tolerance."""
+        best, smallest = np.zeros_like(y), step.unit
+        seen: set[bytes] = set()
+        for _ in range(self.method.max_iterations):
+            states = _States(step, y)
+            r = None if states.key in seen else self._solved(step, states)
+            if r is None:
+                break
+            if states.exact:
+                seen.add(states.key)
+            w = step.w(r)
+            residual = step.residual(r, w)
+            history.append(residual / step.unit)
+            if residual < smallest:
+                best, smallest = r, residual
+            if residual <= step.rounding(r):
+                return r, True
+            y = r - w
+        return best, smallest <= self.method.tolerance * step.unit
+
+    def _solved(self, step: Step, states: _States) -> Array | None:
+        """The next iterate; None when the linear problem is singular."""
+        rows, columns, factor = self._linear(states)
+        if rows.shape[0] == 0:
+            return states.fixed
+        if factor is None:
+            return None
+        solved, _ = lapack.dgetrs(*factor, -(rows @ step.w(states.fixed).ravel()))
+        if not np.isfinite(solved).all():
+            return None
+        return np.asarray(states.fixed + (columns @ solved).reshape(states.fixed.shape))
+
+    def _linear(self, states: _States) -> tuple[Any, Any, Any]:
+        """(rows, columns, factor) of the states, kept where they do not depend on more."""
+        if states.exact and states.key in self._kept:
+            self._kept.move_to_end(states.key)
+            return self._kept[states.key]
+        rows, columns, turning = states.linear()
+        factor = None
+        if rows.shape[0]:
+            matrix = rows @ (columns.T @ self.blocks.matrix).T
+            matrix[np.diag_indices_from(matrix)] += turning
+            lu, pivots, info = lapack.dgetrf(matrix)
+            factor = None if info else (lu, pivots)
+        if states.exact:
+            self._kept[states.key] = (rows, columns, factor)
+            if len(self._kept) > KEPT:
+                self._kept.popitem(last=False)
+        return rows, columns, factor
+
+
+def _start(step: Step, guess: Array | Mask | None) -> Array:
+    """y to start from. A guessed set: closed there and sticking, open elsewhere."""
+    if guess is None or guess.dtype != bool:
+        r = step.start(guess)
+        return np.asarray(r - step.w(r))
+    y = np.zeros_like(step.q)
+    y[:, 0] = np.where(guess & np.isfinite(step.q[:, 0]), 1.0, -1.0)
+    return y
+
+
+class _States:
+    """The states of all nodes at y. ``exact``: the linear problem depends on ``key`` only."""
+
+    def __init__(self, step: Step, y: Array) -> None:
+        m, d = y.shape
+        limit = step.limit(y[:, 0])
+        size = np.linalg.norm(y[:, 1:], axis=1)
+        self.closed: Mask = (y[:, 0] > 0.0) | step.blocks.bilateral
+        self.stick: Mask = (size <= limit) & (limit > 0.0)
+        slip = ~self.stick & (limit > 0.0)
+        self.direction = np.zeros((m, d - 1))
+        np.divide(y[:, 1:], size[:, None], out=self.direction, where=slip[:, None])
+        self.growth = np.where(slip & (y[:, 0] > 0.0), step.slope, 0.0)
+        self.turns: Mask = slip if d == 3 else np.zeros(m, dtype=bool)
+        self.exact = not self.turns.any()
+        self.turning = size[self.turns] / limit[self.turns] - 1.0
+        self.fixed = np.column_stack([np.zeros(m), np.where(slip, step.cohesion, 0.0)[:, None] * self.direction])
+        self.key = b"".join(part.tobytes() for part in (self.closed, self.stick, self.direction, self.growth))
+
+    def linear(self) -> tuple[Any, Any, Array]:
+        """Rows R, columns P and turning t of  R (q + G (fixed + P z)) + t z = 0,  r = fixed + P z."""
+        m, d = self.fixed.shape
+        base = d * np.arange(m)
+        normals = _columns(base[:, None], np.ones((m, 1)), m * d)[:, self.closed]
+        tied = _columns(base[:, None] + np.arange(1, d), self.growth[:, None] * self.direction, m * d)[:, self.closed]
+        free = (base[self.stick][:, None] + np.arange(1, d)).reshape(-1, 1)
+        sticks = _columns(free, np.ones(free.shape), m * d)
+        n = self.direction[self.turns]
+        across = n[:, ::-1] * np.array([-1.0, 1.0]) if d == 3 else np.zeros((0, 0))
+        turns = _columns(base[self.turns][:, None] + np.arange(1, 1 + across.shape[1]), across, m * d)
+        rows = sp.hstack([normals, sticks, turns]).T.tocsr()
+        columns = sp.hstack([normals + tied, sticks, turns]).tocsr()
+        return rows, columns, np.concatenate([np.zeros(rows.shape[0] - len(self.turning)), self.turning])
+
+
+def _columns(places: Any, values: Array, rows: int) -> Any:
+    """A sparse matrix whose column j holds values[j] in the rows places[j]."""
+    count, width = places.shape
+    pointers = width * np.arange(count + 1)
+    return sp.csc_matrix((values.ravel(), places.ravel(), pointers), shape=(rows, count))
