@@ -121,5 +121,5 @@ def test_petsc_options_are_told_from_ours():
 
 def test_wall_defaults_are_those_of_the_seed():
     options = parser().parse_args(["wall"])
-    assert (options.solver, options.scheme, options.impact) == ("condensed", "zwt", "inelastic")
+    assert (options.solver, options.scheme, options.impact) == ("condensed", "zwt", None)
     assert options.motion is None and not options.gravity and not options.projection and options.dt is None

@@ -57,8 +57,15 @@ def add_wall_arguments(wall: argparse.ArgumentParser) -> None:
         "--solver", default="condensed",
         help="condensed (default), hildreth, projected-cg, volume, volume-reference, semismooth, tron, bnls"
     )
-    step.add_argument("--scheme", default="zwt", help="zwt or zienkiewicz-wood-taylor (default), ss22, newmark")
-    step.add_argument("--impact", default="inelastic", help="inelastic, elastic, none or a restitution in [0, 1]")
+    step.add_argument(
+        "--scheme", default="zwt",
+        help="zwt: the source's (default); trapezoidal: does not ring; newmark, hht, generalised-alpha, houbolt, "
+        "contact-stabilised, kane, moreau-jean, midpoint, ss22, newmark-consistent",
+    )
+    step.add_argument(
+        "--impact", help="inelastic, elastic, none or a restitution in [0, 1]; default inelastic with zwt and ss22, "
+        "none with schemes that need no impact law",
+    )
     step.add_argument("--projection", action="store_true", help="impact as an M-orthogonal impulse, no reset")
     step.add_argument("--gravity", action="store_true", help="a gravity stage with contact active comes first")
     step.add_argument("--dt", type=float, help="time step [s] (default 1/20 of the first natural period)")
@@ -75,11 +82,15 @@ def add_wall_arguments(wall: argparse.ArgumentParser) -> None:
     output.add_argument("--quiet", action="store_true", help="no progress line")
 
 
-def _impact(name: str, projection: bool) -> Any:
+def _impact(name: str | None, projection: bool) -> Any:
     from .errors import InputError
     from .impact import ComponentReset, Elastic, Inelastic, MassProjection, Newton, NoImpact
 
+    if name is None and not projection:
+        return None
     reading: Any = MassProjection() if projection else ComponentReset()
+    if name is None:
+        return Inelastic(reading)
     if name == "none":
         return NoImpact()
     if name in ("inelastic", "elastic"):

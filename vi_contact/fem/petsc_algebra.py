@@ -211,7 +211,9 @@ class PetscAlgebra:
         return PetscMatrix(mat)
 
     def held(self, A: Matrix, mask: Mask) -> Matrix:
-        mat = as_petsc(A).mat.copy()
+        every = np.arange(len(mask))
+        ones = self.local(every, every, mask.astype(float), len(mask))  # a row of zeros may have no diagonal entry
+        mat = as_petsc(self.combine([(1.0, A), (1.0, ones)])).mat
         rows = (mat.getOwnershipRange()[0] + np.flatnonzero(mask)).astype(PETSc.IntType)
         mat.zeroRowsColumns(rows, diag=1.0)
         return PetscMatrix(mat)

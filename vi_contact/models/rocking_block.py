@@ -54,7 +54,9 @@ class RockingModel:
     def tilted(self, theta: float, *, rate: float = 0.0) -> State:
         """The block at rest, turned by theta [rad] about its lower left corner, turning at ``rate`` [rad/s]."""
         turn = self._turning()
-        return replace(self.rest, u=self.rest.u + theta * turn, v=rate * turn, r_n=np.zeros(2), active=np.zeros(2, bool))
+        return replace(
+            self.rest, u=self.rest.u + theta * turn, v=rate * turn, r_n=np.zeros(2), active=np.zeros(2, dtype=bool)
+        )
 
     def _turning(self) -> Array:
         """Displacements of a unit turn to the left about the lower left corner, x = 0."""

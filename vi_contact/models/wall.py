@@ -17,6 +17,7 @@ from ..fem.mesh import Facets, build_mesh
 from ..fem.petsc_algebra import MpiComm
 from ..fem.trace import contact_surface
 from ..impact import Inelastic
+from ..mass import ConsistentMass, MassLaw
 from ..materials import Damping, LinearElastic, NoDamping, PlaneStress
 from ..meshes.wall import WallMesh
 from ..modal import lowest_frequency
@@ -108,12 +109,17 @@ class WallModel:
         *,
         excitation: Excitation | Sequence[Excitation] | None = None,
         impact: ImpactLaw | None = None,
+        mass: MassLaw | None = None,
     ) -> ContactProblem:
-        """The wall in a case; by default the harmonic of Fig. 3 and the seed's inelastic impact rule."""
+        """The wall in a case; by default the harmonic of Fig. 3 and the seed's inelastic impact rule on its mass.
+
+        Schemes with massless contact nodes take no impact law: give impact=NoImpact(), and leave mass to them.
+        """
         return ContactProblem(
             self.system,
             self.surface(case),
             impact=Inelastic() if impact is None else impact,
+            mass=ConsistentMass() if impact is None and mass is None else mass,
             excitation=self.harmonic() if excitation is None else excitation,
         )
 

@@ -13,41 +13,15 @@ from ..errors import InputError
 from ..excitation import Excitation, GroundMotion, Harmonic
 from ..fem.fields import XDMF
 from ..ground_motion import Record, pga, read_record, resampled, scaled, scaled_to_pga
-from ..impact import Inelastic
 from ..plotting import plot_certificate, plot_contact, plot_energy, plot_excitation, plot_points
 from ..recorders import Contact, Energy, Probe
-from ..schemes.linear_multistep import LinearMultistep
-from ..schemes.ss22 import SS22
-from ..schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from ..simulate import Solution, simulate
-from ..solvers.condensed import Condensed
-from ..solvers.hildreth import Hildreth
-from ..solvers.mprgp import ProjectedCG
-from ..solvers.volume import Volume
-from ..solvers.volume_factorised import OneFactorisation
-from ..solvers.volume_snes import ReducedNewton, SemismoothNewton
-from ..solvers.volume_tao import TaoBnls, TaoTron
 from ..static import static_equilibrium
-from ..step import ContactProblem, ImpactLaw, Scheme, Solver, State
+from ..step import ContactProblem, ImpactLaw, Solver, State
 from ..surfaces import ContactSurface
+from .choices import SCHEMES, SOLVERS
 from .wall import CASES, Wall, WallModel, build
 
-SCHEMES: dict[str, Scheme] = {
-    "zienkiewicz-wood-taylor": ZienkiewiczWoodTaylor(phi=0.5),
-    "zwt": ZienkiewiczWoodTaylor(phi=0.5),
-    "ss22": SS22(),
-    "newmark": LinearMultistep.newmark(),
-}
-SOLVERS: dict[str, Solver] = {
-    "condensed": Condensed(),
-    "hildreth": Condensed(Hildreth()),
-    "projected-cg": Condensed(ProjectedCG()),
-    "volume": Volume(method=OneFactorisation()),
-    "volume-reference": Volume(method=ReducedNewton()),  # factorises every reduced matrix anew: shares only A and b
-    "semismooth": Volume(method=SemismoothNewton()),
-    "tron": Volume(method=TaoTron()),
-    "bnls": Volume(method=TaoBnls()),
-}
 TITLES = {
     "a": "Wall, three possible contact points (Fig. 4)",
     "b": "Wall, eleven possible contact points (Fig. 5)",
@@ -59,7 +33,10 @@ TITLES = {
 
 @dataclass(frozen=True)
 class WallRun:
-    """Options of a run. ``motion``: a record file; without one the harmonic of Fig. 3 shakes the wall for 400 steps."""
+    """Options of a run. ``motion``: a record file; without one the harmonic of Fig. 3 shakes the wall for 400 steps.
+
+    ``impact`` None: seed 000's inelastic rule for the schemes that seed could have used, none for the others.
+    """
 
     case: str = "a"
     wall: Wall = field(default_factory=Wall)
@@ -71,7 +48,7 @@ class WallRun:
     resample: float | None = None
     solver: str = "condensed"
     scheme: str = "zwt"
-    impact: ImpactLaw = field(default_factory=Inelastic)
+    impact: ImpactLaw | None = None
     gravity: bool = False
     dt: float | None = None
     steps: int | None = None
@@ -99,11 +76,13 @@ def run_wall(run: WallRun, comm: Any, out: str | Path, *, progress: bool = True)
     model = build(run.wall, comm, weight=run.gravity)
     excitation = _excitations(run, model, horizontal, vertical)
     dt = run.dt if run.dt is not None else model.time_step()
-    problem = model.problem(run.case, excitation=excitation, impact=run.impact)
+    choice = SCHEMES[run.scheme]
+    impact = choice.impact if run.impact is None else run.impact
+    problem = model.problem(run.case, excitation=excitation, impact=impact, mass=choice.mass)
     solver, checked = _solvers(run)
     solution = simulate(
         problem,
-        scheme=SCHEMES[run.scheme],
+        scheme=choice.scheme,
         solver=solver,
         dt=dt,
         steps=_steps(run, dt, excitation),
