@@ -52,6 +52,8 @@ _CONTENTS = {
     "schemes.hht": ("HHT",),
     "schemes.generalised_alpha": ("GeneralisedAlpha",),
     "schemes.houbolt": ("Houbolt",),
+    "schemes.contact_stabilised": ("ContactStabilisedNewmark",),
+    "schemes.moreau_jean": ("MoreauJean",),
     "schemes.linear_multistep": ("LinearMultistep",),
     # solvers
     "solvers.condensed": ("Condensed",),

@@ -1,0 +1,50 @@
+"""Energy along a run: its largest rise in a step, and what the ledger cannot explain."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from bar import before_impact, energy, run
+
+from vi_contact.static import initial_state
+from vi_contact.step import ContactProblem, State
+from vi_contact.verify import energies, energy_balance
+
+
+@dataclass(frozen=True)
+class Course:
+    """Energies E include the potential of the constant load [J].
+
+    rise: largest increase of E in a step; first, last: E at the ends; defect: of the ledger, summed over the run;
+    largest: the largest ½ vᵀMv + ½ uᵀKu; min_gap [m]; contact, algorithmic, friction: smallest loss in a step.
+    """
+
+    rise: float
+    first: float
+    last: float
+    defect: float
+    largest: float
+    min_gap: float
+    contact: float
+    algorithmic: float
+    friction: float
+
+
+def course(
+    problem: ContactProblem, scheme: Any, *, dt: float, steps: int, state: State | None = None, **more: Any
+) -> Course:
+    """The energies of a run; other keywords go to ``bar.run``."""
+    surface, state = problem.surface, state or initial_state(problem)
+    first = last = energy(problem, state)
+    rise = contact = algorithmic = friction = min_gap = float("inf")
+    rise, defect, largest = -rise, 0.0, 0.0
+    for report in run(problem, scheme, dt=dt, steps=steps, state=state, **more):
+        step = energy_balance(problem, report.old, before_impact(report), report.balance)
+        now = energy(problem, report.new)
+        rise, last, defect = max(rise, now - last), now, defect + step.defect
+        largest = max(largest, energies(problem.equations, report.new.u, report.new.v).total)
+        min_gap = min(min_gap, float((surface.gap0 - surface.normal_values(report.new.u)).min()))
+        contact, algorithmic = min(contact, step.contact), min(algorithmic, step.algorithmic)
+        friction = min(friction, step.friction)
+    return Course(rise, first, last, defect, largest, min_gap, contact, algorithmic, friction)

@@ -1,0 +1,69 @@
+"""The nearest admissible displacement in the norm of the mass matrix: what keeps contact forces from ringing.
+
+    u_p = argmin ½ (u - u_f)ᵀ M (u - u_f)  over  B_n u <= gap0  (= on bilateral rows)
+    that is    M w = -B_nᵀ q,    0 <= q  ⊥  gap0 - B_n u_f - B_n w >= 0,    u_p = u_f + w
+
+The same small problem as a step with A = M, solved in the increment w, so that nothing is rounded where nothing is in
+the way. Springs give way: their points are not projected. Normal directions only; friction has no part in it.
+Source: Deuflhard, Krause and Ertel, Int. J. Numer. Meth. Engng 73 (2008) 1274-1290.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..algebra import Array, Mask
+from ..certified import TOLERANCE, CertifiedSolver
+from ..errors import StepFailure
+from ..friction import Frictionless
+from ..solvers.condensed import Condensed
+from ..step import ContactProblem, EffectiveMatrix, State, StepProblem
+
+
+def admissible(problem: ContactProblem, state: State, u: Array, dt: float) -> tuple[Array, Mask]:
+    """(u_p, the points that stopped it) for a predicted displacement ``u`` of the step of dt after ``state``.
+
+    StepFailure when the projection cannot be certified.
+    """
+    surface, system = problem.surface, problem.equations
+    rigid = surface.compliance == 0.0
+    gap = np.where(rigid, surface.gap0 - surface.normal_values(u), np.inf)
+    closed = (gap < 0.0) | (surface.bilateral & rigid)
+    if not np.any(gap[closed] != 0.0):
+        return u, closed
+    bounds: ContactProblem = system.kept("mass projection bounds", lambda: _rigid_part(problem))
+    solver: CertifiedSolver = system.kept(
+        "mass projection", lambda: CertifiedSolver(bounds, _mass(problem), 1.0, [Condensed()], TOLERANCE)
+    )
+    step = StepProblem(
+        A=_mass(problem),
+        b=np.zeros_like(u),
+        bound=gap,
+        surface=bounds.surface,
+        scale=1.0,
+        guess=np.zeros_like(u),
+        active=closed,
+        t=state.t + dt,
+        k=state.k + 1,
+    )
+    try:
+        result, _, _ = solver.solve(step)
+    except StepFailure as failure:
+        raise StepFailure(f"the predictor could not be projected onto the admissible set: {failure}") from failure
+    return u + result.x, result.active
+
+
+def _mass(problem: ContactProblem) -> EffectiveMatrix:
+    system = problem.equations
+    matrix: EffectiveMatrix = system.kept("mass", lambda: EffectiveMatrix(system.M, system.algebra))
+    return matrix
+
+
+def _rigid_part(problem: ContactProblem) -> ContactProblem:
+    """Springs are not bounds here, and nothing rubs."""
+    surface = problem.surface
+    rigid = surface.compliance == 0.0
+    stiff = replace(surface, compliance=np.zeros(surface.count), bilateral=surface.bilateral & rigid)
+    return replace(problem, surface=stiff, friction=Frictionless())

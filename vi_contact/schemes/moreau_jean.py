@@ -1,0 +1,153 @@
+"""Moreau and Jean's time stepping: contact and impact as impulses on velocities.
+
+    v_θ = (1 - theta) v0 + theta v1,    u1 = u0 + dt v_θ
+    M (v1 - v0) + dt C v_θ + dt K ((1 - theta) u0 + theta u1) = dt ((1 - theta) f0 + theta f1) - B_nᵀ P_n - B_tᵀ P_t
+    0 <= P_n  ⊥  -e B_n v0 - B_n v1 >= 0   where gap(u0 + ½ dt v0) <= 0,    P_n = 0 elsewhere
+    |P_t| <= limit(P_n) along the tangential velocity B_t v1;    B_n v1 = 0 on bilateral points
+
+In x = v1:  A = M + theta dt C + theta² dt² K,  bound = -e B_n v0 on closed points and +inf elsewhere,  r = P [N s],
+scale = dt; the state keeps the mean reactions P/dt, and its active points are those that carry an impulse. Restitution
+is a law for nodes: on a fine mesh it has no macroscopic effect. Order 2 without contact at theta = ½, else 1.
+
+Energy (V9.3):  E1 - E0 = Δu·f_θ - dt v_θ·C v_θ - P·B v_θ - (theta - ½)(Δv·M Δv + Δu·K Δu)
+
+With Newton's law P_n B_n v_θ = (1 - theta - theta e) P_n B_n v0: no energy comes from points that approach if
+theta <= 1/(1 + e). From points that had begun to separate and are caught within the step it does. They therefore get
+the bound -(1 - theta)/theta B_n v0, that is B_n v_θ <= 0: such a point ends the step no deeper than it began, and is an
+approaching one in the next. Normal contact then never creates energy; at theta = 1/(1 + e) there is no difference.
+Friction has the law at the end of the step but the work of its mean: P_t·B_t v_θ may be negative where sliding turns.
+
+Penetration: the condition is on velocities, so a gap closes late, by less than dt times the speed of approach, and
+what it has passed by then stays while the contact lasts (e = 0): a property of the scheme that shrinks with dt. The
+recorder's ``contact_min_gap`` shows it as a negative gap.
+
+Sources: Moreau in Nonsmooth Mechanics and Applications (Springer 1988), 1-82; Jean, Comput. Methods Appl. Mech. Engng
+177 (1999) 235-257; the range of theta: Acary, ZAMM 96 (2016) 585-603. The bound of separating points is ours.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..algebra import Array, Mask, max_abs
+from ..errors import InputError
+from ..impact import NoImpact
+from ..step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
+from ..surfaces import ContactSurface
+from .single_step import SingleStep, stepped
+
+ROUND_OFF = 1e-12  # of the largest displacement: smaller gaps are closed
+
+
+@dataclass(frozen=True)
+class MoreauJean(SingleStep):
+    """See the module's equations.
+
+    Attributes:
+        theta: weight of the end of the step, from ½ to 1/(1 + e).
+        e: restitution coefficient of the contact nodes, from 0 to 1.
+        allow_energy_gain: accept any theta from ½ to 1, and use Newton's law for points that separate too.
+
+    InputError for numbers outside these ranges.
+    """
+
+    theta: float = 0.5
+    e: float = 0.0
+    allow_energy_gain: bool = False
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.e <= 1.0:
+            raise InputError(f"MoreauJean e is {self.e}: give a restitution from 0 (inelastic) to 1 (elastic)")
+        if not 0.5 <= self.theta <= 1.0:
+            raise InputError(f"MoreauJean theta is {self.theta}: give a weight from 0.5 to 1, less is unstable")
+        largest = 1.0 / (1.0 + self.e)
+        if self.theta > largest + 1e-12 and not self.allow_energy_gain:
+            raise InputError(
+                f"MoreauJean theta={self.theta} with e={self.e} creates energy in impacts: give theta from 0.5 to "
+                f"1/(1 + e) = {largest:g}, or allow_energy_gain=True"
+            )
+
+    def check(self, problem: ContactProblem) -> None:
+        """InputError for massless contact nodes, springs, an impact law, or a bilateral point with a gap."""
+        super().check(problem)
+        surface = problem.surface
+        if np.any(surface.compliance > 0.0):
+            raise InputError(
+                "MoreauJean stops velocities and springs do not: use ContactStabilisedNewmark() or Midpoint() on "
+                "elastic supports"
+            )
+        if problem.impact is not None and not isinstance(problem.impact, NoImpact):
+            raise InputError(
+                f"MoreauJean has its own restitution coefficient and {problem.impact} would act on top of it: leave "
+                "the impact law out, and give MoreauJean(e=…)"
+            )
+        if np.any(surface.gap0[surface.bilateral] > 0.0):
+            raise InputError(
+                "MoreauJean holds the velocity of bilateral points and would never close their initial gap: let them "
+                "start on the obstacle, or use another scheme"
+            )
+
+    def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
+        """A = M + theta dt C + theta² dt² K."""
+        system = problem.equations
+        terms = [(1.0, system.M), ((self.theta * dt) ** 2, system.K)]
+        if system.C is not None:
+            terms.append((self.theta * dt, system.C))
+        return EffectiveMatrix(system.algebra.combine(terms), system.algebra)
+
+    def _load(self, problem: ContactProblem, t: float, dt: float) -> Array:
+        load = problem.equations.load
+        return (1.0 - self.theta) * load(t) + self.theta * load(t + dt)
+
+    def _target(self, surface: ContactSurface, v_n: Array) -> Array:
+        """Largest normal velocity after the step of a closed point that had v_n before."""
+        returning = -self.e if self.allow_energy_gain else -(1.0 - self.theta) / self.theta
+        return np.where(surface.bilateral, 0.0, np.where(v_n < 0.0, returning, -self.e) * v_n)
+
+    def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem:
+        """b = M v0 + dt (f_θ - K (u0 + theta (1 - theta) dt v0) - (1 - theta) C v0), and the bound on velocities."""
+        system, surface, left = problem.equations, problem.surface, 1.0 - self.theta
+        force = self._load(problem, state.t, dt) - system.K @ (state.u + self.theta * left * dt * state.v)
+        if system.C is not None:
+            force -= system.C @ (left * state.v)
+        closed = _closed(problem, state, dt)
+        slip = problem.slip_origin(state.u)
+        return StepProblem(
+            A=A,
+            b=system.M @ state.v + dt * force,
+            bound=np.where(closed, self._target(surface, surface.normal_values(state.v)), np.inf),
+            surface=surface,
+            scale=dt,
+            guess=state.v,
+            active=closed,
+            t=state.t + dt,
+            k=state.k + 1,
+            friction=problem.friction,
+            slip0=None if slip is None else np.zeros_like(slip),
+        )
+
+    def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
+        """u1 = u0 + dt v_θ."""
+        u = state.u + dt * ((1.0 - self.theta) * state.v + self.theta * result.x)
+        return stepped(state, step, result, u, result.x)
+
+    def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
+        """Averages of the equation above."""
+        return Balance(
+            u=old.u + self.theta * (new.u - old.u),
+            v=(new.u - old.u) / dt,
+            a=(new.v - old.v) / dt,
+            f=self._load(problem, old.t, dt),
+            r_n=new.r_n,
+            r_t=new.r_t,
+        )
+
+
+def _closed(problem: ContactProblem, state: State, dt: float) -> Mask:
+    """Points whose gap is closed in the middle of the step if nothing stops them, and bilateral ones."""
+    surface = problem.surface
+    gap = surface.gap0 - surface.normal_values(state.u + 0.5 * dt * state.v)
+    size = surface.comm.max(np.array([max(max_abs(state.u), dt * max_abs(state.v))]))[0]
+    return np.asarray((gap <= ROUND_OFF * size) | surface.bilateral)
