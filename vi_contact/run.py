@@ -16,7 +16,7 @@ from .checkpoint import Place
 from .history import Table
 from .march import March
 from .run_log import Progress, versions
-from .solution import Solution, history_facts
+from .solution import Solution, energy_warning, history_facts
 from .step import ContactProblem, Recorder, Report, Scheme, Solver, State, StepResult
 from .time_steps import Course, TimeSteps, described
 from .writer import Writer
@@ -102,6 +102,9 @@ class Run:
             raise
         history = self.table.history()
         facts = self._facts(history, "finished", "", time.perf_counter() - begin) | {"seconds_per_linear_step": linear}
+        warning = energy_warning(facts)
+        if warning and self.settings.root:
+            log.warning("%s", warning)
         writer.close(facts)
         return Solution(history, self.table.columns, self.place.state, facts)
 

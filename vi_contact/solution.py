@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from textwrap import shorten
+from textwrap import shorten, wrap
 from typing import Any
 
 import numpy as np
@@ -25,6 +25,9 @@ _LEDGER = (
     ("loss_algorithmic", "algorithmic loss"),
     ("energy_defect", "defect"),
 )
+
+
+CREATED = 0.01  # of the largest energy: more than schemes without a fault gain at sensible time steps
 
 
 @dataclass(frozen=True)
@@ -92,18 +95,32 @@ def energy_facts(history: Mapping[str, Array]) -> dict[str, Any]:
     defect = float(np.abs(history["energy_defect"]).max())
     ledger = {name: float(history[name][-1]) for name, _ in _LEDGER[:-1]}
     relative = defect / size if size > 0.0 else defect
+    losses = np.asarray(sum(history[name] for name, _ in _LEDGER if name.startswith("loss_")))
+    created = max(0.0, -float(losses.min()))
     return {
         "energy": {"energy_start": float(total[0]), "energy_max": float(total.max())} | ledger
         | {"energy_defect_joule": float(history["energy_defect"][-1]), "energy_defect": relative},
         "energy_defect": relative,
+        "energy_created": created / size if size > 0.0 else created,
     }
+
+
+def energy_warning(facts: Mapping[str, Any]) -> str | None:
+    """A sentence when the run had more energy than was put in, by more than CREATED of the largest energy."""
+    if facts.get("energy_created", 0.0) <= CREATED:
+        return None
+    return (
+        f"contact and time scheme created {100 * facts['energy_created']:.3g} % of the largest energy of the run: take "
+        "a smaller dt (a wave should not cross more than two elements in a step), HalvedAtImpact, or a dissipative "
+        "scheme such as ContactStabilisedNewmark() or HHT()"
+    )
 
 
 def _lines(facts: Mapping[str, Any]) -> list[str]:
     def line(name: str, value: str) -> str:
         return f"  {name:<26} {value}"
 
-    iterations = facts["iterations_per_step"]
+    iterations, warning = facts["iterations_per_step"], energy_warning(facts)
     lines = [
         f"run {facts['status']}: {_steps(facts)}, "
         f"t = {facts['t_start']:g} to {facts['t_end']:g} s, on {facts['ranks']} rank(s)",
@@ -129,6 +146,7 @@ def _lines(facts: Mapping[str, Any]) -> list[str]:
         lines.append(line("  energy at the start", f"{facts['energy']['energy_start']: .6e}"))
         lines += [line(f"  {title}", f"{facts['energy'][name]: .6e}") for name, title in _LEDGER[:-1]]
         lines.append(line("  defect, relative", f"{facts['energy_defect']: .2e}"))
+    lines += wrap(f"WARNING: {warning}", 110, initial_indent="  ", subsequent_indent="  ") if warning else []
     if np.isfinite(facts["seconds_per_step"]):
         mean, plain = facts["seconds_per_step"], facts["seconds_per_linear_step"]
         ratio = f", plain linear step {plain:.3e} s, ratio {mean / plain:.2f}" if np.isfinite(plain) else ""
