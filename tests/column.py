@@ -99,11 +99,11 @@ def column(
 
 
 def rubbing_mass(
-    *, mass: float = 1.0, stiffness: float = 1.0e4, normal_force: float = 1.0, u0: float, **problem: Any
+    *, u0: float, kilograms: float = 1.0, stiffness: float = 1.0e4, normal_force: float = 1.0, **problem: Any
 ) -> ContactProblem:
     """One mass on a horizontal spring, pressed onto its base (V2.7 iii)."""
     one = sp.csr_matrix([[1.0]])
     system = two_component_system(
-        mass * one, stiffness * one, stiffness * one, np.zeros(1), load=(0.0, -normal_force), u0=(u0, 0.0)
+        kilograms * one, stiffness * one, stiffness * one, np.zeros(1), load=(0.0, -normal_force), u0=(u0, 0.0)
     )
     return ContactProblem(replace(system, floating=False), base(2), **problem)

@@ -128,10 +128,15 @@ class Contact:
     gap = gap0 - u_n, plus the shortening of a deformable support; pressure = r_n / weight; the force on the body is
     -Σ r_n n; its point of action is Σ r_n X / Σ r_n (NaN while the contact is open). Arrays have shape (m,) and the
     order of ``surface.points``, which is in ``history.h5`` too.
+
+    With friction also: the friction force on the body, the largest slip, and arrays (m, d - 1) in the tangents of the
+    nodal frames: traction_t = r_t / weight, that of the body on its support, and slip = B_t u, the tangential
+    displacement on the support (also of points that are open).
     """
 
     def __init__(self) -> None:
         self._dimension = len(AXES)
+        self._frictional = False
 
     def columns(self) -> Columns:
         """contact_uplift, contact_resultant, … and the arrays pressure, gap, active. Call ``start`` first."""
@@ -153,12 +158,22 @@ class Contact:
                 "gap": ("m", "gap of every contact point"),
                 "active": ("-", "whether the contact point is closed"),
             }
+            | (self._friction_columns() if self._frictional else {})
         )
+
+    def _friction_columns(self) -> dict[str, tuple[str, str]]:
+        axes = AXES[: self._dimension]
+        return {f"friction_force_{a}": ("N", f"friction force on the body along {a}") for a in axes} | {
+            "contact_max_slip": ("m", "largest tangential displacement on the support; nan without contact points"),
+            "traction_t": ("Pa", "tangential reaction r_t / weight of every contact point, in its nodal tangents"),
+            "slip": ("m", "tangential displacement of every contact point, in its nodal tangents"),
+        }
 
     def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
         """The initial contact: of a gravity stage, or open."""
-        self._surface = problem.surface
+        self._problem, self._surface = problem, problem.surface
         self._dimension = problem.surface.points.shape[1]
+        self._frictional = problem.frictional
         return self._row(state)
 
     def row(self, report: Report) -> Row:
@@ -187,7 +202,20 @@ class Contact:
                 "gap": gap,
                 "active": state.active,
             }
+            | (self._friction(state) if self._frictional else {})
         )
+
+    def _friction(self, state: State) -> dict[str, Any]:
+        surface, system = self._surface, self._problem.equations
+        slip = surface.tangential_values(state.u)
+        r_t = np.zeros_like(slip) if state.r_t is None else state.r_t
+        load = surface.reaction_load(np.zeros(surface.count), system.rows, r_t)
+        force = 0.0 - surface.comm.sum(system.influence.T @ load)
+        return {f"friction_force_{axis}": float(value) for axis, value in zip(AXES, force, strict=False)} | {
+            "contact_max_slip": float(np.linalg.norm(slip, axis=1).max()) if len(slip) else np.nan,
+            "traction_t": r_t / surface.weights[:, None],
+            "slip": slip,
+        }
 
 
 @dataclass

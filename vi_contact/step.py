@@ -250,7 +250,7 @@ class Certificate:
     that the impact law will see is certified too.
     cone: max(|r_t| - limit(r_n), 0) / t_ref;  dissipation: max (limit |slip| - r_t·slip) / (t_ref s_ref), the maximum
     dissipation that Coulomb's and Tresca's law ask for: it is 0 where the slip or the limit is, or where r_t lies
-    along the slip on the edge of the cone. t_ref = max(limit, |r_t|, 1e-5 r_ref), s_ref = max(|slip|, 1e-5 x_ref): a
+    along the slip on the edge of the cone. t_ref = max(limit, |r_t|, 1e-10 r_ref), s_ref = max(|slip|, 1e-5 x_ref): a
     step slides a small part of the way and rubs with a small part of the inertia. Both are 0 without friction.
     x_ref = max(|x|, |guess|), r_ref = max(|b|, |r_n|), maxima over all unknowns: a wide gap blunts no residual.
     """

@@ -48,7 +48,7 @@ def _friction_residuals(step: StepProblem, result: StepResult, x_ref: float, r_r
     limit = step.friction.limit(result.r_n, surface.weights, step.scale)
     size, way = np.linalg.norm(r_t, axis=1), np.linalg.norm(slip, axis=1)
     missing = limit * way - np.sum(r_t * slip, axis=1)
-    t_ref = max(max_abs(limit), max_abs(size), ROUNDED * r_ref)
+    t_ref = max(max_abs(limit), max_abs(size), ROUNDED**2 * r_ref)
     s_ref = max(max_abs(way), ROUNDED * x_ref)
     return max_abs(_over(np.maximum(size - limit, 0.0), t_ref)), max_abs(_over(missing, t_ref * s_ref))
 

@@ -126,12 +126,13 @@ class Step:
         r = self.admissible(r)
         w = self.w(r)
         residual, unit = self.residual(r, w), self.unit or 1.0
-        if not residual <= max(tolerance * unit, self.rounding(r)):
+        small = max(tolerance * unit, self.rounding(r))
+        if not residual <= small:
             raise StepFailure(
                 f"{method} stopped after {iterations} iterations with residual {residual / unit:.1e}: reduce the time "
                 "step, or try another friction method (FrictionNewton, NSGS, FixedPoint)."
             )
-        still = np.linalg.norm(w[:, 1:], axis=1) <= max(tolerance * unit, self.rounding(r))
+        still = np.linalg.norm(w[:, 1:], axis=1) <= 4.0 * small
         active = (r[:, 0] > 0.0) | self.blocks.bilateral
         stick = still & (self.limit(r[:, 0]) > 0.0)
         return FrictionResult(r * self.blocks.scale, active, stick, iterations, residual / unit, method, history)
