@@ -6,10 +6,10 @@
 
 In x = u1:  A = 4/dt² M + 2/dt C + K,  b = 4/dt² M u_p + 2/dt C u0 - K u0 + 2 f,  scale = 2, guess u_p. The impulse
 that projects the predictor moves contact nodes to the obstacle and leaves their velocity alone: r̄ is what the body
-presses with, not what stops the mass of the contact nodes. That velocity stays as it was, and is undone at release.
+presses with, not what stops the mass of the contact nodes. They keep the velocity of their approach till they open.
 
-Order 2 without contact, where it is the midpoint rule; unconditionally stable. Energy (V9.5), q the projection's
-multipliers, [N] with 2/dt² q:
+Order 2 without contact, where it is the midpoint rule; unconditionally stable. Energy (V9.5), q [N s²] the
+multipliers of the projection:
 
     E1 - E0 = Δu·f - Δu·C Δu/dt - r̄_n·gap(u0) - r̄_t·B_t Δu - 2/dt² q·gap(u1)
 

@@ -31,8 +31,8 @@ def admissible(problem: ContactProblem, state: State, u: Array, dt: float) -> tu
     rigid = surface.compliance == 0.0
     gap = np.where(rigid, surface.gap0 - surface.normal_values(u), np.inf)
     closed = (gap < 0.0) | (surface.bilateral & rigid)
-    if not np.any(gap[closed] != 0.0):
-        return u, closed
+    if np.isnan(gap).any() or not np.any(gap[closed] != 0.0):
+        return u, closed  # nothing in the way; of NaN the step itself tells
     bounds: ContactProblem = system.kept("mass projection bounds", lambda: _rigid_part(problem))
     solver: CertifiedSolver = system.kept(
         "mass projection", lambda: CertifiedSolver(bounds, _mass(problem), 1.0, [Condensed()], TOLERANCE)
