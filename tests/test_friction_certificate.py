@@ -72,7 +72,7 @@ def test_slip_below_the_limit() -> None:
 
 
 def test_a_long_way_blunts_nothing() -> None:
-    """A column that has slid 1e4 steps far under a weak law: one promille less of the reaction is one promille still."""
+    """A column that has slid 1e4 steps far under a weak law: a promille less of the reaction is a promille still."""
     report = last(Tresca(1e-4), v0=(1.0, 0.0))
     step = report.step
     far = np.zeros_like(step.guess)
