@@ -1,0 +1,164 @@
+#!/usr/bin/env python3
+"""A quarter or an eighth of a ball of tetrahedra, fine at its lowest point: a sphere that lies on or strikes a plane.
+
+The ball touches the plane y = 0 at the origin, its centre is (0, R, 0), and the planes x = 0 and z = 0 are planes of
+symmetry: the quarter has x >= 0 and z >= 0, the eighth also y <= R. Physical groups: cells "ball"; boundary "surface"
+(the sphere), "foot" (its part near the origin: the contact side), "side_x" (x = 0), "side_z" (z = 0) and, of the
+eighth, "cut" (y = R).
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+if not __package__:  # run as a file of the source tree, maybe not installed
+    sys.path[0] = str(Path(__file__).resolve().parents[2])
+
+from vi_contact.errors import InputError
+from vi_contact.meshes.gmsh_session import write
+
+_TRIANGLE = 2  # Gmsh's number
+_SIZES = {  # the size field alone decides
+    "Mesh.MeshSizeExtendFromBoundary": 0,
+    "Mesh.MeshSizeFromPoints": 0,
+    "Mesh.MeshSizeFromCurvature": 0,
+    "Mesh.MeshSizeMin": 0,
+    "Mesh.MeshSizeMax": 1e22,
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class BallMesh:
+    """Mesh of a ball of `radius` [m].
+
+    Cells have about `size` [m] within the distance `foot` [m] of the origin, from there on `size` + `growth` times the
+    distance from the foot, but no more than `coarsest` (a quarter of the radius unless given). The sphere becomes a
+    polyhedron inside it: volume and mass are too small by about 0.35 (coarsest/radius)². Raises InputError for sizes
+    that make no ball.
+    """
+
+    radius: float
+    size: float
+    foot: float
+    growth: float = 0.3
+    coarsest: float | None = None
+    eighth: bool = False
+
+    def __post_init__(self) -> None:
+        sizes = (self.size, self.foot, self.radius)
+        if not all(math.isfinite(length) for length in sizes) or not 0.0 < self.size <= self.foot < self.radius:
+            raise InputError(f"ball of radius {self.radius} m, cell size {self.size} m, foot {self.foot} m: they must"
+                             " be 0 < size <= foot < radius")
+        if not (math.isfinite(self.growth) and self.growth > 0.0):
+            raise InputError(f"growth {self.growth} of the cells of a ball must be positive: give 0.1 to 0.5")
+        if not self.size <= self._largest <= self.radius:
+            raise InputError(f"coarsest cell {self.coarsest} m must lie between the size {self.size} m and the radius")
+
+    @property
+    def _largest(self) -> float:
+        return 0.25 * self.radius if self.coarsest is None else self.coarsest
+
+    def build(self, gmsh: Any) -> None:
+        """Add the ball to Gmsh's current model."""
+        model = gmsh.model
+        volume = _add_ball(model, self.radius, self.eighth)
+        field = model.mesh.field.add("MathEval")
+        model.mesh.field.setString(field, "F", self._size_field())
+        model.mesh.field.setAsBackgroundMesh(field)
+        sphere = _name_sides(model, volume, self.radius)
+        with _sizes_by_field(gmsh):
+            model.mesh.generate(3)
+        _add_foot(model, sphere, self.foot)
+
+    def _size_field(self) -> str:
+        """min(coarsest, size + growth max(0, distance - foot)), written with abs: MathEval has neither."""
+        beyond = f"(sqrt(x^2+y^2+z^2)-{self.foot!r})"
+        wanted = f"({self.size!r}+{0.5 * self.growth!r}*({beyond}+abs({beyond})))"
+        return f"0.5*({self._largest!r}+{wanted}-abs({self._largest!r}-{wanted}))"
+
+
+def _add_ball(model: Any, radius: float, eighth: bool) -> int:
+    """The part of the ball, its parametric poles on the x axis: away from the foot, where cells are finest."""
+    turn = 0.5 * math.pi
+    ball: int = model.occ.addSphere(0.0, 0.0, 0.0, radius, -1, 0.0, turn, turn if eighth else 2.0 * turn)
+    model.occ.rotate([(3, ball)], 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 2.0 * math.pi / 3.0)  # x to y to z to x
+    if eighth:
+        model.occ.rotate([(3, ball)], 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, turn)
+    model.occ.translate([(3, ball)], 0.0, radius, 0.0)
+    model.occ.synchronize()
+    return ball
+
+
+def _name_sides(model: Any, volume: int, radius: float) -> int:
+    """Physical groups; the tag of the spherical surface."""
+    model.setPhysicalName(3, model.addPhysicalGroup(3, [volume]), "ball")
+    groups: dict[str, list[int]] = {}
+    for _, surface in model.getEntities(2):
+        centre = np.array(model.occ.getCenterOfMass(2, surface)) - (0.0, radius, 0.0)
+        flat = np.abs(centre) < 1e-6 * radius
+        flat[1] &= model.getType(2, surface) == "Plane"  # the sphere of the quarter is centred there as well
+        names = [name for name, here in zip(("side_x", "cut", "side_z"), flat, strict=True) if here]
+        groups.setdefault(names[0] if names else "surface", []).append(surface)
+    for name, surfaces in groups.items():
+        model.setPhysicalName(2, model.addPhysicalGroup(2, surfaces), name)
+    return groups["surface"][0]
+
+
+def _add_foot(model: Any, sphere: int, foot: float) -> None:
+    """The triangles of the sphere whose centre is nearer to the origin than `foot`, as a group of their own."""
+    _, nodes = model.mesh.getElementsByType(_TRIANGLE, sphere)
+    tags, points, _ = model.mesh.getNodes(2, sphere, includeBoundary=True)
+    order = np.argsort(tags)
+    triangles = np.asarray(nodes).reshape(-1, 3)
+    corners = np.reshape(points, (-1, 3))[order[np.searchsorted(tags, triangles, sorter=order)]]
+    near = np.linalg.norm(corners.mean(axis=1), axis=1) < foot
+    entity = model.addDiscreteEntity(2)
+    model.mesh.addElementsByType(entity, _TRIANGLE, [], triangles[near].reshape(-1))
+    model.setPhysicalName(2, model.addPhysicalGroup(2, [entity]), "foot")
+
+
+@contextmanager
+def _sizes_by_field(gmsh: Any) -> Iterator[None]:
+    """Options for the length of a with-block."""
+    kept = {option: gmsh.option.getNumber(option) for option in _SIZES}
+    for option, value in _SIZES.items():
+        gmsh.option.setNumber(option, value)
+    try:
+        yield
+    finally:
+        for option, value in kept.items():
+            gmsh.option.setNumber(option, value)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Write a ball to a file: `ball.py --radius 0.01 --size 2e-5 --foot 2e-4 -o ball.msh`."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
+    parser.add_argument("--radius", type=float, required=True, help="[m]")
+    parser.add_argument("--size", type=float, required=True, help="of the cells at the foot [m]")
+    parser.add_argument("--foot", type=float, required=True, help="distance from the lowest point [m]")
+    parser.add_argument("--growth", type=float, default=0.3, help="of the cell size per distance")
+    parser.add_argument("--coarsest", type=float, help="cell size [m], default a quarter of the radius")
+    parser.add_argument("--eighth", action="store_true", help="the lower half of the quarter")
+    parser.add_argument("-o", "--output", default="ball.msh")
+    given = parser.parse_args(arguments)
+    try:
+        ball = BallMesh(
+            radius=given.radius, size=given.size, foot=given.foot, growth=given.growth, coarsest=given.coarsest,
+            eighth=given.eighth,
+        )
+        write(ball, given.output)
+    except InputError as error:
+        sys.exit(str(error))
+
+
+if __name__ == "__main__":
+    main()
