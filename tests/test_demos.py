@@ -149,3 +149,18 @@ def test_bad_input_is_one_sentence(tmp_path: Path, name: str) -> None:
     assert done.stderr.startswith("vi-contact: ") and done.stderr.count("\n") == 1
     assert [word for word in words if word not in done.stderr] == []
     assert sorted(tmp_path.rglob("*")) == before and (tmp_path / "file").read_text() == "in the way"
+
+
+def test_the_bouncing_bar_demo(comm: Any, shared_tmp: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """V1.3, one bounce: every scheme certified, its ledger closed; energy stays, but for Newmark on consistent mass."""
+    numbers = demo("bouncing_bar").main(quick=True, out=shared_tmp, progress=False)
+    comm.Barrier()  # rank 0 draws
+    named = {name.split(":")[0] for name in numbers}
+    assert len(named) == 9
+    for name in named:
+        prefix = next(key for key in numbers if key.startswith(name)).rsplit(":", 1)[0]
+        assert numbers[f"{prefix}: certificate"] <= 1e-9 and numbers[f"{prefix}: ledger defect"] <= 1e-10
+        energy = numbers[f"{prefix}: energy at the end"]
+        assert (energy > 4.0) if "do not use" in prefix else (0.85 < energy <= 1.0 + 1e-9), (prefix, energy)
+    assert (shared_tmp / "bouncing_bar.png").stat().st_size > 50_000
+    assert comm.rank or "trapezoidal, redistributed mass (default)" in capsys.readouterr().out
