@@ -1,0 +1,138 @@
+"""The condensed route with friction: its Delassus operator, what it stores and when, springs under it, its fallback."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from column import column
+from test_friction_methods import small
+
+from vi_contact.certified import CertifiedSolver
+from vi_contact.friction import Coulomb, Frictionless, Tresca
+from vi_contact.march import march
+from vi_contact.mass import ConsistentMass, Redistributed
+from vi_contact.schemes.trapezoidal import Trapezoidal
+from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
+from vi_contact.solvers import condensed
+from vi_contact.solvers.condensed import Condensed
+from vi_contact.solvers.friction_newton import FrictionNewton
+from vi_contact.solvers.mprgp import ProjectedCG
+from vi_contact.step import ContactProblem, Report
+from vi_contact.surfaces import ContactSurface
+
+pytestmark = pytest.mark.serial
+SCHEME, DT = ZienkiewiczWoodTaylor(), 1e-2
+
+
+def problem(friction: Any = Coulomb(0.4), **more: Any) -> ContactProblem:
+    """A column in oblique impact."""
+    return column(12, v0=(1.0, -1.0), friction=friction, **({"mass": ConsistentMass()} | more))
+
+
+def rough(slots: tuple[int, ...] = (1, 0, 2)) -> ContactProblem:
+    """The column rubbing with three of its nodes, in any order; the last one may not move along the wall."""
+    p = problem()
+    owned = np.array([1, 5, 9])
+    surface: ContactSurface = replace(
+        p.surface,
+        points=np.zeros((3, 2)),
+        normals=np.tile([0.0, -1.0], (3, 1)),
+        weights=np.ones(3),
+        gap0=np.zeros(3),
+        bilateral=np.zeros(3, dtype=bool),
+        compliance=np.array([0.0, 0.0, 0.25]),
+        owned=owned,
+        slots=np.array(slots),
+        tangents=np.array([[0], [4], [-1]]),
+    )
+    return replace(p, surface=surface)
+
+
+def reports(p: ContactProblem, scheme: Any = SCHEME, steps: int = 100, solver: Any = None) -> list[Report]:
+    return [report for _, report in march(p, scheme=scheme, solver=solver or Condensed(), dt=DT, steps=steps)]
+
+
+def test_delassus_operator_from_its_definition() -> None:
+    """DᵀA⁻¹D node by node, compliance/scale on the diagonal of normal rows; a prescribed tangent stands alone."""
+    p = rough()
+    A = SCHEME.effective_matrix(p, DT)
+    inverse = np.linalg.inv(np.column_stack([A @ e for e in np.eye(p.equations.rows)]))
+    order = [5, 4, 1, 0, 9, -1]  # slots 0, 1, 2
+    expected = np.zeros((6, 6))
+    expected[:5, :5] = inverse[np.ix_(order[:5], order[:5])]
+    expected[4, 4] += 0.25 / 2.0
+    expected[5, 5] = expected[4, 4]
+    found = Condensed().prepare(A, p.surface, 2.0).friction.delassus
+    np.testing.assert_allclose(found, expected, atol=1e-14 * np.abs(expected).max())
+    np.testing.assert_array_equal(found, found.T)
+
+
+def test_nothing_is_made_without_friction() -> None:
+    """Tangential columns cost back-substitutions: none before the first step that rubs."""
+    p = problem(Frictionless())
+    A = SCHEME.effective_matrix(p, DT)
+    solver = CertifiedSolver(p, A, 2.0, [Condensed()], 1e-9)
+    prepared: Any = solver._get(0)
+    state = next(report.old for report in reports(p) if report.new.active.any())
+    result, _, _ = solver.solve(SCHEME.step(p, state, A, DT))
+    assert result.r_t is None and prepared._friction is None
+    rubbing = replace(p, friction=Coulomb(0.4))
+    result, certificate, _ = solver.solve(SCHEME.step(rubbing, state, A, DT))
+    assert result.r_t is not None and result.r_t.any() and prepared._friction is not None
+    assert result.method == "condensed FrictionNewton" and certificate.worst <= 1e-14
+
+
+def test_stored_columns_a_second_substitution_and_projected_cg_give_the_same(monkeypatch: Any) -> None:
+    one = reports(rough())
+    assert any(report.result.r_t.any() for report in one)
+    cg = reports(rough(), solver=Condensed(ProjectedCG()))
+    monkeypatch.setattr(condensed, "STORED_ENTRIES", 0)
+    again = reports(rough())
+    for report, other, third in zip(one, again, cg, strict=True):
+        assert report.certificate.worst <= 1e-13
+        np.testing.assert_allclose(other.new.u, report.new.u, rtol=0.0, atol=1e-13)
+        np.testing.assert_allclose(third.new.u, report.new.u, rtol=0.0, atol=1e-13)
+
+
+def test_the_order_of_conditions_has_no_effect() -> None:
+    one = rough()
+    other = replace(one, surface=replace(rough((0, 1, 2)).surface, compliance=np.array([0.0, 0.0, 0.25])))
+    for a, b in zip(reports(one), reports(other), strict=True):
+        np.testing.assert_allclose(b.new.u, a.new.u, rtol=0.0, atol=1e-13)
+        np.testing.assert_allclose(b.new.r_t, a.new.r_t[[1, 0, 2]], rtol=0.0, atol=1e-11)
+
+
+@pytest.mark.parametrize(("scheme", "mass"), [(SCHEME, ConsistentMass()), (Trapezoidal(), Redistributed())])
+def test_friction_on_springs(scheme: Any, mass: Any) -> None:
+    """A compliant support rubs under the force of its springs; V9.7 is in the ledger tests."""
+    p = problem(mass=mass)
+    p = replace(p, surface=replace(p.surface, compliance=np.array([0.2])))
+    closed = [report for report in reports(p, scheme) if report.new.r_n[0] > 0.0]
+    assert len(closed) > 50
+    for report in closed:
+        assert report.certificate.worst <= 1e-12
+        assert report.new.u[1] == pytest.approx(0.2 * report.new.r_n[0], rel=1e-9)  # u_n = -u_y of the base
+        assert report.new.r_t[0, 0] == pytest.approx(0.4 * report.new.r_n[0], rel=1e-12)
+
+
+def test_no_coefficient_no_friction() -> None:
+    """mu = 0, a threshold of 0 and no law: the same motion to round-off (metamorphic)."""
+    plain = reports(problem(Frictionless()))
+    for friction in (Coulomb(0.0), Tresca(0.0)):
+        for one, other in zip(plain, reports(problem(friction)), strict=True):
+            np.testing.assert_allclose(other.new.u, one.new.u, rtol=0.0, atol=1e-13)
+            assert not other.new.r_t.any() and np.array_equal(other.new.active, one.new.active)
+
+
+def test_newton_that_wanders_is_led_back() -> None:
+    """Friction far beyond real values (mu = 3): Newton cycles in some problems, and ends well after sweeps."""
+    rescued = 0
+    for seed in range(60):
+        G, q, bilateral = small(seed, 10, 3)
+        result = FrictionNewton(max_iterations=6).prepare(G, bilateral).solve(q, np.zeros(10), np.full(10, 3.0))
+        assert result.residual <= 1e-11
+        rescued += result.iterations > len(result.history)
+    assert rescued > 0
