@@ -11,9 +11,10 @@ from mpi4py import MPI
 
 from vi_contact.algebra import Array
 from vi_contact.errors import InputError
-from vi_contact.fem.assemble import assemble
+from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import BodyForce, Prescribed, Traction
 from vi_contact.fem.trace import contact_surface
+from vi_contact.friction import Coulomb
 from vi_contact.march import march
 from vi_contact.materials import LinearElastic
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
@@ -208,6 +209,30 @@ def test_no_equilibrium_is_refused(case, way, gap):
     problem = standing(gap=gap, **case)
     with pytest.raises(InputError, match="no static equilibrium: its loads carry it off along " + way):
         static_equilibrium(problem, solver=Condensed())
+
+
+@pytest.mark.parametrize("gap", [0.0, 1.0e-4])
+def test_friction_holds_a_block_up_to_its_coefficient(gap):
+    """Coulomb, mu = 0.3, on a plane inclined by theta: at tan theta = 0.99 mu it stands, Σ r_t = W sin theta and
+    Σ r_n = W cos theta to 1e-9 with part of its base slipping; at 1.01 mu there is no equilibrium."""
+    mesh, tags = block(COMM, lengths=(2.0, 1.0), divisions=(8, 4))
+    ground = HalfSpace(point=(0.0, -gap), normal=(0.0, 1.0))
+
+    def on_slope(theta: float) -> ContactProblem:
+        pull = 2400.0 * G * np.array([np.sin(theta), -np.cos(theta)])
+        system = assemble(mesh, CONCRETE, loads=BodyForce(tuple(pull)))
+        return ContactProblem(
+            system, contact_surface(system, tags["bottom"], obstacle=ground), friction=Coulomb(mu=0.3)
+        )
+
+    theta = float(np.arctan(0.99 * 0.3))
+    state = static_equilibrium(on_slope(theta), solver=Condensed())
+    assert state.r_n.sum() == pytest.approx(4800.0 * G * np.cos(theta), rel=1e-9)
+    assert state.r_t is not None and state.r_t.sum() == pytest.approx(4800.0 * G * np.sin(theta), rel=1e-9)
+    used = np.abs(state.r_t[:, 0]) / np.where(state.r_n > 0.0, 0.3 * state.r_n, 1.0)
+    assert used.max() < 1.0 + 1e-9 and used.min() < 0.999 and np.sum(used > 1.0 - 1e-9) > 0
+    with pytest.raises(InputError, match=r"no static equilibrium: its loads carry it off along \(1, 0\)"):
+        static_equilibrium(on_slope(float(np.arctan(1.01 * 0.3))), solver=Condensed())
 
 
 def test_floating_without_contact_is_refused():
