@@ -16,7 +16,7 @@ import numpy as np
 
 from vi_contact.algebra import Array, Mask
 from vi_contact.excitation import Harmonic
-from vi_contact.fem.assemble import assemble
+from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import BodyForce, Prescribed
 from vi_contact.fem.mesh import build_mesh
 from vi_contact.fem.petsc_algebra import as_petsc

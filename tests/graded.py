@@ -10,7 +10,7 @@ import numpy as np
 from fem_problems import block
 
 from vi_contact.algebra import Array
-from vi_contact.fem.assemble import assemble
+from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import Prescribed, Traction
 from vi_contact.fem.trace import contact_surface
 from vi_contact.materials import LinearElastic

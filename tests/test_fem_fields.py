@@ -16,7 +16,7 @@ import h5py
 from fem_problems import CONCRETE, block, field, shaken_wall, turned
 
 from vi_contact.errors import InputError
-from vi_contact.fem.assemble import assemble
+from vi_contact.fem.assembly import assemble
 from vi_contact.fem.fields import XDMF
 from vi_contact.fem.loads import Prescribed
 from vi_contact.fem.stress import VonMises

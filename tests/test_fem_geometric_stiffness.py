@@ -15,7 +15,7 @@ from test_static import COLUMN, G, standing
 
 from vi_contact.algebra import Array
 from vi_contact.errors import InputError
-from vi_contact.fem.assemble import assemble
+from vi_contact.fem.assembly import assemble
 from vi_contact.fem.gravity import geometric_stiffness, initial_stress_matrix
 from vi_contact.fem.loads import BodyForce, Prescribed, Traction
 from vi_contact.fem.petsc_algebra import PetscMatrix

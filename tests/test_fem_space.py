@@ -9,7 +9,7 @@ from mpi4py import MPI
 
 from vi_contact.errors import InputError
 from vi_contact.excitation import Harmonic
-from vi_contact.fem.assemble import assemble
+from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import BodyForce, Prescribed, Traction
 from vi_contact.fem.mesh import Facets
 from vi_contact.materials import LinearElastic, Rayleigh

@@ -10,7 +10,7 @@ from fem_problems import CONCRETE, block, field, held_by, max_over_ranks, turned
 from mpi4py import MPI
 
 from vi_contact.algebra import Array
-from vi_contact.fem.assemble import assemble
+from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import BodyForce, Prescribed, Traction
 from vi_contact.fem.trace import contact_surface
 from vi_contact.march import march

@@ -12,7 +12,7 @@ from mpi4py import MPI
 
 from vi_contact.algebra import Array
 from vi_contact.errors import InputError
-from vi_contact.fem.assemble import assemble
+from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import BodyForce, Prescribed
 from vi_contact.fem.mesh import Facets
 from vi_contact.fem.trace import contact_surface

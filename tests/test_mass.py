@@ -13,7 +13,7 @@ from fem_problems import BODIES, CONCRETE, block, dense, spread, turned
 from mpi4py import MPI
 
 from vi_contact.errors import InputError
-from vi_contact.fem.assemble import assemble
+from vi_contact.fem.assembly import assemble
 from vi_contact.fem.trace import contact_surface
 from vi_contact.friction import Coulomb
 from vi_contact.impact import Inelastic

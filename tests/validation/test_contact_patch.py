@@ -26,7 +26,7 @@ from fem_problems import block, field, held_by, turned
 from mpi4py import MPI
 
 from vi_contact.algebra import Array
-from vi_contact.fem.assemble import assemble
+from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import Prescribed, Traction
 from vi_contact.fem.trace import contact_surface
 from vi_contact.materials import LinearElastic

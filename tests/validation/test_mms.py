@@ -14,7 +14,7 @@ from fem_problems import Errors, block, field, field_errors, linear, max_over_ra
 from mpi4py import MPI
 
 from vi_contact.algebra import Array
-from vi_contact.fem.assemble import assemble
+from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import BodyForce, Prescribed
 from vi_contact.march import march
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor

@@ -16,7 +16,7 @@ import pytest
 from fem_problems import Errors, block, field, field_errors, orders, plane_strain, signorini_field, signorini_pressure
 from mpi4py import MPI
 
-from vi_contact.fem.assemble import assemble
+from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import BodyForce, Prescribed
 from vi_contact.fem.trace import contact_surface
 from vi_contact.march import march

@@ -8,7 +8,7 @@ from typing import Any
 _HOME = {
     "read_mesh": "mesh", "build_mesh": "mesh", "node_numbers": "mesh",
     "Cells": "mesh", "Facets": "mesh", "Tags": "mesh",
-    "assemble": "assemble",
+    "assemble": "assembly",
     "BodyForce": "loads", "Prescribed": "loads", "TangentialTraction": "loads", "Traction": "loads",
     "contact_surface": "trace",
     "geometric_stiffness": "gravity",

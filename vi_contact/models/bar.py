@@ -14,7 +14,7 @@ import numpy as np
 from ..algebra import Array
 from ..exact.bar import PeriodicBar, ThrownBar
 from ..exact.bouncing_bar import BouncingBar
-from ..fem.assemble import assemble
+from ..fem.assembly import assemble
 from ..fem.loads import BodyForce
 from ..fem.mesh import build_mesh
 from ..fem.trace import contact_surface

@@ -11,7 +11,7 @@ from typing import Any
 
 from ..errors import InputError
 from ..excitation import Excitation, Harmonic
-from ..fem.assemble import assemble
+from ..fem.assembly import assemble
 from ..fem.loads import BodyForce
 from ..fem.mesh import Facets, build_mesh
 from ..fem.petsc_algebra import MpiComm

@@ -9,9 +9,10 @@ import pytest
 from fem_problems import BODIES, CONCRETE, block, dense, field, linear, max_over_ranks, nodal
 from mpi4py import MPI
 
+from vi_contact import fem
 from vi_contact.errors import InputError
 from vi_contact.fem import compat
-from vi_contact.fem.assemble import assemble
+from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import BodyForce, Prescribed, Traction
 from vi_contact.fem.mesh import Cells
 from vi_contact.march import march
@@ -212,3 +213,7 @@ def test_static_stage_is_the_start_of_an_equilibrium():
         assert max_over_ranks(COMM, state.v) * 1e-3 < 1e-12 * sag
 
 
+def test_assemble_stays_a_function() -> None:
+    """``fem.assemble`` is the function also after its module was imported: they must not share a name."""
+    assert callable(fem.assemble)
+    assert all(callable(getattr(fem, name)) for name in fem.__all__)
