@@ -5,10 +5,10 @@
 
 Generalised-alpha with alpha_m = 0, alpha_f = -alpha (see there for equations, restart, energy V9.7 and impulses V9.8).
 Order 2, unconditionally stable for -1/3 <= alpha <= 0; amplification (1 + alpha)/(1 - alpha) at infinite frequency: 1
-at alpha = 0, which is Newmark(¼, ½), and ½ at -1/3. On consistent mass the damping keeps the energy that contact creates
-(V9.2) in bounds only while dt does not resolve the highest frequency of the mesh: V1.3 ends its fourth bounce with
-0.95, 0.99 and 8.4 times its energy at Courant numbers 1, ½ and 0.1 (alpha = -0.1). On redistributed mass, with
-0.96, 0.98 and 0.99.
+at alpha = 0, which is Newmark(¼, ½), and ½ at -1/3.
+On consistent mass the damping keeps the energy that contact creates (V9.2) in bounds only while dt does not resolve the
+highest frequency of the mesh: V1.3 ends its fourth bounce with 0.95, 0.99 and 8.4 times its energy at Courant numbers
+1, ½ and 0.1 (alpha = -0.1); on redistributed mass with 0.96, 0.98 and 0.99.
 Source: Hilber, Hughes and Taylor, Earthquake Eng. Struct. Dyn. 5 (1977) 283-292.
 """
 

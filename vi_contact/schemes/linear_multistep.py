@@ -11,7 +11,7 @@ Solved for the newest velocity and acceleration and put into M u'' + C u' + K u 
 Start, and restart after every velocity jump or change of dt: the past is filled in with constant acceleration, which
 makes Newmark's two-step form reproduce its one-step form exactly and keeps second order for the other members. After a
 jump it is the one that fits the state without the reaction of the collision (schemes.acceleration): kept, that would
-act for another step, and throw off what the impact law has just stopped. A change of dt keeps acceleration and reaction.
+act for another step, and throw off what the impact law has just stopped. A change of dt keeps both.
 Unknowns without mass (mass.Redistributed) have no acceleration and the mean velocity of the step.
 Energy: the ledger closes with the means of both ends (V9.7). Unlike the midpoint form, contact in the acceleration
 balance at t_p can *gain* energy on consistent mass (V9.2), booked as algorithmic or contact loss of negative sign.
