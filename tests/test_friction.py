@@ -35,6 +35,33 @@ def test_bad_coefficient_is_refused(law, value):
         law(value)
 
 
+def test_a_field_has_one_value_per_point():
+    """Given as any sequence, kept as a tuple: laws stay comparable. Wrong counts are told when used."""
+    law = Coulomb(np.array([0.0, 0.5, 0.5, 1.0]))
+    assert law == Coulomb([0.0, 0.5, 0.5, 1.0]) and law.mu == (0.0, 0.5, 0.5, 1.0)
+    assert np.array_equal(law.limit(R_N, WEIGHTS, 1.0), [0.0, 1.0, 0.0, 5.0])
+    assert np.array_equal(law.slope(WEIGHTS), [0.0, 0.5, 0.5, 1.0])
+    assert np.array_equal(Tresca((4.0, 3.0, 2.0, 1.0)).limit(R_N, WEIGHTS, 2.0), [4.0, 6.0, 4.0, 1.0])
+    for wrong in (Coulomb((0.3, 0.3)), Tresca((0.3, 0.3))):
+        with pytest.raises(InputError, match="has 2 values but there are 4 contact points"):
+            wrong.limit(R_N, WEIGHTS, 1.0)
+
+
+@pytest.mark.parametrize("value", [[0.3, -0.1], np.array([0.3, math.nan]), np.eye(2), None])
+def test_bad_fields_are_refused(value):
+    for law in (Coulomb, Tresca):
+        with pytest.raises(InputError, match="or one per point"):
+            law(value)
+
+
+def test_limits_are_affine_in_the_pressure():
+    """limit = cohesion + slope max(r_n, 0), what the solvers use."""
+    for law in (Frictionless(), Tresca(100.0), Coulomb(0.5), Coulomb((0.1, 0.2, 0.3, 0.4))):
+        cohesion = law.limit(np.zeros(4), WEIGHTS, 0.5)
+        expected = cohesion + law.slope(WEIGHTS) * np.maximum(R_N, 0.0)
+        assert np.array_equal(law.limit(R_N, WEIGHTS, 0.5), expected)
+
+
 def test_projection_in_two_dimensions_is_clipping():
     r_t, limit = np.array([[3.0], [-3.0], [0.5], [0.0]]), np.array([1.0, 2.0, 1.0, 0.0])
     assert np.array_equal(project(r_t, limit), [[1.0], [-2.0], [0.5], [0.0]])
