@@ -1,0 +1,190 @@
+#!/usr/bin/env python3
+"""What each time scheme does in an impact, measured against exact solutions, and what its step costs.
+
+    python3 benchmarks/schemes.py [--elements 100] [--bounces 20] [--blocks 2e3 2e4] [--json FILE]
+
+Two tables, in the form of docs/schemes.md:
+
+* the bar (1D elements): largest error of the contact force in the window 0.6 < t < 1.067 of the thrown bar (V1.1),
+  energy of the bar of V1.3 after 1, 4 and 20 bounces over the exact 1/8, L2 error of its contact force over four
+  bounces (the force that a scheme reports: end value or mean of the step);
+* the block: a unit square, plane strain, thrown at 1 m/s on the ground, 400 steps of 1 ms: energy and mean speed at the
+  end, largest force, and the time of a step over that of the plain linear step with the same matrix, timed beside it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import logging
+import math
+import os
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ[name] = "1"
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+import numpy as np  # noqa: E402
+from mpi4py import MPI  # noqa: E402
+
+import vi_contact as vc  # noqa: E402
+from vi_contact import fem  # noqa: E402
+from vi_contact.meshes.block import BlockMesh  # noqa: E402
+from vi_contact.models.bar import Bar, build  # noqa: E402
+
+CONSISTENT = vc.ConsistentMass()
+SCHEMES: dict[str, tuple[Any, Any]] = {  # name -> scheme, mass (None: the scheme's own choice)
+    "Trapezoidal (default)": (vc.Trapezoidal(), None),
+    "Newmark(¼, ½)": (vc.Newmark(), None),
+    "HHT(-0.1)": (vc.HHT(-0.1), None),
+    "GeneralisedAlpha, rho 0.8": (vc.GeneralisedAlpha.spectral_radius(0.8), None),
+    "Houbolt": (vc.Houbolt(), None),
+    "ContactStabilisedNewmark": (vc.ContactStabilisedNewmark(), None),
+    "Midpoint, ZWT(½), SS22, Kane": (vc.Midpoint(), None),
+    "ZWT(0.6)": (vc.ZienkiewiczWoodTaylor(phi=0.6), None),
+    "MoreauJean(½), e = 0": (vc.MoreauJean(), None),
+    "MoreauJean(½), e = 1": (vc.MoreauJean(e=1.0), None),
+    "Newmark(¼, ½), consistent mass": (vc.Newmark(), CONSISTENT),
+    "HHT(-0.1), consistent mass": (vc.HHT(-0.1), CONSISTENT),
+}
+
+
+def march(problem: Any, scheme: Any, dt: float, steps: int) -> Any:
+    """Steps with the condensed solver."""
+    return vc.march(problem, scheme=scheme, solver=vc.Condensed(), dt=dt, steps=steps)
+
+
+def energy(report: Any) -> float:
+    """Kinetic and strain energy after a step [J]."""
+    system = report.problem.equations
+    return float(system.kinetic_energy(report.new.v) + system.strain_energy(report.new.u))
+
+
+def oscillation(elements: int, courant: float, scheme: Any, mass: Any) -> float:
+    """max |p/300 - 1| over 0.6 < t < 1.067 (V1.1)."""
+    bar = Bar(vc.ThrownBar(), elements=elements)
+    dt = bar.time_step(courant)
+    worst = 0.0
+    for state, _ in march(build(bar, MPI.COMM_WORLD).problem(mass=mass), scheme, dt, int(1.067 / dt)):
+        if 0.6 < state.t < 1.067:
+            worst = max(worst, abs(state.r_n.sum() / bar.section / 300.0 - 1.0))
+    return worst
+
+
+def bounces(elements: int, courant: float, count: int, scheme: Any, mass: Any) -> dict[str, Any]:
+    """Energies of V1.3 after 1, 4 and ``count`` bounces over 1/8; relative L2 error of the force of four bounces, and
+    their largest force over the exact one."""
+    bar = Bar(vc.PeriodicBar(), elements=elements)
+    dt = bar.time_step(courant)
+    per_bounce = round(3.0 / dt)
+    problem = build(bar, MPI.COMM_WORLD).problem(mass=mass)
+    energies, error, size, peak = [], 0.0, 0.0, 0.0
+    for k, (state, report) in enumerate(march(problem, scheme, dt, count * per_bounce), start=1):
+        if k <= 4 * per_bounce:
+            exact = float(bar.case.force(state.t - 0.5 * dt))
+            error, size = error + (report.balance.r_n.sum() - exact) ** 2, size + exact**2
+            peak = max(peak, float(state.r_n.sum()) / 0.5)
+        if k % per_bounce == 0:
+            energies.append(energy(report) / 0.125)
+            if energies[-1] > 1e4:
+                break
+    found = {n: energies[n - 1] if len(energies) >= n else math.inf for n in (1, 4, count)}
+    return {"energies": list(found.values()), "force_error": math.sqrt(error / size), "peak": peak}
+
+
+def linear_step(report: Any, scheme: Any, dt: float) -> float:
+    """Seconds of the plain linear step with the same matrix from the same state."""
+    problem, old, A = report.problem, report.old, report.step.A
+    none = np.zeros(problem.surface.count)
+    begin = time.perf_counter()
+    step = scheme.step(problem, old, A, dt)
+    scheme.finish(problem, old, step, vc.StepResult(A.factor.solve(step.b), none, none > 0.0, 0, "linear"), dt)
+    return time.perf_counter() - begin
+
+
+def block(unknowns: float, scheme: Any, mass: Any, *, steps: int = 400, dt: float = 1e-3) -> dict[str, float]:
+    """The thrown unit square: E = 1000, nu = 0.3, rho = 1, gap 0.05, speed 1."""
+    n = round(math.sqrt(unknowns / 2.0)) - 1
+    mesh, tags = fem.build_mesh(BlockMesh(lengths=(1.0, 1.0), divisions=(n, n)), MPI.COMM_WORLD)
+    rubber = vc.LinearElastic(E=1000.0, nu=0.3, rho=1.0)
+    system = fem.assemble(mesh, rubber, section=vc.PlaneStrain(), initial_velocity=(0.0, -1.0))
+    ground = vc.HalfSpace(point=(0.0, -0.05), normal=(0.0, 1.0))
+    problem = vc.ContactProblem(system, fem.contact_surface(system, tags["bottom"], obstacle=ground), mass=mass)
+    largest, seconds, linear, worst = 0.0, [], [], 0.0
+    loop = iter(march(problem, scheme, dt, steps))
+    for _ in range(steps):
+        begin = time.perf_counter()
+        state, report = next(loop)
+        spent = time.perf_counter() - begin
+        largest, worst = max(largest, float(state.r_n.sum())), max(worst, report.certificate.worst)
+        if state.active.any():
+            seconds.append(spent)
+            linear.append(linear_step(report, scheme, dt))
+    equations = report.problem.equations
+    up = equations.influence[:, 1]
+    return {
+        "unknowns": len(state.u), "energy": energy(report) / 0.5, "speed": float(up @ (equations.M @ state.v)),
+        "force": largest, "ms": 1e3 * float(np.median(seconds)),
+        "ratio": float(np.median(seconds) / np.median(linear)), "certificate": worst,
+    }
+
+
+def number(value: float) -> str:
+    """Four digits, or a dash for what has left the scale."""
+    return "> 10⁴" if value > 1e4 else f"{value:.4g}" if value >= 10 else f"{value:.3f}"
+
+
+def bar_row(elements: int, count: int, scheme: Any, mass: Any) -> dict[str, Any]:
+    """A scheme's row of the first table, Courant numbers 1, ½ and 0.1."""
+    return {
+        str(courant): {"oscillation": oscillation(elements, courant, scheme, mass)}
+        | bounces(elements, courant, count if courant >= 0.5 else 4, scheme, mass)
+        for courant in (1.0, 0.5, 0.1)
+    }
+
+
+def print_bars(rows: dict[str, Any], count: int) -> None:
+    print(f"| scheme | Courant | force error in the window | energy after 1, 4, {count} bounces | "
+          "L2 error of the force | largest force |\n|---|---|---|---|---|---|")
+    for name, row in rows.items():
+        for courant, found in row.items():
+            energies = ", ".join(number(e) for e in found["energies"][: 3 if courant != "0.1" else 2])
+            print(f"| {name} | {courant} | {found['oscillation']:.1e} | {energies} | {found['force_error']:.2f} | "
+                  f"{number(found['peak'])} |", flush=True)
+
+
+def print_blocks(rows: dict[str, Any]) -> None:
+    print("| scheme | unknowns | energy | mean speed | largest force | ms per step | over a linear step |\n"
+          "|---|---|---|---|---|---|---|")
+    for name, row in rows.items():
+        for found in row:
+            print(f"| {name} | {found['unknowns']} | {number(found['energy'])} | {found['speed']:.3f} | "
+                  f"{number(found['force'])} | {found['ms']:.2f} | {found['ratio']:.1f} |", flush=True)
+
+
+def main() -> None:
+    """Both tables."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--elements", type=int, default=100)
+    parser.add_argument("--bounces", type=int, default=20)
+    parser.add_argument("--blocks", type=float, nargs="*", default=[2e3, 2e4])
+    parser.add_argument("--only", help="schemes whose name contains this")
+    parser.add_argument("--json", type=Path)
+    options = parser.parse_args()
+    logging.getLogger("vi_contact").setLevel(logging.ERROR)
+    chosen = {name: pair for name, pair in SCHEMES.items() if not options.only or options.only in name}
+    bars = {name: bar_row(options.elements, options.bounces, *pair) for name, pair in chosen.items()}
+    print_bars(bars, options.bounces)
+    blocks = {name: [block(size, *pair) for size in options.blocks] for name, pair in chosen.items()}
+    print()
+    print_blocks(blocks)
+    if options.json:
+        options.json.write_text(json.dumps({"bars": bars, "blocks": blocks}, indent=1), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
