@@ -20,7 +20,7 @@ from graded import Pressed, even_then_growing, growing, pressed_half
 from mpi4py import MPI
 
 from vi_contact.exact.hertz import HertzLine, HertzPoint, contact_modulus
-from vi_contact.fem.assemble import assemble
+from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import Prescribed, Traction
 from vi_contact.fem.mesh import build_mesh
 from vi_contact.fem.trace import contact_surface
