@@ -27,6 +27,7 @@ Source: Chung and Hulbert, J. Appl. Mech. 60 (1993) 371-375.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -62,14 +63,14 @@ class Weights:
             )
 
 
-class AlphaStep:
+class AlphaStep(ABC):
     """The step of the module's equations, with the weights of a member. Its memory is "a" (the acceleration),
     "reaction" (Bᵀr at the same end) and "of" (alpha_m, alpha_f and t they belong to)."""
 
     @property
+    @abstractmethod
     def weights(self) -> Weights:
         """alpha_m, alpha_f, beta, gamma of the member."""
-        raise TypeError(f"{type(self).__name__} has no weights")
 
     @property
     def mass(self) -> MassLaw:
