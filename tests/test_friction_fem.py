@@ -12,7 +12,7 @@ pytest.importorskip("dolfinx")
 
 from fem_problems import BOX_DT, block, run, thrown_box, turned
 
-from vi_contact.fem.assemble import assemble
+from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import BodyForce, Prescribed
 from vi_contact.fem.trace import contact_surface
 from vi_contact.friction import Coulomb, FrictionLaw, Tresca
