@@ -77,7 +77,7 @@ class ContactStabilisedNewmark(SingleStep):
 
     def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
         """v1 = v0 + 2/dt (u1 - u_p)."""
-        return stepped(state, step, result, result.x, state.v + 2.0 / dt * (result.x - step.guess))
+        return stepped(step, result, result.x, state.v + 2.0 / dt * (result.x - step.guess))
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
         """Averages of the equation above."""

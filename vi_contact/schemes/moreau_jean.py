@@ -131,7 +131,7 @@ class MoreauJean(SingleStep):
     def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
         """u1 = u0 + dt v_θ."""
         u = state.u + dt * ((1.0 - self.theta) * state.v + self.theta * result.x)
-        return stepped(state, step, result, u, result.x)
+        return stepped(step, result, u, result.x)
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
         """Averages of the equation above."""

@@ -31,9 +31,7 @@ class SingleStep:
         return replace(state, v=v)
 
 
-def stepped(state: State, step: StepProblem, result: StepResult, u: Array, v: Array) -> State:
-    """The state after the step, with the mean reactions r/scale."""
+def stepped(step: StepProblem, result: StepResult, u: Array, v: Array) -> State:
+    """The state after the step, with the mean reactions r/scale; what another scheme remembered is forgotten."""
     r_t = None if result.r_t is None else result.r_t / step.scale
-    return replace(
-        state, t=step.t, k=step.k, u=u, v=v, r_n=result.r_n / step.scale, r_t=r_t, active=result.active
-    )
+    return State(step.t, step.k, u, v, result.r_n / step.scale, result.active, r_t=r_t)

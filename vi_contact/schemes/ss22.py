@@ -67,7 +67,7 @@ class SS22(SingleStep):
     def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
         """alpha = 2 (u1 - u0 - dt v0)/dt², v1 = v0 + dt alpha."""
         v = state.v + 2.0 * (result.x - step.guess) / dt
-        return stepped(state, step, result, result.x, v)
+        return stepped(step, result, result.x, v)
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
         """Averages of the residual equation."""

@@ -95,5 +95,5 @@ class Trapezoidal:
             a=(new.v - old.v) / dt,
             f=0.5 * (load(old.t) + load(new.t)),
             r_n=0.5 * (old.r_n + new.r_n),
-            r_t=None if new.r_t is None or old.r_t is None else 0.5 * (old.r_t + new.r_t),
+            r_t=None if new.r_t is None else 0.5 * (new.r_t if old.r_t is None else old.r_t + new.r_t),
         )

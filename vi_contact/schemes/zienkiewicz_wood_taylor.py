@@ -69,7 +69,7 @@ class ZienkiewiczWoodTaylor(SingleStep):
     def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
         """v1 = v0 + ((u1 - u0)/dt - v0)/phi."""
         v = state.v + ((result.x - state.u) / dt - state.v) / self.phi
-        return stepped(state, step, result, result.x, v)
+        return stepped(step, result, result.x, v)
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
         """Averages of the equation above."""
