@@ -149,6 +149,24 @@ def _log(axis: Any, t: Array, values: Array) -> None:
     axis.semilogy(t, np.maximum(values, 1e-18), ".", ms=2, color="black")
 
 
+def plot_runs(
+    runs: Mapping[str, History], quantities: Sequence[tuple[str, str, str]], path: str | Path, *, title: str
+) -> Path:
+    """The same quantities of several runs, a panel per quantity. quantities: (column, label, SI unit)."""
+    figure, axes = _panels(len(quantities), (9.0, 2.1 * len(quantities) + 1.2))
+    for axis, (column, label, unit) in zip(axes, quantities, strict=True):
+        size = np.array([max(float(np.max(np.abs(run[column]), initial=0.0)) for run in runs.values())])
+        shown, prefixed = _scaled(size, unit)
+        factor = shown[0] / size[0] if size[0] else 1.0
+        for name, run in runs.items():
+            axis.plot(run["t"], run[column] * factor, lw=0.9, label=name)
+        axis.set_ylabel(f"{label} [{prefixed}]")
+    axes[0].margins(y=0.25)  # room for the legend
+    axes[0].legend(fontsize=8, ncol=len(runs), loc="lower right")
+    axes[0].set_title(title)
+    return _save(figure, path)
+
+
 def plot_contact(history: History, path: str | Path, *, position: Array, axis_label: str = "position [m]") -> Path:
     """Map of the contact pressure over position and time, and the uplift ratio. ``position``: (m,) of the points.
 
