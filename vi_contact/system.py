@@ -14,8 +14,8 @@ from .algebra import Algebra, Array, Mask, Matrix
 class Space(Protocol):
     """What the unknowns mean: how an owned vector of unknowns becomes displacements of points.
 
-    ``ids`` are rank-independent numbers of the owned unknowns, node * dimension + component; ``coordinates`` (rows, d) the
-    positions of their nodes [m].
+    ``ids`` are rank-independent numbers of the owned unknowns, node * dimension + component; ``coordinates`` (rows, d)
+    the positions of their nodes [m].
     """
 
     dimension: int

@@ -30,8 +30,8 @@ def contact_in_the_balance(name: str, problem: ContactProblem) -> None:
     told = problem.equations.kept(f"told of {name}", list)
     if not told and surface.comm.rank == 0:
         log.warning(
-            "%s with consistent mass can gain energy whenever a contact opens: with Newmark's method a bar that bounces "
-            "four times ends with 14 to 29 times its energy; leave out mass=ConsistentMass(), or take "
+            "%s with consistent mass can gain energy whenever a contact opens: with Newmark's method a bar that "
+            "bounces four times ends with 14 to 29 times its energy; leave out mass=ConsistentMass(), or take "
             "ContactStabilisedNewmark() or Midpoint()",
             name,
         )
