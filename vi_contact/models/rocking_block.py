@@ -24,7 +24,7 @@ from ..algebra import Array
 from ..errors import InputError
 from ..exact.housner import HousnerBlock
 from ..excitation import Excitation
-from ..fem.assemble import assemble
+from ..fem.assembly import assemble
 from ..fem.gravity import geometric_stiffness
 from ..fem.loads import BodyForce, Prescribed
 from ..fem.mesh import build_mesh
@@ -55,7 +55,7 @@ class RockingBlock:
 
     def __post_init__(self) -> None:
         least = self.material.rho * (RIGID * self.shape.p * self.shape.height) ** 2
-        if self.material.E < least:
+        if least > self.material.E:
             raise InputError(f"RockingBlock: E = {self.material.E:g} Pa is too soft for a rigid block of this size: "
                              f"give at least {least:.2g} Pa")
         if self.divisions[1] < 4:
@@ -115,8 +115,8 @@ class RockingModel:
 
     def tilted(self, theta: float, *, rate: float = 0.0) -> State:
         """The block at rest, turned by theta [rad] about its lower left corner, turning at ``rate`` [rad/s]."""
-        turn = self._turn
-        return replace(self.rest, u=self.rest.u + theta * turn, v=rate * turn, r_n=np.zeros(2), active=np.zeros(2, bool))
+        u, v, none = self.rest.u + theta * self._turn, rate * self._turn, np.zeros(2)
+        return replace(self.rest, u=u, v=v, r_n=none, active=none.astype(bool))
 
     @property
     def onset_acceleration(self) -> float:
@@ -209,16 +209,18 @@ def build(block: RockingBlock, comm: Any) -> RockingModel:
 def impacts(history: Mapping[str, Array]) -> tuple[Array, Array]:
     """(times when theta passes zero [s], largest abs(theta) before each since the one before [rad]) of a free block.
 
-    A rotation within a thousandth of the largest one does not count as a change of sides: corners may chatter.
+    The other side counts once a thousandth of the largest rotation is reached there: landing corners may chatter.
     """
     t, theta = history["t"], history["theta"]
     rows = np.flatnonzero(np.abs(theta) > 1e-3 * np.max(np.abs(theta)))
-    changes = np.flatnonzero(theta[rows[1:]] * theta[rows[:-1]] < 0.0)
-    before, after = rows[changes], rows[changes + 1]
-    times = t[before] + (t[after] - t[before]) * theta[before] / (theta[before] - theta[after])
-    ends = np.searchsorted(t, np.concatenate([[t[0]], times]))
+    times = []
+    for row in rows[:-1][theta[rows[1:]] * theta[rows[:-1]] < 0.0]:
+        after = row + int(np.argmax(theta[row:] * theta[row] <= 0.0))
+        share = theta[after - 1] / (theta[after - 1] - theta[after])
+        times.append(float(t[after - 1] + share * (t[after] - t[after - 1])))
+    ends = np.searchsorted(t, [t[0], *times])
     peaks = [float(np.max(np.abs(theta[i : j + 1]))) for i, j in zip(ends[:-1], ends[1:], strict=True)]
-    return times, np.array(peaks)
+    return np.array(times), np.array(peaks)
 
 
 def restitution(block: RockingBlock, history: Mapping[str, Array], impact: float) -> float:
