@@ -164,3 +164,17 @@ def test_the_bouncing_bar_demo(comm: Any, shared_tmp: Path, capsys: pytest.Captu
         assert (energy > 2.0) if "do not use" in prefix else (0.85 < energy <= 1.0 + 1e-9), (prefix, energy)
     assert (shared_tmp / "bouncing_bar.png").stat().st_size > 50_000
     assert comm.rank or "trapezoidal, redistributed mass (default)" in capsys.readouterr().out
+
+
+def test_the_hertz_impact_demo(comm: Any, shared_tmp: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """V3.3 with 4 cells in the contact radius: within 5 % of the theory, certified, rebound with full speed."""
+    numbers = demo("hertz_impact").main(quick=True, out=shared_tmp, progress=False)
+    comm.Barrier()  # rank 0 draws
+    of = {name.split(": ")[1]: value for name, value in numbers.items()}
+    assert len(of) == len(numbers) == 6
+    for name in ("approach", "duration", "force"):
+        assert of[name] == pytest.approx(1.0, abs=0.05), name
+    assert of["rebound"] == pytest.approx(1.0, abs=5e-3)
+    assert 0.0 < of["certificate"] <= 1e-9 and of["ledger defect"] <= 1e-10
+    assert (shared_tmp / "hertz_impact.png").stat().st_size > 30_000
+    assert comm.rank or "4 cells in the contact radius" in capsys.readouterr().out
