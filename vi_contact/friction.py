@@ -37,6 +37,10 @@ class FrictionLaw(Protocol):
         """d limit / d r_n of each node under pressure, shape (n,); limit does not grow with tension."""
         ...
 
+    def at(self, speed: Array) -> FrictionLaw:
+        """The law at slip rates |v| [m/s], shape (n,); ``limit`` and ``slope`` of a law itself are those at rest."""
+        ...
+
 
 @dataclass(frozen=True)
 class Frictionless:
@@ -49,6 +53,10 @@ class Frictionless:
     def slope(self, weights: Array) -> Array:
         """Zeros, shape (n,)."""
         return np.zeros(len(weights))
+
+    def at(self, speed: Array) -> Frictionless:
+        """Itself: the law does not know the slip rate."""
+        return self
 
 
 @dataclass(frozen=True)
@@ -72,6 +80,10 @@ class Tresca:
         """Zeros, shape (n,)."""
         return np.zeros(len(weights))
 
+    def at(self, speed: Array) -> Tresca:
+        """Itself: the law does not know the slip rate."""
+        return self
+
 
 @dataclass(frozen=True)
 class Coulomb:
@@ -93,6 +105,10 @@ class Coulomb:
     def slope(self, weights: Array) -> Array:
         """mu, shape (n,)."""
         return _nodal("Coulomb", "mu", self.mu, len(weights)) * np.ones(len(weights))
+
+    def at(self, speed: Array) -> Coulomb:
+        """Itself: the law does not know the slip rate."""
+        return self
 
 
 def project(r_t: Array, limit: Array) -> Array:

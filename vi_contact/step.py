@@ -138,7 +138,11 @@ class EffectiveMatrix:
 
 @dataclass(frozen=True)
 class StepProblem:
-    """One step, as every solver sees it. ``guess``: predicted x; ``active``: predicted contact set."""
+    """One step, as every solver sees it. ``guess``: predicted x; ``active``: predicted contact set.
+
+    ``rate_factor``: slip rate [m/s] = rate_factor (B_t x - slip0): 1/dt for displacements, 1 for velocities, 0 in
+    static problems, where friction is that of rest.
+    """
 
     A: EffectiveMatrix
     b: Array
@@ -151,11 +155,19 @@ class StepProblem:
     k: int
     friction: FrictionLaw = field(default_factory=Frictionless)
     slip0: Array | None = None
+    rate_factor: float = 0.0
+
+    def friction_at(self, slip: Array) -> FrictionLaw:
+        """The friction law at the rates [m/s] of this slip, B_t x - slip0 (m, d - 1)."""
+        return self.friction.at(self.rate_factor * np.linalg.norm(slip, axis=1))
 
 
 @dataclass(frozen=True)
 class StepResult:
-    """x, reactions, active set; iterations count changes of the active set, sweeps or Newton steps (method says)."""
+    """x, reactions, active set; iterations count changes of the active set, sweeps or Newton steps (method says).
+
+    ``history``: what the method with friction logs of its convergence, see there.
+    """
 
     x: Array
     r_n: Array
@@ -163,6 +175,7 @@ class StepResult:
     iterations: int
     method: str
     r_t: Array | None = None
+    history: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)

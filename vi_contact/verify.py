@@ -45,7 +45,7 @@ def _friction_residuals(step: StepProblem, result: StepResult, x_ref: float, r_r
     surface = step.surface
     r_t = np.zeros_like(step.slip0) if result.r_t is None else result.r_t
     slip = surface.tangential_values(result.x) - step.slip0
-    limit = step.friction.limit(result.r_n, surface.weights, step.scale)
+    limit = step.friction_at(slip).limit(result.r_n, surface.weights, step.scale)
     size, way = np.linalg.norm(r_t, axis=1), np.linalg.norm(slip, axis=1)
     missing = limit * way - np.sum(r_t * slip, axis=1)
     t_ref = max(max_abs(limit), max_abs(size), ROUNDED**2 * r_ref)

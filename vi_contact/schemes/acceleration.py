@@ -54,6 +54,7 @@ def _with_contact(problem: ContactProblem, state: State, force: Array, dt: float
         k=state.k,
         friction=problem.friction,
         slip0=None if slip is None else -slip / dt,
+        rate_factor=dt,
     )
     solver: PreparedSolver = problem.equations.kept(
         "resting contacts", lambda: Condensed().prepare(step.A, step.surface, 1.0)

@@ -73,6 +73,7 @@ class ContactStabilisedNewmark(SingleStep):
             k=state.k + 1,
             friction=problem.friction,
             slip0=problem.slip_origin(state.u),
+            rate_factor=1.0 / dt,
         )
 
     def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:

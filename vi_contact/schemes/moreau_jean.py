@@ -126,6 +126,7 @@ class MoreauJean(SingleStep):
             k=state.k + 1,
             friction=problem.friction,
             slip0=None if slip is None else np.zeros_like(slip),
+            rate_factor=1.0,
         )
 
     def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:

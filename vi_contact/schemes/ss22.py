@@ -62,6 +62,7 @@ class SS22(SingleStep):
             k=state.k + 1,
             friction=problem.friction,
             slip0=problem.slip_origin(state.u),
+            rate_factor=1.0 / dt,
         )
 
     def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
