@@ -181,7 +181,7 @@ class Contact:
 
     def _row(self, state: State) -> Row:
         surface, r_n = self._surface, state.r_n
-        gap = surface.gap0 - surface.normal_values(state.u) + surface.compliance * r_n
+        gap = surface.gap(state.t) - surface.normal_values(state.u) + surface.compliance * r_n
         pressure = r_n / surface.weights
         total, resultant = float(surface.weights.sum()), float(r_n.sum())
         closed = float(surface.weights[state.active].sum())
@@ -206,10 +206,13 @@ class Contact:
         )
 
     def _friction(self, state: State) -> dict[str, Any]:
-        surface, system = self._surface, self._problem.equations
+        surface, system = self._surface, self._problem.system
         slip = surface.tangential_values(state.u)
+        if surface.slide is not None:
+            slip = slip - surface.slide(state.t)
         r_t = np.zeros_like(slip) if state.r_t is None else state.r_t
         load = surface.reaction_load(np.zeros(surface.count), system.rows, r_t)
+        load = load if surface.basis is None else surface.basis @ load
         force = 0.0 - surface.comm.sum(system.influence.T @ load)
         return {f"friction_force_{axis}": float(value) for axis, value in zip(AXES, force, strict=False)} | {
             "contact_max_slip": float(np.linalg.norm(slip, axis=1).max()) if len(slip) else np.nan,

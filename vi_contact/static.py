@@ -15,6 +15,7 @@ of mass of a block free to slide on level ground does not move). On a conservati
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -36,7 +37,7 @@ STOPPED = 1e-9  # of the largest motion: what a contact point may move towards i
 def initial_state(problem: ContactProblem, t: float = 0.0) -> State:
     """u0, v0 of the system, in the rotated basis, no reaction; InputError when u0 penetrates the obstacle."""
     system, surface = problem.equations, problem.surface
-    gap = surface.gap0 - surface.normal_values(system.u0)
+    gap = surface.gap(t) - surface.normal_values(system.u0)
     u_max = float(surface.comm.max(np.array([np.max(np.abs(system.u0), initial=0.0)]))[0])
     size = max(u_max, float(np.max(surface.gap0, initial=0.0)))
     if len(gap) and gap.min() < -1e-9 * size:
@@ -60,26 +61,41 @@ def static_equilibrium(
         InputError: the loads drive a rigid motion that nothing stops: there is no equilibrium.
         StepFailure: no answer below the certificate tolerance.
     """
-    system = problem.static_load
-    start = initial_state(problem, t)
-    step = StepProblem(
-        A=EffectiveMatrix(system.algebra.combine([(1.0, system.K)]), system.algebra),
-        b=system.load(t),
-        bound=problem.surface.gap0,
-        surface=problem.surface,
-        scale=1.0,
-        guess=start.u,
-        active=start.active,
-        t=t,
-        k=0,
-        friction=problem.friction,
-        slip0=problem.slip_origin(start.u),
-    )
-    if system.floating:
-        result = _Proximal(problem, step, solver, tolerance).run()
-    else:
-        result, _, _ = CertifiedSolver(problem, step.A, 1.0, [solver], tolerance).solve(step)
-    return State(t, 0, result.x, np.zeros_like(start.v), result.r_n, result.active, r_t=result.r_t)
+    return Equilibria(problem, solver=solver, tolerance=tolerance).after(initial_state(problem, t), t)
+
+
+class Equilibria:
+    """Static stages of one problem, with one factorisation for all."""
+
+    def __init__(self, problem: ContactProblem, *, solver: Solver, tolerance: float = TOLERANCE) -> None:
+        system = problem.static_load
+        self._problem = problem
+        self._K = EffectiveMatrix(system.algebra.combine([(1.0, system.K)]), system.algebra)
+        self._solve: Callable[[StepProblem], StepResult]
+        if system.floating:
+            self._solve = _Proximal(problem, self._K, solver, tolerance).solve
+        else:
+            certified = CertifiedSolver(problem, self._K, 1.0, [solver], tolerance)
+            self._solve = lambda step: certified.solve(step)[0]
+
+    def after(self, old: State, t: float) -> State:
+        """The equilibrium at time t, of a body that rubs and slides from where ``old`` left it; numbered as ``old``."""
+        problem = self._problem
+        step = StepProblem(
+            A=self._K,
+            b=problem.static_load.load(t),
+            bound=problem.surface.gap(t),
+            surface=problem.surface,
+            scale=1.0,
+            guess=old.u,
+            active=old.active,
+            t=t,
+            k=old.k,
+            friction=problem.friction,
+            slip0=problem.slip_origin(old.u, old.t, t),
+        )
+        result = self._solve(step)
+        return State(t, old.k, result.x, np.zeros_like(old.u), result.r_n, result.active, r_t=result.r_t)
 
 
 @dataclass(frozen=True)
@@ -94,25 +110,28 @@ class _Motion:
 
 
 class _Proximal:
-    """The proximal-point iteration; ``step`` is the problem itself, its matrix K is singular."""
+    """The proximal-point iteration for the matrix ``K``, which is singular."""
 
-    def __init__(self, problem: ContactProblem, step: StepProblem, solver: Solver, tolerance: float) -> None:
+    step: StepProblem
+
+    def __init__(self, problem: ContactProblem, K: EffectiveMatrix, solver: Solver, tolerance: float) -> None:
         system = self.system = problem.static_load
         mass = EffectiveMatrix(system.M, system.algebra)
-        self.eps = REGULARISATION * step.A.largest / mass.largest
-        A = EffectiveMatrix(system.algebra.combine([(1.0, system.K), (self.eps, system.M)]), system.algebra)
-        self.certified = CertifiedSolver(problem, A, 1.0, [solver], NEAR * tolerance)
-        self.step, self.near, self.tolerance = step, replace(step, A=A), tolerance
+        self.eps = REGULARISATION * K.largest / mass.largest
+        self.A = EffectiveMatrix(system.algebra.combine([(1.0, system.K), (self.eps, system.M)]), system.algebra)
+        self.certified = CertifiedSolver(problem, self.A, 1.0, [solver], NEAR * tolerance)
+        self.tolerance = tolerance
 
-    def run(self) -> StepResult:
+    def solve(self, step: StepProblem) -> StepResult:
         """Iterates to the tolerance and on until the residual of the problem itself has not fallen twice running."""
-        u, active = self.step.guess, self.step.active
+        self.step, near = step, replace(step, A=self.A)
+        u, active = step.guess, step.active
         best: StepResult | None = None
         least, vain, old = np.inf, 0, None
         for _ in range(ITERATIONS):
-            b = self.step.b + self.eps * (self.system.M @ u)
-            result, _, _ = self.certified.solve(replace(self.near, b=b, guess=u, active=active))
-            worst = kkt_residual(self.step, result).worst
+            b = step.b + self.eps * (self.system.M @ u)
+            result, _, _ = self.certified.solve(replace(near, b=b, guess=u, active=active))
+            worst = kkt_residual(step, result).worst
             vain = 0 if worst < least else vain + 1
             least, best = (worst, result) if worst < least else (least, best)
             if vain == 2 and best is not None and least <= self.tolerance:
@@ -159,7 +178,7 @@ class _Proximal:
             return 0.0
         surface, ratio = self.step.surface, new.pace / old.pace
         rows = self._closes(new) & ~result.active
-        gap = surface.gap0[rows] - surface.normal_values(result.x)[rows]
+        gap = (self.step.bound - surface.normal_values(result.x))[rows]
         stop = float(np.min(np.maximum(gap, 0.0) / new.closing[rows], initial=np.inf))
         ahead = min(stop, ratio / (1.0 - ratio) if ratio < UNBRAKED else np.inf)
         aside = self._size(new.d - ratio * old.d, new.momentum - ratio * old.momentum)

@@ -61,9 +61,10 @@ class ContactProblem:
     @cached_property
     def equations(self) -> SemiDiscreteSystem:
         """The system in the rotated basis, with the inertia loads -M r a_g(t) of the excitations; schemes see this."""
-        system = self.static_load
+        system = self._turned
         if self.mass is not None:
             system = self.mass.apply(system, self.surface, tangential=self.frictional)
+        system = self._relative(system)
         inertia = []
         for excitation in self.excitations:
             rigid = system.influence @ np.asarray(excitation.direction, dtype=float)
@@ -72,20 +73,31 @@ class ContactProblem:
 
     @cached_property
     def static_load(self) -> SemiDiscreteSystem:
-        """The rotated system without excitation: the gravity stage."""
+        """The system in the basis of the equations, without excitation: the gravity stage."""
+        return self._relative(self._turned)
+
+    @cached_property
+    def _turned(self) -> SemiDiscreteSystem:
         return self.system if self.surface.basis is None else self.system.in_basis(self.surface.basis)
+
+    def _relative(self, system: SemiDiscreteSystem) -> SemiDiscreteSystem:
+        return system if self.surface.coupling is None else system.in_relative(self.surface.coupling)
 
     @property
     def frictional(self) -> bool:
         """Whether tangential reactions can occur at all."""
         return not isinstance(self.friction, Frictionless)
 
-    def slip_origin(self, u: Array) -> Array | None:
-        """B_t u, where the slip of a step that starts from u is zero; None without friction."""
-        return self.surface.tangential_values(u) if self.frictional else None
+    def slip_origin(self, u: Array, start: float, end: float) -> Array | None:
+        """B_t u plus what the obstacle slides until then: where the slip of a step is zero; None without friction."""
+        if not self.frictional:
+            return None
+        origin, sliding = self.surface.tangential_values(u), self.surface.sliding(start, end)
+        return origin if sliding is None else origin + sliding
 
     def cartesian(self, x: Array) -> Array:
-        """T x: unknowns in the rotated basis back to the system's own."""
+        """T R x: unknowns of the equations back to the system's own."""
+        x = x if self.surface.coupling is None else self.surface.coupling @ x
         return x if self.surface.basis is None else self.surface.basis @ x
 
     def ground_acceleration(self, t: float) -> Array:

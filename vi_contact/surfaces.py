@@ -111,7 +111,11 @@ class ContactSurface:
         compliance: (m,) of the support [m/N]; 0 is rigid (springs, remark after seed 000 eq. 6).
         owned: indices in û of the normal unknowns this rank owns; slots: their rows among the m conditions.
         tangents: (len(owned), d-1) indices in û of the tangential unknowns of the same points; -1 where prescribed.
-        basis: T with u = T û, or None when the nodal frames already point along the axes.
+        basis: T with u = T û, the turn into nodal frames, or None when they already point along the axes.
+        coupling: R with û = R ǔ where the other side deforms too: the unknowns of a contact point are then those of its
+            displacement relative to that side; R - 1 takes from rows of other points only. None on an obstacle.
+        motion: how far the obstacle has moved towards the body at time t, (m,) [m]; None for one at rest.
+        slide: how far it has moved along the tangents at time t, (m, d-1) [m]; None for one at rest.
     """
 
     comm: Comm
@@ -125,6 +129,9 @@ class ContactSurface:
     slots: Indices
     tangents: Indices
     basis: Matrix | None = None
+    coupling: Matrix | None = None
+    motion: Callable[[float], Array] | None = None
+    slide: Callable[[float], Array] | None = None
 
     @property
     def count(self) -> int:
@@ -151,6 +158,35 @@ class ContactSurface:
             free = self.tangents >= 0
             load[self.tangents[free]] = r_t[self.slots][free]
         return load
+
+    def gap(self, t: float) -> Array:
+        """The gap of the undeformed body at time t, (m,) [m]: gap0 less what the obstacle has moved."""
+        return self.gap0 if self.motion is None else self.gap0 - self.motion(t)
+
+    def advance(self, start: float, end: float) -> Array | None:
+        """What the obstacle moves towards the body between two times, (m,) [m]; None for one at rest."""
+        return None if self.motion is None else self.motion(end) - self.motion(start)
+
+    def sliding(self, start: float, end: float) -> Array | None:
+        """What the obstacle moves along the tangents between two times, (m, d-1) [m]; None for one at rest."""
+        return None if self.slide is None else self.slide(end) - self.slide(start)
+
+    def moving(
+        self,
+        towards: Callable[[float], float | Array] | None = None,
+        along: Callable[[float], float | Array] | None = None,
+    ) -> ContactSurface:
+        """On an obstacle that moves: ``towards`` the body and ``along`` the tangents, t [s] -> [m], one value for all
+        points or arrays of shape (m,) and (m, d-1). A moving obstacle is not turned; its points face the same nodes."""
+
+        def spread(function: Callable[[float], float | Array], shape: tuple[int, ...]) -> Callable[[float], Array]:
+            return lambda t: np.broadcast_to(np.asarray(function(t), dtype=float), shape)
+
+        return replace(
+            self,
+            motion=None if towards is None else spread(towards, (self.count,)),
+            slide=None if along is None else spread(along, (self.count, self.tangents.shape[1])),
+        )
 
     def held(self) -> ContactSurface:
         """The bilateral comparison case: every point stays on the obstacle."""

@@ -138,3 +138,25 @@ class SemiDiscreteSystem:
             v0=T.transpose_apply(self.v0),
             _cache={},
         )
+
+    def in_relative(self, R: Matrix) -> SemiDiscreteSystem:
+        """The same system in the unknowns ǔ of û = R ǔ, in which contact points move relative to the other body.
+
+        R = 1 + N with N N = 0 (nobody's partner is somebody's partner), so that R⁻¹ = 2 - R.
+        """
+        turn = self.algebra.congruence
+
+        def inverse(x: Array) -> Array:
+            return 2.0 * x - R @ x
+
+        return replace(
+            self,
+            M=turn(R, self.M),
+            C=None if self.C is None else turn(R, self.C),
+            K=turn(R, self.K),
+            load=self.load.in_basis(R),
+            influence=np.column_stack([inverse(column) for column in self.influence.T]),
+            u0=inverse(self.u0),
+            v0=inverse(self.v0),
+            _cache={},
+        )

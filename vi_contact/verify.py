@@ -116,8 +116,8 @@ def energy_balance(
 
     The step satisfied M a + C v + K u = f - B_nᵀ r_n - B_tᵀ r_t with the averages of ``balance``. Times the increment
     du:
-        input = f·du,  damping = du·C v,  contact = r_n·B_n du (work lost to the support, stored or dissipated there),
-        friction = r_t·B_t du,
+        input = f·du + work of a moving obstacle,  damping = du·C v,
+        contact = r_n·B_n du (work lost to the support, stored or dissipated there),  friction = r_t·B_t du,
         algorithmic = du·M a - ½(v0 + v1)·M (v1 - v0) + du·K u - ½(u0 + u1)·K du   (0 for the midpoint rule)
     and change is the difference of the energies themselves, so the defect measures the equation of motion.
     ``before``, ``after``: the energies of both states, when known; one product (two with damping) is left then.
@@ -134,11 +134,21 @@ def energy_balance(
         (balance.u - 0.5 * (old.u + new.u), after.elastic - before.elastic),
         (du, np.zeros_like(du) if system.C is None else system.C @ balance.v),
     )
+    obstacle = _obstacle_work(problem, old.t, new.t, balance)
+    rubbing = 0.0 if balance.r_t is None else float(np.sum(balance.r_t * surface.tangential_values(du)))
     return StepEnergy(
         change=after.total - before.total,
-        input=float(work),
+        input=float(work + obstacle[0] + obstacle[1]),
         damping=float(damping),
-        contact=float(balance.r_n @ surface.normal_values(du)),
-        friction=0.0 if balance.r_t is None else float(np.sum(balance.r_t * surface.tangential_values(du))),
+        contact=float(balance.r_n @ surface.normal_values(du)) + obstacle[0],
+        friction=rubbing + obstacle[1],
         algorithmic=float(inertia - kinetic + stiffness),
     )
+
+
+def _obstacle_work(problem: ContactProblem, start: float, end: float, balance: Balance) -> tuple[float, float]:
+    """Work that a moving obstacle does on the body, (normal, tangential): r_n·advance and -r_t·sliding."""
+    advance, sliding = problem.surface.advance(start, end), problem.surface.sliding(start, end)
+    pushed = 0.0 if advance is None else float(balance.r_n @ advance)
+    dragged = 0.0 if sliding is None or balance.r_t is None else -float(np.sum(balance.r_t * sliding))
+    return pushed, dragged

@@ -38,10 +38,10 @@ def consistent_acceleration(problem: ContactProblem, state: State, dt: float) ->
 def _with_contact(problem: ContactProblem, state: State, force: Array, dt: float) -> tuple[Array, Array]:
     """The small problem of points that rest on their support."""
     surface = problem.surface
-    compression = surface.normal_values(state.u) - surface.gap0
+    compression = surface.normal_values(state.u) - surface.gap(state.t)
     springs = surface.reaction_load(_spring_reactions(surface, compression), len(force))
     resting = _resting(surface, compression, state)
-    slip = problem.slip_origin(state.v)
+    slip = _slip_rate(problem, state, dt)
     step = StepProblem(
         A=_mass(problem),
         b=force - springs,
@@ -61,6 +61,14 @@ def _with_contact(problem: ContactProblem, state: State, force: Array, dt: float
     )
     result = solver.solve(step)
     return result.x, springs + surface.reaction_load(result.r_n, len(force), result.r_t)
+
+
+def _slip_rate(problem: ContactProblem, state: State, dt: float) -> Array | None:
+    """Tangential velocity relative to the obstacle [m/s]; None without friction."""
+    if not problem.frictional:
+        return None
+    rate, sliding = problem.surface.tangential_values(state.v), problem.surface.sliding(state.t, state.t + dt)
+    return rate if sliding is None else rate - sliding / dt
 
 
 def without_inertia(problem: ContactProblem, a: Array) -> Array:

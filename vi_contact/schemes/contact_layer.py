@@ -27,7 +27,7 @@ def relaxed(problem: ContactProblem, state: State) -> State:
     step = StepProblem(
         A=A,
         b=np.where(inner, state.u, load),
-        bound=surface.gap0,
+        bound=surface.gap(state.t),
         surface=surface,
         scale=1.0,
         guess=state.u,
@@ -35,7 +35,7 @@ def relaxed(problem: ContactProblem, state: State) -> State:
         t=state.t,
         k=state.k,
         friction=problem.friction,
-        slip0=problem.slip_origin(state.u),
+        slip0=problem.slip_origin(state.u, state.t, state.t),
     )
     result, _, _ = CertifiedSolver(problem, A, 1.0, [Condensed()], TOLERANCE).solve(step)
     u = np.where(inner, state.u, result.x)

@@ -64,7 +64,7 @@ class ContactStabilisedNewmark(SingleStep):
         return StepProblem(
             A=A,
             b=b,
-            bound=problem.surface.gap0,
+            bound=problem.surface.gap(state.t + dt),
             surface=problem.surface,
             scale=2.0,
             guess=u_p,
@@ -72,7 +72,7 @@ class ContactStabilisedNewmark(SingleStep):
             t=state.t + dt,
             k=state.k + 1,
             friction=problem.friction,
-            slip0=problem.slip_origin(state.u),
+            slip0=problem.slip_origin(state.u, state.t, state.t + dt),
             rate_factor=1.0 / dt,
         )
 

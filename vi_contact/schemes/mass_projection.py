@@ -29,7 +29,7 @@ def admissible(problem: ContactProblem, state: State, u: Array, dt: float) -> tu
     """
     surface, system = problem.surface, problem.equations
     rigid = surface.compliance == 0.0
-    gap = np.where(rigid, surface.gap0 - surface.normal_values(u), np.inf)
+    gap = np.where(rigid, surface.gap(state.t + dt) - surface.normal_values(u), np.inf)
     closed = (gap < 0.0) | (surface.bilateral & rigid)
     if np.isnan(gap).any() or not np.any(gap[closed] != 0.0):
         return u, closed  # nothing in the way; of NaN the step itself tells

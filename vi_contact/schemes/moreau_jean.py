@@ -101,10 +101,13 @@ class MoreauJean(SingleStep):
         load = problem.equations.load
         return (1.0 - self.theta) * load(t) + self.theta * load(t + dt)
 
-    def _target(self, surface: ContactSurface, v_n: Array) -> Array:
-        """Largest normal velocity after the step of a closed point that had v_n before."""
+    def _target(self, problem: ContactProblem, state: State, dt: float) -> Array:
+        """Largest normal velocity after the step of a closed point; all refer to the velocity of the obstacle."""
+        surface, advance = problem.surface, problem.surface.advance(state.t, state.t + dt)
+        obstacle = 0.0 if advance is None else -advance / dt
+        v_n = surface.normal_values(state.v) - obstacle
         returning = -self.e if self.allow_energy_gain else -(1.0 - self.theta) / self.theta
-        return np.where(surface.bilateral, 0.0, np.where(v_n < 0.0, returning, -self.e) * v_n)
+        return obstacle + np.where(surface.bilateral, 0.0, np.where(v_n < 0.0, returning, -self.e) * v_n)
 
     def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem:
         """b = M v0 + dt (f_θ - K (u0 + theta (1 - theta) dt v0) - (1 - theta) C v0), and the bound on velocities."""
@@ -113,11 +116,12 @@ class MoreauJean(SingleStep):
         if system.C is not None:
             force -= system.C @ (left * state.v)
         closed = _closed(problem, state, dt)
-        slip = problem.slip_origin(state.u)
+        sliding = surface.sliding(state.t, state.t + dt)
+        slip = np.zeros((surface.count, surface.tangents.shape[1])) if sliding is None else sliding / dt
         return StepProblem(
             A=A,
             b=system.M @ state.v + dt * force,
-            bound=np.where(closed, self._target(surface, surface.normal_values(state.v)), np.inf),
+            bound=np.where(closed, self._target(problem, state, dt), np.inf),
             surface=surface,
             scale=dt,
             guess=state.v,
@@ -125,7 +129,7 @@ class MoreauJean(SingleStep):
             t=state.t + dt,
             k=state.k + 1,
             friction=problem.friction,
-            slip0=None if slip is None else np.zeros_like(slip),
+            slip0=slip if problem.frictional else None,
             rate_factor=1.0,
         )
 
@@ -149,6 +153,6 @@ class MoreauJean(SingleStep):
 def _closed(problem: ContactProblem, state: State, dt: float) -> Mask:
     """Points whose gap is closed in the middle of the step if nothing stops them, and bilateral ones."""
     surface = problem.surface
-    gap = surface.gap0 - surface.normal_values(state.u + 0.5 * dt * state.v)
+    gap = surface.gap(state.t + 0.5 * dt) - surface.normal_values(state.u + 0.5 * dt * state.v)
     size = surface.comm.max(np.array([max(max_abs(state.u), dt * max_abs(state.v))]))[0]
     return np.asarray((gap <= ROUND_OFF * size) | surface.bilateral)

@@ -53,7 +53,7 @@ class SS22(SingleStep):
         return StepProblem(
             A=A,
             b=A @ guess + force / self.theta2,
-            bound=problem.surface.gap0,
+            bound=problem.surface.gap(state.t + dt),
             surface=problem.surface,
             scale=1.0 / self.theta2,
             guess=guess,
@@ -61,7 +61,7 @@ class SS22(SingleStep):
             t=state.t + dt,
             k=state.k + 1,
             friction=problem.friction,
-            slip0=problem.slip_origin(state.u),
+            slip0=problem.slip_origin(state.u, state.t, state.t + dt),
             rate_factor=1.0 / dt,
         )
 

@@ -69,7 +69,7 @@ class Trapezoidal:
         return StepProblem(
             A=A,
             b=b,
-            bound=problem.surface.gap0,
+            bound=problem.surface.gap(state.t + dt),
             surface=problem.surface,
             scale=1.0,
             guess=state.u + dt * state.v,
@@ -77,7 +77,7 @@ class Trapezoidal:
             t=state.t + dt,
             k=state.k + 1,
             friction=problem.friction,
-            slip0=problem.slip_origin(state.u),
+            slip0=problem.slip_origin(state.u, state.t, state.t + dt),
             rate_factor=1.0 / dt,
         )
 
