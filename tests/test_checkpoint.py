@@ -18,10 +18,14 @@ from chain import chain_problem
 
 from vi_contact.errors import InputError
 from vi_contact.excitation import Harmonic
+from vi_contact.friction import Coulomb
 from vi_contact.impact import Inelastic, MassProjection
+from vi_contact.mass import ConsistentMass, Redistributed
 from vi_contact.recorders import Contact, Energy, Probe
 from vi_contact.schemes.linear_multistep import LinearMultistep
+from vi_contact.schemes.moreau_jean import MoreauJean
 from vi_contact.schemes.ss22 import SS22
+from vi_contact.schemes.trapezoidal import Trapezoidal
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.simulate import Solution, simulate
 from vi_contact.solvers.condensed import Condensed
@@ -50,10 +54,12 @@ def run(out: Path | None, steps: int = 250, *, problem: ContactProblem | None = 
 
 
 def difference(one: State, other: State) -> float:
-    """Largest relative difference of u, v, r_n and memory; infinite when time, step or contact set differ."""
+    """Largest relative difference of u, v, reactions and memory; infinite when time, step or contact set differ."""
     if (one.t, one.k) != (other.t, other.k) or not np.array_equal(one.active, other.active):
         return float("inf")
     pairs = [(one.u, other.u), (one.v, other.v), (one.r_n, other.r_n)]
+    if one.r_t is not None and other.r_t is not None:
+        pairs.append((one.r_t, other.r_t))
     pairs += [(one.memory[name], other.memory[name]) for name in other.memory]
     return max(float(np.max(np.abs(a - b), initial=0.0)) / (np.max(np.abs(b), initial=0.0) or 1.0) for a, b in pairs)
 
@@ -220,6 +226,45 @@ def test_restart_on_the_same_ranks(comm: Any, shared_tmp: Path) -> None:
     for name, values in straight.history.items():
         assert np.array_equal(parts.history[name], values, equal_nan=values.dtype != bool), name
     assert difference(parts.state, straight.state) == 0.0
+
+
+def rubbing_box(comm: Any, mass: Any) -> ContactProblem:
+    """A box of tetrahedra that is thrown obliquely onto a rough, inclined plane."""
+    from fem_problems import thrown_box
+
+    box = thrown_box(comm, angle=0.3, simplices=True, divisions=(4, 5, 3))
+    return replace(box, friction=Coulomb(0.3), mass=mass)
+
+
+FRICTIONAL = {"impulses": (MoreauJean(), ConsistentMass()), "massless": (Trapezoidal(), None)}
+
+
+@pytest.mark.parametrize(("scheme", "mass"), FRICTIONAL.values(), ids=FRICTIONAL.keys())
+def test_restart_with_friction_on_the_same_ranks(comm: Any, shared_tmp: Path, scheme: Any, mass: Any) -> None:
+    """A box that lands, rubs and begins to lift; reactions and slips too go on to the last bit, on all ranks."""
+    pytest.importorskip("dolfinx")
+    problem = rubbing_box(comm, mass)
+    settings: dict[str, Any] = {"scheme": scheme, "dt": 2e-3, "record": [Energy(), Contact()]}
+    straight = simulate(problem, steps=32, out=shared_tmp / "straight", **settings)
+    for until in (17, 30, 32):
+        parts = simulate(problem, steps=until, out=shared_tmp / "parts", restart=until > 17, **settings)
+    closed = straight.history["contact_active"]
+    assert closed[0] == 0 < closed[17] and np.ptp(closed[17:]) > 0
+    assert straight.state.r_t is not None and np.abs(straight.state.r_t).max() > 0.0
+    assert difference(parts.state, straight.state) == 0.0
+    assert comm.rank > 0 or equal_files(shared_tmp / "parts", shared_tmp / "straight")
+
+
+def test_restart_with_another_mass_matrix_is_refused(comm: Any, shared_tmp: Path) -> None:
+    """The default scheme on its own mass matrix does not go on with the consistent one; the sentence names both."""
+    pytest.importorskip("dolfinx")
+    box = rubbing_box(comm, None)
+    settings: dict[str, Any] = {"scheme": Trapezoidal(), "dt": 1e-3, "out": shared_tmp}
+    simulate(box, steps=3, **settings)
+    words = r"a run with mass = Redistributed\(lumping=0.4\) but this one has ConsistentMass\(\): restart the same"
+    with pytest.raises(InputError, match=words):
+        simulate(replace(box, mass=ConsistentMass()), steps=6, restart=True, **settings)
+    assert simulate(replace(box, mass=Redistributed()), steps=6, restart=True, **settings).state.k == 6
 
 
 def test_restart_on_another_number_of_ranks(comm: Any, shared_tmp: Path) -> None:
