@@ -22,6 +22,7 @@ from vi_contact.solvers.active_set import ActiveSet
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.hildreth import Hildreth
 from vi_contact.solvers.mprgp import ProjectedCG
+from vi_contact.time_steps import HalvedAtImpact, Schedule
 
 pytestmark = pytest.mark.serial
 HALF = ZienkiewiczWoodTaylor()
@@ -81,6 +82,49 @@ def test_differences_are_measured_at_their_size():
     assert entry["u"] == pytest.approx(1e-3, rel=1e-9) and entry["r_n"] == pytest.approx(0.25, rel=1e-9)
     assert entry["iterations_per_step"] == 2.0
     assert checked.worst == entry["r_n"]
+
+
+@dataclass(frozen=True)
+class WrongWhenClosing(Off):
+    """Off in the steps that close a point, but right in the shortest ones."""
+
+    shortest: Any
+
+    def prepare(self, A: Any, surface: Any, scale: float) -> Any:
+        wrong, right, off = Off.prepare(self, A, surface, scale), Condensed().prepare(A, surface, scale), self
+
+        class Prepared:
+            def solve(self, step: Any) -> Any:
+                result = right.solve(step)
+                final = np.array_equal(A @ step.guess, off.shortest @ step.guess)
+                return result if final or not np.any(result.active & ~step.active) else wrong.solve(step)
+
+        return Prepared()
+
+
+def test_attempts_that_were_thrown_away_do_not_count():
+    """HalvedAtImpact: every step that closes a point is halved, down to the last halving. Another solver that is wrong
+    in nothing but the attempts agrees, and as many steps are compared as were accepted."""
+    problem, base, plan = shaken(), 5e-3, HalvedAtImpact(5e-3, halvings=3)
+    accepted = list(run(problem, HALF, dt=plan, steps=200))
+    assert len(accepted) > 200 + 3 * 3
+    attempts = WrongWhenClosing(1.0, 2.0, HALF.effective_matrix(problem, base / 8))
+    checked = cross_check(problem, scheme=HALF, solvers=[Condensed(), attempts], dt=plan, steps=200)
+    assert checked.worst <= 1e-9 and checked.found[0].steps == len(accepted)
+    whole = cross_check(problem, scheme=HALF, solvers=[Condensed(), attempts], dt=base, steps=200)
+    assert whole.worst > 0.1 and whole.found[0].steps == 200
+
+
+def test_schedules_of_steps():
+    """The pieces of a Schedule, with halves in them; two runs with one CrossChecked add up."""
+    plan = HalvedAtImpact(Schedule(((5e-3, 0.1), (2e-3, np.inf))), halvings=2)
+    for dt in (plan, plan.dt):
+        accepted = len(list(run(shaken(), HALF, dt=dt, steps=120)))
+        checked = cross_check(shaken(), scheme=HALF, solvers=METHODS[:3], dt=dt, steps=120)
+        assert 0.0 < checked.worst <= 1e-9 and [one.steps for one in checked.found] == [accepted] * 2
+    for _ in run(shaken(), HALF, dt=plan.dt, steps=120, solver=checked):
+        pass
+    assert checked.found[0].steps == 2 * accepted
 
 
 def test_no_contact_and_no_steps():

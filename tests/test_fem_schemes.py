@@ -1,4 +1,4 @@
-"""Schemes with impulses on finite elements: volume and condensed routes take the same steps, on any number of ranks."""
+"""Schemes on finite elements: volume and condensed routes take the same steps, on any number of ranks."""
 
 from __future__ import annotations
 
@@ -15,12 +15,14 @@ from mpi4py import MPI
 
 from vi_contact.cross_check import cross_check
 from vi_contact.friction import Coulomb
-from vi_contact.mass import ConsistentMass
+from vi_contact.march import march
+from vi_contact.mass import ConsistentMass, Redistributed
 from vi_contact.schemes.contact_stabilised import ContactStabilisedNewmark
 from vi_contact.schemes.moreau_jean import MoreauJean
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.volume import OneFactorisation, ReducedNewton, Volume
 from vi_contact.step import ContactProblem
+from vi_contact.time_steps import HalvedAtImpact
 
 STEPS = 80
 SCHEMES = {
@@ -46,6 +48,19 @@ def test_volume_and_condensed_routes_take_the_same_steps(scheme: Any) -> None:
     checked = cross_check(wall(MPI.COMM_WORLD), scheme=scheme, solvers=solvers, dt=WALL_DT, steps=STEPS)
     assert len(checked.report()) == 2
     assert checked.worst <= 1e-9
+
+
+@pytest.mark.parametrize("dt", [WALL_DT, HalvedAtImpact(WALL_DT, halvings=2)], ids=["whole", "halved"])
+def test_default_scheme_takes_the_same_steps(dt: Any) -> None:
+    """V4.0: no scheme and no mass named, so redistributed mass and the trapezoidal rule; steps may be halved."""
+    problem = replace(wall(MPI.COMM_WORLD), mass=None)
+    solvers = (Condensed(), Volume(method=OneFactorisation()), Volume(method=ReducedNewton()))
+    checked = cross_check(problem, solvers=solvers, dt=dt, steps=STEPS)
+    accepted = [report for _, report in march(problem, dt=dt, steps=STEPS)]
+    assert accepted[0].problem.mass == Redistributed() and accepted[0].problem.equations.massless is not None
+    assert len({int(report.new.active.sum()) for report in accepted}) > 3  # contact opens and closes
+    assert [one.steps for one in checked.found] == [len(accepted)] * 2 and len(accepted) >= STEPS
+    assert 0.0 < checked.worst <= 1e-9
 
 
 @pytest.mark.parametrize("law", [{}, {"friction": Coulomb(0.4)}], ids=["frictionless", "Coulomb"])

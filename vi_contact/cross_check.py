@@ -6,7 +6,7 @@ Whole runs of an energy-growing scheme may drift apart by round-off; single step
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from .algebra import max_abs
 from .march import march
 from .step import ContactProblem, EffectiveMatrix, PreparedSolver, Scheme, Solver, State, StepProblem, StepResult
 from .surfaces import ContactSurface
+from .time_steps import TimeSteps
 
 
 @dataclass
@@ -46,7 +47,10 @@ class Disagreement:
 
 @dataclass
 class CrossChecked:
-    """A solver that also asks others at every step and remembers how far they are off; returns the primary's answer."""
+    """A solver that also asks others at every step and remembers how far they are off; returns the primary's answer.
+
+    ``found`` does not count attempts that ``HalvedAtImpact`` threw away.
+    """
 
     primary: Solver
     others: Sequence[Solver]
@@ -54,6 +58,14 @@ class CrossChecked:
 
     def __post_init__(self) -> None:
         self.found = [Disagreement() for _ in self.others]
+        self._earlier, self._last = self.found, (-1, 0.0)
+
+    def begin(self, step: StepProblem) -> None:
+        """Forgets the attempt before when this one is of the same step but shorter: that was thrown away."""
+        k, t = self._last
+        if step.k == k and step.t < t:
+            self.found = self._earlier
+        self._earlier, self._last = [replace(one) for one in self.found], (step.k, step.t)
 
     def check(self, problem: ContactProblem) -> None:
         """Every solver must be able to take the problem."""
@@ -95,6 +107,7 @@ class PreparedCrossCheck:
 
     def solve(self, step: StepProblem) -> StepResult:
         result = self._primary.solve(step)
+        self._settings.begin(step)
         for solver, found in zip(self._others, self._settings.found, strict=True):
             self._compare(result, solver.solve(step), found)
         return result
@@ -114,11 +127,14 @@ def cross_check(
     *,
     scheme: Scheme | None = None,
     solvers: Sequence[Solver],
-    dt: float,
+    dt: TimeSteps,
     steps: int,
     state: State | None = None,
 ) -> CrossChecked:
-    """Marches with the first solver and compares the others with it at every step; see ``worst`` and ``report()``."""
+    """Marches with the first solver and compares the others with it at every step; see ``worst`` and ``report()``.
+
+    ``dt`` and ``steps`` as in ``march``: ``steps`` counts base steps, the statistics all accepted ones.
+    """
     checked = CrossChecked(solvers[0], tuple(solvers[1:]))
     for _ in march(problem, scheme=scheme, solver=checked, dt=dt, steps=steps, state=state):
         pass
