@@ -67,6 +67,7 @@ _CONTENTS = {
     "march": ("march",),
     "time_steps": ("HalvedAtImpact", "Schedule"),
     "static": ("static_equilibrium",),
+    "load_steps": ("quasi_static",),
     "simulate": ("Solution", "simulate"),
     "recorders": ("Contact", "Energy", "Probe"),
     "cross_check": ("CrossChecked", "cross_check"),

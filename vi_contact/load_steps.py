@@ -1,0 +1,64 @@
+"""Load histories so slow that inertia does not matter: one static stage after another.
+
+Friction makes the equilibrium depend on the way to it. Each stage solves the static problem with slips counted from
+the stage before (slip rate times time step, implicit Euler):
+
+    K u_k = f(t_k) - B_nᵀ r_n - B_tᵀ r_t,    r_t against B_t (u_k - u_{k-1}),    |r_t| <= limit(r_n)
+
+so that t only orders the loads: histories of ``Traction`` and ``BodyForce``, ``Prescribed`` displacements, and
+obstacles that move. Without friction every stage is the equilibrium of its own loads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from .certified import TOLERANCE
+from .errors import InputError
+from .static import Equilibria, initial_state
+from .step import ContactProblem, Solver, State
+
+
+def quasi_static(
+    problem: ContactProblem,
+    times: Iterable[float],
+    *,
+    solver: Solver,
+    state: State | None = None,
+    tolerance: float = TOLERANCE,
+) -> Iterator[State]:
+    """Yields the equilibrium at each of the times, from where the one before left the body. v = 0; k counts stages.
+
+    A load that grows in proportion needs one step as long as all slips go one way; a cyclic one at least a step for
+    every turn, and more where zones of slip grow (small steps follow the path, the error is that of implicit Euler).
+    K is factorised once. Prescribed motions should have no velocity and acceleration: their C U' + M U'' are loads.
+
+    Args:
+        times: increasing, none before ``state.t``; the loads are taken there, excitations are not.
+        state: where the history starts, from ``static_equilibrium`` or an earlier history; u0 at t = 0 without
+            reactions when None. A body pressed without friction first: the state of that problem.
+    Raises:
+        InputError: times that do not increase; loads that drive a rigid motion which nothing stops.
+        StepFailure: no answer below the certificate tolerance.
+    """
+    state = initial_state(problem) if state is None else state
+    order = _checked(times, state.t)
+    return _stages(Equilibria(problem, solver=solver, tolerance=tolerance), state, order)
+
+
+def _stages(equilibria: Equilibria, state: State, times: list[float]) -> Iterator[State]:
+    for t in times:
+        state = replace(equilibria.after(state, t), k=state.k + 1)
+        yield state
+
+
+def _checked(times: Iterable[float], start: float) -> list[float]:
+    """The times as a list."""
+    order = [float(t) for t in times]
+    ways = np.diff([start, *order])
+    if not (np.all(np.isfinite(ways)) and np.all(ways >= 0.0) and np.all(ways[1:] > 0.0)):
+        raise InputError(f"load steps from t = {start:g} s at {order}: give times that increase, none before the start")
+    return order
