@@ -36,6 +36,10 @@ class ChainSpace:
     def coordinates(self) -> Array:
         return np.arange(1.0, self.unknowns + 1.0)[:, None]
 
+    @property
+    def bodies(self) -> Any:
+        return np.zeros(self.unknowns, dtype=np.int64)
+
     def find_nodes(self, points: Array) -> Any:
         nodes = np.rint(np.asarray(points, dtype=float)[:, 0]).astype(int) - 1
         if np.any((nodes < 0) | (nodes >= self.unknowns)):

@@ -19,6 +19,7 @@ from vi_contact.friction import Coulomb
 from vi_contact.impact import Inelastic
 from vi_contact.march import march
 from vi_contact.mass import ConsistentMass, Redistributed
+from vi_contact.materials import Rayleigh
 from vi_contact.schemes.trapezoidal import Trapezoidal
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.step import ContactProblem
@@ -84,6 +85,21 @@ def test_only_the_contact_nodes_lose_their_mass(name: str, friction: Any) -> Non
     assert not M[none].any() and not M[:, none].any()
     assert np.allclose(M, M.T, rtol=0.0, atol=1e-14 * np.abs(M).max())
     assert np.linalg.eigvalsh(M[np.ix_(~none, ~none)])[0] > 0.0
+
+
+@pytest.mark.parametrize("name", [name for name in FINER if name != "bar"])
+def test_rigid_motions_are_not_damped(name: str) -> None:
+    """Stiffness-proportional damping on redistributed mass leaves every rigid motion alone, as on consistent mass."""
+    mesh, tags = block(MPI.COMM_WORLD, **FINER[name])
+    system = assemble(mesh, CONCRETE, damping=Rayleigh(alpha=0.0, beta=1e-3))
+    given = ContactProblem(system, contact_surface(system, tags["left"], obstacle=Touching()), mass=Redistributed())
+    C, x = given.equations.C, given.equations.space.coordinates
+    assert C is not None
+    influence = given.system.influence
+    turn = influence[:, 1] * x[:, 0] - influence[:, 0] * x[:, 1]
+    turn = turn if given.surface.basis is None else given.surface.basis.transpose_apply(turn)
+    size = float(given.surface.comm.max(np.array([np.abs(C.diagonal()).max() * np.abs(turn).max()]))[0])
+    assert float(given.surface.comm.max(np.array([np.abs(C @ turn).max()]))[0]) <= 1e-12 * size
 
 
 def test_the_matrix_is_the_same_on_all_ranks() -> None:

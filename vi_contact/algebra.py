@@ -8,7 +8,7 @@ returned by ``dot`` and by ``Comm`` are the same number on every rank.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -80,8 +80,16 @@ class Algebra(Protocol):
         """A with the rows and columns of the masked unknowns replaced by those of the identity."""
         ...
 
-    def handing_over(self, M: Matrix, rows: Mask, donors: Mask, weight: Array) -> Matrix:
-        """P of v = P v: masked rows i hold M_ij/weight_i over the unknowns j of ``donors``, others the identity."""
+    def first(self, n: int) -> int:
+        """The number, among those of all ranks, of the first of the n unknowns that this rank owns."""
+        ...
+
+    def entries(self, A: Matrix, row: int) -> tuple[Indices, Array]:
+        """(columns numbered over all ranks, values) of an owned row."""
+        ...
+
+    def replaced_rows(self, n: int, rows: Mapping[int, tuple[Indices, Array]]) -> Matrix:
+        """The identity with some owned rows replaced by (columns numbered over all ranks, values); n owned rows."""
         ...
 
     def factor(self, A: Matrix) -> Factor: ...
@@ -163,11 +171,16 @@ class SerialAlgebra:
         free = sp.diags([(~mask).astype(float)], [0])
         return SerialMatrix(free @ serial(A).csr @ free + sp.diags([mask.astype(float)], [0]))
 
-    def handing_over(self, M: Matrix, rows: Mask, donors: Mask, weight: Array) -> Matrix:
-        share = np.divide(1.0, weight, out=np.zeros(len(rows)), where=rows)
-        taken = sp.diags([share], [0]) @ serial(M).csr @ sp.diags([donors.astype(float)], [0])
-        taken.eliminate_zeros()
-        return SerialMatrix(taken + sp.diags([(~rows).astype(float)], [0]))
+    def first(self, n: int) -> int:
+        return 0
+
+    def entries(self, A: Matrix, row: int) -> tuple[Indices, Array]:
+        csr = serial(A).csr
+        part = slice(csr.indptr[row], csr.indptr[row + 1])
+        return csr.indices[part].astype(np.int64), csr.data[part]
+
+    def replaced_rows(self, n: int, rows: Mapping[int, tuple[Indices, Array]]) -> Matrix:
+        return SerialMatrix(sp.csr_matrix(identity_with(n, rows, first=0, columns=n)))
 
     def factor(self, A: Matrix) -> Factor:
         return SerialFactor(serial(A))
@@ -181,3 +194,13 @@ def serial(matrix: Matrix) -> SerialMatrix:
     if not isinstance(matrix, SerialMatrix):
         raise TypeError(f"SerialAlgebra got a {type(matrix).__name__}")
     return matrix
+
+
+def identity_with(n: int, rows: Mapping[int, tuple[Indices, Array]], *, first: int, columns: int) -> sp.coo_matrix:
+    """n rows of the identity, whose ones begin in column ``first``, with some rows replaced by (columns, values)."""
+    kept = np.setdiff1d(np.arange(n), np.fromiter(rows, dtype=np.int64, count=len(rows)))
+    where = [kept] + [np.full(len(found), row) for row, (found, _) in rows.items()]
+    column = [first + kept] + [found for found, _ in rows.values()]
+    values = [np.ones(len(kept))] + [value for _, value in rows.values()]
+    entries = np.concatenate(values), (np.concatenate(where), np.concatenate(column))
+    return sp.coo_matrix(entries, shape=(n, columns))

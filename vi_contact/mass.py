@@ -14,13 +14,13 @@ from typing import Protocol
 
 import numpy as np
 
-from .algebra import Array, Indices, Mask, Matrix, max_abs
+from .algebra import Array, Comm, Indices, Mask, Matrix, max_abs
 from .errors import InputError
+from .handing_over import from_neighbours
 from .surfaces import ContactSurface
 from .system import SemiDiscreteSystem
 
-LARGEST_CORRECTION = 0.5  # of a node's lumped mass: beyond, the mesh is too coarse to move mass about
-NOTHING = 1e-10  # of a node's own mass: neighbours with less cannot carry it
+LARGEST_CORRECTION = 0.35  # of a node's lumped mass: beyond, the mesh is too coarse to move mass about
 
 
 class MassLaw(Protocol):
@@ -44,13 +44,12 @@ class Redistributed:
     """Massless normal unknowns of all contact nodes; with friction (``tangential``) massless tangential ones too.
 
     M* = Pᵀ M_l P + D with M_l = (1 - lumping) M + lumping diag(row sums of M). P gives every contact node the velocity
-    of its neighbours behind the surface, weighted with their entries of M: it hands the node's mass to them, keeps
-    every translation as it is, and makes M* positive semidefinite by construction. The nodal masses D, polynomials of
-    degree 2 in the coordinates times those of M and of the order of (mesh size / body size)², then restore what the
-    shift by one element changed: the mass matrix of rigid motions (total mass, centre of mass, all moments and products
-    of inertia), in 1D mass, centre and second moment.
-
-    Damping sees the same velocities, C* = PᵀCP: a force on massless unknowns that depends on their rate would ring.
+    of the rigid motion that fits its neighbours behind the surface best: it hands the node's mass to them, keeps every
+    rigid motion as it is, and makes M* positive semidefinite. The nodal masses D, polynomials of degree 2 in the
+    coordinates times those of M and of the order of (mesh size / body size)², restore what the lumping changed: the
+    mass matrix of rigid motions (total mass, centre of mass, all moments and products of inertia) of every body; in 1D
+    also what the shift by one element changed, centre and second moment. Damping sees the same velocities, C* = PᵀCP:
+    a force on massless unknowns that depends on their rate would ring.
 
     ``lumping`` 0.4 balances the dispersion of mesh and time step: consistent mass sends high frequencies ahead of
     the wave, lumped mass leaves them behind (table in docs/schemes.md). InputError for lumping outside [0, 1], a
@@ -72,10 +71,16 @@ class Redistributed:
         every = np.arange(system.rows)
         lumped = algebra.local(every, every, nodal, system.rows)
         bulk = algebra.combine([(1.0 - self.lumping, system.M), (self.lumping, lumped)])
-        moved, C = _handed_over(system, [bulk, system.C], massless, contact, nodal)
-        assert moved is not None
-        correction = _inertia_correction(system, moved, ~contact, nodal)
-        M = algebra.combine([(1.0, moved), (1.0, correction)])
+        levels = from_neighbours(system, massless, contact, nodal)
+        moved = _congruent(system, levels, bulk)
+        C = None if system.C is None else _congruent(system, levels, system.C)
+        bodies = system.space.bodies
+        last = int(algebra.comm.max(np.array([float(np.max(bodies, initial=0))]))[0])
+        corrections = [
+            _inertia_correction(system, moved, ~contact & (bodies == body), bodies == body, nodal)
+            for body in range(last + 1)
+        ]
+        M = algebra.combine([(1.0, moved), *((1.0, correction) for correction in corrections)])
         return replace(system, M=M, C=C, massless=massless, _cache={})
 
 
@@ -93,28 +98,11 @@ def _row_sums(system: SemiDiscreteSystem) -> Array:
     return np.asarray(sum(r * (system.M @ r) for r in system.influence.T))
 
 
-def _handed_over(
-    system: SemiDiscreteSystem, matrices: Sequence[Matrix | None], massless: Mask, contact: Mask, nodal: Array
-) -> list[Matrix | None]:
-    """Pᵀ A P of each: contact nodes hand over inwards, those without inner neighbours to contact nodes that have."""
-    levels: list[tuple[Mask, Mask, Array]] = []
-    left, donors = massless.copy(), ~contact
-    comm = system.algebra.comm
-    while comm.max(np.array([float(left.any())]))[0]:
-        weight = np.asarray(sum(r * (system.M @ (donors * r)) for r in system.influence.T))
-        ready = left & (weight > NOTHING * nodal)
-        if not comm.max(np.array([float(ready.any())]))[0]:
-            raise InputError(
-                "the mass of some contact nodes has nowhere to go, no node behind them carries any: refine the mesh "
-                "across the body, or give the problem mass=ConsistentMass()"
-            )
-        levels.append((ready, donors.copy(), weight))
-        left, donors = left & ~ready, ready
-    moved = list(matrices)
-    for ready, donors, weight in reversed(levels):
-        P = system.algebra.handing_over(system.M, ready, donors, weight)
-        moved = [None if A is None else system.algebra.congruence(P, A) for A in moved]
-    return moved
+def _congruent(system: SemiDiscreteSystem, levels: Sequence[Matrix], A: Matrix) -> Matrix:
+    """PᵀAP for the product P of the levels, the last one applied to velocities first."""
+    for P in levels:
+        A = system.algebra.congruence(P, A)
+    return A
 
 
 def _motions(system: SemiDiscreteSystem, x: Array) -> Array:
@@ -129,32 +117,42 @@ def _motions(system: SemiDiscreteSystem, x: Array) -> Array:
     return np.column_stack(modes)
 
 
-def _inertia_correction(system: SemiDiscreteSystem, moved: Matrix, inner: Mask, nodal: Array) -> Matrix:
-    """D: smallest nodal masses m_i p(x_i) on inner nodes, p a symmetric (d, d) matrix of polynomials of degree 2, such
-    that Rᵀ(M* + D)R = RᵀMR for the rigid motions R."""
+def _inertia_correction(system: SemiDiscreteSystem, moved: Matrix, inner: Mask, body: Mask, nodal: Array) -> Matrix:
+    """D of one body: smallest nodal masses m_i p(x_i) on its inner nodes, p a symmetric (d, d) matrix of polynomials of
+    degree 2, such that Rᵀ(M* + D)R = RᵀMR for its rigid motions R."""
     comm, d = system.algebra.comm, system.influence.shape[1]
     points = system.space.coordinates
-    high = comm.max(np.max(points, axis=0, initial=-np.inf))
-    low = -comm.max(np.max(-points, axis=0, initial=-np.inf))
-    x = (points - 0.5 * (low + high)) / max(float(np.max(high - low)), np.finfo(float).tiny)
-    R = _motions(system, x)
+    high = comm.max(np.max(points[body], axis=0, initial=-np.inf))
+    low = -comm.max(np.max(-points[body], axis=0, initial=-np.inf))
+    x = (points - 0.5 * (low + high)) / max(float(np.max(high - low)), 1e-300)
+    R = _motions(system, x) * body[:, None]
     upper = np.triu_indices(R.shape[1])
     wanted = R.T @ np.column_stack([system.M @ mode - moved @ mode for mode in R.T])
-    powers = [np.ones(len(x)), *x.T] + [x[:, i] * x[:, j] for i in range(d) for j in range(i, d)]
+    powers = np.column_stack([np.ones(len(x)), *x.T] + [x[:, i] * x[:, j] for i in range(d) for j in range(i, d)])
     pairs = list(_pairs_of_components(system, inner))
+    shapes = [powers[i] @ _orthonormal(comm, powers[i], nodal[i]) for i, _ in pairs]
     effects = []
-    for i, j in pairs:
-        for power in powers:
-            block = R[i].T @ ((nodal[i] * power[i])[:, None] * R[j])
+    for (i, j), shape in zip(pairs, shapes, strict=True):
+        for p in shape.T:
+            block = R[i].T @ ((nodal[i] * p)[:, None] * R[j])
             effects.append((0.5 * (block + block.T))[upper])
     packed = comm.sum(np.column_stack([wanted[upper], *effects]))
-    coefficients = np.linalg.lstsq(packed[:, 1:], packed[:, 0], rcond=1e-10)[0].reshape(len(pairs), len(powers))
-    shares = [np.column_stack(powers)[i] @ c for (i, _), c in zip(pairs, coefficients, strict=True)]
-    _refuse_coarse(float(comm.max(np.array([max(max_abs(share) for share in shares)]))[0]))
+    coefficients = np.linalg.lstsq(packed[:, 1:], packed[:, 0], rcond=1e-10)[0]
+    ends = np.cumsum([shape.shape[1] for shape in shapes])[:-1]
+    shares = [shape @ c for shape, c in zip(shapes, np.split(coefficients, ends), strict=True)]
+    _refuse_coarse(float(comm.max(np.array([max_abs(np.concatenate(shares))]))[0]))
     i, j = (np.concatenate([pair[side] for pair in pairs]) for side in (0, 1))
     value = 0.5 * np.concatenate(shares) * nodal[i]
     both = np.concatenate([i, j]), np.concatenate([j, i])
     return system.algebra.local(*both, np.tile(value, 2), system.rows)
+
+
+def _orthonormal(comm: Comm, powers: Array, nodal: Array) -> Array:
+    """Columns c such that the polynomials powers @ c are orthonormal with the nodal masses as weights: with them the
+    smallest coefficients are the smallest changes of nodal masses. Dependent polynomials are left out."""
+    values, vectors = np.linalg.eigh(comm.sum(powers.T @ (nodal[:, None] * powers)))
+    kept = values > 1e-10 * values[-1]
+    return np.asarray(vectors[:, kept] / np.sqrt(values[kept]))
 
 
 def _pairs_of_components(system: SemiDiscreteSystem, inner: Mask) -> Iterator[tuple[Indices, Indices]]:

@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from ..algebra import Array, Factor, Indices, Mask, Matrix
+from ..algebra import Array, Factor, Indices, Mask, Matrix, identity_with
 from ..errors import InputError
 
 PREFIX = "vi_contact_factor_"
@@ -202,13 +202,30 @@ class PetscAlgebra:
         return PetscMatrix(as_petsc(K).mat.PtAP(as_petsc(T).mat))
 
     def local(self, rows: Indices, columns: Indices, values: Array, n: int) -> Matrix:
-        entries = sp.csr_matrix((values, (rows, columns)), shape=(n, n))
-        first = int(self.comm.mpi.exscan(n) or 0)
-        kind = PETSc.IntType
-        csr = (entries.indptr.astype(kind), (first + entries.indices).astype(kind), entries.data)
+        places = rows, self.first(n) + np.asarray(columns)
+        return self._matrix(sp.coo_matrix((values, places), shape=(n, self._all(n))))
+
+    def _matrix(self, rows: sp.coo_matrix) -> PetscMatrix:
+        """The square matrix of which this rank owns these rows, columns numbered over all ranks."""
+        entries, kind, n = sp.csr_matrix(rows), PETSc.IntType, rows.shape[0]
+        csr = (entries.indptr.astype(kind), entries.indices.astype(kind), entries.data)
         mat = PETSc.Mat().createAIJ(((n, None), (n, None)), csr=csr, comm=self.comm.mpi)
         mat.assemble()
         return PetscMatrix(mat)
+
+    def first(self, n: int) -> int:
+        return int(self.comm.mpi.exscan(n) or 0)
+
+    def _all(self, n: int) -> int:
+        return int(self.comm.mpi.allreduce(n))
+
+    def entries(self, A: Matrix, row: int) -> tuple[Indices, Array]:
+        mat = as_petsc(A).mat
+        columns, values = mat.getRow(mat.getOwnershipRange()[0] + row)
+        return columns.astype(np.int64), values
+
+    def replaced_rows(self, n: int, rows: Mapping[int, tuple[Indices, Array]]) -> Matrix:
+        return self._matrix(identity_with(n, rows, first=self.first(n), columns=self._all(n)))
 
     def held(self, A: Matrix, mask: Mask) -> Matrix:
         every = np.arange(len(mask))
@@ -217,27 +234,6 @@ class PetscAlgebra:
         rows = (mat.getOwnershipRange()[0] + np.flatnonzero(mask)).astype(PETSc.IntType)
         mat.zeroRowsColumns(rows, diag=1.0)
         return PetscMatrix(mat)
-
-    def handing_over(self, M: Matrix, rows: Mask, donors: Mask, weight: Array) -> Matrix:
-        mat, mpi = as_petsc(M).mat, self.comm.mpi
-        first = mat.getOwnershipRange()[0]
-        excluded = np.concatenate(mpi.allgather(first + np.flatnonzero(~donors)))
-        taken = {}
-        for row in np.flatnonzero(rows):
-            columns, values = mat.getRow(first + row)
-            kept = (values != 0.0) & ~np.isin(columns, excluded)
-            taken[row] = (columns[kept].astype(PETSc.IntType), values[kept] / weight[row])
-        width = max((len(columns) for columns, _ in taken.values()), default=1)
-        size = (len(rows), None)
-        P = PETSc.Mat().createAIJ((size, size), nnz=(max(width, 1), width), comm=mpi)
-        P.setUp()
-        for row in range(len(rows)):
-            if row in taken:
-                P.setValues(first + row, *taken[row])
-            else:
-                P.setValue(first + row, first + row, 1.0)
-        P.assemble()
-        return PetscMatrix(P)
 
     def factor(self, A: Matrix) -> Factor:
         return PetscFactor(as_petsc(A))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from petsc4py import PETSc
 from ..algebra import Array, Indices, Mask
 from ..errors import InputError
 from . import compat
+from .bodies import body_numbers
 from .loads import Prescribed, evaluate_here, refuse
 from .mesh import node_numbers
 from .petsc_algebra import MpiComm
@@ -91,6 +93,12 @@ class FemSpace:
     def coordinates(self) -> Array:
         """Positions (rows, d) of the nodes of the free unknowns [m]."""
         return np.asarray(np.repeat(self.points, self.dimension, axis=0)[self.free])
+
+    @cached_property
+    def bodies(self) -> Indices:
+        """The body of every free unknown: parts of the mesh that share no node, in the order of their node numbers."""
+        bodies = body_numbers(self.mesh, node_numbers(self.mesh))[compat.dof_to_node(self.V)[: len(self.nodes)]]
+        return np.asarray(np.repeat(bodies, self.dimension)[self.free])
 
     # Vectors ---------------------------------------------------------------------------------------------------------
 
