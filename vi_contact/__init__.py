@@ -22,7 +22,7 @@ _CONTENTS = {
     "materials": (
         "LinearElastic", "MassProportional", "NoDamping", "PlaneStrain", "PlaneStress", "Rayleigh", "Solid",
     ),
-    "friction": ("Coulomb", "Frictionless", "Tresca"),
+    "friction": ("Coulomb", "ExponentialDecay", "Frictionless", "SlipRateCoulomb", "StaticKinetic", "Tresca"),
     "impact": ("ComponentReset", "Elastic", "Inelastic", "MassProjection", "Newton", "NoImpact"),
     "excitation": (
         "FullSine", "GroundMotion", "HalfSine", "Harmonic", "Rectangular", "Ricker", "Tabulated",
@@ -63,6 +63,10 @@ _CONTENTS = {
     "solvers.friction_newton": ("FrictionNewton",),
     "solvers.nsgs": ("NSGS",),
     "solvers.fixed_point": ("FixedPoint",),
+    "solvers.given_forces": ("GivenForces",),
+    "solvers.uzawa": ("Uzawa",),
+    "solvers.extrapolation": ("Aitken", "Anderson", "Plain"),
+    "solvers.slip_rate": ("RateIteration",),
     # the loop and what listens to it
     "march": ("march",),
     "time_steps": ("HalvedAtImpact", "Schedule"),

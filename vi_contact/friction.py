@@ -6,12 +6,13 @@ With r_n >= 0 the normal reaction of a contact node and r_t its tangential react
 
 and differs only in `limit`, which is affine in the pressure: limit = cohesion + slope max(r_n, 0). Reactions are forces
 [N] for displacement schemes and impulses [N s] for velocity schemes; `scale` (1 or the time step [s]) is the factor
-between the two, so that a stress times a nodal weight becomes either.
+between the two, so that a stress times a nodal weight becomes either. The slope may depend on the slip rate: `at`.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from numbers import Real
 from typing import Any, Protocol
@@ -38,7 +39,10 @@ class FrictionLaw(Protocol):
         ...
 
     def at(self, speed: Array) -> FrictionLaw:
-        """The law at slip rates |v| [m/s], shape (n,); ``limit`` and ``slope`` of a law itself are those at rest."""
+        """The law at slip rates |v| [m/s], shape (n,), with a slope of its own.
+
+        ``limit`` and ``slope`` of a law itself are those at rest. A law that does not know rates returns itself.
+        """
         ...
 
 
@@ -111,6 +115,93 @@ class Coulomb:
         return self
 
 
+@dataclass(frozen=True)
+class SlipRateCoulomb:
+    """Dry friction whose coefficient depends on the slip rate: limit = mu(|v|) · r_n.
+
+    ``mu``: ExponentialDecay, StaticKinetic, or any function that takes speeds [m/s] >= 0, shape (n,), and returns as
+    many coefficients, or one. Raises InputError when it is no function, and, when used, for a coefficient that is
+    negative or not finite, naming the rate.
+
+    Implicit: |v| is the rate of the step that is being solved, (B_t u1 - B_t u0)/dt, or B_t v1 for velocity schemes.
+    mu(0) is the static coefficient.
+    """
+
+    mu: Callable[[Array], Any]
+
+    def __post_init__(self) -> None:
+        if not callable(self.mu):
+            raise InputError(f"SlipRateCoulomb: mu is {self.mu!r}; give a function of the slip rate, or use Coulomb()")
+
+    def at(self, speed: Array) -> Coulomb:
+        """Coulomb's law with the coefficients of these speeds."""
+        found = np.asarray(self.mu(speed), dtype=float)
+        if found.shape not in ((), speed.shape):
+            raise InputError(
+                f"SlipRateCoulomb: mu returns shape {found.shape} for {len(speed)} slip rates; return one coefficient "
+                "per rate"
+            )
+        found = np.broadcast_to(found, speed.shape)
+        wrong = np.flatnonzero(~(np.isfinite(found) & (found >= 0.0)))
+        if len(wrong):
+            raise InputError(
+                f"SlipRateCoulomb: mu({speed[wrong[0]]:.6g} m/s) is {found[wrong[0]]:.6g}; let it return zero or a "
+                "positive finite number for every slip rate from 0 on"
+            )
+        return Coulomb(found)
+
+    def limit(self, r_n: Array, weights: Array, scale: float) -> Array:
+        """mu(0) · max(r_n, 0), shape (n,): at rest."""
+        return self.at(np.zeros(len(r_n))).limit(r_n, weights, scale)
+
+    def slope(self, weights: Array) -> Array:
+        """mu(0), shape (n,): at rest."""
+        return self.at(np.zeros(len(weights))).slope(weights)
+
+
+@dataclass(frozen=True)
+class ExponentialDecay:
+    """mu(v) = mu_k + (mu_s - mu_k) exp(-v/v_c): from static to kinetic friction over the speed v_c [m/s] > 0.
+
+    mu_s, mu_k: numbers >= 0, or one per contact point. InputError for other values.
+    """
+
+    mu_s: float | Array | tuple[float, ...]
+    mu_k: float | Array | tuple[float, ...]
+    v_c: float
+
+    def __post_init__(self) -> None:
+        _keep_coefficients(self)
+        if not (isinstance(self.v_c, Real) and 0.0 < self.v_c < math.inf):
+            raise InputError(f"ExponentialDecay: v_c [m/s] is {self.v_c!r}; give a positive speed, or StaticKinetic()")
+
+    def __call__(self, speed: Array) -> Array:
+        """mu of each speed."""
+        static, kinetic = _nodal_pair(self, len(speed))
+        return np.asarray(kinetic + (static - kinetic) * np.exp(-speed / self.v_c))
+
+
+@dataclass(frozen=True)
+class StaticKinetic:
+    """mu_s at rest, mu_k in motion: the limit of ExponentialDecay for v_c -> 0. Where both hold, rest is chosen.
+
+    mu_s >= mu_k >= 0: numbers, or one per contact point. InputError for other values.
+    """
+
+    mu_s: float | Array | tuple[float, ...]
+    mu_k: float | Array | tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        _keep_coefficients(self)
+        if np.any(np.asarray(self.mu_s) < np.asarray(self.mu_k)):
+            raise InputError(f"{self}: moving points that rub more than resting ones have no rate; give mu_s >= mu_k")
+
+    def __call__(self, speed: Array) -> Array:
+        """mu of each speed."""
+        static, kinetic = _nodal_pair(self, len(speed))
+        return np.where(speed == 0.0, static, kinetic)
+
+
 def project(r_t: Array, limit: Array) -> Array:
     """Nearest point of the friction disks |r_t| <= limit: r_t · min(1, limit / |r_t|), node by node.
 
@@ -143,6 +234,20 @@ def _nodal(law: str, name: str, value: Any, count: int) -> Array:
             "per contact point in the order of surface.points"
         )
     return np.asarray(value, dtype=float)
+
+
+def _keep_coefficients(law: ExponentialDecay | StaticKinetic) -> None:
+    """Checks mu_s and mu_k and keeps fields as tuples."""
+    for name, meaning in (("mu_s", "the static coefficient mu_s"), ("mu_k", "the kinetic coefficient mu_k")):
+        object.__setattr__(law, name, _checked(type(law).__name__, meaning, getattr(law, name)))
+    if isinstance(law.mu_s, tuple) and isinstance(law.mu_k, tuple) and len(law.mu_s) != len(law.mu_k):
+        raise InputError(f"{law}: {len(law.mu_s)} static and {len(law.mu_k)} kinetic coefficients; give as many")
+
+
+def _nodal_pair(law: ExponentialDecay | StaticKinetic, count: int) -> tuple[Array, Array]:
+    """(mu_s, mu_k) as arrays that broadcast over the nodes."""
+    name = type(law).__name__
+    return _nodal(name, "mu_s", law.mu_s, count), _nodal(name, "mu_k", law.mu_k, count)
 
 
 def refuse_friction(solver: str, law: FrictionLaw) -> None:

@@ -29,6 +29,7 @@ from .friction_newton import FrictionNewton
 from .friction_small import FrictionMethod
 from .lcp import LCPResult
 from .mprgp import ProjectedCG
+from .slip_rate import RateIteration
 
 STORED_ENTRIES = 200_000  # of A⁻¹E over all ranks: beyond it a second back-substitution is cheaper than the product
 
@@ -45,11 +46,13 @@ class Condensed:
 
     ``method`` solves it without friction. ``ProjectedCG`` never forms G: each of its products is a back-substitution,
     for contact sets too large to store. ``friction_method`` solves it with friction: FrictionNewton, NSGS or
-    FixedPoint, which all form G.
+    FixedPoint, GivenForces or Uzawa, which all form G; ``rates`` is the iteration around it for laws that depend on the
+    slip rate.
     """
 
     method: SmallMethod = field(default_factory=ActiveSet)
     friction_method: FrictionMethod = field(default_factory=FrictionNewton)
+    rates: RateIteration = field(default_factory=RateIteration)
 
     def check(self, problem: ContactProblem) -> None:
         """InputError for friction without a tangential direction, or of a wrong number of values."""
@@ -133,8 +136,8 @@ class PreparedCondensed:
             normal = self.delassus
             if isinstance(normal, AppliedDelassus):
                 normal = self._form(normal.extra)
-            method, keep = self._settings.friction_method, self._columns is not None
-            self._friction = CondensedFriction(method, self._A, self._surface, normal, keep=keep)
+            method, rates, keep = self._settings.friction_method, self._settings.rates, self._columns is not None
+            self._friction = CondensedFriction(method, self._A, self._surface, normal, rates=rates, keep=keep)
         return self._friction
 
     def _with_friction(self, step: StepProblem, x: Array) -> StepResult:
@@ -145,7 +148,7 @@ class PreparedCondensed:
             x = self._corrected(x, r_n, step, r_t)
             self.friction.held(x, step, small)
         name = f"condensed {type(self._settings.friction_method).__name__}"
-        return StepResult(x, r_n, small.active, small.iterations, name, r_t=r_t)
+        return StepResult(x, r_n, small.active, small.iterations, name, r_t=r_t, history=small.history)
 
     def _corrected(self, x: Array, r: Array, step: StepProblem, r_t: Array | None = None) -> Array:
         """A⁻¹(b - E r_n - F r_t); unknowns on a rigid support are put on their bound, which removes round-off only."""

@@ -2,7 +2,7 @@
 
 Every problem with the threshold s given is convex and has one solution; the map is a contraction for small friction
 (Nečas, Jarušek and Haslinger, Boll. Unione Mat. Ital. 17-B, 1980; Haslinger, Hlaváček and Nečas, Handbook of Numerical
-Analysis IV, 1996). Its observed factor is in the result.
+Analysis IV, 1996). Its observed factor is in the result. ``extrapolation`` may shorten the sequence.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from .extrapolation import Extrapolation, Plain
 from .friction_newton import FrictionNewton
 from .friction_small import Blocks, FrictionMethod, FrictionResult, observed_contraction
 from .lcp import Array, Mask, largest
@@ -18,15 +19,17 @@ from .lcp import Array, Mask, largest
 
 @dataclass(frozen=True)
 class FixedPoint:
-    """Settings. ``tolerance``: change of the thresholds relative to the largest; ``tresca``: method for each problem.
+    """Settings. ``tolerance``: change of the thresholds relative to the largest; ``tresca``: method for each problem;
+    ``extrapolation``: Plain(), Aitken() or Anderson(), how the next thresholds follow.
 
     In the result ``iterations`` counts Tresca problems and ``history`` the relative change of the thresholds in each;
-    ``contraction(result)`` is the mean factor between them.
+    ``contraction(result)`` is the mean factor between them: with Plain() that of the map itself.
     """
 
-    tolerance: float = 1e-12
+    tolerance: float = 1e-10
     max_iterations: int = 200
     tresca: FrictionMethod = field(default_factory=FrictionNewton)
+    extrapolation: Extrapolation = field(default_factory=Plain)
 
     def prepare(self, G: Array, bilateral: Mask) -> PreparedFixedPoint:
         """Check and scale G (m d, m d)."""
@@ -45,16 +48,17 @@ class PreparedFixedPoint:
         """See PreparedFriction."""
         step = self.blocks.step(q, cohesion, slope)
         constant = np.zeros_like(slope)
-        limit = cohesion
+        limit, unit = cohesion, self.blocks.scale[:, -1]
+        sequence = self.method.extrapolation.start()
         history: list[float] = []
         found = self._tresca.solve(q, limit, constant, guess)
         while len(history) < self.method.max_iterations:
             new = cohesion + slope * np.maximum(found.r[:, 0], 0.0)
-            change, size = largest(new - limit), max(largest(new), largest(limit))
+            change, size = largest((new - limit) / unit), max(largest(new / unit), largest(limit / unit))
             if change <= self.method.tolerance * size:
                 break
             history.append(change / size)
-            limit = new
+            limit = np.maximum(unit * sequence.next(limit / unit, new / unit), 0.0)
             found = self._tresca.solve(q, limit, constant, found.r)
         return step.result(
             found.r / self.blocks.scale,

@@ -6,6 +6,8 @@ With the unit vectors E of the normal and F of the tangential unknowns, x_free =
     q_n = bound - Eᵀx_free,   q_t = slip0 - Fᵀx_free             gap, and minus the slip, without reactions
     the small problem of friction_small.py gives r;   x = A⁻¹(b - E r_n - F r_t)
 
+A law that depends on the slip rate makes this a sequence of such problems: slip_rate.py.
+
 Tangential unknowns that are prescribed carry no reaction: their rows are replaced by those of a free spring.
 """
 
@@ -17,6 +19,7 @@ from ..algebra import Array, Indices, Mask
 from ..step import EffectiveMatrix, StepProblem
 from ..surfaces import ContactSurface
 from .friction_small import FrictionMethod, FrictionResult
+from .slip_rate import RateIteration
 
 
 class CondensedFriction:
@@ -26,9 +29,16 @@ class CondensedFriction:
     """
 
     def __init__(
-        self, method: FrictionMethod, A: EffectiveMatrix, surface: ContactSurface, normal: Array, *, keep: bool
+        self,
+        method: FrictionMethod,
+        A: EffectiveMatrix,
+        surface: ContactSurface,
+        normal: Array,
+        *,
+        rates: RateIteration,
+        keep: bool,
     ) -> None:
-        self._surface = surface
+        self._surface, self._rates = surface, rates
         m, k = surface.count, surface.tangents.shape[1]
         free = surface.tangents >= 0
         places = (surface.slots[:, None] * k + np.arange(k))[free]
@@ -60,9 +70,23 @@ class CondensedFriction:
         surface = self._surface
         gap = step.bound - surface.normal_values(x_free)
         slip = surface.tangential_values(x_free) - origin(step)
+        q = np.column_stack([gap, -slip])
         cohesion = step.friction.limit(np.zeros(surface.count), surface.weights, step.scale)
-        slope = step.friction.slope(surface.weights)
-        return self._small.solve(np.column_stack([gap, -slip]), cohesion, slope, step.active)
+        if step.friction_at(np.zeros_like(slip)) is step.friction:
+            return self._small.solve(q, cohesion, step.friction.slope(surface.weights), step.active)
+
+        def solved(mu: Array, before: FrictionResult | None) -> FrictionResult:
+            return self._small.solve(q, cohesion, mu, step.active if before is None else before.r)
+
+        def coefficients(found: FrictionResult) -> Array:
+            return step.friction_at(self._slip(q, found)).slope(surface.weights)
+
+        return self._rates.solve(step.friction.slope(surface.weights), solved, coefficients)
+
+    def _slip(self, q: Array, found: FrictionResult) -> Array:
+        """B_t x - slip0 (m, d - 1) of points that rub, exactly zero where they stick."""
+        w = q[:, 1:] + (self.delassus @ found.r.ravel()).reshape(q.shape)[:, 1:]
+        return np.where(((found.r[:, 0] > 0.0) & ~found.stick)[:, None], -w, 0.0)
 
     def held(self, x: Array, step: StepProblem, small: FrictionResult) -> None:
         """Puts the tangential unknowns of sticking points where they were, which removes round-off only."""

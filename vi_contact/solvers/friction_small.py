@@ -59,7 +59,7 @@ class PreparedFriction(Protocol):
 
 
 class FrictionMethod(Protocol):
-    """A method for (1): FrictionNewton, NSGS or FixedPoint."""
+    """A method for (1): FrictionNewton, NSGS, FixedPoint, GivenForces or Uzawa."""
 
     def prepare(self, G: Array, bilateral: Mask) -> PreparedFriction: ...
 
