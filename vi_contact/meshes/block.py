@@ -24,7 +24,7 @@ from vi_contact.errors import InputError
 from vi_contact.meshes.gmsh_session import write
 from vi_contact.meshes.grid import Array, add_grid, lattice
 
-_SIDES = (("left", "right"), ("bottom", "top"), ("back", "front"))
+SIDES = (("left", "right"), ("bottom", "top"), ("back", "front"))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,7 +61,7 @@ class BlockMesh:
 
     def build(self, gmsh: Any) -> None:
         """Add the block to Gmsh's current model."""
-        add_grid(gmsh, self.points(), simplices=self.simplices, body="block", sides=_SIDES[: len(self.lengths)])
+        add_grid(gmsh, self.points(), simplices=self.simplices, body="block", sides=SIDES[: len(self.lengths)])
 
 
 def check_box(lengths: Sequence[float], divisions: Sequence[int]) -> None:

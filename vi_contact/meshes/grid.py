@@ -21,22 +21,25 @@ def lattice(lengths: Sequence[float], divisions: Sequence[int]) -> Array:
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
 
 
-def add_grid(gmsh: Any, nodes: Array, *, simplices: bool, body: str, sides: Sequence[tuple[str, str]]) -> None:
+def add_grid(
+    gmsh: Any, nodes: Array, *, simplices: bool, body: str, sides: Sequence[tuple[str, str]], first: int = 1
+) -> None:
     """Add a structured mesh to the current model as discrete entities with named physical groups.
 
     `nodes` (n_1+1, ..., n_d+1, d) are the points of the deformed lattice [m]; `sides[a]` names the two sides on which
     lattice index a is lowest and highest; `body` names all cells. `simplices` splits every box along its diagonal
-    (Kuhn).
+    (Kuhn). `first` is the tag of the first node: above those of the bodies that are there already.
     """
     d = nodes.shape[-1]
     shape = nodes.shape[:-1]
-    tags = 1 + np.arange(np.prod(shape)).reshape(shape, order="F")
+    number = np.arange(np.prod(shape)).reshape(shape, order="F")
+    tags = first + number
     points = np.zeros((tags.size, 3))
-    points[tags.reshape(-1) - 1, :d] = nodes.reshape(-1, d)
+    points[number.reshape(-1), :d] = nodes.reshape(-1, d)
     model, types = gmsh.model, _SIMPLEX_TYPE if simplices else _BOX_TYPE
     boundary = [_add_entity(model, d - 1, name) for pair in sides for name in pair]
     volume = _add_entity(model, d, body, boundary)
-    model.mesh.addNodes(d, volume, np.arange(1, tags.size + 1), points.reshape(-1))
+    model.mesh.addNodes(d, volume, first + np.arange(tags.size), points.reshape(-1))
     model.mesh.addElementsByType(volume, types[d], [], _cells(tags, simplices).reshape(-1))
     faces = [np.take(tags, end, axis=axis) for axis in range(d) for end in (0, -1)]
     for entity, face in zip(boundary, faces, strict=True):

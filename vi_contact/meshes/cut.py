@@ -1,0 +1,179 @@
+"""Joints and cracks in a mesh: nodes along an inner boundary are doubled (cut open) or those of two bodies made one
+(welded).
+
+Two bodies that may part need nodes of their own on either side. A mesh of one geometry, fragmented along the joint and
+conforming there, gets them by `CutOpen`; bodies meshed one by one have them already.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from vi_contact.errors import InputError
+from vi_contact.meshes.extract import MeshArrays
+from vi_contact.meshes.from_arrays import Source, add_arrays, arrays_of
+from vi_contact.meshes.rows import Rows, cell_sides, number_alike
+
+Mask = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class CutOpen:
+    """The mesh of `source`, a script or a file, cut open along its inner boundary group; see `cut_open`."""
+
+    source: Source
+    group: str
+    inside: str | None = None
+    towards: tuple[float, ...] | None = None
+
+    def build(self, gmsh: Any) -> None:
+        """Add the mesh to Gmsh's current model."""
+        add_arrays(gmsh, cut_open(arrays_of(self.source), self.group, inside=self.inside, towards=self.towards))
+
+
+@dataclass(frozen=True)
+class Welded:
+    """The mesh of `source` with the nodes of two boundary groups made one where they coincide; see `welded`."""
+
+    source: Source
+    first: str
+    second: str
+
+    def build(self, gmsh: Any) -> None:
+        """Add the mesh to Gmsh's current model."""
+        add_arrays(gmsh, welded(arrays_of(self.source), self.first, self.second))
+
+
+def cut_open(
+    arrays: MeshArrays, group: str, *, inside: str | None = None, towards: Sequence[float] | None = None
+) -> MeshArrays:
+    """The mesh with doubled nodes along an inner boundary; the two sides become the groups "<group>_1", "<group>_2".
+
+    Side 1 is that of the cell group `inside`, or the one from which the vector `towards` leads across the boundary:
+    give one of them. Cells around a node of the boundary keep a common node as long as they hang together through
+    other facets: a crack that ends inside a body stays closed at its tip, and boundaries cut one after the other may
+    meet and cross. InputError for a group that does not exist or lies on the outside, or sides that cannot be told.
+    """
+    facets = _group(arrays, group)
+    if (inside is None) == (towards is None):
+        raise InputError(f"cut of '{group}': say which side is the first, either inside=a cell group or towards=vector")
+    sides, owner = cell_sides(arrays.cells, arrays.cell)
+    side, *numbers = number_alike(sides, *arrays.facet_groups.values())
+    named = dict(zip(arrays.facet_groups, numbers, strict=True))
+    wanted = named[group]
+    order = np.argsort(side, kind="stable")
+    inner = np.flatnonzero(side[order][1:] == side[order][:-1])
+    one, other = order[inner], order[inner + 1]  # rows of sides: the two of every inner facet
+    cut = np.isin(side[one], wanted)
+    if cut.sum() < len(np.unique(wanted)):
+        raise InputError(
+            f"boundary group '{group}' is not between cells everywhere: cut only boundaries inside the mesh"
+        )
+    first = _on_first_side(arrays, group, owner[one[cut]], owner[other[cut]], inside, towards)
+    cells, points = _doubled(arrays, np.unique(facets), sides, owner, one[~cut], other[~cut])
+
+    def moved(rows: Rows, number: Rows, at: Rows) -> Rows:
+        """The facets `rows` of these numbers as the cells beside them know them now, for the rows `at` of sides."""
+        known, place = np.unique(number, return_index=True)
+        before = rows[place[np.searchsorted(known, side[at])]]
+        match = arrays.cells[owner[at]][:, None, :] == before[:, :, None]
+        return np.asarray(np.take_along_axis(cells[owner[at]], match.argmax(axis=2), axis=1))
+
+    groups = {}
+    for name, rows in arrays.facet_groups.items():
+        found = moved(rows, named[name], np.flatnonzero(np.isin(side, named[name])))
+        groups[name] = found[np.sort(np.unique(number_alike(found)[0], return_index=True)[1])]
+    del groups[group]
+    near, far = np.where(first, one[cut], other[cut]), np.where(first, other[cut], one[cut])
+    groups |= {f"{group}_1": moved(facets, wanted, near), f"{group}_2": moved(facets, wanted, far)}
+    return replace(arrays, points=points, cells=cells, facet_groups=groups)
+
+
+def welded(arrays: MeshArrays, first: str, second: str) -> MeshArrays:
+    """The mesh in which every node of the group `second` is the node of `first` at its place.
+
+    Both groups remain, as the same inner boundary. InputError for nodes of `second` without a partner (within 1e-9 of
+    the mesh's size).
+    """
+    one, two = (np.unique(_group(arrays, name)) for name in (first, second))
+    size = float(np.ptp(arrays.points, axis=0).max())
+    distance, nearest = cKDTree(arrays.points[one]).query(arrays.points[two])
+    if distance.max(initial=0.0) > 1e-9 * size:
+        where = ", ".join(f"{x:g}" for x in arrays.points[two[np.argmax(distance)]])
+        raise InputError(
+            f"group '{second}' has a node at ({where}), {distance.max():.3g} m away from every node of '{first}': "
+            "weld only sides that are divided alike"
+        )
+    target = np.arange(len(arrays.points))
+    target[two] = one[nearest]
+    kept, number = np.unique(target, return_inverse=True)
+    return replace(
+        arrays,
+        points=arrays.points[kept],
+        cells=number[arrays.cells],
+        facet_groups={name: number[rows] for name, rows in arrays.facet_groups.items()},
+    )
+
+
+def _group(arrays: MeshArrays, name: str) -> Rows:
+    if name not in arrays.facet_groups:
+        has = ", ".join(arrays.facet_groups) or "none"
+        raise InputError(f"mesh has no boundary group '{name}'; it has {has}: name it in Gmsh as a physical group")
+    return arrays.facet_groups[name]
+
+
+def _on_first_side(
+    arrays: MeshArrays, group: str, one: Rows, other: Rows, inside: str | None, towards: Sequence[float] | None
+) -> Mask:
+    """For every cut facet whether the first of its two cells is on side 1."""
+    if inside is not None:
+        if inside not in arrays.cell_groups:
+            raise InputError(f"mesh has no cell group '{inside}'; it has {', '.join(arrays.cell_groups)}")
+        mask = arrays.cell_groups[inside]
+        if np.any(mask[one] == mask[other]):
+            raise InputError(f"cell group '{inside}' is not on one side of '{group}' only: say towards=vector instead")
+        return np.asarray(mask[one])
+    way = np.asarray(towards, dtype=float)
+    centres = arrays.points[arrays.cells].mean(axis=1)
+    across = centres[other] - centres[one]
+    ahead = across @ way
+    if np.any(np.abs(ahead) <= 1e-9 * np.linalg.norm(across, axis=1) * np.linalg.norm(way)):
+        raise InputError(f"towards={tuple(way)} runs along '{group}' somewhere: say inside=a cell group instead")
+    return np.asarray(ahead > 0.0)
+
+
+def _doubled(
+    arrays: MeshArrays, nodes: Rows, sides: Rows, owner: Rows, one: Rows, other: Rows
+) -> tuple[Rows, npt.NDArray[np.float64]]:
+    """(cells, points) with a node of its own for every part of the cells around each of the nodes; parts hang together
+    through the facets (rows `one`, `other` of sides)."""
+    n = len(arrays.points)
+    around, column = np.nonzero(np.isin(arrays.cells, nodes))
+    node = arrays.cells[around, column]
+    key = around * n + node  # ascending within a cell's row only
+    order = np.argsort(key)
+
+    def place(rows: Rows) -> Rows:
+        """Places among `key` of the vertices of sides that are nodes of the cut."""
+        vertices = sides[rows]
+        return order[np.searchsorted(key[order], (owner[rows][:, None] * n + vertices)[np.isin(vertices, nodes)])]
+
+    links = place(one), place(other)
+    graph = sp.coo_matrix((np.ones(len(links[0])), links), shape=(len(key), len(key)))
+    _, part = connected_components(graph, directed=False)
+    _, first = np.unique(node, return_index=True)
+    keeps = np.isin(part, part[first])  # the part of the first cell around a node keeps it
+    fresh, number = np.unique(part[~keeps], return_inverse=True)
+    cells = arrays.cells.copy()
+    cells[around[~keeps], column[~keeps]] = n + number
+    origin = np.zeros(len(fresh), dtype=np.int64)
+    origin[number] = node[~keeps]
+    return cells, np.concatenate([arrays.points, arrays.points[origin]])

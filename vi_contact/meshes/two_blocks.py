@@ -1,0 +1,111 @@
+#!/usr/bin/env python3
+"""Bars, rectangles or boxes that touch without sharing a node: bodies of their own, meshed each for itself.
+
+Physical groups of a body called "lower": cells "lower"; boundary "lower_left", "lower_right" (x lowest, highest),
+"lower_bottom", "lower_top" (y), "lower_back", "lower_front" (z).
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+if not __package__:  # run as a file of the source tree, maybe not installed
+    sys.path[0] = str(Path(__file__).resolve().parents[2])
+
+from vi_contact.errors import InputError
+from vi_contact.meshes.block import SIDES, BlockMesh
+from vi_contact.meshes.gmsh_session import write
+from vi_contact.meshes.grid import add_grid
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """Any number of blocks by name, each a body of its own. InputError for blocks of different dimension or cells."""
+
+    blocks: Mapping[str, BlockMesh]
+
+    def __post_init__(self) -> None:
+        kinds = {(len(block.lengths), block.simplices) for block in self.blocks.values()}
+        if len(kinds) != 1:
+            raise InputError("blocks of one mesh need the same number of lengths and the same cells: give all alike")
+
+    def build(self, gmsh: Any) -> None:
+        """Add the blocks to Gmsh's current model."""
+        first = 1
+        for name, block in self.blocks.items():
+            nodes = block.points()
+            sides = [(f"{name}_{low}", f"{name}_{high}") for low, high in SIDES[: nodes.shape[-1]]]
+            add_grid(gmsh, nodes, simplices=block.simplices, body=name, sides=sides, first=first)
+            first += nodes[..., 0].size
+
+
+@dataclass(frozen=True, kw_only=True)
+class TwoBlocks:
+    """Block "upper" on top of block "lower", in one dimension to the right of it.
+
+    The lower one has a corner at the origin; the upper one begins at `offset` [m] along the interface (x, and z of a
+    box), `gap` [m] above it. Interface "lower_top" and "upper_bottom", of bars "lower_right" and "upper_left": nodes at
+    the same places when lengths and divisions match, never the same nodes. `angle` [rad] turns both about the origin.
+    """
+
+    lower: BlockMesh = field(default_factory=BlockMesh)
+    upper: BlockMesh = field(default_factory=BlockMesh)
+    offset: tuple[float, ...] = (0.0, 0.0)
+    gap: float = 0.0
+    angle: float = 0.0
+
+    @property
+    def interface(self) -> tuple[str, str]:
+        """Names of the side of the upper block and of that of the lower one."""
+        return ("upper_left", "lower_right") if len(self.lower.lengths) == 1 else ("upper_bottom", "lower_top")
+
+    def blocks(self) -> Blocks:
+        """Both blocks where they are."""
+        d = len(self.lower.lengths)
+        up = 0 if d == 1 else 1
+        corner = np.zeros(d)
+        along = [axis for axis in range(d) if axis != up]
+        corner[along] = self.offset[: len(along)]
+        corner[up] = self.lower.lengths[up] + self.gap
+        upper = replace(self.upper, corner=tuple(corner), angle=self.angle)
+        return Blocks({"lower": replace(self.lower, angle=self.angle), "upper": upper})
+
+    def build(self, gmsh: Any) -> None:
+        """Add both to Gmsh's current model."""
+        self.blocks().build(gmsh)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Write two blocks to a file: `two_blocks.py --lower 2 1 --upper 1 1 --divisions 8 4 5 5 --offset 0.5`."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
+    parser.add_argument("--lower", type=float, nargs="+", default=[1.0, 1.0], help="lengths of the lower block [m]")
+    parser.add_argument("--upper", type=float, nargs="+", default=[1.0, 1.0], help="lengths of the upper block [m]")
+    parser.add_argument("--divisions", type=int, nargs="+", default=[1, 1, 1, 1], help="of the lower, of the upper")
+    parser.add_argument("--offset", type=float, nargs="+", default=[0.0, 0.0], help="of the upper block, x and z [m]")
+    parser.add_argument("--gap", type=float, default=0.0, help="between them [m]")
+    parser.add_argument("--simplices", action="store_true", help="triangles or tetrahedra")
+    parser.add_argument("--angle", type=float, default=0.0, help="rotation about the origin [rad]")
+    parser.add_argument("-o", "--output", default="two_blocks.msh")
+    given = parser.parse_args(arguments)
+    half = len(given.divisions) // 2
+    sizes = ((given.lower, given.divisions[:half]), (given.upper, given.divisions[half:]))
+    try:
+        lower, upper = (
+            BlockMesh(lengths=tuple(lengths), divisions=tuple(divisions), simplices=given.simplices)
+            for lengths, divisions in sizes
+        )
+        offset = (*given.offset, 0.0)
+        write(TwoBlocks(lower=lower, upper=upper, offset=offset, gap=given.gap, angle=given.angle), given.output)
+    except InputError as error:
+        sys.exit(str(error))
+
+
+if __name__ == "__main__":
+    main()
