@@ -171,9 +171,9 @@ def _doubled(
     _, part = connected_components(graph, directed=False)
     _, first = np.unique(node, return_index=True)
     keeps = np.isin(part, part[first])  # the part of the first cell around a node keeps it
-    fresh, number = np.unique(part[~keeps], return_inverse=True)
+    _, number = np.unique(node[~keeps] * len(key) + part[~keeps], return_inverse=True)  # new nodes in order of the old
     cells = arrays.cells.copy()
     cells[around[~keeps], column[~keeps]] = n + number
-    origin = np.zeros(len(fresh), dtype=np.int64)
+    origin = np.zeros(int(number.max(initial=-1)) + 1, dtype=np.int64)
     origin[number] = node[~keeps]
     return cells, np.concatenate([arrays.points, arrays.points[origin]])
