@@ -42,6 +42,10 @@ class ColumnSpace:
     def coordinates(self) -> Array:
         return np.column_stack([np.zeros(self.unknowns), np.repeat(self.heights, 2)])
 
+    @property
+    def bodies(self) -> Any:
+        return np.zeros(self.unknowns, dtype=np.int64)
+
     def find_nodes(self, points: Array) -> Any:
         return np.argmin(np.abs(np.asarray(points)[:, 1][:, None] - self.heights), axis=1)
 
