@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import ufl
 from petsc4py import PETSc
 
-from ..algebra import Array, Indices
+from ..algebra import Array, Indices, Mask
 from ..errors import InputError
 from ..surfaces import ContactSurface, Obstacle, Touching, admissible_gap, nodal_frames
 from ..system import SemiDiscreteSystem
@@ -45,13 +46,20 @@ def contact_surface(
     space = system.space
     if not isinstance(space, FemSpace):
         raise InputError("contact_surface needs a system made by fem.assemble")
-    nodes = _trace(space, facets)
-    nodes = _free_nodes(space, nodes, facets.name) if points is None else _listed(space, nodes, points, facets.name)
+    nodes = nodes_on(space, facets)
+    nodes = free_nodes(space, nodes, facets.name) if points is None else listed(space, nodes, points, facets.name)
     obstacle = obstacle or Touching()
-    directions = _snapped(np.asarray(obstacle.directions(nodes.points, nodes.normals), dtype=float))
+    directions = snapped(np.asarray(obstacle.directions(nodes.points, nodes.normals), dtype=float))
     gap = admissible_gap(np.asarray(obstacle.gap(nodes.points, nodes.normals), dtype=float), nodes.points, space.size)
-    owned, slots, tangents, basis = _basis(space, nodes, directions)
-    count = len(nodes.numbers)
+    return surface_on(space, nodes, directions, gap, frames_of(space, nodes, directions))
+
+
+def surface_on(
+    space: FemSpace, nodes: Nodes, directions: Array, gap: Array, frames: Sequence[Frame]
+) -> ContactSurface:
+    """The conditions u·direction <= gap at nodes with these frames, those of this rank. Collective."""
+    d, count = space.dimension, len(nodes.numbers)
+    tangents = [np.delete(frame.index, frame.normal) for frame in frames]
     return ContactSurface(
         comm=space.comm,
         points=nodes.points,
@@ -60,24 +68,42 @@ def contact_surface(
         gap0=gap,
         bilateral=np.zeros(count, dtype=bool),
         compliance=np.zeros(count),
-        owned=owned,
-        slots=slots,
-        tangents=tangents,
-        basis=basis,
+        owned=np.array([frame.index[frame.normal] for frame in frames], dtype=np.int64),
+        slots=np.array([frame.slot for frame in frames], dtype=np.int64),
+        tangents=np.array(tangents, dtype=np.int64).reshape(len(frames), d - 1),
+        basis=_basis(space, frames),
     )
 
 
-class _Nodes:
-    """Contact nodes, the same on every rank: original numbers, coordinates, body normals, weights, held components."""
+@dataclass(frozen=True, eq=False)
+class Nodes:
+    """Nodes of a boundary, the same on every rank: original numbers, coordinates, body normals, weights, held
+    components, and the numbers over all ranks of their free unknowns, -1 for held ones."""
 
-    def __init__(self, numbers: Indices, points: Array, normals: Array, weights: Array, held: Any) -> None:
-        self.numbers, self.points, self.normals, self.weights, self.held = numbers, points, normals, weights, held
+    numbers: Indices
+    points: Array
+    normals: Array
+    weights: Array
+    held: Mask
+    unknowns: Indices
 
-    def pick(self, rows: Any) -> _Nodes:
-        return _Nodes(self.numbers[rows], self.points[rows], self.normals[rows], self.weights[rows], self.held[rows])
+    def pick(self, rows: Any) -> Nodes:
+        """Some of them."""
+        return Nodes(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
 
 
-def _trace(space: FemSpace, facets: Facets) -> _Nodes:
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """The frame of a contact node that this rank owns: ``index`` of its unknowns (-1 where held), ``block`` with the
+    frame's vectors as columns, the contact direction in column ``normal``."""
+
+    slot: int
+    index: Indices
+    normal: int
+    block: Array
+
+
+def nodes_on(space: FemSpace, facets: Facets) -> Nodes:
     """All nodes of the facets, ordered by original node number."""
     mesh, d = space.mesh, space.dimension
     ds = compat.measure(mesh, mesh.topology.dim - 1, facets.indices)
@@ -86,17 +112,23 @@ def _trace(space: FemSpace, facets: Facets) -> _Nodes:
     one = compat.assemble_vector(compat.compile_form(sum(v[c] for c in range(d)) * ds)).array_r.reshape(-1, d)
     normal = compat.assemble_vector(compat.compile_form(ufl.inner(n, v) * ds)).array_r.reshape(-1, d)
     blocks = space.facet_blocks(facets.indices)
-    local = (space.nodes[blocks], space.points[blocks], normal[blocks], one[blocks, 0], space.held[blocks])
-    parts = space.comm.bcast(space.comm.gather(local))
-    numbers, points, normals, weights, held = (np.concatenate([part[i] for part in parts]) for i in range(5))
-    if len(numbers) == 0:
+    first = int(mesh.comm.exscan(len(space.ids)) or 0)
+    unknowns = np.where(space.free, first + space.free_index, -1).reshape(-1, d)
+    local = (space.nodes, space.points, normal, one[:, 0], space.held, unknowns)
+    parts = space.comm.bcast(space.comm.gather(tuple(values[blocks] for values in local)))
+    nodes = Nodes(*(np.concatenate([part[i] for part in parts]) for i in range(6)))
+    if len(nodes.numbers) == 0:
         raise InputError(f"no contact nodes: boundary group '{facets.name}' is empty, choose a group that has facets")
-    order = np.argsort(numbers)
-    normals = normals / np.linalg.norm(normals, axis=1)[:, None]
-    return _Nodes(numbers, points, normals, weights, held).pick(order)
+    if not nodes.weights.all():
+        raise InputError(
+            f"boundary group '{facets.name}' lies inside the body, where cells on both sides share its nodes: cut the "
+            "mesh open there (meshes.cut.CutOpen), or choose an outer boundary"
+        )
+    normals = nodes.normals / np.linalg.norm(nodes.normals, axis=1)[:, None]
+    return replace(nodes, normals=normals).pick(np.argsort(nodes.numbers))
 
 
-def _free_nodes(space: FemSpace, nodes: _Nodes, name: str) -> _Nodes:
+def free_nodes(space: FemSpace, nodes: Nodes, name: str) -> Nodes:
     """The nodes that are not clamped; InputError when none is left."""
     clamped = nodes.held.all(axis=1)
     if clamped.all():
@@ -109,7 +141,7 @@ def _free_nodes(space: FemSpace, nodes: _Nodes, name: str) -> _Nodes:
     return nodes.pick(~clamped)
 
 
-def _listed(space: FemSpace, nodes: _Nodes, points: Sequence[Sequence[float]], name: str) -> _Nodes:
+def listed(space: FemSpace, nodes: Nodes, points: Sequence[Sequence[float]], name: str) -> Nodes:
     """The nodes nearest to the listed points, in their order."""
     rows = []
     for point in points:
@@ -138,13 +170,13 @@ def _listed(space: FemSpace, nodes: _Nodes, points: Sequence[Sequence[float]], n
     return nodes.pick(rows)
 
 
-def _snapped(directions: Array) -> Array:
+def snapped(directions: Array) -> Array:
     """Directions along an axis to the last bit, where they are to round-off: keeps axis-aligned walls unrotated."""
     snapped = np.where(np.abs(directions) < 1e-13, 0.0, directions)
     return np.asarray(snapped / np.linalg.norm(snapped, axis=1)[:, None])
 
 
-def _refuse_prescribed(nodes: _Nodes, directions: Array) -> None:
+def _refuse_prescribed(nodes: Nodes, directions: Array) -> None:
     """InputError, on all ranks, for a node whose contact direction is partly prescribed."""
     for slot in np.flatnonzero(np.any(nodes.held & (directions != 0.0), axis=1)):
         at = ", ".join(f"{x:g}" for x in nodes.points[slot])
@@ -154,7 +186,7 @@ def _refuse_prescribed(nodes: _Nodes, directions: Array) -> None:
         )
 
 
-def _block(frame: Array) -> tuple[int, Array]:
+def block_of(frame: Array) -> tuple[int, Array]:
     """(c, Q): a nodal frame with the contact direction in column c, so that component c becomes the normal unknown.
 
     c is the direction's largest component. Axes at right angles to the direction keep their own columns: these are the
@@ -174,25 +206,22 @@ def _block(frame: Array) -> tuple[int, Array]:
     return normal, block
 
 
-def _basis(space: FemSpace, nodes: _Nodes, directions: Array) -> tuple[Indices, Indices, Indices, PetscMatrix | None]:
-    """(owned, slots, tangents, T): which unknowns of û are normal and tangential, and the matrix u = T û."""
-    d = space.dimension
+def frames_of(space: FemSpace, nodes: Nodes, directions: Array) -> list[Frame]:
+    """Frames of the nodes this rank owns; InputError, on all ranks, where a contact direction is partly prescribed."""
     _refuse_prescribed(nodes, directions)
-    frames = nodal_frames(directions)
-    where = space._where(nodes.numbers)
-    owned, slots, tangents, blocks = [], [], [], []
+    axes, where = nodal_frames(directions), space._where(nodes.numbers)
+    frames = []
     for slot in np.flatnonzero(where >= 0):
-        normal, block = _block(frames[slot])
-        index = space.free_index[where[slot] * d + np.arange(d)]
-        owned.append(index[normal])
-        slots.append(slot)
-        tangents.append(np.delete(index, normal))
-        blocks.append((index, block))
-    turned = any(not np.array_equal(block, np.eye(d)) for _, block in blocks)
+        index = space.free_index[where[slot] * space.dimension + np.arange(space.dimension)]
+        frames.append(Frame(int(slot), index, *block_of(axes[slot])))
+    return frames
+
+
+def _basis(space: FemSpace, frames: Sequence[Frame]) -> PetscMatrix | None:
+    """T with u = T û, None when all frames point along the axes."""
+    turned = any(not np.array_equal(frame.block, np.eye(space.dimension)) for frame in frames)
     turned = bool(space.comm.max(np.array([float(turned)]))[0])
-    basis = _rotation(space, blocks) if turned else None
-    shape = np.array(tangents, dtype=np.int64).reshape(len(owned), d - 1)
-    return np.array(owned, dtype=np.int64), np.array(slots, dtype=np.int64), shape, basis
+    return _rotation(space, [(frame.index, frame.block) for frame in frames]) if turned else None
 
 
 def _rotation(space: FemSpace, blocks: list[tuple[Indices, Array]]) -> PetscMatrix:
