@@ -1,0 +1,120 @@
+"""The tennis ball of the space-time boundary elements: a disk on a plane that pushes it up and retracts (V7.3).
+
+No weight and no other load: once released, the disk flies up with a constant velocity and swings. The plane is rigid,
+stays horizontal and moves by s(t); the gap of a point of the disk is its height above the plane, y + u_y - s(t).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from ..errors import InputError
+from ..fem.assembly import assemble
+from ..fem.mesh import build_mesh
+from ..fem.trace import contact_surface
+from ..friction import FrictionLaw, Frictionless
+from ..mass import MassLaw
+from ..materials import LinearElastic, PlaneStrain
+from ..meshes.disk import DiskMesh
+from ..step import ContactProblem, Report, State
+from ..surfaces import HalfSpace
+from ..system import SemiDiscreteSystem
+
+
+@dataclass(frozen=True)
+class Push:
+    """s(t) = ``height`` sin²(pi t / (2 ``rise``)) until it is back at zero at t = 2 ``rise``, zero from then on.
+
+    With height 0.05 and rise 1 it is 0.05 (1 - cos pi t)/2 for t <= 1; it goes down as it came up. [m, s]
+    """
+
+    height: float = 0.05
+    rise: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not (0.0 < self.height < math.inf and 0.0 < self.rise < math.inf):
+            raise InputError(f"{self}: give a positive height in metres and a positive rise in seconds")
+
+    def __call__(self, t: float) -> float:
+        """[m]"""
+        return self.height * math.sin(0.5 * math.pi * t / self.rise) ** 2 if 0.0 < t < 2.0 * self.rise else 0.0
+
+
+@dataclass(frozen=True)
+class Disk:
+    """Of ``radius`` [m], with cells of ``size`` [m], plane strain, pushed by ``push``."""
+
+    radius: float = 0.5
+    size: float = 0.04
+    material: LinearElastic = field(default_factory=lambda: LinearElastic.from_wave_speeds(2.0, 1.0, 1.0))
+    push: Push = field(default_factory=Push)
+
+    @property
+    def time_step(self) -> float:
+        """In which a pressure wave crosses a cell: half the cell size in the source's units [s]."""
+        return self.size / self.material.c_p
+
+
+@dataclass(frozen=True)
+class DiskModel:
+    """The assembled disk; ``foot``: its contact side; ``mass``: of the disk as the mesh has it [kg/m]."""
+
+    disk: Disk
+    system: SemiDiscreteSystem
+    foot: Any
+    mass: float
+
+    def problem(self, *, friction: FrictionLaw | None = None, mass: MassLaw | None = None) -> ContactProblem:
+        """The disk on its moving plane."""
+        plane = HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))
+        surface = contact_surface(self.system, self.foot, obstacle=plane).moving(towards=self.disk.push)
+        return ContactProblem(self.system, surface, friction=friction or Frictionless(), mass=mass)
+
+    def probes(self) -> dict[str, tuple[float, float]]:
+        """Lowest and highest point."""
+        return {"bottom": (0.0, 0.0), "top": (0.0, 2.0 * self.disk.radius)}
+
+
+def build(disk: Disk, comm: Any) -> DiskModel:
+    """Mesh and system of the disk; collective."""
+    mesh, tags = build_mesh(DiskMesh(radius=disk.radius, size=disk.size), comm)
+    system = assemble(mesh, disk.material, section=PlaneStrain())
+    up = system.influence[:, 1]
+    return DiskModel(disk, system, tags["foot"], system.algebra.dot(up, system.M @ up))
+
+
+class Momentum:
+    """Recorder of the momentum rᵀMv of a body in the plane along x and y and about the point ``centre``, in which
+    contact and friction are the only forces; M is the mass matrix of the run."""
+
+    def __init__(self, centre: tuple[float, float]) -> None:
+        self._centre = centre
+
+    def columns(self) -> Mapping[str, tuple[str, str]]:
+        """momentum_x, momentum_y, momentum_angular."""
+        return {
+            "momentum_x": ("kg m/s", "momentum along x"),
+            "momentum_y": ("kg m/s", "momentum along y"),
+            "momentum_angular": ("kg m²/s", "angular momentum, positive anticlockwise"),
+        }
+
+    def start(
+        self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
+    ) -> Mapping[str, float]:
+        """Of the initial state."""
+        self._system = system = problem.equations
+        x, y = (system.space.coordinates - self._centre).T
+        along, up = system.influence.T
+        self._motions = {"x": along, "y": up, "angular": up * x - along * y}
+        return self._row(state)
+
+    def row(self, report: Report) -> Mapping[str, float]:
+        return self._row(report.new)
+
+    def _row(self, state: State) -> Mapping[str, float]:
+        impulse = self._system.M @ state.v
+        return {f"momentum_{name}": self._system.algebra.dot(motion, impulse)
+                for name, motion in self._motions.items()}

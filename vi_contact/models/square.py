@@ -1,0 +1,94 @@
+"""The square that is pressed on a rigid support: the compression tests of space-time boundary elements (V7.1, V7.2).
+
+A uniform pressure acts on the top of [-a/2, a/2]², the bottom is in possible contact, the sides are free, plane strain;
+at rest for t <= 0. In the source's units: c_P = 1, c_S = 1/2, rho = 1, side 1, pressure 0.1 from t = 0 on.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from ..errors import InputError
+from ..fem.assembly import assemble
+from ..fem.loads import Prescribed, Traction
+from ..fem.mesh import build_mesh
+from ..fem.trace import contact_surface
+from ..friction import FrictionLaw, Frictionless
+from ..mass import MassLaw
+from ..materials import LinearElastic, PlaneStrain
+from ..meshes.block import BlockMesh
+from ..step import ContactProblem
+from ..system import SemiDiscreteSystem
+
+
+@dataclass(frozen=True)
+class Square:
+    """``cells`` bilinear cells along each ``side`` [m]; ``pressure`` [Pa] on the top times ``history``(t).
+
+    ``confined``: the sides move vertically only, so that plane waves run up and down. InputError for no cells.
+    """
+
+    cells: int = 20
+    side: float = 1.0
+    material: LinearElastic = field(default_factory=lambda: LinearElastic.from_wave_speeds(1.0, 0.5, 1.0))
+    pressure: float = 0.1
+    history: Callable[[float], float] | None = None
+    confined: bool = False
+
+    def __post_init__(self) -> None:
+        if self.cells < 1:
+            raise InputError(f"Square of {self.cells!r} cells per side: give a whole number, at least 1")
+
+    @property
+    def time_step(self) -> float:
+        """In which a pressure wave crosses a cell [s]."""
+        return self.side / self.cells / self.material.c_p
+
+    @property
+    def energy_rate(self) -> float:
+        """Energy per time [W/m] that a plane wave takes in under constant pressure, p² side / (rho c_P)."""
+        return self.pressure**2 * self.side / (self.material.rho * self.material.c_p)
+
+
+def concrete(cells: int = 20) -> Square:
+    """A box of concrete on steel, 1 m wide: c_P = 3253 m/s, c_S = 1992 m/s, 4 MPa tanh((t/15 ms)²) (V7.2)."""
+    return Square(
+        cells=cells,
+        material=LinearElastic.from_wave_speeds(3253.0, 1992.0, 2400.0),
+        pressure=4.0e6,
+        history=lambda t: math.tanh((t / 0.015) ** 2),
+    )
+
+
+@dataclass(frozen=True)
+class SquareModel:
+    """The assembled square; ``bottom``: its contact side."""
+
+    square: Square
+    system: SemiDiscreteSystem
+    bottom: Any
+
+    def problem(self, *, friction: FrictionLaw | None = None, mass: MassLaw | None = None) -> ContactProblem:
+        """The square on a support that it fits."""
+        surface = contact_surface(self.system, self.bottom)
+        return ContactProblem(self.system, surface, friction=friction or Frictionless(), mass=mass)
+
+    def probes(self) -> dict[str, tuple[float, float]]:
+        """Middle of the top, corner at the right end of the contact."""
+        half = 0.5 * self.square.side
+        return {"top": (0.0, half), "corner": (half, -half)}
+
+
+def build(square: Square, comm: Any) -> SquareModel:
+    """Mesh and system of the square; collective."""
+    half = 0.5 * square.side
+    mesh, tags = build_mesh(
+        BlockMesh(lengths=(square.side,) * 2, divisions=(square.cells,) * 2, corner=(-half, -half)), comm
+    )
+    load = Traction(tags["top"], (0.0, -square.pressure), history=square.history)
+    rollers = [Prescribed(tags[side], components=(0,)) for side in ("left", "right")] if square.confined else []
+    system = assemble(mesh, square.material, section=PlaneStrain(), loads=load, prescribed=rollers)
+    return SquareModel(square, system, tags["bottom"])

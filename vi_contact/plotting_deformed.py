@@ -1,0 +1,205 @@
+"""Pictures of deformed bodies in the plane with their contact tractions, from the folder of a run.
+
+A run that writes fields (``fields=fem.XDMF(every=...)``) and records ``Contact()`` leaves all that is needed there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from .algebra import Array, Indices
+from .errors import InputError
+from .output import FIELDS, HISTORY_H5
+from .plotting import _STYLE, _save, _scaled
+
+ARROW = 0.3  # length of the longest arrow over the size of the body
+
+
+@dataclass(frozen=True)
+class Tractions:
+    """Contact tractions on the body: ``points`` (m, 2) [m]; ``normals``, ``tangents`` (m, 2), the normals towards the
+    support; times ``t`` (k,) [s]; pressures ``normal`` (k, m) [Pa] and shear tractions ``shear`` (k, m) [Pa] of the
+    support on the body along the tangents."""
+
+    points: Array
+    normals: Array
+    tangents: Array
+    t: Array
+    normal: Array
+    shear: Array
+
+    def at(self, t: float) -> tuple[Array, Array]:
+        """(pressure, shear) of the step that ends next to t."""
+        row = int(np.argmin(np.abs(self.t - t)))
+        return self.normal[row], self.shear[row]
+
+
+@dataclass(frozen=True)
+class Frames:
+    """The fields of a run: ``points`` (n, 2) [m], ``cells`` (c, corners), times (f,) [s] and a reader of each frame."""
+
+    points: Array
+    cells: Indices
+    t: Array
+    paths: tuple[Path, ...]
+
+    def at(self, t: float) -> tuple[float, Array, Array]:
+        """(its time [s], u (n, 2) [m], von Mises stress (c,) [Pa]) of the frame nearest to t."""
+        row = int(np.argmin(np.abs(self.t - t)))
+        with h5py.File(self.paths[row]) as file:
+            return float(self.t[row]), file["u"][:, :2], file["von_mises"][:]
+
+
+def read_tractions(folder: str | Path) -> Tractions:
+    """From the history of a run in the plane. InputError for a folder without one."""
+    path = Path(folder) / HISTORY_H5
+    if not path.is_file():
+        raise InputError(f"{path} does not exist: give the folder of a finished run with contact in it")
+    with h5py.File(path) as file:
+        if "pressure" not in file or file["contact/points"].shape[1] != 2:
+            raise InputError(f"{path} is not of a body in the plane with the recorder Contact(): run it with both")
+        points, normals, pressure = file["contact/points"][:], file["contact/normals"][:], file["pressure"][:]
+        shear = -file["traction_t"][:, :, 0] if "traction_t" in file else np.zeros_like(pressure)
+        return Tractions(points, normals, _tangents(normals), file["t"][:], pressure, shear)
+
+
+def _tangents(normals: Array) -> Array:
+    """Those of the nodal frames: the axis at right angles to a normal along the other one, else (-n_y, n_x)."""
+    turned = np.column_stack([-normals[:, 1], normals[:, 0]])
+    axis = np.count_nonzero(normals, axis=1) == 1
+    return np.where(axis[:, None], np.abs(turned), turned)
+
+
+def read_frames(folder: str | Path) -> Frames:
+    """From the fields of a run. InputError for a folder without them."""
+    fields, history = Path(folder) / FIELDS, Path(folder) / HISTORY_H5
+    paths = sorted(fields.glob("frame_*.h5"))
+    if not paths or not history.is_file():
+        raise InputError(f"no frames in {fields}: run it with out and fields=fem.XDMF(every=...)")
+    with h5py.File(history) as file:
+        times = dict(zip(file["k"][:].astype(int), file["t"][:], strict=True))
+    with h5py.File(fields / "mesh.h5") as file:
+        t = np.array([times[int(path.stem.removeprefix("frame_"))] for path in paths])
+        return Frames(file["points"][:, :2], file["cells"][:], t, tuple(paths))
+
+
+def plot_snapshots(
+    folders: Mapping[str, str | Path],
+    times: Sequence[float],
+    path: str | Path,
+    *,
+    title: str,
+    support: Callable[[float], float],
+    magnified: float = 1.0,
+) -> Path:
+    """A row per run (name -> folder), a column per time [s]: the deformed mesh and the contact tractions on it.
+
+    Cells are coloured by von Mises stress, tractions drawn as arrows with one scale for all. ``support``: height y [m]
+    of the rigid support at a time; displacements (not ``support``) are drawn ``magnified`` times.
+    """
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    runs = {name: (read_frames(folder), read_tractions(folder)) for name, folder in folders.items()}
+    stresses = np.array([frames.at(t)[2].max() for frames, _ in runs.values() for t in times])
+    shown, unit = _scaled(stresses, "Pa")
+    longest = max(float(np.hypot(*tractions.at(t)).max(initial=0.0)) for _, tractions in runs.values() for t in times)
+    size = float(np.ptp(next(iter(runs.values()))[0].points, axis=0).max())
+    with matplotlib.rc_context(_STYLE | {"axes.grid": False}):
+        figure = Figure(figsize=(2.6 * len(times) + 1.2, 3.0 * len(runs) + 0.6), layout="constrained")
+        axes = figure.subplots(len(runs), len(times), sharex=True, sharey=True, squeeze=False)
+    for row, (name, (frames, tractions)) in zip(axes, runs.items(), strict=True):
+        for axis, t in zip(row, times, strict=True):
+            exact, u, stress = frames.at(t)
+            u = magnified * u
+            _draw_support(axis, support(exact), size)
+            cells = _draw_body(axis, frames.points + u, frames.cells, stress * (shown.max() / stresses.max()))
+            cells.set_clim(0.0, shown.max())
+            _draw_tractions(axis, frames, tractions, u, exact, longest / (ARROW * size))
+            axis.set_title(f"{name}, {_moment(exact)}", fontsize=9)
+    _label(axes, size)
+    figure.colorbar(cells, ax=axes, label=f"von Mises stress [{unit}]", shrink=0.7)
+    figure.suptitle(title + (f" (displacements x {magnified:g})" if magnified != 1.0 else ""))
+    return _save(figure, path)
+
+
+def _moment(t: float) -> str:
+    """t with its unit."""
+    return f"t = {1e3 * t:.4g} ms" if 0.0 < t < 0.1 else f"t = {t:.4g} s"
+
+
+def _label(axes: Any, size: float) -> None:
+    """Names of the axes, and room for everything, arrows included."""
+    for axis in axes[-1]:
+        axis.set_xlabel("x [m]")
+    for axis in axes[:, 0]:
+        axis.set_ylabel("y [m]")
+    corners = np.concatenate([axis.dataLim.get_points() for axis in axes.ravel()])
+    (left, bottom), (right, top) = corners.min(axis=0), corners.max(axis=0)
+    axes[0, 0].set(xlim=(left - 0.2 * size, right + 0.2 * size), ylim=(bottom - 0.35 * size, top + 0.1 * size))
+
+
+def _draw_body(axis: Any, points: Array, cells: Indices, stress: Array) -> Any:
+    """The cells where they are now, coloured."""
+    from matplotlib.collections import PolyCollection
+
+    drawn = PolyCollection(list(points[cells]), cmap="YlOrRd", edgecolor="0.35", linewidth=0.3)
+    drawn.set_array(stress)
+    axis.add_collection(drawn)
+    axis.update_datalim(points)
+    axis.set_aspect("equal")
+    return drawn
+
+
+def _draw_tractions(axis: Any, frames: Frames, tractions: Tractions, u: Array, t: float, scale: float) -> None:
+    """Arrows that end at the contact points; nothing at open ones. scale: Pa per metre of arrow."""
+    pressure, shear = tractions.at(t)
+    acts = np.hypot(pressure, shear) > 0.0
+    if not acts.any():
+        return
+    points = tractions.points[acts]
+    nodes = [int(np.argmin(np.sum((frames.points - point) ** 2, axis=1))) for point in points]
+    arrows = shear[acts, None] * tractions.tangents[acts] - pressure[acts, None] * tractions.normals[acts]
+    tips = points + u[nodes]
+    axis.quiver(*tips.T, *arrows.T, angles="xy", scale_units="xy", scale=scale, pivot="tip", width=0.004,
+                color="tab:blue", zorder=3)
+
+
+def _draw_support(axis: Any, height: float, size: float) -> None:
+    axis.axhline(height, color="black", lw=1.0, zorder=2)
+    axis.axhspan(height - 0.05 * size, height, color="0.8", lw=0.0, zorder=0)
+
+
+def plot_tractions(
+    folders: Mapping[str, str | Path], times: Sequence[float], path: str | Path, *, title: str
+) -> Path:
+    """Contact pressure p_n and shear traction p_t on the body over x: a column per run, a curve per time [s]."""
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    with matplotlib.rc_context(_STYLE):
+        figure = Figure(figsize=(3.8 * len(folders) + 0.5, 5.4), layout="constrained")
+        axes = figure.subplots(2, len(folders), sharex=True, sharey="row", squeeze=False)
+    runs = {name: read_tractions(folder) for name, folder in folders.items()}
+    size = np.array([max(float(np.abs(run.at(t)).max(initial=0.0)) for run in runs.values() for t in times)])
+    shown, unit = _scaled(size, "Pa")
+    factor = shown[0] / size[0] if size[0] else 1.0
+    colours = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.85, len(times)))
+    for column, (name, tractions) in zip(axes.T, runs.items(), strict=True):
+        x, order = tractions.points[:, 0], np.argsort(tractions.points[:, 0])
+        for t, colour in zip(times, colours, strict=True):
+            for axis, values in zip(column, tractions.at(t), strict=True):
+                axis.plot(x[order], factor * values[order], ".-", ms=3, lw=0.9, color=colour, label=_moment(t))
+        column[0].set_title(name, fontsize=10)
+        column[1].set_xlabel("x [m]")
+    axes[0, 0].set_ylabel(f"pressure $p_n$ [{unit}]")
+    axes[1, 0].set_ylabel(f"shear traction $p_t$ [{unit}]")
+    axes[0, -1].legend(fontsize=8)
+    figure.suptitle(title)
+    return _save(figure, path)
