@@ -84,18 +84,20 @@ def test_thrown_bar(body: str, courant: float) -> None:
 def test_period_three(body: str, courant: float) -> None:
     """V1.3, four bounces: energy never above 1/8 nor below 98 % of it, force up to 1.8 times the exact one, impulse of
     the first contact within 2 %. Of all four together 4 % are missing at Courant number 1, 2.5 % at ½, 1.5 % at 0.1: it
-    has gone into waves too short for the mesh."""
-    found = follow(Bar(PeriodicBar(), **BODIES[body]), courant, 12.0)  # type: ignore[arg-type]
+    has gone into waves too short for the mesh. Two bounces and 1 % at 0.1 in two dimensions."""
+    bounces = 2 if courant == 0.1 and body != "bar" else 4
+    missing = {1.0: 0.04, 0.5: 0.025, 0.1: 0.015 if bounces == 4 else 0.01}[courant]
+    found = follow(Bar(PeriodicBar(), **BODIES[body]), courant, 3.0 * bounces)  # type: ignore[arg-type]
     assert found.energy.max() <= 0.125 * (1.0 + 1e-9) and found.energy[-1] >= 0.98 * 0.125
     assert found.force.max() <= 1.8 * 0.5
     assert found.impulse(0.0, 3.0) == pytest.approx(0.5, rel=0.02)
-    assert found.impulse(0.0, 12.0) == pytest.approx(2.0, rel={1.0: 0.04, 0.5: 0.025, 0.1: 0.015}[courant])
+    assert found.impulse(0.0, 12.0) == pytest.approx(0.5 * bounces, rel=missing)
 
 
-@pytest.mark.parametrize("courant, periods, floor", [(1.0, 10, 0.88), (0.5, 10, 0.97), (0.1, 1, 0.999)])
+@pytest.mark.parametrize("courant, periods, floor", [(1.0, 10, 0.88), (0.5, 3, 0.998), (0.1, 0.5, 0.9999)])
 @pytest.mark.parametrize("body", ["strip"])
-def test_bouncing_strip(body: str, courant: float, periods: int, floor: float) -> None:
-    """V1.2: energy after ten periods, impulse of the first contact 800/3 within 0.5 %."""
+def test_bouncing_strip(body: str, courant: float, periods: float, floor: float) -> None:
+    """V1.2: energy after so many periods, impulse of the first contact 800/3 within 0.5 %."""
     bar = Bar(BouncingBar(), **BODIES[body])  # type: ignore[arg-type]
     found = follow(bar, courant, periods * 16.0 / 3.0)
     above = found.energy + bar.case.energy  # zero is the bar standing on the wall
