@@ -67,8 +67,7 @@ class ContactProblem:
         system = self._relative(system)
         inertia = []
         for excitation in self.excitations:
-            rigid = system.influence @ np.asarray(excitation.direction, dtype=float)
-            inertia.append((-(system.M @ rigid), excitation.acceleration))
+            inertia.append((-system.inertia(np.asarray(excitation.direction, dtype=float)), excitation.acceleration))
         return system.with_load(*inertia)
 
     @cached_property

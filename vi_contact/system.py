@@ -56,6 +56,11 @@ class Load:
             total += function(t)
         return total
 
+    def inertia(self, direction: Array) -> Array:
+        """M r: the force [N] that accelerates body and prescribed nodes together by one in this direction (d,)."""
+        force = self.M @ (self.influence @ direction)
+        return force if self.base_mass is None else force + self.base_mass @ direction
+
     def in_basis(self, T: Matrix) -> Load:
         """The same load on the unknowns û of u = T û: Tᵀ f."""
 
@@ -79,6 +84,8 @@ class SemiDiscreteSystem:
         C: damping [N s/m] or None (seed 000 eq. 7 with c = 0).
         load: f(t) [N].
         influence: (n, d) rigid unit translation in each direction, for the inertia load -M r a_g(t).
+        base_mass: (n, d) forces on the unknowns when the prescribed nodes alone are accelerated by one in each direction:
+            the part of the inertia load that comes from mass shared with them. None: left out.
         u0, v0: initial displacement [m] and velocity [m/s].
         space: what the unknowns mean.
         massless: unknowns without inertia (rows and columns of M are zero), None when there are none.
@@ -96,6 +103,7 @@ class SemiDiscreteSystem:
     space: Space
     floating: bool = False
     massless: Mask | None = None
+    base_mass: Array | None = None
     _cache: dict[str, Any] = field(default_factory=dict, compare=False, repr=False)
 
     @property
@@ -122,6 +130,11 @@ class SemiDiscreteSystem:
         load = replace(self.load, separable=self.load.separable + terms)
         return replace(self, load=load, _cache={})
 
+    def inertia(self, direction: Array) -> Array:
+        """M r: the force [N] that accelerates body and prescribed nodes together by one in this direction (d,)."""
+        force = self.M @ (self.influence @ direction)
+        return force if self.base_mass is None else force + self.base_mass @ direction
+
     def in_basis(self, T: Matrix) -> SemiDiscreteSystem:
         """The same system in the unknowns û of u = T û: TᵀMT, TᵀCT, TᵀKT, Tᵀf (design idea 3).
 
@@ -136,6 +149,7 @@ class SemiDiscreteSystem:
             K=turn(T, self.K),
             load=self.load.in_basis(T),
             influence=influence,
+            base_mass=_columns(self.base_mass, T.transpose_apply),
             u0=T.transpose_apply(self.u0),
             v0=T.transpose_apply(self.v0),
             _cache={},
@@ -158,7 +172,12 @@ class SemiDiscreteSystem:
             K=turn(R, self.K),
             load=self.load.in_basis(R),
             influence=np.column_stack([inverse(column) for column in self.influence.T]),
+            base_mass=_columns(self.base_mass, R.transpose_apply),
             u0=inverse(self.u0),
             v0=inverse(self.v0),
             _cache={},
         )
+
+
+def _columns(values: Array | None, apply: Callable[[Array], Array]) -> Array | None:
+    return None if values is None else np.column_stack([apply(column) for column in values.T])

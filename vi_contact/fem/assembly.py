@@ -39,6 +39,7 @@ def assemble(
     damping: Damping | None = None,
     initial_displacement: Initial = None,
     initial_velocity: Initial = None,
+    base_inertia: bool = True,
 ) -> SemiDiscreteSystem:
     """The system of a body, on the free unknowns.
 
@@ -49,6 +50,8 @@ def assemble(
         clamped: facets with u = 0; prescribed: facets that move (eq. 3) or are held in some components.
         loads: tractions (eqs. 4, 6) and body forces.
         damping: NoDamping() by default, MassProportional(c) (eq. 7) or Rayleigh.
+        base_inertia: whether a ground motion's inertia load counts the mass that elements share with prescribed nodes, as
+            it must to be the motion seen from the ground; False is the load of the reference of V4.1.
         initial_displacement, initial_velocity: constant or points (k, d) -> (k, d) (eqs. 10, 10a).
     Raises:
         InputError: cells without material, NaN in data, components that do not exist.
@@ -66,13 +69,15 @@ def assemble(
     rigid = np.zeros((len(space.ids), space.dimension))
     for direction in range(space.dimension):
         rigid[:, direction] = space.restrict(np.tile(np.eye(space.dimension)[direction], (len(space.nodes), 1)))
+    M = reduced(mass)
     system = SemiDiscreteSystem(
         algebra=algebra,
-        M=reduced(mass),
+        M=M,
         C=None if damper is None else reduced(damper),
         K=reduced(stiffness),
         load=assemble_loads(space, section, as_tuple(loads), (stiffness, damper, mass)),
         influence=rigid,
+        base_mass=_base_mass(space, PetscMatrix(mass), M, rigid) if base_inertia else None,
         u0=_initial(space, "initial displacement", initial_displacement),
         v0=_initial(space, "initial velocity", initial_velocity),
         space=space,
@@ -80,6 +85,12 @@ def assemble(
     )
     space.forms = forms
     return system
+
+
+def _base_mass(space: FemSpace, full: PetscMatrix, M: PetscMatrix, rigid: Array) -> Array:
+    """Pᵀ M_full r - M r_free for every direction: what accelerated prescribed nodes pull on the free ones."""
+    whole = [np.tile(direction, (len(space.nodes), 1)).ravel() for direction in np.eye(space.dimension)]
+    return np.column_stack([(full @ r)[space.free] - M @ free for r, free in zip(whole, rigid.T, strict=True)])
 
 
 class ElasticForms:

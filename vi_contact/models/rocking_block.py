@@ -120,13 +120,9 @@ class RockingModel:
 
     @property
     def onset_acceleration(self) -> float:
-        """Slowly growing horizontal acceleration [m/s²] that lifts the block: m g b/(turn·M r) with its mass matrix.
-
-        Above g b/h because the held base nodes have no part in the inertia load -M r a_g: by (1/n)²/3 of it for n
-        elements over the height.
-        """
+        """Slowly growing horizontal acceleration [m/s²] that lifts the block, g b/h: that of m g b over turn·M r."""
         system = self.problem.equations
-        overturning = float(system.algebra.dot(self._turn, system.M @ system.influence[:, 0]))
+        overturning = float(system.algebra.dot(self._turn, system.inertia(np.array([1.0, 0.0]))))
         return 0.5 * self.block.mass * self.block.shape.gravity * self.block.shape.width / abs(overturning)
 
     def angle(self, state: State) -> float:

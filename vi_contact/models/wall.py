@@ -147,5 +147,6 @@ def build(wall: Wall, comm: Any, *, weight: bool = False) -> WallModel:
         clamped=tags["base"],
         loads=loads,
         damping=wall.damping,
+        base_inertia=False,  # as the reference numbers
     )
     return WallModel(wall, mesh, tags, system)
