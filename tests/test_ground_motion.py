@@ -92,8 +92,9 @@ def test_motion_info_lists_every_quantity(tmp_path):
     assert rows["units"] == "gal (1 gal = 0.01 m/s2)" and rows["samples"] == "5" and rows["duration"] == "0.4 s"
     assert rows["PGA"] == "0.02 m/s2 = 0.002039 g at t = 0.2 s"
     assert [line[:20].strip() for line in lines] == [
-        "file", "format", "title", "units", "samples", "dt", "duration", "PGA", "PGV", "PGD", "Arias intensity",
-        "D5-95", "final velocity", "final displacement", "sha256", "note"]
+        "file", "format", "title", "station", "component", "units", "samples", "dt", "duration", "PGA", "PGV", "PGD",
+        "Arias intensity", "D5-95", "CAV", "RMS", "Housner intensity", "predominant period", "mean period",
+        "final velocity", "final displacement", "sha256", "note"]
     assert "samples             3" in motion_info(path, "gal", resample_dt=0.2)
 
 

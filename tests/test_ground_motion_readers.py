@@ -203,7 +203,8 @@ TIMES = [0.02 * k for k in range(11)]
 
 @pytest.mark.parametrize("units", sorted(UNITS))
 def test_columns_in_every_unit(units, tmp_path):
-    factor = {"m/s2": 1.0, "cm/s2": 0.01, "gal": 0.01, "g": G, "mm/s2": 1e-3, "in/s2": 0.0254, "ft/s2": 0.3048}[units]
+    factor = {"m/s2": 1.0, "cm/s2": 0.01, "gal": 0.01, "g": G, "g/10": 0.1 * G,
+              "mm/s2": 1e-3, "in/s2": 0.0254, "ft/s2": 0.3048}[units]
     record = read_record(write(tmp_path, columns(TIMES, VALUES)), units)
     assert np.allclose(record.acceleration, factor * VALUES, rtol=1e-15, atol=0.0)
     assert record.dt == pytest.approx(0.02, rel=1e-14) and record.units == units
@@ -229,8 +230,8 @@ def test_units_of_columns_are_never_guessed(tmp_path):
 
 
 def test_an_unknown_format_is_refused_at_its_first_line(tmp_path):
-    with pytest.raises(InputError, match="line 1: 'EVENT_NAME:' is not a number"):
-        read_record(write(tmp_path, "EVENT_NAME: X\nUNITS: cm/s^2\n1.0\n2.0\n"))
+    with pytest.raises(InputError, match="line 1: 'RECORD' is not a number"):
+        read_record(write(tmp_path, "RECORD of X\nUNITS cm/s^2\n1.0\n2.0\n"), "g")
 
 
 def test_one_column_needs_the_time_step(tmp_path):

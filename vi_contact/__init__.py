@@ -27,7 +27,12 @@ _CONTENTS = {
     "excitation": (
         "FullSine", "GroundMotion", "HalfSine", "Harmonic", "Rectangular", "Ricker", "Tabulated",
     ),
-    "ground_motion": ("Record", "motion_info", "read_record", "resampled", "scaled", "scaled_to_pga"),
+    "ground_motion": (
+        "EC8Spectrum", "Envelope", "KanaiTajimi", "Processing", "Record", "ResponseSpectrum", "baseline_corrected",
+        "filtered", "motion_info", "padded", "read_record", "resampled", "response_spectrum", "scaled",
+        "scaled_to_arias", "scaled_to_pga", "scaled_to_psa", "synthetic", "tapered", "trimmed", "without_mean",
+        "write_at2", "write_columns", "write_path_series",
+    ),
     "mass": ("ConsistentMass", "Redistributed"),
     "surfaces": ("AnalyticGap", "ContactSurface", "HalfSpace", "Touching"),
     "system": ("Load", "SemiDiscreteSystem"),

@@ -1,10 +1,38 @@
-"""Recorded ground motions: readers of record files, scaling, resampling, integration, intensity measures."""
+"""Ground motions: readers and writers of record files, processing, spectra, intensity measures, synthetic motions."""
 
-from .info import motion_info
-from .intensity import arias, d5_95, pga, pga_time, pgd, pgv
+from .baseline import baseline_corrected
+from .chain import Processing
+from .ec8 import EC8Spectrum
+from .filters import filtered, tapered, without_mean
+from .info import motion_info, record_info
+from .intensity import (
+    arias,
+    bracketed_duration,
+    cav,
+    d5_95,
+    husid,
+    pga,
+    pga_time,
+    pgd,
+    pgv,
+    rms,
+    significant_duration,
+)
+from .kanai_tajimi import Envelope, KanaiTajimi, synthetic
 from .processing import integrated, resampled, scaled, scaled_to_pga
 from .reader import read_record
 from .record import STANDARD_GRAVITY, UNITS, Record
+from .scaling import scaled_to_arias, scaled_to_psa
+from .spectra import ResponseSpectrum, fourier_spectrum, response_spectrum
+from .spectral_intensity import housner_intensity, mean_period, predominant_period, psa
+from .window import padded, trimmed
+from .writer import write_at2, write_columns, write_path_series
 
-__all__ = ["STANDARD_GRAVITY", "UNITS", "Record", "arias", "d5_95", "integrated", "motion_info", "pga", "pga_time",
-           "pgd", "pgv", "read_record", "resampled", "scaled", "scaled_to_pga"]
+__all__ = [
+    "STANDARD_GRAVITY", "UNITS", "EC8Spectrum", "Envelope", "KanaiTajimi", "Processing", "Record", "ResponseSpectrum",
+    "arias", "baseline_corrected", "bracketed_duration", "cav", "d5_95", "filtered", "fourier_spectrum",
+    "housner_intensity", "husid", "integrated", "mean_period", "motion_info", "padded", "pga", "pga_time", "pgd", "pgv",
+    "predominant_period", "psa", "read_record", "record_info", "resampled", "response_spectrum", "rms", "scaled",
+    "scaled_to_arias", "scaled_to_pga", "scaled_to_psa", "significant_duration", "synthetic", "tapered", "trimmed",
+    "without_mean", "write_at2", "write_columns", "write_path_series",
+]

@@ -1,5 +1,7 @@
 """Plain columns: time [s] and acceleration, or acceleration alone with the time step given by the caller.
 
+The latter are the path series of OpenSees (.th, .g3, .acc): no header, values in one column or row by row.
+
 Lines starting with "#" and empty lines are skipped; columns are separated by blanks, commas or semicolons. A header
 that ends in `*** Begin data ***` is skipped too. The units are never guessed.
 """
@@ -26,11 +28,11 @@ def read(text: TextFile, units: str | None = None, dt: float | None = None, resa
 
     Uneven times are refused unless resample_dt [s] is given: then straight lines between the samples are read off at
     resample_dt, or at the nearest whole part of it that is not longer than the usual step, so that reading does not
-    alias. The first time of the file becomes t = 0.
+    alias. The first time of the file becomes t = 0. With dt, rows of three or more values are read one after the other.
     Raises InputError naming file and line for missing units, ragged rows, words that are not numbers, times that do
     not increase, uneven times.
     """
-    lines, table = _table(text)
+    lines, table = _table(text, series=dt is not None)
     name = file_units(text.path, None, units)
     notes: tuple[str, ...] = ()
     if table.shape[1] == 1:
@@ -60,17 +62,20 @@ def follow_begin_data(text: TextFile) -> bool:
     return all(len(row) == 2 for row in rows) and all(after > before >= 0.0 for before, after in pairwise(times))
 
 
-def _table(text: TextFile) -> tuple[list[int], Array]:
-    """Line index of every row and the rows, shape (n, 1) or (n, 2), n >= 2."""
-    lines, rows = [], []
-    for index in range(begin_data(text) or 0, len(text.lines)):
-        line = text.lines[index].strip()
-        if line and not line.startswith("#"):
-            lines.append(index)
-            rows.append(text.numbers(index))
-            if len(rows[-1]) not in (1, 2) or len(rows[-1]) != len(rows[0]):
-                raise InputError(f"{text.at(index)}: {len(rows[-1])} columns instead of {min(len(rows[0]), 2)}; "
-                                 "give time and acceleration, or acceleration alone")
+def _table(text: TextFile, *, series: bool) -> tuple[list[int], Array]:
+    """Line index of every row and the rows, shape (n, 1) or (n, 2), n >= 2.
+
+    series: rows of more than two values, the last perhaps shorter, are one column written in rows.
+    """
+    lines = [index for index in range(begin_data(text) or 0, len(text.lines))
+             if text.lines[index].strip() and not text.lines[index].lstrip().startswith("#")]
+    rows = [text.numbers(index) for index in lines]
+    if series and rows and len(rows[0]) > 2:
+        return lines, np.array([value for row in rows for value in row])[:, None]
+    for index, row in zip(lines, rows, strict=True):
+        if len(row) not in (1, 2) or len(row) != len(rows[0]):
+            raise InputError(f"{text.at(index)}: {len(row)} columns instead of {min(len(rows[0]), 2)}; give time and "
+                             "acceleration, or acceleration alone, or dt= if rows of accelerations follow each other")
     if len(rows) < 2:
         raise InputError(f"{text.path}: {len(rows)} samples is no record; give at least two")
     return lines, np.array(rows)

@@ -4,21 +4,32 @@ from __future__ import annotations
 
 import os
 
-from .intensity import arias, d5_95, pga, pga_time, pgd, pgv
+from .chain import Processing
+from .intensity import arias, cav, d5_95, pga, pga_time, pgd, pgv, rms
 from .processing import integrated
 from .reader import read_record
-from .record import STANDARD_GRAVITY, UNITS
+from .record import STANDARD_GRAVITY, UNITS, Record
+from .spectral_intensity import housner_intensity, mean_period, predominant_period
 
 
 def motion_info(path: str | os.PathLike[str], units: str | None = None, *, dt: float | None = None,
-                resample_dt: float | None = None) -> str:
-    """A table of one quantity a line; the options and the InputError raised are those of `read_record`."""
-    record = read_record(path, units, dt=dt, resample_dt=resample_dt)
+                resample_dt: float | None = None, channel: int | None = None,
+                processing: Processing | None = None) -> str:
+    """A table of one quantity a line, after `processing`; other options and InputError: see `read_record`."""
+    record = read_record(path, units, dt=dt, resample_dt=resample_dt, channel=channel)
+    return record_info(record if processing is None else processing(record))
+
+
+def record_info(record: Record) -> str:
+    """The table of a record: where it comes from, peaks, intensities, what is left at its end, notes."""
+    shaken = pga(record) > 0.0
     velocity, displacement = integrated(record)
     rows = [
         ("file", record.source),
         ("format", record.format),
         ("title", record.title or "(none)"),
+        ("station", record.station or "(not stated)"),
+        ("component", record.component or "(not stated)"),
         ("units", f"{record.units} (1 {record.units} = {UNITS[record.units]:g} m/s2)"),
         ("samples", f"{record.acceleration.size}"),
         ("dt", f"{record.dt:g} s"),
@@ -28,6 +39,11 @@ def motion_info(path: str | os.PathLike[str], units: str | None = None, *, dt: f
         ("PGD", f"{pgd(record):.4g} m"),
         ("Arias intensity", f"{arias(record):.4g} m/s"),
         ("D5-95", f"{d5_95(record):.4g} s"),
+        ("CAV", f"{cav(record):.4g} m/s"),
+        ("RMS", f"{rms(record):.4g} m/s2"),
+        ("Housner intensity", f"{housner_intensity(record):.4g} m, 5 % damping, 0.1 to 2.5 s"),
+        ("predominant period", f"{predominant_period(record):.3g} s" if shaken else "(all zero)"),
+        ("mean period", f"{mean_period(record):.3g} s" if shaken else "(all zero)"),
         ("final velocity", f"{velocity[-1]:.4g} m/s"),
         ("final displacement", f"{displacement[-1]:.4g} m"),
         ("sha256", record.sha256),

@@ -1,4 +1,4 @@
-"""Intensity measures of a record: peaks, Arias intensity, significant duration."""
+"""Intensity measures of a record: peaks, Arias intensity, durations, cumulative absolute velocity."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from ..algebra import Array
+from ..errors import InputError
 from .processing import integrated
 from .record import STANDARD_GRAVITY, Record
 
@@ -33,7 +34,7 @@ def pgd(record: Record) -> float:
 
 def arias(record: Record) -> float:
     """Arias intensity pi / (2 g) times the integral of a² over the record, by the trapezoidal rule [m/s]."""
-    return float(_husid(record)[-1])
+    return float(husid(record)[-1])
 
 
 def d5_95(record: Record) -> float:
@@ -41,15 +42,43 @@ def d5_95(record: Record) -> float:
 
     Both instants are interpolated linearly in the Husid curve, the Arias intensity accumulated up to t.
     """
-    husid = _husid(record)
-    if husid[-1] == 0.0:
-        return 0.0
-    start, end = np.interp((0.05 * husid[-1], 0.95 * husid[-1]), husid, record.times)
-    return float(end - start)
+    return significant_duration(record, 0.05, 0.95)
 
 
-def _husid(record: Record) -> Array:
+def husid(record: Record) -> Array:
     """Arias intensity accumulated up to each sample, shape (n,) [m/s]."""
     square = record.acceleration**2
     steps = 0.5 * record.dt * (square[:-1] + square[1:])
     return math.pi / (2.0 * STANDARD_GRAVITY) * np.concatenate(([0.0], np.cumsum(steps)))
+
+
+def significant_duration(record: Record, start: float, end: float) -> float:
+    """Time between the fractions `start` and `end` of the Arias intensity [s], zero for a record that is all zero."""
+    if not 0.0 <= start < end <= 1.0:
+        raise InputError(f"significant_duration: {start!r} to {end!r}; give fractions with 0 <= start < end <= 1")
+    curve = husid(record)
+    if curve[-1] == 0.0:
+        return 0.0
+    first, last = np.interp((start * curve[-1], end * curve[-1]), curve, record.times)
+    return float(last - first)
+
+
+def bracketed_duration(record: Record, threshold: float) -> float:
+    """Time between the first and the last sample with |a| >= threshold [m/s²], zero if there is none [s]."""
+    if not threshold > 0.0:
+        raise InputError(f"bracketed_duration: threshold is {threshold!r}; give a positive acceleration in m/s²")
+    above = np.flatnonzero(np.abs(record.acceleration) >= threshold)
+    return float((above[-1] - above[0]) * record.dt) if above.size else 0.0
+
+
+def cav(record: Record) -> float:
+    """Cumulative absolute velocity, the integral of |a| [m/s], exact for straight lines between samples."""
+    a, b = np.abs(record.acceleration[:-1]), np.abs(record.acceleration[1:])
+    change = record.acceleration[:-1] * record.acceleration[1:] < 0.0  # two triangles where the sign changes
+    total = np.where(change, a + b, 1.0)
+    return float(np.sum(0.5 * record.dt * np.where(change, (a**2 + b**2) / total, a + b)))
+
+
+def rms(record: Record) -> float:
+    """Root of the mean of a² over the record, by the trapezoidal rule [m/s²]."""
+    return math.sqrt(2.0 * STANDARD_GRAVITY / math.pi * arias(record) / record.duration)

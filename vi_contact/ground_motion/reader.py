@@ -5,31 +5,39 @@ from __future__ import annotations
 import math
 import os
 
-from . import at2, columns, smc
+from ..errors import InputError
+from . import at2, columns, cosmos, esm, knet, smc
 from .processing import resampled
 from .record import Record
 from .text import TextFile, load_text
 
 
 def read_record(path: str | os.PathLike[str], units: str | None = None, *, dt: float | None = None,
-                resample_dt: float | None = None) -> Record:
-    """One component of ground motion from a PEER AT2, a USGS SMC or a column file.
+                resample_dt: float | None = None, channel: int | None = None) -> Record:
+    """One component of ground motion from a PEER AT2, USGS SMC, COSMOS, CSMIP, K-NET, ESM or column file.
 
-    units: "m/s2", "cm/s2", "gal", "g", "mm/s2", "in/s2" or "ft/s2"; required for column files, elsewhere only checked
-    against what the file states. dt: time step [s], for files that do not state one. resample_dt: time step [s] the
-    record is brought to by `resampled`; it also allows uneven times in a column file.
+    units: a key of UNITS ("m/s2", "cm/s2", "gal", "g", ...); required for column files, elsewhere only checked against
+    what the file states. dt: time step [s], for files that do not state one. resample_dt: time step [s] the record is
+    brought to by `resampled`; it also allows uneven times in a column file. channel: which one, from 1, of a COSMOS or
+    CSMIP file that holds several.
     Raises InputError with one sentence that names the file and, where there is one, the line.
     """
     text = load_text(path)
-    record = _read(text, units, dt, resample_dt)
+    if channel is not None and not cosmos.recognises(text):
+        raise InputError(f"{text.path}: channel={channel} was passed but the file holds one record; leave channel out")
+    record = _read(text, units, dt, resample_dt, channel)
     if resample_dt is not None and not math.isclose(record.dt, resample_dt, rel_tol=1e-9):
         record = resampled(record, resample_dt)
     return record
 
 
-def _read(text: TextFile, units: str | None, dt: float | None, resample_dt: float | None) -> Record:
-    if smc.recognises(text):
-        return smc.read(text, units, dt)
+def _read(text: TextFile, units: str | None, dt: float | None, resample_dt: float | None,
+          channel: int | None) -> Record:
+    if cosmos.recognises(text):
+        return cosmos.read(text, units, dt, channel)
+    for reader in (smc, knet, esm):
+        if reader.recognises(text):
+            return reader.read(text, units, dt)
     if at2.recognises(text) and not columns.follow_begin_data(text):
         return at2.read(text, units, dt)
     return columns.read(text, units, dt, resample_dt)

@@ -15,8 +15,8 @@ from ..errors import InputError
 STANDARD_GRAVITY = 9.80665
 """Standard gravity [m/s²], the g of every record file."""
 
-UNITS = {"m/s2": 1.0, "cm/s2": 0.01, "gal": 0.01, "g": STANDARD_GRAVITY, "mm/s2": 0.001, "in/s2": 0.0254,
-         "ft/s2": 0.3048}
+UNITS = {"m/s2": 1.0, "cm/s2": 0.01, "gal": 0.01, "g": STANDARD_GRAVITY, "g/10": 0.1 * STANDARD_GRAVITY, "mm/s2": 0.001,
+         "in/s2": 0.0254, "ft/s2": 0.3048}
 """Accepted units of acceleration and their size in m/s²."""
 
 
@@ -26,7 +26,8 @@ class Record:
 
     acceleration: shape (n,), n >= 2 [m/s²], copied and made read-only; dt: time step [s] > 0; title; source: path of
     the file; format: name of its format; units: of the file, before conversion to m/s²; sha256: of the file's bytes;
-    notes: what the file says about station and processing, then every change made since, one line each.
+    notes: what the file says about station and processing, then every change made since, one line each; station and
+    component (direction): as the file names them, empty where it does not.
     Between samples the acceleration is a straight line. Two records are equal only if they are the same object.
     Raises InputError for NaN or infinite samples, fewer than two of them, or a time step that is not positive.
     """
@@ -39,6 +40,8 @@ class Record:
     units: str = "m/s2"
     sha256: str = ""
     notes: tuple[str, ...] = ()
+    station: str = ""
+    component: str = ""
 
     def __post_init__(self) -> None:
         samples = np.array(self.acceleration, dtype=float)

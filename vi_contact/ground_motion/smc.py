@@ -14,7 +14,7 @@ import numpy as np
 from ..algebra import Array
 from ..errors import InputError
 from .record import UNITS, Record, file_dt, file_units
-from .text import TextFile, to_float
+from .text import TextFile
 
 TEXT_LINES, INTEGER_LINES, REAL_LINES = 11, 6, 10
 INTEGER_WIDTH, REAL_WIDTH, SAMPLE_WIDTH = 10, 15, 10
@@ -24,6 +24,7 @@ UNDEFINED = 1e38  # any real at least this large is the mark of an undefined val
 
 _KIND = re.compile(r"^\s*\d\s+(?:(?:UN)?CORRECTED ACCELEROGRAM|UNKNOWN|VELOCITY|DISPLACEMENT|RESPONSE|FOURIER)",
                    re.IGNORECASE)
+_STATION = re.compile(r"station\s*=\s*(.*?)\s*(?:component|$)", re.IGNORECASE)
 
 
 def recognises(text: TextFile) -> bool:
@@ -49,10 +50,12 @@ def read(text: TextFile, units: str | None = None, dt: float | None = None) -> R
     name = file_units(text.path, "cm/s2", units)
     rate = reals[SAMPLING_RATE]
     stated = 1.0 / rate if 0.0 < rate < UNDEFINED else None
-    notes = _orientation(integers) + tuple(line[1:].strip() for line in comments if line[1:].strip())
+    direction = _direction(integers)
+    notes = ((f"component: {direction}",) if direction else ()) + _problem(integers)
+    notes += tuple(line[1:].strip() for line in comments if line[1:].strip())
     return Record(acceleration=UNITS[name] * _samples(text, start, int(integers[SAMPLES])),
                   dt=file_dt(text.path, stated, dt), title=_title(text), source=text.path, format="USGS SMC",
-                  units=name, sha256=text.sha256, notes=notes)
+                  units=name, sha256=text.sha256, notes=notes, station=_station(text), component=direction)
 
 
 def _refuse_other_kinds(text: TextFile) -> None:
@@ -69,24 +72,10 @@ def _fields(text: TextFile, start: int, lines: int, width: int, per_line: int) -
     """`lines` lines from `start` cut into `per_line` columns of `width` characters."""
     values: list[float] = []
     for index in range(start, start + lines):
-        row = _cut(text, index, width) if index < len(text.lines) else []
+        row = text.fixed(index, width) if index < len(text.lines) else []
         if len(row) != per_line:
             raise InputError(f"{text.at(index)}: {len(row)} header values instead of {per_line}; get the file again")
         values += row
-    return values
-
-
-def _cut(text: TextFile, index: int, width: int) -> list[float]:
-    """The numbers in columns of `width` characters on one line, trailing blanks ignored."""
-    line = text.lines[index].rstrip()
-    values = []
-    for left in range(0, len(line), width):
-        word = line[left:left + width].strip()
-        try:
-            values.append(to_float(word))
-        except ValueError:
-            raise InputError(f"{text.at(index)}: {word!r} in columns {left + 1} to {left + width} is not a number; "
-                             "correct it or get the file again") from None
     return values
 
 
@@ -94,7 +83,7 @@ def _samples(text: TextFile, start: int, count: int) -> Array:
     """The samples in cm/s², shape (count,)."""
     values: list[float] = []
     for index in range(start, len(text.lines)):
-        row = _cut(text, index, SAMPLE_WIDTH)
+        row = text.fixed(index, SAMPLE_WIDTH)
         if any(abs(value) >= UNDEFINED for value in row):
             raise InputError(f"{text.at(index)}: a sample is marked as undefined; fill the gap or use another record")
         values += row
@@ -109,14 +98,20 @@ def _title(text: TextFile) -> str:
     return "; ".join(" ".join(text.lines[index].split()) for index in (3, 5) if text.lines[index].strip(" *"))
 
 
-def _orientation(integers: list[float]) -> tuple[str, ...]:
-    """The component's direction and the problem flag, in words."""
-    undefined = integers[0]
-    notes = []
+def _direction(integers: list[float]) -> str:
+    """The component's direction in words."""
     if integers[VERTICAL] in (0.0, 180.0):
-        notes.append(f"component: vertical, {'up' if integers[VERTICAL] == 0.0 else 'down'}")
-    elif integers[AZIMUTH] != undefined:
-        notes.append(f"component: azimuth {integers[AZIMUTH]:g} degrees clockwise from north")
-    if integers[PROBLEM] == 1.0:
-        notes.append("the file carries the agency's problem flag: read its comments")
-    return tuple(notes)
+        return f"vertical, {'up' if integers[VERTICAL] == 0.0 else 'down'}"
+    undefined = integers[0]
+    return "" if integers[AZIMUTH] == undefined else f"azimuth {integers[AZIMUTH]:g} degrees clockwise from north"
+
+
+def _problem(integers: list[float]) -> tuple[str, ...]:
+    """The agency's problem flag, in words."""
+    return ("the file carries the agency's problem flag: read its comments",) if integers[PROBLEM] == 1.0 else ()
+
+
+def _station(text: TextFile) -> str:
+    """What follows "station =" on text line 6, up to "component"."""
+    match = _STATION.search(text.lines[5])
+    return " ".join(match[1].split()) if match else ""

@@ -41,6 +41,22 @@ class TextFile:
             values += [to_float(part) for part in parts]
         return values
 
+    def fixed(self, index: int, width: int) -> list[float]:
+        """Values on lines[index] in columns of `width` characters, which may touch; trailing blanks are ignored.
+
+        Raises InputError naming file, line, columns and word for anything that is not a number.
+        """
+        line = self.lines[index].rstrip()
+        values = []
+        for left in range(0, len(line), width):
+            word = line[left:left + width].strip()
+            try:
+                values.append(to_float(word))
+            except ValueError:
+                raise InputError(f"{self.at(index)}: {word!r} in columns {left + 1} to {left + width} is not a number; "
+                                 "correct it or get the file again") from None
+        return values
+
 
 def to_float(number: str) -> float:
     """float() that also reads the exponent letter D of Fortran, and no NaN; ValueError for anything else."""
@@ -65,7 +81,7 @@ def load_text(path: str | os.PathLike[str]) -> TextFile:
     if not data.strip():
         raise InputError(f"{name}: the file is empty; download or copy it again")
     if b"\0" in data:
-        raise InputError(f"{name}: this is not a text file; give a PEER AT2, a USGS SMC or a column file")
+        raise InputError(f"{name}: this is not a text file; convert MiniSEED and SAC, unpack archives")
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:

@@ -1,0 +1,83 @@
+"""Elastic response spectra of Eurocode 8, EN 1998-1:2004, 3.2.2.2 (horizontal) and 3.2.2.3 (vertical)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..algebra import Array
+from ..errors import InputError
+
+GROUNDS = {
+    1: {"A": (1.0, 0.15, 0.4, 2.0), "B": (1.2, 0.15, 0.5, 2.0), "C": (1.15, 0.20, 0.6, 2.0),
+        "D": (1.35, 0.20, 0.8, 2.0), "E": (1.4, 0.15, 0.5, 2.0)},
+    2: {"A": (1.0, 0.05, 0.25, 1.2), "B": (1.35, 0.05, 0.25, 1.2), "C": (1.5, 0.10, 0.25, 1.2),
+        "D": (1.8, 0.10, 0.30, 1.2), "E": (1.6, 0.05, 0.25, 1.2)},
+}
+"""S, T_B, T_C, T_D [s] by spectrum type and ground type: tables 3.2 and 3.3, the recommended values."""
+
+VERTICAL = {1: (0.90, 0.05, 0.15, 1.0), 2: (0.45, 0.05, 0.15, 1.0)}
+"""a_vg / a_g, T_B, T_C, T_D [s] by spectrum type: table 3.4."""
+
+
+@dataclass(frozen=True)
+class EC8Spectrum:
+    """S_e(T), eqs. 3.2 to 3.5, of given parameters; `on_ground` and `vertical` take them from the tables.
+
+    ag: design ground acceleration on ground A, gamma_I a_gR [m/s²]; s: soil factor; tb, tc, td [s]; damping: ratio;
+    plateau: 2.5, or 3.0 vertically. A National Annex may give other numbers.
+    Raises InputError unless ag, s > 0, 0 < tb <= tc <= td and 0 <= damping < 1.
+    """
+
+    ag: float
+    s: float
+    tb: float
+    tc: float
+    td: float
+    damping: float = 0.05
+    plateau: float = 2.5
+
+    def __post_init__(self) -> None:
+        if not (self.ag > 0.0 and self.s > 0.0 and 0.0 < self.tb <= self.tc <= self.td and math.isfinite(self.ag)):
+            raise InputError(f"EC8Spectrum: ag={self.ag!r}, s={self.s!r}, tb={self.tb!r}, tc={self.tc!r}, "
+                             f"td={self.td!r}; give positive numbers with tb <= tc <= td")
+        if not 0.0 <= self.damping < 1.0:
+            raise InputError(f"EC8Spectrum: damping is {self.damping!r}; give a ratio from 0 to below 1, 0.05 for 5 %")
+
+    @classmethod
+    def on_ground(cls, ground: str, *, ag: float, kind: int = 1, damping: float = 0.05) -> EC8Spectrum:
+        """The horizontal spectrum of type `kind` (1, or 2 for weak near earthquakes) on ground "A" to "E"."""
+        if kind not in GROUNDS or ground not in GROUNDS[kind]:
+            raise InputError(f"EC8Spectrum: ground {ground!r}, type {kind!r}; give A, B, C, D or E and type 1 or 2")
+        return cls(ag, *GROUNDS[kind][ground], damping=damping)
+
+    @classmethod
+    def vertical(cls, *, ag: float, kind: int = 1, damping: float = 0.05) -> EC8Spectrum:
+        """The vertical spectrum S_ve(T), eqs. 3.8 to 3.11, the same on every ground; ag is the horizontal one."""
+        if kind not in VERTICAL:
+            raise InputError(f"EC8Spectrum: type {kind!r}; give 1 or 2")
+        ratio, tb, tc, td = VERTICAL[kind]
+        return cls(ratio * ag, 1.0, tb, tc, td, damping=damping, plateau=3.0)
+
+    @property
+    def eta(self) -> float:
+        """Damping correction sqrt(10 / (5 + xi in %)), not below 0.55 (eq. 3.6)."""
+        return max(math.sqrt(10.0 / (5.0 + 100.0 * self.damping)), 0.55)
+
+    def acceleration(self, periods: Array) -> Array:
+        """S_e [m/s²] at the periods [s] >= 0; the code states it up to 4 s."""
+        t = np.asarray(periods, dtype=float)
+        if np.any(t < 0.0):
+            raise InputError("EC8Spectrum: a period is negative; give seconds from 0 upwards")
+        top = self.plateau * self.eta
+        later = np.maximum(t, self.tc)  # no division by zero at T = 0
+        shape = np.where(t <= self.tb, 1.0 + t / self.tb * (top - 1.0), top * self.tc / later)
+        shape = np.where((t > self.tb) & (t <= self.tc), top, shape)
+        shape = np.where(t > self.td, top * self.tc * self.td / later**2, shape)
+        return self.ag * self.s * shape
+
+    def displacement(self, periods: Array) -> Array:
+        """S_De = S_e (T / 2 pi)² [m], eq. 3.7."""
+        return self.acceleration(periods) * (np.asarray(periods, dtype=float) / (2.0 * math.pi)) ** 2

@@ -1,0 +1,74 @@
+"""ASCII files of the Engineering Strong-Motion database (ESM, ITACA; AFAD alike): 64 lines "KEY: value", then samples.
+
+One value a line. Read DATA_LICENSE and DATA_CITATION, kept in the notes, before passing a record on.
+"""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from ..errors import InputError
+from .record import UNITS, Record, file_dt, file_units
+from .text import TextFile, to_float
+
+NEEDED = ("SAMPLING_INTERVAL_S", "NDATA", "UNITS")
+_ENTRY = re.compile(r"^\s*([A-Z][A-Z0-9_/^ ]*?)\s*:\s*(.*?)\s*$")
+
+
+def recognises(text: TextFile) -> bool:
+    """Whether the first line is an entry "KEY: value" and one of the first hundred is NDATA or SAMPLING_INTERVAL_S."""
+    keys = ("EVENT_NAME", "SAMPLING_INTERVAL_S", "NDATA")
+    entries = [_ENTRY.match(line) for line in text.lines[:100]]
+    return entries[0] is not None and any(entry is not None and entry[1] in keys for entry in entries)
+
+
+def read(text: TextFile, units: str | None = None, dt: float | None = None) -> Record:
+    """The record of an ESM ASCII file; units and dt are only checked.
+
+    Raises InputError naming the file, mostly with a line: a velocity or displacement file, a needed entry missing or no
+    number, a word between the samples, a number of samples unlike NDATA.
+    """
+    header, start = _header(text)
+    for key in NEEDED:
+        if not header.get(key, (0, ""))[1]:
+            raise InputError(f"{text.path}: the header does not give {key}; get the complete file")
+    index, kind = header.get("DATA_TYPE", (0, "ACCELERATION"))
+    if kind and "ACCELERATION" not in kind.upper():
+        raise InputError(f"{text.at(index)}: the file holds {kind.lower()}; get the file of accelerations (.ACC.ASC)")
+    count, step = _number(text, header, "NDATA"), _number(text, header, "SAMPLING_INTERVAL_S")
+    values = [value for line in range(start, len(text.lines)) if text.lines[line].strip()
+              for value in text.numbers(line)]
+    if len(values) != count:
+        raise InputError(f"{text.at(header['NDATA'][0])}: NDATA is {count:g} but {len(values)} values follow; get the "
+                         "complete file")
+    name = file_units(text.at(header["UNITS"][0]), header["UNITS"][1], units)
+    value = {key: content for key, (_, content) in header.items()}
+    station = ".".join(filter(None, (value.get("NETWORK"), value.get("STATION_CODE"))))
+    title = " ".join(filter(None, (value.get("EVENT_NAME"), value.get("EVENT_DATE_YYYYMMDD"),
+                                   value.get("EVENT_TIME_HHMMSS"), station, value.get("STREAM"))))
+    notes = tuple(f"{key}: {content}" for key, content in value.items() if content and not key.startswith("USER"))
+    return Record(acceleration=UNITS[name] * np.array(values), dt=file_dt(text.path, step, dt), title=title,
+                  source=text.path, format="ESM", units=name, sha256=text.sha256, notes=notes, station=station,
+                  component=value.get("STREAM", ""))
+
+
+def _header(text: TextFile) -> tuple[dict[str, tuple[int, str]], int]:
+    """Line index and value of each key, and the index of the first line that is no entry."""
+    header: dict[str, tuple[int, str]] = {}
+    for index, line in enumerate(text.lines):
+        entry = _ENTRY.match(line)
+        if entry is None:
+            return header, index
+        header[entry[1]] = index, entry[2]
+    return header, len(text.lines)
+
+
+def _number(text: TextFile, header: dict[str, tuple[int, str]], key: str) -> float:
+    """The number after a key of the header."""
+    index, value = header[key]
+    try:
+        return to_float(value)
+    except ValueError:
+        raise InputError(f"{text.at(index)}: {key} is {value!r}, not a number; get the file again") from None

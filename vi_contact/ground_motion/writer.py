@@ -1,0 +1,52 @@
+"""Record files for other programs: two columns, PEER AT2, OpenSees path series."""
+
+from __future__ import annotations
+
+import os
+
+from ..errors import InputError
+from .record import UNITS, Record, canonical_units
+
+DIGITS = 9
+"""Significant digits of a written sample; what is read back differs by half a unit in the last of them."""
+
+
+def write_columns(record: Record, path: str | os.PathLike[str], units: str) -> None:
+    """Time [s] and acceleration in `units`, after comment lines "#" with title, units, time step and notes."""
+    samples, name = _samples(record, units)
+    comments = [record.title, f"time [s], acceleration [{name}], dt = {record.dt:.10g} s", *record.notes]
+    rows = [f"{time:.10g} {sample}" for time, sample in zip(record.times, samples, strict=True)]
+    _write(path, [f"# {_one_line(comment)}" for comment in comments if comment] + rows)
+
+
+def write_at2(record: Record, path: str | os.PathLike[str], units: str = "g") -> None:
+    """PEER AT2: four header lines with units, NPTS and DT, then five values a row."""
+    samples, name = _samples(record, units)
+    header = ["PEER AT2 format, written by vi_contact", _one_line(record.title) or "record",
+              f"ACCELERATION TIME SERIES IN UNITS OF {name.upper()}",
+              f"NPTS= {record.acceleration.size}, DT= {record.dt:.10g} SEC"]
+    rows = ["".join(f"{sample:>18}" for sample in samples[k:k + 5]) for k in range(0, len(samples), 5)]
+    _write(path, header + rows)
+
+
+def write_path_series(record: Record, path: str | os.PathLike[str], units: str) -> None:
+    """One value a line and nothing else, as `timeSeries Path -filePath` of OpenSees reads; it needs -dt and units."""
+    _write(path, _samples(record, units)[0])
+
+
+def _samples(record: Record, units: str) -> tuple[list[str], str]:
+    """The accelerations in `units` as text, and the key of UNITS."""
+    name = canonical_units("output units", units)
+    return [f"{value:.{DIGITS - 1}e}" for value in record.acceleration / UNITS[name]], name
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())
+
+
+def _write(path: str | os.PathLike[str], lines: list[str]) -> None:
+    try:
+        with open(path, "w", encoding="utf-8", newline="\n") as file:
+            file.write("\n".join(lines) + "\n")
+    except OSError as error:
+        raise InputError(f"{os.fspath(path)}: cannot be written ({error.strerror}); check the folder") from None
