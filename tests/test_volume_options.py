@@ -55,21 +55,25 @@ def prepare(c: Case, volume: Volume) -> Any:
     return volume.prepare(c.step.A, c.step.surface, c.step.scale)
 
 
-def frictional(c: Case, friction: Any) -> Any:
+class Rubbing:
     """What check() looks at."""
 
-    class Problem:
-        pass
-
-    problem = Problem()
-    problem.friction = friction  # type: ignore[attr-defined]
-    return problem
+    def __init__(self, c: Case, friction: Any) -> None:
+        self.surface, self.friction = c.step.surface, friction
+        self.frictional = not isinstance(friction, Frictionless)
 
 
-def test_friction_is_refused(pushed: Case) -> None:
-    Volume().check(frictional(pushed, Frictionless()))
-    with pytest.raises(InputError, match=r"would ignore Coulomb\(mu=0.3\).*condensed"):
-        Volume().check(frictional(pushed, Coulomb(mu=0.3)))
+def test_friction_is_refused_with_the_methods_that_carry_it(pushed: Case) -> None:
+    """Bounds on displacements cannot express |r_t| <= limit, and there is no energy to minimise; nor is there slip in
+    one dimension."""
+    for method in (*METHODS, Selected("bntr"), Selected("vinewtonrsls"), Selected("vinewtonssls")):
+        Volume(method=method).check(Rubbing(pushed, Frictionless()))
+    for method in (*METHODS[1:], Selected("bntr"), Selected("vinewtonssls")):
+        with pytest.raises(InputError, match=r"would ignore Coulomb\(mu=0.3\).*ReducedNewton\(\).*condensed"):
+            Volume(method=method).check(Rubbing(pushed, Coulomb(mu=0.3)))
+    for method in (ReducedNewton(), Selected("vinewtonrsls")):
+        with pytest.raises(InputError, match="one dimension"):
+            Volume(method=method).check(Rubbing(pushed, Coulomb(mu=0.3)))
 
 
 @pytest.mark.parametrize("tolerance", [0.0, -1e-9, 1.0, float("nan")])

@@ -19,13 +19,19 @@ from .time_steps import TimeSteps
 
 @dataclass
 class Disagreement:
-    """Largest differences between a solver and the primary one so far, with the largest values they compare to."""
+    """Largest differences between a solver and the primary one so far, with the largest values they compare to.
+
+    ``rubbed``: whether there was friction to compare, in one of the ``steps``.
+    """
 
     method: str = ""
     x: float = 0.0
     r_n: float = 0.0
+    r_t: float = 0.0
     x_ref: float = 0.0
     r_ref: float = 0.0
+    t_ref: float = 0.0
+    rubbed: bool = False
     iterations: int = 0
     steps: int = 0
 
@@ -40,9 +46,14 @@ class Disagreement:
         return self.r_n / self.r_ref if self.r_ref else self.r_n
 
     @property
+    def relative_r_t(self) -> float:
+        """max |r_t - r_t'| / max |r_t| over all conditions and steps; 0 without friction."""
+        return self.r_t / self.t_ref if self.t_ref else self.r_t
+
+    @property
     def worst(self) -> float:
-        """The larger of both."""
-        return max(self.relative_u, self.relative_r_n)
+        """The largest of them."""
+        return max(self.relative_u, self.relative_r_n, self.relative_r_t)
 
 
 @dataclass
@@ -77,23 +88,20 @@ class CrossChecked:
         return PreparedCrossCheck(self, A, surface, scale)
 
     def report(self) -> Mapping[str, Mapping[str, float]]:
-        """method -> relative differences in u and r_n, iterations per step: what summary.json shows.
-
-        A name that comes again gets a number.
+        """method -> relative differences in u, r_n and, with friction, r_t, iterations per step: what summary.json
+        shows. A name that comes again gets a number.
         """
         names = [one.method for one in self.found]
         return {
-            name if names.count(name) == 1 else f"{name} #{rank}": {
-                "u": one.relative_u,
-                "r_n": one.relative_r_n,
-                "iterations_per_step": one.iterations / max(one.steps, 1),
-            }
+            name if names.count(name) == 1 else f"{name} #{rank}": {"u": one.relative_u, "r_n": one.relative_r_n}
+            | ({"r_t": one.relative_r_t} if one.rubbed else {})
+            | {"iterations_per_step": one.iterations / max(one.steps, 1)}
             for rank, (name, one) in enumerate(zip(names, self.found, strict=True), start=1)
         }
 
     @property
     def worst(self) -> float:
-        """The largest relative difference of any solver in u or r_n."""
+        """The largest relative difference of any solver in u, r_n or r_t."""
         return max((one.worst for one in self.found), default=0.0)
 
 
@@ -118,6 +126,11 @@ class PreparedCrossCheck:
         found.x, found.x_ref = max(found.x, dx), max(found.x_ref, x_ref)
         found.r_n = max(found.r_n, max_abs(other.r_n - result.r_n))
         found.r_ref = max(found.r_ref, max_abs(result.r_n))
+        if result.r_t is not None:
+            rubbed = np.zeros_like(result.r_t) if other.r_t is None else other.r_t
+            found.rubbed = True
+            found.r_t = max(found.r_t, max_abs((rubbed - result.r_t).ravel()))
+            found.t_ref = max(found.t_ref, max_abs(result.r_t.ravel()))
         found.iterations += other.iterations
         found.steps += 1
 

@@ -2,25 +2,27 @@
 
     A x = b - B_nᵀ r_n,    0 <= r_n  ⊥  bound - B_n x + compliance r_n / scale >= 0
 
-In the rotated basis every condition is a bound on one unknown, which is all that SNES-VI and TAO know of contact. They
-cannot carry friction. Reference: solver notes in docs; PETSc manual, chapters SNES (variational inequalities) and TAO.
+In the rotated basis every condition is a bound on one unknown, which is all that SNES-VI and TAO know of contact. With
+friction the tangential reactions become bounded unknowns too (volume_friction.py); then there is nothing to minimise,
+and only SNES can do it. Reference: PETSc manual, chapters SNES (variational inequalities) and TAO.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 
 import numpy as np
 from petsc4py import PETSc
 
 from ..algebra import Array
 from ..errors import InputError, StepFailure
-from ..friction import refuse_friction
 from ..step import ContactProblem, EffectiveMatrix, StepProblem, StepResult
 from ..surfaces import ContactSurface
 from .volume_factorised import OneFactorisation
+from .volume_friction import VolumeFriction
+from .volume_friction_step import ScaledRubbing
 from .volume_options import OptionLayers, Options
 from .volume_reasons import raised, stopped
 from .volume_snes import ReducedNewton, SemismoothNewton
@@ -45,11 +47,24 @@ class Driver(Protocol):
 
 
 class Method(Protocol):
-    """How the bounded problem is solved: settings that make a driver and choose where it starts."""
+    """How the bounded problem is solved: settings that make a driver and choose where it starts.
+
+    One that ``carries_friction`` is a FrictionMethod.
+    """
+
+    @property
+    def carries_friction(self) -> bool: ...
 
     def defaults(self, ranks: int) -> Options: ...
     def driver(self, scaled: ScaledStep, layers: OptionLayers) -> Any: ...
     def start(self, driver: Any, system: BoundedSystem, step: StepProblem) -> Array: ...
+
+
+class FrictionMethod(Method, Protocol):
+    """A method that carries friction: its settings for the larger system."""
+
+    def friction_defaults(self) -> Options: ...
+    def friction_driver(self, scaled: ScaledRubbing, layers: OptionLayers) -> Any: ...
 
 
 @dataclass(frozen=True)
@@ -73,8 +88,18 @@ class Volume:
             raise InputError(f"Volume tolerance is {self.tolerance}: give a relative error below 1, such as 1e-9")
 
     def check(self, problem: ContactProblem) -> None:
-        """InputError for friction: bounds on single unknowns cannot express |r_t| <= threshold."""
-        refuse_friction("Volume", problem.friction)
+        """InputError for friction that the method cannot carry, without a tangent, or of a wrong number of values."""
+        if not problem.frictional:
+            return
+        surface, law = problem.surface, problem.friction
+        if not self.method.carries_friction:
+            raise InputError(
+                f"Volume({self.method}) only enforces bounds on displacements and would ignore {law}: use "
+                "Volume(ReducedNewton()), or Condensed(), the condensed route"
+            )
+        if surface.tangents.shape[1] == 0:
+            raise InputError(f"Volume would ignore {law}: a body in one dimension cannot slide, use Frictionless()")
+        law.limit(np.zeros(surface.count), surface.weights, 1.0)
 
     def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> PreparedVolume:
         """The solver for one effective matrix; collective. InputError for options that cannot work."""
@@ -91,16 +116,28 @@ class PreparedVolume:
     def __init__(self, settings: Volume, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> None:
         self._system = BoundedSystem(A, surface, scale)
         PETSc.garbage_cleanup(self._system.comm)
-        self._method = settings.method
+        self._settings, self._method = settings, settings.method
         defaults = settings.method.defaults(surface.comm.size)
         self._layers = OptionLayers(settings.prefix, defaults, settings.petsc_options)
         self._scaled = ScaledStep(self._system, settings.tolerance)
         self._name = f"Volume({getattr(settings.method, 'petsc_type', type(settings.method).__name__)})"
+        self._friction: VolumeFriction | None = None
         self._driver: Driver | None = self._make()
 
     def _make(self) -> Driver:
         driver: Driver = self._method.driver(self._scaled, self._layers)
         return driver
+
+    def _rubbing(self) -> VolumeFriction:
+        """The problem with friction, made at the first step that has some, in the place of the other one."""
+        if self._friction is None:
+            self.close()
+            settings, method = self._settings, cast(FrictionMethod, self._settings.method)
+            layers = OptionLayers(settings.prefix, method.friction_defaults(), settings.petsc_options)
+            self._friction = VolumeFriction(
+                self._system, settings.tolerance, lambda scaled: method.friction_driver(scaled, layers), self._name
+            )
+        return self._friction
 
     @property
     def snes(self) -> Any:
@@ -113,7 +150,8 @@ class PreparedVolume:
         return self._petsc("TAO")
 
     def _petsc(self, kind: str) -> Any:
-        solver = None if self._driver is None else self._driver.solver
+        driver = self._driver if self._friction is None else self._friction.driver
+        solver = None if driver is None else driver.solver
         return solver if isinstance(solver, getattr(PETSc, kind)) else None
 
     def close(self) -> None:
@@ -121,14 +159,14 @@ class PreparedVolume:
         if self._driver is not None:
             self._driver.destroy()
             self._driver = None
+        if self._friction is not None:
+            self._friction.driver.destroy()
+            self._friction = None
 
     def solve(self, step: StepProblem) -> StepResult:
         """The step; StepFailure with PETSc's reason when it does not converge."""
-        if self._driver is None:
-            self._driver = self._make()
         try:
-            self._scaled.set(step, self._method.start(self._driver, self._system, step))
-            y, F, reason, iterations = self._driver.run()
+            return self._solve(step) if step.slip0 is None else self._rubbing().solve(step)
         except PETSc.Error as error:
             self.close()  # its state is unknown; the next step gets a new one
             if error.__cause__ is not None:
@@ -137,11 +175,15 @@ class PreparedVolume:
         except StepFailure:
             self.close()
             raise
+
+    def _solve(self, step: StepProblem) -> StepResult:
+        """The step without friction."""
+        if self._driver is None:
+            self._driver = self._make()
+        self._scaled.set(step, self._method.start(self._driver, self._system, step))
+        y, F, reason, iterations = self._driver.run()
         if reason <= 0 and not self._scaled.accepts(y, F):
-            failure = stopped(self._name, self._driver.reasons, reason, iterations, self._scaled.worst)
-            if np.isnan(self._scaled.worst):
-                self.close()  # VINEWTONSSLS leaves its own residual installed and would call itself without end
-            raise failure
+            raise stopped(self._name, self._driver.reasons, reason, iterations, self._scaled.worst)
         return self._result(y, F, iterations)
 
     def _result(self, y: Array, F: Array, iterations: int) -> StepResult:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import weakref
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from petsc4py import PETSc
@@ -150,6 +150,7 @@ class OneFactorisation:
             contact); beyond it every change of the contact set costs a back-substitution.
     """
 
+    carries_friction: ClassVar[bool] = False
     exchanges: int = 5
     limit: int = 5_000_000
 

@@ -98,12 +98,23 @@ def check_own_inverse(snes: Any, layers: OptionLayers) -> None:
 
 def check_semismooth(snes: Any, layers: OptionLayers) -> None:
     """Refuse what needs a symmetric matrix: the Jacobian D_a + D_b A of VINEWTONSSLS is not (P8)."""
-    _check_type(snes, "vinewtonssls", layers)
+    _check_unsymmetric(snes, layers, "vinewtonssls", "vinewtonssls", "the semismooth Jacobian")
+
+
+def check_friction(snes: Any, layers: OptionLayers) -> None:
+    """Refuse what needs a symmetric matrix, and what fails on the reduced systems of VINEWTONRSLS, with friction."""
+    pc = snes.ksp.pc.getType()
+    if pc in REDUCED_PC:
+        refuse(f"pc_type {pc} with friction", REDUCED_PC[pc], "use lu with MUMPS")
+    _check_unsymmetric(snes, layers, "vinewtonrsls", "friction", "the system with friction")
+
+
+def _check_unsymmetric(snes: Any, layers: OptionLayers, wanted: str, what: str, matrix: str) -> None:
+    _check_type(snes, wanted, layers)
     pc, ksp = snes.ksp.pc.getType(), snes.ksp.getType()
     for kind, name, symmetric in (("pc", pc, ("cholesky", "icc")), ("ksp", ksp, SYMMETRIC_KSP)):
         if name in symmetric:
-            reason = "the semismooth Jacobian is not symmetric"
-            refuse(f"{kind}_type {name} with vinewtonssls", reason, "use lu with preonly")
+            refuse(f"{kind}_type {name} with {what}", f"{matrix} is not symmetric", "use lu with preonly")
     if ksp == "preonly" and pc != "lu":
         refuse(f"ksp_type preonly with pc_type {pc}", NOT_EXACT, "use lu or gmres")
     _check_line_search(layers)

@@ -12,14 +12,16 @@ import weakref
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from petsc4py import PETSc
 
 from ..algebra import Array
 from ..step import StepProblem
-from .volume_options import OptionLayers, Options, check_reduced, check_semismooth
+from .volume_friction_jacobian import RubbingJacobian
+from .volume_friction_step import ScaledRubbing
+from .volume_options import OptionLayers, Options, check_friction, check_reduced, check_semismooth
 from .volume_step import ScaledStep
 from .volume_system import BoundedSystem
 
@@ -196,8 +198,10 @@ class ReducedNewton:
     """SNES VINEWTONRSLS, Cholesky by MUMPS on each reduced matrix: the reference. Iterations are factorisations.
 
     Other linear solvers by ``petsc_options``, e.g. {"ksp_type": "cg", "pc_type": "hypre"}; gamg, mg and fieldsplit are
-    refused, they do not survive the reduction.
+    refused, they do not survive the reduction. With friction LU in the place of Cholesky.
     """
+
+    carries_friction: ClassVar[bool] = True
 
     def defaults(self, ranks: int) -> Options:
         """Options before the user's."""
@@ -213,6 +217,15 @@ class ReducedNewton:
         """The guess with the predicted contacts on their bounds."""
         return system.start(step)
 
+    def friction_defaults(self) -> Options:
+        """Options before the user's: LU, the system with friction is not symmetric."""
+        return {**NEWTON_OPTIONS, **MUMPS_OPTIONS, "pc_type": "lu"}
+
+    def friction_driver(self, scaled: ScaledRubbing, layers: OptionLayers) -> SnesDriver:
+        """The SNES object of a step with friction."""
+        jacobian = RubbingJacobian(scaled)
+        return SnesDriver(scaled, layers, jacobian, snes_type="vinewtonrsls", check=check_friction)
+
 
 @dataclass(frozen=True)
 class SemismoothNewton:
@@ -220,6 +233,8 @@ class SemismoothNewton:
 
     With springs 1e6 times stiffer or softer than the body its line search fails or not, as rounding will have it.
     """
+
+    carries_friction: ClassVar[bool] = False
 
     def defaults(self, ranks: int) -> Options:
         """Options before the user's."""

@@ -88,9 +88,9 @@ class ScaledStep:
             return np.nan, np.nan, np.nan
         size = self._norm * y_max * self.x_ref / self.r_ref + self._b_max
         return (
-            _fraction(force_max, max(self._b_max, Ax_max)),
-            _fraction(gap_max, y_max),
-            _fraction(force_max, size),
+            fraction(force_max, max(self._b_max, Ax_max)),
+            fraction(gap_max, y_max),
+            fraction(force_max, size),
         )
 
     def verdict(self, y: Array, F: Array) -> int:
@@ -126,5 +126,5 @@ def _power_of_two(value: float) -> float:
     return float(np.exp2(np.ceil(np.log2(value)))) if 0.0 < value < np.inf else 1.0
 
 
-def _fraction(value: float, reference: float) -> float:
+def fraction(value: float, reference: float) -> float:
     return value / reference if reference > 0.0 else value

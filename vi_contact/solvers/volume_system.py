@@ -19,7 +19,7 @@ import numpy as np
 import scipy.sparse as sp
 from petsc4py import PETSc
 
-from ..algebra import Array, Mask, SerialMatrix
+from ..algebra import Array, Comm, Indices, Mask, SerialMatrix
 from ..errors import InputError
 from ..step import EffectiveMatrix, StepProblem
 from ..surfaces import ContactSurface
@@ -120,7 +120,7 @@ class BoundedSystem:
             if not self.surface.compliance.any():
                 return mat
             indptr, columns, values = mat.getValuesCSR()
-        first, columns, total = self._renumber(columns)
+        first, columns, total = renumbered(self.surface.comm, self.rows, self.size, columns)
         body = sp.csr_matrix((values, columns, indptr), shape=(self.rows, total)).tocoo()
         feet, tips = self.feet, np.arange(self.rows, self.size)
         local = np.concatenate([body.row, feet, feet, tips, tips])
@@ -132,12 +132,12 @@ class BoundedSystem:
         size = (self.size, total)
         return PETSc.Mat().createAIJ((size, size), csr=arrays, comm=self.comm)
 
-    def _renumber(self, columns: Array) -> tuple[int, Array, int]:
-        """First global number of this rank, global column numbers, total size, all of the enlarged system."""
-        comm = self.surface.comm
-        sizes = np.zeros((comm.size, 2))
-        sizes[comm.rank] = self.rows, self.size
-        sizes = comm.sum(sizes)
-        old, new = (np.concatenate([[0], np.cumsum(column)]).astype(np.int64) for column in sizes.T)
-        owner = np.searchsorted(old, columns, side="right") - 1
-        return int(new[comm.rank]), columns + (new - old)[owner], int(new[-1])
+
+def renumbered(comm: Comm, old_size: int, new_size: int, columns: Any) -> tuple[int, Indices, int]:
+    """First global number of this rank, global column numbers and total, where every rank's part grows at its end."""
+    sizes = np.zeros((comm.size, 2))
+    sizes[comm.rank] = old_size, new_size
+    sizes = comm.sum(sizes)
+    old, new = (np.concatenate([[0], np.cumsum(column)]).astype(np.int64) for column in sizes.T)
+    owner = np.searchsorted(old, columns, side="right") - 1
+    return int(new[comm.rank]), columns + (new - old)[owner], int(new[-1])

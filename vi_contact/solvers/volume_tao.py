@@ -16,6 +16,7 @@ from petsc4py import PETSc
 from ..algebra import Array
 from ..errors import InputError
 from ..step import StepProblem
+from .volume_friction_step import ScaledRubbing
 from .volume_options import REDUCED_PC, OptionLayers, Options, refuse
 from .volume_snes import AssembledJacobian, ReducedNewton, SemismoothNewton, SnesDriver, weakly, write_bounds
 from .volume_step import ScaledStep
@@ -129,6 +130,7 @@ class TaoTron:
     Slow, or a StepFailure, with springs more than about 1e3 times stiffer than the body: they shrink its trust region.
     """
 
+    carries_friction: ClassVar[bool] = False
     tao_type: ClassVar[str] = "tron"
 
     def defaults(self, ranks: int) -> Options:
@@ -165,6 +167,11 @@ class Selected:
         if self.petsc_type not in SNES_TYPES:
             refuse_type(self.petsc_type)
 
+    @property
+    def carries_friction(self) -> bool:
+        """Whether it is vinewtonrsls."""
+        return isinstance(SNES_TYPES.get(self.petsc_type), ReducedNewton)
+
     def defaults(self, ranks: int) -> Options:
         """Options before the user's."""
         if self.petsc_type in SNES_TYPES:
@@ -180,6 +187,14 @@ class Selected:
     def start(self, driver: Any, system: BoundedSystem, step: StepProblem) -> Array:
         """The guess with the predicted contacts on their bounds."""
         return system.start(step)
+
+    def friction_defaults(self) -> Options:
+        """Options before the user's, with friction."""
+        return ReducedNewton().friction_defaults()
+
+    def friction_driver(self, scaled: ScaledRubbing, layers: OptionLayers) -> SnesDriver:
+        """The SNES object of a step with friction."""
+        return ReducedNewton().friction_driver(scaled, layers)
 
 
 SNES_TYPES: Mapping[str, ReducedNewton | SemismoothNewton] = {
