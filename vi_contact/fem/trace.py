@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 import ufl
-from petsc4py import PETSc
 
-from ..algebra import Array, Indices, Mask
+from ..algebra import Array
 from ..errors import InputError
-from ..surfaces import ContactSurface, Obstacle, Touching, admissible_gap, nodal_frames
+from ..surfaces import ContactSurface, Obstacle, Touching, admissible_gap
 from ..system import SemiDiscreteSystem
 from . import compat
+from .frames import Conditions, Nodes, surface_of
 from .mesh import Facets
-from .petsc_algebra import PetscMatrix
 from .space import FemSpace
 
 log = logging.getLogger(__name__)
@@ -51,56 +49,8 @@ def contact_surface(
     obstacle = obstacle or Touching()
     directions = snapped(np.asarray(obstacle.directions(nodes.points, nodes.normals), dtype=float))
     gap = admissible_gap(np.asarray(obstacle.gap(nodes.points, nodes.normals), dtype=float), nodes.points, space.size)
-    return surface_on(space, nodes, directions, gap, frames_of(space, nodes, directions))
-
-
-def surface_on(
-    space: FemSpace, nodes: Nodes, directions: Array, gap: Array, frames: Sequence[Frame]
-) -> ContactSurface:
-    """The conditions u·direction <= gap at nodes with these frames, those of this rank. Collective."""
-    d, count = space.dimension, len(nodes.numbers)
-    tangents = [np.delete(frame.index, frame.normal) for frame in frames]
-    return ContactSurface(
-        comm=space.comm,
-        points=nodes.points,
-        normals=directions,
-        weights=nodes.weights * space.forms.section.thickness,
-        gap0=gap,
-        bilateral=np.zeros(count, dtype=bool),
-        compliance=np.zeros(count),
-        owned=np.array([frame.index[frame.normal] for frame in frames], dtype=np.int64),
-        slots=np.array([frame.slot for frame in frames], dtype=np.int64),
-        tangents=np.array(tangents, dtype=np.int64).reshape(len(frames), d - 1),
-        basis=_basis(space, frames),
-    )
-
-
-@dataclass(frozen=True, eq=False)
-class Nodes:
-    """Nodes of a boundary, the same on every rank: original numbers, coordinates, body normals, weights, held
-    components, and the numbers over all ranks of their free unknowns, -1 for held ones."""
-
-    numbers: Indices
-    points: Array
-    normals: Array
-    weights: Array
-    held: Mask
-    unknowns: Indices
-
-    def pick(self, rows: Any) -> Nodes:
-        """Some of them."""
-        return Nodes(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
-
-
-@dataclass(frozen=True, eq=False)
-class Frame:
-    """The frame of a contact node that this rank owns: ``index`` of its unknowns (-1 where held), ``block`` with the
-    frame's vectors as columns, the contact direction in column ``normal``."""
-
-    slot: int
-    index: Indices
-    normal: int
-    block: Array
+    weights = nodes.weights * space.forms.section.thickness
+    return surface_of(space, [Conditions(nodes, directions)], gap0=gap, weights=weights)
 
 
 def nodes_on(space: FemSpace, facets: Facets) -> Nodes:
@@ -174,69 +124,3 @@ def snapped(directions: Array) -> Array:
     """Directions along an axis to the last bit, where they are to round-off: keeps axis-aligned walls unrotated."""
     snapped = np.where(np.abs(directions) < 1e-13, 0.0, directions)
     return np.asarray(snapped / np.linalg.norm(snapped, axis=1)[:, None])
-
-
-def _refuse_prescribed(nodes: Nodes, directions: Array) -> None:
-    """InputError, on all ranks, for a node whose contact direction is partly prescribed."""
-    for slot in np.flatnonzero(np.any(nodes.held & (directions != 0.0), axis=1)):
-        at = ", ".join(f"{x:g}" for x in nodes.points[slot])
-        raise InputError(
-            f"contact node ({at}) is also prescribed along its contact direction: "
-            "free that component or leave the node out of the contact surface"
-        )
-
-
-def block_of(frame: Array) -> tuple[int, Array]:
-    """(c, Q): a nodal frame with the contact direction in column c, so that component c becomes the normal unknown.
-
-    c is the direction's largest component. Axes at right angles to the direction keep their own columns: these are the
-    components that may be prescribed.
-    """
-    d = len(frame)
-    direction = frame[:, 0]
-    normal = int(np.argmax(np.abs(direction)))
-    others = [c for c in range(d) if c != normal]
-    block = np.empty((d, d))
-    block[:, normal] = direction
-    if np.count_nonzero(direction) == 1:
-        block[:, others] = np.eye(d)[:, others]
-    else:
-        others.sort(key=lambda c: abs(direction[c]))  # the first tangent is made of the axis least aligned
-        block[:, others] = frame[:, 1:]
-    return normal, block
-
-
-def frames_of(space: FemSpace, nodes: Nodes, directions: Array) -> list[Frame]:
-    """Frames of the nodes this rank owns; InputError, on all ranks, where a contact direction is partly prescribed."""
-    _refuse_prescribed(nodes, directions)
-    axes, where = nodal_frames(directions), space._where(nodes.numbers)
-    frames = []
-    for slot in np.flatnonzero(where >= 0):
-        index = space.free_index[where[slot] * space.dimension + np.arange(space.dimension)]
-        frames.append(Frame(int(slot), index, *block_of(axes[slot])))
-    return frames
-
-
-def _basis(space: FemSpace, frames: Sequence[Frame]) -> PetscMatrix | None:
-    """T with u = T û, None when all frames point along the axes."""
-    turned = any(not np.array_equal(frame.block, np.eye(space.dimension)) for frame in frames)
-    turned = bool(space.comm.max(np.array([float(turned)]))[0])
-    return _rotation(space, [(frame.index, frame.block) for frame in frames]) if turned else None
-
-
-def _rotation(space: FemSpace, blocks: list[tuple[Indices, Array]]) -> PetscMatrix:
-    """T as a PETSc matrix: identity but for the nodal blocks (columns: frame vectors) of the contact nodes."""
-    rows = len(space.ids)
-    T = PETSc.Mat().createAIJ(((rows, None), (rows, None)), nnz=(space.dimension, 0), comm=space.mesh.comm)
-    T.setUp()
-    start = T.getOwnershipRange()[0]
-    plain = np.ones(rows, dtype=bool)
-    for index, block in blocks:
-        free = index >= 0
-        plain[index[free]] = False
-        rotated = (start + index[free]).astype(PETSc.IntType)
-        T.setValues(rotated, rotated, np.ascontiguousarray(block[np.ix_(free, free)]))
-    for row in np.flatnonzero(plain):
-        T.setValue(start + row, start + row, 1.0)
-    T.assemble()
-    return PetscMatrix(T)

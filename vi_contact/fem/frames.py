@@ -1,0 +1,264 @@
+"""Nodal frames of contact nodes and what they make of conditions: the bases T and R of a `ContactSurface`.
+
+A condition is a node, a contact direction and, between two bodies, what the node faces. Each node has one frame, with
+the directions of all its conditions among its vectors. Everything here but the matrices is the same on every rank.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from petsc4py import PETSc
+
+from ..algebra import Array, Indices, Mask
+from ..errors import InputError
+from ..surfaces import ContactSurface, nodal_frames
+from .petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc
+from .space import FemSpace
+
+PARALLEL = 1e-9  # sine of the angle between directions that count as one, cosine between those at right angles
+
+
+@dataclass(frozen=True, eq=False)
+class Nodes:
+    """Nodes of a boundary, the same on every rank: original numbers, coordinates, body normals, weights, held
+    components, and the numbers over all ranks of their free unknowns, -1 for held ones."""
+
+    numbers: Indices
+    points: Array
+    normals: Array
+    weights: Array
+    held: Mask
+    unknowns: Indices
+
+    def pick(self, rows: Any) -> Nodes:
+        """Some of them."""
+        return Nodes(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
+
+
+@dataclass(frozen=True, eq=False)
+class Facing:
+    """What contact nodes face: opposite node s the other body moves by sum_j P_sj u_j of these nodes."""
+
+    nodes: Nodes
+    P: sp.csr_matrix
+
+
+@dataclass(frozen=True, eq=False)
+class Conditions:
+    """Conditions u·direction <= gap at nodes, u being relative to what they are ``facing`` if that deforms too."""
+
+    nodes: Nodes
+    directions: Array
+    facing: Facing | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class FemSurface(ContactSurface):
+    """A contact surface that remembers what it was made of, so that it can be joined with others."""
+
+    space: FemSpace = field(repr=False)
+    parts: tuple[Conditions, ...] = field(repr=False)
+
+
+class Frames:
+    """One orthonormal frame per node of the conditions.
+
+    Attributes:
+        numbers: (k,) nodes; blocks: (k, d, d) frames, vectors as columns.
+        place, column: (m,) node and column of each condition; double: (k,) nodes with several conditions.
+    Raises:
+        InputError: a contact direction that is partly prescribed; directions of one node parallel or oblique.
+    """
+
+    def __init__(self, parts: Sequence[Conditions]) -> None:
+        numbers = np.concatenate([part.nodes.numbers for part in parts])
+        self.points = np.concatenate([part.nodes.points for part in parts])
+        self.directions = np.concatenate([part.directions for part in parts])
+        self._refuse_prescribed(np.concatenate([part.nodes.held for part in parts]))
+        self.numbers, first, self.place = np.unique(numbers, return_index=True, return_inverse=True)
+        self.double: Mask = np.bincount(self.place) > 1
+        self.blocks = nodal_frames(self.directions[first])
+        self.column = np.zeros(len(numbers), dtype=np.int64)
+        for node, slot in enumerate(first):
+            if not self.double[node]:
+                self.column[slot], self.blocks[node] = block_of(self.blocks[node])
+        for node in np.flatnonzero(self.double):
+            slots = np.flatnonzero(self.place == node)
+            self._refuse_skew(slots)
+            self.column[slots], self.blocks[node] = corner_of(self.directions[slots])
+
+    @property
+    def tangents(self) -> Array:
+        """(m, d, d-1) tangential vectors of each condition, in the order of the tangential unknowns."""
+        blocks = self.blocks[self.place]
+        return np.array([np.delete(block, c, axis=1) for block, c in zip(blocks, self.column, strict=True)])
+
+    def _refuse_prescribed(self, held: Mask) -> None:
+        for slot in np.flatnonzero(np.any(held & (self.directions != 0.0), axis=1)):
+            raise InputError(
+                f"contact node {at(self.points[slot])} is also prescribed along its contact direction: "
+                "free that component or leave the node out of the contact surface"
+            )
+
+    def _refuse_skew(self, slots: Indices) -> None:
+        cosines = np.abs(self.directions[slots] @ self.directions[slots].T)[np.triu_indices(len(slots), 1)]
+        where = f"contact node {at(self.points[slots[0]])} is on several contact surfaces"
+        if np.any(cosines**2 > 1.0 - PARALLEL**2):
+            raise InputError(f"{where} with one contact direction: list every boundary and every pair once")
+        if np.any(cosines > PARALLEL):
+            raise InputError(
+                f"{where} with directions that are not at right angles: leave it out of all but one (points=), or "
+                "round the edge off"
+            )
+
+
+def block_of(frame: Array) -> tuple[int, Array]:
+    """(c, Q): a nodal frame with the contact direction in column c, so that component c becomes the normal unknown.
+
+    c is the direction's largest component. Axes at right angles to the direction keep their own columns: these are the
+    components that may be prescribed.
+    """
+    d = len(frame)
+    direction = frame[:, 0]
+    normal = int(np.argmax(np.abs(direction)))
+    others = [c for c in range(d) if c != normal]
+    block = np.empty((d, d))
+    block[:, normal] = direction
+    if np.count_nonzero(direction) == 1:
+        block[:, others] = np.eye(d)[:, others]
+    else:
+        others.sort(key=lambda c: abs(direction[c]))  # the first tangent is made of the axis least aligned
+        block[:, others] = frame[:, 1:]
+    return normal, block
+
+
+def corner_of(directions: Array) -> tuple[list[int], Array]:
+    """(columns, Q): the frame of a node with two or three contact directions (k, d) at right angles."""
+    d = directions.shape[1]
+    columns: list[int] = []
+    for direction in directions:
+        order = np.argsort(-np.abs(direction), kind="stable")
+        columns.append(next(int(c) for c in order if c not in columns))
+    block = np.zeros((d, d))
+    block[:, columns] = directions.T
+    for c in set(range(d)) - set(columns):  # in space, one vector may be missing
+        block[:, c] = np.cross(block[:, (c + 1) % 3], block[:, (c + 2) % 3])
+    return columns, block
+
+
+def at(point: Array) -> str:
+    """A point for a sentence."""
+    return f"({', '.join(f'{x:g}' for x in point)})"
+
+
+def surface_of(space: FemSpace, parts: Sequence[Conditions], **data: Any) -> FemSurface:
+    """The surface of these conditions; ``data``: gap0, weights and what else a surface holds for each. Collective."""
+    frames = Frames(parts)
+    d, count = space.dimension, len(frames.place)
+    where = space._where(frames.numbers)
+    index = np.where(where[:, None] >= 0, space.free_index.reshape(-1, d)[where], -1)
+    slots = np.flatnonzero(where[frames.place] >= 0)
+    place, column = frames.place[slots], frames.column[slots]
+    tangents = np.array([np.delete(index[p], c) for p, c in zip(place, column, strict=True)], dtype=np.int64)
+    tangents = tangents.reshape(len(slots), d - 1)
+    tangents[frames.double[place]] = -1
+    given = {"bilateral": np.zeros(count, dtype=bool), "compliance": np.zeros(count)} | data
+    return FemSurface(
+        comm=space.comm,
+        points=frames.points,
+        normals=frames.directions,
+        owned=index[place, column],
+        slots=slots,
+        tangents=tangents,
+        basis=_turn(space, frames, where >= 0, index),
+        coupling=_coupling(space, parts, frames, index),
+        space=space,
+        parts=tuple(parts),
+        **given,
+    )
+
+
+def _turn(space: FemSpace, frames: Frames, mine: Mask, index: Indices) -> PetscMatrix | None:
+    """T with u = T û: the identity but for the frames of the contact nodes; None when all point along the axes."""
+    if all(np.array_equal(block, np.eye(space.dimension)) for block in frames.blocks):
+        return None
+    rows = len(space.ids)
+    T = PETSc.Mat().createAIJ(((rows, None), (rows, None)), nnz=(space.dimension, 0), comm=space.mesh.comm)
+    T.setUp()
+    start = T.getOwnershipRange()[0]
+    plain = np.ones(rows, dtype=bool)
+    for own, block in zip(index[mine], frames.blocks[mine], strict=True):
+        free = own >= 0
+        plain[own[free]] = False
+        rotated = (start + own[free]).astype(PETSc.IntType)
+        T.setValues(rotated, rotated, np.ascontiguousarray(block[np.ix_(free, free)]))
+    for row in np.flatnonzero(plain):
+        T.setValue(start + row, start + row, 1.0)
+    T.assemble()
+    return PetscMatrix(T)
+
+
+def _coupling(
+    space: FemSpace, parts: Sequence[Conditions], frames: Frames, index: Indices
+) -> PetscMatrix | None:
+    """R with û = R ǔ: to the unknowns of a node that faces others, q_c·u = ǔ_c + q_c·sum_j P_sj u_j.
+
+    At nodes with several conditions each one's own direction only is relative to what it faces.
+    """
+    if all(part.facing is None for part in parts):
+        return None
+    _refuse_chains(parts)
+    algebra, rows, slot = PetscAlgebra(space.mesh.comm), {}, -1
+    first = algebra.first(len(space.ids))
+    for part in parts:
+        turns = None if part.facing is None else _turns(frames, part.facing.nodes)
+        for row in range(len(part.nodes.numbers)):
+            slot += 1
+            if part.facing is None or turns is None:
+                continue
+            place = frames.place[slot]
+            columns = [frames.column[slot]] if frames.double[place] else range(space.dimension)
+            for c in columns:
+                own = int(index[place, c])
+                if own >= 0:
+                    faced, values = _faced(part.facing, row, turns, frames.blocks[place][:, c])
+                    rows[own] = np.append(first + own, faced), np.append(1.0, values)
+    return as_petsc(algebra.replaced_rows(len(space.ids), rows))
+
+
+def _turns(frames: Frames, nodes: Nodes) -> Array:
+    """Frames (k, d, d) of nodes that are faced; the axes where they are in contact with nothing else."""
+    turns = np.tile(np.eye(nodes.points.shape[1]), (len(nodes.numbers), 1, 1))
+    place = np.minimum(np.searchsorted(frames.numbers, nodes.numbers), len(frames.numbers) - 1)
+    known = frames.numbers[place] == nodes.numbers
+    turns[known] = frames.blocks[place[known]]
+    return turns
+
+
+def _faced(facing: Facing, row: int, turns: Array, direction: Array) -> tuple[Indices, Array]:
+    """(numbers over all ranks, coefficients) of direction·sum_j P_sj u_j in the unknowns û."""
+    entries = slice(facing.P.indptr[row], facing.P.indptr[row + 1])
+    partners, shares = facing.P.indices[entries], facing.P.data[entries]
+    unknowns = facing.nodes.unknowns[partners]
+    values = shares[:, None] * (direction @ turns[partners])
+    used = (unknowns >= 0) & (values != 0.0)
+    return unknowns[used], values[used]
+
+
+def _refuse_chains(parts: Sequence[Conditions]) -> None:
+    """InputError for a node on side 1 of one pair and side 2 of another: R⁻¹ = 2 - R needs them apart."""
+    coupled = [(part.nodes, part.facing) for part in parts if part.facing is not None]
+    first = np.concatenate([nodes.numbers for nodes, _ in coupled])
+    for _, facing in coupled:
+        used = np.unique(facing.P.indices)
+        both = used[np.isin(facing.nodes.numbers[used], first)]
+        if len(both):
+            raise InputError(
+                f"node {at(facing.nodes.points[both[0]])} is on side 1 of one contact pair and on side 2 of another: "
+                "exchange the sides of one of the pairs"
+            )
