@@ -35,7 +35,6 @@ from ..algebra import Array, Mask, max_abs
 from ..errors import InputError
 from ..impact import NoImpact
 from ..step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
-from ..surfaces import ContactSurface
 from .single_step import SingleStep, stepped
 
 ROUND_OFF = 1e-12  # of the largest displacement: smaller gaps are closed
