@@ -20,7 +20,7 @@ from ..surfaces import ContactSurface, nodal_frames
 from .petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc
 from .space import FemSpace
 
-PARALLEL = 1e-9  # sine of the angle between directions that count as one, cosine between those at right angles
+PARALLEL = 1e-9  # 1 - cosine of the angle between directions that count as one, cosine between those at right angles
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +108,7 @@ class Frames:
     def _refuse_skew(self, slots: Indices) -> None:
         cosines = np.abs(self.directions[slots] @ self.directions[slots].T)[np.triu_indices(len(slots), 1)]
         where = f"contact node {at(self.points[slots[0]])} is on several contact surfaces"
-        if np.any(cosines**2 > 1.0 - PARALLEL**2):
+        if np.any(cosines > 1.0 - PARALLEL):
             raise InputError(f"{where} with one contact direction: list every boundary and every pair once")
         if np.any(cosines > PARALLEL):
             raise InputError(

@@ -1,0 +1,216 @@
+"""Several contact surfaces as one: stacks of bodies, bodies on obstacles, corners with two and three directions."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("dolfinx")
+
+from fem_problems import dense, field, max_over_ranks, turned
+from mpi4py import MPI
+from two_bodies import SOFT, blocks, forces, per_body, relative, thrown, two_blocks
+
+from vi_contact.algebra import Array
+from vi_contact.errors import InputError
+from vi_contact.fem.assembly import assemble
+from vi_contact.fem.loads import BodyForce
+from vi_contact.fem.mesh import build_mesh
+from vi_contact.fem.pairs import contact_pair
+from vi_contact.fem.together import together
+from vi_contact.fem.trace import contact_surface
+from vi_contact.friction import Coulomb
+from vi_contact.march import march
+from vi_contact.meshes.block import BlockMesh
+from vi_contact.meshes.two_blocks import Blocks
+from vi_contact.schemes.midpoint import Midpoint
+from vi_contact.step import ContactProblem
+from vi_contact.surfaces import AnalyticGap, ContactSurface, HalfSpace, empty_surface
+
+COMM = MPI.COMM_WORLD
+
+
+def wavy(x: Array) -> Array:
+    return np.cos(2.0 * x + 0.3) + x[:, ::-1] ** 2
+
+
+def linear(x: Array) -> Array:
+    d = x.shape[1]
+    return x @ np.arange(1.0, d * d + 1.0).reshape(d, d)
+
+
+def cubic(x: Array) -> Array:
+    return x**3 - x[:, ::-1]
+
+
+def tower(angle: float = 0.4, d: int = 2) -> tuple[Any, Any]:
+    """Three blocks, one on top of the other: "a" lowest."""
+    lengths, divisions = (1.0, 0.5, 0.8)[:d], (4, 2, 3)[:d]
+    parts = {
+        name: BlockMesh(lengths=lengths, divisions=divisions, corner=(0.0, 0.5 * i, 0.0)[:d], angle=angle)
+        for i, name in enumerate("abc")
+    }
+    mesh, tags = build_mesh(Blocks(parts), COMM)
+    return assemble(mesh, SOFT), tags
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_two_pairs_and_an_obstacle(d):
+    """Side 1: the lower sides of c and b; a stands on a plane. All conditions in order, each relative to the right
+    body; the middle body is side 1 of one pair and side 2 of the other, with different nodes."""
+    system, tags = tower(d=d)
+    up = np.zeros(d)
+    up[:2] = turned((0.0, 1.0), 0.4)
+    ground = contact_surface(system, tags["a_bottom"], obstacle=HalfSpace(point=(0.0,) * d, normal=tuple(up)))
+    parts = [ground, *(contact_pair(system, tags[f"{one}_bottom"], tags[f"{two}_top"]) for one, two in ("ba", "cb"))]
+    surface = together(*parts)
+    problem = ContactProblem(system, surface)
+    m = parts[0].count
+    assert surface.count == 3 * m
+    u = per_body(system, wavy, linear, cubic)
+    x = relative(problem, u)
+    assert max_over_ranks(COMM, problem.cartesian(x) - u) < 1e-12
+    jumps = [f(part.points) for f, part in zip((wavy, linear, cubic), parts, strict=True)]
+    jumps[2] -= linear(parts[2].points)
+    jumps[1] -= wavy(parts[1].points)
+    for i, jump in enumerate(jumps):
+        rows = slice(i * m, (i + 1) * m)
+        assert surface.normal_values(x)[rows] == pytest.approx(-jump @ up, abs=1e-12)
+        along = np.linalg.norm(jump - np.outer(jump @ up, up), axis=1)
+        assert np.linalg.norm(surface.tangential_values(x)[rows], axis=1) == pytest.approx(along, abs=1e-12)
+        assert np.array_equal(surface.points[rows], parts[i].points)
+    same = ContactProblem(system, empty_surface(system.space.comm, d))
+    assert problem.equations.strain_energy(x) == pytest.approx(same.equations.strain_energy(u), rel=1e-11)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.4])
+@pytest.mark.parametrize("d", [2, 3])
+def test_corners(d, angle):
+    """A block in the corner between another block and a wall (in space: two walls): its corner nodes have two (three)
+    conditions, each exact; T stays orthogonal; they do not rub. The wall also touches the lower block: a node of
+    side 2 with a turned frame of its own."""
+    mesh = blocks(d, angle=angle)
+    system, tags = two_blocks(COMM, mesh)
+    sides = ["left", "back"][: d - 1]
+    walls = [contact_surface(system, tags[f"{body}_{side}"]) for side in sides for body in ("upper", "lower")]
+    pair = contact_pair(system, *(tags[side] for side in mesh.interface))
+    surface = together(pair, *walls)
+    problem = ContactProblem(system, surface)
+    u = per_body(system, wavy, linear)
+    x = relative(problem, u)
+    assert max_over_ranks(COMM, problem.cartesian(x) - u) < 1e-12
+    expected = [np.sum((linear(pair.points) - wavy(pair.points)) * pair.normals, axis=1)]
+    for i, wall in enumerate(walls):
+        expected.append(np.sum((wavy if i % 2 else linear)(wall.points) * wall.normals, axis=1))
+    assert surface.normal_values(x) == pytest.approx(np.concatenate(expected), abs=1e-12)
+    if surface.basis is not None:
+        T = dense(COMM, system, surface.basis)
+        assert np.abs(T.T @ T - np.eye(len(T))).max() < 1e-14
+    places = np.round(surface.points, 9) + 0.0
+    body = np.repeat([1, *[1, 0] * len(sides)], [pair.count, *(wall.count for wall in walls)])
+    _, place, count = np.unique(np.column_stack([places, body]), axis=0, return_inverse=True, return_counts=True)
+    free = np.zeros((surface.count, d - 1))
+    free[surface.slots] = surface.tangents >= 0
+    free = system.algebra.comm.sum(free)
+    assert np.array_equal(free.all(axis=1), count[place.ravel()] == 1)
+    assert np.array_equal(free.any(axis=1), count[place.ravel()] == 1)
+    assert count.max() == d
+    # a push on every condition of the pair moves nothing as a whole, corner nodes included
+    r_n = np.zeros(surface.count)
+    r_n[: pair.count] = 1.0
+    push = forces(problem, surface.reaction_load(r_n, system.rows))
+    upper = field(system, (system.space.bodies == 1).astype(float))[1][:, 0] > 0.0
+    assert push[upper].sum(axis=0) == pytest.approx(pair.count * pair.normals[0], abs=1e-12)
+    assert push[~upper].sum(axis=0) == pytest.approx(-pair.count * pair.normals[0], abs=1e-12)
+
+
+def corner_run(angle: float, **how: Any) -> tuple[ContactSurface, Array, Array]:
+    """(surface, r_n, active of every step) of a block thrown into the corner of a wall and another block."""
+    mesh = blocks(2, upper=(8, 6), lower=(8, 6), angle=angle, gap=1e-3)
+    system, tags = two_blocks(COMM, mesh, loads=BodyForce(tuple(turned((-2e3, -9.81e3), angle))))
+    system = thrown(system, np.zeros_like, lambda x: np.tile(turned((-1.0, -2.0), angle), (len(x), 1)))
+    near = AnalyticGap(lambda x: np.full(len(x), 1e-3))
+    walls = [contact_surface(system, tags[f"{name}_left"], obstacle=near) for name in ("upper", "lower")]
+    ground = contact_surface(system, tags["lower_bottom"])
+    surface = together(contact_pair(system, *(tags[side] for side in mesh.interface)), *walls, ground)
+    problem = ContactProblem(system, surface, friction=Coulomb(0.3))
+    reports = [report for _, report in march(problem, dt=1e-3, steps=60, **how)]
+    assert max(report.certificate.worst for report in reports) <= 1e-9
+    return surface, np.array([report.new.r_n for report in reports]), np.array([r.new.active for r in reports])
+
+
+@pytest.mark.parametrize("scheme", [None, Midpoint()], ids=["default", "midpoint"])
+def test_a_block_thrown_into_a_corner(scheme):
+    """Gravity, speed and friction: every step certified, both conditions of the corner node active in some steps."""
+    surface, _, active = corner_run(0.0, scheme=scheme)
+    corner = [0, 9]  # first node of the pair, first node of the wall: the same
+    assert surface.points[corner[0]] == pytest.approx(surface.points[corner[1]], abs=1e-12)
+    assert np.any(active[:, corner].all(axis=1)) and not active.all()
+
+
+def test_a_turned_corner_is_the_same():
+    """With consistent mass; redistributed mass depends on the axes (0.1 to 3 % of the forces here)."""
+    _, r_n, active = corner_run(0.0, scheme=Midpoint())
+    _, turned_r_n, turned_active = corner_run(0.4, scheme=Midpoint())
+    assert np.array_equal(active, turned_active)
+    assert np.abs(turned_r_n - r_n).max() < 1e-8 * r_n.max()
+
+
+def test_what_surfaces_know_is_kept():
+    """Gaps, springs, bilateral points, motions, each in its place; joined surfaces may be joined again."""
+    mesh = blocks(2, gap=0.125)
+    system, tags = two_blocks(COMM, mesh)
+    pair = contact_pair(system, *(tags[side] for side in mesh.interface)).held()
+    ground = contact_surface(system, tags["lower_bottom"]).on_springs(1e6).moving(towards=lambda t: 2.0 * t)
+    wall = contact_surface(system, tags["upper_right"])
+    once, twice = together(pair, ground, wall), together(together(pair, ground), wall)
+    for surface in (once, twice):
+        assert surface.bilateral.tolist() == [True] * 5 + [False] * (5 + 4)
+        assert surface.gap(0.5).tolist() == [0.125] * 5 + [-1.0] * 5 + [0.0] * 4
+        assert np.array_equal(surface.compliance[5:10], ground.compliance) and np.count_nonzero(surface.compliance) == 5
+        assert surface.sliding(0.0, 1.0) is None
+        assert np.array_equal(surface.owned, once.owned) and np.array_equal(surface.tangents, once.tangents)
+
+
+# Refusals -------------------------------------------------------------------------------------------------------------
+
+def test_refusals():
+    mesh = blocks(2)
+    system, tags = two_blocks(COMM, mesh)
+    one, two = (tags[side] for side in mesh.interface)
+    pair, wall = contact_pair(system, one, two), contact_surface(system, tags["upper_left"])
+    slope = contact_surface(
+        system, tags["upper_left"], obstacle=HalfSpace(point=(-9.0, 0.0), normal=(1.0, 0.5)), points=[(0.0, 1.0)]
+    )
+    other, names = two_blocks(COMM, mesh)
+    chain = contact_surface(system, two)
+    for surfaces, sentence in (
+        ((pair, pair), r"contact node \(0, 1\) is on several contact surfaces with one contact direction: list every"),
+        ((wall, wall), "list every boundary and every pair once"),
+        ((pair, slope), r"contact node \(0, 1\) is on several contact surfaces with directions that are not at right"),
+        ((pair, contact_surface(other, names["lower_bottom"])), "together needs surfaces of .* of the same system"),
+        ((), "together needs surfaces of"),
+        ((pair, empty_surface(system.space.comm, 2)), "together needs surfaces of"),
+    ):
+        with pytest.raises(InputError, match=sentence):
+            together(*surfaces)
+    assert together(pair, chain).count == 10  # side 2 may touch an obstacle
+
+
+def test_a_node_on_both_sides():
+    """Four blocks about a point: one of them on side 1 of a pair and side 2 of another at the same node is refused;
+    with the sides exchanged it has both conditions."""
+    parts = {
+        name: BlockMesh(divisions=(2, 2), corner=corner)
+        for name, corner in {"sw": (0.0, 0.0), "se": (1.0, 0.0), "ne": (1.0, 1.0)}.items()
+    }
+    mesh, tags = build_mesh(Blocks(parts), COMM)
+    system = assemble(mesh, SOFT)
+    first = contact_pair(system, tags["sw_right"], tags["se_left"])
+    sentence = r"node \(1, 1\) is on side 1 of one contact pair and on side 2 of another: exchange the sides of one"
+    good = together(first, contact_pair(system, tags["ne_bottom"], tags["se_top"]))
+    assert good.count == 6
+    with pytest.raises(InputError, match=sentence):
+        together(first, contact_pair(system, tags["se_top"], tags["ne_bottom"]))
