@@ -29,6 +29,7 @@ from dataclasses import dataclass
 from ..algebra import Array, Mask
 from ..step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
 from .mass_projection import admissible
+from .position_step import position_step
 from .single_step import SingleStep, stepped
 
 
@@ -61,20 +62,7 @@ class ContactStabilisedNewmark(SingleStep):
         b = 2.0 * system.load(state.t + 0.5 * dt) + system.M @ (4.0 / dt**2 * u_p) - system.K @ state.u
         if system.C is not None:
             b += system.C @ (2.0 / dt * state.u)
-        return StepProblem(
-            A=A,
-            b=b,
-            bound=problem.surface.gap(state.t + dt),
-            surface=problem.surface,
-            scale=2.0,
-            guess=u_p,
-            active=active,
-            t=state.t + dt,
-            k=state.k + 1,
-            friction=problem.friction,
-            slip0=problem.slip_origin(state.u, state.t, state.t + dt),
-            rate_factor=1.0 / dt,
-        )
+        return position_step(problem, state, A, dt, b=b, scale=2.0, guess=u_p, active=active)
 
     def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
         """v1 = v0 + 2/dt (u1 - u_p)."""

@@ -39,6 +39,7 @@ from ..step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem,
 from .acceleration import consistent_acceleration, without_inertia
 from .contact_layer import at_rest_between, relaxed
 from .guard import contact_in_the_balance, needs_no_impact_law
+from .position_step import position_step
 
 SLACK = 1e-12  # round-off in the conditions of stability
 
@@ -127,20 +128,7 @@ class AlphaStep(ABC):
             v = v + ratio * state.v
         if system.C is not None:
             b -= system.C @ v
-        return StepProblem(
-            A=A,
-            b=b,
-            bound=problem.surface.gap(state.t + dt),
-            surface=problem.surface,
-            scale=1.0,
-            guess=state.u + dt * state.v,
-            active=state.active,
-            t=state.t + dt,
-            k=state.k + 1,
-            friction=problem.friction,
-            slip0=problem.slip_origin(state.u, state.t, state.t + dt),
-            rate_factor=1.0 / dt,
-        )
+        return position_step(problem, state, A, dt, b=b, scale=1.0)
 
     def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
         """a1 and v1 from u1; massless unknowns get none and the mean velocity of the step."""

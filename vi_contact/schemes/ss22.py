@@ -18,6 +18,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
+from .position_step import position_step
 from .single_step import SingleStep, stepped
 
 
@@ -50,20 +51,8 @@ class SS22(SingleStep):
         force = system.load(state.t + self.theta1 * dt) - system.K @ (state.u + self.theta1 * dt * state.v)
         if system.C is not None:
             force -= system.C @ state.v
-        return StepProblem(
-            A=A,
-            b=A @ guess + force / self.theta2,
-            bound=problem.surface.gap(state.t + dt),
-            surface=problem.surface,
-            scale=1.0 / self.theta2,
-            guess=guess,
-            active=state.active,
-            t=state.t + dt,
-            k=state.k + 1,
-            friction=problem.friction,
-            slip0=problem.slip_origin(state.u, state.t, state.t + dt),
-            rate_factor=1.0 / dt,
-        )
+        b = A @ guess + force / self.theta2
+        return position_step(problem, state, A, dt, b=b, scale=1.0 / self.theta2, guess=guess)
 
     def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
         """alpha = 2 (u1 - u0 - dt v0)/dt², v1 = v0 + dt alpha."""

@@ -22,6 +22,7 @@ from ..mass import MassLaw, Redistributed
 from ..step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
 from .contact_layer import at_rest_between, relaxed
 from .guard import contact_in_the_balance, needs_no_impact_law
+from .position_step import position_step
 
 
 @dataclass(frozen=True)
@@ -66,20 +67,7 @@ class Trapezoidal:
         b = state.memory["force"] + system.load(state.t + dt) + system.M @ (4.0 / dt**2 * (state.u + dt * state.v))
         if system.C is not None:
             b += system.C @ (2.0 / dt * state.u)
-        return StepProblem(
-            A=A,
-            b=b,
-            bound=problem.surface.gap(state.t + dt),
-            surface=problem.surface,
-            scale=1.0,
-            guess=state.u + dt * state.v,
-            active=state.active,
-            t=state.t + dt,
-            k=state.k + 1,
-            friction=problem.friction,
-            slip0=problem.slip_origin(state.u, state.t, state.t + dt),
-            rate_factor=1.0 / dt,
-        )
+        return position_step(problem, state, A, dt, b=b, scale=1.0)
 
     def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
         """v1 = 2 (u1 - u0)/dt - v0; massless unknowns get the mean velocity of the step."""

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from ..algebra import Array
 from ..errors import InputError
 from ..step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
+from .position_step import position_step
 from .single_step import SingleStep, stepped
 
 
@@ -52,20 +53,7 @@ class ZienkiewiczWoodTaylor(SingleStep):
         b -= (1.0 - phi) / phi * (system.K @ state.u)
         if system.C is not None:
             b += system.C @ (state.u / (phi * dt))
-        return StepProblem(
-            A=A,
-            b=b,
-            bound=problem.surface.gap(state.t + dt),
-            surface=problem.surface,
-            scale=1.0 / phi,
-            guess=state.u + dt * state.v,
-            active=state.active,
-            t=state.t + dt,
-            k=state.k + 1,
-            friction=problem.friction,
-            slip0=problem.slip_origin(state.u, state.t, state.t + dt),
-            rate_factor=1.0 / dt,
-        )
+        return position_step(problem, state, A, dt, b=b, scale=1.0 / phi)
 
     def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
         """v1 = v0 + ((u1 - u0)/dt - v0)/phi."""
