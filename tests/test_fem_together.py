@@ -11,7 +11,7 @@ pytest.importorskip("dolfinx")
 
 from fem_problems import dense, field, max_over_ranks, turned
 from mpi4py import MPI
-from two_bodies import SOFT, blocks, forces, per_body, relative, thrown, two_blocks
+from two_bodies import SOFT, blocks, forces, momenta, per_body, relative, thrown, two_blocks
 
 from vi_contact.algebra import Array
 from vi_contact.errors import InputError
@@ -21,8 +21,9 @@ from vi_contact.fem.mesh import build_mesh
 from vi_contact.fem.pairs import contact_pair
 from vi_contact.fem.together import together
 from vi_contact.fem.trace import contact_surface
-from vi_contact.friction import Coulomb
+from vi_contact.friction import Coulomb, Frictionless
 from vi_contact.march import march
+from vi_contact.mass import Redistributed
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import Blocks
 from vi_contact.schemes.midpoint import Midpoint
@@ -89,8 +90,8 @@ def test_two_pairs_and_an_obstacle(d):
 @pytest.mark.parametrize("d", [2, 3])
 def test_corners(d, angle):
     """A block in the corner between another block and a wall (in space: two walls): its corner nodes have two (three)
-    conditions, each exact; T stays orthogonal; they do not rub. The wall also touches the lower block: a node of
-    side 2 with a turned frame of its own."""
+    conditions, each exact; T stays orthogonal; they rub along the edge only. The walls also touch the lower block:
+    nodes of side 2 with a turned frame of their own."""
     mesh = blocks(d, angle=angle)
     system, tags = two_blocks(COMM, mesh)
     sides = ["left", "back"][: d - 1]
@@ -115,7 +116,7 @@ def test_corners(d, angle):
     free[surface.slots] = surface.tangents >= 0
     free = system.algebra.comm.sum(free)
     assert np.array_equal(free.all(axis=1), count[place.ravel()] == 1)
-    assert np.array_equal(free.any(axis=1), count[place.ravel()] == 1)
+    assert free.sum() == sum((d - n) for n in count)
     assert count.max() == d
     # a push on every condition of the pair moves nothing as a whole, corner nodes included
     r_n = np.zeros(surface.count)
@@ -172,6 +173,44 @@ def test_what_surfaces_know_is_kept():
         assert np.array_equal(surface.compliance[5:10], ground.compliance) and np.count_nonzero(surface.compliance) == 5
         assert surface.sliding(0.0, 1.0) is None
         assert np.array_equal(surface.owned, once.owned) and np.array_equal(surface.tangents, once.tangents)
+
+
+def test_redistributed_mass_at_corners():
+    """No inertia on any contact unknown, that of the edge included; each body keeps its mass."""
+    mesh = blocks(3, angle=0.4, upper=(6, 5, 5), lower=(6, 4, 5))
+    system, tags = two_blocks(COMM, mesh)
+    sides = [tags[f"{body}_{side}"] for side in ("left", "back") for body in ("upper", "lower")]
+    walls = [contact_surface(system, side) for side in sides]
+    surface = together(contact_pair(system, *(tags[side] for side in mesh.interface)), *walls)
+    for friction in (Frictionless(), Coulomb(0.3)):
+        problem = ContactProblem(system, surface, friction=friction, mass=Redistributed())
+        massless = problem.equations.massless
+        rows = np.zeros(surface.count)
+        rows[surface.slots] = massless[surface.owned]
+        assert system.algebra.comm.sum(rows).all()
+        random = np.random.default_rng(5).random(system.rows)
+        inertia = problem.equations.M @ random
+        assert np.abs(inertia[massless]).max(initial=0.0) < 1e-14 * max_over_ranks(COMM, inertia)
+        momentum = momenta(problem, problem.equations.influence[:, 0])
+        assert momentum == pytest.approx(np.array([[1800.0, 0.0, 0.0]] * 2), abs=1e-9 * 1800.0)
+
+
+def test_sliding_obstacles_at_corners():
+    """A floor that slides along the edge and across: corner nodes feel the part along the edge."""
+    system, tags = two_blocks(COMM, blocks(3, angle=0.0))
+    floor = contact_surface(system, tags["lower_bottom"]).moving(along=lambda t: np.array([2.0 * t, 3.0 * t]))
+    wall = contact_surface(system, tags["lower_left"])
+    surface = together(floor, wall)
+    x = system.influence @ np.array([0.0, 0.0, 1.0])  # the edge runs along z
+    along = surface.tangential_values(x)
+    edge = np.flatnonzero(np.isclose(surface.points[:, 0], 0.0) & np.isclose(surface.points[:, 1], 0.0))
+    slide, alone = surface.sliding(0.0, 1.0), floor.sliding(0.0, 1.0)[0]
+    z = floor.tangential_values(x)[0]  # components of the z axis in the floor's own tangents
+    for slot in edge[: len(edge) // 2]:
+        assert np.sum(along[slot] * slide[slot]) == pytest.approx(alone @ z) and np.count_nonzero(slide[slot]) == 1
+    assert not slide[edge[len(edge) // 2 :]].any() and not along[edge[len(edge) // 2 :]].any()
+    inside = np.setdiff1d(np.arange(floor.count), edge)
+    assert np.array_equal(slide[inside], np.tile(alone, (len(inside), 1)))
 
 
 # Refusals -------------------------------------------------------------------------------------------------------------

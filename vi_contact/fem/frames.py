@@ -71,6 +71,8 @@ class Frames:
     Attributes:
         numbers: (k,) nodes; blocks: (k, d, d) frames, vectors as columns.
         place, column: (m,) node and column of each condition; double: (k,) nodes with several conditions.
+        rubs: (m, d-1) tangential vectors that belong to each condition; what a node with several of them has left, the
+            direction of the edge in space, belongs to the first.
     Raises:
         InputError: a contact direction that is partly prescribed; directions of one node parallel or oblique.
     """
@@ -91,6 +93,12 @@ class Frames:
             slots = np.flatnonzero(self.place == node)
             self._refuse_skew(slots)
             self.column[slots], self.blocks[node] = corner_of(self.directions[slots])
+        self.rubs = np.ones((len(numbers), self.blocks.shape[1] - 1), dtype=bool)
+        for node in np.flatnonzero(self.double):
+            slots = np.flatnonzero(self.place == node)
+            free = ~np.isin(np.arange(self.blocks.shape[1]), self.column[slots])
+            self.rubs[slots] = False
+            self.rubs[slots[0]] = np.delete(free, self.column[slots[0]])
 
     @property
     def tangents(self) -> Array:
@@ -165,8 +173,7 @@ def surface_of(space: FemSpace, parts: Sequence[Conditions], **data: Any) -> Fem
     slots = np.flatnonzero(where[frames.place] >= 0)
     place, column = frames.place[slots], frames.column[slots]
     tangents = np.array([np.delete(index[p], c) for p, c in zip(place, column, strict=True)], dtype=np.int64)
-    tangents = tangents.reshape(len(slots), d - 1)
-    tangents[frames.double[place]] = -1
+    tangents = np.where(frames.rubs[slots], tangents.reshape(len(slots), d - 1), -1)
     given = {"bilateral": np.zeros(count, dtype=bool), "compliance": np.zeros(count)} | data
     return FemSurface(
         comm=space.comm,
@@ -208,7 +215,7 @@ def _coupling(
 ) -> PetscMatrix | None:
     """R with û = R ǔ: to the unknowns of a node that faces others, q_c·u = ǔ_c + q_c·sum_j P_sj u_j.
 
-    At nodes with several conditions each one's own direction only is relative to what it faces.
+    At nodes with several conditions each one's own vectors only are relative to what it faces.
     """
     if all(part.facing is None for part in parts):
         return None
@@ -222,8 +229,9 @@ def _coupling(
             if part.facing is None or turns is None:
                 continue
             place = frames.place[slot]
-            columns = [frames.column[slot]] if frames.double[place] else range(space.dimension)
-            for c in columns:
+            own_column = int(frames.column[slot])
+            others = np.delete(np.arange(space.dimension), own_column)[frames.rubs[slot]]
+            for c in (own_column, *others):
                 own = int(index[place, c])
                 if own >= 0:
                     faced, values = _faced(part.facing, row, turns, frames.blocks[place][:, c])

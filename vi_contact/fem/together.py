@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..algebra import Array, Mask
+from ..algebra import Array
 from ..errors import InputError
 from ..surfaces import ContactSurface
 from .frames import FemSurface, Frames, surface_of
@@ -19,7 +19,8 @@ def together(*surfaces: ContactSurface) -> ContactSurface:
     """One surface with the conditions of all, in the order given.
 
     A node that is on several of them, at the edge of a channel, has a condition for each. Their directions must be at
-    right angles: each is one vector of the node's frame. Such a node rubs on none of them (its tangents are -1).
+    right angles: each is one vector of the node's frame. Such a node rubs along the edge only, in space, with the
+    normal force of the first of them: name the surface that carries the body first.
     A node of side 2 of a pair may touch an obstacle, but not be on side 1 of another pair.
 
     Raises:
@@ -32,24 +33,35 @@ def together(*surfaces: ContactSurface) -> ContactSurface:
     names = ("gap0", "weights", "bilateral", "compliance")
     data: dict[str, Any] = {name: np.concatenate([getattr(surface, name) for surface in made]) for name in names}
     parts = [part for surface in made for part in surface.parts]
-    frames = Frames(parts)
-    single = ~frames.double[frames.place]
     return surface_of(
         made[0].space,
         parts,
         motion=_joined([(surface.motion, (surface.count,)) for surface in made]),
-        slide=_joined([(surface.slide, (surface.count, surface.tangents.shape[1])) for surface in made], single),
+        slide=_slide(made, Frames(parts)),
         **data,
     )
 
 
-def _joined(motions: Sequence[tuple[Motion | None, tuple[int, ...]]], kept: Mask | None = None) -> Motion | None:
-    """The motions of all conditions from those of the surfaces; zero where not kept."""
+def _joined(motions: Sequence[tuple[Motion | None, tuple[int, ...]]]) -> Motion | None:
+    """The motions of all conditions from those of the surfaces."""
     if all(motion is None for motion, _ in motions):
         return None
+    return lambda t: np.concatenate([np.zeros(shape) if motion is None else motion(t) for motion, shape in motions])
 
-    def moved(t: float) -> Array:
-        values = np.concatenate([np.zeros(shape) if motion is None else motion(t) for motion, shape in motions])
-        return values if kept is None else values * kept[:, None]
 
-    return moved
+def _slide(made: Sequence[FemSurface], frames: Frames) -> Motion | None:
+    """The slides of all conditions, those of nodes with several along the vectors that are left to them."""
+    joined = _joined([(surface.slide, (surface.count, surface.tangents.shape[1])) for surface in made])
+    corners = np.flatnonzero(frames.double[frames.place])
+    if joined is None or not len(corners):
+        return joined
+    before = np.concatenate([Frames(surface.parts).tangents for surface in made])[corners]
+    after = frames.tangents[corners] * frames.rubs[corners, None, :]
+    turn = np.einsum("kic,kie->kce", after, before)
+
+    def slide(t: float) -> Array:
+        values = joined(t)
+        values[corners] = np.einsum("kce,ke->kc", turn, values[corners])
+        return values
+
+    return slide
