@@ -84,6 +84,18 @@ def test_csmip_in_tenths_of_g_and_without_a_format(tmp_path):
     assert np.allclose(record.acceleration, 0.01 * VALUES, rtol=1e-14, atol=0.0)
 
 
+def test_csmip_of_1983_and_its_first_volume(tmp_path):
+    """Capitals, units in brackets, no format; and samples at a rate, touching, in g, not yet corrected."""
+    record = read_record(write(tmp_path, csmip(unit="(units: cm/sec/sec)").upper()))
+    assert np.allclose(record.acceleration, 0.01 * VALUES, rtol=1e-14, atol=0.0) and record.component == "90 DEG"
+    data = "    11 Accelerogram points at 200 pts/sec in units of g .      Format: (8f9.6)\n"
+    text = csmip().replace("Station No.", "Station Id.").split("    11 points of accel data")[0]
+    text = "Un" + text.replace("Corrected", "corrected") + data + rows(VALUES / 1000.0, 8, 9, 6)
+    record = read_record(write(tmp_path, text))
+    assert np.allclose(record.acceleration, G / 1000.0 * VALUES, rtol=1e-12) and record.dt == 0.005
+    assert record.station == "58000" and record.notes[0].startswith("Uncorrected accelerogram")
+
+
 def test_csmip_several_channels_are_chosen_by_number(tmp_path):
     path = write(tmp_path, csmip(1, "90 Deg") + csmip(2, "UP", -VALUES) + csmip(3, "360 Deg", 2.0 * VALUES))
     refused(path, "3 channels (1: 90 Deg, 2: UP, 3: 360 Deg)", "pass channel=")
@@ -270,6 +282,42 @@ def test_esm_in_g_windows_line_ends_and_first_key_unlike_event_name(tmp_path):
 ], ids=lambda value: value[-1] if isinstance(value, list) else "")
 def test_bad_esm_is_refused_in_one_sentence(text, words, tmp_path):
     refused(write(tmp_path, text), *words)
+
+
+AFAD = """STRONG GROUND MOTION RECORDS OF TURKIYE
+PLACE                   : SOMEWHERE
+EARTHQUAKE DATE         : 2017/07/20 22:31:09 (GMT)
+STATION ID              : 5405
+NUMBER OF DATA          : 3
+SAMPLING INTERVAL (sec) : 0.01
+RAW PGA VALUES (gal)    : (N-S) 1.5 (E-W) 1.1 (U-D) 0.4
+DISASTER AND EMERGENCY MANAGEMENT PRESIDENCY
+       N-S          E-W          U-D
+   -0.500000      1.100000    -0.260000
+   -1.500000      0.780000     0.400000
+    0.520000     -1.000000    -0.260000
+"""
+
+
+@pytest.mark.parametrize("channel, name, samples", [
+    (1, "N-S", [-0.5, -1.5, 0.52]), (2, "E-W", [1.1, 0.78, -1.0]), (3, "U-D", [-0.26, 0.4, -0.26])])
+def test_afad_columns_are_channels(channel, name, samples, tmp_path):
+    record = read_record(write(tmp_path, AFAD.replace("\n", "\r\n")), channel=channel)
+    assert np.allclose(record.acceleration, 0.01 * np.array(samples), rtol=1e-14) and record.dt == 0.01
+    assert (record.format, record.station, record.component, record.units) == ("AFAD", "5405", name, "gal")
+
+
+@pytest.mark.parametrize("text, words, options", [
+    (AFAD, ["1: N-S, 2: E-W, 3: U-D", "pass channel="], {}), (AFAD, ["pass channel="], {"channel": 4}),
+    (AFAD.replace(": 3\n", ": 4\n"), ["line 5", "4 samples", "3 follow"], {"channel": 1}),
+    (AFAD.replace("0.780000 ", " "), ["line 11", "2 values"], {"channel": 1}),
+    (AFAD.replace("0.780000", "0.78O000"), ["line 11", "'0.78O000' is not a number"], {"channel": 1}),
+    (AFAD.replace("N-S  ", "N  "), ["no line 'N-S E-W U-D'"], {"channel": 1}),
+    (AFAD.replace(": 0.01", ": often"), ["line 6", "SAMPLING INTERVAL (SEC) is 'often'"], {"channel": 1}),
+    (AFAD.replace("NUMBER", "Numbers"), ["does not give NUMBER OF DATA"], {"channel": 1}),
+], ids=lambda value: value[-1] if isinstance(value, list) else "")
+def test_bad_afad_is_refused_in_one_sentence(text, words, options, tmp_path):
+    refused(write(tmp_path, text), *words, **options)
 
 
 # --- OpenSees path series -------------------------------------------------------------------------------------------

@@ -3,7 +3,8 @@
 A block begins with a line that states its number of points, quantity, units and Fortran format, such as
 "7500 points of accel data equally spaced at .010 sec, in cm/sec2. (8f10.6)" (CSMIP) or
 "12091 acceleration pts, approx 120 secs, units=cm/sec2(04),Format=(8F10.5)" (COSMOS), the time step of the latter being
-real number 34 of its header. Samples are cut by column, for they may touch. Velocities and displacements are skipped.
+real number 34 of its header. Without a stated format it is (8F10.3). Samples are cut by column, for they may touch.
+Velocities and displacements are skipped.
 """
 
 from __future__ import annotations
@@ -24,12 +25,13 @@ STEP = 33
 _FIRST = re.compile(r"^\s*(?:un)?corrected accelerogram|\(\s*format\s+v[\d.]+ with \d+ text lines", re.IGNORECASE)
 _BLOCK = re.compile(r"^\s*(\d+)\s+.*?\b(accel|veloc|displ)\w*\.?.*?(?:\bpts\b|\bspaced\b|\bdata\b)", re.IGNORECASE)
 _FORMAT = re.compile(r"\(\s*(\d*)\s*(?:1P)?[FEIDG](\d+)[^)]*\)", re.IGNORECASE)
-_UNITS = (re.compile(r"units?\s*=\s*(g/10|[^,(\s]+)", re.IGNORECASE),
+_UNITS = (re.compile(r"units?\s*(?:[=:]|\bof\b)\s*(g/10|[^,()\s]+)", re.IGNORECASE),
           re.compile(r"\bin\s+(g/10|cm/s(?:ec)?[*^]*2|cm/s(?:ec)?/s(?:ec)?|g)\b", re.IGNORECASE))
 _SPACED = re.compile(rf"equally[- ]spaced\s+(?:at|intervals\s+of)\s+({NUMBER})\s*sec", re.IGNORECASE)
+_RATE = re.compile(rf"\bat\s+({NUMBER})\s*pts/sec", re.IGNORECASE)
 _REALS = re.compile(r"^\s*(\d+)\s+real-header values follow on\s+(\d+)\s+lines", re.IGNORECASE)
-_CHANNEL = re.compile(r"\bchan\s+([\w?]+):\s*([^(]*?)\s*(?:\(|\bfrom\b|$)", re.IGNORECASE)
-_STATION = re.compile(r"\b(?:stat(?:io)?n)\s*no[.:]\s*(\S+)(?:\s+code:\s*(.*?))?\s*(?:$|\s{3,})", re.IGNORECASE)
+_CHANNEL = re.compile(r"\bchan?:?\s+([\w?]+):\s*([^(]*?)\s*(?:\(|\bfrom\b|$)", re.IGNORECASE)
+_STATION = re.compile(r"\bstat(?:io)?n\s*(?:no|id)[.:]\s*(?:.*?\bcode:\s*)?(\S+)", re.IGNORECASE)
 _EVENT = re.compile(r"re?co?rd of", re.IGNORECASE)
 _UNKNOWN = re.compile(rf"unknown/unspecified:\s*{NUMBER}[,\s]+({NUMBER})", re.IGNORECASE)
 
@@ -71,9 +73,11 @@ def read(text: TextFile, units: str | None = None, dt: float | None = None, chan
     stated = next((match[1] for match in (pattern.search(line) for pattern in _UNITS) if match), None)
     name = file_units(text.at(block.line), stated, units)
     words, comments = _words(text, block)
+    cosmos = "format v" in text.lines[0].lower()
+    event = next(filter(_EVENT.match, words), " ".join(words[1:2] if cosmos else words[2:3]))
     return Record(acceleration=UNITS[name] * _samples(text, block), dt=file_dt(text.path, _step(text, block), dt),
-                  title=next(filter(_EVENT.match, words), ""), source=text.path, units=name, sha256=text.sha256,
-                  format="COSMOS" if "format v" in text.lines[0].lower() else "CSMIP", notes=(*words, *comments),
+                  title=event, source=text.path, units=name, sha256=text.sha256,
+                  format="COSMOS" if cosmos else "CSMIP", notes=(*words, *comments),
                   station=_station(text, block), component=_component(text, block))
 
 
@@ -133,6 +137,9 @@ def _samples(text: TextFile, block: Block) -> Array:
 
 def _step(text: TextFile, block: Block) -> float | None:
     """The time step stated with the samples, in the text of the header or among its real numbers."""
+    rate = _RATE.search(text.lines[block.line])
+    if rate and to_float(rate[1]) > 0.0:
+        return 1.0 / to_float(rate[1])
     for index in (block.line, *block.header):
         spaced = _SPACED.search(text.lines[index])
         if spaced:
@@ -155,4 +162,4 @@ def _component(text: TextFile, block: Block) -> str:
 def _station(text: TextFile, block: Block) -> str:
     """Number or code of the station, from the text of the header."""
     match = next(filter(None, (_STATION.search(text.lines[index]) for index in block.header)), None)
-    return (match[2] or match[1]) if match else ""
+    return match[1] if match else ""
