@@ -107,23 +107,28 @@ def plot_snapshots(
     from matplotlib.figure import Figure
 
     runs = {name: (read_frames(folder), read_tractions(folder)) for name, folder in folders.items()}
-    stresses = np.array([frames.at(t)[2].max() for frames, _ in runs.values() for t in times])
+    shots = [[frames.at(t) for t in times] for frames, _ in runs.values()]
+    stresses = np.array([stress.max() for row in shots for *_, stress in row])
     shown, unit = _scaled(stresses, "Pa")
     longest = max(float(np.hypot(*tractions.at(t)).max(initial=0.0)) for _, tractions in runs.values() for t in times)
-    size = float(np.ptp(next(iter(runs.values()))[0].points, axis=0).max())
+    points = next(iter(runs.values()))[0].points
+    size = float(np.ptp(points, axis=0).max())
+    low, high = _limits([points + magnified * u for row in shots for _, u, _ in row], size)
+    height = 2.4 * (high[1] - low[1]) / (high[0] - low[0]) + 0.4
     with matplotlib.rc_context(_STYLE | {"axes.grid": False}):
-        figure = Figure(figsize=(2.6 * len(times) + 1.2, 3.0 * len(runs) + 0.6), layout="constrained")
+        figure = Figure(figsize=(2.5 * len(times) + 1.6, height * len(runs) + 0.8), layout="constrained")
         axes = figure.subplots(len(runs), len(times), sharex=True, sharey=True, squeeze=False)
-    for row, (name, (frames, tractions)) in zip(axes, runs.items(), strict=True):
-        for axis, t in zip(row, times, strict=True):
-            exact, u, stress = frames.at(t)
-            u = magnified * u
-            _draw_support(axis, support(exact), size)
-            cells = _draw_body(axis, frames.points + u, frames.cells, stress * (shown.max() / stresses.max()))
+    axes[0, 0].set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+    for row, row_shots, (name, (frames, tractions)) in zip(axes, shots, runs.items(), strict=True):
+        for axis, (t, u, stress) in zip(row, row_shots, strict=True):
+            _draw_support(axis, support(t), size)
+            moved = frames.points + magnified * u
+            cells = _draw_body(axis, moved[frames.cells], stress * (shown.max() / stresses.max()))
             cells.set_clim(0.0, shown.max())
-            _draw_tractions(axis, frames, tractions, u, exact, longest / (ARROW * size))
-            axis.set_title(f"{name}, {_moment(exact)}", fontsize=9)
-    _label(axes, size)
+            _draw_tractions(axis, frames, tractions, magnified * u, t, longest / (ARROW * size))
+            axis.set_title(f"{name}, {_moment(t)}", fontsize=9)
+    figure.supxlabel("x [m]", fontsize=10)
+    figure.supylabel("y [m]", fontsize=10)
     figure.colorbar(cells, ax=axes, label=f"von Mises stress [{unit}]", shrink=0.7)
     figure.suptitle(title + (f" (displacements x {magnified:g})" if magnified != 1.0 else ""))
     return _save(figure, path)
@@ -134,25 +139,20 @@ def _moment(t: float) -> str:
     return f"t = {1e3 * t:.4g} ms" if 0.0 < t < 0.1 else f"t = {t:.4g} s"
 
 
-def _label(axes: Any, size: float) -> None:
-    """Names of the axes, and room for everything, arrows included."""
-    for axis in axes[-1]:
-        axis.set_xlabel("x [m]")
-    for axis in axes[:, 0]:
-        axis.set_ylabel("y [m]")
-    corners = np.concatenate([axis.dataLim.get_points() for axis in axes.ravel()])
-    (left, bottom), (right, top) = corners.min(axis=0), corners.max(axis=0)
-    axes[0, 0].set(xlim=(left - 0.2 * size, right + 0.2 * size), ylim=(bottom - 0.35 * size, top + 0.1 * size))
+def _limits(moved: Sequence[Array], size: float) -> tuple[Array, Array]:
+    """Corners of what is drawn, with room for the arrows below."""
+    low = np.min([points.min(axis=0) for points in moved], axis=0)
+    high = np.max([points.max(axis=0) for points in moved], axis=0)
+    return low - size * np.array([0.2, 0.35]), high + size * np.array([0.2, 0.1])
 
 
-def _draw_body(axis: Any, points: Array, cells: Indices, stress: Array) -> Any:
+def _draw_body(axis: Any, cells: Array, stress: Array) -> Any:
     """The cells where they are now, coloured."""
     from matplotlib.collections import PolyCollection
 
-    drawn = PolyCollection(list(points[cells]), cmap="YlOrRd", edgecolor="0.35", linewidth=0.3)
+    drawn = PolyCollection(list(cells), cmap="YlOrRd", edgecolor="0.35", linewidth=0.3)
     drawn.set_array(stress)
     axis.add_collection(drawn)
-    axis.update_datalim(points)
     axis.set_aspect("equal")
     return drawn
 
