@@ -37,7 +37,8 @@ def test_ec8_branches_of_every_ground(kind, ground, damping):
     top = 3.0 * s * 2.5 * eta
     assert spectrum.eta == eta
     periods = [0.0, 0.5 * tb, tb, 0.5 * (tb + tc), tc, 0.5 * (tc + td), td, 2.0 * td]
-    exact = [3.0 * s, 0.5 * (3.0 * s + top), top, top, top, 2.0 * top * tc / (tc + td), top * tc / td, top * tc / td / 4]
+    late = [2.0 * top * tc / (tc + td), top * tc / td, top * tc / td / 4.0]
+    exact = [3.0 * s, 0.5 * (3.0 * s + top), top, top, top, *late]
     assert np.allclose(spectrum.acceleration(periods), exact, rtol=1e-13, atol=0.0)
     assert np.allclose(spectrum.displacement(periods), np.array(exact) * (np.array(periods) / (2.0 * np.pi)) ** 2)
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from . import __version__
+from .cli_motion import add_motion_commands
 from .errors import ViContactError
 
 _DESCRIPTION = """Dynamic unilateral contact of elastic structures: exact non-penetration, a closed energy ledger and a
@@ -29,14 +30,7 @@ def parser() -> argparse.ArgumentParser:
     )
     add_wall_arguments(wall)
     wall.set_defaults(run=_wall)
-    motion = commands.add_parser("motion", help="ground motion files").add_subparsers(
-        dest="action", required=True, metavar="ACTION"
-    )
-    info = motion.add_parser("info", help="what a record file holds: units, peaks, intensity, duration")
-    info.add_argument("file", help="PEER AT2, USGS SMC or two columns t, a")
-    info.add_argument("--units", help="m/s2, cm/s2, gal, g, ...: required where the file does not say")
-    info.add_argument("--dt", type=float, help="time step [s], where the file does not say")
-    info.set_defaults(run=_motion_info)
+    add_motion_commands(commands)
     return top
 
 
@@ -140,12 +134,6 @@ def _wall_case(options: argparse.Namespace, case: str, out: Path) -> str:
     )
     solution = run_wall(run, MPI.COMM_WORLD, out, progress=not options.quiet)
     return f"Wall, case {case}\n{solution.summary()}\noutput: {out}"
-
-
-def _motion_info(options: argparse.Namespace) -> str:
-    from .ground_motion import motion_info
-
-    return motion_info(options.file, options.units, dt=options.dt)
 
 
 def split_petsc(arguments: Sequence[str]) -> tuple[list[str], list[str]]:

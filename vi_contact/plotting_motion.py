@@ -1,0 +1,139 @@
+"""Pictures of ground motions: acceleration, velocity, displacement and Husid's curve; response spectra and a target."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .algebra import Array
+from .ground_motion import (
+    STANDARD_GRAVITY,
+    UNITS,
+    EC8Spectrum,
+    Record,
+    ResponseSpectrum,
+    arias,
+    d5_95,
+    husid,
+    integrated,
+    pga,
+)
+from .plotting import _STYLE, _panels, _save, length_unit
+
+SAMPLES_A_PERIOD = 10
+"""A spectrum is drawn pale at periods with fewer samples of the record than this."""
+
+
+def plot_motion(record: Record, path: str | Path, *, title: str | None = None, units: str = "m/s2") -> Path:
+    """Acceleration in `units`, velocity, displacement and the Husid curve above each other; peaks marked, D5-95 shaded.
+
+    title: default the record's. Nothing is corrected: a drift of the record shows.
+    """
+    figure, axes = _panels(4, (9.0, 8.0))
+    velocity, displacement = integrated(record)
+    _line(axes[0], record.times, record.acceleration / UNITS[units], f"acceleration [{_pretty(units)}]")
+    for axis, values, quantity, per_second in (
+        (axes[1], velocity, "velocity", "/s"), (axes[2], displacement, "displacement", "")
+    ):
+        metres, unit = _size(values)
+        _line(axis, record.times, values / metres, f"{quantity} [{unit}{per_second}]")
+    _husid(axes[3], record)
+    axes[0].set_title(title if title is not None else record.title or record.source, fontsize=10)
+    axes[-1].set_xlim(0.0, record.duration)
+    return _save(figure, path)
+
+
+def plot_spectra(
+    spectra: Mapping[str, ResponseSpectrum],
+    path: str | Path,
+    *,
+    target: EC8Spectrum | None = None,
+    steps: Mapping[str, float] | None = None,
+    title: str = "Response spectra",
+    units: str = "g",
+) -> Path:
+    """Pseudo-acceleration in `units` and displacement over the period, one line for each label, the target dashed.
+
+    steps: time step [s] of the record behind each label; below ten of them its line is pale.
+    """
+    figure, (top, bottom) = _logarithmic_panels()
+    shown = np.concatenate([spectrum.periods for spectrum in spectra.values()])
+    metres, unit = length_unit(max(float(np.max(spectrum.displacement)) for spectrum in spectra.values()))
+    for label, spectrum in spectra.items():
+        trusted = spectrum.periods >= SAMPLES_A_PERIOD * (steps or {}).get(label, 0.0)
+        colour = None
+        for axis, values in ((top, spectrum.psa / UNITS[units]), (bottom, spectrum.displacement / metres)):
+            (line,) = axis.plot(spectrum.periods, np.where(trusted, values, np.nan), lw=1.2, color=colour, label=label)
+            colour = line.get_color()
+            axis.plot(spectrum.periods, values, lw=0.8, color=colour, alpha=0.35)
+    if target is not None:
+        periods = np.geomspace(shown.min(), shown.max(), 500)
+        name = f"EC8 target, {100.0 * target.damping:g} %"
+        top.plot(periods, target.acceleration(periods) / UNITS[units], "k--", lw=1.2, label=name)
+        code = periods <= 4.0  # beyond, the code gives another displacement spectrum
+        bottom.plot(periods[code], target.displacement(periods[code]) / metres, "k--", lw=1.2, label=name)
+    if any(np.min(spectrum.periods) < SAMPLES_A_PERIOD * (steps or {}).get(label, 0.0)
+           for label, spectrum in spectra.items()):
+        top.plot([], [], color="0.5", lw=0.8, alpha=0.5, label=f"pale: under {SAMPLES_A_PERIOD} samples a period")
+    top.legend(fontsize=8)
+    for axis in (top, bottom):
+        axis.set_ylim(bottom=0.0)
+    top.set(ylabel=f"pseudo-acceleration [{_pretty(units)}]", title=title)
+    bottom.set(ylabel=f"displacement [{unit}]", xlabel="period [s]", xlim=(shown.min(), shown.max()))
+    return _save(figure, path)
+
+
+def _logarithmic_panels() -> tuple[Any, Any]:
+    """(figure, two axes above each other) with one logarithmic axis of periods, marked in plain numbers."""
+    import matplotlib
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    with matplotlib.rc_context(_STYLE):
+        figure = Figure(figsize=(8.0, 7.5), layout="constrained")
+        axes = figure.subplots(2, 1, sharex=True)
+    axes[1].set_xscale("log")
+    axes[1].xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes[1].xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes[1].xaxis.set_minor_formatter(NullFormatter())
+    return figure, axes
+
+
+def _line(axis: Any, times: Array, values: Array, label: str) -> None:
+    """A history with its peak marked and written."""
+    axis.plot(times, values, color="black", lw=0.7)
+    peak = int(np.argmax(np.abs(values)))
+    axis.plot(times[peak], values[peak], "o", ms=4, color="tab:red", clip_on=False)
+    side, outwards = -1 if times[peak] > 0.75 * times[-1] else 1, -1 if values[peak] < 0.0 else 1
+    axis.annotate(f"{values[peak]:.3g} at {times[peak]:g} s", (times[peak], values[peak]),
+                  xytext=(6 * side, 4 * outwards), textcoords="offset points", fontsize=8, color="tab:red", va="center",
+                  ha="left" if side > 0 else "right")
+    axis.axhline(0.0, color="0.6", lw=0.6)
+    axis.margins(y=0.12)
+    axis.set_ylabel(label)
+
+
+def _husid(axis: Any, record: Record) -> None:
+    """Accumulated Arias intensity in percent, the significant duration shaded."""
+    curve = husid(record)
+    if curve[-1] > 0.0:
+        curve = 100.0 * curve / curve[-1]
+        start, end = np.interp((5.0, 95.0), curve, record.times)
+        axis.axvspan(start, end, color="tab:blue", alpha=0.12)
+    axis.plot(record.times, curve, color="black", lw=0.9)
+    text = f"Arias {arias(record):.3g} m/s, D5-95 {d5_95(record):.3g} s, PGA {pga(record) / STANDARD_GRAVITY:.3g} g"
+    axis.text(0.98, 0.08, text, transform=axis.transAxes, ha="right", fontsize=8)
+    axis.set(ylabel="Arias intensity [%]", ylim=(-3.0, 103.0))
+
+
+def _size(values: Array) -> tuple[float, str]:
+    """Unit of length that fits; centimetres in place of hundreds of millimetres, as is usual for ground motions."""
+    peak = float(np.max(np.abs(values)))
+    return (0.01, "cm") if 0.001 <= peak < 10.0 else length_unit(peak)
+
+
+def _pretty(units: str) -> str:
+    return units.replace("s2", "s²")
