@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from vi_contact.errors import InputError
-from vi_contact.friction import Coulomb, Frictionless, Tresca, project
+from vi_contact.friction import (
+    Coulomb,
+    ExponentialDecay,
+    Frictionless,
+    SlipRateCoulomb,
+    StaticKinetic,
+    Tresca,
+    project,
+)
 
 pytestmark = pytest.mark.serial
 
@@ -60,6 +68,43 @@ def test_limits_are_affine_in_the_pressure():
         cohesion = law.limit(np.zeros(4), WEIGHTS, 0.5)
         expected = cohesion + law.slope(WEIGHTS) * np.maximum(R_N, 0.0)
         assert np.array_equal(law.limit(R_N, WEIGHTS, 0.5), expected)
+
+
+def test_laws_without_rates_stay_themselves():
+    for law in (Frictionless(), Tresca(100.0), Coulomb(0.5)):
+        assert law.at(np.ones(4)) is law
+
+
+def test_coefficients_of_slip_rates():
+    """mu_s at rest, mu_k far beyond v_c, their mean at v_c ln 2; a jump; any function, any number of values."""
+    v = np.array([0.0, 0.1 * math.log(2.0), 10.0])
+    decay = ExponentialDecay(mu_s=0.6, mu_k=0.4, v_c=0.1)
+    np.testing.assert_allclose(decay(v), [0.6, 0.5, 0.4], rtol=1e-15)
+    np.testing.assert_array_equal(StaticKinetic(0.6, 0.4)(v), [0.6, 0.4, 0.4])
+    np.testing.assert_array_equal(StaticKinetic((0.6, 0.7, 0.8), 0.4)(v), [0.6, 0.4, 0.4])
+    law = SlipRateCoulomb(decay)
+    assert law.at(v) == Coulomb(decay(v)) and law == SlipRateCoulomb(ExponentialDecay(0.6, 0.4, 0.1))
+    assert np.array_equal(law.slope(WEIGHTS), np.full(4, 0.6))
+    assert np.array_equal(law.limit(R_N, WEIGHTS, 1.0), 0.6 * np.maximum(R_N, 0.0))
+    assert SlipRateCoulomb(lambda v: 0.3).at(v) == Coulomb((0.3, 0.3, 0.3))
+
+
+@pytest.mark.parametrize("wrong, message", [
+    (lambda: SlipRateCoulomb(0.3), "mu is 0.3; give a function"),
+    (lambda: SlipRateCoulomb(lambda v: 0.3 - v).at(np.array([0.1, 0.5])), r"mu\(0.5 m/s\) is -0.2; let it return zero"),
+    (lambda: SlipRateCoulomb(lambda v: v / 0.0 * 0.0).slope(WEIGHTS), r"mu\(0 m/s\) is nan"),
+    (lambda: SlipRateCoulomb(lambda v: np.zeros(3)).slope(WEIGHTS), r"shape \(3,\) for 4 slip rates"),
+    (lambda: ExponentialDecay(-0.1, 0.3, 0.1), "static coefficient mu_s is -0.1; give zero or a positive"),
+    (lambda: ExponentialDecay(0.6, math.nan, 0.1), "kinetic coefficient mu_k is nan"),
+    (lambda: ExponentialDecay(0.6, 0.3, 0.0), "v_c .* is 0.0; give a positive speed"),
+    (lambda: StaticKinetic(0.3, 0.6), "give mu_s >= mu_k"),
+    (lambda: StaticKinetic((0.3, 0.6), (0.1, 0.1, 0.1)), "2 static and 3 kinetic coefficients"),
+    (lambda: ExponentialDecay((0.6, 0.5), 0.3, 0.1)(np.zeros(4)), "has 2 values but there are 4 contact points"),
+])
+@pytest.mark.filterwarnings("ignore:invalid value")
+def test_bad_laws_of_rates_are_refused(wrong, message):
+    with pytest.raises(InputError, match=message):
+        wrong()
 
 
 def test_projection_in_two_dimensions_is_clipping():

@@ -11,13 +11,19 @@ import pytest
 from vi_contact.algebra import Array, Mask
 from vi_contact.errors import InputError, StepFailure
 from vi_contact.solvers.active_set import ActiveSet
+from vi_contact.solvers.extrapolation import Aitken, Anderson, Plain
 from vi_contact.solvers.fixed_point import FixedPoint, contraction
 from vi_contact.solvers.friction_newton import FrictionNewton
+from vi_contact.solvers.given_forces import GivenForces
 from vi_contact.solvers.nsgs import NSGS
+from vi_contact.solvers.uzawa import Uzawa
 
 pytestmark = pytest.mark.serial
-METHODS = [FrictionNewton(), NSGS(), FixedPoint(), FixedPoint(tresca=NSGS())]
-NAMES = ["newton", "nsgs", "fixed point", "fixed point nsgs"]
+METHODS = [
+    FrictionNewton(), NSGS(), FixedPoint(), FixedPoint(tresca=NSGS()), FixedPoint(extrapolation=Aitken()),
+    FixedPoint(extrapolation=Anderson()), GivenForces(), GivenForces(extrapolation=Anderson()), Uzawa(),
+]
+NAMES = ["newton", "nsgs", "fixed", "fixed nsgs", "aitken", "anderson", "given", "given anderson", "uzawa"]
 
 
 def small(seed: int, m: int, d: int) -> tuple[Array, Array, Mask]:
@@ -186,6 +192,55 @@ def test_fixed_point_contracts_faster_for_less_friction() -> None:
         assert result.iterations == len(result.history) + 1
         factors.append(contraction(result))
     assert 0.0 < factors[0] < factors[1] < factors[2] < 1.0
+
+
+def test_extrapolation_shortens_fixed_points() -> None:
+    """2D and 3D, mu = 0.5: Anderson's method needs fewer problems than Aitken's, and that fewer than plain iterations;
+    also where the plain map expands before it contracts (mu = 0.8, one strongly coupled node)."""
+    for kind in (FixedPoint, GivenForces):
+        counts = []
+        for way in (Plain(), Aitken(), Anderson()):
+            spent = 0
+            for seed in range(16):
+                m, d = 1 + seed % 8, 2 + seed % 2
+                G, q, bilateral = small(100 + seed, m, d)
+                spent += kind(extrapolation=way).prepare(G, bilateral).solve(q, np.zeros(m), np.full(m, 0.5)).iterations
+            counts.append(spent)
+            G, q, bilateral = small(112, 1, 2)
+            assert kind(extrapolation=way).prepare(G, bilateral).solve(q, np.zeros(1), np.full(1, 0.8)).iterations < 150
+        assert counts[2] < counts[1] < counts[0] and counts[2] < 0.7 * counts[0]
+
+
+def test_given_forces_are_the_right_hand_side_of_the_normal_problem() -> None:
+    """Seed 000 eqs. 6, 40, 42: with the tangential reactions of the answer as C_T, its normal ones are the solution."""
+    for d in (2, 3):
+        G, q, bilateral = small(7, 8, d)
+        r = GivenForces().prepare(G, bilateral).solve(q, np.zeros(8), np.full(8, 0.4)).r
+        given = np.column_stack([np.zeros(8), r[:, 1:]]).ravel()
+        normal = ActiveSet().prepare(G[::d, ::d], bilateral).solve((q.ravel() + G @ given)[::d])
+        size = G[::d, ::d].diagonal() ** 0.5
+        assert np.abs((normal.r - r[:, 0]) * size).max() <= 1e-9 * np.abs(r[:, 0] * size).max()
+
+
+def test_uzawa_step_size() -> None:
+    """The automatic rho is that of the least contraction factor; beyond 2/lambda_max Tresca's iteration may diverge."""
+    G, q, bilateral = small(7, 8, 2)
+    cohesion = 0.2 * G[1::2, 1::2].diagonal() ** -0.5
+    prepared = Uzawa().prepare(G, bilateral)
+    values = np.linalg.eigvalsh(prepared.blocks.matrix)
+    assert prepared.rho == pytest.approx(2.0 / (values[0] + values[-1]), rel=1e-12)
+    best = prepared.solve(q, cohesion, np.zeros(8))
+    errors = np.array(best.history)
+    factor = (values[-1] - values[0]) / (values[-1] + values[0])
+    assert (errors[-1] / errors[0]) ** (1.0 / (len(errors) - 1)) <= factor
+    slower = Uzawa(rho=0.1 * prepared.rho).prepare(G, bilateral).solve(q, cohesion, np.zeros(8))
+    assert slower.iterations > 2 * best.iterations
+    assert energy_norm(slower.r - best.r, G) <= 1e-9 * energy_norm(best.r, G)
+    with pytest.raises(StepFailure, match="Uzawa.*stopped after"):
+        Uzawa(rho=3.0 / values[-1], max_iterations=500).prepare(G, np.ones(8, dtype=bool)).solve(q, cohesion, cohesion)
+    for rho in (0.0, -1.0, np.nan):
+        with pytest.raises(InputError, match="give a positive number, or None"):
+            Uzawa(rho=rho)
 
 
 def test_mirror_image() -> None:

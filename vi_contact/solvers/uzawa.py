@@ -29,7 +29,7 @@ class Uzawa:
     In the result ``iterations`` counts projections and ``history`` the residual after each. InputError for rho <= 0.
     """
 
-    tolerance: float = 1e-11
+    tolerance: float = 1e-12
     max_iterations: int = 100_000
     rho: float | None = None
 
