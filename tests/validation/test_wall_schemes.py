@@ -54,10 +54,11 @@ def test_creation_of_energy_is_told() -> None:
 
 
 def test_schemes_agree_when_dt_is_fine() -> None:
-    """Case b, five periods with a sixteenth of the seed's dt: the extreme displacement of the top within 10 %."""
+    """Case b, 2½ periods with a sixteenth of the seed's dt: the extreme displacement of the top, of which five periods
+    have no other, within 10 %."""
     model = wall()
     found = {
-        name: run(model, "b", name, refined=16, steps=200, record=[Probe(model.probes())]).history["u_x_12"].min()
+        name: run(model, "b", name, refined=16, steps=100, record=[Probe(model.probes())]).history["u_x_12"].min()
         for name in ("zwt", "trapezoidal", "hht", "contact-stabilised", "generalised-alpha")
     }
     assert max(found.values()) == pytest.approx(min(found.values()), rel=0.1), found
