@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from bar import run, thrown
 from chain import chain_problem
+from rubbing import rubbing_block
 from shaken import SHAKE, shaken
 
 from vi_contact.cross_check import CrossChecked, cross_check
 from vi_contact.errors import InputError
-from vi_contact.friction import Tresca
+from vi_contact.friction import Coulomb, Tresca
 from vi_contact.impact import Inelastic
 from vi_contact.schemes.linear_multistep import LinearMultistep
 from vi_contact.schemes.ss22 import SS22
@@ -22,6 +23,7 @@ from vi_contact.solvers.active_set import ActiveSet
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.hildreth import Hildreth
 from vi_contact.solvers.mprgp import ProjectedCG
+from vi_contact.solvers.nsgs import NSGS
 from vi_contact.time_steps import HalvedAtImpact, Schedule
 
 pytestmark = pytest.mark.serial
@@ -137,3 +139,29 @@ def test_every_solver_must_take_the_problem():
     problem = replace(shaken(), friction=Tresca(1.0))
     with pytest.raises(InputError, match="Tresca"):
         cross_check(problem, scheme=HALF, solvers=[Off(1.0, 1.0), Condensed(ActiveSet())], dt=5e-3, steps=1)
+
+
+class HalfTheFriction(Off):
+    """Condensed, with r_t that is wrong by a factor, or missing for the factor zero."""
+
+    def prepare(self, A: Any, surface: Any, scale: float) -> Any:
+        prepared, off = Condensed().prepare(A, surface, scale), self
+
+        class Prepared:
+            def solve(self, step: Any) -> Any:
+                result = prepared.solve(step)
+                return replace(result, r_t=result.r_t * off.r if off.r else None, method=f"times {off.r}")
+
+        return Prepared()
+
+
+def test_friction_is_compared():
+    """r_t counts where there is friction, at its own size, and is in the report; missing is wrong by as much as all."""
+    solvers = [Condensed(), HalfTheFriction(1.0, 0.5), HalfTheFriction(1.0, 0.0), Condensed(friction_method=NSGS())]
+    checked = cross_check(rubbing_block(Coulomb(0.3)), scheme=HALF, solvers=solvers, dt=0.05, steps=60)
+    half, missing, same = checked.report().values()
+    assert half["r_t"] == pytest.approx(0.5, rel=1e-12) and half["u"] == half["r_n"] == 0.0
+    assert missing["r_t"] == checked.worst == pytest.approx(1.0, rel=1e-12)
+    assert 0.0 < same["r_t"] <= 1e-9
+    without = cross_check(shaken(), scheme=HALF, solvers=METHODS[:2], dt=5e-3, steps=60)
+    assert "r_t" not in without.report()["condensed Hildreth"]

@@ -73,7 +73,7 @@ def states(c: Case, result: StepResult) -> tuple[int, int, int]:
 @pytest.mark.parametrize(("push", "pull"), [(2.0, 0.5), (2.0, -3.0), (2.0, 3.0), (-1.0, 3.0)])
 @pytest.mark.parametrize("law", [Coulomb(0.5), Tresca(1.0)], ids=repr)
 def test_one_point_by_hand(law: Any, push: float, pull: float) -> None:
-    """A = diag(4, 2), closed: r_n = push, r_t = pull if |pull| <= 1, else ±1, x_t = (pull - r_t)/2; open: Coulomb none."""
+    """A = diag(4, 2): r_n = push, r_t = pull where |pull| <= 1, else ±1, x_t = (pull - r_t)/2; open: Coulomb none."""
     c = rubbing(case(sp.diags([4.0, 2.0]), np.array([0]), np.array([push, pull]), np.zeros(1)), law, 0.0)
     result = solve(c)
     limit = 1.0 if push > 0.0 or isinstance(law, Tresca) else 0.0

@@ -84,9 +84,10 @@ class ScaledRubbing(ScaledStep):
         body, still, room = self._parts(y)
         pairs, moved, _ = self.disks(y)
         room += self.disk_stiffness * self.disk_inverse * np.sum(pairs * moved, axis=1)
-        room[self.disk_limits == 0.0] = 1.0  # so that gamma stays on its bounds
         line = rubbing.line
         still[line] += body[rubbing.tangent[line]] * (self.r_ref / self.x_ref) / rubbing.stiffness[line]
+        held = self.limit == 0.0  # lambda and gamma on both their bounds, where any F but zero keeps them
+        still[held[rubbing.point]], room[held[rubbing.disk]] = 1.0, 1.0
         return np.concatenate([body, still, room])
 
     def errors(self, y: Array, F: Array) -> tuple[float, float, float]:

@@ -218,8 +218,9 @@ class ReducedNewton:
         return system.start(step)
 
     def friction_defaults(self) -> Options:
-        """Options before the user's: LU, the system with friction is not symmetric."""
-        return {**NEWTON_OPTIONS, **MUMPS_OPTIONS, "pc_type": "lu"}
+        """Options before the user's: LU, the system with friction is not symmetric. Its zeros on the diagonal delay
+        pivots, for which MUMPS on several ranks needs room: it stops with INFOG(1) = -9 when it has only the usual."""
+        return {**NEWTON_OPTIONS, **MUMPS_OPTIONS, "pc_type": "lu", "mat_mumps_icntl_14": 200}
 
     def friction_driver(self, scaled: ScaledRubbing, layers: OptionLayers) -> SnesDriver:
         """The SNES object of a step with friction."""

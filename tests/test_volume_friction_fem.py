@@ -1,0 +1,96 @@
+"""Volume and condensed route step by step with friction on finite elements, any number of ranks (V4.0)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("dolfinx")
+
+from fem_problems import BOX_DT, block, thrown_box, turned
+
+from vi_contact.cross_check import CrossChecked
+from vi_contact.fem.assembly import assemble
+from vi_contact.fem.loads import BodyForce, Prescribed
+from vi_contact.fem.trace import contact_surface
+from vi_contact.friction import Coulomb, FrictionLaw, Tresca
+from vi_contact.march import march
+from vi_contact.mass import ConsistentMass, Redistributed
+from vi_contact.materials import LinearElastic
+from vi_contact.schemes.trapezoidal import Trapezoidal
+from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
+from vi_contact.solvers.condensed import Condensed
+from vi_contact.solvers.volume import ReducedNewton, Volume
+from vi_contact.step import ContactProblem
+from vi_contact.surfaces import HalfSpace
+
+POINTS = 13
+ROUGH_ON_ONE_SIDE = [Coulomb(tuple(np.linspace(0.0, 1.2, POINTS))), Tresca(tuple(np.linspace(0.0, 2e4, POINTS)))]
+RUBBER = LinearElastic(E=1.0e6, nu=0.3, rho=1000.0)
+
+
+def tipped(comm: Any, friction: FrictionLaw, *, simplices: bool, angle: float) -> ContactProblem:
+    """A soft rectangle that lands on one corner, turning and gliding, on a plane that gets rougher on one side."""
+    mesh, tags = block(comm, lengths=(1.5, 1.0), divisions=(POINTS - 1, 6), angle=angle, simplices=simplices)
+    down, along = turned((0.0, -1.0), angle), turned((1.0, 0.0), angle)
+
+    def throw(x: Any) -> Any:
+        return np.outer(2.0 + x @ along, down) + np.outer(np.full(len(x), 0.5), along)
+
+    system = assemble(mesh, RUBBER, loads=BodyForce(tuple(9.81e3 * down)), initial_velocity=throw)
+    plane = HalfSpace(point=tuple(1e-3 * down), normal=tuple(-down))
+    surface = contact_surface(system, tags["bottom"], obstacle=plane)
+    return ContactProblem(system, surface, friction=friction, mass=ConsistentMass())
+
+
+def compared(problem: ContactProblem, scheme: Any, steps: int) -> tuple[CrossChecked, list[tuple[int, int, int]]]:
+    """The cross-check of a run, and how many points are open, stick and slip in every step."""
+    checked = CrossChecked(Condensed(), [Volume(method=ReducedNewton())])
+    states = []
+    for _, report in march(problem, scheme=scheme, solver=checked, dt=BOX_DT, steps=steps):
+        result = report.result
+        slip = np.linalg.norm(problem.surface.tangential_values(result.x) - report.step.slip0, axis=1)
+        slips = result.active & (slip > 0.0)
+        states.append((int((~result.active).sum()), int((result.active & ~slips).sum()), int(slips.sum())))
+    return checked, states
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.3])
+@pytest.mark.parametrize("simplices", [False, True], ids=["quadrilaterals", "triangles"])
+@pytest.mark.parametrize("friction", ROUGH_ON_ONE_SIDE, ids=["coulomb", "tresca"])
+def test_routes_agree_in_the_plane(comm: Any, friction: FrictionLaw, simplices: bool, angle: float) -> None:
+    """u, r_n and r_t of every step to 1e-9; open, sticking and slipping points in the same step."""
+    problem = tipped(comm, friction, simplices=simplices, angle=angle)
+    checked, states = compared(problem, ZienkiewiczWoodTaylor(), 30)
+    found = checked.found[0]
+    assert found.t_ref > 0.0 and found.steps == 30
+    assert max(found.relative_u, found.relative_r_n, found.relative_r_t) <= 1e-9
+    assert max(min(counts) for counts in states) >= 2
+    assert checked.report()["Volume(ReducedNewton)"]["r_t"] == found.relative_r_t
+
+
+@pytest.mark.parametrize("friction", [Coulomb(0.3), Tresca(2e3)], ids=repr)
+def test_routes_agree_in_space(comm: Any, friction: FrictionLaw) -> None:
+    """The circular cone on an inclined plane, another scheme: to 1e-9."""
+    box = thrown_box(comm, angle=0.3, simplices=True, divisions=(4, 3, 3))
+    problem = replace(box, friction=friction, mass=Redistributed())
+    checked, states = compared(problem, Trapezoidal(), 20)
+    assert 0.0 < checked.worst <= 1e-9
+    assert max(slips for _, _, slips in states) >= 10
+
+
+def test_nodes_with_one_and_with_two_free_tangents(comm: Any) -> None:
+    """On rollers along z some points have one free tangent, and rub in an interval, the others in a disk."""
+    mesh, tags = block(comm, lengths=(1.5, 1.0, 1.2), divisions=(3, 2, 2))
+    system = assemble(
+        mesh, RUBBER, prescribed=[Prescribed(tags["front"], components=(2,))], loads=BodyForce((0.0, -9.81e3, 0.0)),
+        initial_velocity=lambda x: np.outer(x[:, 1] + 1.0, [0.5, -1.0, 0.0]),
+    )
+    plane = HalfSpace(point=(0.0, -1e-3, 0.0), normal=(0.0, 1.0, 0.0))
+    surface = contact_surface(system, tags["bottom"], obstacle=plane)
+    problem = ContactProblem(system, surface, friction=Coulomb(0.3), mass=ConsistentMass())
+    checked, _ = compared(problem, ZienkiewiczWoodTaylor(), 15)
+    assert 0.0 < checked.worst <= 1e-9 and checked.found[0].t_ref > 0.0
