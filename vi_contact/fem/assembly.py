@@ -50,8 +50,8 @@ def assemble(
         clamped: facets with u = 0; prescribed: facets that move (eq. 3) or are held in some components.
         loads: tractions (eqs. 4, 6) and body forces.
         damping: NoDamping() by default, MassProportional(c) (eq. 7) or Rayleigh.
-        base_inertia: whether a ground motion's inertia load counts the mass that elements share with prescribed nodes, as
-            it must to be the motion seen from the ground; False is the load of the reference of V4.1.
+        base_inertia: whether a ground motion's inertia load counts the mass that elements share with prescribed nodes,
+            as it must to be the motion seen from the ground; False is the load of the reference of V4.1.
         initial_displacement, initial_velocity: constant or points (k, d) -> (k, d) (eqs. 10, 10a).
     Raises:
         InputError: cells without material, NaN in data, components that do not exist.
