@@ -40,7 +40,7 @@ def from_neighbours(system: SemiDiscreteSystem, massless: Mask, contact: Mask, n
             left[ready] = False
             donors |= contact & np.isin(node, node[ready])
         elif exact:
-            exact = False  # too few neighbours for every rotation: what they say of it will do
+            exact = False  # too few neighbours to tell a rotation: translations will do
         else:
             raise InputError(
                 "the mass of some contact nodes has nowhere to go, no node behind them carries any: refine the mesh "
@@ -61,7 +61,7 @@ def _rows(
     for row, (columns, values) in entries.items():
         weights = neighbours.weights(columns, values)
         if weights.sum() > NOTHING * nodal[row]:
-            fitted, error = neighbours.fit(weights, system.influence[row], points[row])
+            fitted, error = neighbours.fit(weights, system.influence[row], points[row], turning=exact)
             if error <= KEPT or not exact:
                 rows[row] = fitted
     waiting = set(node[[row for row in entries if row not in rows]])  # a node goes as a whole
@@ -88,14 +88,19 @@ class _Neighbours:
         np.add.at(total, self.node[place[found]], values[found] ** 2)
         return np.asarray(np.sqrt(total))
 
-    def fit(self, weights: Array, direction: Array, point: Array) -> tuple[tuple[Indices, Array], float]:
-        """(columns, values) of the row R_i G⁻¹ w_J R_Jᵀ, and how much of a rigid motion it loses."""
+    def fit(
+        self, weights: Array, direction: Array, point: Array, *, turning: bool
+    ) -> tuple[tuple[Indices, Array], float]:
+        """(columns, values) of the row R_i G⁻¹ w_J R_Jᵀ, and how much of a rigid motion it loses; with ``turning``
+        False of translations only, which a single neighbour can tell."""
         of_unknown = weights[self.node]
         used = np.flatnonzero(of_unknown)
         offset = self.points[used] - point
         size = float(np.max(np.abs(offset)))
         R = _motions(self.directions[used], offset / size)
         target = _motions(direction[None, :], np.zeros((1, len(point))))[0]
+        if not turning:
+            R, target = R[:, : len(point)], target[: len(point)]
         root = np.sqrt(of_unknown[used])
         U, values, V = np.linalg.svd(root[:, None] * R, full_matrices=False)
         kept = values > 1e-8 * values[0]

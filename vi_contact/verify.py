@@ -55,6 +55,8 @@ def _friction_residuals(step: StepProblem, result: StepResult, x_ref: float, r_r
 
 def _over(values: Array, reference: float) -> Array:
     """values/reference, with 0/0 = 0 (nothing happens, nothing is wrong); NaN stays NaN."""
+    if 0.0 < reference < np.inf:
+        return np.asarray(values / reference)
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(values == 0.0, 0.0, values / np.float64(reference))
 
