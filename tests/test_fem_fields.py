@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from math import cos, pi, sin, sqrt
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,8 @@ import pytest
 pytest.importorskip("dolfinx")
 
 import h5py
-from fem_problems import CONCRETE, block, field, shaken_wall, turned
+from fem_problems import BOX_DT, CONCRETE, block, field, shaken_wall, thrown_box, turned
+from tipped import ROUGH_ON_ONE_SIDE, tipped
 
 from vi_contact.errors import InputError
 from vi_contact.fem.assembly import assemble
@@ -21,6 +23,8 @@ from vi_contact.fem.fields import XDMF
 from vi_contact.fem.loads import Prescribed
 from vi_contact.fem.stress import VonMises
 from vi_contact.fem.trace import contact_surface
+from vi_contact.friction import Coulomb
+from vi_contact.march import march
 from vi_contact.materials import LinearElastic, PlaneStrain, PlaneStress, Section
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.simulate import Solution, simulate
@@ -163,6 +167,47 @@ def test_frames_hold_the_run(comm: Any, shared_tmp: Path) -> None:
     assert (found[2]["contact_status"] == 2).any()
 
 
+def test_friction_in_the_frames(comm: Any, shared_tmp: Path) -> None:
+    """Status 2 where a point sticks and 3 where it slipped; traction and slip as vectors along the turned tangents."""
+    problem = tipped(comm, ROUGH_ON_ONE_SIDE[0], simplices=True, angle=0.3)
+    surface = problem.surface
+    simulate(problem, scheme=ZienkiewiczWoodTaylor(), solver=Condensed(), dt=BOX_DT, steps=24, out=shared_tmp,
+             fields=XDMF(every=1))
+    found = frames(shared_tmp)
+    nodes = [int(np.argmin(np.linalg.norm(found[0]["points"][:, :2] - x, axis=1))) for x in surface.points]
+    others = np.setdiff1d(np.arange(len(found[0]["points"])), nodes)
+    tangents = np.column_stack([-surface.normals[:, 1], surface.normals[:, 0], np.zeros(surface.count)])
+    seen = set()
+    for frame, (state, report) in zip(found[1:], march(problem, scheme=ZienkiewiczWoodTaylor(), solver=Condensed(),
+                                                       dt=BOX_DT, steps=24), strict=True):
+        slips = (surface.tangential_values(report.result.x) != report.step.slip0)[:, 0]
+        assert frame["contact_status"][nodes].tolist() == np.where(state.active, np.where(slips, 3, 2), 1).tolist()
+        traction, slip = state.r_t / surface.weights[:, None], surface.tangential_values(state.u)
+        for name, exact in (("contact_traction_t", traction * tangents), ("slip", slip * tangents)):
+            assert np.allclose(frame[name][nodes], exact, rtol=0.0, atol=1e-10 * np.abs(exact).max())
+            assert not frame[name][others].any()
+        seen |= set(frame["contact_status"].tolist())
+        assert np.abs(frame["slip"]).max() > 0.0
+    assert seen == {0, 1, 2, 3} and not found[0]["contact_traction_t"].any()
+
+
+def test_friction_in_space(comm: Any, shared_tmp: Path) -> None:
+    """Vectors lie in the plane of the obstacle and are as long as r_t / weight; without friction
+    the frames are as before."""
+    problem = replace(thrown_box(comm, angle=0.3, divisions=(2, 2, 2)), friction=Coulomb(0.3))
+    solution = simulate(problem, scheme=ZienkiewiczWoodTaylor(), solver=Condensed(), dt=BOX_DT, steps=8,
+                        out=shared_tmp / "box", fields=XDMF(every=8))
+    last, surface = frames(shared_tmp / "box")[-1], problem.surface
+    size = np.linalg.norm(solution.state.r_t, axis=1) / surface.weights
+    nodes = [int(np.argmin(np.linalg.norm(last["points"] - x, axis=1))) for x in surface.points]
+    traction = last["contact_traction_t"][nodes]
+    assert size.max() > 0.0
+    assert np.allclose(np.linalg.norm(traction, axis=1), size, rtol=1e-9, atol=1e-9 * size.max())
+    assert np.abs(np.sum(traction * surface.normals, axis=1)).max() <= 1e-12 * size.max()
+    run(shaken_wall(comm), shared_tmp / "wall", 1, 1)
+    assert not {"slip", "contact_traction_t"} & set(frames(shared_tmp / "wall")[0])
+
+
 def test_acceleration_is_that_of_the_step(comm: Any, shared_tmp: Path) -> None:
     """a = (v_new - v_old)/dt where no impact law changes the velocity."""
     mesh, tags = block(comm, lengths=(1.0, 2.0), divisions=(2, 3))
@@ -221,13 +266,16 @@ def test_files_do_not_depend_on_the_ranks(comm: Any, shared_tmp: Path) -> None:
     """The frames of all ranks together and of one rank alone: same mesh, same order, fields to 1e-10."""
     from mpi4py import MPI
 
-    run(shaken_wall(comm, angle=0.3, gap=1e-7), shared_tmp / "all", 36, 12)
+    def wall(ranks: Any) -> ContactProblem:
+        return replace(shaken_wall(ranks, angle=0.3, gap=1e-7), friction=Coulomb(0.3))
+
+    run(wall(comm), shared_tmp / "all", 36, 12)
     if comm.rank == 0:
-        run(shaken_wall(MPI.COMM_SELF, angle=0.3, gap=1e-7), shared_tmp / "one", 36, 12)
+        run(wall(MPI.COMM_SELF), shared_tmp / "one", 36, 12)
     comm.Barrier()
     for together, alone in zip(frames(shared_tmp / "all"), frames(shared_tmp / "one"), strict=True):
         assert np.array_equal(together["cells"], alone["cells"]) and np.array_equal(together["points"], alone["points"])
-        for name in ("u", "v", "a", "von_mises", "contact_pressure", "contact_status"):
+        for name in ("u", "v", "a", "von_mises", "contact_pressure", "contact_status", "contact_traction_t", "slip"):
             size = np.max(np.abs(alone[name]), initial=0.0)
             assert np.allclose(together[name], alone[name], rtol=0.0, atol=1e-10 * size), name
 

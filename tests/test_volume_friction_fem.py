@@ -10,7 +10,8 @@ import pytest
 
 pytest.importorskip("dolfinx")
 
-from fem_problems import BOX_DT, block, thrown_box, turned
+from fem_problems import BOX_DT, block, thrown_box
+from tipped import ROUGH_ON_ONE_SIDE, RUBBER, tipped
 
 from vi_contact.cross_check import CrossChecked
 from vi_contact.fem.assembly import assemble
@@ -19,31 +20,12 @@ from vi_contact.fem.trace import contact_surface
 from vi_contact.friction import Coulomb, FrictionLaw, Tresca
 from vi_contact.march import march
 from vi_contact.mass import ConsistentMass, Redistributed
-from vi_contact.materials import LinearElastic
 from vi_contact.schemes.trapezoidal import Trapezoidal
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.volume import ReducedNewton, Volume
 from vi_contact.step import ContactProblem
 from vi_contact.surfaces import HalfSpace
-
-POINTS = 13
-ROUGH_ON_ONE_SIDE = [Coulomb(tuple(np.linspace(0.0, 1.2, POINTS))), Tresca(tuple(np.linspace(0.0, 2e4, POINTS)))]
-RUBBER = LinearElastic(E=1.0e6, nu=0.3, rho=1000.0)
-
-
-def tipped(comm: Any, friction: FrictionLaw, *, simplices: bool, angle: float) -> ContactProblem:
-    """A soft rectangle that lands on one corner, turning and gliding, on a plane that gets rougher on one side."""
-    mesh, tags = block(comm, lengths=(1.5, 1.0), divisions=(POINTS - 1, 6), angle=angle, simplices=simplices)
-    down, along = turned((0.0, -1.0), angle), turned((1.0, 0.0), angle)
-
-    def throw(x: Any) -> Any:
-        return np.outer(2.0 + x @ along, down) + np.outer(np.full(len(x), 0.5), along)
-
-    system = assemble(mesh, RUBBER, loads=BodyForce(tuple(9.81e3 * down)), initial_velocity=throw)
-    plane = HalfSpace(point=tuple(1e-3 * down), normal=tuple(-down))
-    surface = contact_surface(system, tags["bottom"], obstacle=plane)
-    return ContactProblem(system, surface, friction=friction, mass=ConsistentMass())
 
 
 def compared(problem: ContactProblem, scheme: Any, steps: int) -> tuple[CrossChecked, list[tuple[int, int, int]]]:

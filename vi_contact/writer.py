@@ -26,7 +26,7 @@ log = logging.getLogger(__name__)
 class OpenFields(Protocol):
     """Writes frames of fields; collective."""
 
-    def write(self, state: State, acceleration: Array) -> None: ...
+    def write(self, state: State, acceleration: Array, report: Report | None = None) -> None: ...
 
 
 class FieldWriter(Protocol):
@@ -86,7 +86,7 @@ class Writer:
     def frame(self, report: Report, number: int) -> None:
         """A frame of the fields at the end of a base step, when one is due by its number."""
         if self._fields is not None and self._settings is not None and number % self._settings.every == 0:
-            self._fields.write(report.new, report.balance.a)
+            self._fields.write(report.new, report.balance.a, report)
 
     def checkpoint(self, place: Place, *, scheme: Scheme, dt: TimeSteps) -> None:
         """A checkpoint of this place, unless there is one already."""

@@ -6,6 +6,9 @@ moment, also while the run goes on or after it was killed. Nothing in the files 
 Per node: u [m], v [m/s] and a [m/s²] as 3-vectors along the axes, relative to the ground when an excitation shakes the
 body (a: of the step's equation of motion, without the jumps of an impact law; zero in the first frame);
 contact_pressure [Pa]; contact_status: 0 not a contact node, 1 open, 2 closed. Per cell: von_mises [Pa].
+With friction closed nodes stick (2) or slipped (3) in the step of the frame, those of the first frame stick; and there
+are contact_traction_t [Pa], the tangential traction of the body on its support, and slip [m], the tangential
+displacement on it, of open nodes too: 3-vectors along the axes, zero at other nodes.
 """
 
 from __future__ import annotations
@@ -20,10 +23,10 @@ from xml.sax.saxutils import quoteattr
 import h5py
 import numpy as np
 
-from ..algebra import Array, Indices
+from ..algebra import Array, Indices, Mask
 from ..errors import InputError
 from ..output import FIELDS, FIELDS_INDEX, hdf5_image, on_root, write_atomically
-from ..step import ContactProblem, State
+from ..step import ContactProblem, Report, State
 from . import compat
 from .mesh import node_numbers
 from .space import FemSpace
@@ -38,6 +41,7 @@ _CELLS = {
 """XDMF's name of a cell by its dimension and number of vertices."""
 
 _VECTORS = ("u", "v", "a")
+_RUBBING = ("contact_traction_t", "slip")
 
 
 @dataclass(frozen=True)
@@ -64,6 +68,7 @@ class Frames:
         space = problem.system.space
         assert isinstance(space, FemSpace)
         self._problem, self._space, self._folder = problem, space, folder
+        self._names = _VECTORS + (_RUBBING if problem.frictional else ())
         self._von_mises = VonMises(space.forms)
         self._contact_nodes = self._nodes_of_conditions()
         self._type, mine = _cells(space.mesh)
@@ -106,22 +111,43 @@ class Frames:
             if path not in known:
                 path.unlink()
 
-    def write(self, state: State, acceleration: Array) -> None:
-        """A frame of the state and the acceleration of its step, both in the rotated basis. Collective."""
+    def write(self, state: State, acceleration: Array, report: Report | None = None) -> None:
+        """A frame of the state, the acceleration of its step, both in the rotated basis, and its report. Collective."""
         problem, space = self._problem, self._space
         moving = [
             space.expand(problem.cartesian(x), state.t, derivative)
             for derivative, x in enumerate((state.u, state.v, acceleration))
         ]
         stress = self._by_cell(self._von_mises(moving[0]))
+        slipping = np.zeros(problem.surface.count, dtype=bool)
+        if problem.frictional:
+            moving += self._rubbing(state)
+            slipping = slipping if report is None else slipped(report)
         vectors = self._by_node(np.hstack([_three(nodal) for nodal in moving]))
-        on_root(space.comm, partial(self._write, state, vectors, stress))
+        on_root(space.comm, partial(self._write, state, vectors, stress, slipping))
 
-    def _write(self, state: State, vectors: Array, stress: Array) -> None:
-        pressure, status = self._contact(state)
+    def _rubbing(self, state: State) -> list[Array]:
+        """Tangential traction and slip at the owned nodes, (k, d) each."""
+        surface = self._problem.surface
+        slip = surface.tangential_values(state.u)
+        if surface.slide is not None:
+            slip = slip - surface.slide(state.t)
+        r_t = np.zeros_like(slip) if state.r_t is None else state.r_t
+        return [self._along_axes(values) for values in (r_t / surface.weights[:, None], slip)]
+
+    def _along_axes(self, tangential: Array) -> Array:
+        """Components (m, d - 1) in nodal tangents as vectors at the owned nodes."""
+        space, surface = self._space, self._problem.surface
+        turned = surface.reaction_load(np.zeros(surface.count), len(space.ids), tangential)
+        full = np.zeros(space.free.shape)
+        full[space.free] = turned if surface.basis is None else surface.basis @ turned
+        return full.reshape(-1, space.dimension)
+
+    def _write(self, state: State, vectors: Array, stress: Array, slipping: Mask) -> None:
+        pressure, status = self._contact(state, slipping)
 
         def fill(file: h5py.File) -> None:
-            for i, name in enumerate(_VECTORS):
+            for i, name in enumerate(self._names):
                 file[name] = vectors[:, 3 * i : 3 * i + 3]
             file["von_mises"], file["contact_pressure"], file["contact_status"] = stress, pressure, status
 
@@ -129,11 +155,11 @@ class Frames:
         self._frames.append((state.k, state.t))
         self._write_index()
 
-    def _contact(self, state: State) -> tuple[Array, Any]:
+    def _contact(self, state: State, slipping: Mask) -> tuple[Array, Any]:
         """Contact pressure and status of all nodes."""
         pressure, status = np.zeros(self._shape[0]), np.zeros(self._shape[0], dtype=np.int32)
         np.add.at(pressure, self._contact_nodes, state.r_n / self._problem.surface.weights)
-        np.maximum.at(status, self._contact_nodes, np.where(state.active, 2, 1))
+        np.maximum.at(status, self._contact_nodes, np.where(state.active, np.where(slipping, 3, 2), 1))
         return pressure, status
 
     def _write_index(self) -> None:
@@ -149,7 +175,7 @@ class Frames:
         nodes, cells, corners = self._shape
         mesh = f"{FIELDS}/mesh.h5"
         frame = _name(k)
-        attributes = [_attribute(name, "Vector", "Node", _item((nodes, 3), f"{frame}:/{name}")) for name in _VECTORS]
+        attributes = [_attribute(name, "Vector", "Node", _item((nodes, 3), f"{frame}:/{name}")) for name in self._names]
         for name, center, count, kind in (
             ("contact_pressure", "Node", nodes, "Float"),
             ("contact_status", "Node", nodes, "Int"),
@@ -163,6 +189,12 @@ class Frames:
             f'<Geometry GeometryType="XYZ">{_item((nodes, 3), f"{mesh}:/points")}</Geometry>\n'
             f'{"".join(attributes)}</Grid>\n'
         )
+
+
+def slipped(report: Report) -> Mask:
+    """(m,) points that moved along their support in a step with friction. Collective."""
+    step, result = report.step, report.result
+    return np.asarray(np.any(step.surface.tangential_values(result.x) != step.slip0, axis=1))
 
 
 def _name(k: int) -> str:
