@@ -1,4 +1,4 @@
-"""COSMOS, CSMIP, K-NET, ESM and OpenSees path files written here, and one sentence for every way they can be wrong."""
+"""Files of every other format written here, and one sentence for every way they can be wrong; writing."""
 
 import hashlib
 
@@ -220,6 +220,7 @@ def test_knet_counts_become_accelerations_without_offset(direction, tmp_path):
 
 
 @pytest.mark.parametrize("text, words", [
+    (knet(COUNTS[:199]), ["line 12", "2 s at 100 Hz", "199 samples"]),
     (knet(seconds=4), ["line 12", "4 s at 100 Hz", "200 samples"]),
     (knet().replace("Scale Factor", "Scale Farce "), ["line 1", "'Origin' is not a number"]),
     (knet().replace("Dir. ", "Dor. "), ["no line 'Dir.'"]),
@@ -318,6 +319,85 @@ def test_afad_columns_are_channels(channel, name, samples, tmp_path):
 ], ids=lambda value: value[-1] if isinstance(value, list) else "")
 def test_bad_afad_is_refused_in_one_sentence(text, words, options, tmp_path):
     refused(write(tmp_path, text), *words, **options)
+
+
+# --- SimCenter JSON -------------------------------------------------------------------------------------------------
+
+EVENT = """{"Events": [
+    {"name": "two components", "type": "Seismic", "dT": 0.01, "numSteps": 3,
+     "timeSeries": [
+        {"name": "accel_X", "type": "Value", "dT": 0.01, "data": [0.0, 0.1, -0.2]},
+        {"name": "accel_Y", "type": "Value", "dT": 0.01, "data": [0.3, 1e-1, 0]}],
+     "pattern": [
+        {"type": "UniformAcceleration", "timeSeries": "accel_X", "dof": 1},
+        {"type": "UniformAcceleration", "timeSeries": "accel_Y", "dof": 2}]
+    }]}
+"""
+ONE = '{"timeSeries": [{"name": "x", "dT": 0.02, "data": [0.0, 0.1, -0.2]}]}'
+
+
+@pytest.mark.parametrize("channel, name, samples", [(1, "accel_X", [0.0, 0.1, -0.2]), (2, "accel_Y", [0.3, 0.1, 0.0])])
+def test_simcenter_series_are_channels(channel, name, samples, tmp_path):
+    record = read_record(write(tmp_path, EVENT), "g", channel=channel)
+    assert np.allclose(record.acceleration, G * np.array(samples), rtol=1e-14) and record.dt == 0.01
+    assert (record.format, record.title, record.component) == ("SimCenter", "two components", name)
+
+
+def test_simcenter_one_series_without_events(tmp_path):
+    assert read_record(write(tmp_path, ONE), "m/s2").dt == 0.02
+
+
+@pytest.mark.parametrize("text, words, options", [
+    (EVENT, ["1: accel_X, 2: accel_Y", "pass channel="], {}), (EVENT, ["there is no channel 3"], {"channel": 3}),
+    (ONE, ["pass units="], {"units": None}), (ONE.replace('"dT": 0.02, ', ""), ["pass dt="], {}),
+    (EVENT.replace("UniformAcceleration", "UniformVelocity", 1), ["'accel_X'", "'UniformVelocity'"], {"channel": 1}),
+    (ONE.replace('"dT"', '"factor": 9.81, "dT"'), ["factor 9.81"], {}), (ONE.replace("0.02", '"?"'), ["is '?'"], {}),
+    (ONE.replace("0.1", "NaN"), ["no list of two or more numbers"], {}),
+    (ONE.replace("[0.0, 0.1, -0.2]", "3"), ["no list"], {}),
+    (EVENT.replace("0.3, 1e-1", "0.3 1e-1"), ["line 5", "not JSON"], {}), (EVENT[:200], ["line 5", "not JSON"], {}),
+    ('{"Events": [], "timeSeries": 1}', ["no event holds"], {}),
+], ids=lambda value: value[-1] if isinstance(value, list) else "")
+def test_bad_simcenter_is_refused_in_one_sentence(text, words, options, tmp_path):
+    refused(write(tmp_path, text), *words, **({"units": "g"} | options))
+
+
+# --- mutilated files ------------------------------------------------------------------------------------------------
+
+def mutilated(text, random):
+    """Lines lost, doubled or cut, characters changed: one to three accidents."""
+    lines = text.split("\n")
+    for _ in range(random.integers(1, 4)):
+        index = int(random.integers(len(lines)))
+        line = lines[index]
+        place = int(random.integers(len(line) + 1))
+        accident = int(random.integers(5))
+        if accident == 0:
+            del lines[index + (index == 0):index + 1 + (index == 0)]
+        elif accident == 1:
+            lines = lines[:index + 1]
+        elif accident == 2:
+            lines[index] = line[:place]
+        elif accident == 3:
+            lines.insert(index, line)
+        else:
+            lines[index] = line[:place] + random.choice(list("0123456789.-+eE:(*,; x\t")) + line[place + 1:]
+    return "\n".join(lines)
+
+
+@pytest.mark.parametrize("text", [csmip(), csmip() + csmip(2), *COSMOS.values(), knet(), esm(), AFAD, EVENT, ONE],
+                         ids=lambda text: text.strip()[:20])
+def test_mutilated_files_are_read_or_refused_but_never_crash(text, tmp_path):
+    random = np.random.default_rng(11)
+    outcomes = set()
+    for _ in range(150):
+        path = write(tmp_path, mutilated(text, random))
+        for options in ({}, {"units": "gal", "dt": 0.01}, {"channel": 1}, {"units": "g", "channel": 1}):
+            try:
+                outcomes.add(type(read_record(path, **options)).__name__)
+            except InputError as error:
+                assert str(path) in str(error) and "\n" not in str(error)
+                outcomes.add("refused")
+    assert outcomes == {"Record", "refused"}
 
 
 # --- OpenSees path series -------------------------------------------------------------------------------------------

@@ -30,7 +30,7 @@ def add_motion_commands(commands: Any) -> None:
         parsers[name] = actions.add_parser(name, help=sentence, description=sentence[0].upper() + sentence[1:] + ".")
         several = {"nargs": "+"} if name in ("info", "spectrum") else {}
         parsers[name].add_argument(
-            "file", help="PEER AT2, COSMOS/CSMIP V2, USGS SMC, K-NET, ESM, AFAD, columns or path series", **several
+            "file", help="AT2, COSMOS/CSMIP V2, SMC, K-NET, ESM, AFAD, SimCenter, columns, path series", **several
         )
     parsers["convert"].add_argument("out", help="file to write")
     for one in parsers.values():

@@ -31,7 +31,7 @@ def read(text: TextFile, units: str | None = None, dt: float | None = None) -> R
     """The record of a K-NET or KiK-net file, its mean removed; units and dt are only checked.
 
     Raises InputError naming the file, mostly with a line: an entry of the header is missing or no number, words
-    between the counts, fewer or more seconds than "Duration Time(s)".
+    between the counts, fewer or more samples than "Duration Time(s)".
     """
     header = {key: index for key in KEYS for index in range(len(text.lines)) if text.lines[index].startswith(key)}
     missing = [key for key in KEYS if key not in header]
@@ -42,7 +42,7 @@ def read(text: TextFile, units: str | None = None, dt: float | None = None) -> R
     counts = [value for index in range(header["Memo."] + 1, len(text.lines)) if text.lines[index].strip()
               for value in text.numbers(index)]
     seconds = _number(text, header["Duration Time(s)"], "Duration Time(s)")
-    if abs(len(counts) - seconds * frequency) >= frequency:  # the duration is printed in whole seconds
+    if len(counts) != round(seconds * frequency):
         raise InputError(f"{text.at(header['Duration Time(s)'])}: {seconds:g} s at {frequency:g} Hz are announced but "
                          f"{len(counts)} samples follow; get the complete file")
     name = file_units(text.at(header["Scale Factor"]), unit, units)

@@ -6,24 +6,27 @@ import math
 import os
 
 from ..errors import InputError
-from . import afad, at2, columns, cosmos, esm, knet, smc
+from . import afad, at2, columns, cosmos, esm, knet, simcenter, smc
 from .processing import resampled
 from .record import Record
 from .text import TextFile, load_text
 
+SEVERAL = (cosmos, afad, simcenter)
+"""Formats whose files may hold several components."""
+
 
 def read_record(path: str | os.PathLike[str], units: str | None = None, *, dt: float | None = None,
                 resample_dt: float | None = None, channel: int | None = None) -> Record:
-    """One component of ground motion from a PEER AT2, USGS SMC, COSMOS, CSMIP, K-NET, ESM, AFAD or column file.
+    """One component of ground motion from a file of any format listed in docs/records.md.
 
-    units: a key of UNITS ("m/s2", "cm/s2", "gal", "g", ...); required for column files, elsewhere only checked against
-    what the file states. dt: time step [s], for files that do not state one. resample_dt: time step [s] the record is
-    brought to by `resampled`; it also allows uneven times in a column file. channel: which one, from 1, of a
-    COSMOS, CSMIP or AFAD file that holds several.
+    units: a key of UNITS ("m/s2", "cm/s2", "gal", "g", ...); required for column and SimCenter files, elsewhere only
+    checked against what the file states. dt: time step [s], for files that do not state one. resample_dt: time step [s]
+    the record is brought to by `resampled`; it also allows uneven times in a column file. channel: which one, from 1,
+    of a file that holds several (SEVERAL).
     Raises InputError with one sentence that names the file and, where there is one, the line.
     """
     text = load_text(path)
-    if channel is not None and not (cosmos.recognises(text) or afad.recognises(text)):
+    if channel is not None and not any(several.recognises(text) for several in SEVERAL):
         raise InputError(f"{text.path}: channel={channel} was passed but the file holds one record; leave channel out")
     record = _read(text, units, dt, resample_dt, channel)
     if resample_dt is not None and not math.isclose(record.dt, resample_dt, rel_tol=1e-9):
@@ -33,7 +36,7 @@ def read_record(path: str | os.PathLike[str], units: str | None = None, *, dt: f
 
 def _read(text: TextFile, units: str | None, dt: float | None, resample_dt: float | None,
           channel: int | None) -> Record:
-    for several in (cosmos, afad):
+    for several in SEVERAL:
         if several.recognises(text):
             return several.read(text, units, dt, channel)
     for reader in (smc, knet, esm):
