@@ -6,7 +6,7 @@ The rows of P sum to one, so that a common translation of both bodies opens and 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -31,12 +31,18 @@ class Side:
 
 @dataclass(frozen=True, eq=False)
 class Matched:
-    """The m nodes of side 1 that face side 2: their ``rows`` among those of side 1, P (m, nodes of side 2), and the
-    weights [m] or [m²] of their shares of the interface."""
+    """The m nodes of side 1 that face side 2: their ``rows`` among those of side 1, P (m, nodes of side 2), the weights
+    [m] or [m²] of their shares of the interface, and by how much the sides may overlap there [m] and count as touching.
+    """
 
     rows: Indices
     P: sp.csr_matrix
     weights: Array
+    overlap: Array
+
+    def pick(self, rows: Any) -> Matched:
+        """Some of them."""
+        return Matched(self.rows[rows], self.P[rows], self.weights[rows], self.overlap[rows])
 
 
 class Matching(Protocol):
@@ -74,7 +80,7 @@ class NodeToNode:
             )
         m = len(partner)
         P = sp.csr_matrix((np.ones(m), (np.arange(m), partner)), shape=(m, len(two.nodes.points)))
-        return Matched(np.arange(m), P, one.nodes.weights)
+        return Matched(np.arange(m), P, one.nodes.weights, np.zeros(m))
 
     def _partners(self, one: Side, two: Side, size: float) -> Indices:
         """Place of the nearest node opposite among those of side 2, -1 for none."""

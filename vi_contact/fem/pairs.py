@@ -17,9 +17,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-import scipy.sparse as sp
 
-from ..algebra import Array, Mask
+from ..algebra import Array
 from ..errors import InputError
 from ..surfaces import ContactSurface
 from ..system import SemiDiscreteSystem
@@ -66,15 +65,15 @@ def contact_pair(
             "one, or cut the mesh open (meshes.cut.CutOpen)"
         )
     matched = (matching or NodeToNode()).match(one, two, space.size)
-    matched = _without(matched, shared)
+    matched = matched.pick(~shared[matched.rows])
     matched = _unclamped(space, one, two, matched)
     nodes = replace(one.nodes.pick(matched.rows), weights=matched.weights)
     if points is not None:
         chosen = listed(space, nodes, points, one.name).numbers
         rows = np.array([int(np.flatnonzero(nodes.numbers == number)[0]) for number in chosen])
-        nodes, matched = nodes.pick(rows), Matched(matched.rows[rows], matched.P[rows], matched.weights[rows])
+        nodes, matched = nodes.pick(rows), matched.pick(rows)
     directions = snapped(nodes.normals)
-    gap = _gap(one.name, two, nodes, directions, matched.P, space.size)
+    gap = _gap(space, one.name, two, nodes, directions, matched)
     conditions = Conditions(nodes, directions, Facing(two.nodes, matched.P))
     moving = _prescribed_motion(space, conditions)
     return surface_of(
@@ -89,12 +88,6 @@ def side_of(space: FemSpace, facets: Facets) -> Side:
     rows = np.concatenate(space.comm.bcast(space.comm.gather(vertices.astype(np.int64))))
     _, first = np.unique(np.sort(rows, axis=1), axis=0, return_index=True)
     return Side(facets.name, nodes, np.searchsorted(nodes.numbers, rows[first]))
-
-
-def _without(matched: Matched, dropped: Mask) -> Matched:
-    """Rows whose node of side 1 is not dropped."""
-    kept = ~dropped[matched.rows]
-    return Matched(matched.rows[kept], matched.P[kept], matched.weights[kept])
 
 
 def _unclamped(space: FemSpace, one: Side, two: Side, matched: Matched) -> Matched:
@@ -113,18 +106,21 @@ def _unclamped(space: FemSpace, one: Side, two: Side, matched: Matched) -> Match
         )
     if clamped[matched.rows].any() and space.comm.rank == 0:
         log.info("%d clamped nodes of '%s' are left out of the contact", clamped[matched.rows].sum(), one.name)
-    return _without(matched, clamped)
+    return matched.pick(~clamped[matched.rows])
 
 
-def _gap(name: str, two: Side, nodes: Nodes, directions: Array, P: sp.csr_matrix, size: float) -> Array:
-    """Initial gaps n·(P x_2 - x_1) >= 0, round-off (1e-12 of the mesh's size) removed."""
-    gap = np.sum((P @ two.nodes.points - nodes.points) * directions, axis=1)
-    if gap.min() < -1e-12 * size:
-        worst = int(np.argmin(gap))
+def _gap(space: FemSpace, name: str, two: Side, nodes: Nodes, directions: Array, matched: Matched) -> Array:
+    """Initial gaps n·(P x_2 - x_1) >= 0; overlaps of round-off (1e-12 of the mesh's size) or of polygons count as 0."""
+    gap = np.sum((matched.P @ two.nodes.points - nodes.points) * directions, axis=1)
+    behind = -gap - np.maximum(matched.overlap, 1e-12 * space.size)
+    if behind.max() > 0.0:
+        worst = int(np.argmax(behind))
         raise InputError(
             f"'{two.name}' lies {-gap[worst]:.3g} m behind '{name}' at {at(nodes.points[worst])}: the bodies overlap "
             "there, or these are not the boundaries between them; move one body, or choose the sides that face"
         )
+    if gap.min() < -1e-12 * space.size and space.comm.rank == 0:
+        log.warning("'%s' and '%s' overlap by up to %.3g m: taken as touching there", name, two.name, -gap.min())
     return np.maximum(gap, 0.0)
 
 
