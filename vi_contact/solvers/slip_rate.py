@@ -6,8 +6,9 @@ It starts from rest, mu(0), and every inner problem from the reactions of the on
 slips with, (1) contracts with the factor c |mu'(v)|, c = r_n dt/m or, in a velocity scheme, P_n/m. One point whose
 friction weakens with the rate converges for every dt: v(mu) falls with mu, so that (1) climbs from rest to the smallest
 rate that solves the step, which is no rate at all as long as the point can stick. For c |mu'| > 1 there may be other
-solutions, and extrapolation, which begins after four plain steps, might end in one. Friction that grows with the rate has one, but plain iterations need c mu' < 1; beyond that Anderson's method
-takes over, a secant method for one point.
+solutions, and extrapolation, which begins after four plain steps, might end in one. Friction that grows with the rate
+has one solution, but plain iterations need c mu' < 1; beyond that Anderson's method takes over, a secant method for one
+point.
 """
 
 from __future__ import annotations
