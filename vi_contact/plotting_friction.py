@@ -1,0 +1,109 @@
+"""Pictures of friction from recorded histories: force against slip, and where and when points stick or slip."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from .algebra import Array
+from .errors import InputError
+from .plotting import _STYLE, History, _edges, _panels, _save, _scaled, length_unit
+
+OPEN, STICK, SLIP = 1, 2, 3  # as contact_status in fields.xdmf
+_COLOURS = {OPEN: ("open", "white"), STICK: ("stick", "tab:blue"), SLIP: ("slip", "tab:orange")}
+
+
+def plot_hysteresis(
+    history: History, path: str | Path, *, axis: str | None = None, tangent: int = 0,
+    title: str = "Friction force and slip",
+) -> Path:
+    """Tangential force of the body on its support along an axis, against the mean slip of all contact points.
+
+    ``axis``: x, y or z, where the force varies most when None; ``tangent``: which component of the slip. The slip's
+    sign is that of the axis for work that is done on the support, so that the loop runs clockwise and its area is the
+    work of friction where all points slide alike. InputError without records of friction.
+    """
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    force, name = _force(history, axis)
+    slip = _slip(history)[:, :, tangent].mean(axis=1)
+    work = float(np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(slip)))
+    slip = slip if work >= 0.0 else -slip
+    metres, unit = length_unit(float(np.max(np.abs(slip), initial=0.0)))
+    newtons, force_unit = _scaled(force, "N")
+    with matplotlib.rc_context(_STYLE):
+        figure = Figure(figsize=(6.4, 4.8), layout="constrained")
+        plot = figure.subplots()
+    plot.axhline(0.0, color="0.6", lw=0.6)
+    plot.axvline(0.0, color="0.6", lw=0.6)
+    plot.plot(slip / metres, newtons, color="black", lw=0.9)
+    plot.plot(slip[:1] / metres, newtons[:1], "o", color="tab:green", ms=5, label="start")
+    plot.plot(slip[-1:] / metres, newtons[-1:], "s", color="tab:red", ms=5, label="end")
+    plot.legend(fontsize=8, ncol=2, loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
+    plot.set(xlabel=f"mean slip [{unit}]", ylabel=f"friction force on the support, {name} [{force_unit}]")
+    plot.set_title(title, loc="left")
+    return _save(figure, path)
+
+
+def plot_states(
+    history: History, path: str | Path, *, position: Array, axis_label: str = "position [m]",
+    title: str = "Open, sticking and slipping points",
+) -> Path:
+    """Map of the states of the contact points over position and time. ``position``: (m,) of the points.
+
+    InputError without records of friction.
+    """
+    from matplotlib.colors import BoundaryNorm, ListedColormap
+    from matplotlib.patches import Patch
+
+    t, order = history["t"], np.argsort(position)
+    states = contact_states(history)[:, order]
+    figure, (panel,) = _panels(1, (9.0, 4.0))
+    panel.grid(False)
+    colours = ListedColormap([colour for _, colour in _COLOURS.values()])
+    panel.pcolormesh(
+        _edges(t), _edges(np.asarray(position)[order]), states.T, cmap=colours,
+        norm=BoundaryNorm([0.5, 1.5, 2.5, 3.5], 3), rasterized=True,
+    )
+    patches = [Patch(facecolor=colour, edgecolor="0.5", label=label) for label, colour in _COLOURS.values()]
+    panel.legend(handles=patches, fontsize=8, ncol=3, loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
+    panel.set_ylabel(axis_label)
+    panel.set_title(title, loc="left")
+    return _save(figure, path)
+
+
+def contact_states(history: History) -> Array:
+    """(rows, m) 1 open, 2 stick, 3 slip: closed points slip when their slip changed since the row before.
+
+    Changes below 1e-9 of the largest one are rounding. In the first row closed points stick. InputError without records
+    of friction.
+    """
+    slip = _slip(history)
+    active = np.reshape(history["active"], slip.shape[:2]).astype(bool)
+    change = np.zeros(slip.shape[:2])
+    change[1:] = np.linalg.norm(np.diff(slip, axis=0), axis=2)
+    moved = change > 1e-9 * np.max(change, initial=0.0)
+    return np.where(active, np.where(moved, SLIP, STICK), OPEN)
+
+
+def _slip(history: History) -> Array:
+    """(rows, m, d - 1)."""
+    if "slip" not in history:
+        raise InputError("the history has no column slip: run a problem with friction and record Contact()")
+    rows = len(history["t"])
+    points = np.reshape(history["active"], (rows, -1)).shape[1]
+    return np.reshape(history["slip"], (rows, points, -1)).astype(float)
+
+
+def _force(history: History, axis: str | None) -> tuple[Array, str]:
+    """Force of the body on its support along the axis, and the name of the axis."""
+    names = {name[-1]: name for name in history if name.startswith("friction_force_")}
+    if not names:
+        raise InputError("the history has no friction_force: run a problem with friction and record Contact()")
+    if axis is None:
+        axis = max(names, key=lambda one: float(np.ptp(history[names[one]])))
+    if axis not in names:
+        raise InputError(f"plot_hysteresis: no friction force is along {axis!r}, choose one of {', '.join(names)}")
+    return 0.0 - history[names[axis]], axis
