@@ -26,6 +26,7 @@ from vi_contact.friction import Coulomb
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.cut import CutOpen
 from vi_contact.meshes.two_blocks import Blocks
+from vi_contact.schemes.midpoint import Midpoint
 from vi_contact.schemes.trapezoidal import Trapezoidal
 from vi_contact.step import ContactProblem
 from vi_contact.surfaces import HalfSpace
@@ -200,7 +201,7 @@ def thrown_down(problem: ContactProblem, angle: float) -> ContactProblem:
 @pytest.mark.parametrize("moves", [False, True], ids=["rest", "moving"])
 def test_a_body_held_everywhere_is_an_obstacle(moves, friction):
     """The upper block thrown on a lower one that is prescribed all over does what it does on the half-space, at rest
-    and moving: same displacements (1e-10) and reactions (1e-9)."""
+    and moving: same displacements (1e-10) and reactions (1e-9). With friction on redistributed mass."""
     angle, speed = 0.4, turned((0.4, 0.7), 0.4)
     mesh = blocks(2, gap=1e-3, angle=angle)
 
@@ -232,7 +233,7 @@ def test_a_body_held_everywhere_is_an_obstacle(moves, friction):
     found, expected = (
         run(
             thrown_down(ContactProblem(system, surface, **({} if friction is None else {"friction": friction})), angle),
-            scheme=Trapezoidal(), dt=2e-3, steps=40,
+            scheme=Midpoint() if friction is None else Trapezoidal(), dt=2e-3, steps=40,
         )
         for surface in (pair, alone)
     )
