@@ -79,7 +79,10 @@ class VolumeFriction:
         sequence, spent = EXTRAPOLATION.start(), 0
         history: list[float] = []
         limit = cohesion if before is None else cohesion + slope * np.maximum(before.r_n, 0.0)
-        start = self._first(step, limit) if before is None else self._scaled.moved(before.state, before.slip, limit)
+        if before is None:
+            start, spent = self._first(step, limit)
+        else:
+            start = self._scaled.moved(before.state, before.slip, limit)
         while len(history) < PROBLEMS:
             found = self._tresca(step, limit, start)
             spent += found.iterations
@@ -96,11 +99,15 @@ class VolumeFriction:
             "thresholds: reduce the time step, or use Condensed()"
         )
 
-    def _first(self, step: StepProblem, limit: Array) -> Rubbing:
-        """The guess, sliding as predicted."""
-        rubbing = self._rubbing
+    def _first(self, step: StepProblem, limit: Array) -> tuple[Rubbing, int]:
+        """The guess, sliding as predicted, and no iterations; with disks the solution without friction, whose slip gives
+        the directions that Newton's method needs."""
+        rubbing, scaled = self._rubbing, self._scaled
         state = Rubbing(self._body.start(step), np.zeros(len(rubbing.tangent)), np.zeros(len(rubbing.pairs)))
-        return self._scaled.moved(state, state.z[rubbing.tangent] - rubbing.origin(step), limit)
+        if not (rubbing.any_disk and limit.any()):
+            return scaled.moved(state, state.z[rubbing.tangent] - rubbing.origin(step), limit), 0
+        free = self._tresca(step, np.zeros_like(limit), state)
+        return scaled.moved(free.state, free.slip, limit), free.iterations
 
     def _tresca(self, step: StepProblem, limit: Array, start: Rubbing) -> Found:
         """The problem with thresholds (m,)."""
