@@ -71,7 +71,7 @@ def measure(size: float, steps: int, mu: float) -> None:
     plain = replace(shaken, excitation=(*shaken.excitations, vertical))
     dt = model.time_step()
     linear = LinearSteps(plain, SCHEME.effective_matrix(plain, dt), dt)
-    linear.A.factor
+    linear()  # makes the factor
     for name, solver in {"no friction": vc.Condensed(), **ROUTES}.items():
         problem = plain if name == "no friction" else replace(plain, friction=vc.Coulomb(mu))
         f = measured(problem, solver, dt, steps, linear)

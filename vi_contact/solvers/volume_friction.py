@@ -100,8 +100,8 @@ class VolumeFriction:
         )
 
     def _first(self, step: StepProblem, limit: Array) -> tuple[Rubbing, int]:
-        """The guess, sliding as predicted, and no iterations; with disks the solution without friction, whose slip gives
-        the directions that Newton's method needs."""
+        """The guess, sliding as predicted, and no iterations; with disks the solution without friction, whose slip
+        gives the directions that Newton's method needs."""
         rubbing, scaled = self._rubbing, self._scaled
         state = Rubbing(self._body.start(step), np.zeros(len(rubbing.tangent)), np.zeros(len(rubbing.pairs)))
         if not (rubbing.any_disk and limit.any()):
