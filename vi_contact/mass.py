@@ -90,7 +90,21 @@ def _contact_unknowns(system: SemiDiscreteSystem, surface: ContactSurface, tange
     contact[surface.owned] = True
     massless = contact.copy()
     contact[surface.tangents[surface.tangents >= 0]] = True
-    return (contact.copy() if tangential else massless), contact
+    if surface.coupling is not None:  # relative unknowns: nodes of both sides lose their inertia as a whole
+        contact |= _faced(system, surface.coupling, contact)
+    return (contact.copy() if tangential or surface.coupling is not None else massless), contact
+
+
+def _faced(system: SemiDiscreteSystem, coupling: Matrix, contact: Mask) -> Mask:
+    """The unknowns of side 2 that contact nodes face: with mass they would ring between the springs of both bodies.
+    Collective."""
+    algebra, faced = system.algebra, np.zeros(system.rows, dtype=bool)
+    rows = [algebra.entries(coupling, int(row))[0] for row in np.flatnonzero(contact)]
+    mine = np.concatenate(rows) if rows else np.zeros(0, dtype=np.int64)
+    columns = np.unique(np.concatenate(algebra.comm.bcast(algebra.comm.gather(mine))))
+    first = algebra.first(system.rows)
+    faced[columns[(columns >= first) & (columns < first + system.rows)] - first] = True
+    return faced
 
 
 def _row_sums(system: SemiDiscreteSystem) -> Array:
@@ -131,6 +145,8 @@ def _inertia_correction(system: SemiDiscreteSystem, moved: Matrix, inner: Mask, 
     powers = np.column_stack([np.ones(len(x)), *x.T] + [x[:, i] * x[:, j] for i in range(d) for j in range(i, d)])
     pairs = list(_pairs_of_components(system, inner))
     shapes = [powers[i] @ _orthonormal(comm, powers[i], nodal[i]) for i, _ in pairs]
+    # an off-diagonal mass stands in two places: with this factor "smallest" does not depend on the axes
+    shapes = [shape * (1.0 if i is j else np.sqrt(2.0)) for shape, (i, j) in zip(shapes, pairs, strict=True)]
     effects = []
     for (i, j), shape in zip(pairs, shapes, strict=True):
         for p in shape.T:
@@ -140,7 +156,8 @@ def _inertia_correction(system: SemiDiscreteSystem, moved: Matrix, inner: Mask, 
     coefficients = np.linalg.lstsq(packed[:, 1:], packed[:, 0], rcond=1e-10)[0]
     ends = np.cumsum([shape.shape[1] for shape in shapes])[:-1]
     shares = [shape @ c for shape, c in zip(shapes, np.split(coefficients, ends), strict=True)]
-    _refuse_coarse(float(comm.max(np.array([max_abs(np.concatenate(shares))]))[0]))
+    entries = [share if i is j else 0.5 * share for share, (i, j) in zip(shares, pairs, strict=True)]
+    _refuse_coarse(float(comm.max(np.array([max_abs(np.concatenate(entries))]))[0]))
     i, j = (np.concatenate([pair[side] for pair in pairs]) for side in (0, 1))
     value = 0.5 * np.concatenate(shares) * nodal[i]
     both = np.concatenate([i, j]), np.concatenate([j, i])
@@ -166,7 +183,8 @@ def _pairs_of_components(system: SemiDiscreteSystem, inner: Mask) -> Iterator[tu
     for c in range(d):
         for e in range(c, d):
             full = (table[:, c] >= 0) & (table[:, e] >= 0)
-            yield table[full, c], table[full, e]
+            own = table[full, c]
+            yield own, own if c == e else table[full, e]
 
 
 def _refuse_coarse(largest: float) -> None:

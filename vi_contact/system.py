@@ -56,11 +56,6 @@ class Load:
             total += function(t)
         return total
 
-    def inertia(self, direction: Array) -> Array:
-        """M r: the force [N] that accelerates body and prescribed nodes together by one in this direction (d,)."""
-        force = self.M @ (self.influence @ direction)
-        return force if self.base_mass is None else force + self.base_mass @ direction
-
     def in_basis(self, T: Matrix) -> Load:
         """The same load on the unknowns û of u = T û: Tᵀ f."""
 

@@ -97,7 +97,7 @@ def mirrored_pair(history: History, *, h: float = H) -> ContactProblem:
     none = np.zeros(2 * n)
     pair = replace(
         system, algebra=SerialAlgebra(), K=twice(system.K), M=twice(system.M), load=load, u0=none, v0=none,
-        influence=np.tile(system.influence, (2, 1)), space=ChainSpace(2 * n),
+        influence=np.tile(system.influence, (2, 1)), base_mass=None, space=ChainSpace(2 * n),
     )
     down = np.ones(2 * n)
     down[own] = -1.0  # the unknown of the upper body that closes the gap

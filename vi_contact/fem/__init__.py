@@ -11,7 +11,7 @@ _HOME = {
     "assemble": "assembly",
     "BodyForce": "loads", "Prescribed": "loads", "TangentialTraction": "loads", "Traction": "loads",
     "contact_surface": "trace",
-    "contact_pair": "pairs", "NodeToNode": "matching", "DualMortar": "mortar", "together": "together",
+    "contact_pair": "pairs", "NodeToNode": "matching", "DualMortar": "mortar", "together": "joined",
     "geometric_stiffness": "gravity",
     "XDMF": "fields",
 }

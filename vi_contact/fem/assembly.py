@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import ufl
 
-from ..algebra import Array
+from ..algebra import Array, Mask
 from ..errors import InputError
 from ..materials import Damping, LinearElastic, NoDamping, PlaneStrain, Section, Solid
 from ..system import Load, SemiDiscreteSystem
@@ -217,13 +217,21 @@ def _initial(space: FemSpace, name: str, value: Initial) -> Array:
 
 
 def floats(space: FemSpace) -> bool:
-    """Whether a rigid motion of the whole body leaves every prescribed component at rest.
+    """Whether a rigid motion of some body of the mesh leaves every prescribed component of it at rest.
 
-    The Gram matrix of the rigid modes on the prescribed components is singular exactly then (scaled by the body's
-    size).
+    The Gram matrix of its rigid modes on its prescribed components is singular exactly then (scaled by its size).
     """
     d = space.dimension
-    middle = space.comm.sum(np.append(space.points.sum(axis=0), len(space.points)))
+    numbers = space.body_of_node
+    count = 1 + int(space.comm.max(np.array([float(np.max(numbers, initial=0))]))[0])
+    return any(_floats(space, np.repeat(numbers == body, d)) for body in range(count))
+
+
+def _floats(space: FemSpace, body: Mask) -> bool:
+    """The same for the body with these components (owned full mask)."""
+    d = space.dimension
+    own = body[::d]
+    middle = space.comm.sum(np.append(space.points[own].sum(axis=0), own.sum()))
     x = (space.points - middle[:d] / middle[d]) / space.size
     modes = [np.tile(np.eye(d)[i], (len(x), 1)) for i in range(d)]
     for i in range(d):
@@ -231,7 +239,7 @@ def floats(space: FemSpace) -> bool:
             turn = np.zeros_like(x)
             turn[:, i], turn[:, j] = -x[:, j], x[:, i]
             modes.append(turn)
-    rows = np.column_stack([mode.ravel()[~space.free] for mode in modes])
+    rows = np.column_stack([mode.ravel()[~space.free & body] for mode in modes])
     gram = space.comm.sum(rows.T @ rows)
     values = np.linalg.eigvalsh(gram)
     return bool(values[0] <= 1e-10 * max(values[-1], np.finfo(float).tiny))

@@ -95,10 +95,14 @@ class FemSpace:
         return np.asarray(np.repeat(self.points, self.dimension, axis=0)[self.free])
 
     @cached_property
+    def body_of_node(self) -> Indices:
+        """The body of every owned node: parts of the mesh that share no node, in the order of their node numbers."""
+        return body_numbers(self.mesh, node_numbers(self.mesh))[compat.dof_to_node(self.V)[: len(self.nodes)]]
+
+    @property
     def bodies(self) -> Indices:
-        """The body of every free unknown: parts of the mesh that share no node, in the order of their node numbers."""
-        bodies = body_numbers(self.mesh, node_numbers(self.mesh))[compat.dof_to_node(self.V)[: len(self.nodes)]]
-        return np.asarray(np.repeat(bodies, self.dimension)[self.free])
+        """The body of every free unknown."""
+        return np.asarray(np.repeat(self.body_of_node, self.dimension)[self.free])
 
     # Vectors ---------------------------------------------------------------------------------------------------------
 

@@ -16,10 +16,10 @@ from two_bodies import SOFT, blocks, forces, momenta, per_body, relative, thrown
 from vi_contact.algebra import Array
 from vi_contact.errors import InputError
 from vi_contact.fem.assembly import assemble
+from vi_contact.fem.joined import together
 from vi_contact.fem.loads import BodyForce
 from vi_contact.fem.mesh import build_mesh
 from vi_contact.fem.pairs import contact_pair
-from vi_contact.fem.together import together
 from vi_contact.fem.trace import contact_surface
 from vi_contact.friction import Coulomb, Frictionless
 from vi_contact.march import march
