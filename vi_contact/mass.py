@@ -74,14 +74,21 @@ class Redistributed:
         levels = from_neighbours(system, massless, contact, nodal)
         moved = _congruent(system, levels, bulk)
         C = None if system.C is None else _congruent(system, levels, system.C)
-        bodies = system.space.bodies
-        last = int(algebra.comm.max(np.array([float(np.max(bodies, initial=0))]))[0])
         corrections = [
-            _inertia_correction(system, moved, ~contact & (bodies == body), bodies == body, nodal)
-            for body in range(last + 1)
+            _inertia_correction(system, moved, body & ~contact, body, nodal) for body in _bodies(system, ~contact)
         ]
         M = algebra.combine([(1.0, moved), *((1.0, correction) for correction in corrections)])
         return replace(system, M=M, C=C, massless=massless, _cache={})
+
+
+def _bodies(system: SemiDiscreteSystem, inner: Mask) -> Iterator[Mask]:
+    """The unknowns of every body that has inner ones. Collective."""
+    comm, numbers = system.algebra.comm, np.asarray(system.space.bodies)
+    last = int(comm.max(np.array([float(np.max(numbers, initial=0))]))[0])
+    for number in range(last + 1):
+        body = numbers == number
+        if comm.max(np.array([float((body & inner).any())]))[0]:
+            yield body
 
 
 def _contact_unknowns(system: SemiDiscreteSystem, surface: ContactSurface, tangential: bool) -> tuple[Mask, Mask]:
