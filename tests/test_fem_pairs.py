@@ -333,3 +333,16 @@ def test_system_of_another_kind():
     _, tags = two_blocks(COMM, blocks(1))
     with pytest.raises(InputError, match="contact_pair needs a system made by fem.assemble"):
         contact_pair(chain_system(), tags["upper_left"], tags["lower_right"])
+
+
+def test_every_body_has_its_own_initial_velocity():
+    """(cells, value) pairs: nodes at the same place move with their own body."""
+    mesh, tags = build_mesh(blocks(2), COMM)
+
+    def flying(x: Array) -> Array:
+        return np.column_stack([x[:, 1], 0.0 * x[:, 0]])
+
+    system = assemble(
+        mesh, SOFT, initial_velocity=[(tags["upper"], (0.0, -1.0)), (tags["lower"], flying)]
+    )
+    assert np.array_equal(system.v0, per_body(system, flying, lambda x: np.tile([0.0, -1.0], (len(x), 1))))

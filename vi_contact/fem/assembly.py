@@ -25,7 +25,8 @@ from .petsc_algebra import PetscAlgebra, PetscMatrix
 from .space import FemSpace
 
 Materials = LinearElastic | Sequence[tuple[Cells, LinearElastic]]
-Initial = tuple[float, ...] | Callable[[Array], Array] | None
+Field = tuple[float, ...] | Callable[[Array], Array]
+Initial = Field | Sequence[tuple[Cells, Field]] | None
 
 
 def assemble(
@@ -52,7 +53,8 @@ def assemble(
         damping: NoDamping() by default, MassProportional(c) (eq. 7) or Rayleigh.
         base_inertia: whether a ground motion's inertia load counts the mass that elements share with prescribed nodes,
             as it must to be the motion seen from the ground; False is the load of the reference of V4.1.
-        initial_displacement, initial_velocity: constant or points (k, d) -> (k, d) (eqs. 10, 10a).
+        initial_displacement, initial_velocity: constant or points (k, d) -> (k, d) (eqs. 10, 10a), or (cells, value)
+            pairs for several bodies; the later pair counts where cells meet, zero where there are none.
     Raises:
         InputError: cells without material, NaN in data, components that do not exist.
     """
@@ -212,8 +214,20 @@ def _initial(space: FemSpace, name: str, value: Initial) -> Array:
     """Initial values on the free unknowns."""
     if value is None:
         return np.zeros(len(space.ids))
+    if isinstance(value, Sequence) and value and isinstance(value[0], tuple):
+        pairs: Any = value
+        values = np.zeros((len(space.nodes), space.dimension))
+        for cells, one in pairs:
+            blocks = np.unique(compat.cell_blocks(space.V)[cells.indices])
+            blocks = blocks[blocks < len(values)]
+            values[blocks] = _nodal(space, name, one)[blocks]
+        return space.restrict(values)
+    return space.restrict(_nodal(space, name, value))
+
+
+def _nodal(space: FemSpace, name: str, value: Any) -> Array:
     field: Any = (lambda points, t: value(points)) if callable(value) else value
-    return space.restrict(evaluate(name, field, space.points, 0.0, space.comm))
+    return evaluate(name, field, space.points, 0.0, space.comm)
 
 
 def floats(space: FemSpace) -> bool:

@@ -112,8 +112,13 @@ def dof_to_node(space: Any) -> Indices:
     """
     index_map = space.dofmap.index_map
     nodes = np.full(index_map.size_local + index_map.num_ghosts, -1, dtype=np.int32)
-    nodes[_as_table(space.dofmap.list, space.mesh)] = geometry_dofmap(space.mesh)
+    nodes[cell_blocks(space)] = geometry_dofmap(space.mesh)
     return nodes
+
+
+def cell_blocks(space: Any) -> Indices:
+    """Local blocks of unknowns of each local cell of a P1/Q1 space (owned, then ghosts), (n_cells, n_vertices)."""
+    return _as_table(space.dofmap.list, space.mesh)
 
 
 def _as_table(rows: Any, mesh: Mesh) -> Indices:
