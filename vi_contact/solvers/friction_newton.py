@@ -22,7 +22,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 from scipy.linalg import lapack
 
 from .friction_small import Blocks, FrictionResult, Step
@@ -56,7 +55,7 @@ class PreparedNewton:
     def __init__(self, method: FrictionNewton, G: Array, bilateral: Mask) -> None:
         self.method = method
         self.blocks = Blocks(G, bilateral)
-        self._kept: OrderedDict[bytes, tuple[Any, Any, Any]] = OrderedDict()
+        self._kept: OrderedDict[bytes, tuple[_Reduced, Any]] = OrderedDict()
 
     def solve(self, q: Array, cohesion: Array, slope: Array, guess: Array | Mask | None = None) -> FrictionResult:
         """See PreparedFriction."""
@@ -102,33 +101,30 @@ class PreparedNewton:
 
     def _solved(self, step: Step, states: _States) -> Array | None:
         """The next iterate; None when the linear problem is singular."""
-        rows, columns, factor = self._linear(states)
-        if rows.shape[0] == 0:
+        reduced, factor = self._linear(states)
+        if reduced.size == 0:
             return states.fixed
         if factor is None:
             return None
-        solved, _ = lapack.dgetrs(*factor, -(rows @ step.w(states.fixed).ravel()))
+        solved, _ = lapack.dgetrs(*factor, -reduced.rows(step.w(states.fixed)))
         if not np.isfinite(solved).all():
             return None
-        return np.asarray(states.fixed + (columns @ solved).reshape(states.fixed.shape))
+        return np.asarray(states.fixed + reduced.columns(solved))
 
-    def _linear(self, states: _States) -> tuple[Any, Any, Any]:
-        """(rows, columns, factor) of the states, kept where they do not depend on more."""
+    def _linear(self, states: _States) -> tuple[_Reduced, Any]:
+        """The linear problem of the states and its factor, kept where they do not depend on more."""
         if states.exact and states.key in self._kept:
             self._kept.move_to_end(states.key)
             return self._kept[states.key]
-        rows, columns, turning = states.linear()
-        factor = None
-        if rows.shape[0]:
-            matrix = rows @ (columns.T @ self.blocks.matrix).T
-            matrix[np.diag_indices_from(matrix)] += turning
-            lu, pivots, info = lapack.dgetrf(matrix)
+        reduced, factor = _Reduced(states), None
+        if reduced.size:
+            lu, pivots, info = lapack.dgetrf(reduced.matrix(self.blocks.matrix), overwrite_a=1)
             factor = None if info else (lu, pivots)
         if states.exact:
-            self._kept[states.key] = (rows, columns, factor)
+            self._kept[states.key] = (reduced, factor)
             if len(self._kept) > KEPT:
                 self._kept.popitem(last=False)
-        return rows, columns, factor
+        return reduced, factor
 
 
 def _start(step: Step, guess: Array | Mask | None) -> Array:
@@ -160,24 +156,51 @@ class _States:
         self.fixed = np.column_stack([np.zeros(m), np.where(slip, step.cohesion, 0.0)[:, None] * self.direction])
         self.key = b"".join(part.tobytes() for part in (self.closed, self.stick, self.direction, self.growth))
 
-    def linear(self) -> tuple[Any, Any, Array]:
-        """Rows R, columns P and turning t of  R (q + G (fixed + P z)) + t z = 0,  r = fixed + P z."""
-        m, d = self.fixed.shape
-        base = d * np.arange(m)
-        normals = _columns(base[:, None], np.ones((m, 1)), m * d)[:, self.closed]
-        tied = _columns(base[:, None] + np.arange(1, d), self.growth[:, None] * self.direction, m * d)[:, self.closed]
-        free = (base[self.stick][:, None] + np.arange(1, d)).reshape(-1, 1)
-        sticks = _columns(free, np.ones(free.shape), m * d)
-        n = self.direction[self.turns]
-        across = n[:, ::-1] * np.array([-1.0, 1.0]) if d == 3 else np.zeros((0, 0))
-        turns = _columns(base[self.turns][:, None] + np.arange(1, 1 + across.shape[1]), across, m * d)
-        rows = sp.hstack([normals, sticks, turns]).T.tocsr()
-        columns = sp.hstack([normals + tied, sticks, turns]).tocsr()
-        return rows, columns, np.concatenate([np.zeros(rows.shape[0] - len(self.turning)), self.turning])
 
+class _Reduced:
+    """Rows R, columns P and turning t of  R (q + G (fixed + P z)) + t z = 0,  r = fixed + P z, by places in r.
 
-def _columns(places: Any, values: Array, rows: int) -> Any:
-    """A sparse matrix whose column j holds values[j] in the rows places[j]."""
-    count, width = places.shape
-    pointers = width * np.arange(count + 1)
-    return sp.csc_matrix((values.ravel(), places.ravel(), pointers), shape=(rows, count))
+    z: normals of closed nodes, each with the slip reaction that grows with it, tangents of sticking nodes, turns.
+    """
+
+    def __init__(self, states: _States) -> None:
+        m, d = self._shape = states.fixed.shape
+        self._closed, self._turns, self._turning = states.closed, states.turns, states.turning
+        places = np.arange(m * d).reshape(m, d)
+        self._plain = np.concatenate([places[states.closed, 0], places[states.stick, 1:].ravel()])
+        self._tied = places[states.closed, 1:]
+        self._growth = (states.growth[:, None] * states.direction)[states.closed]
+        n = states.direction[states.turns]
+        self._across = n[:, ::-1] * np.array([-1.0, 1.0]) if d == 3 else np.zeros((0, d - 1))
+        self._turned = places[states.turns, 1:]
+        self.size = len(self._plain) + len(self._turned)
+
+    def rows(self, w: Array) -> Array:
+        """R w."""
+        flat = w.ravel()
+        return np.concatenate([flat[self._plain], np.sum(self._across * flat[self._turned], axis=1)])
+
+    def columns(self, z: Array) -> Array:
+        """P z (m, d)."""
+        r = np.zeros(self._shape)
+        flat, plain = r.ravel(), len(self._plain)
+        flat[self._plain] = z[:plain]
+        r[self._closed, 1:] += self._growth * z[: len(self._tied), None]
+        flat[self._turned] += self._across * z[plain:, None]
+        return r
+
+    def matrix(self, G: Array) -> Array:
+        """R G P + diag(t)."""
+        part = G[self._plain]
+        if len(self._turned):
+            part = np.vstack([part, np.einsum("ik,ikj->ij", self._across, G[self._turned])])
+        matrix = np.empty((self.size, self.size), order="F")
+        plain = len(self._plain)
+        matrix[:, :plain] = part[:, self._plain]
+        grows = np.flatnonzero(self._growth.any(axis=1))
+        for k in range(self._shape[1] - 1):
+            matrix[:, grows] += part[:, self._tied[grows, k]] * self._growth[grows, k]
+        matrix[:, plain:] = np.einsum("ik,jik->ji", self._across, part[:, self._turned])
+        turns = np.arange(plain, self.size)
+        matrix[turns, turns] += self._turning
+        return matrix
