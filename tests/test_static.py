@@ -153,12 +153,14 @@ def test_free_motions_keep_their_place():
 
 @pytest.mark.parametrize("push", [0.0, 5.0e3, -9.0e3])
 def test_two_corners_share_the_weight_like_a_beam(push):
-    """Only the base corners touch (u_x held at the base): r = W/2 ± T H / L, T = push · L on the top at height H."""
+    """Only the base corners touch (u_x held at the base): r = W/2 ± T H / L, T = push · L on the top at height H.
+
+    Round-off of K u under the free rotation is 1e-10 of the weight on some machines' BLAS: 1e-9, as the certificate."""
     problem = standing(points=[(0.0, 0.0), (1.0, 0.0)], held=True, push=push)
     state = static_equilibrium(problem, solver=Condensed())
     weight, moment = 2400.0 * G * 3.0, push * 3.0
     assert state.active.all()
-    assert state.r_n == pytest.approx([weight / 2.0 - moment, weight / 2.0 + moment], rel=1e-10)
+    assert state.r_n == pytest.approx([weight / 2.0 - moment, weight / 2.0 + moment], rel=1e-9)
 
 
 def test_partly_lifted_base_balances_moments():
