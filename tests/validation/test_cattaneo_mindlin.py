@@ -49,7 +49,8 @@ COMM = MPI.COMM_WORLD
 MU, NU = 0.5, 0.3
 HERTZ = HertzLine(force=0.02, modulus=1.0, radius=1.0)
 A = HERTZ.half_width
-CERTIFIED = 1e-9 * HERTZ.force  # on nodal forces [N/m]: static stages are certified to 1e-9 of the loads
+FLOOR = 4e-9  # residual of static stages that contact alone holds: some BLAS reach 3e-10, others 1.1e-9
+CERTIFIED = FLOOR * HERTZ.force  # on nodal forces [N/m]
 H = 1.5 * A / round(1.5 * 11.3)  # the edge of the contact is no node
 
 
@@ -139,12 +140,12 @@ class Contact:
 
 def stages(pressed: ContactProblem, times: Sequence[float]) -> list[Contact]:
     """First pressed, then rubbed through the history."""
-    state = static_equilibrium(pressed, solver=Condensed())
+    state = static_equilibrium(pressed, solver=Condensed(), tolerance=FLOOR)
     surface = pressed.surface
     order = np.argsort(surface.points[:, 0])
     contacts = []
     rough = replace(pressed, friction=Coulomb(MU))
-    for stage in quasi_static(rough, times, solver=Condensed(), state=state):
+    for stage in quasi_static(rough, times, solver=Condensed(), state=state, tolerance=FLOOR):
         assert stage.r_t is not None
         columns = (surface.points[:, 0], surface.weights, stage.r_n, stage.r_t[:, 0])
         contacts.append(Contact(*(column[order] for column in columns)))
@@ -165,12 +166,12 @@ def shear_error(found: Contact, share: float) -> float:
 
 
 def check_first_loading(found: Contact, share: float, h: float = H) -> None:
-    """c to h on both sides, slip along Q on both rings, Σ r_t = Q and Σ r_n = P to 1e-9 (asked: 1e-6)."""
+    """c to h on both sides, slip along Q on both rings, Σ r_t = Q and Σ r_n = P to 5e-8 (asked: 1e-6)."""
     stick, slip, c = found.sticking(), found.slips(1.0), A * np.sqrt(1.0 - share)
     assert abs(stick[0] + c) < h and abs(stick[-1] - c) < h
     assert len(stick) + len(slip) == np.sum(found.r_n > 0.0) and slip[0] < stick[0] and slip[-1] > stick[-1]
-    assert found.r_t.sum() == pytest.approx(share * MU * HERTZ.force, rel=1e-9)
-    assert found.r_n.sum() == pytest.approx(HERTZ.force, rel=1e-9)
+    assert found.r_t.sum() == pytest.approx(share * MU * HERTZ.force, rel=5e-8)
+    assert found.r_n.sum() == pytest.approx(HERTZ.force, rel=5e-8)
 
 
 SHARES = (0.25, 0.5, 0.75, 0.9)
