@@ -79,6 +79,7 @@ def test_thrown_bar(body: str, courant: float) -> None:
     assert found.impulse(0.0, 1.6) == pytest.approx(200.0, rel=0.02)
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("courant", COURANTS)
 @pytest.mark.parametrize("body", BODIES)
 def test_period_three(body: str, courant: float) -> None:
@@ -94,6 +95,7 @@ def test_period_three(body: str, courant: float) -> None:
     assert found.impulse(0.0, 12.0) == pytest.approx(0.5 * bounces, rel=missing)
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("courant, periods, floor", [(1.0, 10, 0.88), (0.5, 3, 0.998), (0.1, 0.5, 0.9999)])
 @pytest.mark.parametrize("body", ["strip"])
 def test_bouncing_strip(body: str, courant: float, periods: float, floor: float) -> None:
@@ -177,6 +179,7 @@ def test_newmark_on_consistent_mass_blows_up(courant: float) -> None:
     assert energy(problem, last.new) > 10.0 * 0.125
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("courant", COURANTS)
 @pytest.mark.parametrize("case", [ThrownBar(), PeriodicBar()], ids=lambda case: type(case).__name__)
 def test_dissipative_schemes_never_gain_on_a_strip(case: Any, courant: float) -> None:
