@@ -248,12 +248,3 @@ def _nodal_pair(law: ExponentialDecay | StaticKinetic, count: int) -> tuple[Arra
     """(mu_s, mu_k) as arrays that broadcast over the nodes."""
     name = type(law).__name__
     return _nodal(name, "mu_s", law.mu_s, count), _nodal(name, "mu_k", law.mu_k, count)
-
-
-def refuse_friction(solver: str, law: FrictionLaw) -> None:
-    """InputError unless the law is Frictionless: a solver that only enforces bounds would silently drop it."""
-    if not isinstance(law, Frictionless):
-        raise InputError(
-            f"{solver} only enforces bounds and would ignore {law}: use Condensed(), the condensed route carries "
-            "friction, or Frictionless() here"
-        )

@@ -97,8 +97,8 @@ class _Neighbours:
         used = np.flatnonzero(of_unknown)
         offset = self.points[used] - point
         size = float(np.max(np.abs(offset)))
-        R = _motions(self.directions[used], offset / size)
-        target = _motions(direction[None, :], np.zeros((1, len(point))))[0]
+        R = rigid_motions(self.directions[used], offset / size)
+        target = rigid_motions(direction[None, :], np.zeros((1, len(point))))[0]
         if not turning:
             R, target = R[:, : len(point)], target[: len(point)]
         root = np.sqrt(of_unknown[used])
@@ -124,7 +124,7 @@ def _neighbours(system: SemiDiscreteSystem, donors: Mask, columns: list[Indices]
     return _Neighbours(numbers[order], place, directions[order], points[order])
 
 
-def _motions(directions: Array, offset: Array) -> Array:
+def rigid_motions(directions: Array, offset: Array) -> Array:
     """Rows R of rigid motions: d translations and the rotations, of unknowns with these directions at these places."""
     d = directions.shape[1]
     turns = [

@@ -16,7 +16,7 @@ import numpy as np
 
 from .algebra import Array, Comm, Indices, Mask, Matrix, max_abs
 from .errors import InputError
-from .handing_over import from_neighbours
+from .handing_over import from_neighbours, rigid_motions
 from .surfaces import ContactSurface
 from .system import SemiDiscreteSystem
 
@@ -128,14 +128,8 @@ def _congruent(system: SemiDiscreteSystem, levels: Sequence[Matrix], A: Matrix) 
 
 def _motions(system: SemiDiscreteSystem, x: Array) -> Array:
     """Rigid motions (rows, modes) in the nodal frames, x (rows, d) from the middle; in 1D also the uniform stretch."""
-    d = system.influence.shape[1]
-    modes = list(system.influence.T)
-    if d == 1:
-        modes.append(system.influence[:, 0] * x[:, 0])
-    for i in range(d):
-        for j in range(i + 1, d):
-            modes.append(system.influence[:, j] * x[:, i] - system.influence[:, i] * x[:, j])
-    return np.column_stack(modes)
+    rigid = rigid_motions(system.influence, x)
+    return rigid if x.shape[1] > 1 else np.column_stack([rigid, system.influence[:, 0] * x[:, 0]])
 
 
 def _inertia_correction(system: SemiDiscreteSystem, moved: Matrix, inner: Mask, body: Mask, nodal: Array) -> Matrix:

@@ -32,7 +32,7 @@ def consistent_acceleration(problem: ContactProblem, state: State, dt: float) ->
     if system.massless is None:
         return _with_contact(problem, state, force, dt)
     moving = np.where(system.massless, 0.0, force)
-    return _mass(problem).factor.solve(moving), force - moving
+    return mass_matrix(problem).factor.solve(moving), force - moving
 
 
 def _with_contact(problem: ContactProblem, state: State, force: Array, dt: float) -> tuple[Array, Array]:
@@ -43,10 +43,10 @@ def _with_contact(problem: ContactProblem, state: State, force: Array, dt: float
     resting = _resting(surface, compression, state)
     slip = _slip_rate(problem, state, dt)
     step = StepProblem(
-        A=_mass(problem),
+        A=mass_matrix(problem),
         b=force - springs,
         bound=np.where(resting, 0.0, np.inf),
-        surface=_rigid_part(surface),
+        surface=rigid_part(surface),
         scale=1.0,
         guess=np.zeros_like(force),
         active=resting,
@@ -77,7 +77,7 @@ def without_inertia(problem: ContactProblem, a: Array) -> Array:
     return a if massless is None else np.where(massless, 0.0, a)
 
 
-def _mass(problem: ContactProblem) -> EffectiveMatrix:
+def mass_matrix(problem: ContactProblem) -> EffectiveMatrix:
     """M, with ones in place of the empty rows of massless unknowns."""
     system = problem.equations
 
@@ -89,7 +89,7 @@ def _mass(problem: ContactProblem) -> EffectiveMatrix:
     return matrix
 
 
-def _rigid_part(surface: ContactSurface) -> ContactSurface:
+def rigid_part(surface: ContactSurface) -> ContactSurface:
     """Springs are loads here, not bounds."""
     rigid = surface.compliance == 0.0
     return replace(surface, compliance=np.zeros(surface.count), bilateral=surface.bilateral & rigid)

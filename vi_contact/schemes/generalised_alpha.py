@@ -34,11 +34,10 @@ import numpy as np
 
 from ..algebra import Array
 from ..errors import InputError
-from ..mass import MassLaw, Redistributed
 from ..step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
 from .acceleration import consistent_acceleration, without_inertia
+from .balance_step import BalanceStep
 from .contact_layer import at_rest_between, relaxed
-from .guard import contact_in_the_balance, needs_no_impact_law
 from .position_step import position_step
 
 SLACK = 1e-12  # round-off in the conditions of stability
@@ -64,7 +63,7 @@ class Weights:
             )
 
 
-class AlphaStep(ABC):
+class AlphaStep(BalanceStep, ABC):
     """The step of the module's equations, with the weights of a member. Its memory is "a" (the acceleration),
     "reaction" (Bᵀr at the same end) and "of" (alpha_m, alpha_f and t they belong to)."""
 
@@ -72,16 +71,6 @@ class AlphaStep(ABC):
     @abstractmethod
     def weights(self) -> Weights:
         """alpha_m, alpha_f, beta, gamma of the member."""
-
-    @property
-    def mass(self) -> MassLaw:
-        """Contact stands in the balance of forces: without mass at the contact nodes it cannot create energy."""
-        return Redistributed()
-
-    def check(self, problem: ContactProblem) -> None:
-        """InputError for an impact law on massless contact nodes; warns when they have mass."""
-        needs_no_impact_law(problem)
-        contact_in_the_balance(repr(self), problem)
 
     def _mark(self, t: float) -> Array:
         return np.array([self.weights.alpha_m, self.weights.alpha_f, t])

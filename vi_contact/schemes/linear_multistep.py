@@ -26,11 +26,10 @@ import numpy as np
 
 from ..algebra import Array
 from ..errors import InputError
-from ..mass import MassLaw, Redistributed
 from ..step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
 from .acceleration import consistent_acceleration, without_inertia
+from .balance_step import BalanceStep
 from .contact_layer import at_rest_between, relaxed
-from .guard import contact_in_the_balance, needs_no_impact_law
 from .position_step import position_step
 
 FREQUENCIES = np.logspace(-2.0, 3.0, 61)  # natural frequency times dt, for the stability check
@@ -38,7 +37,7 @@ DAMPING = (0.0, 0.1, 1.0)  # damping ratios, for the stability check
 
 
 @dataclass(frozen=True)
-class LinearMultistep:
+class LinearMultistep(BalanceStep):
     """Coefficients of eqs. 11a,b, newest level first, all of the same length q + 1 >= 2.
 
     InputError for unequal lengths, b[0] = 0, or inconsistent operators (they must be exact for u = 1, t and t²).
@@ -89,16 +88,6 @@ class LinearMultistep:
             raise InputError(f"Newmark beta is {beta}: give beta > 0, the explicit member cannot hold contact")
         b = (beta, 0.5 + gamma - 2.0 * beta, 0.5 - gamma + beta)
         return cls(a=(gamma, 1.0 - 2.0 * gamma, gamma - 1.0), b=b, gamma=(1.0, -2.0, 1.0))
-
-    @property
-    def mass(self) -> MassLaw:
-        """Contact stands in the acceleration balance: without mass at the contact nodes it cannot create energy."""
-        return Redistributed()
-
-    def check(self, problem: ContactProblem) -> None:
-        """InputError for an impact law on massless contact nodes; warns when they have mass."""
-        needs_no_impact_law(problem)
-        contact_in_the_balance(repr(self), problem)
 
     def _velocity_factor(self, dt: float) -> float:
         return self.a[0] / (dt * self.b[0])

@@ -19,7 +19,8 @@ from ..certified import TOLERANCE, CertifiedSolver
 from ..errors import StepFailure
 from ..friction import Frictionless
 from ..solvers.condensed import Condensed
-from ..step import ContactProblem, EffectiveMatrix, State, StepProblem
+from ..step import ContactProblem, State, StepProblem
+from .acceleration import mass_matrix, rigid_part
 
 
 def admissible(problem: ContactProblem, state: State, u: Array, dt: float) -> tuple[Array, Mask]:
@@ -35,10 +36,10 @@ def admissible(problem: ContactProblem, state: State, u: Array, dt: float) -> tu
         return u, closed  # nothing in the way; of NaN the step itself tells
     bounds: ContactProblem = system.kept("mass projection bounds", lambda: _rigid_part(problem))
     solver: CertifiedSolver = system.kept(
-        "mass projection", lambda: CertifiedSolver(bounds, _mass(problem), 1.0, [Condensed()], TOLERANCE)
+        "mass projection", lambda: CertifiedSolver(bounds, mass_matrix(problem), 1.0, [Condensed()], TOLERANCE)
     )
     step = StepProblem(
-        A=_mass(problem),
+        A=mass_matrix(problem),
         b=np.zeros_like(u),
         bound=gap,
         surface=bounds.surface,
@@ -55,15 +56,6 @@ def admissible(problem: ContactProblem, state: State, u: Array, dt: float) -> tu
     return u + result.x, result.active
 
 
-def _mass(problem: ContactProblem) -> EffectiveMatrix:
-    system = problem.equations
-    matrix: EffectiveMatrix = system.kept("mass", lambda: EffectiveMatrix(system.M, system.algebra))
-    return matrix
-
-
 def _rigid_part(problem: ContactProblem) -> ContactProblem:
     """Springs are not bounds here, and nothing rubs."""
-    surface = problem.surface
-    rigid = surface.compliance == 0.0
-    stiff = replace(surface, compliance=np.zeros(surface.count), bilateral=surface.bilateral & rigid)
-    return replace(problem, surface=stiff, friction=Frictionless())
+    return replace(problem, surface=rigid_part(problem.surface), friction=Frictionless())
