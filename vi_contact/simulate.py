@@ -58,8 +58,8 @@ def simulate(
         escalation, tolerance: see ``march``.
         checkpoint_every: base steps between checkpoints.
         restart: True continues the run in ``out`` from its checkpoint; a path continues the run in that folder.
-            ``steps`` and ``t_end`` are those of the whole run. The result is the uninterrupted run's: on one rank to the
-            last bit, on several to round-off.
+            ``steps`` and ``t_end`` are those of the whole run. The result is the uninterrupted run's: on one rank to
+            the last bit, on several to round-off.
         progress: a progress line on a terminal.
         fields: fem.XDMF(every=10) for ParaView.
         cross_check: whose report() goes into the summary.

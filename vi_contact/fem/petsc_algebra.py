@@ -85,7 +85,8 @@ class PetscFactor:
 
     PETSc's own factorisation with minimum degree ordering where it serves (``_own_serves``): its substitutions are 4 to
     15 times as fast as those of MUMPS. On several ranks each keeps a whole copy of it, so that results do
-    not depend on the order of messages, as those of MUMPS do. MUMPS takes the rest: large 3D matrices, and what is too large to be copied.
+    not depend on the order of messages, as those of MUMPS do. MUMPS takes the rest: large 3D matrices, and what is too
+    large to be copied.
     Options with the prefix vi_contact_factor_ choose otherwise. InputError when the matrix cannot be factorised.
     """
 
