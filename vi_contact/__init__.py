@@ -10,6 +10,7 @@ from importlib import import_module
 from typing import Any
 
 # Functions that share their module's name are bound here, before somebody imports the module and takes the name.
+from .base_motion import base_motion  # noqa: F401
 from .cross_check import cross_check  # noqa: F401
 from .march import march  # noqa: F401
 from .simulate import simulate  # noqa: F401
@@ -27,6 +28,7 @@ _CONTENTS = {
     "excitation": (
         "FullSine", "GroundMotion", "HalfSine", "Harmonic", "Rectangular", "Ricker", "Tabulated",
     ),
+    "base_motion": ("BaseMotion", "base_motion"),
     "ground_motion": (
         "EC8Spectrum", "Envelope", "KanaiTajimi", "Processing", "Record", "ResponseSpectrum", "baseline_corrected",
         "filtered", "motion_info", "padded", "read_record", "resampled", "response_spectrum", "scaled",

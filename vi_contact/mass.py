@@ -74,11 +74,14 @@ class Redistributed:
         levels = from_neighbours(system, massless, contact, nodal)
         moved = _congruent(system, levels, bulk)
         C = None if system.C is None else _congruent(system, levels, system.C)
+        load = system.load
+        for P in levels:
+            load = load.handed_over(P)
         corrections = [
             _inertia_correction(system, moved, body & ~contact, body, nodal) for body in _bodies(system, ~contact)
         ]
         M = algebra.combine([(1.0, moved), *((1.0, correction) for correction in corrections)])
-        return replace(system, M=M, C=C, massless=massless, _cache={})
+        return replace(system, M=M, C=C, load=load, massless=massless, _cache={})
 
 
 def _bodies(system: SemiDiscreteSystem, inner: Mask) -> Iterator[Mask]:

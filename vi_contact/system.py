@@ -39,34 +39,41 @@ class Space(Protocol):
 
 @dataclass(frozen=True)
 class Load:
-    """f(t) = constant + sum_i vector_i * history_i(t) + sum_j general_j(t), in newtons on the unknowns.
+    """f(t) = constant + sum_i vector_i * history_i(t) + sum_j general_j(t) + sum_k viscous_k(t) [N].
 
-    Separable parts cost one vector update a step; general parts are evaluated anew at every time.
+    Separable parts cost one vector update a step; the others are evaluated anew at every time. Viscous parts are the
+    share in C u' of what moves in a given way (a base, a free field): a mass law that changes C changes them alike.
     """
 
     constant: Array
     separable: tuple[tuple[Array, Callable[[float], float]], ...] = ()
     general: tuple[Callable[[float], Array], ...] = ()
+    viscous: tuple[Callable[[float], Array], ...] = ()
 
     def __call__(self, t: float) -> Array:
         total = self.constant.copy()
         for vector, history in self.separable:
             total += history(t) * vector
-        for function in self.general:
+        for function in self.general + self.viscous:
             total += function(t)
         return total
 
     def in_basis(self, T: Matrix) -> Load:
         """The same load on the unknowns û of u = T û: Tᵀ f."""
-
-        def turned(function: Callable[[float], Array]) -> Callable[[float], Array]:
-            return lambda t: T.transpose_apply(function(t))
-
         return Load(
             T.transpose_apply(self.constant),
             tuple((T.transpose_apply(vector), history) for vector, history in self.separable),
-            tuple(turned(function) for function in self.general),
+            tuple(_turned(T, function) for function in self.general),
+            tuple(_turned(T, function) for function in self.viscous),
         )
+
+    def handed_over(self, P: Matrix) -> Load:
+        """The load beside C* = PᵀCP: Pᵀ on its viscous parts."""
+        return replace(self, viscous=tuple(_turned(P, function) for function in self.viscous))
+
+
+def _turned(T: Matrix, function: Callable[[float], Array]) -> Callable[[float], Array]:
+    return lambda t: T.transpose_apply(function(t))
 
 
 @dataclass(frozen=True)

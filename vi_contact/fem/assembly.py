@@ -157,6 +157,7 @@ def assemble_loads(space: FemSpace, section: Section, loads: tuple[Any, ...], fu
     constant = np.zeros(len(space.ids))
     separable: list[tuple[Array, Callable[[float], float]]] = []
     general: list[Callable[[float], Array]] = []
+    viscous: list[Callable[[float], Array]] = []
     for load in loads:
         integrate = _integrator(space, section, load)
         name = type(load).__name__
@@ -167,8 +168,11 @@ def assemble_loads(space: FemSpace, section: Section, loads: tuple[Any, ...], fu
         else:
             general.append(_field_load(space, name, load.value, integrate))
     if any(condition.moves for condition in space.prescribed):
-        general.append(_prescribed_load(space, full))
-    return Load(constant, tuple(separable), tuple(general))
+        stiffness, damper, mass = full
+        general.append(_prescribed_load(space, ((0, stiffness), (2, mass))))
+        if damper is not None:
+            viscous.append(_prescribed_load(space, ((1, damper),)))
+    return Load(constant, tuple(separable), tuple(general), tuple(viscous))
 
 
 def _field_load(
@@ -196,15 +200,14 @@ def _integrator(space: FemSpace, section: Section, load: Traction | BodyForce) -
     return integrate
 
 
-def _prescribed_load(space: FemSpace, full: tuple[Any, Any, Any]) -> Callable[[float], Array]:
-    """-Pᵀ(K U + C U' + M U'')."""
-    matrices = [None if mat is None else PetscMatrix(mat) for mat in full]
+def _prescribed_load(space: FemSpace, full: tuple[tuple[int, Any], ...]) -> Callable[[float], Array]:
+    """The parts of -Pᵀ(K U + C U' + M U''), given as pairs (derivative, matrix)."""
+    parts = [(derivative, PetscMatrix(mat)) for derivative, mat in full]
 
     def load(t: float) -> Array:
         pull = np.zeros(len(space.ids))
-        for derivative, matrix in enumerate(matrices):
-            if matrix is not None:
-                pull -= (matrix @ space.prescribed_values(t, derivative))[space.free]
+        for derivative, matrix in parts:
+            pull -= (matrix @ space.prescribed_values(t, derivative))[space.free]
         return pull
 
     return load

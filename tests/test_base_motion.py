@@ -1,0 +1,119 @@
+"""A moved base and the frame of the ground are the same discrete problem : seismic practice, relative frame or prescribed base."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import vi_contact as vc
+from vi_contact import fem
+from vi_contact.base_motion import base_motion
+from vi_contact.errors import InputError
+from vi_contact.march import march
+from vi_contact.meshes.block import BlockMesh
+
+WAVES = (vc.Ricker(6.0, 8.0), vc.Ricker(4.0, 11.0, direction=(0.0, 1.0)))
+DT = 2e-3
+SCHEMES: dict[str, Any] = {
+    "trapezoidal": vc.Trapezoidal(),
+    "zwt": vc.ZienkiewiczWoodTaylor(),
+    "zwt damped": vc.ZienkiewiczWoodTaylor(phi=0.7),
+    "newmark": vc.Newmark(),
+    "newmark damped": vc.Newmark(beta=0.3025, gamma=0.6),
+    "ss22": vc.SS22(0.5, 0.5),
+    "midpoint": vc.Midpoint(),
+    "hht": vc.HHT(-0.1),
+    "generalised-alpha": vc.GeneralisedAlpha.spectral_radius(0.8),
+    "houbolt": vc.Houbolt(),
+    "multistep": vc.LinearMultistep.newmark(0.25, 0.5),
+}
+
+
+@pytest.mark.serial
+def test_the_base_is_integrated_as_the_schemes_do():
+    """Trapezoidal rule, twice; Zienkiewicz-Wood-Taylor with the acceleration in the middle of the step."""
+    shake = vc.Harmonic(2.0, 1.5, phase=0.4, direction=(1.0, -0.5))
+    t = DT * np.arange(40)
+    a = np.array([shake.acceleration(s) for s in t])
+    middle = np.array([shake.acceleration(s + 0.5 * DT) for s in t])
+    for scheme, mean in ((vc.Trapezoidal(), 0.5 * (a[:-1] + a[1:])), (vc.ZienkiewiczWoodTaylor(), middle[:-1])):
+        v = np.append(0.0, np.cumsum(DT * mean))
+        u = np.append(0.0, np.cumsum(0.5 * DT * (v[:-1] + v[1:])))
+        ground = base_motion(shake, DT, scheme)
+        for k in (39, 0, 7):  # not in order
+            found = ground.at(t[k])
+            np.testing.assert_allclose(found[0], u[k] * np.array([1.0, -0.5]), rtol=1e-12, atol=1e-16)
+            np.testing.assert_allclose(found[1], v[k] * np.array([1.0, -0.5]), rtol=1e-12, atol=1e-15)
+            np.testing.assert_array_equal(found[2], a[k] * np.array([1.0, -0.5]))
+        half = ground.at(0.5 * (t[7] + t[8]))[0][0]
+        assert math.isclose(half, 0.5 * (u[7] + u[8]), rel_tol=1e-9)
+        np.testing.assert_array_equal(ground.at(-1.0)[0], [0.0, 0.0])
+
+
+@pytest.mark.serial
+def test_time_steps_of_the_run_are_refused():
+    with pytest.raises(InputError, match="found while the run goes"):
+        base_motion(WAVES, vc.HalvedAtImpact(DT), vc.Trapezoidal())  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="same number of components"):
+        base_motion((), DT)
+
+
+def two_frames(comm: Any, scheme: Any, *, damping: Any = None, friction: Any = None) -> tuple[Any, Any]:
+    """A panel beside a rigid wall, shaken both ways: (problem in the ground's frame, with a moved base)."""
+    mesh, tags = fem.build_mesh(BlockMesh(lengths=(1.0, 2.0), divisions=(3, 6)), comm)
+    data = {"section": vc.PlaneStress(0.2), "damping": damping, "loads": fem.BodyForce((0.0, -2.4e4))}
+    soft = vc.LinearElastic(E=2e7, nu=0.2, rho=2400.0)
+    wall = vc.HalfSpace(point=(1.001, 0.0), normal=(-1.0, 0.0))
+    ground = base_motion(WAVES, DT, scheme)
+    held = fem.assemble(mesh, soft, clamped=tags["bottom"], **data)
+    base = fem.Prescribed(tags["bottom"], ground.displacement, ground.velocity, ground.acceleration)
+    moved = fem.assemble(mesh, soft, prescribed=base, **data)
+    surfaces = [fem.contact_surface(system, tags["right"], obstacle=wall) for system in (held, moved)]
+    settings = {} if friction is None else {"friction": friction}
+    relative = vc.ContactProblem(held, surfaces[0], excitation=WAVES, **settings)
+    return relative, vc.ContactProblem(moved, ground.carrying(surfaces[1], moved), **settings)
+
+
+def difference(pair: tuple[Any, Any], scheme: Any, steps: int = 220) -> float:
+    """Largest difference of the reactions of two problems over the largest reaction; contact opens and closes."""
+    histories = []
+    for problem in pair:
+        rows = []
+        for state, _ in march(problem, scheme=scheme, dt=DT, steps=steps):
+            rows.append(np.append(state.r_n, () if state.r_t is None else state.r_t.ravel()))
+        histories.append(np.array(rows))
+    one, other = histories
+    closed = (one > 0.0).any(axis=1)
+    assert np.sum(closed[1:] != closed[:-1]) >= 4
+    return float(np.max(np.abs(one - other)) / np.max(np.abs(one)))
+
+
+@pytest.mark.parametrize("name", ["trapezoidal", "zwt", "newmark"])
+def test_both_frames_give_the_same_contact_forces(comm, name):
+    """Horizontal and vertical motion together, with stiffness damping; measured 1e-12."""
+    pair = two_frames(comm, SCHEMES[name], damping=vc.Rayleigh(0.0, 1e-4))
+    assert difference(pair, SCHEMES[name]) <= 1e-10
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("name", [name for name in SCHEMES if name not in ("trapezoidal", "zwt", "newmark")])
+def test_other_schemes_too(comm, name):
+    """The scheme integrates the base, so every scheme without velocity jumps agrees with itself."""
+    pair = two_frames(comm, SCHEMES[name], damping=vc.Rayleigh(0.0, 1e-4))
+    assert difference(pair, SCHEMES[name]) <= 1e-10
+
+
+def test_with_friction_on_an_obstacle_that_goes_along(comm):
+    """Slip is measured against the moving wall."""
+    pair = two_frames(comm, vc.Trapezoidal(), friction=vc.Coulomb(0.3))
+    assert difference(pair, vc.Trapezoidal()) <= 1e-10
+
+
+@pytest.mark.serial
+def test_mass_damping_tells_the_frames_apart(comm):
+    """alpha M acts on absolute or on relative velocity: not the same problem."""
+    pair = two_frames(comm, vc.Trapezoidal(), damping=vc.Rayleigh(1.0, 0.0))
+    assert difference(pair, vc.Trapezoidal()) > 1e-3
