@@ -1,0 +1,139 @@
+#!/usr/bin/env python3
+"""A U-shaped channel buried in a soil layer on bedrock (seed 000, Fig. 6): two bodies with nodes of their own.
+
+Physical groups: cells "channel", "soil"; boundary "bedrock" (y = 0), "left_side", "right_side" (x = 0, width),
+"surface" (y = depth); the interface from both sides, "channel_left", "channel_base", "channel_right" and "soil_left",
+"soil_base", "soil_right", divided alike; "channel_inside" (what the water wets) and "channel_top" (the tops of the
+walls). The channel is open at the surface, with which its walls end. Nodes of the channel come first.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+if not __package__:  # run as a file of the source tree, maybe not installed
+    sys.path[0] = str(Path(__file__).resolve().parents[2])
+
+from vi_contact.errors import InputError
+from vi_contact.meshes.channel_grid import channel_grid
+from vi_contact.meshes.from_arrays import add_arrays
+from vi_contact.meshes.gmsh_session import write
+
+Outline = list[tuple[float, float]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ChannelMesh:
+    """Mesh of a layer, width x depth [m], and of a channel in it, `outer_width` x `height`, of `wall` and `slab` [m].
+
+    `left`: x of the outer left side of the channel, by default in the middle. `size` [m]: of the cells, a grid of
+    rectangles or, with `triangles`, of their halves; every part is divided evenly into cells of about that size. With
+    `far` [m] an irregular mesh of triangles: those of `size` on the channel grow to `far` at bedrock and sides.
+    InputError for sizes that make no such layer.
+    """
+
+    width: float = 24.0
+    depth: float = 8.0
+    outer_width: float = 4.0
+    height: float = 3.0
+    wall: float = 0.5
+    slab: float = 0.5
+    left: float | None = None
+    size: float = 0.5
+    far: float | None = None
+    triangles: bool = False
+
+    def __post_init__(self) -> None:
+        lengths = {name: getattr(self, name) for name in ("width", "depth", "outer_width", "height", "wall", "slab")}
+        for name, length in (lengths | {"size": self.size, "far": self.far}).items():
+            if length is not None and not (math.isfinite(length) and length > 0.0):
+                raise InputError(f"channel: {name} is {length} m, give a positive number of metres")
+        if not (2.0 * self.wall < self.outer_width and self.slab < self.height < self.depth):
+            raise InputError(
+                f"channel {self.outer_width} x {self.height} m with walls of {self.wall} m and a slab of {self.slab} m "
+                f"does not fit a layer {self.depth} m deep: it needs room inside, and soil under it"
+            )
+        if not 0.0 < self.x[1] < self.x[4] < self.width:
+            ends = f"from x = {self.x[1]} to {self.x[4]} m"
+            raise InputError(f"channel {ends} needs soil on both sides: keep it between 0 and {self.width} m")
+        if self.far is not None and self.far < self.size:
+            raise InputError(f"cells of {self.far} m far from the channel: give at least those at it, {self.size} m")
+
+    @property
+    def x(self) -> tuple[float, ...]:
+        """Ends of the layer, outer and inner sides of the walls, from left to right [m]."""
+        left = 0.5 * (self.width - self.outer_width) if self.left is None else self.left
+        right = left + self.outer_width
+        return 0.0, left, left + self.wall, right - self.wall, right, self.width
+
+    @property
+    def y(self) -> tuple[float, ...]:
+        """Bedrock, lower and upper side of the slab, surface [m]."""
+        return 0.0, self.depth - self.height, self.depth - self.height + self.slab, self.depth
+
+    def build(self, gmsh: Any) -> None:
+        """Add both bodies to Gmsh's current model."""
+        if self.far is None:
+            add_arrays(gmsh, channel_grid(self.x, self.y, self.size, triangles=self.triangles))
+        else:
+            _build_irregular(self, gmsh, self.far)
+
+
+def _build_irregular(mesh: ChannelMesh, gmsh: Any, far: float) -> None:
+    x, y = mesh.x, mesh.y
+    sides = ("left", "base", "right")
+    u = [(x[1], y[3]), (x[1], y[1]), (x[4], y[1]), (x[4], y[3])]  # what both bodies share
+    inside = [(x[3], y[3]), (x[3], y[2]), (x[2], y[2]), (x[2], y[3])]
+    names = [*(f"channel_{side}" for side in sides), "channel_top", *["channel_inside"] * 3, "channel_top"]
+    _add_body(gmsh.model, "channel", u + inside, names, [mesh.size] * 8, mesh)
+    layer = [(x[5], y[3]), (x[5], 0.0), (0.0, 0.0), (0.0, y[3])]
+    names = [*(f"soil_{side}" for side in sides), "surface", "right_side", "bedrock", "left_side", "surface"]
+    _add_body(gmsh.model, "soil", u + layer, names, [mesh.size] * 4 + [far] * 4, mesh)
+    gmsh.model.mesh.generate(2)
+
+
+def _add_body(
+    model: Any, name: str, outline: Outline, names: Sequence[str], sizes: Sequence[float], mesh: ChannelMesh
+) -> None:
+    """A surface within an outline; its first three curves are the interface, divided alike on both bodies."""
+    points = [model.geo.addPoint(*place, 0.0, size) for place, size in zip(outline, sizes, strict=True)]
+    curves = [model.geo.addLine(one, two) for one, two in zip(points, [*points[1:], points[0]], strict=True)]
+    for i in range(3):
+        cells = round(math.dist(outline[i], outline[i + 1]) / mesh.size)
+        model.geo.mesh.setTransfiniteCurve(curves[i], max(cells, 1) + 1)
+    surface = model.geo.addPlaneSurface([model.geo.addCurveLoop(curves)])
+    model.geo.synchronize()
+    for group in dict.fromkeys(names):
+        held = [curve for curve, one in zip(curves, names, strict=True) if one == group]
+        model.setPhysicalName(1, model.addPhysicalGroup(1, held), group)
+    model.setPhysicalName(2, model.addPhysicalGroup(2, [surface]), name)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Write a channel to a file: `channel.py --width 24 --depth 8 --size 0.25 --far 1 --triangles -o channel.msh`."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
+    for name, meaning in (
+        ("width", "of the layer"), ("depth", "of the layer"), ("outer_width", "of the channel"),
+        ("height", "of the channel"), ("wall", "thickness"), ("slab", "thickness"), ("size", "of the cells"),
+        ("left", "x of the channel's left side (default: in the middle)"), ("far", "cells at bedrock and sides"),
+    ):
+        default = getattr(ChannelMesh, name)
+        parser.add_argument(f"--{name.replace('_', '-')}", type=float, default=default, help=f"{meaning} [m]")
+    parser.add_argument("--triangles", action="store_true", help="instead of quadrilaterals")
+    parser.add_argument("-o", "--output", default="channel.msh")
+    given = vars(parser.parse_args(arguments))
+    output = given.pop("output")
+    try:
+        write(ChannelMesh(**given), output)
+    except InputError as error:
+        sys.exit(str(error))
+
+
+if __name__ == "__main__":
+    main()

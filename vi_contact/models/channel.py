@@ -1,0 +1,193 @@
+"""Seed 000's second example: a channel buried in a soil layer on bedrock, shaken (Figs. 6-9).
+
+The figures' data are not in the text: what is assumed is marked CHOSEN. Between channel and soil: contact on left wall,
+base and right wall; the two bottom corners touch with both their sides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..algebra import Array, Mask
+from ..base_motion import BaseMotion
+from ..errors import InputError
+from ..excitation import Excitation, Harmonic
+from ..fem.assembly import assemble
+from ..fem.joined import together
+from ..fem.loads import Prescribed, as_tuple
+from ..fem.mesh import build_mesh
+from ..fem.pairs import contact_pair
+from ..friction import FrictionLaw, Frictionless
+from ..impact import Inelastic, MassProjection
+from ..mass import ConsistentMass, MassLaw
+from ..materials import Damping, LinearElastic, NoDamping, PlaneStrain
+from ..meshes.channel import ChannelMesh
+from ..recorders import Contact, Energy, Probe
+from ..step import ContactProblem, ImpactLaw, Recorder
+from ..surfaces import ContactSurface
+from ..system import SemiDiscreteSystem
+from .channel_points import Openings, SoilProbe
+from .channel_sides import Rollers, Sides
+from .wall import STANDARD_GRAVITY
+
+BODIES = ("channel", "soil")  # in the order of their nodes
+SIDES = ("base", "left", "right")  # of the contact, in the order of its conditions
+POINTS = 19
+
+
+@dataclass(frozen=True)
+class Channel:
+    """Geometry and materials, in SI units. CHOSEN throughout; the text says neither.
+
+    shape: a layer of 24 x 8 m and a channel of 4 x 3 m, walls and slab 0.5 m thick, cells of 0.5 m.
+    soil: 100 MPa, 1800 kg/m³, shear waves at 146 m/s. concrete: 20 GPa, 2400 kg/m³. Plane strain, per metre.
+    """
+
+    shape: ChannelMesh = field(default_factory=ChannelMesh)
+    soil: LinearElastic = field(default_factory=lambda: LinearElastic(E=1.0e8, nu=0.3, rho=1800.0))
+    concrete: LinearElastic = field(default_factory=lambda: LinearElastic(E=2.0e10, nu=0.2, rho=2400.0))
+    damping: Damping = field(default_factory=NoDamping)
+
+    def point(self, number: int) -> tuple[float, float]:
+        """Coordinates of the boundary points 1..19 of the channel, CHOSEN so that 1 and 7 are its bottom corners.
+
+        1-7 base from left to right, 8-13 right wall upwards (13 at the surface), 14-19 left wall upwards (19 at the
+        surface), evenly spaced.
+        """
+        if not 1 <= number <= POINTS:
+            raise InputError(f"the channel has boundary points 1 to {POINTS}, there is no point {number}")
+        left, right = self.shape.x[1], self.shape.x[4]
+        bottom, height = self.shape.y[1], self.shape.height
+        if number <= 7:
+            return left + (number - 1) / 6.0 * (right - left), bottom
+        if number <= 13:
+            return right, bottom + (number - 7) / 6.0 * height
+        return left, bottom + (number - 13) / 6.0 * height
+
+    def harmonic(self, amplitude: float = 2.0) -> Harmonic:
+        """a_g = 2 sin(2 pi 2 t) m/s². CHOSEN: "a sinusoidal strong acceleration"."""
+        return Harmonic(amplitude, 2.0, direction=(1.0, 0.0))
+
+    def time_step(self) -> float:
+        """dt = 1/80 s, a fortieth of the period. CHOSEN."""
+        return 1.0 / 80.0
+
+    def probes(self) -> dict[str, tuple[float, float]]:
+        """Bottom corners and middle (1, 7, 4), middle of the walls (10, 16), their tops (13, 19): always nodes but for
+        the middles of irregular meshes."""
+        return {str(number): self.point(number) for number in (1, 4, 7, 10, 13, 16, 19)}
+
+
+@dataclass(frozen=True)
+class ChannelModel:
+    """The assembled channel and soil; ``surface``: the contact of base, left and right wall, in this order, normals
+    and forces those of the channel."""
+
+    channel: Channel
+    mesh: Any
+    tags: Any
+    system: SemiDiscreteSystem
+    surface: ContactSurface
+
+    def problem(
+        self,
+        *,
+        friction: FrictionLaw | None = None,
+        bilateral: bool = False,
+        excitation: Excitation | Sequence[Excitation] | None = None,
+        impact: ImpactLaw | None = None,
+        mass: MassLaw | None = None,
+    ) -> ContactProblem:
+        """Channel and soil under the harmonic motion, sliding freely; with the inelastic impact rule, as an impulse,
+        on consistent mass.
+
+        Args:
+            friction: Coulomb(mu) for instance.
+            bilateral: soil and channel cannot part, but slide as before: the linear comparison run of Fig. 9.
+            impact, mass: schemes with massless contact nodes take no impact law: give impact=NoImpact(), and leave
+                mass to them.
+        """
+        return ContactProblem(
+            self.system,
+            self.surface.held() if bilateral else self.surface,
+            friction=friction or Frictionless(),
+            impact=Inelastic(MassProjection()) if impact is None else impact,
+            mass=ConsistentMass() if impact is None and mass is None else mass,
+            excitation=self.channel.harmonic() if excitation is None else excitation,
+        )
+
+    def recorders(self) -> tuple[Recorder, ...]:
+        """Energy, contact, the probes on channel (u_x_1, ...) and soil (u_x_1_soil, ...), openings of the sides."""
+        probes = self.channel.probes()
+        soil = SoilProbe({f"{label}_soil": point for label, point in probes.items()})
+        return Energy(), Contact(), Probe(probes), soil, Openings(self.sides)
+
+    @cached_property
+    def sides(self) -> dict[str, Mask]:
+        """Masks (m,) of the contact conditions of each of SIDES."""
+        normals = {"base": (0.0, -1.0), "left": (-1.0, 0.0), "right": (1.0, 0.0)}
+        return {side: self.surface.normals @ normals[side] > 0.5 for side in SIDES}
+
+    @cached_property
+    def arc(self) -> Array:
+        """(m,) place of the contact conditions along the channel's outline, from the surface down the left wall, along
+        the base and up the right wall [m]. The corners' two conditions are at one place."""
+        shape, points = self.channel.shape, self.surface.points
+        down, along, up = shape.y[3] - points[:, 1], points[:, 0] - shape.x[1], points[:, 1] - shape.y[1]
+        return np.select(
+            [self.sides["left"], self.sides["base"]],
+            [down, shape.height + along],
+            shape.height + shape.outer_width + up,
+        )
+
+
+def build(
+    channel: Channel,
+    comm: Any,
+    *,
+    sides: Sides | None = None,
+    weighing: Sequence[str] = ("channel",),
+    base: BaseMotion | None = None,
+) -> ChannelModel:
+    """Meshes and assembles channel and soil; collective.
+
+    Args:
+        sides: the ends of the soil layer; by default Rollers(), which hold them vertically (CHOSEN).
+        weighing: the bodies, of BODIES, that have weight. CHOSEN: the channel only, so that the soil's own settlement
+            is not in the figures; without any weight a channel with smooth sides drifts up without bound.
+        base: moves the bedrock, in the frame of an observer at rest; its problems take excitation=(). By default the
+            bedrock is at rest and what shakes it is an inertia load, in the frame of the bedrock.
+    """
+    mesh, tags = build_mesh(channel.shape, comm)
+    motion: dict[str, Any] = {} if base is None else {
+        "displacement": base.displacement, "velocity": base.velocity, "acceleration": base.acceleration
+    }
+    ends = (sides or Rollers()).conditions(tags, motion)
+    held = [*as_tuple(ends.pop("prescribed", ())), Prescribed(tags["bedrock"], **motion)]  # the bedrock has its corners
+    system = assemble(
+        mesh,
+        [(tags["channel"], channel.concrete), (tags["soil"], channel.soil)],
+        section=PlaneStrain(),
+        prescribed=held,
+        damping=channel.damping,
+        **ends,
+    )
+    system = weighted(system, weighing)
+    pairs = [contact_pair(system, tags[f"channel_{side}"], tags[f"soil_{side}"]) for side in SIDES]
+    return ChannelModel(channel, mesh, tags, system, together(*pairs))
+
+
+def weighted(system: SemiDiscreteSystem, weighing: Sequence[str]) -> SemiDiscreteSystem:
+    """The system with the weight of some of BODIES, ∫ rho g v of their own mass matrix."""
+    for name in weighing:
+        if name not in BODIES:
+            raise InputError(f"unknown body '{name}': {' and '.join(BODIES)} may have weight")
+    down = -STANDARD_GRAVITY * system.inertia(np.array([0.0, 1.0]))
+    heavy = np.isin(system.space.bodies, [BODIES.index(name) for name in weighing])
+    load = replace(system.load, constant=system.load.constant + np.where(heavy, down, 0.0))
+    return replace(system, load=load, _cache={})

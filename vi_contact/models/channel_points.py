@@ -1,0 +1,62 @@
+"""What is recorded of the interface between channel and soil besides the channel's own points (Fig. 7)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..algebra import Indices, Mask
+from ..errors import InputError
+from ..fem.frames import FemSurface
+from ..recorders import Columns, Probe, Row
+from ..step import ContactProblem, Report, State
+from ..surfaces import ContactSurface
+
+
+@dataclass
+class SoilProbe(Probe):
+    """As `Probe`, at the nodes of the soil that touch the given points of the channel in the undeformed mesh.
+
+    InputError for a point that is not at the interface.
+    """
+
+    def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
+        row = dict(super().start(problem, state, resumed))
+        self._nodes = touched_nodes(problem.surface, self._nodes)
+        return row | self._row(state)
+
+
+def touched_nodes(surface: ContactSurface, nodes: Indices) -> Indices:
+    """Numbers of the nodes of side 2 that face nodes of side 1 (the nearest one where sides are not divided alike)."""
+    faced: dict[int, int] = {}
+    for part in surface.parts if isinstance(surface, FemSurface) else ():
+        if part.facing is not None:
+            opposite = np.asarray(part.facing.P.argmax(axis=1)).ravel()
+            faced |= dict(zip(part.nodes.numbers.tolist(), part.facing.nodes.numbers[opposite].tolist(), strict=True))
+    missing = [node for node in nodes.tolist() if node not in faced]
+    if missing:
+        raise InputError("a soil probe is not at the interface with the channel: give points of the channel's outline")
+    return np.array([faced[node] for node in nodes.tolist()], dtype=np.int64)
+
+
+@dataclass(frozen=True)
+class Openings:
+    """The largest gap of each side of the contact: columns opening_<side> [m]. ``sides``: name -> mask (m,)."""
+
+    sides: Mapping[str, Mask]
+
+    def columns(self) -> Columns:
+        return {f"opening_{side}": ("m", f"largest gap of the contact side '{side}'") for side in self.sides}
+
+    def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
+        return self._row(problem.surface, state)
+
+    def row(self, report: Report) -> Row:
+        return self._row(report.problem.surface, report.new)
+
+    def _row(self, surface: ContactSurface, state: State) -> dict[str, Any]:
+        gap = surface.gap(state.t) - surface.normal_values(state.u)
+        return {f"opening_{side}": float(gap[mask].max()) for side, mask in self.sides.items()}
