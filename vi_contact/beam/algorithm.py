@@ -1,0 +1,188 @@
+"""Algorithm 10 of seed 002: the beam with friction at its tip under a given normal force, by block elimination.
+
+Midpoint rule (5.4), (5.5) for y = (theta, u), w = y', with the stiffness S and C = a2 S:
+
+    P y1 = Q y0 + (2/dt) M w0 + f(t0) - e_m R,     P = 2/dt² M + (a2/dt + ½) S,   Q = 2/dt² M + (a2/dt - ½) S      (7.7)
+    w1 = (2/dt) (y1 - y0) - w0                                                                                (7.11)
+
+R is the friction force of the step at the tip, with the limit mu(t0, |w0_m|) |r_N(t0)|: force and coefficient are those
+of the *old* time, as in the source. Solved for the increment d = y1 - y0, as Q = P - S: the same equations with less
+round-off. With P split at the tip into T, p and P_mm, T is factorised once, and
+
+    P d = r - e_m R,    r = (2/dt) M w0 - S y0 + f
+    c = P_mm - pᵀT⁻¹p,    g = r_m - pᵀT⁻¹r     leave the scalar equation  c s - g + R(s) = 0  of tip.py        (7.8)
+    d = (T⁻¹r - s T⁻¹p, s)                                                                                    (7.10)
+
+One back-substitution per step. Energy: E = ½ wᵀMw + ½ yᵀSy, and (6.5) holds step by step:
+
+    E1 - E0 = f·(y1 - y0) - a2/dt (y1 - y0)·S (y1 - y0) - R s,      each loss >= 0 (Lemma 11)
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..algebra import Array, SerialFactor, SerialMatrix
+from ..errors import InputError, StepFailure
+from .elements import Elements, beam_matrices
+from .tip import ExactFriction, Slip, TipFriction
+from .values import Start, TimoshenkoBeam
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """The beam at a time: rows theta, omega, u, v at all nodes, the clamped one included, shape (4, m + 1)."""
+
+    t: float
+    values: Array
+
+
+@dataclass(frozen=True)
+class BeamRun:
+    """What a run recorded: columns of shape (steps + 1,) and, when asked for, snapshots.
+
+    history: t [s]; u_tip [m], v_tip [m/s]; friction_force [N] and slip [m] of the step that led there; normal_force [N]
+    and mu [-] of that step; newton: updates; energy_kinetic, energy_strain, work_input, loss_damping, loss_friction and
+    energy_defect [J] (works and losses since the start).
+    """
+
+    x: Array
+    history: Mapping[str, Array]
+    snapshots: tuple[Snapshot, ...]
+
+    @property
+    def energy(self) -> Array:
+        """½ wᵀMw + ½ yᵀSy [J], (7.12)."""
+        return np.asarray(self.history["energy_kinetic"] + self.history["energy_strain"])
+
+    @property
+    def mean_updates(self) -> float:
+        """Newton updates per step."""
+        return float(np.mean(self.history["newton"][1:]))
+
+
+@dataclass(frozen=True)
+class BeamStepper:
+    """The condensed step. ``normal_force``: t -> |r_N| >= 0 [N]; ``mu``: (t, slip rate [m/s] >= 0) -> coefficient;
+    ``load``: t -> uniform force along the beam [N/m], or None. InputError for dt <= 0."""
+
+    beam: TimoshenkoBeam
+    elements: Elements
+    dt: float
+    normal_force: Callable[[float], float]
+    mu: Callable[[float, float], float]
+    friction: TipFriction = field(default_factory=ExactFriction)
+    load: Callable[[float], float] | None = None
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.dt) and self.dt > 0.0):
+            raise InputError(f"the time step dt is {self.dt!r} s; give a positive number")
+        object.__setattr__(self, "_matrices", beam_matrices(self.beam, self.elements))
+
+    @property
+    def matrices(self) -> Any:
+        """M, S and the unit load."""
+        return self._matrices  # type: ignore[attr-defined]
+
+    def steps(self, y: Array, w: Array) -> Iterator[tuple[Array, Array, Slip, float, float, float]]:
+        """Endless (y1, w1, slip, |r_N|, mu, f) from y, w at t = 0. InputError for a bad force or coefficient;
+        StepFailure with the number of the step and its time."""
+        M, S, dt = self.matrices.M, self.matrices.S, self.dt
+        P = ((2.0 / dt**2) * M + (self.beam.viscosity / dt + 0.5) * S).tocsr()
+        T = SerialFactor(SerialMatrix(P[:-1, :-1]))
+        p = P[:-1, -1].toarray().ravel()
+        column = T.solve(p)
+        c = float(P[-1, -1] - p @ column)
+        k = 0
+        while True:
+            t = k * dt
+            N, mu = self._limits(t, abs(float(w[-1])))
+            f = 0.0 if self.load is None else float(self.load(t))
+            r = (2.0 / dt) * (M @ w) - S @ y + f * self.matrices.load
+            free = T.solve(r[:-1])
+            g = float(r[-1] - p @ free)
+            try:
+                slip = self.friction.solve(c, g, mu * N)
+            except StepFailure as failure:
+                raise StepFailure(f"step {k + 1}, t = {t + dt:.6g} s: {failure}") from None
+            increment = np.append(free - slip.s * column, slip.s)
+            y, w = y + increment, (2.0 / dt) * increment - w
+            k += 1
+            yield y, w, slip, N, mu, f
+
+    def _limits(self, t: float, rate: float) -> tuple[float, float]:
+        """(|r_N|, mu) at a time, checked."""
+        N, mu = float(self.normal_force(t)), float(self.mu(t, rate))
+        if not (math.isfinite(N) and N >= 0.0):
+            raise InputError(f"normal_force({t:.6g} s) is {N:g} N; return |r_N|, zero or a positive finite number")
+        if not (math.isfinite(mu) and mu >= 0.0):
+            raise InputError(f"mu({t:.6g} s, {rate:.6g} m/s) is {mu:g}; return zero or a positive finite number")
+        return N, mu
+
+
+def run_beam(stepper: BeamStepper, start: Start, *, steps: int, every: int = 0) -> BeamRun:
+    """Marches ``steps`` steps from ``start`` and keeps the ledger; ``every``: steps between snapshots, 0 for none.
+
+    Raises InputError for bad numbers and StepFailure, with step and time, where the tip's equation is not solved.
+    """
+    if steps < 1 or every < 0:
+        raise InputError(f"run_beam: steps is {steps} and every {every}; give steps >= 1 and every >= 0")
+    x = stepper.elements.nodes(stepper.beam.length)
+    y = np.concatenate([start.at("theta", x), start.at("u", x)])
+    w = np.concatenate([start.at("omega", x), start.at("v", x)])
+    ledger = _Ledger(stepper, y, w)
+    snapshots = [_snapshot(0.0, y, w)] if every else []
+    for k, (y1, w1, slip, N, mu, f) in zip(range(1, steps + 1), stepper.steps(y, w), strict=False):
+        ledger.add(k, y1 - y, f, slip, N, mu, y1, w1)
+        y, w = y1, w1
+        if every and k % every == 0:
+            snapshots.append(_snapshot(k * stepper.dt, y, w))
+    return BeamRun(np.insert(x, 0, 0.0), ledger.columns(), tuple(snapshots))
+
+
+def _snapshot(t: float, y: Array, w: Array) -> Snapshot:
+    m = len(y) // 2
+    values = np.zeros((4, m + 1))
+    values[:, 1:] = y[:m], w[:m], y[m:], w[m:]
+    return Snapshot(t, values)
+
+
+class _Ledger:
+    """Rows of the history; the sums of works and losses."""
+
+    NAMES = (
+        "t", "u_tip", "v_tip", "friction_force", "slip", "normal_force", "mu", "newton", "energy_kinetic",
+        "energy_strain", "work_input", "loss_damping", "loss_friction", "energy_defect",
+    )
+
+    def __init__(self, stepper: BeamStepper, y: Array, w: Array) -> None:
+        self._stepper, self._sums = stepper, np.zeros(3)
+        kinetic, strain = self._energies(y, w)
+        self._start = kinetic + strain
+        self._rows = [(0.0, y[-1], w[-1], 0.0, 0.0, 0.0, 0.0, 0, kinetic, strain, 0.0, 0.0, 0.0, 0.0)]
+
+    def _energies(self, y: Array, w: Array) -> tuple[float, float]:
+        matrices = self._stepper.matrices
+        return 0.5 * float(w @ (matrices.M @ w)), 0.5 * float(y @ (matrices.S @ y))
+
+    def add(self, k: int, dy: Array, f: float, slip: Slip, N: float, mu: float, y: Array, w: Array) -> None:
+        """The row of a step."""
+        matrices, stepper = self._stepper.matrices, self._stepper
+        damping = stepper.beam.viscosity / stepper.dt * float(dy @ (matrices.S @ dy))
+        self._sums += f * float(matrices.load @ dy), damping, slip.force * slip.s
+        kinetic, strain = self._energies(y, w)
+        work, viscous, friction = self._sums
+        defect = kinetic + strain - self._start - (work - viscous - friction)
+        self._rows.append((
+            k * stepper.dt, y[-1], w[-1], slip.force, slip.s, N, mu, slip.updates, kinetic, strain, work, viscous,
+            friction, defect,
+        ))
+
+    def columns(self) -> dict[str, Array]:
+        """Name -> column."""
+        return dict(zip(self.NAMES, np.array(self._rows, dtype=float).T, strict=True))

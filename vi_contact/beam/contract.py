@@ -1,0 +1,140 @@
+"""Rod and beam as contact problems of the project: the exact inequalities, for ``march`` and ``simulate``.
+
+The tip is one contact point: its normal unknown is the displacement along the axis, v_n <= gap, its tangential one the
+deflection u_m. With ``Midpoint()`` the rod's step is (5.1)-(5.3) of seed 002, midpoint rule in the bulk and the
+complementarity at the end of the step, and the beam's is (5.4), (5.5) with the inequality (2.8), (2.9) itself:
+
+    Algorithm 10 -> this    for eps -> 0, with |r_N| of the same step
+
+Three problems: the rod alone; the beam under a given normal force, which presses a point mass against the wall; the
+beam that rubs with the contact force of its own rod, the coupling that the seed leaves out. Along the axis and across
+nothing else is coupled (small displacements): the rod moves as it would alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..algebra import Array, SerialAlgebra, SerialComm, SerialMatrix
+from ..errors import InputError
+from ..friction import FrictionLaw, Frictionless
+from ..step import ContactProblem
+from ..surfaces import ContactSurface
+from ..system import Load, SemiDiscreteSystem
+from .elements import Elements, beam_matrices, rod_matrices
+from .space import BeamSpace
+from .values import Rod, Start, TimoshenkoBeam
+
+History = Callable[[float], float]
+
+
+def rod_problem(rod: Rod, elements: Elements, start: Start | None = None) -> ContactProblem:
+    """The rod before its wall (2.1)-(2.5). ``start``: u and v along the axis; at rest when None."""
+    x = elements.nodes(rod.length)
+    start = start or Start()
+    return _problem(x, _Part.of_rod(rod, elements, start), None, rod.gap, Frictionless())
+
+
+def beam_problem(
+    beam: TimoshenkoBeam, elements: Elements, *, normal_force: History, friction: FrictionLaw,
+    start: Start | None = None, load: History | None = None,
+) -> ContactProblem:
+    """The beam pressed on the wall with normal_force(t) >= 0 [N], the load of a mass rho A l held by the wall.
+
+    ``friction``: Coulomb or SlipRateCoulomb. Schemes take the force where they take loads: ``Midpoint`` at t + dt/2,
+    Algorithm 10 at t. ``load``: uniform, across [N/m].
+    """
+    x = elements.nodes(beam.length)
+    mass = sp.csr_matrix([[beam.rho * beam.area * beam.length]])
+    point = _Part(mass, None, sp.csr_matrix((1, 1)), ((np.ones(1), normal_force),), np.zeros(1), np.zeros(1))
+    return _problem(x, point, _Part.of_beam(beam, elements, start or Start(), load), 0.0, friction)
+
+
+def rubbing_problem(
+    rod: Rod, beam: TimoshenkoBeam, elements: Elements, *, friction: FrictionLaw, rod_start: Start | None = None,
+    start: Start | None = None, load: History | None = None,
+) -> ContactProblem:
+    """Rod and beam of the same length: the beam rubs with the rod's contact force. InputError for other lengths."""
+    if rod.length != beam.length:
+        raise InputError(
+            f"the rod is {rod.length:g} m long and the beam {beam.length:g} m: they are one body, give one length"
+        )
+    x = elements.nodes(beam.length)
+    bar = _Part.of_rod(rod, elements, rod_start or Start())
+    return _problem(x, bar, _Part.of_beam(beam, elements, start or Start(), load), rod.gap, friction)
+
+
+class _Part:
+    """Matrices, loads and initial values of the unknowns along the axis, or of those across."""
+
+    def __init__(self, M: Any, C: Any, K: Any, loads: tuple[tuple[Array, History], ...], u0: Array, v0: Array) -> None:
+        self.M, self.C, self.K, self.loads, self.u0, self.v0 = M, C, K, loads, u0, v0
+
+    @classmethod
+    def of_rod(cls, rod: Rod, elements: Elements, start: Start) -> _Part:
+        x = elements.nodes(rod.length)
+        M, K, uniform = rod_matrices(rod, elements.count)
+        tip = np.zeros_like(x)
+        tip[-1] = 1.0
+        given = ((uniform, rod.body_force), (tip, rod.end_force))
+        loads = tuple((vector, history) for vector, history in given if history is not None)
+        return cls(M, rod.viscosity * K if rod.viscosity else None, K, loads, start.at("u", x), start.at("v", x))
+
+    @classmethod
+    def of_beam(cls, beam: TimoshenkoBeam, elements: Elements, start: Start, load: History | None) -> _Part:
+        x, found = elements.nodes(beam.length), beam_matrices(beam, elements)
+        y = np.concatenate([start.at("theta", x), start.at("u", x)])
+        w = np.concatenate([start.at("omega", x), start.at("v", x)])
+        loads = () if load is None else ((found.load, load),)
+        return cls(found.M, beam.viscosity * found.S if beam.viscosity else None, found.S, loads, y, w)
+
+
+def _problem(x: Array, along: _Part, across: _Part | None, gap: float, friction: FrictionLaw) -> ContactProblem:
+    parts = [along] if across is None else [along, across]
+    sizes = [len(part.u0) for part in parts]
+    space = BeamSpace(x, sizes[0], across is not None)
+    loads = []
+    for i, part in enumerate(parts):
+        for vector, history in part.loads:
+            whole = [np.zeros(size) for size in sizes]
+            whole[i] = vector
+            loads.append((np.concatenate(whole), history))
+    damped = any(part.C is not None for part in parts)
+    dampings = [sp.csr_matrix(part.K.shape) if part.C is None else part.C for part in parts]
+    influence = np.zeros((space.unknowns, space.dimension))
+    influence[: sizes[0], 0] = 1.0
+    influence[space.unknowns - len(x) :, -1] = 1.0
+    system = SemiDiscreteSystem(
+        algebra=SerialAlgebra(),
+        M=SerialMatrix(sp.block_diag([part.M for part in parts])),
+        C=SerialMatrix(sp.block_diag(dampings)) if damped else None,
+        K=SerialMatrix(sp.block_diag([part.K for part in parts])),
+        load=Load(np.zeros(space.unknowns), tuple(loads)),
+        influence=influence,
+        u0=np.concatenate([part.u0 for part in parts]),
+        v0=np.concatenate([part.v0 for part in parts]),
+        space=space,
+    )
+    return ContactProblem(system, _tip(x[-1], space, gap), friction=friction)
+
+
+def _tip(length: float, space: BeamSpace, gap: float) -> ContactSurface:
+    """One contact point, its weight 1: pressures are forces."""
+    d = space.dimension
+    tangents = np.array([[space.unknowns - 1]]) if space.beam else np.zeros((1, 0), dtype=np.int64)
+    return ContactSurface(
+        comm=SerialComm(),
+        points=np.eye(1, d) * length,
+        normals=np.eye(1, d),
+        weights=np.ones(1),
+        gap0=np.array([gap]),
+        bilateral=np.zeros(1, dtype=bool),
+        compliance=np.zeros(1),
+        owned=np.array([space.along - 1]),
+        slots=np.array([0]),
+        tangents=tangents,
+    )

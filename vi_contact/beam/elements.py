@@ -1,0 +1,131 @@
+"""Piecewise linear elements for rod and beam, and the last rotation function of seed 002 (section 7).
+
+On an element s = (x - x_left)/h runs from 0 to 1. Deflection and rotation are linear; the shear energy is
+
+    ½ K A G ∫ (u_x - theta)² dx      by one point per element (reduced_shear), or exactly
+
+Exact integration locks: a slender beam bends too little until h is small beside its *depth*. One point removes that.
+
+``published_end``: on the last element the seed multiplies the tip's rotation by -s³ + s² + s, whose slope is zero at
+the tip, in order to satisfy theta_x(l) = 0. But its neighbour 1 - s keeps the slope -1/h, and both together do not
+reproduce a constant: equal rotations at both nodes cost energy. With the tip's rotation eliminated the last element is
+a spring 2 E I/(17 h) on the rotation of its left node, so that h -> 0 clamps the rotation: theta(l) = 0 instead of
+theta_x(l) = 0. It is here to reproduce the source; theta_x(l) = 0 is natural and needs no special function.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..algebra import Array
+from ..errors import InputError
+from .values import Rod, TimoshenkoBeam
+
+_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(4)  # exact to degree 7: squares of cubics
+S, W = 0.5 * (_POINTS + 1.0), 0.5 * _WEIGHTS
+
+
+@dataclass(frozen=True)
+class Elements:
+    """``count`` equal elements. ``reduced_shear``: one point for the shear energy; ``published_end``: see the module.
+
+    The source has Elements(1000, reduced_shear=False, published_end=True). InputError for fewer than two elements, and
+    for a published end with reduced shear, which the source does not have.
+    """
+
+    count: int = 100
+    reduced_shear: bool = True
+    published_end: bool = False
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.count, (int, np.integer)) or isinstance(self.count, bool) or self.count < 2:
+            raise InputError(f"Elements: count is {self.count!r}; give a whole number of elements from 2 on")
+        if self.published_end and self.reduced_shear:
+            raise InputError("Elements: the published end function goes with reduced_shear=False, as in the source")
+
+    def nodes(self, length: float) -> Array:
+        """Positions of the unknowns: all nodes but the clamped one, shape (count,) [m]."""
+        return np.linspace(0.0, length, self.count + 1)[1:]
+
+
+@dataclass(frozen=True)
+class BeamMatrices:
+    """Mass and stiffness of y = (theta_1 … theta_m, u_1 … u_m): ½ wᵀMw and ½ yᵀSy are energies [J]. C = a2 S.
+
+    ``load``: a unit of distributed force [N/m] on the unknowns.
+    """
+
+    M: Any
+    S: Any
+    load: Array
+
+
+def beam_matrices(beam: TimoshenkoBeam, elements: Elements) -> BeamMatrices:
+    """M1, M2, K1, K2, L1 of section 7 with their coefficients, sparse."""
+    m, h = elements.count, beam.length / elements.count
+    lines, slopes = _lines(S), _line_slopes(S) / h
+    turn, bend = lines, slopes
+    if elements.published_end:
+        turn = np.array([1.0 - S, -(S**3) + S**2 + S])
+        bend = np.array([-np.ones_like(S), -3.0 * S**2 + 2.0 * S + 1.0]) / h
+    middle = np.array([0.5])
+    at, weight = (middle, np.ones(1)) if elements.reduced_shear else (S, W)
+    shear_u = _line_slopes(at) / h
+    shear_turn = [_lines(at), turn if elements.published_end else _lines(at)]
+    ends = (lines, turn), (slopes, bend)
+
+    def matrix(left: Any, right: Any, weights: Array) -> Any:
+        """∫ left_i right_j over all elements: a pair of tables for the inner elements and the last one."""
+        inner, last = (h * (a * weights) @ b.T for a, b in zip(left, right, strict=True))
+        return _assembled(inner, last, m)
+
+    turns, bends, plain, steep = ends[0], ends[1], (lines, lines), (shear_u, shear_u)
+    EI, KAG = beam.bending_stiffness, beam.shear_stiffness
+    M1, K1 = matrix(turns, turns, W), matrix(bends, bends, W)
+    M2, K2 = matrix(plain, plain, W), matrix(steep, steep, weight)
+    N1, L1 = matrix(shear_turn, shear_turn, weight), matrix(shear_turn, steep, weight)
+    M = sp.block_diag([beam.rho * beam.inertia * M1, beam.rho * beam.area * M2]).tocsr()
+    stiffness = sp.bmat([[EI * K1 + KAG * N1, -KAG * L1], [-KAG * L1.T, KAG * K2]]).tocsr()
+    load = np.concatenate([np.zeros(m), _uniform(m, h)])
+    return BeamMatrices(M, stiffness, load)
+
+
+def rod_matrices(rod: Rod, count: int) -> tuple[Any, Any, Array]:
+    """(M, K, unit of distributed force [N/m]) of v_1 … v_n, sparse; C = viscosity K."""
+    h = rod.length / count
+    lines, slopes = _lines(S), _line_slopes(S) / h
+    M, K = (h * (a * W) @ a.T for a in (lines, slopes))
+    return rod.rho * rod.area * _assembled(M, M, count), rod.E * rod.area * _assembled(K, K, count), _uniform(count, h)
+
+
+def _lines(s: Array) -> Array:
+    """The two linear functions at s, shape (2, len(s))."""
+    return np.array([1.0 - s, s])
+
+
+def _line_slopes(s: Array) -> Array:
+    """Their slopes times h."""
+    return np.array([-np.ones_like(s), np.ones_like(s)])
+
+
+def _uniform(m: int, h: float) -> Array:
+    """∫ of each function: h, half of it at the tip."""
+    load = np.full(m, h)
+    load[-1] *= 0.5
+    return load
+
+
+def _assembled(inner: Array, last: Array, m: int) -> Any:
+    """The (m, m) matrix of m element matrices (2, 2), all ``inner`` but the last; node 0 is clamped."""
+    low, rows, columns, values = np.arange(m), [], [], []
+    for i in range(2):
+        for j in range(2):
+            rows.append(low + i)
+            columns.append(low + j)
+            values.append(np.append(np.full(m - 1, inner[i, j]), last[i, j]))
+    entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
+    return sp.coo_matrix(entries, shape=(m + 1, m + 1)).tocsr()[1:, 1:]

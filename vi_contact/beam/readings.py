@@ -1,0 +1,74 @@
+"""Data of seed 002, section 8, with the readings of what its text leaves open (verification 6.1).
+
+The normal force is printed as r_N(0) = 100,000 and r_N(t) = 100,000/100t. Three readings, as |r_N| >= 0:
+
+    A    10⁵/(100 t) for t > 0              B    10⁵/100^t            C    10⁵/100^k at step k, t = k dt
+
+Only C dies within a few steps, as the text's negligible loss by friction and its two Newton iterations per step ask
+for. eps is printed as 102/5, read as 10⁻²/5 = 0.002; minus signs of the initial data are lost: "moves downward".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ..errors import InputError
+from .elements import Elements
+from .tip import RegularisedFriction
+from .values import Start, TimoshenkoBeam
+
+Force = Callable[[float], float]
+FORCE = 1.0e5  # |r_N(0)| [N]
+DT, STEPS = 0.002, 1000
+
+
+def reading_a(t: float) -> float:
+    """10⁵/(100 t) [N], and 10⁵ at t = 0."""
+    return FORCE / (100.0 * t) if t > 0.0 else FORCE
+
+
+def reading_b(t: float) -> float:
+    """10⁵/100^t [N], t in seconds."""
+    return float(FORCE * 100.0**-t)
+
+
+def reading_c(dt: float = DT) -> Force:
+    """The function 10⁵/100^(t/dt) [N]: a hundredth in every step of dt [s]. InputError unless dt > 0."""
+    if not dt > 0.0:
+        raise InputError(f"reading_c: dt is {dt!r}; give the time step in seconds, above zero")
+    return lambda t: float(FORCE * 100.0 ** -(t / dt))
+
+
+def no_force(t: float) -> float:
+    """Zero: the tip is free."""
+    return 0.0
+
+
+def published_mu(t: float, rate: float) -> float:
+    """mu = |slip rate|/100 [-], rate in m/s."""
+    return abs(rate) / 100.0
+
+
+def published_beam(viscosity: float) -> TimoshenkoBeam:
+    """l = 5, rho A = rho I = 1, EI = KAG = 100; viscosity 0.001 or 2 in the source [s]."""
+    return TimoshenkoBeam(viscosity=viscosity)
+
+
+def published_start() -> Start:
+    """u = -x/200, v = -x; theta = omega = 0, which the source does not state."""
+    return Start(u=lambda x: -x / 200.0, v=lambda x: -x)
+
+
+def published_elements(count: int = 1000) -> Elements:
+    """m = 1000: linear functions, exact integration, the cubic last rotation function."""
+    return Elements(count, reduced_shear=False, published_end=True)
+
+
+def published_friction(eps: float = 0.002) -> RegularisedFriction:
+    """eps = 0.002 m, Newton's method without safeguard until |F| <= 1e-10."""
+    return RegularisedFriction(eps, absolute=1e-10, safeguard=False)
+
+
+def readings(dt: float = DT) -> dict[str, Force]:
+    """All of them by their letters, and "none"."""
+    return {"none": no_force, "A": reading_a, "B": reading_b, "C": reading_c(dt)}

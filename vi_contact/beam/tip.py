@@ -1,0 +1,98 @@
+"""Friction at the tip: one scalar equation per step for the slip s = u_m^{k+1} - u_m^k (seed 002, section 7).
+
+Condensed to the tip, the step says  c s - g + R = 0  with the friction R that the wall takes from the beam [N]:
+c > 0 [N/m] is the stiffness of the step, g [N] the force that would hold the tip. With limit = mu |r_N| >= 0:
+
+    exact           |R| <= limit,   R = limit sgn(s) where s is not zero                 (2.8), (2.9)
+    regularised     R = limit s / sqrt(s² + eps²)                                        (7.1), J' of (3.5)
+
+eps [m] is a slip per *step*, not a speed: the rate that is rounded off is eps/dt.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+from ..errors import InputError, StepFailure
+from ..exact.numbers import check
+
+
+@dataclass(frozen=True)
+class Slip:
+    """The slip s of a step [m], the friction force R [N] and the Newton updates it took."""
+
+    s: float
+    force: float
+    updates: int
+
+
+class TipFriction(Protocol):
+    """Solves the scalar equation."""
+
+    def solve(self, c: float, g: float, limit: float) -> Slip: ...
+
+
+@dataclass(frozen=True)
+class ExactFriction:
+    """The inequality itself: the tip sticks while |g| <= limit, else R = ± limit. Closed form, no iteration."""
+
+    def solve(self, c: float, g: float, limit: float) -> Slip:
+        """s = (g - R)/c with R the point of [-limit, limit] nearest to g."""
+        force = min(max(g, -limit), limit)
+        return Slip((g - force) / c, force, 0)
+
+
+@dataclass(frozen=True)
+class RegularisedFriction:
+    """Newton's method from s = 0 for (7.9), the equation multiplied by the root:
+
+        F(s) = sqrt(s² + eps²) (c s - g) + limit s = 0
+
+    eps [m] > 0. ``tolerance``: |F| over c eps² (plus the round-off of F); ``absolute`` [N m] replaces it: 1e-10 in the
+    source. F has one zero, between 0 and the frictionless slip g/c, but is not monotonic where the slip is large beside
+    eps; Newton's method may then run away. ``safeguard`` bisects when an iterate leaves the bracket of the zero; off,
+    the method is the source's. InputError for numbers out of range.
+    """
+
+    eps: float
+    tolerance: float = 1e-9
+    absolute: float | None = None
+    max_iterations: int = 60
+    safeguard: bool = True
+
+    def __post_init__(self) -> None:
+        check(self, positive=("eps", "tolerance"))
+        if self.absolute is not None:
+            check(self, positive=("absolute",))
+        if self.max_iterations < 1:
+            raise InputError(f"RegularisedFriction: max_iterations is {self.max_iterations}; give a number from 1 on")
+
+    def solve(self, c: float, g: float, limit: float) -> Slip:
+        """The zero of F. StepFailure when max_iterations updates do not reach the tolerance."""
+        s, low, high = 0.0, *sorted((0.0, g / c * (1.0 + 1e-9)))  # a little wider: the zero may be its end
+        for updates in range(self.max_iterations + 1):
+            root = math.hypot(s, self.eps)
+            F = root * (c * s - g) + limit * s
+            if abs(F) <= self._stop(c, g, limit, s):
+                return Slip(s, limit * s / root, updates)
+            if self.safeguard:
+                low, high = (s, high) if F < 0.0 else (low, s)
+            slope = s / root * (c * s - g) + root * c + limit
+            s = s - F / slope if slope else math.inf
+            if self.safeguard and not low <= s <= high:
+                s = 0.5 * (low + high)
+            if not math.isfinite(s):
+                break
+        raise StepFailure(
+            f"Newton's method for the slip of the tip did not converge in {updates} updates (|F| = {abs(F):.1e} N m): "
+            "take a smaller time step, a larger eps, safeguard=True or ExactFriction()"
+        )
+
+    def _stop(self, c: float, g: float, limit: float, s: float) -> float:
+        """The largest |F| that counts as zero."""
+        if self.absolute is not None:
+            return self.absolute
+        size = abs(c * s) + abs(g) + limit
+        return self.tolerance * c * self.eps**2 + 1e-15 * size * math.hypot(s, self.eps)

@@ -1,0 +1,96 @@
+"""Timoshenko beam and Kelvin-Voigt rod: their coefficients and the state they start from (seed 002, section 2)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..algebra import Array
+from ..errors import InputError
+from ..exact.numbers import check
+
+Profile = Callable[[Array], Array]
+
+
+@dataclass(frozen=True)
+class TimoshenkoBeam:
+    """A beam clamped at x = 0 with a free tip at x = length, u up, theta the rotation of the section (2.6), (2.7):
+
+        rho I theta'' = E I theta_xx + K A G (u_x - theta) + viscosity (same terms of the rates)
+        rho A u''     = K A G (u_xx - theta_x) + viscosity (same terms of the rates) + f(t)
+
+    length [m]; rho [kg/m³]; area A [m²]; inertia I [m⁴]; E, G [Pa]; shear_factor K [-]; viscosity a2 [s] >= 0. The
+    defaults are seed 002's, with EI = KAG = 100. InputError for numbers out of range.
+    """
+
+    length: float = 5.0
+    rho: float = 1.0
+    area: float = 1.0
+    inertia: float = 1.0
+    E: float = 100.0
+    G: float = 100.0
+    shear_factor: float = 1.0
+    viscosity: float = 0.0
+
+    def __post_init__(self) -> None:
+        positive = ("length", "rho", "area", "inertia", "E", "G", "shear_factor")
+        check(self, positive=positive, not_negative=("viscosity",))
+
+    @property
+    def bending_stiffness(self) -> float:
+        """E I [N m²]."""
+        return self.E * self.inertia
+
+    @property
+    def shear_stiffness(self) -> float:
+        """K A G [N]."""
+        return self.shear_factor * self.area * self.G
+
+
+@dataclass(frozen=True)
+class Rod:
+    """A rod along x, clamped at x = 0, whose end x = length may touch a wall at the distance gap (2.1)-(2.4):
+
+        rho A v'' = E A (v_xx + viscosity v'_xx) + body_force(t),    v(length) <= gap
+
+    length [m]; rho [kg/m³]; area [m²]; E [Pa]; viscosity a1/c1 [s] >= 0; gap [m] >= 0; body_force [N/m] (f_h of the
+    seed, uniform) and end_force [N] pull towards the wall for positive values. InputError for numbers out of range.
+    """
+
+    length: float = 5.0
+    rho: float = 1.0
+    area: float = 1.0
+    E: float = 100.0
+    viscosity: float = 0.0
+    gap: float = 0.0
+    body_force: Callable[[float], float] | None = None
+    end_force: Callable[[float], float] | None = None
+
+    def __post_init__(self) -> None:
+        check(self, positive=("length", "rho", "area", "E"), not_negative=("viscosity", "gap"))
+        for name in ("body_force", "end_force"):
+            if getattr(self, name) is not None and not callable(getattr(self, name)):
+                raise InputError(f"Rod: {name} is {getattr(self, name)!r}; give a function of the time, or None")
+
+
+def _zero(x: Array) -> Array:
+    return np.zeros_like(x)
+
+
+@dataclass(frozen=True)
+class Start:
+    """Initial values as functions of x: displacement u [m], velocity v [m/s], rotation theta, its rate omega [1/s]."""
+
+    u: Profile = field(default=_zero)
+    v: Profile = field(default=_zero)
+    theta: Profile = field(default=_zero)
+    omega: Profile = field(default=_zero)
+
+    def at(self, name: str, x: Array) -> Array:
+        """One of the four at the nodes; InputError unless it gives finite numbers, one per node or one for all."""
+        values = np.asarray(getattr(self, name)(x), dtype=float)
+        if values.shape not in ((), x.shape) or not np.all(np.isfinite(values)):
+            raise InputError(f"Start: {name}(x) has shape {values.shape} or is not finite; return a number per node")
+        return np.broadcast_to(values, x.shape).copy()
