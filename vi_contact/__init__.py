@@ -47,6 +47,9 @@ _CONTENTS = {
     "exact.punch": ("RoundPunch", "StripPunch"),
     "exact.housner": ("HousnerBlock",),
     "exact.sliding": ("SlidingBlock",),
+    "exact.rigid_wall": ("RigidWall",),
+    "exact.racking": ("BoxFrame", "ChannelFrame", "racking_ratio"),
+    "exact.lining": ("ThickLining", "ThinLining"),
     # contract
     "step": ("Certificate", "ContactProblem", "Report", "State", "StepProblem", "StepResult"),
     # schemes
@@ -78,6 +81,7 @@ _CONTENTS = {
     "march": ("march",),
     "time_steps": ("HalvedAtImpact", "Schedule"),
     "static": ("static_equilibrium",),
+    "weight": ("with_weight",),
     "load_steps": ("quasi_static",),
     "simulate": ("Solution", "simulate"),
     "recorders": ("Contact", "Energy", "Probe"),

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import ufl
 
-from ..algebra import Array
+from ..algebra import Array, Mask
 from ..errors import InputError
 from ..surfaces import ContactSurface, Obstacle, Touching, admissible_gap
 from ..system import SemiDiscreteSystem
@@ -19,6 +19,7 @@ from .mesh import Facets
 from .space import FemSpace
 
 log = logging.getLogger(__name__)
+LEANING = 0.9  # cosine of the angle (26°) up to which a normal counts as lying in a symmetry plane
 
 
 def contact_surface(
@@ -31,8 +32,8 @@ def contact_surface(
     """The contact conditions of a boundary part, or only of the listed points of it (seed 000's case a).
 
     Nodal weights are ∫ phi_i times the section's thickness (so that r_n / weights is in Pa), nodal normals the
-    direction of ∫ phi_i n over the facets. Nodes of the facets that are clamped in every component (where the boundary
-    meets a clamped part) are left out.
+    direction of ∫ phi_i n over the facets, on rollers (a symmetry plane) without the component held there. Nodes of
+    the facets that are clamped in every component (where the boundary meets a clamped part) are left out.
 
     Args:
         obstacle: Touching() by default, HalfSpace, AnalyticGap or the user's own.
@@ -74,8 +75,18 @@ def nodes_on(space: FemSpace, facets: Facets) -> Nodes:
             f"boundary group '{facets.name}' lies inside the body, where cells on both sides share its nodes: cut the "
             "mesh open there (meshes.cut.CutOpen), or choose an outer boundary"
         )
-    normals = nodes.normals / np.linalg.norm(nodes.normals, axis=1)[:, None]
+    normals = in_symmetry_planes(nodes.normals / np.linalg.norm(nodes.normals, axis=1)[:, None], nodes.held)
     return replace(nodes, normals=normals).pick(np.argsort(nodes.numbers))
+
+
+def in_symmetry_planes(normals: Array, held: Mask) -> Array:
+    """Normals (k, d) without the prescribed components of their nodes, where that turns them by little.
+
+    On a symmetry plane the true normal lies in the plane; that of the facets on one side of it leans to that side.
+    """
+    inside = np.where(held, 0.0, normals)
+    length = np.linalg.norm(inside, axis=1)[:, None]
+    return np.asarray(np.where(length > LEANING, inside / np.maximum(length, LEANING), normals))
 
 
 def free_nodes(space: FemSpace, nodes: Nodes, name: str) -> Nodes:

@@ -1,0 +1,158 @@
+"""A circular lining in an elastic full space that is sheared far away, with and without friction at its outside.
+
+``ThickLining`` is the plane-strain solution of two rings of Michell's second harmonic; theta is measured from the
+direction in which the ground is stretched, at 45° to the shear gamma:
+
+    phi = (A r² + B r⁴ + C/r² + D) cos 2 theta
+    sigma_r = -(2 A + 6 C/r⁴ + 4 D/r²) cos 2 theta
+    sigma_theta = (2 A + 12 B r² + 6 C/r⁴) cos 2 theta
+    tau = (2 A + 6 B r² - 6 C/r⁴ - 2 D/r²) sin 2 theta
+    2 G u_r = (-2 A r - 4 nu B r³ + 2 C/r³ + 4 (1 - nu) D/r) cos 2 theta
+    2 G u_theta = (2 A r + 2 (3 - 2 nu) B r³ + 2 C/r³ - 2 (1 - 2 nu) D/r) sin 2 theta
+
+with A = -G gamma/2, B = 0 in the soil. ``ThinLining`` is the usual formula for a thin shell (Wang 1993, Hashash et al.
+2001). Both suppose that soil and lining do not part: with full slip that needs a pressure beforehand.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..algebra import Array
+from ..errors import InputError
+from ..materials import LinearElastic
+from .numbers import check
+
+
+@dataclass(frozen=True)
+class ThinLining:
+    """radius R [m], thickness t [m]; lining and soil of two materials, plane strain."""
+
+    radius: float
+    thickness: float
+    lining: LinearElastic
+    soil: LinearElastic
+
+    def __post_init__(self) -> None:
+        check(self, positive=("radius", "thickness"))
+
+    @property
+    def compressibility(self) -> float:
+        """C = E_m (1 - nu_l²) R/(E_l t (1 + nu)(1 - 2 nu))."""
+        nu = self.soil.nu
+        hoop = self.lining.E * self.thickness * (1.0 + nu) * (1.0 - 2.0 * nu)
+        return self.soil.E * (1.0 - self.lining.nu**2) * self.radius / hoop
+
+    @property
+    def flexibility(self) -> float:
+        """F = E_m (1 - nu_l²) R³/(6 E_l I (1 + nu)), I = t³/12."""
+        bending = 6.0 * self.lining.E * self.thickness**3 / 12.0 * (1.0 + self.soil.nu)
+        return self.soil.E * (1.0 - self.lining.nu**2) * self.radius**3 / bending
+
+    @property
+    def full_slip(self) -> float:
+        """K1 = 12 (1 - nu)/(2 F + 5 - 6 nu)."""
+        nu = self.soil.nu
+        return 12.0 * (1.0 - nu) / (2.0 * self.flexibility + 5.0 - 6.0 * nu)
+
+    def diameter_change(self, gamma: float) -> float:
+        """Full slip: K1 F gamma D/3 [m], of the diameter that is stretched most."""
+        return self.full_slip * self.flexibility * gamma / 3.0 * 2.0 * self.radius
+
+    def thrust(self, gamma: float, *, slip: bool) -> float:
+        """Largest hoop force [N/m]: full slip K1 E_m R gamma/(6 (1 + nu)), no slip K2 G R gamma."""
+        nu, F, C = self.soil.nu, self.flexibility, self.compressibility
+        if slip:
+            return self.full_slip * self.soil.E * self.radius * gamma / (6.0 * (1.0 + nu))
+        a = 1.0 - 2.0 * nu
+        above = F * (a - a * C) - 0.5 * a**2 + 2.0
+        below = F * ((3.0 - 2.0 * nu) + a * C) + C * (2.5 - 8.0 * nu + 6.0 * nu**2) + 6.0 - 8.0 * nu
+        return (1.0 + above / below) * self.soil.shear_modulus * gamma * self.radius
+
+    def moment(self, gamma: float) -> float:
+        """Full slip: largest bending moment [N m/m], thrust times R."""
+        return self.thrust(gamma, slip=True) * self.radius
+
+
+@dataclass(frozen=True)
+class ThickLining:
+    """inner and outer radius [m]; ``slip``: no friction at the outside, else nothing slides there."""
+
+    inner: float
+    outer: float
+    lining: LinearElastic
+    soil: LinearElastic
+    slip: bool = True
+
+    def __post_init__(self) -> None:
+        check(self, positive=("inner", "outer"))
+        if not self.inner < self.outer:
+            raise InputError(f"ThickLining: inner radius {self.inner!r} m, outer {self.outer!r} m; give inner < outer")
+
+    @cached_property
+    def _constants(self) -> Array:
+        """A, B, C, D of the lining; C, D of the soil, for gamma = 1 and lengths in units of the outer radius."""
+        G = self.soil.shear_modulus
+        lining, soil = self._rows(self.lining), self._rows(self.soil)
+        inside, interface = lining(self.inner / self.outer), lining(1.0)
+        outside = soil(1.0)
+        far = np.array([-0.5 * G, 0.0, 0.0, 0.0])
+        matrix, right = np.zeros((6, 6)), np.zeros(6)
+        matrix[0, :4], matrix[1, :4] = inside["sigma_r"], inside["tau"]
+        jumps = ["u_r", "sigma_r"] + ([] if self.slip else ["u_theta", "tau"])
+        for row, name in enumerate(jumps, 2):
+            matrix[row, :4], matrix[row, 4:] = interface[name], -outside[name][2:]
+            right[row] = outside[name] @ far
+        if self.slip:
+            matrix[4, :4] = interface["tau"]
+            matrix[5, 4:], right[5] = outside["tau"][2:], -outside["tau"] @ far
+        scale = np.abs(matrix).max(axis=1)
+        return np.asarray(np.linalg.solve(matrix / scale[:, None], right / scale))
+
+    @staticmethod
+    def _rows(material: LinearElastic) -> Callable[[float], dict[str, Array]]:
+        """Amplitudes of the fields at r as products with (A, B, C, D)."""
+        nu, G2 = material.nu, 2.0 * material.shear_modulus
+
+        def at(r: float) -> dict[str, Array]:
+            return {
+                "sigma_r": -np.array([2.0, 0.0, 6.0 / r**4, 4.0 / r**2]),
+                "sigma_theta": np.array([2.0, 12.0 * r**2, 6.0 / r**4, 0.0]),
+                "tau": np.array([2.0, 6.0 * r**2, -6.0 / r**4, -2.0 / r**2]),
+                "u_r": np.array([-2.0 * r, -4.0 * nu * r**3, 2.0 / r**3, 4.0 * (1.0 - nu) / r]) / G2,
+                "u_theta": np.array([2 * r, 2 * (3 - 2 * nu) * r**3, 2 / r**3, -2 * (1 - 2 * nu) / r]) / G2,
+            }
+
+        return at
+
+    def field(self, name: str, r: float, gamma: float) -> float:
+        """Amplitude of "sigma_r", "sigma_theta", "tau" [Pa], "u_r" or "u_theta" [m] in the lining at r [m]."""
+        size = self.outer if name.startswith("u_") else 1.0
+        return float(gamma * size * (self._rows(self.lining)(r / self.outer)[name] @ self._constants[:4]))
+
+    def diameter_change(self, gamma: float) -> float:
+        """2 u_r [m] at the outside, of the diameter that is stretched most."""
+        return 2.0 * self.field("u_r", self.outer, gamma)
+
+    def pressure(self, gamma: float) -> float:
+        """Amplitude of sigma_r [Pa] at the outside: contact lasts under a pressure beforehand that exceeds it."""
+        return self.field("sigma_r", self.outer, gamma)
+
+    def thrust(self, gamma: float) -> float:
+        """Amplitude of the hoop force N = ∫ sigma_theta dr [N/m]."""
+        return self._integral(gamma)[0]
+
+    def moment(self, gamma: float) -> float:
+        """Amplitude of the bending moment ∫ sigma_theta (r - R) dr [N m/m] about the mean radius R."""
+        return self._integral(gamma)[1]
+
+    def _integral(self, gamma: float) -> tuple[float, float]:
+        """Gauss quadrature across the thickness."""
+        x, w = np.polynomial.legendre.leggauss(12)
+        half, mean = 0.5 * (self.outer - self.inner), 0.5 * (self.outer + self.inner)
+        hoop = np.array([self.field("sigma_theta", mean + half * s, gamma) for s in x])
+        return float(half * (w @ hoop)), float(half * (w @ (hoop * half * x)))

@@ -1,0 +1,153 @@
+"""Work of a group of cells on virtual displacements: the resultants of nodal forces without making the forces.
+
+The nodal forces that hold a group of cells in its motion are q = K u + C v + M a - f, all of these cells alone, with a
+the absolute acceleration and f their loads. For a nodal field r, rᵀq is a number, and as K, C, M are symmetric it is
+(K r)ᵀu + (C r)ᵀv + (M r)ᵀa - rᵀf: three sparse products a step, however many cells there are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+import ufl
+
+from ..algebra import Array, Mask
+from ..errors import InputError
+from ..step import ContactProblem, Report, State
+from . import compat
+from .loads import BodyForce, TangentialTraction, Traction, as_tuple, evaluate, is_constant
+from .space import FemSpace
+
+Loads = Traction | BodyForce | Sequence[Traction | BodyForce]
+
+
+class NodalWork:
+    """rᵀ(K u + C v + M a - f) for any number of pairs (r, group of cells).
+
+    Args:
+        problem: its system is made by ``fem.assemble``; InputError otherwise.
+        loads: those given to ``fem.assemble``: what acts on cells of the group belongs to their balance.
+    """
+
+    def __init__(self, problem: ContactProblem, loads: Loads = ()) -> None:
+        space = problem.system.space
+        if not isinstance(space, FemSpace) or space.forms is None:
+            raise InputError("reactions and section forces need a system made by fem.assemble")
+        self._problem, self.space, self._loads = problem, space, as_tuple(loads)
+        self._r, self._inside = compat.function(space.V), compat.function(compat.cell_space(space.mesh))
+        self._forms = [None if form is None else compat.compile_form(form) for form in self._motions()]
+        self._load_forms = [compat.compile_form(self._load(load)) for load in self._loads]
+        self._rows: list[list[Any]] = [[] for _ in range(len(self._forms) + len(self._loads))]
+
+    def _motions(self) -> tuple[Any, Any | None, Any]:
+        """(K r, C r, M r) of the cells inside, as linear forms."""
+        forms, w, r, inside = self.space.forms, ufl.TestFunction(self.space.V), self._r, self._inside
+        strain = ufl.inner(forms.stress(r), ufl.sym(ufl.grad(w)))
+        mass = ufl.inner(r, w)
+        fields = forms.fields
+        damping = inside * (fields["alpha_rho"] * mass + fields["beta"] * strain) * ufl.dx if forms.damped else None
+        return inside * strain * ufl.dx, damping, inside * fields["rho"] * mass * ufl.dx
+
+    def _load(self, load: Traction | BodyForce) -> Any:
+        """Its product with nodal values of the load is rᵀf."""
+        g, mesh, thickness = ufl.TestFunction(self.space.V), self.space.mesh, self.space.forms.section.thickness
+        if isinstance(load, BodyForce):
+            return thickness * self._inside * ufl.inner(self._r, g) * ufl.dx
+        n = ufl.FacetNormal(mesh)
+        acting = g - ufl.dot(g, n) * n if isinstance(load, TangentialTraction) else g
+        ds = compat.measure(mesh, mesh.topology.dim - 1, load.facets.indices)
+        return thickness * self._inside * ufl.inner(self._r, acting) * ds
+
+    def add(self, r: Array, cells: Mask | None = None) -> None:
+        """A field r (owned nodes, d) and the group (mask of the local cells, ghosts too; all when None). Collective."""
+        self._r.x.array[: r.size] = r.ravel()
+        self._r.x.scatter_forward()
+        self._inside.x.array[:] = 1.0 if cells is None else cells
+        for rows, form in zip(self._rows, [*self._forms, *self._load_forms], strict=True):
+            if form is not None:
+                rows.append(sp.csr_matrix(compat.assemble_vector(form).array_r))
+        self._stacked: list[Any] | None = None
+
+    def _matrices(self) -> list[Any]:
+        if self._stacked is None:
+            self._stacked = [sp.vstack(rows).tocsr() if rows else None for rows in self._rows]
+        return self._stacked
+
+    def at_rest(self, state: State) -> Array:
+        """Of a state without acceleration, (count,): a static one, or the start of a run before the ground moves."""
+        problem, space, t = self._problem, self.space, state.t
+        motion = [space.expand(problem.cartesian(x), t, k) for k, x in enumerate((state.u, state.v))]
+        return self._sum([*motion, np.zeros_like(motion[0])], lambda one: one(t))
+
+    def of_step(self, report: Report) -> Array:
+        """Of the equation of motion that the step satisfied (``Report.balance``), with absolute accelerations: (count,).
+
+        Loads, prescribed and ground motion are taken between the ends of the step where the balance has its u.
+        """
+        problem, space, balance = self._problem, self.space, report.balance
+        late, t0, t1 = self._place(report), report.old.t, report.new.t
+
+        def between(value: Callable[[float], Any]) -> Any:
+            return value(t1) if late == 1.0 else (1.0 - late) * value(t0) + late * value(t1)
+
+        moves = any(condition.moves for condition in space.prescribed)
+        motion = []
+        for k, x in enumerate((balance.u, balance.v, balance.a)):
+            free = problem.cartesian(x)
+            nodal = between(lambda t, free=free, k=k: space.expand(free, t, k)) if moves else space.expand(free, t1, k)
+            motion.append(nodal)
+        motion[2] = motion[2] + between(problem.ground_acceleration)
+        return self._sum(motion, between)
+
+    def _place(self, report: Report) -> float:
+        """w of u = (1 - w) u_old + w u_new; the end where nothing moved."""
+        way, here = report.new.u - report.old.u, report.balance.u - report.old.u
+        both, square = self.space.comm.sum(np.array([here @ way, way @ way]))
+        return float(min(max(both / square, 0.0), 1.0)) if square > 0.0 else 1.0
+
+    def _sum(self, motion: Sequence[Array], at: Callable[[Callable[[float], Any]], Any]) -> Array:
+        """The numbers for nodal u, v, a (owned, d); ``at`` evaluates functions of time."""
+        matrices = self._matrices()
+        total = np.zeros(max(matrix.shape[0] for matrix in matrices if matrix is not None))
+        for matrix, x in zip(matrices, motion, strict=False):
+            if matrix is not None:
+                total += matrix @ x.ravel()
+        for matrix, load in zip(matrices[len(self._forms) :], self._loads, strict=True):
+            total -= matrix @ self._values(load, at).ravel()
+        return self.space.comm.sum(total)
+
+    def _values(self, load: Traction | BodyForce, at: Callable[[Callable[[float], Any]], Any]) -> Array:
+        """Nodal values (owned, d) of a load."""
+
+        def nodal(t: float) -> Array:
+            return evaluate(type(load).__name__, load.value, self.space.points, t, self.space.comm)
+
+        if load.history is not None:
+            return np.asarray(at(load.history) * nodal(0.0))
+        return np.asarray(nodal(0.0) if is_constant(load) else at(nodal))
+
+
+def rigid_fields(points: Array, centre: Sequence[float]) -> tuple[list[Array], list[str]]:
+    """Nodal fields (k, d) of unit translations and of the unit rotations about the centre, and names of their work:
+    axes, then M, in three dimensions M_x, M_y, M_z, in one none."""
+    d = points.shape[1]
+    arms = points - np.asarray(centre, dtype=float)
+    fields = [np.tile(axis, (len(points), 1)) for axis in np.eye(d)]
+    names = list("xyz"[:d])
+    if d == 2:
+        fields.append(np.column_stack([-arms[:, 1], arms[:, 0]]))
+        names.append("M")
+    if d == 3:
+        fields += [np.cross(axis, arms) for axis in np.eye(3)]
+        names += [f"M_{axis}" for axis in "xyz"]
+    return fields, names
+
+
+def check_labels(kind: str, points: Mapping[str, Sequence[float]], dimension: int) -> None:
+    """InputError for a point with a wrong number of coordinates."""
+    for label, point in points.items():
+        if len(point) != dimension:
+            raise InputError(f"{kind} '{label}': a point has {len(point)} coordinates, give {dimension}")

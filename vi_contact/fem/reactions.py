@@ -1,0 +1,90 @@
+"""Reactions of prescribed boundaries: base shear and overturning moment."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError
+from ..recorders import Columns, Row
+from ..step import ContactProblem, Report, State
+from .mesh import Facets
+from .nodal_work import Loads, NodalWork, rigid_fields
+from .space import FemSpace
+
+
+@dataclass
+class Reactions:
+    """Recorder of what a clamped or prescribed boundary does to its body: force [N] and moment about a centre [N m].
+
+    On the held components c of the nodes of the facets, with the loads f on them and the absolute acceleration a + a_g:
+
+        R = (K u + C v + M (a + r a_g) - f)_c
+
+    The rows of the equation of motion that the elimination of prescribed displacements took out. In the relative frame
+    the inertia load of the ground motion is M r a_g, of the held nodes too, so that R is the same force as with the
+    ground moved by ``Prescribed``, and balances all masses, loads and contact forces of the body (with
+    ``base_inertia=True``, the default of ``assemble``; K, C, M are those of the elements, whatever a time scheme does
+    to the mass of contact nodes). Values are those of the step's equation of motion, its mean or end, as the contact
+    reactions are; row 0 is that of the initial state at rest.
+
+    Columns reaction_x_<name>, reaction_y_<name>, …: the force on the body; reaction_M_<name> about the centre,
+    anticlockwise positive (reaction_M_x_<name>, … in three dimensions). Base shear is reaction_x, the overturning
+    moment of the body on its base is -reaction_M.
+
+    Args:
+        facets: a boundary with prescribed components; other components of its nodes are not counted.
+        loads: those given to ``assemble``: their part on the held nodes goes straight into the support.
+    Raises:
+        InputError: nothing is prescribed on the facets.
+    """
+
+    name: str
+    facets: Facets
+    centre: Sequence[float]
+    loads: Loads = ()
+
+    def __post_init__(self) -> None:
+        if not re.fullmatch(r"\w+", self.name, re.ASCII):
+            raise InputError(f"reaction name {self.name!r}: use letters, digits and underscores, it names columns")
+
+    def columns(self) -> Columns:
+        """Call ``start`` first."""
+        found = {}
+        for part in self._parts:
+            axis = part.removeprefix("M").removeprefix("_")
+            along = f" along {axis}" if axis else ""
+            turning = part.startswith("M")
+            text = f"moment of boundary {self.name} on the body about its centre" if turning else (
+                f"force of boundary {self.name} on the body"
+            )
+            found[f"reaction_{part}_{self.name}"] = ("N m" if turning else "N", text + along)
+        return found
+
+    def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
+        """Prepares the work of rigid motions of the held nodes; the row of the state at rest. Collective."""
+        self._work = NodalWork(problem, self.loads)
+        space: FemSpace = self._work.space
+        if len(self.centre) != space.dimension:
+            raise InputError(f"reactions '{self.name}': the centre has {len(self.centre)} coordinates, give "
+                             f"{space.dimension}")
+        held = np.zeros_like(space.held)
+        blocks = space.facet_blocks(self.facets.indices)
+        held[blocks] = space.held[blocks]
+        if not space.comm.max(np.array([float(held.any())]))[0]:
+            raise InputError(f"nothing is prescribed on boundary group '{self.facets.name}': it has no reactions")
+        fields, self._parts = rigid_fields(space.points, self.centre)
+        for field in fields:
+            self._work.add(np.where(held, field, 0.0))
+        return self._named(self._work.at_rest(state))
+
+    def row(self, report: Report) -> Row:
+        return self._named(self._work.of_step(report))
+
+    def _named(self, values: np.ndarray) -> Row:
+        return {
+            f"reaction_{part}_{self.name}": float(value) for part, value in zip(self._parts, values, strict=True)
+        }

@@ -1,0 +1,78 @@
+"""Racking of a frame: the shear of four corner points, which no rigid rotation changes."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .algebra import Array
+from .errors import InputError
+from .recorders import Columns, Row
+from .step import ContactProblem, Report, State
+
+
+def racking(corners: Array, displacements: Array) -> tuple[Array, Array]:
+    """(racking, rotation) of four corners (4, 2) [m] with displacements (..., 4, 2) [m]; each (...,), in radians.
+
+    The displacement gradient G that fits the corners best, u = a + G X, gives racking = du_x/dy + du_y/dx and rotation
+    = (du_y/dx - du_x/dy)/2, anticlockwise. Of a rectangle du_x/dy is the mean over its two sides and du_y/dx that over
+    bottom and top (Wang 1993: the racking ratio is this over the free field's shear strain).
+    InputError for corners on one line.
+    """
+    x = np.asarray(corners, dtype=float)
+    if x.shape != (4, 2):
+        raise InputError(f"racking needs four corners of two coordinates, these have the shape {x.shape}")
+    arms = x - x.mean(axis=0)
+    gram = arms.T @ arms
+    if np.linalg.eigvalsh(gram)[0] <= 1e-12 * np.trace(gram):
+        raise InputError("the four corners of a racking are on one line: give the corners of a frame")
+    gradient = np.einsum("...ki,kj->...ij", np.asarray(displacements, dtype=float), arms @ np.linalg.inv(gram))
+    return gradient[..., 0, 1] + gradient[..., 1, 0], 0.5 * (gradient[..., 1, 0] - gradient[..., 0, 1])
+
+
+@dataclass
+class Racking:
+    """Recorder of racking: label -> four corner points (x, y) [m], at the nodes nearest to them.
+
+    Columns racking_<label>, rotation_<label> [rad]: see ``racking``. A rigid motion of the frame, and of the ground,
+    leaves racking alone. InputError for corners that are not four, on one line, or outside the body.
+    """
+
+    frames: Mapping[str, Sequence[Sequence[float]]]
+
+    def __post_init__(self) -> None:
+        for label, corners in self.frames.items():
+            if not re.fullmatch(r"\w+", str(label), re.ASCII):
+                raise InputError(f"racking label {label!r}: use letters, digits and underscores, it names columns")
+            racking(np.asarray(corners, dtype=float), np.zeros((4, 2)))
+
+    def columns(self) -> Columns:
+        """racking_<label>, rotation_<label>."""
+        found = {}
+        for label in self.frames:
+            found[f"racking_{label}"] = ("rad", f"racking du_x/dy + du_y/dx of frame {label}")
+            found[f"rotation_{label}"] = ("rad", f"rotation of frame {label}, anticlockwise positive")
+        return found
+
+    def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
+        """Finds the nodes."""
+        self._problem, space = problem, problem.system.space
+        if space.dimension != 2:
+            raise InputError(f"racking is of plane frames, the body has {space.dimension} dimensions")
+        self._nodes = {k: space.find_nodes(np.asarray(corners, float)) for k, corners in self.frames.items()}
+        return self._row(state)
+
+    def row(self, report: Report) -> Row:
+        return self._row(report.new)
+
+    def _row(self, state: State) -> Row:
+        found = {}
+        u = self._problem.cartesian(state.u)
+        for label, nodes in self._nodes.items():
+            values = self._problem.system.space.sample(u, nodes, state.t)
+            shear, turn = racking(np.asarray(self.frames[label], dtype=float), values)
+            found[f"racking_{label}"], found[f"rotation_{label}"] = float(shear), float(turn)
+        return found
