@@ -1,0 +1,100 @@
+"""What the runs of ready models have in common: records, length of the run, solvers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+from ..cross_check import CrossChecked
+from ..errors import InputError
+from ..excitation import Excitation, GroundMotion
+from ..ground_motion import Record, pga, read_record, resampled, scaled, scaled_to_pga
+from ..step import Solver
+from .choices import SCHEMES, SOLVERS
+
+
+class RunOptions(Protocol):
+    """Options by the names of the command line. ``motion``: a record file; without one a harmonic shakes the model."""
+
+    @property
+    def motion(self) -> str | None: ...
+    @property
+    def vertical(self) -> str | None: ...
+    @property
+    def units(self) -> str | None: ...
+    @property
+    def scale(self) -> float: ...
+    @property
+    def pga(self) -> float | None: ...
+    @property
+    def resample(self) -> float | None: ...
+    @property
+    def solver(self) -> str: ...
+    @property
+    def scheme(self) -> str: ...
+    @property
+    def steps(self) -> int | None: ...
+    @property
+    def cross_check(self) -> bool: ...
+    @property
+    def fields_every(self) -> int: ...
+
+
+def check_options(run: RunOptions) -> None:
+    """InputError for unknown words and for options of a record without one."""
+    check_word("solver", run.solver, list(SOLVERS))
+    check_word("scheme", run.scheme, list(SCHEMES))
+    if run.motion is None and run.vertical is None:
+        for name, value in (("pga", run.pga), ("units", run.units), ("resample", run.resample)):
+            if value is not None:
+                raise InputError(f"{name} speaks of a record: give a motion file too, or leave {name} out")
+    if run.fields_every < 0:
+        raise InputError(f"fields_every is {run.fields_every}: give a number of steps, or 0 for no fields")
+
+
+def check_word(name: str, given: str, known: Sequence[str]) -> None:
+    """InputError for a word that is not among those known."""
+    if given not in known:
+        raise InputError(f"unknown {name} '{given}': choose one of {', '.join(known)}")
+
+
+def records(run: RunOptions) -> list[Record | None]:
+    """(horizontal, vertical) records in m/s², resampled and scaled as asked; both by the same factor, which brings the
+    first one that is given to the wanted peak."""
+    raw = [None if path is None else read_record(path, run.units) for path in (run.motion, run.vertical)]
+    if run.resample is not None:
+        raw = [None if one is None else resampled(one, run.resample) for one in raw]
+    first = next((one for one in raw if one is not None), None)
+    factor = run.scale
+    if run.pga is not None and first is not None:
+        factor = pga(scaled_to_pga(first, run.pga)) / pga(first)
+    return [None if one is None else scaled(one, factor=factor) for one in raw]
+
+
+def excitations(shaking: Sequence[Record | None], harmonic: Callable[[], Excitation]) -> list[Excitation]:
+    """Horizontal and vertical motion of the records, or the model's own harmonic without any."""
+    directions = ((1.0, 0.0), (0.0, 1.0))
+    found: list[Excitation] = [
+        GroundMotion(record, direction=direction)
+        for record, direction in zip(shaking, directions, strict=True)
+        if record is not None
+    ]
+    return found or [harmonic()]
+
+
+def number_of_steps(run: RunOptions, dt: float, shaking: Sequence[Excitation]) -> int:
+    """As asked; else the whole record, or the seed's 400 steps."""
+    if run.steps is not None:
+        return run.steps
+    duration = max(one.duration for one in shaking)
+    return 400 if duration == float("inf") or dt <= 0.0 else int(duration / dt) + 1
+
+
+def solvers(run: RunOptions) -> tuple[Solver, CrossChecked | None]:
+    """The solver; with ``cross_check`` the other route accompanies every step."""
+    solver = SOLVERS[run.solver]
+    if not run.cross_check:
+        return solver, None
+    other = "condensed" if run.solver.startswith("volume") else "volume-reference"
+    checked = CrossChecked(solver, (SOLVERS[other],))
+    return checked, checked
