@@ -20,8 +20,8 @@ RANKS = {  # by the first part of a module's name; what is not named is a worker
     0: "algebra errors exact materials friction impact excitation ground_motion handing_over mass meshes surfaces "
        "system",
     1: "step",
-    3: "models",
-    4: "cli __main__ __init__",
+    3: "models studies",
+    4: "cli cli_case __main__ __init__",
 }
 WORKER = 2
 HOMES = {  # foreign package: modules that may import it; "late": only inside functions

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from . import __version__
+from .cli_case import add_case_commands
 from .cli_motion import add_motion_commands
 from .errors import ViContactError
 
@@ -30,6 +31,7 @@ def parser() -> argparse.ArgumentParser:
     )
     add_wall_arguments(wall)
     wall.set_defaults(run=_wall)
+    add_case_commands(commands)
     add_motion_commands(commands)
     return top
 

@@ -1,0 +1,154 @@
+"""A table is a call: tables are read against the signatures of the functions they name, before anything is computed.
+
+    [friction]
+    type = "Coulomb"       Coulomb(mu=0.3)
+    mu = 0.3
+
+``read`` turns a value of the file into a node by the type hint of the parameter it is for, and refuses what does not
+fit in one sentence with file, table and key. ``node.build(context)`` makes the calls; the context supplies what no file
+holds: communicator, mesh, its groups, system. Nothing of the file is ever evaluated as code.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, is_dataclass
+from inspect import Parameter, signature
+from typing import Any, Protocol, get_type_hints
+
+from ..errors import InputError
+
+Context = Mapping[str, Any]
+GIVEN = ("comm", "mesh", "system")  # parameters that the context supplies
+
+
+class Node(Protocol):
+    """A value that has been read; ``build`` makes it."""
+
+    def build(self, context: Context) -> Any: ...
+
+
+@dataclass(frozen=True)
+class Spot:
+    """Where in the file: str() is "[system.damping] alpha"."""
+
+    file: str
+    table: str = ""
+    key: str = ""
+
+    def __str__(self) -> str:
+        return f"[{self.table}] {self.key}".strip() if self.table else f"[{self.key}]"
+
+    def at(self, key: str) -> Spot:
+        """A key of the table that is here."""
+        return Spot(self.file, self._here(), key)
+
+    def entry(self, number: int) -> Spot:
+        """An entry of the list that is here, counted from 1."""
+        return Spot(self.file, self.table, f"{self.key}[{number}]")
+
+    def _here(self) -> str:
+        return f"{self.table}.{self.key}" if self.table and self.key else self.table or self.key
+
+    def wrong(self, text: str) -> InputError:
+        """What is wrong here; ``text`` continues the sentence."""
+        return InputError(f"{self.file}: {self} {text}")
+
+    def inside(self, text: str) -> InputError:
+        """What is wrong with the table that is here."""
+        return InputError(f"{self.file}: [{self._here()}] {text}")
+
+
+@dataclass(frozen=True)
+class Value:
+    """A plain value."""
+
+    value: Any
+
+    def build(self, context: Context) -> Any:
+        return self.value
+
+
+@dataclass(frozen=True)
+class Group:
+    """A named group of the mesh."""
+
+    name: str
+    kind: type
+    spot: Spot
+
+    def build(self, context: Context) -> Any:
+        try:
+            found = context["tags"][self.name]
+        except InputError as error:
+            raise self.spot.wrong(f"is '{self.name}', but the {error}") from None
+        if not isinstance(found, self.kind):
+            wanted = GROUP[self.kind.__name__]
+            raise self.spot.wrong(f"is '{self.name}', a group of other things: give the name of {wanted}")
+        return found
+
+
+GROUP = {"Facets": "a boundary group", "Cells": "a cell group"}
+
+
+@dataclass(frozen=True)
+class Items:
+    """A list, as a tuple."""
+
+    items: tuple[Node, ...]
+
+    def build(self, context: Context) -> Any:
+        return tuple(one.build(context) for one in self.items)
+
+
+@dataclass(frozen=True)
+class Named:
+    """A table of names."""
+
+    items: Mapping[str, Node]
+
+    def build(self, context: Context) -> Any:
+        return {name: one.build(context) for name, one in self.items.items()}
+
+
+@dataclass(frozen=True)
+class Callee:
+    """A function that tables may call: the hints of its parameters, which of them it needs, which are supplied."""
+
+    name: str
+    function: Callable[..., Any]
+    hints: Mapping[str, Any]
+    required: frozenset[str] = frozenset()
+    given: tuple[str, ...] = ()
+
+
+def callee(function: Callable[..., Any], *, name: str = "", only: Sequence[str] = ()) -> Callee:
+    """How to call a function or a class; ``only``: the parameters a file may give."""
+    plain_class = isinstance(function, type) and not is_dataclass(function)
+    hints = get_type_hints(vars(function).get("__init__", object.__init__) if plain_class else function)
+    parameters = signature(function).parameters
+    settable = [one for one in parameters if one not in GIVEN and (not only or one in only)]
+    return Callee(
+        name or getattr(function, "__name__", ""),
+        function,
+        {one: hints[one] for one in settable},
+        frozenset(one for one in settable if parameters[one].default is Parameter.empty),
+        tuple(one for one in parameters if one in GIVEN),
+    )
+
+
+@dataclass(frozen=True)
+class Call:
+    """A call; InputErrors of the function get the place in the file."""
+
+    callee: Callee
+    arguments: Mapping[str, Node]
+    spot: Spot = field(compare=False)
+
+    def build(self, context: Context) -> Any:
+        supplied = {name: context[name] for name in self.callee.given}
+        arguments = {name: node.build(context) for name, node in self.arguments.items()}
+        try:
+            return self.callee.function(**supplied, **arguments)
+        except InputError as error:
+            raise self.spot.inside(f"{error}") from error

@@ -1,0 +1,232 @@
+"""Case files: a contact problem and its run in TOML, table by table the calls of the Python interface.
+
+    [mesh]            fem.build_mesh, fem.read_mesh        [scheme] [solver] [[escalation]]
+    [material.NAME]   LinearElastic                        [[record]] [fields]
+    [system]          fem.assemble                         [run]      the other arguments of simulate
+    [[contact]]       fem.contact_surface, .contact_pair   [gravity]  with_weight, then static_equilibrium
+    [friction] [impact] [mass] [[excitation]]              [model]    instead of mesh, material, system, contact
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from ..cross_check import CrossChecked
+from ..errors import InputError
+from ..excitation import Excitation
+from ..fem.assembly import assemble
+from ..fem.joined import together
+from ..fem.mesh import build_mesh, read_mesh
+from ..friction import FrictionLaw, Frictionless
+from ..impact import ImpactLaw
+from ..mass import MassLaw
+from ..materials import LinearElastic
+from ..meshes.gmsh_session import MeshScript
+from ..output import on_root, run_folder, write_atomically
+from ..simulate import Solution, simulate
+from ..solvers.condensed import Condensed
+from ..static import static_equilibrium
+from ..step import ContactProblem, Recorder, Scheme, Solver
+from ..surfaces import ContactSurface, empty_surface
+from ..weight import with_weight
+from ..writer import FieldWriter
+from .calls import Callee, Named, Node, Spot, callee
+from .models import Parts
+from .reading import Words, arguments, nearest, read
+from .toml_file import read_toml, with_settings
+from .words import MeshFile, words
+
+COPY = "case.toml"
+_HINTS: dict[str, Any] = {
+    "title": str,
+    "model": Parts,
+    "mesh": MeshScript | MeshFile,
+    "material": Mapping[str, LinearElastic],
+    "contact": ContactSurface | Sequence[ContactSurface],
+    "friction": FrictionLaw,
+    "impact": ImpactLaw,
+    "mass": MassLaw,
+    "excitation": Excitation | Sequence[Excitation],
+    "scheme": Scheme,
+    "solver": Solver,
+    "escalation": Solver | Sequence[Solver],
+    "record": Recorder | Sequence[Recorder],
+    "fields": FieldWriter,
+}
+_CALLED: dict[str, Callee] = {  # tables that always call the same function
+    "system": callee(assemble),
+    "gravity": callee(with_weight),
+    "run": replace(
+        callee(simulate, only=("dt", "t_end", "steps", "tolerance", "checkpoint_every", "out")),
+        function=dict,
+    ),
+}
+TABLES = ("title", "model", "mesh", "material", "system", "contact", "gravity", "friction", "impact", "mass",
+           "excitation", "scheme", "solver", "escalation", "run", "record", "fields")
+
+
+@dataclass(frozen=True)
+class Case:
+    """A case file that has been read and checked; nothing is computed yet.
+
+    path: of the file; tables: its content, with the settings; settings: the KEY=VALUE made after reading; nodes: the
+    calls that its tables are.
+    """
+
+    path: Path
+    tables: Mapping[str, Any]
+    settings: tuple[str, ...]
+    nodes: Mapping[str, Node] = field(repr=False)
+
+    @property
+    def out(self) -> Path | None:
+        """The run folder of [run], if it names one."""
+        folder: Path | None = self._made("run").get("out")
+        return folder
+
+    def excitations(self) -> tuple[Excitation, ...]:
+        """What shakes the body; record files are read here."""
+        return self._several("excitation")
+
+    def check(self) -> None:
+        """Makes everything that needs no mesh, so that a wrong value or record file is told at once; InputError."""
+        for table in ("material", *TABLES[TABLES.index("friction") :]):
+            self._made(table)
+
+    def problem(self, comm: Any) -> ContactProblem:
+        """The contact problem; collective."""
+        return self._problem(self._parts(comm))
+
+    def run(
+        self, comm: Any, *, out: str | Path | None = None, restart: bool | str | Path = False, progress: bool = True
+    ) -> Solution:
+        """The whole run; collective. ``out``: the run folder, by default the one of [run], if any.
+
+        Without ``steps`` and ``t_end`` it lasts as long as the excitation. A problem with weight starts from its static
+        equilibrium. The folder gets a copy of the case, ``case.toml``. Raises as ``simulate``.
+        """
+        self.check()
+        folder = self.out if out is None else Path(out)
+        own = {name: value for name, value in self._made("run").items() if name != "out"}
+        parts = self._parts(comm)
+        problem = self._problem(parts)
+        if "steps" not in own and "t_end" not in own:
+            own["t_end"] = self._duration(problem)
+        solver = self._made("solver")
+        state = static_equilibrium(problem, solver=solver or Condensed()) if parts.weighted else None
+        if folder is not None:
+            self._keep(run_folder(comm, folder), comm)
+        return simulate(
+            problem, scheme=self._made("scheme"), solver=solver, state=state, out=folder, restart=restart,
+            record=self._several("record") if "record" in self.nodes else None, escalation=self._several("escalation"),
+            fields=self._made("fields"), cross_check=solver if isinstance(solver, CrossChecked) else None,
+            progress=progress, **own,
+        )
+
+    def _made(self, table: str, **context: Any) -> Any:
+        """What a table makes; None where there is none."""
+        return self.nodes[table].build(context) if table in self.nodes else None
+
+    def _several(self, table: str, **context: Any) -> tuple[Any, ...]:
+        """The same of a table, or an array of tables."""
+        made = self._made(table, **context)
+        return made if isinstance(made, tuple) else () if made is None else (made,)
+
+    def _parts(self, comm: Any) -> Parts:
+        if "model" in self.nodes:
+            parts: Parts = self._made("model", comm=comm)
+            return parts
+        script = self._made("mesh")
+        given = read_mesh(script.path, comm) if isinstance(script, MeshFile) else build_mesh(script, comm)
+        mesh, tags = given
+        system = self._made("system", mesh=mesh, tags=tags)
+        system = self._made("gravity", system=system) if "gravity" in self.nodes else system
+        surfaces = self._several("contact", system=system, tags=tags)
+        surface = together(*surfaces) if len(surfaces) > 1 else (*surfaces, None)[0]
+        if surface is None:
+            surface = empty_surface(system.algebra.comm, system.space.dimension)
+        return Parts(system, surface, "gravity" in self.nodes)
+
+    def _problem(self, parts: Parts) -> ContactProblem:
+        return ContactProblem(
+            parts.system, parts.surface, friction=self._made("friction") or Frictionless(), impact=self._made("impact"),
+            excitation=self.excitations(), mass=self._made("mass"),
+        )
+
+    def _duration(self, problem: ContactProblem) -> float:
+        """Until the last excitation ends [s]."""
+        longest = max((one.duration for one in problem.excitations), default=math.inf)
+        if not math.isfinite(longest):
+            raise InputError(f"{self.path}: [run] has neither steps nor t_end, and the excitation has no end: give one")
+        return longest
+
+    def _keep(self, folder: Path, comm: Any) -> None:
+        """A copy of the file, with the settings as comments."""
+        made = "".join(f"# set {setting}\n" for setting in self.settings)
+
+        def copy() -> None:
+            text = self.path.read_bytes()
+            if (folder / COPY).resolve() != self.path.resolve():
+                write_atomically(folder / COPY, made.encode() + text)
+
+        on_root(comm, copy)
+
+
+def read_case(path: str | Path, settings: Sequence[str] = ()) -> Case:
+    """Reads and checks a case file; ``settings``: texts KEY=VALUE that replace values of it (``with_settings``).
+
+    Raises InputError, one sentence with file, table, key and remedy: no TOML (with the line), a table, type or key that
+    nobody knows (with the nearest known), a missing key, a value of the wrong kind. Groups of the mesh are looked up
+    when the case runs.
+    """
+    path = Path(path)
+    tables = with_settings(read_toml(path), settings)
+    known = words(path.parent)
+    file = str(path)
+    for name in tables:
+        if name not in TABLES:
+            raise InputError(f"{file}: unknown table [{name}]: {nearest(name, dict.fromkeys(TABLES))}")
+    if ("model" in tables) == ("mesh" in tables):
+        raise InputError(f"{file}: give either [mesh], the problem table by table, or [model], a model by its name")
+    for name in ("material", "system", "contact", "gravity"):
+        if "model" in tables and name in tables:
+            raise InputError(f"{file}: [{name}] is part of the model: leave it out, or replace [model] by [mesh]")
+    given = tables if "model" in tables else {"system": {}} | tables
+    given = {"run": {}} | given
+    order = sorted(given, key=TABLES.index)  # materials are known before the system names them
+    nodes = {name: _node(name, given, Spot(file, "", name), known) for name in order}
+    return Case(path, tables, tuple(settings), nodes)
+
+
+def _node(name: str, tables: Mapping[str, Any], spot: Spot, known: Words) -> Node:
+    value = tables[name]
+    if name in _CALLED:
+        if not isinstance(value, dict):
+            raise spot.wrong("is no table: give its keys below it")
+        if name == "system":
+            value = _with_materials(value, tables.get("material", {}))
+        return arguments(value, _CALLED[name], spot, known)
+    node = read(value, _HINTS[name], spot, known)
+    if name == "material" and isinstance(node, Named):
+        known.named[LinearElastic] = dict(node.items)
+    return node
+
+
+def _with_materials(system: Mapping[str, Any], materials: Mapping[str, Any]) -> Mapping[str, Any]:
+    """[system] with the materials it does not name: one for the whole body, or each for the cell group of its name."""
+    names = list(materials)
+    if "material" in system or not names:
+        return system
+    return {"material": names[0] if len(names) == 1 else [[name, name] for name in names]} | dict(system)
+
+
+def run_case(
+    path: str | Path, comm: Any, *, settings: Sequence[str] = (), out: str | Path | None = None,
+    restart: bool | str | Path = False, progress: bool = True,
+) -> Solution:
+    """``read_case(path, settings).run(comm, …)``."""
+    return read_case(path, settings).run(comm, out=out, restart=restart, progress=progress)

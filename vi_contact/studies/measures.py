@@ -1,0 +1,118 @@
+"""What an incremental dynamic analysis plots: intensity measures of motions, demands on the structure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from ..algebra import Array
+from ..errors import InputError
+from ..ground_motion import Record, arias, cav, housner_intensity, pga, pgd, pgv, psa
+
+_MEASURES: dict[str, tuple[Callable[[Record], float], str, str, int]] = {
+    "pga": (pga, "m/s²", "peak ground acceleration", 1),
+    "pgv": (pgv, "m/s", "peak ground velocity", 1),
+    "pgd": (pgd, "m", "peak ground displacement", 1),
+    "arias": (arias, "m/s", "Arias intensity", 2),
+    "cav": (cav, "m/s", "cumulative absolute velocity", 1),
+    "housner": (housner_intensity, "m", "Housner intensity", 1),
+}
+"""Word -> function, unit, meaning, power of the scale with which it grows."""
+
+_WAYS: dict[str, tuple[Callable[[Array], float], str]] = {
+    "max": (lambda values: float(np.fmax.reduce(values)), "largest value of"),
+    "min": (lambda values: float(np.fmin.reduce(values)), "smallest value of"),
+    "absmax": (lambda values: float(np.fmax.reduce(np.abs(values))), "largest magnitude of"),
+    "last": (lambda values: float(values[-1]), "last value of"),
+}
+
+
+@dataclass(frozen=True)
+class Intensity:
+    """An intensity measure: of(record) in ``unit``; a motion times f has f**degree of it."""
+
+    name: str
+    unit: str
+    meaning: str
+    degree: int
+    of: Callable[[Record], float]
+
+    def scale(self, record: Record, level: float) -> float:
+        """The factor that brings the record to this level; InputError unless both are positive."""
+        value = self.of(record)
+        if not (level > 0.0 and value > 0.0):
+            raise InputError(f"level {level:g} of {self.name}: the record has {value:g}; give levels above zero, and "
+                             "records that shake")
+        return float((level / value) ** (1.0 / self.degree))
+
+
+def intensity(text: str) -> Intensity:
+    """The measure of a word: pga, pgv, pgd, arias, cav, housner, or sa:T, the pseudo-acceleration at T seconds, 5 %."""
+    word, _, period = text.partition(":")
+    if word == "sa":
+        try:
+            seconds = float(period)
+        except ValueError:
+            seconds = 0.0
+        if not 0.0 < seconds < np.inf:
+            raise InputError(f"intensity '{text}': give the period after the colon in seconds, such as sa:0.5")
+        meaning = f"pseudo-acceleration at {seconds:g} s, 5 % damping"
+        return Intensity(f"sa_{seconds:g}", "m/s²", meaning, 1, partial(psa, period=seconds))
+    if period or word not in _MEASURES:
+        raise InputError(f"unknown intensity '{text}': choose one of {', '.join(_MEASURES)}, or sa:T with T in seconds")
+    function, unit, meaning, degree = _MEASURES[word]
+    return Intensity(word, unit, meaning, degree, function)
+
+
+@dataclass(frozen=True)
+class Demand:
+    """A demand parameter: a column of history.csv and what of it counts; values that are not a number do not."""
+
+    column: str
+    way: str = "absmax"
+
+    @property
+    def name(self) -> str:
+        """The column of the table, "u_x_top_absmax"."""
+        return f"{self.column}_{self.way}"
+
+    @property
+    def meaning(self) -> str:
+        """In words."""
+        return f"{_WAYS[self.way][1]} {self.column}"
+
+    def of(self, history: Mapping[str, Array]) -> float:
+        """The value of a run; InputError for a column it has not recorded."""
+        if self.column not in history:
+            known = ", ".join(history)
+            raise InputError(f"the run has no column '{self.column}': record it, or choose one of {known}")
+        return _WAYS[self.way][0](np.asarray(history[self.column], dtype=float))
+
+
+def demand(text: str) -> Demand:
+    """The demand of "COLUMN" (its largest magnitude) or "COLUMN:max", ":min", ":absmax", ":last"."""
+    column, _, way = text.partition(":")
+    if not column or (way or "absmax") not in _WAYS:
+        raise InputError(f"demand '{text}': give COLUMN or COLUMN:WAY, WAY one of {', '.join(_WAYS)}")
+    return Demand(column, way or "absmax")
+
+
+def fractiles(curves: Mapping[str, tuple[Array, Array]], shares: tuple[float, ...]) -> tuple[Array, Array]:
+    """(levels (n,), demands (n, shares)): fractiles over the records of the demand at equal intensity.
+
+    curves: record -> (intensities, demands), straight lines between them; the levels are those of all records in the
+    range that every record covers (Vamvatsikos and Cornell, Earthquake Engng Struct. Dyn. 31, 2002, section 5). Empty
+    for fewer than two records and where ranges do not overlap.
+    """
+    full = [(im[np.argsort(im)], edp[np.argsort(im)]) for im, edp in curves.values() if len(im)]
+    if len(full) < 2:
+        return np.zeros(0), np.zeros((0, len(shares)))
+    low, high = max(im[0] for im, _ in full), min(im[-1] for im, _ in full)
+    every = np.unique(np.concatenate([im for im, _ in full]))
+    slack = 1e-9 * high
+    levels = np.clip(every[(every >= low - slack) & (every <= high + slack)], low, max(low, high))
+    found = np.array([np.interp(levels, im, edp) for im, edp in full])
+    return levels, np.quantile(found, shares, axis=0).T

@@ -1,0 +1,45 @@
+"""Models that a case file may name instead of mesh, material, system and contact."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from inspect import signature
+from typing import Any, get_type_hints
+
+from ..models import wall
+from ..surfaces import ContactSurface
+from ..system import SemiDiscreteSystem
+from .calls import Callee
+
+
+@dataclass(frozen=True)
+class Parts:
+    """What a problem is made of; ``weighted``: it carries its weight, and starts from its equilibrium."""
+
+    system: SemiDiscreteSystem
+    surface: ContactSurface
+    weighted: bool = False
+
+
+def _wall(shape: wall.Wall, comm: Any, *, case: str = "b", weight: bool = False) -> Parts:
+    model = wall.build(shape, comm, weight=weight)
+    return Parts(model.system, model.surface(case), weight)
+
+
+def model(shape: type, build: Callable[..., Parts]) -> Callee:
+    """The call of a model: keys are the fields of its shape and the keyword arguments of ``build(shape, comm, …)``."""
+    own = {one.name for one in fields(shape)}
+    parameters = signature(build).parameters.values()
+    extra = {one.name for one in parameters if one.kind is one.KEYWORD_ONLY}
+    hints = {key: hint for key, hint in get_type_hints(shape).items() if key in own}
+    hints |= {key: hint for key, hint in get_type_hints(build).items() if key in extra}
+
+    def made(comm: Any, **given: Any) -> Parts:
+        of_shape = {key: value for key, value in given.items() if key in own}
+        return build(shape(**of_shape), comm, **{key: value for key, value in given.items() if key in extra})
+
+    return Callee(shape.__name__, made, hints, given=("comm",))
+
+
+MODELS = {"Wall": model(wall.Wall, _wall)}

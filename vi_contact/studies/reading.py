@@ -1,0 +1,203 @@
+"""From values of a TOML file to nodes of calls, by type hints; see ``calls``."""
+
+from __future__ import annotations
+
+import os
+import types
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, is_dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any, Union, get_args, get_origin
+
+from ..errors import InputError
+from .calls import GROUP, Call, Callee, Group, Items, Named, Node, Spot, Value, callee
+
+
+@dataclass(frozen=True)
+class Words:
+    """What names mean: the ``choices`` of every type that tables can make, by the word after ``type``; the ``default``
+    where it may be left out; ``groups``: types that are named groups of the mesh; ``short``: the one key that a plain
+    text stands for; ``named``: nodes by type and name."""
+
+    folder: Path
+    choices: Mapping[Any, Mapping[str, Callee]]
+    default: Mapping[Any, str]
+    groups: tuple[type, ...]
+    short: Mapping[Any, str]
+    named: dict[Any, dict[str, Node]] = field(default_factory=dict)
+
+
+def read(value: Any, hint: Any, spot: Spot, words: Words) -> Node:
+    """The node of a value for a parameter with this hint. InputError when it does not fit."""
+    members = list(_members(hint))
+    if isinstance(value, dict):
+        return _table(value, members, spot, words)
+    if isinstance(value, list):
+        return _list(value, members, spot, words)
+    for member in members:
+        node = _scalar(value, member, spot, words)
+        if node is not None:
+            return node
+    raise spot.wrong(f"is {_shown(value)}: give {_expected(members, words)}")
+
+
+def call(
+    table: Mapping[str, Any], choices: Mapping[str, Callee], default: str | None, spot: Spot, words: Words
+) -> Call:
+    """The call of a table, whose ``type`` is one of the choices."""
+    chosen = table.get("type", default)
+    if chosen is None:
+        raise spot.inside(f"has no type: give type = one of {', '.join(choices)}")
+    if not isinstance(chosen, str) or chosen not in choices:
+        raise spot.inside(f"has the unknown type {_shown(chosen)}: {nearest(chosen, choices)}")
+    return arguments(table, choices[chosen], spot, words)
+
+
+def arguments(table: Mapping[str, Any], target: Callee, spot: Spot, words: Words) -> Call:
+    """The call of this function with the keys of the table."""
+    given = {key: value for key, value in table.items() if key != "type"}
+    for key in given:
+        if key not in target.hints:
+            raise spot.inside(f"has the unknown key '{key}' for {target.name}: {nearest(key, target.hints)}")
+    missing = sorted(target.required - set(given))
+    if missing:
+        raise spot.inside(f"lacks '{missing[0]}', which {target.name} needs")
+    nodes = {key: read(value, target.hints[key], spot.at(key), words) for key, value in given.items()}
+    return Call(target, nodes, spot)
+
+
+def nearest(word: Any, known: Mapping[str, Any]) -> str:
+    """The rest of a sentence about a word nobody knows."""
+    names = list(known)
+    if not names:
+        return "leave it out, there are none"
+    near = get_close_matches(str(word), names, n=3, cutoff=0.5)
+    return (f"did you mean {' or '.join(near)}? " if near else "") + f"Known: {', '.join(names)}"
+
+
+def _members(hint: Any) -> Iterator[Any]:
+    """The types of a union, or the one type."""
+    if get_origin(hint) in (Union, types.UnionType):
+        for one in get_args(hint):
+            yield from _members(one)
+    elif hint is not type(None):
+        yield hint
+
+
+def _scalar(value: Any, member: Any, spot: Spot, words: Words) -> Node | None:
+    """The node, or None where the value is nothing of this type."""
+    if member in (Any, object):
+        return Value(value)
+    if isinstance(value, bool):
+        return Value(value) if member is bool else None
+    if isinstance(value, int | float) and member is float:
+        return Value(float(value))
+    if isinstance(value, int) and member is int:
+        return Value(value)
+    if not isinstance(value, str):
+        return None
+    if member in words.groups:
+        return Group(value, member, spot)
+    if member in words.named:
+        if value not in words.named[member]:
+            raise spot.wrong(f"names '{value}', which is not there: {nearest(value, words.named[member])}")
+        return words.named[member][value]
+    if member in words.short:
+        return _table({words.short[member]: value}, [member], spot, words)
+    if _is_path(member):
+        return Value(words.folder / value)
+    return Value(value) if member is str else None
+
+
+def _is_path(member: Any) -> bool:
+    origin = get_origin(member) or member
+    return isinstance(origin, type) and issubclass(origin, os.PathLike)
+
+
+def _list(value: list[Any], members: list[Any], spot: Spot, words: Words) -> Node:
+    wrong: InputError | None = None
+    for member in members:
+        if _is_list(member):
+            try:
+                return _items(value, get_args(member), get_origin(member) is tuple, spot, words)
+            except InputError as error:
+                wrong = wrong or error
+    if wrong is not None:
+        raise wrong
+    if any(member in (Any, object) for member in members):
+        return Value(value)
+    raise spot.wrong(f"is a list: give {_expected(members, words)}")
+
+
+def _is_list(member: Any) -> bool:
+    return get_origin(member) in (tuple, list, Sequence)
+
+
+def _items(value: list[Any], kinds: tuple[Any, ...], fixed: bool, spot: Spot, words: Words) -> Items:
+    if not fixed or kinds[-1] is Ellipsis:
+        kinds = (kinds[0],) * len(value)
+    elif len(kinds) != len(value):
+        raise spot.wrong(f"has {len(value)} entries: give {len(kinds)}")
+    pairs = enumerate(zip(value, kinds, strict=True), start=1)
+    return Items(tuple(read(one, kind, spot.entry(number), words) for number, (one, kind) in pairs))
+
+
+def _table(value: dict[str, Any], members: list[Any], spot: Spot, words: Words) -> Node:
+    choices: dict[str, Callee] = {}
+    default: str | None = None
+    for member in members:
+        found = _choices(member, words)
+        choices |= found
+        default = default or words.default.get(member)
+    if choices:
+        return call(value, choices, default or (next(iter(choices)) if len(choices) == 1 else None), spot, words)
+    for member in members:
+        if get_origin(member) in (Mapping, dict):
+            kind = get_args(member)[1]
+            return Named({key: read(one, kind, spot.at(key), words) for key, one in value.items()})
+    raise spot.wrong(f"is a table: give {_expected(members, words)}")
+
+
+def _choices(member: Any, words: Words) -> Mapping[str, Callee]:
+    """What a table may make for this type: as listed, or an object of the value class itself."""
+    if member in words.choices:
+        return words.choices[member]
+    if isinstance(member, type) and is_dataclass(member) and member not in words.groups:
+        return {member.__name__: callee(member)}
+    return {}
+
+
+def _shown(value: Any) -> str:
+    """A value as in the file."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f"'{value}'" if isinstance(value, str) else str(value)
+
+
+_EXPECTED = {float: "a number", int: "a whole number", bool: "true or false", str: "text"}
+
+
+def _expected(members: Sequence[Any], words: Words) -> str:
+    """What would fit."""
+    found = []
+    for member in members:
+        if member in _EXPECTED:
+            found.append(_EXPECTED[member])
+        elif member in words.groups:
+            found.append(f"the name of {GROUP[member.__name__]}")
+        elif _is_path(member):
+            found.append("the path of a file")
+        elif _choices(member, words):
+            found.append(f"a table with type = one of {', '.join(_choices(member, words))}")
+            if words.named.get(member):
+                found.append(f"one of the names {', '.join(words.named[member])}")
+        elif _is_list(member):
+            inner = [one for one in get_args(member) if one is not Ellipsis]
+            found.append(f"a list of {_expected(inner[:1], words).removeprefix('a ')}s" if _EXPECTED.get(inner[0])
+                         else "a list")
+        elif get_origin(member) in (Mapping, dict):
+            found.append("a table of names")
+    if not found or any(get_origin(member) is Callable or member is Callable for member in members):
+        found.append("a function, which only the Python interface takes")
+    return " or ".join(dict.fromkeys(found))

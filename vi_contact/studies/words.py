@@ -1,0 +1,158 @@
+"""The words of case files: which functions a table may call where, all of them of the public interface."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from .. import excitation, friction, impact, mass, materials, recorders, surfaces, time_steps
+from ..cross_check import CrossChecked
+from ..fem.fields import XDMF
+from ..fem.loads import BodyForce, Prescribed, TangentialTraction, Traction
+from ..fem.matching import Matching, NodeToNode
+from ..fem.mesh import Cells, Facets
+from ..fem.mortar import DualMortar
+from ..fem.pairs import contact_pair
+from ..fem.trace import contact_surface
+from ..ground_motion import Processing, Record, read_record, synthetic
+from ..meshes.ball import BallMesh
+from ..meshes.block import BlockMesh
+from ..meshes.cut import CutOpen, Welded
+from ..meshes.disk import DiskMesh
+from ..meshes.gmsh_session import MeshScript
+from ..meshes.two_blocks import Blocks, TwoBlocks
+from ..meshes.wall import WallMesh
+from ..schemes.contact_stabilised import ContactStabilisedNewmark
+from ..schemes.generalised_alpha import GeneralisedAlpha
+from ..schemes.hht import HHT
+from ..schemes.houbolt import Houbolt
+from ..schemes.linear_multistep import LinearMultistep
+from ..schemes.midpoint import Midpoint
+from ..schemes.moreau_jean import MoreauJean
+from ..schemes.newmark import Newmark
+from ..schemes.ss22 import SS22
+from ..schemes.trapezoidal import Trapezoidal
+from ..schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
+from ..solvers import extrapolation, friction_small, volume
+from ..solvers.active_set import ActiveSet
+from ..solvers.condensed import Condensed, SmallMethod
+from ..solvers.fixed_point import FixedPoint
+from ..solvers.friction_newton import FrictionNewton
+from ..solvers.given_forces import GivenForces
+from ..solvers.hildreth import Hildreth
+from ..solvers.mprgp import ProjectedCG
+from ..solvers.nsgs import NSGS
+from ..solvers.uzawa import Uzawa
+from ..solvers.volume_factorised import OneFactorisation
+from ..solvers.volume_snes import ReducedNewton, SemismoothNewton
+from ..solvers.volume_tao import TaoBnls, TaoTron
+from ..step import Recorder, Scheme, Solver
+from ..surfaces import ContactSurface
+from ..system import SemiDiscreteSystem
+from ..writer import FieldWriter
+from .calls import Callee, callee
+from .models import MODELS, Parts
+from .reading import Words
+
+
+class MeshFile:
+    """What [mesh] makes of type = "read_mesh": the path of a file for ``fem.read_mesh``."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+
+def _record(
+    path: Path, units: str | None = None, *, dt: float | None = None, resample_dt: float | None = None,
+    channel: int | None = None, processing: Processing | None = None,
+) -> Record:
+    """``read_record``, then ``processing``."""
+    record = read_record(path, units, dt=dt, resample_dt=resample_dt, channel=channel)
+    return record if processing is None else processing(record)
+
+
+def _surface(
+    system: SemiDiscreteSystem, facets: Facets, *, obstacle: surfaces.Obstacle | None = None,
+    points: Sequence[tuple[float, ...]] | None = None, held: bool = False, springs: float | None = None,
+) -> ContactSurface:
+    """``contact_surface``; held: ``.held()``; springs: ``.on_springs(stiffness)``."""
+    found = contact_surface(system, facets, obstacle=obstacle, points=points)
+    found = found if springs is None else found.on_springs(springs)
+    return found.held() if held else found
+
+
+def _pair(
+    system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *, matching: Matching | None = None,
+    points: Sequence[tuple[float, ...]] | None = None, held: bool = False,
+) -> ContactSurface:
+    """``contact_pair``; held: ``.held()``."""
+    found = contact_pair(system, facets1, facets2, matching=matching, points=points)
+    return found.held() if held else found
+
+
+def _slip_rate(mu: friction.ExponentialDecay | friction.StaticKinetic) -> friction.SlipRateCoulomb:
+    return friction.SlipRateCoulomb(mu)
+
+
+def _named(*functions: Any) -> dict[str, Callee]:
+    """Callees by name; classmethods as "Class.method"."""
+    return {one.__qualname__: callee(one, name=one.__qualname__) for one in functions}
+
+
+def _choices() -> dict[Any, Mapping[str, Callee]]:
+    """Type -> word -> what it calls."""
+    frictional = _named(FrictionNewton, NSGS, FixedPoint, GivenForces, Uzawa)
+    scripts = _named(WallMesh, BlockMesh, TwoBlocks, Blocks, DiskMesh, BallMesh, CutOpen, Welded)
+    rate = {"SlipRateCoulomb": callee(_slip_rate, name="SlipRateCoulomb")}
+    return {
+        Parts: MODELS,
+        MeshScript: scripts,
+        MeshFile: {"read_mesh": callee(MeshFile, name="read_mesh")},
+        materials.LinearElastic: _named(materials.LinearElastic, materials.LinearElastic.from_wave_speeds),
+        materials.Section: _named(materials.PlaneStrain, materials.PlaneStress, materials.Solid),
+        materials.Damping: _named(
+            materials.NoDamping, materials.MassProportional, materials.Rayleigh, materials.Rayleigh.from_frequencies
+        ),
+        Prescribed: _named(Prescribed),
+        Traction: _named(Traction, TangentialTraction),
+        BodyForce: _named(BodyForce),
+        ContactSurface: {
+            "contact_surface": callee(_surface, name="contact_surface"),
+            "contact_pair": callee(_pair, name="contact_pair"),
+        },
+        surfaces.Obstacle: _named(surfaces.Touching, surfaces.HalfSpace),
+        Matching: _named(NodeToNode, DualMortar),
+        friction.FrictionLaw: _named(friction.Frictionless, friction.Tresca, friction.Coulomb) | rate,
+        impact.ImpactLaw: _named(impact.NoImpact, impact.Inelastic, impact.Newton, impact.Elastic),
+        impact.Reading: _named(impact.ComponentReset, impact.MassProjection),
+        mass.MassLaw: _named(mass.ConsistentMass, mass.Redistributed),
+        excitation.Excitation: _named(
+            excitation.Harmonic, excitation.Ricker, excitation.HalfSine, excitation.FullSine, excitation.Rectangular,
+            excitation.Tabulated, excitation.GroundMotion,
+        ),
+        Record: {"read_record": callee(_record, name="read_record"), "synthetic": callee(synthetic)},
+        Scheme: _named(
+            Trapezoidal, ZienkiewiczWoodTaylor, SS22, Midpoint, Newmark, HHT, GeneralisedAlpha,
+            GeneralisedAlpha.spectral_radius, Houbolt, ContactStabilisedNewmark, MoreauJean, LinearMultistep,
+            LinearMultistep.newmark,
+        ),
+        Solver: _named(Condensed, volume.Volume, CrossChecked),
+        SmallMethod: _named(ActiveSet, Hildreth, ProjectedCG),
+        friction_small.FrictionMethod: frictional,
+        extrapolation.Extrapolation: _named(extrapolation.Plain, extrapolation.Aitken, extrapolation.Anderson),
+        volume.Method: _named(OneFactorisation, ReducedNewton, SemismoothNewton, TaoTron, TaoBnls),
+        time_steps.Schedule: _named(time_steps.Schedule),
+        time_steps.HalvedAtImpact: _named(time_steps.HalvedAtImpact),
+        Recorder: _named(recorders.Energy, recorders.Contact, recorders.Probe),
+        FieldWriter: _named(XDMF),
+    }
+
+
+def words(folder: Path) -> Words:
+    """The words of a case file in this folder, to which its relative paths belong."""
+    default = {
+        materials.LinearElastic: "LinearElastic", Record: "read_record", ContactSurface: "contact_surface",
+        Traction: "Traction",
+    }
+    return Words(folder, _choices(), default, (Facets, Cells), short={Record: "path"})

@@ -1,0 +1,31 @@
+"""The weight of a body as a load on its unknowns."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from .errors import InputError
+from .system import SemiDiscreteSystem
+
+STANDARD_GRAVITY = 9.80665  # m/s²
+
+
+def with_weight(
+    system: SemiDiscreteSystem, *, acceleration: float = STANDARD_GRAVITY, direction: tuple[float, ...] | None = None
+) -> SemiDiscreteSystem:
+    """The same system under its own weight, f + M r g: whatever its materials and densities.
+
+    acceleration: g [m/s²]; direction: where it acts, of length one, (0, -1) or (0, 0, -1) by default, in one dimension
+    (-1,). It is the load of ``BodyForce`` with the density of every material. InputError for a direction of another
+    length or number of components, and for a system without ``base_inertia``, which has lost the mass at held nodes.
+    """
+    d = system.influence.shape[1]
+    way = np.array([0.0] * (d - 1) + [-1.0]) if direction is None else np.array(direction, dtype=float)
+    if way.shape != (d,) or not np.isclose(np.linalg.norm(way), 1.0):
+        raise InputError(f"the direction {tuple(way)} of gravity: give {d} components of a vector of length one")
+    if system.base_mass is None:
+        raise InputError("the weight needs the mass at held nodes: assemble with base_inertia=True")
+    load = replace(system.load, constant=system.load.constant + system.inertia(acceleration * way))
+    return replace(system, load=load, _cache={})
