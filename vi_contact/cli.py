@@ -11,6 +11,7 @@ from typing import Any
 from . import __version__
 from .cli_case import add_case_commands
 from .cli_motion import add_motion_commands
+from .cli_report import add_report_commands
 from .errors import ViContactError
 
 _DESCRIPTION = """Dynamic unilateral contact of elastic structures: exact non-penetration, a closed energy ledger and a
@@ -33,6 +34,7 @@ def parser() -> argparse.ArgumentParser:
     wall.set_defaults(run=_wall)
     add_case_commands(commands)
     add_motion_commands(commands)
+    add_report_commands(commands)
     return top
 
 

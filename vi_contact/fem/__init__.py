@@ -10,10 +10,12 @@ _HOME = {
     "Cells": "mesh", "Facets": "mesh", "Tags": "mesh",
     "assemble": "assembly",
     "BodyForce": "loads", "Prescribed": "loads", "TangentialTraction": "loads", "Traction": "loads",
+    "Tied": "ties", "Dashpots": "dashpots", "CompliantBase": "dashpots",
     "contact_surface": "trace",
     "contact_pair": "pairs", "NodeToNode": "matching", "DualMortar": "mortar", "together": "joined",
     "geometric_stiffness": "gravity",
     "XDMF": "fields",
+    "Reactions": "reactions", "SectionForces": "section_forces",
 }
 """Public name -> module of this folder it lives in."""
 

@@ -8,6 +8,7 @@ the absolute acceleration and f their loads. For a nodal field r, rᵀq is a num
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -83,7 +84,7 @@ class NodalWork:
         return self._sum([*motion, np.zeros_like(motion[0])], lambda one: one(t))
 
     def of_step(self, report: Report) -> Array:
-        """Of the equation of motion that the step satisfied (``Report.balance``), with absolute accelerations: (count,).
+        """Of the equation of motion of a step (``Report.balance``), with absolute accelerations, (count,).
 
         Loads, prescribed and ground motion are taken between the ends of the step where the balance has its u.
         """
@@ -97,8 +98,7 @@ class NodalWork:
         motion = []
         for k, x in enumerate((balance.u, balance.v, balance.a)):
             free = problem.cartesian(x)
-            nodal = between(lambda t, free=free, k=k: space.expand(free, t, k)) if moves else space.expand(free, t1, k)
-            motion.append(nodal)
+            motion.append(between(partial(_expanded, space, free, k)) if moves else space.expand(free, t1, k))
         motion[2] = motion[2] + between(problem.ground_acceleration)
         return self._sum(motion, between)
 
@@ -128,6 +128,10 @@ class NodalWork:
         if load.history is not None:
             return np.asarray(at(load.history) * nodal(0.0))
         return np.asarray(nodal(0.0) if is_constant(load) else at(nodal))
+
+
+def _expanded(space: FemSpace, free: Array, derivative: int, t: float) -> Array:
+    return space.expand(free, t, derivative)
 
 
 def rigid_fields(points: Array, centre: Sequence[float]) -> tuple[list[Array], list[str]]:

@@ -1,0 +1,183 @@
+"""``vi-contact report`` and ``vi-contact post peaks|spectrum|transfer|loop``: options and what each does."""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import io
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from .errors import InputError, ViContactError
+
+_ACTIONS = {
+    "peaks": "largest and smallest value of every column, as a table",
+    "spectrum": "floor response spectra of recorded accelerations, as CSV and picture",
+    "transfer": "transfer function of two recorded accelerations, as CSV and picture",
+    "loop": "a force over a deformation, with the work in it, as CSV and picture",
+}
+
+
+def add_report_commands(commands: Any) -> None:
+    """Adds ``report`` and ``post`` to the commands of the top parser."""
+    report = commands.add_parser(
+        "report", help="one page about a run", description="One page about a run, from the files in its folder alone, "
+        "and its peak values in peaks.csv beside it."
+    )
+    report.add_argument("folder", metavar="DIR", help="output folder of a run")
+    report.add_argument("--out", metavar="FILE", help=".pdf, .png or .svg (default DIR/report.pdf)")
+    report.add_argument("--title", help="default: the name of the folder")
+    report.add_argument("--show", metavar="COLUMN[,COLUMN...]", action="append",
+                        help="a panel with these columns, of one unit; repeat for more (default: the page chooses)")
+    report.set_defaults(run=_report)
+    actions = commands.add_parser("post", help="numbers and pictures from the folder of a run").add_subparsers(
+        dest="action", required=True, metavar="ACTION"
+    )
+    parsers = {}
+    for name, sentence in _ACTIONS.items():
+        one = actions.add_parser(name, help=sentence, description=sentence[0].upper() + sentence[1:] + ".")
+        one.add_argument("folder", metavar="DIR", help="output folder of a run")
+        one.add_argument("--out", metavar="CSV", help=f"default DIR/{name}.csv; a picture goes beside it")
+        parsers[name] = one
+    _add_actions(parsers)
+    for name, run in (("peaks", _peaks), ("spectrum", _spectrum), ("transfer", _transfer), ("loop", _loop)):
+        parsers[name].set_defaults(run=run)
+
+
+def _add_actions(parsers: dict[str, argparse.ArgumentParser]) -> None:
+    parsers["peaks"].add_argument("columns", metavar="COLUMN", nargs="*", help="default: all")
+    spectrum, transfer, loop = parsers["spectrum"], parsers["transfer"], parsers["loop"]
+    spectrum.add_argument("columns", metavar="COLUMN", nargs="+", help="a_x_top, a_g_x, ...")
+    spectrum.add_argument("--damping", type=float, default=0.05, metavar="Z", help="ratio (default 0.05)")
+    spectrum.add_argument("--periods", type=float, nargs=3, default=(0.02, 4.0, 200), metavar=("FROM", "TO", "N"),
+                          help="logarithmically spaced [s] (default 0.02 4 200)")
+    spectrum.add_argument("--relative", action="store_true", help="motion relative to the ground, not the absolute one")
+    transfer.add_argument("surface", metavar="COLUMN", help="acceleration above, such as a_x_top")
+    transfer.add_argument("base", metavar="BASE", nargs="?", default="a_g_x", help="below (default a_g_x)")
+    transfer.add_argument("--bandwidth", type=float, default=40.0, metavar="B",
+                          help="of Konno and Ohmachi's smoothing (default 40), 0: none")
+    transfer.add_argument("--frequencies", type=float, nargs=3, metavar=("FROM", "TO", "N"),
+                          help="logarithmically spaced [Hz] (default: 200 from 4/duration to sampling/4)")
+    loop.add_argument("deformation", metavar="DEFORMATION", help="column such as u_x_top or theta_base")
+    loop.add_argument("force", metavar="FORCE", help="column such as reaction_x_base or M_base")
+    loop.add_argument("--turn", action="store_true", help="turn the sign of the force")
+
+
+def _report(options: argparse.Namespace) -> str:
+    from .peaks import peaks, write_peaks
+    from .plotting_report import plot_report
+    from .run_folder import read_run
+
+    run = read_run(options.folder)
+    out = Path(options.out or Path(options.folder) / "report.pdf")
+    _writable(out)
+    shown = None if options.show is None else [one.split(",") for one in options.show]
+    page = plot_report(run, out, title=options.title, columns=shown)
+    table = write_peaks(out.with_name("peaks.csv"), peaks(run.history, run.columns))
+    return f"report: {page}\ntable: {table}"
+
+
+def _peaks(options: argparse.Namespace) -> str:
+    from .peaks import peaks, write_peaks
+    from .run_folder import read_run
+
+    run = read_run(options.folder)
+    rows = peaks(run.history, run.columns, options.columns or None)
+    table = write_peaks(_table_path(options), rows)
+    lines = [f"{row.name:<28}{row.unit:>6}{row.max:>13.4e}{row.t_max:>10.4g}{row.min:>13.4e}{row.t_min:>10.4g}"
+             for row in rows]
+    head = f"{'column':<28}{'unit':>6}{'max':>13}{'t [s]':>10}{'min':>13}{'t [s]':>10}"
+    return "\n".join([head, *lines, f"table: {table}"])
+
+
+def _spaced(option: str, values: Sequence[float]) -> Any:
+    import numpy as np
+
+    first, last, count = values
+    if not (0.0 < first < last and count >= 2 and count == int(count)):
+        raise InputError(f"{option} {first:g} {last:g} {count:g}: give FROM below TO and a whole number N from 2 on")
+    return np.geomspace(first, last, int(count))
+
+
+def _spectrum(options: argparse.Namespace) -> str:
+    from .floor_spectra import floor_spectrum, recorded_motion
+    from .plotting_motion import plot_spectra
+    from .run_folder import read_run
+
+    run, periods = read_run(options.folder), _spaced("--periods", options.periods)
+    table = _table_path(options)
+    spectra = {
+        name: floor_spectrum(run.history, name, periods, damping=options.damping, relative=options.relative)
+        for name in options.columns
+    }
+    rows = [
+        [name, options.damping, *(f"{x:.8g}" for x in row)]
+        for name, one in spectra.items()
+        for row in zip(one.periods, one.displacement, one.velocity, one.acceleration, one.psa, strict=True)
+    ]
+    _write(table, ["column", "damping", "period_s", "sd_m", "sv_m/s", "sa_m/s2", "psa_m/s2"], rows)
+    dt = {name: recorded_motion(run.history, name).dt for name in spectra}
+    kind = "relative" if options.relative else "absolute"
+    title = f"Response spectra of {kind} motions, {100.0 * options.damping:g} %"
+    picture = plot_spectra(spectra, table.with_suffix(".png"), steps=dt, title=title)
+    return f"table: {table}\npicture: {picture}"
+
+
+def _transfer(options: argparse.Namespace) -> str:
+    import numpy as np
+
+    from .floor_spectra import transfer_function
+    from .plotting_engineering import plot_transfer
+    from .run_folder import read_run
+
+    run, table = read_run(options.folder), _table_path(options)
+    t = run.history["t"]
+    given = options.frequencies or (4.0 / (t[-1] - t[0]), 0.25 / float(np.median(np.diff(t))), 200)
+    found = transfer_function(run.history, options.surface, options.base, bandwidth=options.bandwidth or None,
+                              frequencies=_spaced("--frequencies", given))
+    _write(table, ["frequency_Hz", "amplitude"], ([f"{x:.8g}" for x in row] for row in
+                                                  zip(found.frequencies, found.amplitude, strict=True)))
+    picture = plot_transfer(found, table.with_suffix(".png"), title=f"|{options.surface}| / |{options.base}|")
+    frequency, amplitude = found.peak
+    return f"largest: {amplitude:.4g} at {frequency:.4g} Hz\ntable: {table}\npicture: {picture}"
+
+
+def _loop(options: argparse.Namespace) -> str:
+    from .peaks import hysteresis
+    from .plotting_engineering import plot_loop
+    from .run_folder import read_run
+
+    run, table = read_run(options.folder), _table_path(options)
+    loop = hysteresis(run.history, options.deformation, options.force, sign=-1.0 if options.turn else 1.0)
+    _write(table, ["t_s", options.deformation, options.force, "work"],
+           ([repr(float(x)) for x in row]
+            for row in zip(run.history["t"], loop.deformation, loop.force, loop.work, strict=True)))
+    picture = plot_loop(loop, table.with_suffix(".png"),
+                        x=(options.deformation, run.columns[options.deformation][0]),
+                        y=(options.force, run.columns[options.force][0]))
+    return f"work: {loop.work[-1]:.6g} J, secant stiffness {loop.stiffness:.6g}\ntable: {table}\npicture: {picture}"
+
+
+def _table_path(options: argparse.Namespace) -> Path:
+    path = Path(options.out or Path(options.folder) / f"{options.action}.csv")
+    _writable(path)
+    return path
+
+
+def _writable(path: Path) -> None:
+    if path.is_dir() or not path.parent.is_dir():
+        raise InputError(f"{path}: cannot be written; give the name of a file in a folder that exists")
+
+
+def _write(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
+    from .output import sentence, write_atomically
+
+    text = io.StringIO(newline="")
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(header)
+    writer.writerows(rows)
+    try:
+        write_atomically(path, text.getvalue().encode())
+    except OSError as error:
+        raise ViContactError(sentence(error)) from error

@@ -1,0 +1,113 @@
+"""Floor and soil response spectra and transfer functions of the motions that probes recorded.
+
+Which motion: a column a_x_<label> of ``Probe(..., acceleration=True)`` is the absolute acceleration, that of the
+equations, relative to the ground, plus that of the ground. Equipment on a floor and a layer on rock feel the absolute
+one, so it is the default; with ``relative`` the ground's is taken off again. In a run whose ground moves by prescribed
+displacements no ground acceleration is recorded, and both are the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from .algebra import Array
+from .errors import InputError
+from .ground_motion import Record, ResponseSpectrum, response_spectrum
+from .peaks import column_of
+
+BANDWIDTH = 40.0
+
+
+def recorded_motion(history: Mapping[str, Array], column: str, *, relative: bool = False) -> Record:
+    """The acceleration of a column as a record with even steps: the spectra, intensities and writers take it.
+
+    Uneven steps (halved at impacts) are interpolated linearly to the most frequent one. Columns a_<axis>_<label> are
+    means over the step that ends at t, so their instants are half a step before t; spectra and ratios of columns of the
+    same kind do not see that, and a_g_<axis> is brought to the same instants.
+    ``relative``: minus the ground acceleration a_g_<axis> of the run. InputError for columns that are no accelerations.
+    """
+    parts = column.split("_")
+    if parts[0] != "a" or len(parts) < 3:
+        raise InputError(f"column '{column}' is no acceleration: record Probe(..., acceleration=True), "
+                         "and give a_x_<label>, or a_g_x for the ground")
+    values, t = column_of(history, column), column_of(history, "t")
+    ground = column if parts[1] == "g" else f"a_g_{parts[1]}"
+    if len(t) < 3:
+        raise InputError(f"the history has {len(t)} rows: spectra need three or more")
+    if ground in history:
+        # means of the steps, as the probes have them; row 0 is the state at the start
+        mean = np.asarray(history[ground], dtype=float).copy()
+        mean[1:] = 0.5 * (mean[1:] + mean[:-1])
+        if parts[1] == "g":
+            values = mean
+        values = values - mean if relative else values
+    steps = np.diff(t)
+    dt = float(np.median(steps))
+    if np.ptp(steps) > 1e-6 * dt:
+        even = t[0] + dt * np.arange(int(np.floor((t[-1] - t[0]) / dt * (1.0 + 1e-12))) + 1)
+        values = np.interp(even, t, values)
+    kind = "relative" if relative else "absolute"
+    return Record(values, dt, title=f"{column}, {kind}", source=column, notes=(f"{kind} acceleration of a run",))
+
+
+def floor_spectrum(
+    history: Mapping[str, Array], column: str, periods: Array, *, damping: float = 0.05, relative: bool = False
+) -> ResponseSpectrum:
+    """Response spectrum of an oscillator of each period [s] standing where the column was recorded."""
+    return response_spectrum(recorded_motion(history, column, relative=relative), periods, damping=damping)
+
+
+@dataclass(frozen=True)
+class TransferFunction:
+    """frequencies [Hz] and |surface/base| [-], (m,); nan where the base has no motion to divide by."""
+
+    frequencies: Array
+    amplitude: Array
+
+    @property
+    def peak(self) -> tuple[float, float]:
+        """(frequency [Hz], amplitude) of the largest value."""
+        k = int(np.nanargmax(self.amplitude))
+        return float(self.frequencies[k]), float(self.amplitude[k])
+
+
+def transfer_function(
+    history: Mapping[str, Array], surface: str, base: str = "a_g_x", *, frequencies: Array | None = None,
+    bandwidth: float | None = BANDWIDTH, floor: float = 1e-3,
+) -> TransferFunction:
+    """|A_surface(f)| / |A_base(f)| of absolute accelerations, from the Fourier amplitudes of two columns.
+
+    Amplitudes are smoothed with Konno and Ohmachi's window (1998), both alike, before they are divided; it widens
+    peaks, ``bandwidth=None`` takes the raw ones. The motion has to die away before the run ends (or be a periodic one),
+    else its cut end leaks into all frequencies. The amplitudes at ``frequencies`` (all of the transform above zero when
+    None) are nan where the smoothed base has less than ``floor`` of its largest amplitude.
+    InputError for a base without motion.
+    """
+    top, below = recorded_motion(history, surface), recorded_motion(history, base)
+    raw = np.fft.rfftfreq(len(top.acceleration), top.dt)[1:]
+    spectra = [np.abs(np.fft.rfft(one.acceleration))[1:] for one in (top, below)]
+    wanted = raw if frequencies is None else np.atleast_1d(np.asarray(frequencies, dtype=float))
+    if np.any(wanted <= 0.0) or np.any(wanted > raw[-1] * (1.0 + 1e-9)):
+        raise InputError(f"transfer_function: give frequencies above 0 and up to {raw[-1]:.4g} Hz, half the sampling")
+    if bandwidth is None:
+        smooth = [np.interp(wanted, raw, one) for one in spectra]
+    else:
+        smooth = [konno_ohmachi(raw, one, wanted, bandwidth=bandwidth) for one in spectra]
+    largest = float(spectra[1].max())
+    if not largest > 0.0:
+        raise InputError(f"transfer_function: column '{base}' is zero throughout: name the motion at the base")
+    ratio = np.full(len(wanted), np.nan)
+    np.divide(smooth[0], smooth[1], out=ratio, where=smooth[1] > floor * smooth[1].max())
+    return TransferFunction(wanted, ratio)
+
+
+def konno_ohmachi(frequencies: Array, amplitudes: Array, centres: Array, *, bandwidth: float = BANDWIDTH) -> Array:
+    """Amplitudes smoothed at the centres with the weights (sin x / x)⁴, x = b log10(f / f_c) (Konno, Ohmachi 1998)."""
+    smooth = np.empty(len(centres))
+    for k, centre in enumerate(centres):
+        weights = np.sinc(bandwidth * np.log10(frequencies / centre) / np.pi) ** 4
+        smooth[k] = weights @ amplitudes / weights.sum()
+    return smooth

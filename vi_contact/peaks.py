@@ -1,0 +1,105 @@
+"""Peak values of histories as a tidy table, and loops of a force over a deformation with the work in them."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from .algebra import Array
+from .errors import InputError, ViContactError
+from .output import sentence, write_atomically
+from .recorders import Columns
+
+HEADER = ("name", "quantity", "unit", "max", "t_max", "min", "t_min")
+_NOT_PEAKS = ("t", "k", "iterations", "escalated")
+
+
+@dataclass(frozen=True)
+class Peak:
+    """Largest and smallest value of a column and when they came first [s]; nan for a column that is nan throughout."""
+
+    name: str
+    quantity: str
+    unit: str
+    max: float
+    t_max: float
+    min: float
+    t_min: float
+
+
+def peaks(history: Mapping[str, Array], columns: Columns, names: Sequence[str] | None = None) -> list[Peak]:
+    """The peaks of these columns, of all columns of numbers but the counters when None. nan values are left out.
+
+    InputError for a column that the history does not have, or one of arrays.
+    """
+    if names is None:
+        names = [name for name in columns if name not in _NOT_PEAKS and name in history and history[name].ndim == 1]
+    found = []
+    for name in names:
+        values = column_of(history, name)
+        unit, quantity = columns[name]
+        if np.isnan(values).all():
+            found.append(Peak(name, quantity, unit, *[float("nan")] * 4))
+            continue
+        high, low = int(np.nanargmax(values)), int(np.nanargmin(values))
+        t = history["t"]
+        found.append(Peak(name, quantity, unit, *(float(x) for x in (values[high], t[high], values[low], t[low]))))
+    return found
+
+
+def write_peaks(path: str | Path, rows: Sequence[Peak]) -> Path:
+    """``peaks.csv``: name, quantity (the meaning), unit, max, t_max [s], min, t_min [s], numbers to the last bit."""
+    text = io.StringIO(newline="")
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(HEADER)
+    for row in rows:
+        numbers = (repr(x) for x in (row.max, row.t_max, row.min, row.t_min))
+        writer.writerow([row.name, row.quantity, row.unit, *numbers])
+    try:
+        write_atomically(Path(path), text.getvalue().encode())
+    except OSError as error:
+        raise ViContactError(sentence(error)) from error
+    return Path(path)
+
+
+@dataclass(frozen=True)
+class Loop:
+    """deformation and force (rows,); work: of the force on the deformation since the start, ∫ F dx by the trapezoidal
+    rule, (rows,): of a closed loop run through clockwise its area, what the structure took up."""
+
+    deformation: Array
+    force: Array
+    work: Array
+
+    @property
+    def stiffness(self) -> float:
+        """Secant stiffness between the largest and the smallest deformation; nan where nothing moved."""
+        high, low = int(np.argmax(self.deformation)), int(np.argmin(self.deformation))
+        way = self.deformation[high] - self.deformation[low]
+        return float((self.force[high] - self.force[low]) / way) if way > 0.0 else float("nan")
+
+
+def hysteresis(history: Mapping[str, Array], deformation: str, force: str, *, sign: float = 1.0) -> Loop:
+    """The loop of two columns: base shear over top displacement, shear over racking, M over theta.
+
+    ``sign`` = -1 turns the force: reactions on the body push against its deformation. InputError for missing columns.
+    """
+    x, y = column_of(history, deformation), sign * column_of(history, force)
+    work = np.concatenate([[0.0], np.cumsum(0.5 * (y[1:] + y[:-1]) * np.diff(x))])
+    return Loop(x, y, work)
+
+
+def column_of(history: Mapping[str, Array], name: str) -> Array:
+    """A column of numbers; InputError that names what there is."""
+    if name not in history:
+        known = [one for one in history if np.ndim(history[one]) == 1]
+        raise InputError(f"the history has no column '{name}': it has {', '.join(known)}")
+    values = np.asarray(history[name], dtype=float)
+    if values.ndim != 1:
+        raise InputError(f"column '{name}' holds arrays: choose one of numbers")
+    return values

@@ -1,0 +1,59 @@
+"""Pictures of engineering quantities: loops of force and deformation, transfer functions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .floor_spectra import TransferFunction
+from .peaks import Loop
+from .plotting import _STYLE, _save, _scaled
+
+
+def _panel(size: tuple[float, float]) -> tuple[Any, Any]:
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    with matplotlib.rc_context(_STYLE):
+        figure = Figure(figsize=size, layout="constrained")
+        return figure, figure.subplots()
+
+
+def plot_loop(
+    loop: Loop, path: str | Path, *, x: tuple[str, str], y: tuple[str, str], title: str | None = None
+) -> Path:
+    """Force over deformation; ``x``, ``y``: (name, SI unit) of the two. The title says the work at the end."""
+    figure, axis = _panel((6.4, 4.8))
+    across, x_unit = _scaled(loop.deformation, x[1])
+    up, y_unit = _scaled(loop.force, y[1])
+    axis.axhline(0.0, color="0.6", lw=0.6)
+    axis.axvline(0.0, color="0.6", lw=0.6)
+    axis.plot(across, up, color="black", lw=0.8)
+    axis.plot(across[:1], up[:1], "o", color="tab:green", ms=5, label="start")
+    axis.plot(across[-1:], up[-1:], "s", color="tab:red", ms=5, label="end")
+    axis.legend(fontsize=8)
+    work, unit = _scaled(loop.work[-1:], "J")
+    axis.set(xlabel=f"{x[0]} [{x_unit}]", ylabel=f"{y[0]} [{y_unit}]", title=title or f"work {work[0]:.3g} {unit}")
+    return _save(figure, path)
+
+
+def plot_transfer(
+    found: TransferFunction, path: str | Path, *, title: str, theory: TransferFunction | None = None
+) -> Path:
+    """Amplitude over frequency, both logarithmic; a theory dashed."""
+    figure, axis = _panel((7.5, 4.5))
+    axis.loglog(found.frequencies, found.amplitude, color="black", lw=1.0, label="computed")
+    if theory is not None:
+        axis.loglog(theory.frequencies, theory.amplitude, "--", color="tab:red", lw=1.0, label="theory")
+        axis.legend(fontsize=8)
+    axis.axhline(1.0, color="0.6", lw=0.6)
+    frequency, amplitude = found.peak
+    axis.plot(frequency, amplitude, "o", color="tab:blue", ms=4)
+    axis.annotate(f"{amplitude:.3g} at {frequency:.3g} Hz", (frequency, amplitude), xytext=(6, 4),
+                  textcoords="offset points", fontsize=8)
+    finite = found.amplitude[np.isfinite(found.amplitude) & (found.amplitude > 0.0)]
+    axis.set_ylim(0.5 * float(finite.min()), 2.0 * float(finite.max()))
+    axis.set(xlabel="frequency [Hz]", ylabel="|surface / base| [-]", title=title)
+    return _save(figure, path)

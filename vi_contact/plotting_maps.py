@@ -1,0 +1,79 @@
+"""Maps of contact quantities over position and time, for surfaces that are lines: straight, bent or U-shaped."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .algebra import Array, Indices
+from .plotting import _edges, _scaled
+
+STRAIGHT = 1e-6  # of its length: what a line of points may deviate
+ROWS = 1200  # of a map: more instants than a page has dots are gathered
+
+
+def arc_position(points: Array) -> tuple[Array, str]:
+    """(place (m,) along the line of points (m, 2) [m], name of the axis).
+
+    Points on a straight line along an axis: their coordinate; on another one: the length along it; else the arc length
+    of the chain that starts at the highest point (of those the leftmost) and goes on to the nearest one each time.
+    """
+    arms = points - points.mean(axis=0)
+    _, values, axes = np.linalg.svd(arms, full_matrices=False)
+    if values[-1] <= STRAIGHT * values[0]:
+        for i, name in enumerate("xy"):
+            if abs(axes[0, i]) >= 1.0 - STRAIGHT:
+                return np.array(points[:, i]), f"{name} [m]"
+        along = axes[0] if axes[0, int(np.argmax(np.abs(axes[0])))] > 0.0 else -axes[0]
+        place = arms @ along
+        return np.asarray(place - place.min()), "length along the surface [m]"
+    order = chain(points)
+    lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points[order], axis=0), axis=1))])
+    place = np.empty(len(points))
+    place[order] = lengths
+    return place, "arc length [m]"
+
+
+def chain(points: Array) -> Indices:
+    """Order of the points from the highest (leftmost) one, each time to the nearest that is left."""
+    size = float(np.ptp(points, axis=0).max()) or 1.0
+    top = points[:, 1] >= points[:, 1].max() - STRAIGHT * size
+    here = int(np.flatnonzero(top)[np.argmin(points[top, 0])])
+    left = np.ones(len(points), dtype=bool)
+    order = [here]
+    left[here] = False
+    while left.any():
+        rest = np.flatnonzero(left)
+        here = int(rest[np.argmin(np.linalg.norm(points[rest] - points[here], axis=1))])
+        order.append(here)
+        left[here] = False
+    return np.array(order)
+
+
+def thinned(t: Array, values: Array, rows: int = ROWS) -> tuple[Array, Array]:
+    """At most so many instants: of each run of neighbours the largest value of every point, so that peaks stay."""
+    if len(t) <= rows:
+        return t, values
+    starts = np.linspace(0, len(t), rows, endpoint=False).astype(int)
+    return t[starts], np.maximum.reduceat(values, starts, axis=0)
+
+
+def draw_map(
+    axis: Any, t: Array, position: Array, values: Array, unit: str, *, title: str, axis_label: str, colours: str
+) -> None:
+    """values (rows, m) as colours, zero white; points at the same place (corners) side by side in their order."""
+    import matplotlib
+
+    order = np.argsort(position, kind="stable")
+    shown, prefixed = _scaled(values[:, order], unit)
+    size = float(np.nanmax(np.abs(shown), initial=0.0)) or 1.0
+    pulling = bool(np.any(shown < 0.0))
+    palette = matplotlib.colormaps["RdBu_r" if pulling else colours].with_extremes(under="white")
+    low = -size if pulling else 1e-9 * size
+    axis.grid(False)
+    image = axis.pcolormesh(
+        _edges(t), _edges(position[order]), shown.T, cmap=palette, vmin=low, vmax=size, rasterized=True
+    )
+    axis.figure.colorbar(image, ax=axis, label=f"[{prefixed}]")
+    axis.set(xlabel="time [s]", ylabel=axis_label, title=f"{title} (white: none)")

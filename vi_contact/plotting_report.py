@@ -1,0 +1,253 @@
+"""One page about a run, from the files in its folder: facts, input motion, histories, contact, energies, peaks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from textwrap import shorten
+from typing import Any
+
+import numpy as np
+
+from .errors import InputError
+from .floor_spectra import recorded_motion
+from .ground_motion import STANDARD_GRAVITY, response_spectrum
+from .peaks import Peak, peaks
+from .plotting import _LEDGER, _STYLE, _log, _scaled
+from .plotting_maps import arc_position, draw_map, thinned
+from .run_folder import RunFolder
+
+PAGE = (8.27, 11.69)  # inches, A4
+TABLE_ROWS = 13
+_GROUPS = (  # (title, prefixes of columns); the first four that move are drawn
+    ("displacement", ("u_",)),
+    ("contact force", ("contact_resultant", "N_", "contact_force_")),
+    ("uplift ratio", ("contact_uplift", "uplift_")),
+    ("force of the support", ("reaction_x_", "reaction_y_", "reaction_z_")),
+    ("racking and rocking", ("racking_", "theta_")),
+    ("shear force", ("V_",)),
+    ("bending moment", ("M_", "reaction_M")),
+    ("slip", ("contact_max_slip", "slip_")),
+    ("absolute acceleration", ("a_x_", "a_y_", "a_z_")),
+    ("contact pressure", ("contact_max_pressure",)),
+)
+_LINES = 4  # of a panel: those that move most
+_PEAKS = (
+    "a_g_", "u_", "a_x_", "a_y_", "racking_", "theta_", "contact_resultant", "contact_uplift", "contact_max_pressure",
+    "contact_max_slip", "uplift_", "opening_", "slip_", "N_", "T_", "V_", "M_", "height_", "reaction_",
+)
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A drawing of half the page's width."""
+
+    draw: Callable[[Any], None]
+
+
+def plot_report(
+    run: RunFolder, path: str | Path, *, title: str | None = None, columns: Sequence[Sequence[str]] | None = None
+) -> Path:
+    """The page as PNG, PDF or SVG, by the name of the file. Panels that would be empty are left out.
+
+    ``columns``: groups of columns of one unit, a panel each, in place of those the page chooses. InputError for columns
+    that do not exist, a run of one row, or another kind of file.
+    """
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    path = Path(path)
+    if path.suffix.lower() not in (".png", ".pdf", ".svg"):
+        raise InputError(f"'{path}': a report is a .png, .pdf or .svg file")
+    if len(run.history["t"]) < 2:
+        raise InputError(f"the run in '{run.folder}' has no steps yet: there is nothing to report")
+    rows = table_rows(run)
+    panels = _panels_of(run, columns)
+    lines = (len(panels) + 1) // 2
+    table = 0.3 + 0.155 * (len(rows) + 1)
+    with matplotlib.rc_context(_STYLE | {"font.size": 7, "axes.titlesize": 8, "axes.labelsize": 7}):
+        figure = Figure(figsize=PAGE, layout="constrained")
+        heights = [1.25, *[(PAGE[1] - 1.55 - table) / lines] * lines, table]
+        grid = figure.add_gridspec(lines + 2, 2, height_ratios=heights)
+        _header(figure.add_subplot(grid[0, :]), run, title or f"Run {run.folder.resolve().name}")
+        for i, panel in enumerate(panels):
+            last_alone = i == len(panels) - 1 and i % 2 == 0
+            panel.draw(figure.add_subplot(grid[1 + i // 2, :] if last_alone else grid[1 + i // 2, i % 2]))
+        _table(figure.add_subplot(grid[lines + 1, :]), rows)
+        figure.savefig(path, dpi=150)
+    return path
+
+
+def _panels_of(run: RunFolder, columns: Sequence[Sequence[str]] | None) -> list[Panel]:
+    shaken = [f"a_g_{axis}" for axis in "xyz" if np.any(run.history.get(f"a_g_{axis}", 0.0))]
+    panels = []
+    if shaken:
+        panels.append(Panel(lambda axis: _lines(axis, run, shaken, "ground acceleration")))
+    if shaken and len(run.history["t"]) > 2:
+        panels.append(Panel(lambda axis: _spectrum(axis, run, shaken)))
+    groups = _given(run, columns) if columns is not None else _moving(run)
+    for name, found in groups:
+        panels.append(Panel(lambda axis, name=name, found=found: _lines(axis, run, found, name)))  # type: ignore[misc]
+    contact = run.contact
+    if contact is not None and "pressure" in run.history and contact.points.shape[1] == 2 and len(contact.points) > 2:
+        panels += [
+            Panel(lambda axis: _map(axis, run, "pressure", "Pa")), Panel(lambda axis: _map(axis, run, "gap", "m"))
+        ]
+    if "energy_defect" in run.history:
+        panels.append(Panel(lambda axis: _energies(axis, run)))
+    panels.append(Panel(lambda axis: _certificate(axis, run)))
+    return panels
+
+
+def _given(run: RunFolder, columns: Sequence[Sequence[str]]) -> list[tuple[str, list[str]]]:
+    for name in (name for group in columns for name in group):
+        if name not in run.columns or np.ndim(run.history.get(name, 0)) != 1:
+            raise InputError(f"the run has no column '{name}': see columns.json in its folder")
+    for group in columns:
+        if len({run.columns[name][0] for name in group}) > 1:
+            raise InputError(f"columns {', '.join(group)} have different units: give a panel to each unit")
+    return [(", ".join(group) if len(group) < 3 else run.columns[group[0]][1], list(group)) for group in columns]
+
+
+def _moving(run: RunFolder) -> list[tuple[str, list[str]]]:
+    """Up to four groups, each with the columns that vary most."""
+    groups = []
+    for title, prefixes in _GROUPS:
+        found: list[str] = []
+        for prefix in prefixes:
+            if not found:
+                found = [name for name in run.columns if name.startswith(prefix) and _range(run, name) > 0.0]
+        if found:
+            found.sort(key=lambda name: -_range(run, name))
+            groups.append((title, found[:_LINES]))
+    return groups[:4]
+
+
+def _range(run: RunFolder, name: str) -> float:
+    values = run.history.get(name)
+    if values is None or values.ndim != 1 or np.isnan(values).all():
+        return 0.0
+    return float(np.nanmax(values) - np.nanmin(values))
+
+
+def _lines(axis: Any, run: RunFolder, names: Sequence[str], title: str) -> None:
+    """Histories in one unit, with a prefix that fits."""
+    values, unit = _scaled(np.array([run.history[name] for name in names]), run.columns[names[0]][0])
+    for one, name in zip(values, names, strict=True):
+        axis.plot(run.history["t"], one, lw=0.7, label=name)
+    axis.legend(fontsize=6, ncol=2, loc="upper right", framealpha=0.7, handlelength=1.2)
+    axis.margins(x=0.0)
+    axis.set(xlabel="time [s]", ylabel=f"[{unit}]" if unit != "-" else "[-]", title=title)
+
+
+def _spectrum(axis: Any, run: RunFolder, names: Sequence[str]) -> None:
+    """Pseudo-acceleration of the ground's motion, 5 % damping, over periods that its steps resolve."""
+    for name in names:
+        record = recorded_motion(run.history, name)
+        periods = np.geomspace(max(10.0 * record.dt, 0.01 * record.duration), max(2.0 * record.duration, 1.0), 100)
+        periods = periods[periods <= 10.0] if record.duration > 1.0 else periods
+        spectrum = response_spectrum(record, periods)
+        axis.semilogx(periods, spectrum.psa / STANDARD_GRAVITY, lw=0.9, label=name)
+    axis.legend(fontsize=6)
+    axis.set_ylim(bottom=0.0)
+    axis.set(xlabel="period [s]", ylabel="PSA [g]", title="response spectrum of the ground, 5 %")
+
+
+def _map(axis: Any, run: RunFolder, column: str, unit: str) -> None:
+    assert run.contact is not None
+    position, label = arc_position(run.contact.points)
+    values = np.reshape(run.history[column], (len(run.history["t"]), -1))
+    open_gap = column == "gap"
+    t, shown = thinned(run.history["t"], np.maximum(values, 0.0) if open_gap else values)
+    draw_map(axis, t, position, shown, unit, title="opening" if open_gap else "contact pressure", axis_label=label,
+             colours="Blues" if open_gap else "magma_r")
+
+
+def _energies(axis: Any, run: RunFolder) -> None:
+    present = [entry for entry in _LEDGER if np.any(run.history.get(entry[0], 0.0))]
+    if not present:
+        axis.text(0.5, 0.5, "no energy at all", ha="center")
+        return
+    values, unit = _scaled(np.array([run.history[name] for name, *_ in present]), "J")
+    for one, (_, label, colour, style) in zip(values, present, strict=True):
+        axis.plot(run.history["t"], one, color=colour, ls=style, lw=0.8, label=label)
+    axis.legend(fontsize=6, ncol=2)
+    axis.margins(x=0.0)
+    axis.set(xlabel="time [s]", ylabel=f"[{unit}]", title="energies and works since the start")
+
+
+def _certificate(axis: Any, run: RunFolder) -> None:
+    _log(axis, run.history["t"][1:], run.history["certificate"][1:])
+    tolerance = run.facts.get("tolerance")
+    if tolerance:
+        axis.axhline(tolerance, color="tab:red", ls="--", lw=0.8, label=f"tolerance {tolerance:g}")
+        axis.legend(fontsize=6)
+    axis.margins(x=0.0)
+    axis.set(xlabel="time [s]", ylabel="worst residual [-]", title="certificate of every step")
+
+
+def _header(axis: Any, run: RunFolder, title: str) -> None:
+    """Facts in two columns."""
+    axis.set_axis_off()
+    axis.text(0.0, 1.0, title, fontsize=13, weight="bold", va="top", transform=axis.transAxes)
+    for k, (name, value) in enumerate(header_facts(run)):
+        x, y = (0.0, 0.74 - 0.135 * k) if k < 6 else (0.62, 0.74 - 0.135 * (k - 6))
+        axis.text(x, y, name, color="0.35", va="top", transform=axis.transAxes)
+        axis.text(x + (0.1 if k < 6 else 0.14), y, value, va="top", transform=axis.transAxes)
+
+
+def header_facts(run: RunFolder) -> list[tuple[str, str]]:
+    """(name, value) of what the page says first: six of the method, six of the outcome; a dash for what is unknown."""
+    facts, t = run.facts, run.history["t"]
+
+    def fact(name: str, form: str = "{}") -> str:
+        value = facts.get(name)
+        return "-" if value is None else form.format(value)
+
+    dt = facts.get("dt")
+    iterations = (facts.get("iterations_per_step") or {}).get("mean")
+    return [
+        ("scheme", shorten(fact("scheme"), 62, placeholder=" …")),
+        ("mass", shorten(fact("mass"), 62, placeholder=" …")),
+        ("solver", shorten(fact("solver"), 62, placeholder=" …")),
+        ("time step", dt if isinstance(dt, str) else "-" if dt is None else f"{dt:.6g} s"),
+        ("steps", f"{len(t) - 1}, t = {t[0]:g} to {t[-1]:g} s"),
+        ("version", f"vi_contact {(facts.get('versions') or {}).get('vi_contact', '-')}, ranks {fact('ranks')}"),
+        ("status", fact("status") if facts else "not ended"),
+        ("unknowns", fact("unknowns")),
+        ("contact points", fact("contact_points")),
+        ("iterations a step", "-" if iterations is None else f"{iterations:.2f}"),
+        ("worst certificate", f"{np.max(run.history['certificate']):.2e}"),
+        ("energy defect", fact("energy_defect", "{:.2e}")),
+    ]
+
+
+def table_rows(run: RunFolder) -> list[Peak]:
+    """The peaks on the page: of what engineers ask for, those of each kind that vary most; peaks.csv has all."""
+    kinds: list[list[str]] = []
+    for prefix in _PEAKS:
+        names = [name for name in run.columns if name.startswith(prefix) and _range(run, name) > 0.0]
+        kinds.append(sorted(names, key=lambda name: -_range(run, name)))
+    chosen: list[str] = []
+    for place in range(max(map(len, kinds), default=0)):  # the first of every kind before the second of any
+        chosen += [names[place] for names in kinds if len(names) > place and names[place] not in chosen]
+    shown = [name for name in run.columns if name in chosen[:TABLE_ROWS]]
+    return peaks(run.history, run.columns, shown)
+
+
+def _table(axis: Any, rows: Sequence[Peak]) -> None:
+    axis.set_axis_off()
+    if not rows:
+        return
+    cells = [
+        [row.name, shorten(row.quantity, 66, placeholder=" …"), row.unit, f"{row.max:.4g}", f"{row.t_max:.4g}",
+         f"{row.min:.4g}", f"{row.t_min:.4g}"]
+        for row in rows
+    ]
+    table = axis.table(
+        cellText=cells, colLabels=["column", "quantity", "unit", "max", "at t [s]", "min", "at t [s]"],
+        colWidths=[0.18, 0.42, 0.06, 0.09, 0.08, 0.09, 0.08], cellLoc="left", loc="upper center", edges="horizontal",
+    )
+    table.auto_set_font_size(False)
+    table.set_fontsize(6.5)
