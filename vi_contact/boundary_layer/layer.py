@@ -1,0 +1,90 @@
+"""The boundary layer before an obstacle: its width, its cut-off and the force in it (seed 001, equation 25).
+
+    f̂_1 = [k̂/x - ĉ ẋ/x²] delta(x; a, b),    k̂ = k b²,    ĉ = c b²/V,    x = rho(q) > 0 the distance function
+    delta = 1 - s(z),  z = (x - a)/(b - a),  s = f(z)/(f(z) + f(1 - z)),  f(z) = exp(-1/z) for z > 0, else 0
+
+x > 0 is admissible, x = 0 is the obstacle; a positive f̂_1 pushes away from it. The layer reaches from 0 to b; the force
+is complete up to a and fades out smoothly between a and b.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import expit
+
+from ..algebra import Array
+from ..errors import InputError
+
+
+@dataclass(frozen=True)
+class Layer:
+    """Parameters of the law; the distance x is in metres here (k, c have other units for other rho).
+
+    Attributes:
+        width: b [m], where the layer begins.
+        k: [N/m] >= 0, spring-like: k x is what is left of it in the normal equation divided by (b/x)².
+        c: [N] >= 0, damper-like.
+        speed: V [m/s] of ĉ = c b²/V; None: the speed at which the layer is entered, as in the source.
+        start: a [m], 0 < a <= b, where the force is complete; None: a = b, no transition.
+
+    Raises InputError for a parameter outside its range, and when k and c are both zero.
+    """
+
+    width: float
+    k: float
+    c: float = 0.0
+    speed: float | None = None
+    start: float | None = None
+
+    def __post_init__(self) -> None:
+        positive("layer width b", self.width, "m")
+        for name, value in (("k", self.k), ("c", self.c)):
+            if not 0.0 <= value < np.inf:
+                raise InputError(f"layer parameter {name} is {value}: give zero or a positive finite number")
+        if self.k == 0.0 and self.c == 0.0:
+            raise InputError("layer parameters k and c are both zero: nothing would push the body back, give k > 0")
+        if self.speed is not None:
+            positive("layer speed V", self.speed, "m/s")
+        if self.start is not None and not 0.0 < self.start <= self.width:
+            raise InputError(f"layer start a is {self.start}: give a length above 0 and up to the width {self.width} m")
+
+    @property
+    def a(self) -> float:
+        """Where the force is complete [m]."""
+        return self.width if self.start is None else self.start
+
+    @property
+    def v(self) -> float:
+        """V [m/s]; InputError while it is not known."""
+        if self.speed is None:
+            raise InputError("the layer's speed V is not given: give speed, or enter the layer first")
+        return self.speed
+
+    def at(self, speed: float) -> Layer:
+        """The layer as a body that enters with this speed [m/s] meets it."""
+        return self if self.speed is not None else replace(self, speed=speed)
+
+    def times(self, factor: float) -> Layer:
+        """k and c times a factor: the same motion of a mass that many times as large."""
+        return replace(self, k=factor * self.k, c=factor * self.c)
+
+    def cut_off(self, x: Array | float) -> Array:
+        """delta(x; a, b): 1 up to a, 0 from b on, infinitely smooth between."""
+        x, a, b = np.asarray(x, dtype=float), self.a, self.width
+        between = (x > a) & (x < b)
+        z = np.where(between, (x - a) / (b - a if b > a else 1.0), 0.5)
+        z = np.clip(z, 1e-3, 1.0 - 1e-3)  # beyond that exp(-1000) and 1 - exp(-1000)
+        return np.where(between, expit(1.0 / z - 1.0 / (1.0 - z)), np.where(x <= a, 1.0, 0.0))
+
+    def force(self, x: Array | float, rate: Array | float) -> Array:
+        """f̂_1 of (25) [N] at distance x > 0 and rate ẋ."""
+        x = np.asarray(x, dtype=float)
+        return np.asarray(self.width**2 * (self.k - self.c / self.v * rate / x) / x * self.cut_off(x))
+
+
+def positive(name: str, value: float, unit: str) -> None:
+    """InputError unless the value is positive and finite."""
+    if not 0.0 < value < np.inf:
+        raise InputError(f"{name} is {value}: give a positive finite number in {unit}")

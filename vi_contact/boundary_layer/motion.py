@@ -1,0 +1,97 @@
+"""Motion of any system with one frictionless contact, as ordinary differential equations (seed 001, 26 to 28).
+
+In velocities v (of coordinates q, or quasi-velocities) with M = [g_IJ(q)] and A = d rho:
+
+    q̇ = rates(q, v),    M v̇ = f(t, q, v) - Γ(q)(v, v) + Aᵀ lambda,    lambda = 0 outside the layer
+    ρ̈ = A v̇ + Ȧ v,    lambda of metric.Metric inside it: a spring, a damper and the metric's own terms
+
+Aᵀ lambda is (28): every component is a projection of the one normal equation. Γ is the covariant part of (23) by the
+affinities of M, [Γ(v, v)]_I = Ṁ_IJ v_J - ½ ∂M_JK/∂q_I v_J v_K; a constant M has none. The distance rho >= 0 is the
+caller's; where it is no length the law's parameters have its units.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..algebra import Array
+from ..errors import InputError
+
+STEP = 6e-6  # of a central difference over the size of its argument: eps to the power 1/3
+
+
+@dataclass(frozen=True)
+class ConstrainedSystem:
+    """A configuration manifold with boundary, and the forces on it.
+
+    Attributes:
+        mass: M, (n, n) [kg], constant or a function of q.
+        rho: q -> distance to the boundary, > 0 inside.
+        gradient: q -> A (n,), ρ̇ = A v.
+        force: (t, q, v) -> f (n,): applied forces and, for quasi-velocities, gyroscopic ones; None: no forces.
+        rates: (q, v) -> q̇; None: v are the rates of q.
+        gradient_rate: (q, v) -> Ȧ v; None: by a central difference, to ten digits.
+    """
+
+    mass: Array | Callable[[Array], Array]
+    rho: Callable[[Array], float]
+    gradient: Callable[[Array], Array]
+    force: Callable[[float, Array, Array], Array] | None = None
+    rates: Callable[[Array, Array], Array] | None = None
+    gradient_rate: Callable[[Array, Array], float] | None = None
+
+    def __post_init__(self) -> None:
+        if not callable(self.mass):
+            M = np.asarray(self.mass, dtype=float)
+            if M.ndim != 2 or not np.allclose(M, M.T) or np.min(np.linalg.eigvalsh(M)) <= 0.0:
+                raise InputError("the mass matrix is not symmetric positive definite: check its entries")
+
+    def matrix(self, q: Array) -> Array:
+        """M(q)."""
+        return np.asarray(self.mass(q) if callable(self.mass) else self.mass, dtype=float)
+
+    def velocity(self, q: Array, v: Array) -> Array:
+        """q̇."""
+        return v if self.rates is None else np.asarray(self.rates(q, v))
+
+    def normal_rate(self, q: Array, v: Array) -> float:
+        """ρ̇ = A v."""
+        return float(np.dot(self.gradient(q), v))
+
+    def turning(self, q: Array, v: Array) -> float:
+        """Ȧ v, the part of ρ̈ that is there without acceleration."""
+        if self.gradient_rate is not None:
+            return float(self.gradient_rate(q, v))
+        rate = self.velocity(q, v)
+        size = float(np.max(np.abs(rate), initial=0.0))
+        if size == 0.0:
+            return 0.0
+        h = STEP * max(1.0, float(np.max(np.abs(q)))) / size
+        change = np.asarray(self.gradient(q + h * rate)) - np.asarray(self.gradient(q - h * rate))
+        return float(change @ v) / (2.0 * h)
+
+    def generalised_force(self, t: float, q: Array, v: Array) -> Array:
+        """f - Γ(v, v), (n,)."""
+        f = np.zeros_like(v) if self.force is None else np.asarray(self.force(t, q, v), dtype=float)
+        return f - _inertia(self.mass, q, v) if callable(self.mass) else f
+
+    def accelerations(self, t: float, q: Array, v: Array) -> tuple[Array, Array, float, float]:
+        """(v̇ without layer, M⁻¹Aᵀ, g_11, ρ̈ without layer)."""
+        A = np.asarray(self.gradient(q), dtype=float)
+        both = np.linalg.solve(self.matrix(q), np.column_stack([self.generalised_force(t, q, v), A]))
+        free, along = both[:, 0], both[:, 1]
+        return free, along, float(1.0 / (A @ along)), float(A @ free) + self.turning(q, v)
+
+
+def _inertia(mass: Callable[[Array], Array], q: Array, v: Array) -> Array:
+    """Γ(v, v) by central differences of M, for v = q̇."""
+    h = STEP * max(1.0, float(np.max(np.abs(q))))
+    slopes = np.empty((len(q), len(v), len(v)))  # ∂M_IJ/∂q_K in [K, I, J]
+    for K in range(len(q)):
+        side = np.zeros_like(q)
+        side[K] = h
+        slopes[K] = (np.asarray(mass(q + side)) - np.asarray(mass(q - side))) / (2.0 * h)
+    return np.einsum("kij,k,j->i", slopes, v, v) - 0.5 * np.einsum("ijk,j,k->i", slopes, v, v)

@@ -1,0 +1,168 @@
+"""A particle that hits a wall, in closed form (seed 001, equations 35 to 38).
+
+With y = ln x the normal equation (35) is linear, m y'' = k - (c/V) y', and b cancels. From x = a, ẋ = -V:
+
+    x(t) = a exp(beta),   beta = kappa [(1 + s) T² phi(s T) - T],   ẋ = (V/a) x [(1 + s) T psi(s T) - 1]           (36)
+    s = c/(a k),  kappa = m V²/(k a²),  T = a k t/(m V),  phi(z) = (exp(-z) - 1 + z)/z²,  psi(z) = (1 - exp(-z))/z
+
+(this form of (36) has no difference of large numbers as c -> 0). Consequences, with h(z) = (z - ln(1 + z))/z²:
+
+    compression ends at t_c = m V/(a k) ln(1 + s)/s,    x_min = a exp(-kappa h(s))
+    e = V'/V is the root of e² h(-s e) = h(s), that is e = tau/s - 1, tau = 1 + s + W0(-(1 + s) exp(-(1 + s)))
+    contact ends at t_f = (1 + e) m V/(a k)
+
+e depends on s alone: e = 1 - 2/3 s + ... for small s, and tends to 1/s for large s. A speed V of the law that is not
+the particle's own U changes s to c U/(a k V).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.integrate import quad
+from scipy.optimize import brentq
+from scipy.special import exprel, lambertw
+
+from ..algebra import Array
+from ..errors import InputError
+from .layer import Layer, positive
+
+
+@dataclass(frozen=True)
+class ParticleImpact:
+    """A particle of ``mass`` m [kg] that reaches x = a of the layer with ``speed`` [m/s].
+
+    k must be positive: without it no particle leaves the layer. InputError for values outside their range.
+    """
+
+    layer: Layer
+    mass: float
+    speed: float
+
+    def __post_init__(self) -> None:
+        positive("the particle's mass", self.mass, "kg")
+        positive("the particle's speed", self.speed, "m/s")
+        if self.layer.k == 0.0:
+            raise InputError("layer parameter k is zero: the particle would stay in the layer, give k > 0")
+
+    @property
+    def damping_ratio(self) -> float:
+        """s = c/(a k), times the particle's speed over the law's."""
+        layer = self.layer.at(self.speed)
+        return layer.c / (layer.a * layer.k) * (self.speed / layer.v)
+
+    @property
+    def _time(self) -> float:
+        """m V/(a k), the unit of T [s]."""
+        return self.mass * self.speed / (self.layer.a * self.layer.k)
+
+    @property
+    def _kappa(self) -> float:
+        return self.mass * self.speed**2 / (self.layer.k * self.layer.a**2)
+
+    @property
+    def restitution(self) -> float:
+        """e_v = V'/V, Newton's coefficient (37)."""
+        return restitution(self.damping_ratio)
+
+    @property
+    def compression_time(self) -> float:
+        """t_c [s]: the velocity is zero."""
+        return self._time / float(exprel(np.log1p(self.damping_ratio)))
+
+    @property
+    def duration(self) -> float:
+        """t_f [s]: back at x = a."""
+        return self._time * (1.0 + self.restitution)
+
+    @property
+    def deepest(self) -> float:
+        """x_min [m]."""
+        return float(self.layer.a * np.exp(-self._kappa * _h(self.damping_ratio)))
+
+    def position(self, t: Array | float) -> Array:
+        """x [m] at times 0 <= t <= t_f."""
+        T, s = np.asarray(t, dtype=float) / self._time, self.damping_ratio
+        return np.asarray(self.layer.a * np.exp(self._kappa * ((1.0 + s) * T**2 * _phi(s * T) - T)))
+
+    def velocity(self, t: Array | float) -> Array:
+        """ẋ [m/s] at times 0 <= t <= t_f."""
+        T, s = np.asarray(t, dtype=float) / self._time, self.damping_ratio
+        return np.asarray(self.speed / self.layer.a * self.position(t) * ((1.0 + s) * T * exprel(-s * T) - 1.0))
+
+    def boundary_force(self, t: Array | float) -> Array:
+        """f̂_1 of (25) [N] along the motion, without cut-off: x does not exceed a."""
+        x, layer = self.position(t), self.layer.at(self.speed)
+        return np.asarray(layer.width**2 * (layer.k - layer.c / layer.v * self.velocity(t) / x) / x)
+
+    @property
+    def poisson(self) -> float:
+        """e_p = p_r/p_c of (37), (38) with f = m dv/dt, the force on the particle: equal to Newton's e_v."""
+        return float(self.velocity(self.duration) / self.speed)
+
+    @property
+    def poisson_covector(self) -> float:
+        """e_p with f = f̂_1 in (38), the force in the covector space of the boundary: a little above e_v."""
+        t_c, t_f = self.compression_time, self.duration
+        pushed = quad(self.boundary_force, 0.0, t_c, epsabs=0.0, epsrel=1e-12)[0]
+        returned = quad(self.boundary_force, t_c, t_f, epsabs=1e-12 * abs(pushed), epsrel=1e-12)[0]
+        return float(returned / pushed)
+
+
+def restitution(s: float) -> float:
+    """e of s = c/(a k) >= 0."""
+    if not 0.0 <= s < np.inf:
+        raise InputError(f"the damping ratio s = c/(a k) is {s}: give zero or a positive finite number")
+    if s > 1.0:
+        tau = 1.0 + s + float(lambertw(-(1.0 + s) * np.exp(-(1.0 + s))).real)
+        return tau / s - 1.0
+    e = 1.0 - 2.0 / 3.0 * s + 4.0 / 9.0 * s**2 - 44.0 / 135.0 * s**3 * (s < 0.3)
+    for _ in range(8):  # Newton; e² h(-s e) has the derivative e/(1 - s e)
+        e -= (e**2 * _h(-s * e) - _h(s)) * (1.0 - s * e) / e
+    return e
+
+
+def damping_ratio(e: float) -> float:
+    """s = c/(a k) that gives the restitution 0 < e <= 1: the inverse of ``restitution``."""
+    if not 0.0 < e <= 1.0:
+        raise InputError(f"restitution coefficient e is {e}: a layer gives any number above 0 and up to 1")
+    if e == 1.0:
+        return 0.0
+    most = (1.0 + 1e-9) / e  # e(s) < 1/s
+    return float(brentq(lambda s: restitution(s) - e, 0.0, most, xtol=1e-300, rtol=1e-15))
+
+
+def layer_for(
+    e: float, *, mass: float, speed: float, width: float, start: float | None = None, deepest: float = 0.5
+) -> Layer:
+    """The layer from which this mass [kg] with this speed [m/s] returns with e times its speed (dominant terms).
+
+    ``deepest``: x_min/a, the part of the distance a that is left at the greatest compression. InputError unless
+    0 < e <= 1 and 0 < deepest < 1.
+    """
+    if not 0.0 < deepest < 1.0:
+        raise InputError(f"deepest is {deepest}: give the part of the layer that is left, between 0 and 1")
+    positive("the mass", mass, "kg")
+    positive("the speed", speed, "m/s")
+    s = damping_ratio(e)
+    a = width if start is None else start
+    k = mass * speed**2 / a**2 * _h(s) / -np.log(deepest)
+    return Layer(width, k=float(k), c=float(s * a * k), speed=speed, start=start)
+
+
+def _h(z: float) -> float:
+    """(z - ln(1 + z))/z², ½ at z = 0."""
+    if abs(z) > 0.05:
+        return float((z - np.log1p(z)) / z**2)
+    return sum((-z) ** n / (n + 2.0) for n in range(14))
+
+
+def _phi(z: Array) -> Array:
+    """(exp(-z) - 1 + z)/z², ½ at z = 0."""
+    small = np.abs(z) < 0.05
+    large = np.where(small, 1.0, z)
+    series, term = np.zeros_like(z), np.full_like(z, 0.5)
+    for n in range(10):
+        series, term = series + term, -term * z / (n + 3.0)
+    return np.where(small, series, (np.expm1(-large) + large) / large**2)

@@ -1,0 +1,153 @@
+"""A rigid body that hits a plane without friction (seed 001, section "Spatial collision of a rigid body", 39 to 53).
+
+Coordinates q = (r_c, p): mass centre and unit quaternion p = (p_0, p_1, p_2, p_3), R(p) from body to space.
+Velocities v = (ṙ_c, Omega), Omega in the body frame (39); M = diag(m 1, J) (40) is constant. The plane is n·x = d, the
+body before it, n·x > d; P is the body's point next to the plane, l_P in the body frame:
+
+    rho = n·(r_c + R l_P) - d,    A = (n; l_P x Rᵀn)    (45, 46),    M v̇ = (F; T - Omega x J Omega) + Aᵀ lambda
+    ṗ = ½ p ∘ (0, Omega)
+
+The impact map, which the motion through a thin layer tends to: v⁺ = v⁻ - M⁻¹Aᵀ g_11 (1 + e) ρ̇⁻, with the loss
+½ g_11 (1 - e²) ρ̇⁻² and all momenta orthogonal to A unchanged.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..algebra import Array
+from ..errors import InputError
+from .layer import positive
+from .metric import normal_mass
+from .motion import ConstrainedSystem
+
+
+@dataclass(frozen=True)
+class Ellipsoid:
+    """The point of an ellipsoid with semi-axes ``axes`` [m] (along the body axes, about the mass centre) next to a
+    plane: l = -D² nu/|D nu|, D = diag(axes), nu the plane's normal in the body frame."""
+
+    axes: tuple[float, float, float]
+
+    def __post_init__(self) -> None:
+        for length in self.axes:
+            positive("a semi-axis of the ellipsoid", length, "m")
+
+    def __call__(self, nu: Array) -> Array:
+        squares = np.asarray(self.axes, dtype=float) ** 2
+        return np.asarray(-squares * nu / np.sqrt(nu @ (squares * nu)))
+
+
+@dataclass(frozen=True)
+class RigidBody:
+    """A body before a plane.
+
+    Attributes:
+        mass: [kg]. inertia: (3, 3) or its diagonal (3,), about the mass centre in the body frame [kg m²].
+        point: l_P (3,) [m], or a function of the plane's normal in the body frame that returns it (``Ellipsoid``).
+        normal: n, of the plane, towards the body. offset: d [m].
+        gravity: acceleration of free fall in space (3,) [m/s²].
+    InputError for a mass or an inertia that is not positive, or a normal of length zero.
+    """
+
+    mass: float
+    inertia: Any
+    point: Any
+    normal: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    offset: float = 0.0
+    gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        positive("the body's mass", self.mass, "kg")
+        J = self.J
+        if J.shape != (3, 3) or not np.allclose(J, J.T) or np.min(np.linalg.eigvalsh(J)) <= 0.0:
+            raise InputError("the body's inertia is not symmetric positive definite: give (3, 3) or a diagonal (3,)")
+        if not np.linalg.norm(self.normal) > 0.0:
+            raise InputError("the plane's normal has length zero: give a direction")
+
+    @property
+    def J(self) -> Array:
+        """Inertia (3, 3)."""
+        J = np.asarray(self.inertia, dtype=float)
+        return np.diag(J) if J.ndim == 1 else J
+
+    @property
+    def n(self) -> Array:
+        """Unit normal (3,)."""
+        return np.asarray(self.normal, dtype=float) / np.linalg.norm(self.normal)
+
+    @property
+    def matrix(self) -> Array:
+        """M = diag(m 1, J) (40), (6, 6)."""
+        return np.block([[self.mass * np.eye(3), np.zeros((3, 3))], [np.zeros((3, 3)), self.J]])
+
+    def nearest(self, q: Array) -> tuple[Array, Array]:
+        """(l_P, n) in the body frame."""
+        nu = rotation(q[3:]).T @ self.n
+        return np.asarray(self.point(nu) if callable(self.point) else self.point, dtype=float), nu
+
+    def rho(self, q: Array) -> float:
+        """Distance of P from the plane [m] (44)."""
+        l_P, nu = self.nearest(q)
+        return float(self.n @ q[:3] + nu @ l_P) - self.offset
+
+    def gradient(self, q: Array) -> Array:
+        """A (6,) of (45), (46)."""
+        l_P, nu = self.nearest(q)
+        return np.concatenate([self.n, np.cross(l_P, nu)])
+
+    def kinetic_energy(self, v: Array) -> float:
+        """½ vᵀMv [J]."""
+        return float(0.5 * v @ self.matrix @ v)
+
+    def energy(self, q: Array, v: Array) -> float:
+        """Kinetic energy less the work of gravity [J]."""
+        return self.kinetic_energy(v) - self.mass * float(np.dot(self.gravity, q[:3]))
+
+    def normal_mass(self, q: Array) -> float:
+        """g_11 of (50) [kg]."""
+        return normal_mass(self.matrix, self.gradient(q))
+
+    def after_impact(self, q: Array, v: Array, e: float) -> Array:
+        """The impact map: v⁺ (6,)."""
+        A = self.gradient(q)
+        along = np.linalg.solve(self.matrix, A)
+        return np.asarray(v - along * (1.0 + e) * (A @ v) / (A @ along))
+
+    def system(self) -> ConstrainedSystem:
+        """For ``integrate``: coordinates (7,), velocities (6,)."""
+        turning: Callable[[Array, Array], float] | None = None
+        if not callable(self.point):
+            turning = self._turning
+        return ConstrainedSystem(
+            self.matrix, self.rho, self.gradient, force=self._force, rates=_rates, gradient_rate=turning
+        )
+
+    def _force(self, t: float, q: Array, v: Array) -> Array:
+        spin = v[3:]
+        return np.concatenate([self.mass * np.asarray(self.gravity), -np.cross(spin, self.J @ spin)])
+
+    def _turning(self, q: Array, v: Array) -> float:
+        """n·R (Omega x (Omega x l_P)), of a point fixed in the body."""
+        l_P, nu = self.nearest(q)
+        return float(nu @ np.cross(v[3:], np.cross(v[3:], l_P)))
+
+
+def rotation(p: Array) -> Array:
+    """R (3, 3) of the quaternion p (4,), which need not have length one."""
+    w, x, y, z = p / np.linalg.norm(p)
+    return np.array([
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+    ])
+
+
+def _rates(q: Array, v: Array) -> Array:
+    """(ṙ_c, ½ p ∘ (0, Omega))."""
+    w, u, spin = q[3], q[4:], v[3:]
+    return np.concatenate([v[:3], 0.5 * np.r_[-(u @ spin), w * spin + np.cross(u, spin)]])

@@ -1,0 +1,169 @@
+"""Integration in time from flight to layer and back, with an event at every crossing of the layer's edge rho = b."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from ..algebra import Array
+from ..errors import InputError, StepFailure
+from .layer import Layer
+from .metric import Metric
+from .motion import ConstrainedSystem
+
+
+@dataclass(frozen=True)
+class Contact:
+    """One passage through the layer: times [s], normal rates [m/s], the least distance [m] and its time [s]."""
+
+    start: float
+    end: float
+    rate_in: float
+    rate_out: float
+    deepest: float
+    turned: float
+
+    @property
+    def duration(self) -> float:
+        """[s]"""
+        return self.end - self.start
+
+    @property
+    def restitution(self) -> float:
+        """-ρ̇⁺/ρ̇⁻, Newton's coefficient (37)."""
+        return -self.rate_out / self.rate_in
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Times (m,), coordinates (m, n_q), velocities (m, n), distances and reactions lambda (m,) [N]; the contacts that
+    were completed."""
+
+    t: Array
+    q: Array
+    v: Array
+    rho: Array
+    reaction: Array
+    contacts: Sequence[Contact]
+
+
+def integrate(
+    system: ConstrainedSystem,
+    layer: Layer,
+    *,
+    q0: Array,
+    v0: Array,
+    t_end: float,
+    metric: Metric = Metric.DOMINANT,
+    contacts: int | None = None,
+    rtol: float = 1e-11,
+    method: str = "DOP853",
+) -> Trajectory:
+    """The motion from (q0, v0) at t = 0 to t_end, or to the end of so many contacts.
+
+    ``metric``: the reading of the law. ``rtol``: relative tolerance of scipy's solve_ivp.
+
+    Raises:
+        InputError: the start is not inside the admissible set (rho > 0), or in the layer while V is not known.
+        StepFailure: the integrator stopped; the message names the time.
+    """
+    q, v = np.array(q0, dtype=float), np.array(v0, dtype=float)
+    rho = float(system.rho(q))
+    if not rho > 0.0:
+        raise InputError(f"the motion starts at distance rho = {rho:g}, outside the admissible set: start at rho > 0")
+    if not 0.0 < t_end < np.inf:
+        raise InputError(f"t_end is {t_end}: give a positive time in s")
+    passages = _Passages(system, layer, metric, {"rtol": rtol, "method": method})
+    inside = rho < layer.width or (rho == layer.width and system.normal_rate(q, v) < 0.0)
+    t = 0.0
+    while t < t_end and (contacts is None or len(passages.contacts) < contacts):
+        t, q, v, crossed = passages.run(t, t_end, q, v, inside)
+        inside = not inside
+        if not crossed:
+            break
+    return passages.trajectory()
+
+
+class _Passages:
+    """Flights and passages through the layer one after the other.
+
+    The unknowns are v and the way q - q_start since the last crossing, over the time since then: a layer of 1e-8 m is
+    resolved beside a q of 1 m.
+    """
+
+    def __init__(self, system: ConstrainedSystem, layer: Layer, metric: Metric, options: dict[str, Any]) -> None:
+        self._system, self._layer, self._metric, self._options = system, layer, metric, options
+        self._parts: list[tuple[Array, Array, Array, Array, Array]] = []
+        self.contacts: list[Contact] = []
+
+    def run(
+        self, start: float, t_end: float, q: Array, v: Array, inside: bool
+    ) -> tuple[float, Array, Array, bool]:
+        """Integrates to the next crossing of the edge; (t, q, v, whether there was one)."""
+        system, n = self._system, len(q)
+        layer = self._layer.at(abs(system.normal_rate(q, v))) if inside and self._layer.speed is None else self._layer
+        width, rtol = layer.width, self._options["rtol"]
+
+        def rates(t: float, y: Array) -> Array:
+            place, speed = q + y[:n], y[n:]
+            acceleration, _ = self._acceleration(start + t, place, speed, layer, inside)
+            return np.concatenate([system.velocity(place, speed), acceleration])
+
+        def edge(t: float, y: Array) -> float:
+            return float(system.rho(q + y[:n])) - width
+
+        def turn(t: float, y: Array) -> float:
+            return system.normal_rate(q + y[:n], y[n:])
+
+        edge.terminal, edge.direction = True, 1.0 if inside else -1.0  # type: ignore[attr-defined]
+        turn.direction = 1.0  # type: ignore[attr-defined]
+        way = width if inside else max(width, float(np.max(np.abs(q))))
+        pace = max(float(np.max(np.abs(v))), layer.speed or 0.0, self._pace(start, q, v, layer, inside))
+        atol = rtol * np.r_[np.full(n, way), np.full(len(v), pace)]
+        found = solve_ivp(
+            rates, (0.0, t_end - start), np.r_[np.zeros(n), v], events=(edge, turn), atol=atol, **self._options
+        )
+        if found.status < 0:
+            raise StepFailure(
+                f"the motion could not be integrated beyond t = {start + found.t[-1]:.6g} s at rho = "
+                f"{system.rho(q + found.y[:n, -1]):.3g}: give a larger rtol or another method ({found.message})"
+            )
+        places, speeds = q + found.y[:n].T, found.y[n:].T
+        self._keep(start + found.t, places, speeds, layer, inside)
+        crossed = found.status == 1
+        if inside and crossed:
+            rate = system.normal_rate(q, v), system.normal_rate(places[-1], speeds[-1])
+            turns = zip(found.y_events[1], found.t_events[1], strict=True)
+            deepest, when = min(((float(system.rho(q + y[:n])), float(t)) for y, t in turns), default=(width, 0.0))
+            self.contacts.append(Contact(start, start + float(found.t[-1]), *rate, deepest, start + when))
+        return start + float(found.t[-1]), places[-1], speeds[-1], crossed
+
+    def _pace(self, t: float, q: Array, v: Array, layer: Layer, inside: bool) -> float:
+        """The speed [m/s] that the acceleration reaches over the width; 1 where nothing moves."""
+        most = float(np.max(np.abs(self._acceleration(t, q, v, layer, inside)[0])))
+        return float(np.sqrt(most * layer.width)) or 1.0
+
+    def _acceleration(self, t: float, q: Array, v: Array, layer: Layer, inside: bool) -> tuple[Array, float]:
+        """(v̇, lambda); NaN where a trial stage has left the admissible set, which makes the integrator step back."""
+        free, along, g, normal = self._system.accelerations(t, q, v)
+        if not inside:
+            return free, 0.0
+        rho = float(self._system.rho(q))
+        if not rho > 0.0:
+            return np.full_like(free, np.nan), np.nan
+        reaction = self._metric.reaction(layer, g, rho, self._system.normal_rate(q, v), normal)
+        return free + along * reaction, reaction
+
+    def _keep(self, t: Array, q: Array, v: Array, layer: Layer, inside: bool) -> None:
+        rho = np.array([float(self._system.rho(row)) for row in q])
+        reaction = [self._acceleration(*row, layer, inside)[1] for row in zip(t, q, v, strict=True)]
+        self._parts.append((t, q, v, rho, np.array(reaction)))
+
+    def trajectory(self) -> Trajectory:
+        """Everything so far."""
+        t, q, v, rho, reaction = (np.concatenate(part) for part in zip(*self._parts, strict=True))
+        return Trajectory(t, q, v, rho, reaction, tuple(self.contacts))
