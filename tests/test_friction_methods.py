@@ -184,6 +184,28 @@ def test_newton_is_exact_in_few_steps_from_any_guess() -> None:
             assert result.residual <= 1e-13 and result.iterations <= 8
 
 
+def test_points_that_stick_stick_to_rounding() -> None:
+    """Their slip is taken as zero by the solver, which moves the body: what is left of it is an error of the step."""
+    sticking = 0
+    for seed in range(20):
+        G, q, bilateral = small(seed, 10, 2)
+        size = G.diagonal().reshape(q.shape) ** 0.5
+        result = FixedPoint().prepare(G, bilateral).solve(q, np.zeros(10), np.full(10, 0.3))
+        w = (q + (G @ result.r.ravel()).reshape(q.shape)) / size
+        assert np.abs(w[result.stick, 1]).max(initial=0.0) <= 1e-13 * np.abs(q / size).max()
+        sticking += int(result.stick.sum())
+    assert sticking > 10
+
+
+@pytest.mark.parametrize("method", METHODS, ids=NAMES)
+def test_a_point_that_slips_a_little_does_not_stick(method: Any) -> None:
+    """r_n = 1, r_t = mu, and a slip of 1e-9 of the penetration that the reactions remove."""
+    result = method.prepare(np.eye(2), np.zeros(1, dtype=bool)).solve(
+        np.array([[-1.0, -0.3 - 1e-9]]), np.zeros(1), np.full(1, 0.3)
+    )
+    assert result.r == pytest.approx(np.array([[1.0, 0.3]]), rel=1e-12) and not result.stick.any()
+
+
 def test_fixed_point_contracts_faster_for_less_friction() -> None:
     G, q, bilateral = small(20, 8, 2)
     factors = []

@@ -12,7 +12,8 @@ eta is the turn of the slip direction, t perpendicular to n: in 2D there is none
 the iterate of the right states is exact. The factors of the last sets of states are kept, so that a step whose states
 are those of a step before costs triangular solves only; they change no digit of the answer.
 
-Newton may cycle. Then Gauss-Seidel sweeps (nsgs.py) lead to a better start, and it goes on from there.
+Slip that turned back within one iteration overshot: such a node sticks in the next, which ends the usual cycles of
+slip to and fro. Where Newton cycles all the same, Gauss-Seidel sweeps (nsgs.py) lead to a better start.
 """
 
 from __future__ import annotations
@@ -82,8 +83,9 @@ class PreparedNewton:
         """The best iterate, and whether it solves the problem to rounding or to the tolerance."""
         best, smallest = np.zeros_like(y), step.unit
         seen: set[bytes] = set()
+        states: _States | None = None
         for _ in range(self.method.max_iterations):
-            states = _States(step, y)
+            states = _States(step, y, states)
             r = None if states.key in seen else self._solved(step, states)
             if r is None:
                 break
@@ -128,26 +130,29 @@ class PreparedNewton:
 
 
 def _start(step: Step, guess: Array | Mask | None) -> Array:
-    """y to start from. A guessed set: closed there and sticking, open elsewhere."""
-    if guess is None or guess.dtype != bool:
-        r = step.start(guess)
-        return np.asarray(r - step.w(r))
-    y = np.zeros_like(step.q)
-    y[:, 0] = np.where(guess & np.isfinite(step.q[:, 0]), 1.0, -1.0)
-    return y
+    """y to start from. A guessed set gives a direction d, which opens it row by row; r = -(q·d)/(d·G d) d."""
+    r = step.start(guess)
+    carried = r != 0.0
+    if guess is not None and guess.dtype == bool and carried.any():
+        r *= -(step.q[carried] @ r[carried]) / np.vdot(step.moved(r), r)
+    return np.asarray(r - step.w(r))
 
 
 class _States:
-    """The states of all nodes at y. ``exact``: the linear problem depends on ``key`` only."""
+    """The states of all nodes at y; a node that turned back since ``before`` sticks first.
 
-    def __init__(self, step: Step, y: Array) -> None:
+    ``exact``: the linear problem depends on ``key`` only.
+    """
+
+    def __init__(self, step: Step, y: Array, before: _States | None) -> None:
         m, d = y.shape
         limit = step.limit(y[:, 0])
         size = np.linalg.norm(y[:, 1:], axis=1)
         self.closed: Mask = (y[:, 0] > 0.0) | step.blocks.bilateral
-        self.stick: Mask = (size <= limit) & (limit > 0.0)
+        back = np.zeros(m, dtype=bool) if before is None else np.sum(before.direction * y[:, 1:], axis=1) < 0.0
+        self.stick: Mask = ((size <= limit) | back) & (limit > 0.0)
         slip = ~self.stick & (limit > 0.0)
-        self.direction = np.zeros((m, d - 1))
+        self.direction: Array = np.zeros((m, d - 1))
         np.divide(y[:, 1:], size[:, None], out=self.direction, where=slip[:, None])
         self.growth = np.where(slip & (y[:, 0] > 0.0), step.slope, 0.0)
         self.turns: Mask = slip if d == 3 else np.zeros(m, dtype=bool)
@@ -190,17 +195,17 @@ class _Reduced:
         return r
 
     def matrix(self, G: Array) -> Array:
-        """R G P + diag(t)."""
-        part = G[self._plain]
-        if len(self._turned):
-            part = np.vstack([part, np.einsum("ik,ikj->ij", self._across, G[self._turned])])
-        matrix = np.empty((self.size, self.size), order="F")
-        plain = len(self._plain)
-        matrix[:, :plain] = part[:, self._plain]
+        """R G P + diag(t), by rows of its transpose: G is symmetric."""
+        part, plain = G[self._plain], len(self._plain)
         grows = np.flatnonzero(self._growth.any(axis=1))
         for k in range(self._shape[1] - 1):
-            matrix[:, grows] += part[:, self._tied[grows, k]] * self._growth[grows, k]
-        matrix[:, plain:] = np.einsum("ik,jik->ji", self._across, part[:, self._turned])
+            part[grows] += self._growth[grows, k, None] * G[self._tied[grows, k]]
+        if len(self._turned):
+            part = np.vstack([part, np.einsum("ik,ikj->ij", self._across, G[self._turned])])
+        transpose = np.empty((self.size, self.size))
+        transpose[:, :plain] = np.take(part, self._plain, axis=1)
+        if len(self._turned):
+            transpose[:, plain:] = np.einsum("ik,jik->ji", self._across, part[:, self._turned])
         turns = np.arange(plain, self.size)
-        matrix[turns, turns] += self._turning
-        return matrix
+        transpose[turns, turns] += self._turning
+        return transpose.T

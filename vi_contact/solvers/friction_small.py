@@ -35,8 +35,8 @@ class FrictionResult:
     """What a friction method returns when it has reached its tolerance or the limit that rounding sets.
 
     ``r`` (m, d): r_n >= 0 exactly in unilateral rows, |r_t| <= limit(r_n) but for the last digit; ``active`` (m,):
-    r_n > 0 or bilateral; ``stick`` (m,): w_t = 0 but for rounding, under a limit that is not zero; ``residual``:
-    largest |F| of (2) over that of r = 0. Each method tells what ``iterations`` and ``history`` count.
+    r_n > 0 or bilateral; ``stick`` (m,): w_t = 0 but for the residual reached, under a limit that is not zero;
+    ``residual``: largest |F| of (2) over that of r = 0. Each method tells what ``iterations`` and ``history`` count.
     """
 
     r: Array
@@ -78,12 +78,16 @@ class Step:
         """m."""
         return len(self.cohesion)
 
-    def w(self, r: Array) -> Array:
-        """q + G r (m, d), from the rows that carry something."""
+    def moved(self, r: Array) -> Array:
+        """G r (m, d), from the rows that carry something."""
         carried = np.flatnonzero(r)
         matrix = self.blocks.matrix
         product = matrix @ r.ravel() if len(carried) > 0.5 * r.size else r.ravel()[carried] @ matrix[carried]
-        return np.asarray(self.q + product.reshape(r.shape))
+        return np.asarray(product.reshape(r.shape))
+
+    def w(self, r: Array) -> Array:
+        """q + G r (m, d)."""
+        return self.q + self.moved(r)
 
     def limit(self, r_n: Array) -> Array:
         """cohesion + slope max(r_n, 0)."""
@@ -126,13 +130,13 @@ class Step:
         r = self.admissible(r)
         w = self.w(r)
         residual, unit = self.residual(r, w), self.unit or 1.0
-        small = max(tolerance * unit, self.rounding(r))
-        if not residual <= small:
+        rounding = self.rounding(r)
+        if not residual <= max(tolerance * unit, rounding):
             raise StepFailure(
                 f"{method} stopped after {iterations} iterations with residual {residual / unit:.1e}: reduce the time "
                 "step, or try another friction method (FrictionNewton, NSGS, FixedPoint)."
             )
-        still = np.linalg.norm(w[:, 1:], axis=1) <= 4.0 * small
+        still = np.linalg.norm(w[:, 1:], axis=1) <= 4.0 * max(residual, rounding)
         active = (r[:, 0] > 0.0) | self.blocks.bilateral
         stick = still & (self.limit(r[:, 0]) > 0.0)
         return FrictionResult(r * self.blocks.scale, active, stick, iterations, residual / unit, method, history)
