@@ -21,7 +21,7 @@ RANKS = {  # by the first part of a module's name; what is not named is a worker
        "system",
     1: "step",
     3: "models studies",
-    4: "cli cli_case __main__ __init__",
+    4: "cli cli_case cli_channel cli_ida __main__ __init__",
 }
 WORKER = 2
 HOMES = {  # foreign package: modules that may import it; "late": only inside functions

@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
-_HOME = {"Case": "case", "read_case": "case", "run_case": "case"}
+_HOME = {"Case": "case", "read_case": "case", "run_case": "case", "IDA": "ida", "run_ida": "ida"}
 """Public name -> module of this folder it lives in."""
 
 __all__ = sorted(_HOME)

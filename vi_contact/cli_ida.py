@@ -1,0 +1,76 @@
+"""``vi-contact ida CASE.toml``: options and what the command does."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+import signal
+from typing import Any
+
+from .errors import InputError, ViContactError
+
+
+def add_ida_commands(commands: Any) -> None:
+    """Adds ``ida`` to the commands of the top parser."""
+    sentence = "incremental dynamic analysis: a case file under many records, each at many intensities"
+    one = commands.add_parser("ida", help=sentence, description=sentence[0].upper() + sentence[1:] + ".")
+    one.add_argument("case", help="case file shaken by GroundMotions (docs/studies.md)")
+    one.add_argument("--motions", nargs="+", required=True, metavar="FILE",
+                     help="record files; H.at2,V.at2 where the case has two ground motions")
+    values = one.add_mutually_exclusive_group(required=True)
+    values.add_argument("--scales", type=_numbers, metavar="F,F,...", help="factors on the motions")
+    values.add_argument("--levels", type=_numbers, metavar="I,I,...", help="values of the intensity measure, SI units")
+    one.add_argument("--im", default="pga", metavar="IM",
+                     help="intensity of the first motion: pga (default), pgv, pgd, sa:T (5 %% damping, T in s), arias, "
+                     "cav, housner")
+    one.add_argument("--edp", nargs="+", required=True, metavar="COLUMN[:WAY]",
+                     help="columns of history.csv; WAY: absmax (default), max, min, last")
+    one.add_argument("--out", required=True, metavar="DIR", help="folder of the study; the same again to go on")
+    one.add_argument("--jobs", type=int, default=1, metavar="N", help="runs at the same time (default 1)")
+    one.add_argument("--part", type=_part, default=(1, 1), metavar="I/N", help="only every N-th run, for job arrays")
+    one.add_argument("--launch", default="", metavar="WORDS", help="in front of every run, such as 'mpirun -n 4'")
+    one.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
+                     help="replace a value of the case, as for run; repeatable")
+    one.set_defaults(run=_ida)
+
+
+def _numbers(text: str) -> tuple[float, ...]:
+    try:
+        return tuple(float(word) for word in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is no list of numbers such as 0.5,1,2") from None
+
+
+def _part(text: str) -> tuple[int, int]:
+    first, slash, count = text.partition("/")
+    if not (slash and first.isdecimal() and count.isdecimal()):
+        raise argparse.ArgumentTypeError(f"{text!r} is no part such as 1/4")
+    return int(first), int(count)
+
+
+def _ida(options: argparse.Namespace) -> str:
+    from .studies.case import read_case
+    from .studies.ida import IDA, run_ida
+
+    study = IDA(
+        read_case(options.case, options.settings), [_files(motion) for motion in options.motions], options.edp,
+        scales=options.scales or (), levels=options.levels or (), intensity=options.im,
+    )
+    signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGINT))  # a scheduler's end of time is as Ctrl-C
+    try:
+        rows = run_ida(
+            study, options.out, jobs=options.jobs, part=options.part, launch=shlex.split(options.launch),
+            say=lambda line: print(line, flush=True),
+        )
+    except KeyboardInterrupt:
+        raise ViContactError("interrupted: give the same command again to go on") from None
+    failed = sum(row["status"] != "finished" for row in rows)
+    return f"{len(rows)} rows, {failed} of failed runs: {options.out}/ida.csv, ida.png"
+
+
+def _files(motion: str) -> tuple[str, ...]:
+    """The files of one motion; InputError for an empty name."""
+    files = tuple(motion.split(","))
+    if not all(files):
+        raise InputError(f"--motions {motion}: give FILE, or FILE,FILE")
+    return files

@@ -1,0 +1,64 @@
+"""Picture of an incremental dynamic analysis: intensity over demand."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .algebra import Array
+from .plotting import _STYLE, _scaled
+
+_FRACTILES = (("16 %", "tab:blue", "--"), ("50 %", "black", "-"), ("84 %", "tab:red", "--"))
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One demand in its SI unit: curves record -> (intensities, demands); fractiles (n, 3) of 16, 50 and 84 % at the
+    levels (n,); intensities of runs that failed, marked at the right edge."""
+
+    label: str
+    unit: str
+    curves: Mapping[str, tuple[Array, Array]]
+    levels: Array
+    fractiles: Array
+    failed: Sequence[float] = ()
+
+
+def plot_ida(panels: Sequence[Panel], path: str | Path, *, intensity: str) -> Path:
+    """A panel for every demand, side by side: a grey curve per record, named when they are few, and the fractiles."""
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    with matplotlib.rc_context(_STYLE):
+        figure = Figure(figsize=(1.0 + 4.4 * len(panels), 4.6), layout="constrained")
+        axes = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
+    for axis, panel in zip(axes, panels, strict=True):
+        _draw(axis, panel)
+    axes[0].set_ylabel(intensity)
+    axes[0].set_ylim(bottom=0.0)
+    axes[0].legend(fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncol=6, frameon=False)
+    figure.savefig(path, dpi=130)
+    return Path(path)
+
+
+def _draw(axis: Any, panel: Panel) -> None:
+    size = np.array([max(float(np.max(np.abs(demand), initial=0.0)) for _, demand in panel.curves.values())])
+    shown, unit = _scaled(size, panel.unit) if panel.unit != "-" else (size, "-")
+    factor = shown[0] / size[0] if size[0] else 1.0
+    axis.set_xlabel(f"{panel.label} [{unit}]")
+    few = len(panel.curves) <= 5
+    marks = "osv^D"
+    for number, (record, (intensity, demand)) in enumerate(panel.curves.items()):
+        label = record if few else "a record" if number == 0 else None
+        mark = marks[number] if few else ""
+        axis.plot(factor * demand, intensity, mark, ls="-", color="0.65", lw=0.9, ms=4, label=label)
+    if len(panel.levels) > 1:
+        for values, (name, colour, style) in zip(panel.fractiles.T, _FRACTILES, strict=True):
+            axis.plot(factor * values, panel.levels, color=colour, ls=style, lw=1.6, label=name)
+    if len(panel.failed):
+        axis.plot([1.0] * len(panel.failed), panel.failed, "x", color="tab:red", ms=7, clip_on=False,
+                  transform=axis.get_yaxis_transform(), label="run failed")

@@ -1,0 +1,184 @@
+"""Incremental dynamic analysis: one structure under many motions, each at many intensities, in one tidy table.
+
+Vamvatsikos and Cornell, Earthquake Engng Struct. Dyn. 31 (2002). The folder of a study:
+
+    ida.csv        a line per run: record, scale, intensity, demands, worst certificate, steps, status, reason
+    columns.json   unit and meaning of its columns
+    ida.png        intensity over demand, a curve per record, 16, 50 and 84 % fractiles
+    ida.json       the case and the records, so that no other study is mixed in
+    runs/NAME_xSCALE/   the folder of every run, and its row
+"""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..algebra import Array
+from ..errors import InputError
+from ..output import to_json, write_atomically
+from ..plotting_ida import Panel, plot_ida
+from .case import Case
+from .ida_runs import OneRun, Shaking, executed, read_json, refuse_mpirun, shakings
+from .ida_table import Row, tabulated
+from .measures import Demand, Intensity, demand, fractiles, intensity
+
+SHARES = (0.16, 0.50, 0.84)
+TABLE, COLUMNS, FIGURE, STUDY, RUNS = "ida.csv", "columns.json", "ida.png", "ida.json", "runs"
+
+
+@dataclass(frozen=True)
+class IDA:
+    """What to run, and what to tell of it.
+
+    case: shaken by GroundMotions alone, whose record files are replaced; motions: a file, or one file per GroundMotion
+    of the case, for each record; its name is that of its first file. scales: factors on the motion as the case prepares
+    it; or levels: values of the intensity, in its unit. intensity: "pga", "pgv", "pgd", "sa:T", "arias", "cav",
+    "housner", of the first motion. demands: "COLUMN" or "COLUMN:max", ":min", ":absmax", ":last" of history.csv.
+    Raises InputError for other words, no motions, two of one name, not exactly one of scales and levels.
+    """
+
+    case: Case
+    motions: Sequence[str | Path | Sequence[str | Path]]
+    demands: Sequence[str]
+    scales: Sequence[float] = ()
+    levels: Sequence[float] = ()
+    intensity: str = "pga"
+
+    def __post_init__(self) -> None:
+        if bool(self.scales) == bool(self.levels):
+            raise InputError("give either scales or levels of the intensity, at least one value")
+        values = (*self.scales, *self.levels)
+        if len(set(values)) < len(values) or not all(0.0 < value < math.inf for value in values):
+            raise InputError(f"scales or levels {list(values)}: give different positive numbers")
+        if not self.demands:
+            raise InputError("no demands: give at least one column of history.csv, such as contact_uplift:max")
+        _ = self.measure, self.wanted, self.shakings
+
+    @property
+    def measure(self) -> Intensity:
+        """The intensity measure."""
+        return intensity(self.intensity)
+
+    @property
+    def wanted(self) -> list[Demand]:
+        """The demand parameters."""
+        return [demand(text) for text in self.demands]
+
+    @property
+    def shakings(self) -> list[Shaking]:
+        """The motions by name."""
+        return shakings(self.case, self.motions)
+
+    def runs(self, out: Path) -> list[OneRun]:
+        """Every record at every scale, record by record."""
+        return [self._run(out, one, value) for one in self.shakings for value in (*self.scales, *self.levels)]
+
+    def _run(self, out: Path, shaking: Shaking, value: float) -> OneRun:
+        folder = out / RUNS / f"{shaking.name}_{self.measure.name if self.levels else 'x'}{value!r}"
+        try:
+            record = shaking.record(self.case)
+            factor = self.measure.scale(record, value) if self.levels else value
+        except InputError as error:
+            return OneRun(self.case, shaking, math.nan if self.levels else value, folder, str(error))
+        return OneRun(self.case, shaking, factor, folder)
+
+
+def run_ida(
+    study: IDA, out: str | Path, *, jobs: int = 1, part: tuple[int, int] = (1, 1), launch: Sequence[str] = (),
+    say: Callable[[str], None] = print,
+) -> list[Row]:
+    """Makes the runs that have not finished yet, and the table and figure of all that are in ``out``; returns its rows.
+
+    Each run is a process of its own; what it cannot do is told in its row, and the others go on. Called again it keeps
+    finished runs, continues interrupted ones from their checkpoints, and tries failed ones again. Table and figure are
+    made anew after every run, the table in one piece.
+
+    Args:
+        jobs: runs at the same time.
+        part: (i, n): only every n-th run from the i-th on, for job arrays that share the folder.
+        launch: words in front of the command of a run, ("mpirun", "-n", "4").
+        say: takes a line about each run.
+    Raises:
+        InputError: a folder of another study, a part or number of jobs that makes no sense, inside mpirun.
+        KeyboardInterrupt: after the runs have been told to stop; call again to go on.
+    """
+    refuse_mpirun()
+    if jobs < 1 or not 1 <= part[0] <= part[1]:
+        raise InputError(f"jobs = {jobs}, part = {part[0]}/{part[1]}: give at least one job, and 1 <= i <= n for i/n")
+    out = Path(out)
+    _claim(study, out)
+    every = study.runs(out)
+    mine = every[part[0] - 1 :: part[1]]
+    left = [run for run in mine if run.done() is None]
+    say(f"{len(every)} runs, {len(mine)} of them here, {len(mine) - len(left)} finished before")
+    for number, row in enumerate(executed(left, jobs, launch), start=1):
+        _publish(study, out)
+        say(f"[{number}/{len(left)}] {row['record']} x {_shown(row['scale'])}: {row['status']}"
+            + (f": {row['reason']}" if row["reason"] else ""))
+    return _publish(study, out)
+
+
+def _shown(value: float | None) -> str:
+    return "?" if value is None or math.isnan(value) else f"{value:g}"
+
+
+def _claim(study: IDA, out: Path) -> None:
+    """Notes in the folder whose it is; InputError when it is another study's."""
+    case = _digest(to_json(study.case.tables).encode())
+    records = {
+        one.name: [_digest(path.read_bytes()) for path in one.files if path.is_file()] for one in study.shakings
+    }
+    old = read_json(out / STUDY)
+    if old is not None:
+        changed = [name for name, digests in records.items() if old["records"].get(name, digests) != digests]
+        if old["case"] != case or changed:
+            what = f"the record '{changed[0]}'" if changed else "the case"
+            raise InputError(f"'{out}' holds runs from before {what} was changed: choose another folder, or delete it")
+        records = old["records"] | records
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        write_atomically(out / STUDY, to_json({"case": case, "records": records}).encode())
+    except OSError as error:
+        raise InputError(f"output folder '{out}' cannot be written ({error.strerror}): choose another one") from None
+
+
+def _digest(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()
+
+
+def _publish(study: IDA, out: Path) -> list[Row]:
+    """Writes table, units and figure of all runs in the folder."""
+    rows, units = tabulated(study.case, out / RUNS, study.measure, study.wanted)
+    text = io.StringIO()
+    table = csv.DictWriter(text, list(units), lineterminator="\n")
+    table.writeheader()
+    table.writerows({name: "" if value is None else value for name, value in row.items()} for row in rows)
+    described = {name: {"unit": unit, "meaning": meaning} for name, (unit, meaning) in units.items()}
+    write_atomically(out / TABLE, text.getvalue().encode())
+    write_atomically(out / COLUMNS, to_json(described).encode())
+    if any(row["status"] == "finished" for row in rows):
+        panels = [_panel(rows, study.measure.name, one.name, units[one.name]) for one in study.wanted]
+        plot_ida(panels, out / FIGURE, intensity=f"{study.measure.meaning} [{study.measure.unit}]")
+    return rows
+
+
+def _panel(rows: Sequence[Row], level: str, name: str, column: tuple[str, str]) -> Panel:
+    """What one demand shows."""
+    curves: dict[str, tuple[Array, Array]] = {}
+    failed: list[float] = []
+    known = sorted((row for row in rows if row[level] is not None), key=lambda row: float(row[level]))
+    for record in dict.fromkeys(row["record"] for row in rows):
+        own = [row for row in known if row["record"] == record]
+        good = [(row[level], row[name]) for row in own if row["status"] == "finished" and math.isfinite(row[name])]
+        failed += [row[level] for row in own if row["status"] != "finished"]
+        levels, values = np.array(good).reshape(-1, 2).T
+        curves[record] = levels, values
+    return Panel(column[1].partition(":")[0], column[0], curves, *fractiles(curves, SHARES), tuple(failed))

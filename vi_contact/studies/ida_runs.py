@@ -1,0 +1,215 @@
+"""The runs of an incremental dynamic analysis: one case, its motions replaced and scaled, a process for every run."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+from ..excitation import GroundMotion
+from ..ground_motion import Record, scaled
+from ..output import CHECKPOINT, SUMMARY, to_json, write_atomically
+from .case import Case, read_case
+
+ROW = "row.json"
+_MPI = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_RANK")  # in the environment of what mpirun has started
+
+
+@dataclass(frozen=True)
+class Shaking:
+    """A name for the record files of one run, one for each ground motion of the case: "h" of (h.at2, v.at2)."""
+
+    name: str
+    files: tuple[Path, ...]
+
+    def settings(self, case: Case, factor: float = 1.0) -> tuple[str, ...]:
+        """KEY=VALUE that put these records into the case, times its own scales and the factor."""
+        found = []
+        for (place, table), path in zip(ground_motions(case), self.files, strict=True):
+            record = table.get("record")
+            key = f"{place}.record.path" if isinstance(record, dict) else f"{place}.record"
+            found += [f"{key}={quoted(str(path))}", f"{place}.scale={float(table.get('scale', 1.0)) * factor!r}"]
+        return tuple(found)
+
+    def record(self, case: Case) -> Record:
+        """The first motion as the case prepares it, factor 1; InputError when a file is wrong."""
+        return _record(case.path, (*case.settings, *self.settings(case)))
+
+
+@cache
+def _record(path: Path, settings: tuple[str, ...]) -> Record:
+    motion = read_case(path, settings).excitations()[0]
+    assert isinstance(motion, GroundMotion)
+    return scaled(motion.record, factor=motion.scale)
+
+
+def quoted(text: str) -> str:
+    """A basic string of TOML."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def ground_motions(case: Case) -> list[tuple[str, Mapping[str, Any]]]:
+    """(key, table) of the ground motions of a case; InputError unless it is shaken by records alone."""
+    tables = case.tables.get("excitation", [])
+    found: list[tuple[str, Mapping[str, Any]]] = [("excitation", tables)]
+    if not isinstance(tables, dict):
+        found = [(f"excitation.{number}", table) for number, table in enumerate(tables, start=1)]
+    for place, table in found:
+        record = table.get("record")
+        if table.get("type") != "GroundMotion" or (isinstance(record, dict) and "path" not in record):
+            raise InputError(f"{case.path}: [{place}] is no GroundMotion with a record file, whose place other records "
+                             "can take: make it one")
+    if not found:
+        raise InputError(f"{case.path}: no [[excitation]] whose record other records can replace: give a GroundMotion")
+    return found
+
+
+def shakings(case: Case, motions: Sequence[str | Path | Sequence[str | Path]]) -> list[Shaking]:
+    """The records by name; a motion is a file, or one file for each ground motion of the case."""
+    count = len(ground_motions(case))
+    found: dict[str, Shaking] = {}
+    for motion in motions:
+        files = tuple(Path(one).resolve() for one in ([motion] if isinstance(motion, str | Path) else motion))
+        if len(files) != count:
+            names = ", ".join(one.name for one in files)
+            raise InputError(f"motion {names}: the case has {count} ground motion(s), give as many files, joined by "
+                             "commas")
+        name = files[0].stem
+        if name in found:
+            raise InputError(f"two motions are called '{name}': their runs need different names, rename a file")
+        found[name] = Shaking(name, files)
+    if not found:
+        raise InputError("no motions: give at least one record file")
+    return list(found.values())
+
+
+@dataclass(frozen=True)
+class OneRun:
+    """One record at one scale, in its folder. ``wrong``: why it cannot run at all."""
+
+    case: Case
+    shaking: Shaking
+    factor: float
+    folder: Path
+    wrong: str = ""
+
+    @property
+    def name(self) -> str:
+        """For people."""
+        return f"{self.shaking.name} x {self.factor:g}"
+
+    def settings(self) -> tuple[str, ...]:
+        """All KEY=VALUE of the run."""
+        return (*self.case.settings, *self.shaking.settings(self.case, self.factor))
+
+    def done(self) -> dict[str, Any] | None:
+        """The row of a run that has finished, or None."""
+        row = read_json(self.folder / ROW)
+        if row is None and (read_json(self.folder / SUMMARY) or {}).get("status") == "finished":
+            row = self.keep("", 0)  # it outlived the process that had started it
+        return row if row is not None and row["status"] == "finished" else None
+
+    def command(self, launch: Sequence[str]) -> list[str]:
+        """What runs it, from its checkpoint where there is one."""
+        own = [sys.executable, "-m", "vi_contact", "run", str(self.case.path), "--out", str(self.folder), "--quiet"]
+        made = [word for setting in self.settings() for word in ("--set", setting)]
+        return [*launch, *own, *made, *(["--restart"] if (self.folder / CHECKPOINT).is_file() else [])]
+
+    def keep(self, said: str, code: int) -> dict[str, Any]:
+        """Writes the row of a run that ended with this status, having said this on standard error."""
+        facts = read_json(self.folder / SUMMARY) or {}
+        finished = code == 0 and facts.get("status") == "finished"
+        row = {
+            "record": self.shaking.name, "files": [str(path) for path in self.shaking.files], "scale": self.factor,
+            "status": "finished" if finished else "failed", "reason": "" if finished else _sentence(said, code),
+            "certificate": facts.get("worst_certificate"), "steps": facts.get("steps"),
+        }
+        self.folder.mkdir(parents=True, exist_ok=True)
+        write_atomically(self.folder / ROW, to_json(row).encode())
+        return row
+
+    def start(self, launch: Sequence[str]) -> subprocess.Popen[str]:
+        """Starts it, in the environment without what MPI of this process may have put there."""
+        package = str(Path(__file__).resolve().parents[2])
+        way = os.pathsep.join([package, *filter(None, [os.environ.get("PYTHONPATH")])])
+        environment = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"} | dict(os.environ) | {"PYTHONPATH": way}
+        (self.folder / ROW).unlink(missing_ok=True)
+        (self.folder / SUMMARY).unlink(missing_ok=True)
+        try:
+            return subprocess.Popen(
+                self.command(launch), env=environment, text=True, encoding="utf-8", errors="replace",
+                stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, start_new_session=True,
+            )
+        except OSError as error:
+            raise InputError(f"'{error.filename}' cannot be started ({error.strerror}): give another launch") from None
+
+
+def executed(runs: Sequence[OneRun], jobs: int, launch: Sequence[str]) -> Iterator[dict[str, Any]]:
+    """Runs them, so many at a time, and yields the row of each when it ends. Left early, it stops those that go on."""
+    stopped, lock = threading.Event(), threading.Lock()
+    going: set[subprocess.Popen[str]] = set()
+
+    def one(run: OneRun) -> dict[str, Any]:
+        if run.wrong:
+            return run.keep(f"vi-contact: {run.wrong}", 1)
+        with lock:
+            if stopped.is_set():
+                raise KeyboardInterrupt
+            process = run.start(launch)
+            going.add(process)
+        said = process.communicate()[1]
+        with lock:
+            going.discard(process)
+            if stopped.is_set():
+                raise KeyboardInterrupt
+        return run.keep(said, process.returncode)
+
+    with ThreadPoolExecutor(jobs) as pool:
+        futures = [pool.submit(one, run) for run in runs]
+        try:
+            for future in as_completed(futures):
+                yield future.result()
+        finally:
+            with lock:
+                stopped.set()
+                for process in going:
+                    process.send_signal(signal.SIGINT)  # the run keeps what it has
+            for future in futures:
+                future.cancel()
+
+
+def refuse_mpirun() -> None:
+    """InputError in a process that mpirun has started: processes started by it would take themselves for this one."""
+    if any(name in os.environ for name in _MPI):
+        raise InputError("ida starts processes and must not be one of MPI's: start it without mpirun, and give the "
+                         "runs their ranks with --launch 'mpirun -n N'")
+
+
+def read_json(path: Path) -> dict[str, Any] | None:
+    """A whole JSON object, or None when there is none."""
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return found if isinstance(found, dict) else None
+
+
+def _sentence(said: str, code: int) -> str:
+    """Why a run ended: its own sentence, else its last words, else how it was stopped."""
+    lines = [line.strip() for line in said.splitlines() if line.strip()]
+    own = [line.removeprefix("vi-contact: ") for line in lines if line.startswith("vi-contact: ")]
+    if own:
+        return own[-1]
+    if code < 0:
+        return f"ended by {signal.Signals(-code).name}"
+    return lines[-1] if lines else f"ended with status {code}"
