@@ -23,6 +23,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -64,6 +65,29 @@ class BeamRun:
     def mean_updates(self) -> float:
         """Newton updates per step."""
         return float(np.mean(self.history["newton"][1:]))
+
+    def save(self, path: str | Path) -> Path:
+        """The history as CSV, a line per time."""
+        columns = list(self.history)
+        table = np.column_stack([self.history[name] for name in columns])
+        np.savetxt(path, table, fmt="%.17g", delimiter=",", header=",".join(columns), comments="")
+        return Path(path)
+
+    def summary(self) -> str:
+        """Energies, losses, tip and iterations in a few lines."""
+        history, energy = self.history, self.energy
+        defect = float(np.max(np.abs(history["energy_defect"])))
+        return "\n".join([
+            f"{len(energy) - 1} steps, t = 0 to {history['t'][-1]:g} s",
+            f"  energy                  {energy[0]:.6g} J at the start, {energy[-1]:.6g} J at the end",
+            f"  lost to viscosity       {history['loss_damping'][-1]:.6g} J",
+            f"  lost to friction        {history['loss_friction'][-1]:.6g} J",
+            f"  work of the load        {history['work_input'][-1]:.6g} J",
+            f"  ledger closes to        {defect:.1e} J",
+            f"  tip                     {history['u_tip'][-1]:.6g} m at the end, lowest {history['u_tip'].min():.6g} m",
+            f"  steps that stick        {int(np.sum(history['slip'][1:] == 0.0))}",
+            f"  Newton updates per step {self.mean_updates:.4g}, at most {int(history['newton'].max())}",
+        ])
 
 
 @dataclass(frozen=True)

@@ -42,12 +42,15 @@ class BeamSpace:
         return np.zeros(self.unknowns, dtype=np.int64)
 
     def find_nodes(self, points: Array) -> Indices:
-        """The nearest nodes; InputError for points off the axis or beyond an end."""
+        """The nearest nodes; InputError for points off the axis, beyond the tip or at the clamp, which has none."""
         points = np.asarray(points, dtype=float)
-        end = float(self.x[-1])
-        off = points[:, 0] < 0.0, points[:, 0] > end * (1.0 + 1e-12), np.any(points[:, 1:] != 0.0, axis=1)
+        start, end = 0.5 * float(self.x[0]), float(self.x[-1])
+        off = points[:, 0] < start, points[:, 0] > end * (1.0 + 1e-12), np.any(points[:, 1:] != 0.0, axis=1)
         if np.any(off):
-            raise InputError(f"points {points.tolist()} are not all on the beam: give x from 0 to {end:g} on the axis")
+            raise InputError(
+                f"points {points.tolist()} are not all on the moving part of the beam: give x from {start:g} to "
+                f"{end:g} on the axis"
+            )
         return np.abs(points[:, :1] - self.x).argmin(axis=1)
 
     def sample(self, u: Array, nodes: Indices, t: float, derivative: int = 0) -> Array:

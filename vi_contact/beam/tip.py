@@ -57,7 +57,7 @@ class RegularisedFriction:
     """
 
     eps: float
-    tolerance: float = 1e-9
+    tolerance: float = 1e-12
     absolute: float | None = None
     max_iterations: int = 60
     safeguard: bool = True
