@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from . import __version__
+from .cli_beam import add_beam_command
 from .cli_case import add_case_commands
 from .cli_motion import add_motion_commands
 from .cli_report import add_report_commands
@@ -34,6 +35,7 @@ def parser() -> argparse.ArgumentParser:
     wall.set_defaults(run=_wall)
     add_case_commands(commands)
     add_motion_commands(commands)
+    add_beam_command(commands)
     add_report_commands(commands)
     return top
 
