@@ -122,9 +122,9 @@ class Case:
             self._keep(run_folder(comm, folder), comm)
         return simulate(
             problem, scheme=self._made("scheme"), solver=solver, state=state, out=folder, restart=restart,
-            record=self._several("record") if "record" in self.nodes else None, escalation=self._several("escalation"),
-            fields=self._made("fields"), cross_check=solver if isinstance(solver, CrossChecked) else None,
-            progress=progress, **own,
+            record=self._several("record") if "record" in self.nodes else parts.recorders,
+            escalation=self._several("escalation"), fields=self._made("fields"), progress=progress,
+            cross_check=solver if isinstance(solver, CrossChecked) else None, **own,
         )
 
     def _made(self, table: str, **context: Any) -> Any:

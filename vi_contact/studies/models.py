@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from inspect import signature
 from typing import Any, get_type_hints
 
-from ..models import wall
+from ..models import channel, wall
+from ..models.channel_sides import Sides
+from ..recorders import Contact, Energy, Probe
+from ..step import Recorder
 from ..surfaces import ContactSurface
 from ..system import SemiDiscreteSystem
 from .calls import Callee
@@ -15,16 +18,27 @@ from .calls import Callee
 
 @dataclass(frozen=True)
 class Parts:
-    """What a problem is made of; ``weighted``: it carries its weight, and starts from its equilibrium."""
+    """What a problem is made of; ``weighted``: it carries its weight, and starts from its equilibrium; ``recorders``:
+    of a case that names none."""
 
     system: SemiDiscreteSystem
     surface: ContactSurface
     weighted: bool = False
+    recorders: tuple[Recorder, ...] | None = None
 
 
 def _wall(shape: wall.Wall, comm: Any, *, case: str = "b", weight: bool = False) -> Parts:
     model = wall.build(shape, comm, weight=weight)
-    return Parts(model.system, model.surface(case), weight)
+    return Parts(model.system, model.surface(case), weight, (Energy(), Contact(), Probe(model.probes())))
+
+
+def _channel(
+    shape: channel.Channel, comm: Any, *, sides: Sides | None = None, weighing: Sequence[str] = ("channel",),
+    held: bool = False,
+) -> Parts:
+    model = channel.build(shape, comm, sides=sides, weighing=weighing)
+    surface = model.surface.held() if held else model.surface
+    return Parts(model.system, surface, bool(weighing), tuple(model.recorders()))
 
 
 def model(shape: type, build: Callable[..., Parts]) -> Callee:
@@ -42,4 +56,4 @@ def model(shape: type, build: Callable[..., Parts]) -> Callee:
     return Callee(shape.__name__, made, hints, given=("comm",))
 
 
-MODELS = {"Wall": model(wall.Wall, _wall)}
+MODELS = {"Wall": model(wall.Wall, _wall), "Channel": model(channel.Channel, _channel)}

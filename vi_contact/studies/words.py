@@ -18,11 +18,13 @@ from ..fem.trace import contact_surface
 from ..ground_motion import Processing, Record, read_record, synthetic
 from ..meshes.ball import BallMesh
 from ..meshes.block import BlockMesh
+from ..meshes.channel import ChannelMesh
 from ..meshes.cut import CutOpen, Welded
 from ..meshes.disk import DiskMesh
 from ..meshes.gmsh_session import MeshScript
 from ..meshes.two_blocks import Blocks, TwoBlocks
 from ..meshes.wall import WallMesh
+from ..models import channel_sides
 from ..schemes.contact_stabilised import ContactStabilisedNewmark
 from ..schemes.generalised_alpha import GeneralisedAlpha
 from ..schemes.hht import HHT
@@ -103,7 +105,7 @@ def _named(*functions: Any) -> dict[str, Callee]:
 def _choices() -> dict[Any, Mapping[str, Callee]]:
     """Type -> word -> what it calls."""
     frictional = _named(FrictionNewton, NSGS, FixedPoint, GivenForces, Uzawa)
-    scripts = _named(WallMesh, BlockMesh, TwoBlocks, Blocks, DiskMesh, BallMesh, CutOpen, Welded)
+    scripts = _named(WallMesh, ChannelMesh, BlockMesh, TwoBlocks, Blocks, DiskMesh, BallMesh, CutOpen, Welded)
     rate = {"SlipRateCoulomb": callee(_slip_rate, name="SlipRateCoulomb")}
     return {
         Parts: MODELS,
@@ -122,6 +124,7 @@ def _choices() -> dict[Any, Mapping[str, Callee]]:
             "contact_pair": callee(_pair, name="contact_pair"),
         },
         surfaces.Obstacle: _named(surfaces.Touching, surfaces.HalfSpace),
+        channel_sides.Sides: _named(channel_sides.Rollers, channel_sides.Fixed, channel_sides.TiedSides),
         Matching: _named(NodeToNode, DualMortar),
         friction.FrictionLaw: _named(friction.Frictionless, friction.Tresca, friction.Coulomb) | rate,
         impact.ImpactLaw: _named(impact.NoImpact, impact.Inelastic, impact.Newton, impact.Elastic),

@@ -1,0 +1,332 @@
+"""Case files: the same run as in Python to the last bit, and one sentence for every mistake."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("dolfinx")
+
+from mpi4py import MPI
+
+import vi_contact as vc
+from vi_contact import fem
+from vi_contact.cli import main
+from vi_contact.errors import InputError
+from vi_contact.meshes.block import BlockMesh
+from vi_contact.meshes.two_blocks import TwoBlocks
+from vi_contact.models.wall import Wall, build
+from vi_contact.studies import Case, read_case, run_case
+from vi_contact.studies.toml_file import with_settings
+from vi_contact.studies.words import words
+
+ROOT = Path(__file__).resolve().parents[1]
+WALL = ROOT / "demos" / "cases" / "wall.toml"
+COMM = MPI.COMM_WORLD
+ROUND_OFF = ("certificate", "energy_defect", "loss_algorithmic")  # nothing but round-off in these runs
+
+
+def write(folder: Path, text: str, name: str = "case.toml") -> Path:
+    """The same file on every rank, written by the first."""
+    path = folder / name
+    if COMM.rank == 0:
+        path.write_text(text, encoding="utf-8")
+    COMM.Barrier()
+    return path
+
+
+def assert_same(one: Mapping[str, Any], other: Mapping[str, Any]) -> None:
+    """The same columns; to the last bit on one rank, to round-off on several (docs/output.md)."""
+    assert set(one) == set(other)
+    for name, values in one.items():
+        if COMM.size == 1:
+            assert np.array_equal(values, other[name], equal_nan=True), name
+        elif name not in ROUND_OFF:
+            size = float(np.nanmax(np.abs(np.asarray(other[name], dtype=float)), initial=0.0))
+            assert np.allclose(values, other[name], rtol=0.0, atol=1e-9 * size, equal_nan=True), name
+
+
+def test_readmes_first_example_to_the_last_bit() -> None:
+    """demos/cases/wall.toml is the code of README, run for 60 of its 400 steps; dt is 1/560 s exactly."""
+    code = re.search(r"^```python\n(.*?)^```$", (ROOT / "README.md").read_text("utf-8"), re.MULTILINE | re.DOTALL)
+    assert code is not None
+    names: dict[str, Any] = {}
+    exec(code[1].split("solution = ")[0], names)
+    solution = vc.simulate(
+        names["problem"], scheme=vc.ZienkiewiczWoodTaylor(phi=0.5), solver=vc.Condensed(), dt=1.0 / 560.0, steps=60,
+        record=[vc.Energy(), vc.Contact(), vc.Probe({"top": (6.0, 9.0)})], progress=False,
+    )
+    assert "dt=1.0 / 560.0, steps=400" in code[1] and 'fields=fem.XDMF(every=10)' in code[1]
+    case = read_case(WALL)
+    assert case.tables["run"] == {"dt": 1.0 / 560.0, "steps": 400} and case.tables["fields"] == {"every": 10}
+    tables = {name: value for name, value in case.nodes.items() if name != "fields"}
+    found = Case(case.path, case.tables, (), tables | {"run": read_case(WALL, ["run.steps=60"]).nodes["run"]}).run(
+        COMM, progress=False
+    )
+    assert found.history["contact_resultant"].max() > 0.0
+    assert_same(found.history, solution.history)
+
+
+PAIR = """
+[mesh]
+type = "TwoBlocks"
+lower = {lengths = [2.0, 1.0], divisions = [4, 2]}
+upper = {lengths = [1.0, 1.0], divisions = [2, 2]}
+offset = [0.5]
+
+[material.lower]
+E = 3e9
+nu = 0.2
+rho = 2400
+
+[material.upper]
+type = "LinearElastic.from_wave_speeds"
+c_p = 2000
+c_s = 1000
+rho = 2000
+
+[system]
+clamped = ["lower_bottom"]
+damping = {type = "Rayleigh.from_frequencies", f1 = 1, f2 = 10, xi1 = 0.05, xi2 = 0.05}
+loads = [{facets = "upper_top", value = [0.0, -1e3]}]
+
+[gravity]
+acceleration = 9.81
+
+[[contact]]
+type = "contact_pair"
+facets1 = "upper_bottom"
+facets2 = "lower_top"
+
+[friction]
+type = "Coulomb"
+mu = 0.3
+
+[excitation]
+type = "GroundMotion"
+record = {path = "motion.txt", units = "g", processing = {pga = 4.0}}
+scale = 1.5
+
+[run]
+dt = 0.005
+"""
+
+
+def test_a_pair_with_weight_and_record_to_the_last_bit(shared_tmp: Path) -> None:
+    """Two materials, static stage, Coulomb, a processed record beside the file: the run lasts as long as the record."""
+    write(shared_tmp, "".join(f"{0.01 * k} {np.sin(30.0 * 0.01 * k)}\n" for k in range(11)), "motion.txt")
+    found = run_case(write(shared_tmp, PAIR), COMM, progress=False)
+
+    lower = BlockMesh(lengths=(2.0, 1.0), divisions=(4, 2))
+    upper = BlockMesh(lengths=(1.0, 1.0), divisions=(2, 2))
+    mesh, tags = fem.build_mesh(TwoBlocks(lower=lower, upper=upper, offset=(0.5,)), COMM)
+    soft = vc.LinearElastic.from_wave_speeds(2000.0, 1000.0, 2000.0)
+    system = fem.assemble(
+        mesh, [(tags["lower"], vc.LinearElastic(E=3e9, nu=0.2, rho=2400.0)), (tags["upper"], soft)],
+        clamped=tags["lower_bottom"], damping=vc.Rayleigh.from_frequencies(1.0, 10.0, xi1=0.05, xi2=0.05),
+        loads=fem.Traction(tags["upper_top"], (0.0, -1e3)),
+    )
+    system = vc.with_weight(system, acceleration=9.81)
+    surface = fem.contact_pair(system, tags["upper_bottom"], tags["lower_top"])
+    record = vc.scaled_to_pga(vc.read_record(shared_tmp / "motion.txt", "g"), 4.0)
+    problem = vc.ContactProblem(
+        system, surface, friction=vc.Coulomb(0.3), excitation=vc.GroundMotion(record, scale=1.5)
+    )
+    rest = vc.static_equilibrium(problem, solver=vc.Condensed())
+    expected = vc.simulate(problem, dt=0.005, t_end=0.1, state=rest, progress=False)
+    assert len(found.history["t"]) == 21 and np.abs(found.history["a_g_x"]).max() == pytest.approx(6.0, rel=1e-12)
+    weight = 9.81 * (2000.0 * 1.0) + 1e3
+    assert found.history["contact_resultant"][0] == pytest.approx(weight, rel=1e-9)
+    assert found.history["contact_max_slip"].max() > 0.0
+    assert_same(found.history, expected.history)
+
+
+MODEL = """
+[model]
+type = "Wall"
+case = "a"
+thickness = 0.3
+
+[impact]
+type = "Inelastic"
+
+[mass]
+type = "ConsistentMass"
+
+[excitation]
+type = "Harmonic"
+amplitude = 1
+frequency = 14
+
+[scheme]
+type = "ZienkiewiczWoodTaylor"
+
+[run]
+dt = 0.0018
+steps = 30
+"""
+
+
+def test_a_model_by_its_name(shared_tmp: Path) -> None:
+    """[model] is the wall of ``models.wall`` with its own probes."""
+    found = run_case(write(shared_tmp, MODEL), COMM, progress=False)
+    model = build(Wall(thickness=0.3), COMM)
+    expected = vc.simulate(
+        model.problem("a", excitation=vc.Harmonic(1.0, 14.0)), scheme=vc.ZienkiewiczWoodTaylor(), dt=0.0018, steps=30,
+        record=(vc.Energy(), vc.Contact(), vc.Probe(model.probes())), progress=False,
+    )
+    assert_same(found.history, expected.history)
+
+
+def test_the_channel_by_its_name(shared_tmp: Path) -> None:
+    """Tables in tables: mesh and sides of the channel; its own recorders, its weight and static stage."""
+    text = MODEL.replace('type = "Wall"\ncase = "a"\nthickness = 0.3', 'type = "Channel"\nsides = {type = "Rollers"}\n'
+                         "shape = {size = 1.0, wall = 1.0, slab = 1.0}").replace("steps = 30", "steps = 2")
+    history = run_case(write(shared_tmp, text), COMM, progress=False).history
+    assert history["contact_resultant"][0] > 0.0 and "u_x_1_soil" in history
+
+
+def test_weight_is_the_body_force_of_the_density(comm: Any) -> None:
+    """M r g of one material is BodyForce((0, -rho g)), to round-off."""
+    mesh, tags = fem.build_mesh(BlockMesh(lengths=(2.0, 1.0), divisions=(3, 2)), comm)
+    material = vc.LinearElastic(E=1e9, nu=0.2, rho=2000.0)
+    heavy = fem.assemble(mesh, material, clamped=tags["bottom"], loads=fem.BodyForce((0.0, -2000.0 * 9.80665)))
+    system = fem.assemble(mesh, material, clamped=tags["bottom"])
+    difference = vc.with_weight(system).load(0.0) - heavy.load(0.0)
+    assert comm.allreduce(float(np.abs(difference).max(initial=0.0)), op=MPI.MAX) < 1e-12 * 2000.0 * 9.80665
+    for direction, components in (((0.0, 2.0), 2), ((1.0,), 2)):
+        with pytest.raises(InputError, match=f"direction .* give {components} components of a vector of length one"):
+            vc.with_weight(system, direction=direction)
+    bare = fem.assemble(mesh, material, clamped=tags["bottom"], base_inertia=False)
+    with pytest.raises(InputError, match="assemble with base_inertia=True"):
+        vc.with_weight(bare)
+
+
+MISTAKES = {  # what is replaced in demos/cases/wall.toml, by what, what the sentence says after the file's name
+    "no TOML": ("[mesh]", "[mesh", ", line 4, column 6: Expected ']'"),
+    "end of file": ("every = 10", "every =", ", line "),
+    "table twice": ("[impact]", "[solver]", ", line "),
+    "table": ("[impact]", "[impakt]", ": unknown table [impakt]: did you mean impact? Known: title, model, mesh"),
+    "key": ("amplitude", "amplitute", ": [excitation[1]] has the unknown key 'amplitute' for Harmonic: did you mean "
+            "amplitude? Known: amplitude, frequency, phase, direction"),
+    "type": ('"Condensed"', '"Condensd"', ": [solver] has the unknown type 'Condensd': did you mean Condensed?"),
+    "no type": ('type = "Inelastic"', "", ": [impact] has no type: give type = one of NoImpact, Inelastic"),
+    "missing": ("rho = 2400.0", "", ": [material.concrete] lacks 'rho', which LinearElastic needs"),
+    "text": ("amplitude = 3.0", 'amplitude = "big"', ": [excitation[1]] amplitude is 'big': give a number"),
+    "truth": ("amplitude = 3.0", "amplitude = true", ": [excitation[1]] amplitude is true: give a number"),
+    "fraction": ("[8, 12]", "[8, 12.5]", ": [mesh] divisions[2] is 12.5: give a whole number"),
+    "count": ("[8, 12]", "[8, 12, 1]", ": [mesh] divisions has 3 entries: give 2"),
+    "list": ("steps = 400", "steps = [400]", ": [run] steps is a list: give a whole number"),
+    "name": ('clamped = "base"', 'clamped = "base"\nmaterial = "steel"', ": [system] material names 'steel', which is "
+             "not there: Known: concrete"),
+    "function": ('"HalfSpace"', '"AnalyticGap"', ": [contact[1].obstacle] has the unknown type 'AnalyticGap'"),
+    "inner table": ('section = {type = "PlaneStress", thickness = 0.20}', "section = {type = 'PlaneStress', depth = 1}",
+                    ": [system.section] has the unknown key 'depth' for PlaneStress"),
+    "no dt": ("dt = 0.0017857142857142857", "", ": [run] lacks 'dt', which simulate needs"),
+    "both": ("[mesh]", '[model]\ntype = "Wall"\n[mesh]', ": give either [mesh], the problem table by table, or"),
+    "part of the model": ("[mesh]", "[model]", ": [material] is part of the model"),
+}
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("name", MISTAKES)
+def test_mistakes_are_one_sentence(tmp_path: Path, name: str) -> None:
+    """File, table, key and remedy, before anything is computed; on the command line too."""
+    old, new, said = MISTAKES[name]
+    text = WALL.read_text("utf-8")
+    assert old in text
+    path = write(tmp_path, text.replace(old, new, 1))
+    with pytest.raises(InputError) as caught:
+        read_case(path)
+    assert str(caught.value).startswith(f"{path}{said}") and "\n" not in str(caught.value)
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize(("old", "new", "said"), [
+    ("rho = 2400.0", "rho = -1.0", "[material.concrete] LinearElastic: the mass density"),
+    ('type = "Inelastic"', 'type = "Newton"\ne = 2.0', "[impact] restitution coefficient e is 2.0"),
+    ("frequency = 14.0", "frequency = 0.0", "[excitation[1]] Harmonic: frequency is 0.0"),
+])
+def test_wrong_values_are_told_without_a_mesh(tmp_path: Path, old: str, new: str, said: str) -> None:
+    with pytest.raises(InputError, match=re.escape(said)):
+        read_case(write(tmp_path, WALL.read_text("utf-8").replace(old, new, 1))).check()
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize(("old", "new", "said"), [
+    ('clamped = "base"', 'clamped = "foot"', "[system] clamped is 'foot', but the mesh has no boundary group 'foot'"),
+    ('clamped = "base"', 'clamped = ["wall"]', "[system] clamped[1] is 'wall', a group of other things: give the name"),
+    ("steps = 400", "", "[run] has neither steps nor t_end, and the excitation has no end: give one"),
+])
+def test_mistakes_that_need_the_mesh(tmp_path: Path, old: str, new: str, said: str) -> None:
+    with pytest.raises(InputError, match=re.escape(said)):
+        run_case(write(tmp_path, WALL.read_text("utf-8").replace(old, new, 1)), COMM)
+
+
+@pytest.mark.serial
+def test_files_that_are_none(tmp_path: Path) -> None:
+    (tmp_path / "binary.toml").write_bytes(b"\xff\xfe")
+    for path, said in ((tmp_path / "none.toml", "no such file"), (tmp_path, "cannot be read"),
+                       (tmp_path / "binary.toml", "no UTF-8")):
+        with pytest.raises(InputError, match=said):
+            read_case(path)
+
+
+@pytest.mark.serial
+def test_settings() -> None:
+    """KEY=VALUE on a copy: values of TOML, other words as text, lists counted from 1, new tables on the way."""
+    tables = {"run": {"dt": 1.0}, "excitation": [{"scale": 1.0}, {}]}
+    made = with_settings(tables, ["run.dt=2", "excitation.2.scale=[1, 2]", "scheme.type=HHT", "a.b.c=true", "t= x = 1"])
+    assert made == {"run": {"dt": 2}, "excitation": [{"scale": 1.0}, {"scale": [1, 2]}], "scheme": {"type": "HHT"},
+                    "a": {"b": {"c": True}}, "t": "x = 1"}
+    assert tables == {"run": {"dt": 1.0}, "excitation": [{"scale": 1.0}, {}]}
+    for setting, said in (("run.dt", "give KEY=VALUE"), ("excitation.3.scale=1", "number from 1 to 2"),
+                          ("run.dt.x=1", "plain value"), ("excitation.0.scale=1", "no entry '0'")):
+        with pytest.raises(InputError, match=said):
+            with_settings(tables, [setting])
+
+
+@pytest.mark.serial
+def test_the_command_runs_checks_and_restarts(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """20 steps at once are 10 steps, then --restart; case.toml in the folder tells the settings."""
+    whole, parts = tmp_path / "whole", tmp_path / "parts"
+    quiet = ["--quiet", "--set", "solver.method.type=Hildreth"]
+    assert main(["run", str(WALL), "--out", str(whole), "--set", "run.steps=20", *quiet]) == 0
+    assert main(["run", str(WALL), "--out", str(parts), "--set", "run.steps=10", *quiet]) == 0
+    assert main(["run", str(WALL), "--out", str(parts), "--set", "run.steps=20", "--restart", *quiet]) == 0
+    assert (whole / "history.csv").read_bytes() == (parts / "history.csv").read_bytes()
+    assert (whole / "fields.xdmf").is_file()
+    copy = (whole / "case.toml").read_text("utf-8")
+    assert copy.startswith("# set run.steps=20\n# set solver.method.type=Hildreth\n")
+    assert copy.endswith(WALL.read_text("utf-8"))
+    printed = capsys.readouterr().out
+    assert printed.count("A concrete wall beside the ground, shaken\nrun finished:") == 3 and "Hildreth" in printed
+    assert main(["run", str(WALL), "--check"]) == 0 and "in order" in capsys.readouterr().out
+    assert main(["run", str(WALL), "--set", "run.stepps=1", "--check"]) == 1
+    said = capsys.readouterr().err
+    assert said == f"vi-contact: {WALL}: [run] has the unknown key 'stepps' for simulate: did you mean steps? Known: " \
+                   "dt, t_end, steps, out, tolerance, checkpoint_every\n"
+
+
+@pytest.mark.serial
+def test_case_files_know_the_public_names() -> None:
+    """Laws, obstacles, excitations, schemes, solvers and recorders of the interface, but those that take functions."""
+    known = {name.split(".")[0] for choices in words(ROOT).choices.values() for name in choices}
+    wanted = {
+        name for module, names in vc._CONTENTS.items() for name in names
+        if module.split(".")[0] in ("friction", "impact", "mass", "materials", "excitation", "schemes", "recorders")
+    }
+    wanted |= {"Condensed", "Hildreth", "NSGS", "FixedPoint", "Anderson", "CrossChecked", "Schedule", "HalvedAtImpact"}
+    missing = wanted - known - {"ExponentialDecay", "StaticKinetic", "completed"}  # arguments of others; no table
+    assert missing == set()
+
+
+@pytest.mark.serial
+def test_every_example_is_in_order() -> None:
+    for path in sorted((ROOT / "demos" / "cases").glob("*.toml")):
+        assert read_case(path).nodes
