@@ -84,7 +84,7 @@ def plot_rubbing(history: History, path: str | Path, *, mu: float, gap: float, t
     middle.plot(t, mu * force, color="0.5", lw=0.6)
     middle.plot(t, -mu * force, color="0.5", lw=0.6)
     middle.set(ylabel="friction force [N]")
-    middle.legend(fontsize=8, loc="lower left")
+    middle.legend(fontsize=8, loc="lower right")
     bottom.plot(t, history["u_y_tip"], color="black", lw=1.1, label="tip")
     slip = np.append(0.0, np.diff(history["u_y_tip"]))
     _shade(bottom, t, (force > 0.0) & (np.abs(slip) <= 1e-12 * np.max(np.abs(slip))), "sticking")
