@@ -1,4 +1,4 @@
-"""A moved base and the frame of the ground are the same discrete problem : seismic practice, relative frame or prescribed base."""
+"""A moved base and the frame of the ground are the same discrete problem: both base inputs of seismic practice."""
 
 from __future__ import annotations
 

@@ -14,6 +14,7 @@ from .base_motion import base_motion  # noqa: F401
 from .cross_check import cross_check  # noqa: F401
 from .march import march  # noqa: F401
 from .simulate import simulate  # noqa: F401
+from .upgoing import upgoing  # noqa: F401
 
 __version__ = "0.1.0"
 
@@ -29,6 +30,8 @@ _CONTENTS = {
         "FullSine", "GroundMotion", "HalfSine", "Harmonic", "Rectangular", "Ricker", "Tabulated",
     ),
     "base_motion": ("BaseMotion", "base_motion"),
+    "upgoing": ("UpgoingVelocity", "upgoing"),
+    "soil_column": ("SoilColumn",),
     "ground_motion": (
         "EC8Spectrum", "Envelope", "KanaiTajimi", "Processing", "Record", "ResponseSpectrum", "baseline_corrected",
         "filtered", "motion_info", "padded", "read_record", "resampled", "response_spectrum", "scaled",
@@ -47,6 +50,8 @@ _CONTENTS = {
     "exact.punch": ("RoundPunch", "StripPunch"),
     "exact.housner": ("HousnerBlock",),
     "exact.sliding": ("SlidingBlock",),
+    "exact.site_response": ("SoilLayer",),
+    "exact.surface_waves": ("dashpot_energy", "dashpot_reflection", "rayleigh_motion", "rayleigh_speed"),
     "exact.rigid_wall": ("RigidWall",),
     "exact.racking": ("BoxFrame", "ChannelFrame", "racking_ratio"),
     "exact.lining": ("ThickLining", "ThinLining"),
@@ -85,6 +90,12 @@ _CONTENTS = {
     "load_steps": ("quasi_static",),
     "simulate": ("Solution", "simulate"),
     "recorders": ("Contact", "Energy", "Probe"),
+    # what engineers ask of a run
+    "resultants": ("Resultants", "contact_summary"),
+    "racking": ("Racking",),
+    "floor_spectra": ("TransferFunction", "floor_spectrum", "recorded_motion", "transfer_function"),
+    "peak_values": ("Loop", "Peak", "hysteresis", "peaks", "write_peaks"),
+    "run_folder": ("RunFolder", "read_run"),
     "cross_check": ("CrossChecked", "cross_check"),
     "verify": ("energy_balance", "kkt_residual"),
     "modal": ("lowest_frequency",),

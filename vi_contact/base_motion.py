@@ -60,8 +60,8 @@ class PointSpace:
 class BaseMotion:
     """Displacement [m], velocity [m/s] and acceleration [m/s²] of the ground, starting from rest at t = 0.
 
-    ``displacement``, ``velocity`` and ``acceleration`` take points (k, d) and t and return (k, d), as ``fem.Prescribed``
-    wants them; ``at(t)`` gives the three vectors.
+    ``displacement``, ``velocity`` and ``acceleration`` take points (k, d) and t and return (k, d), as
+    ``fem.Prescribed`` wants them; ``at(t)`` gives the three vectors.
     """
 
     excitations: tuple[Excitation, ...]

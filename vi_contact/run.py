@@ -62,6 +62,7 @@ class Settings:
             "ranks": self.problem.system.algebra.comm.size,
             "unknowns": self.problem.system.space.unknowns,
             "contact_points": self.problem.surface.count,
+            "boundaries": list(self.problem.system.notes),
         }
 
 

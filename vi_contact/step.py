@@ -46,6 +46,11 @@ class ContactProblem:
     mass: MassLaw | None = None
 
     def __post_init__(self) -> None:
+        if self.system.absolute and self.excitations:
+            raise InputError(
+                "a compliant base is shaken by its own upgoing motion: leave the excitation of the problem out, its "
+                "inertia load is that of a rigid base"
+            )
         for excitation in self.excitations:
             if len(excitation.direction) != self.system.influence.shape[1]:
                 raise InputError(

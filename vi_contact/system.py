@@ -92,6 +92,8 @@ class SemiDiscreteSystem:
         space: what the unknowns mean.
         massless: unknowns without inertia (rows and columns of M are zero), None when there are none.
         floating: True when some rigid motion is not held by prescribed displacements (static stages refuse it).
+        notes: which motion its boundaries expect, for log and summary of a run.
+        absolute: True when a boundary lets waves in: displacements are those of space, and nothing else may shake it.
     """
 
     algebra: Algebra
@@ -106,6 +108,8 @@ class SemiDiscreteSystem:
     floating: bool = False
     massless: Mask | None = None
     base_mass: Array | None = None
+    notes: tuple[str, ...] = ()
+    absolute: bool = False
     _cache: dict[str, Any] = field(default_factory=dict, compare=False, repr=False)
 
     @property

@@ -10,7 +10,7 @@ _HOME = {
     "Cells": "mesh", "Facets": "mesh", "Tags": "mesh",
     "assemble": "assembly",
     "BodyForce": "loads", "Prescribed": "loads", "TangentialTraction": "loads", "Traction": "loads",
-    "Tied": "ties", "Dashpots": "dashpots", "CompliantBase": "dashpots",
+    "Tied": "ties", "Dashpots": "dashpots", "CompliantBase": "dashpots", "FreeField": "free_field",
     "contact_surface": "trace",
     "contact_pair": "pairs", "NodeToNode": "matching", "DualMortar": "mortar", "together": "joined",
     "geometric_stiffness": "gravity",

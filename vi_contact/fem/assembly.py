@@ -9,20 +9,25 @@ so M, C, K are Pᵀ(·)P and the load gets -Pᵀ(K U + C U' + M U'').
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import ufl
+from petsc4py import PETSc
 
 from ..algebra import Array, Mask
 from ..errors import InputError
 from ..materials import Damping, LinearElastic, NoDamping, PlaneStrain, Section, Solid
 from ..system import Load, SemiDiscreteSystem
 from . import compat
+from .dashpots import CompliantBase, DashpotMatrix, Dashpots, incoming, tell
+from .free_field import free_field_loads
 from .loads import BodyForce, Prescribed, TangentialTraction, Traction, as_tuple, evaluate, is_constant
 from .mesh import Cells, Facets
 from .petsc_algebra import PetscAlgebra, PetscMatrix
 from .space import FemSpace
+from .ties import Tied
 
 Materials = LinearElastic | Sequence[tuple[Cells, LinearElastic]]
 Field = tuple[float, ...] | Callable[[Array], Array]
@@ -36,6 +41,8 @@ def assemble(
     section: Section | None = None,
     clamped: Facets | Sequence[Facets] = (),
     prescribed: Prescribed | Sequence[Prescribed] = (),
+    tied: Tied | Sequence[Tied] = (),
+    dashpots: Dashpots | Sequence[Dashpots] = (),
     loads: Traction | BodyForce | Sequence[Traction | BodyForce] = (),
     damping: Damping | None = None,
     initial_displacement: Initial = None,
@@ -49,6 +56,8 @@ def assemble(
         material: one material, or (cells, material) pairs that cover the mesh.
         section: PlaneStrain() by default in 2D (Solid() in 3D); PlaneStress(thickness) for panels.
         clamped: facets with u = 0; prescribed: facets that move (eq. 3) or are held in some components.
+        tied: boundaries whose opposite nodes move together.
+        dashpots: absorbing boundaries: Dashpots, CompliantBase, FreeField. Their loss counts as damping.
         loads: tractions (eqs. 4, 6) and body forces.
         damping: NoDamping() by default, MassProportional(c) (eq. 7) or Rayleigh.
         base_inertia: whether a ground motion's inertia load counts the mass that elements share with prescribed nodes,
@@ -56,14 +65,20 @@ def assemble(
         initial_displacement, initial_velocity: constant or points (k, d) -> (k, d) (eqs. 10, 10a), or (cells, value)
             pairs for several bodies; the later pair counts where cells meet, zero where there are none.
     Raises:
-        InputError: cells without material, NaN in data, components that do not exist.
+        InputError: cells without material, NaN in data, components that do not exist, dashpots on what is held.
     """
     section = section or (PlaneStrain() if mesh.geometry.dim == 2 else Solid())
     conditions = tuple(Prescribed(facets) for facets in as_tuple(clamped)) + as_tuple(prescribed)
-    space = FemSpace(mesh, conditions)
+    space = FemSpace(mesh, conditions, as_tuple(tied))
     forms = ElasticForms(space, cell_materials(mesh, material), section, damping or NoDamping())
     algebra = PetscAlgebra(mesh.comm)
     mass, stiffness, damper = forms.matrices()
+    boundaries = as_tuple(dashpots)
+    absorbers = [DashpotMatrix(space, forms, one) for one in boundaries]
+    damper = forms.total([damper, *(one.mat for one in absorbers)])
+    load = assemble_loads(space, section, as_tuple(loads), (stiffness, damper, mass))
+    elastic, viscous = free_field_loads(absorbers, forms)
+    load = replace(load, general=load.general + elastic, viscous=load.viscous + incoming(absorbers) + viscous)
 
     def reduced(full: Any) -> PetscMatrix:
         return PetscMatrix(full.PtAP(space.selection))
@@ -77,13 +92,15 @@ def assemble(
         M=M,
         C=None if damper is None else reduced(damper),
         K=reduced(stiffness),
-        load=assemble_loads(space, section, as_tuple(loads), (stiffness, damper, mass)),
+        load=load,
         influence=rigid,
         base_mass=_base_mass(space, PetscMatrix(mass), M, rigid) if base_inertia else None,
         u0=_initial(space, "initial displacement", initial_displacement),
         v0=_initial(space, "initial velocity", initial_velocity),
         space=space,
         floating=floats(space),
+        notes=tell(boundaries, mesh.comm.rank),
+        absolute=any(isinstance(one, CompliantBase) for one in boundaries),
     )
     space.forms = forms
     return system
@@ -92,7 +109,7 @@ def assemble(
 def _base_mass(space: FemSpace, full: PetscMatrix, M: PetscMatrix, rigid: Array) -> Array:
     """Pᵀ M_full r - M r_free for every direction: what accelerated prescribed nodes pull on the free ones."""
     whole = [np.tile(direction, (len(space.nodes), 1)).ravel() for direction in np.eye(space.dimension)]
-    return np.column_stack([(full @ r)[space.free] - M @ free for r, free in zip(whole, rigid.T, strict=True)])
+    return np.column_stack([space.pull(full @ r) - M @ free for r, free in zip(whole, rigid.T, strict=True)])
 
 
 class ElasticForms:
@@ -130,6 +147,17 @@ class ElasticForms:
         damper = self.fields["alpha_rho"] * ufl.inner(u, v) * ufl.dx
         damper += beta * ufl.inner(self.stress(u), ufl.sym(ufl.grad(v))) * ufl.dx
         return M, K, compat.assemble_matrix(compat.compile_form(damper))
+
+    @staticmethod
+    def total(matrices: Sequence[Any]) -> Any | None:
+        """The sum of those that are not None."""
+        found = [matrix for matrix in matrices if matrix is not None]
+        if not found:
+            return None
+        total = found[0].copy()
+        for matrix in found[1:]:
+            total.axpy(1.0, matrix, structure=PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+        return total
 
 
 def cell_materials(mesh: Any, material: Materials) -> list[tuple[Any, LinearElastic]]:
@@ -194,8 +222,7 @@ def _integrator(space: FemSpace, section: Section, load: Traction | BodyForce) -
     matrix = PetscMatrix(compat.assemble_matrix(compat.compile_form(form)))
 
     def integrate(values: Array) -> Array:
-        full = section.thickness * (matrix @ values.ravel())
-        return full[space.free]
+        return space.pull(section.thickness * (matrix @ values.ravel()))
 
     return integrate
 
@@ -207,7 +234,7 @@ def _prescribed_load(space: FemSpace, full: tuple[tuple[int, Any], ...]) -> Call
     def load(t: float) -> Array:
         pull = np.zeros(len(space.ids))
         for derivative, matrix in parts:
-            pull -= (matrix @ space.prescribed_values(t, derivative))[space.free]
+            pull -= space.pull(matrix @ space.prescribed_values(t, derivative))
         return pull
 
     return load
@@ -256,7 +283,7 @@ def _floats(space: FemSpace, body: Mask) -> bool:
             turn = np.zeros_like(x)
             turn[:, i], turn[:, j] = -x[:, j], x[:, i]
             modes.append(turn)
-    rows = np.column_stack([mode.ravel()[~space.free & body] for mode in modes])
+    rows = np.column_stack([mode.ravel()[space.held.ravel() & body] for mode in modes])
     gram = space.comm.sum(rows.T @ rows)
     values = np.linalg.eigvalsh(gram)
     return bool(values[0] <= 1e-10 * max(values[-1], np.finfo(float).tiny))

@@ -75,6 +75,6 @@ def _with_prescribed(space: FemSpace, full: PetscMatrix, load: Load, t0: float) 
     start = space.prescribed_values(t0)
 
     def pull(t: float) -> Array:
-        return -(full @ (space.prescribed_values(t) - start))[space.free]
+        return -space.pull(full @ (space.prescribed_values(t) - start))
 
     return replace(load, general=(*load.general, pull))

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 from petsc4py import PETSc
 
 from ..algebra import Array, Indices, Mask
@@ -14,23 +16,26 @@ from . import compat
 from .bodies import body_numbers
 from .loads import Prescribed, evaluate_here, refuse
 from .mesh import node_numbers
-from .petsc_algebra import MpiComm
+from .petsc_algebra import MpiComm, PetscMatrix
+from .ties import Pairs, Tied, paired
 
 
 class FemSpace:
-    """Nodal unknowns of a P1/Q1 displacement space, with the prescribed ones eliminated.
+    """Nodal unknowns of a P1/Q1 displacement space, with the prescribed and the tied ones eliminated.
 
     "Full" vectors hold every owned component (bs*i + c, P16); "free" vectors only those the equations solve for.
 
     Attributes:
         V: the DOLFINx function space; dimension d; free: (owned full,) mask of free components.
+        held, tied: (owned nodes, d) masks of components that are prescribed, or follow those of another node;
+            tied_nodes: numbers of all nodes that move together with another, on every rank.
         nodes: original node numbers of the owned blocks; points: their coordinates (k, d).
         ids: rank-independent numbers of the free unknowns (node * d + component).
         unknowns: number of free unknowns on all ranks.
-        selection: P with u_full = P u_free + prescribed.
+        selection: P with u_full = P u_free + prescribed; ``pull`` is Pᵀ on forces.
     """
 
-    def __init__(self, mesh: Any, prescribed: tuple[Prescribed, ...]) -> None:
+    def __init__(self, mesh: Any, prescribed: tuple[Prescribed, ...], tied: Sequence[Tied] = ()) -> None:
         self.mesh = mesh
         self.V = compat.vector_space(mesh)
         self.comm = MpiComm(mesh.comm)
@@ -50,12 +55,16 @@ class FemSpace:
         self.held = np.zeros((owned, self.dimension), dtype=bool)
         for entries in self._where_held:
             self.held[entries] = True
-        self.free: Mask = ~self.held.ravel()
+        pairs = paired(self, tied)
+        self.tied_nodes: Indices = np.array([n for pair in pairs for n in (*pair.first, *pair.second)], dtype=np.int64)
+        self.tied: Mask = self._followers(pairs)
+        self.free: Mask = ~(self.held | self.tied).ravel()
         ids = self.nodes[:, None] * self.dimension + np.arange(self.dimension)
         self.ids: Indices = ids.ravel()[self.free]
         self.unknowns = int(self.comm.sum(np.array([float(self.free.sum())]))[0])
         self.free_index: Indices = np.where(self.free, np.cumsum(self.free) - 1, -1)
-        self.selection = self._selection()
+        self.selection = self._selection(pairs)
+        self._P = PetscMatrix(self.selection) if pairs else None
         self.forms: Any = None  # the ElasticForms of the system made on it; stress output needs them
 
     def _size(self) -> float:
@@ -78,14 +87,43 @@ class FemSpace:
         blocks = compat.facet_dofs(self.V, facets)
         return np.asarray(blocks[blocks < len(self.nodes)], dtype=np.int64)
 
-    def _selection(self) -> Any:
-        """P as a PETSc matrix: one 1 per free component."""
-        rows, columns = len(self.free), int(self.free.sum())
-        P = PETSc.Mat().createAIJ(((rows, None), (columns, None)), nnz=1, comm=self.mesh.comm)
-        P.setUp()
-        row0, column0 = P.getOwnershipRange()[0], P.getOwnershipRangeColumn()[0]
-        for column, row in enumerate(np.flatnonzero(self.free)):
-            P.setValue(row0 + row, column0 + column, 1.0)
+    def _followers(self, pairs: Sequence[Pairs]) -> Mask:
+        """Which owned components follow a node of another boundary; InputError where only one of a pair is held."""
+        followers = np.zeros_like(self.held)
+        for pair in pairs:
+            held = [self._of_nodes(numbers, self.held.astype(float)) > 0.0 for numbers in (pair.first, pair.second)]
+            for c in pair.components:
+                if np.any(held[0][:, c] != held[1][:, c]):
+                    raise InputError(f"component {c} of a tied node is prescribed on one side only: prescribe both "
+                                     "sides alike, or tie the other components (components=)")
+                where = self._where(pair.second)
+                mine = (where >= 0) & ~held[1][:, c]
+                followers[where[mine], c] = True
+        return followers
+
+    def _of_nodes(self, numbers: Indices, values: Array) -> Array:
+        """Rows of owned nodal values (k, d) at original node numbers, on every rank; zero for nodes of nobody."""
+        found, where = np.zeros((len(numbers), values.shape[1])), self._where(numbers)
+        found[where >= 0] = values[where[where >= 0]]
+        return self.comm.sum(found)
+
+    def _selection(self, pairs: Sequence[Pairs]) -> Any:
+        """P as a PETSc matrix: one 1 per free component, and one for each that follows another."""
+        d, rows, columns = self.dimension, len(self.free), int(self.free.sum())
+        first = int(self.mesh.comm.exscan(columns) or 0)
+        column = np.where(self.free, first + self.free_index, -1)
+        for pair in pairs:
+            leaders = self._of_nodes(pair.first, column.reshape(-1, d).astype(float)).astype(np.int64)
+            where = self._where(pair.second)
+            for row, leader in zip(where[where >= 0], leaders[where >= 0], strict=True):
+                for c in pair.components:
+                    if self.tied[row, c]:
+                        column[d * row + c] = leader[c]
+        kept = np.flatnonzero(column >= 0)
+        ones = sp.csr_matrix((np.ones(len(kept)), (kept, column[kept])), shape=(rows, self.unknowns))
+        kind = PETSc.IntType
+        csr = (ones.indptr.astype(kind), ones.indices.astype(kind), ones.data)
+        P = PETSc.Mat().createAIJ(((rows, None), (columns, None)), csr=csr, comm=self.mesh.comm)
         P.assemble()
         return P
 
@@ -127,8 +165,15 @@ class FemSpace:
     def expand(self, u: Array, t: float, derivative: int = 0) -> Array:
         """Free vector -> nodal values (owned nodes, d), prescribed components included."""
         full = self.prescribed_values(t, derivative)
-        full[self.free] = u
+        if self._P is None:
+            full[self.free] = u
+        else:
+            full += self._P @ u
         return full.reshape(-1, self.dimension)
+
+    def pull(self, force: Array) -> Array:
+        """Pᵀ: forces on all owned components -> on the free ones; those on tied nodes count at their partners."""
+        return force[self.free] if self._P is None else self._P.transpose_apply(force)
 
     def restrict(self, full: Array) -> Array:
         """Nodal values (owned nodes, d) -> free vector."""
@@ -158,11 +203,7 @@ class FemSpace:
 
     def sample(self, u: Array, nodes: Indices, t: float, derivative: int = 0) -> Array:
         """Nodal values (k, d) at original node numbers, equal on all ranks."""
-        values = np.zeros((len(nodes), self.dimension))
-        where = self._where(nodes)
-        mine = where >= 0
-        values[mine] = self.expand(u, t, derivative)[where[mine]]
-        return self.comm.sum(values)
+        return self._of_nodes(nodes, self.expand(u, t, derivative))
 
     def _where(self, nodes: Indices) -> Indices:
         """Owned block of each original node number, -1 when another rank owns it."""

@@ -14,7 +14,7 @@ from ..errors import InputError
 from ..surfaces import ContactSurface, Obstacle, Touching, admissible_gap
 from ..system import SemiDiscreteSystem
 from . import compat
-from .frames import Conditions, Nodes, surface_of
+from .frames import Conditions, Nodes, at, surface_of
 from .mesh import Facets
 from .space import FemSpace
 
@@ -51,6 +51,7 @@ def contact_surface(
     directions = snapped(np.asarray(obstacle.directions(nodes.points, nodes.normals), dtype=float))
     gap = admissible_gap(np.asarray(obstacle.gap(nodes.points, nodes.normals), dtype=float), nodes.points, space.size)
     weights = nodes.weights * space.forms.section.thickness
+    _refuse_tied(space, nodes, facets.name)
     return surface_of(space, [Conditions(nodes, directions)], gap0=gap, weights=weights)
 
 
@@ -129,6 +130,14 @@ def listed(space: FemSpace, nodes: Nodes, points: Sequence[Sequence[float]], nam
     if not rows:
         raise InputError(f"no contact nodes: the list of contact points on '{name}' is empty")
     return nodes.pick(rows)
+
+
+def _refuse_tied(space: FemSpace, nodes: Nodes, name: str) -> None:
+    for row in np.flatnonzero(np.isin(nodes.numbers, space.tied_nodes)):
+        raise InputError(
+            f"contact node {at(nodes.points[row])} of '{name}' is tied to another: leave it out (points=), or tie "
+            "boundaries that end before the contact"
+        )
 
 
 def snapped(directions: Array) -> Array:

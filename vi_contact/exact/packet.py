@@ -1,0 +1,69 @@
+"""A packet of plane waves that travels up at an angle: initial values with a known reflection (V8.1)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..algebra import Array
+from ..materials import LinearElastic
+from .surface_waves import dashpot_energy
+
+
+@dataclass(frozen=True)
+class WavePacket:
+    """Waves "P" or "S" around ``angle`` [rad] from the vertical, all with one wavelength along x: ``period`` [m].
+
+        u = sum over k_y of weight(k_y) d cos(k_x x + k_y (y - centre) - w t),   k_x = 2 pi/period,   w = c |k|
+
+    with d the direction of motion and Gaussian weights of standard deviation 1/length: a packet of about 4 ``length``
+    [m] in height, around the height ``centre`` [m] at t = 0.
+    """
+
+    material: LinearElastic
+    wave: str
+    angle: float
+    period: float
+    length: float
+    centre: float
+
+    @property
+    def speed(self) -> float:
+        """c_P or c_S [m/s]."""
+        return self.material.c_p if self.wave == "P" else self.material.c_s
+
+    @property
+    def wavelength(self) -> float:
+        """In the direction of travel, of the middle of the packet [m]."""
+        return self.period * math.sin(self.angle)
+
+    def _waves(self) -> tuple[Array, Array, Array]:
+        """(k_y, weights, angles)."""
+        k_x = 2.0 * math.pi / self.period
+        k_y = k_x / math.tan(self.angle) + np.linspace(-4.0, 4.0, 161) / self.length
+        weights = np.exp(-0.5 * np.linspace(-4.0, 4.0, 161) ** 2)
+        return k_y, weights / weights.sum(), np.arctan2(k_x, k_y)
+
+    def motion(self, points: Array, t: float = 0.0) -> tuple[Array, Array]:
+        """(u, v) at points (n, 2), each (n, 2)."""
+        k_x = 2.0 * math.pi / self.period
+        u, v = np.zeros(points.shape), np.zeros(points.shape)
+        for k_y, weight, angle in zip(*self._waves(), strict=True):
+            w = self.speed * math.hypot(k_x, k_y)
+            phase = k_x * points[:, 0] + k_y * (points[:, 1] - self.centre) - w * t
+            along = np.array([math.sin(angle), math.cos(angle)])
+            d = along if self.wave == "P" else np.array([along[1], -along[0]])
+            u += weight * np.cos(phase)[:, None] * d
+            v += weight * w * np.sin(phase)[:, None] * d
+        return u, v
+
+    def reflected(self) -> float:
+        """Energy that dashpots on a horizontal boundary above send back, over that of the packet: its mean."""
+        k_y, weights, angles = self._waves()
+        shares = [
+            dashpot_energy(self.material, angle, wave=self.wave) if angle < 0.5 * math.pi else 1.0 for angle in angles
+        ]
+        energies = weights**2 * (k_y**2 + (2.0 * math.pi / self.period) ** 2)
+        return float(np.sum(energies * shares) / np.sum(energies))

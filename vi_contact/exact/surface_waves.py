@@ -1,0 +1,97 @@
+"""Rayleigh waves, and what dashpots on a plane boundary reflect: closed forms (V8.1, V8.3).
+
+The dashpots are those of Lysmer and Kuhlemeyer, sigma_n = -rho c_P v_n and tau = -rho c_S v_t.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.optimize import brentq
+
+from ..algebra import Array
+from ..errors import InputError
+from ..materials import LinearElastic
+
+
+def rayleigh_speed(material: LinearElastic) -> float:
+    """c_R [m/s]: (2 - x²)² = 4 sqrt(1 - x²) sqrt(1 - x² c_S²/c_P²), x = c_R/c_S, the root in (0, 1)."""
+    ratio = (material.c_s / material.c_p) ** 2
+
+    def equation(y: float) -> float:  # y = x², divided by y: the trivial root is gone
+        return ((2.0 - y) ** 2 - 4.0 * math.sqrt((1.0 - y) * (1.0 - ratio * y))) / y
+
+    return material.c_s * math.sqrt(brentq(equation, 1e-3, 1.0, xtol=1e-15))
+
+
+def rayleigh_motion(material: LinearElastic, depth: Array, wavelength: float) -> tuple[Array, Array]:
+    """(U, V) at depths >= 0 [m] of u_x = U cos k(x - c t), u_y = V sin k(x - c t), y upwards; U = 1 at the surface.
+
+    With q, s = k sqrt(1 - c²/c_P²), k sqrt(1 - c²/c_S²): U ~ exp(-q z) - (1 + s²/k²)/2 exp(-s z) and
+    V ~ (q/k) (exp(-q z) - 2/(1 + s²/k²) exp(-s z)); y = -z.
+    """
+    k, c = 2.0 * np.pi / wavelength, rayleigh_speed(material)
+    q, s = (k * math.sqrt(1.0 - (c / speed) ** 2) for speed in (material.c_p, material.c_s))
+    b = 1.0 + (s / k) ** 2
+    scale = 1.0 / (1.0 - 0.5 * b)
+    first, second = np.exp(-q * depth), np.exp(-s * depth)
+    return scale * (first - 0.5 * b * second), scale * (q / k) * (first - 2.0 / b * second)
+
+
+def dashpot_reflection(
+    material: LinearElastic, angle: float, *, wave: str, normal: float = 1.0, tangential: float = 1.0
+) -> tuple[float, float]:
+    """(|A_P|, |A_S|) of the waves reflected by dashpots, for one of amplitude 1 that arrives at ``angle`` [rad].
+
+    angle: from the normal of the boundary, 0 to pi/2; wave: "P" or "S"; normal, tangential: factors of rho c_P and
+    rho c_S. Amplitudes of displacement. InputError for another wave or angle.
+    """
+    return tuple(abs(a) for a in _reflected(material, angle, wave, normal, tangential))  # type: ignore[return-value]
+
+
+def dashpot_energy(
+    material: LinearElastic, angle: float, *, wave: str, normal: float = 1.0, tangential: float = 1.0
+) -> float:
+    """Reflected over incident energy flux at right angles to the boundary; arguments as ``dashpot_reflection``."""
+    a_p, a_s = _reflected(material, angle, wave, normal, tangential)
+    c_p, c_s = material.c_p, material.c_s
+    speed = c_p if wave == "P" else c_s
+    p = math.sin(angle) / speed
+    cosines = [complex(np.emath.sqrt(1.0 - (p * c) ** 2)) for c in (c_p, c_s)]
+    fluxes = [c * cosine.real * abs(a) ** 2 for c, cosine, a in zip((c_p, c_s), cosines, (a_p, a_s), strict=True)]
+    return float(sum(fluxes) / (speed * math.cos(angle)))
+
+
+def _reflected(
+    material: LinearElastic, angle: float, wave: str, normal: float, tangential: float
+) -> tuple[complex, complex]:
+    """Amplitudes of the reflected P and S wave.
+
+    Boundary y = 0, body y < 0, factor exp(i w (t - p x)) with slowness p along the boundary. P waves have displacement
+    (p, ±eta_p) c_P, S waves (±eta_s, -p) c_S with the vertical slownesses eta (+ travels towards the boundary).
+    """
+    if wave not in ("P", "S") or not 0.0 <= angle < 0.5 * math.pi:
+        raise InputError(f"dashpot reflection of wave {wave!r} at {angle!r} rad: give 'P' or 'S' and 0 <= angle < pi/2")
+    c_p, c_s, rho = material.c_p, material.c_s, material.rho
+    p = math.sin(angle) / (c_p if wave == "P" else c_s)
+    eta_p, eta_s = (complex(np.emath.sqrt(1.0 / c**2 - p**2)) for c in (c_p, c_s))
+    # evanescent waves decay into the body: exp(-i w eta_y y) with y < 0, reflected ones go with the other sign
+    eta_p, eta_s = (complex(eta.real, -abs(eta.imag)) for eta in (eta_p, eta_s))
+
+    def residual(u: tuple[complex, complex], eta: complex) -> Array:
+        """(sigma_xy + c v_x, sigma_yy + c v_y)/(i w) of u exp(i w (t - p x - eta y))."""
+        lame, shear = material.lame_lambda, material.shear_modulus
+        tau = -shear * (eta * u[0] + p * u[1])
+        sigma = -(lame * (p * u[0] + eta * u[1]) + 2.0 * shear * eta * u[1])
+        return np.array([tau + tangential * rho * c_s * u[0], sigma + normal * rho * c_p * u[1]])
+
+    def p_wave(eta: complex) -> Array:
+        return residual((p * c_p, eta * c_p), eta)
+
+    def s_wave(eta: complex) -> Array:
+        return residual((eta * c_s, -p * c_s), eta)
+
+    incident = p_wave(eta_p) if wave == "P" else s_wave(eta_s)
+    a_p, a_s = np.linalg.solve(np.column_stack([p_wave(-eta_p), s_wave(-eta_s)]), -incident)
+    return complex(a_p), complex(a_s)

@@ -1,0 +1,158 @@
+"""Boundaries behind which the ground goes on: dashpots that absorb waves, and a base that lets waves in from below.
+
+Lysmer and Kuhlemeyer (1969), J. Eng. Mech. Div. ASCE 95, 859-877 (verification V8.1): on facets with outward normal n
+
+    sigma_n = -normal rho c_P v_n,    tau = -tangential rho c_S v_t
+
+with factors 1 exact for waves that arrive at right angles. The tractions are integrated with the shape functions and
+the section's thickness into C: their loss is in the damping column of the energy ledger. They hold no static load.
+A compliant base adds the traction of an upgoing wave v_up, whatever its direction:
+
+    sigma_n += 2 rho c_P v_up_n,    tau += 2 rho c_S v_up_t.
+
+The wave that comes back down passes through the dashpots: the record of the base is not the input, but up + down.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from math import isfinite
+from numbers import Real
+from typing import Any
+
+import numpy as np
+import ufl
+
+from ..algebra import Array
+from ..errors import InputError
+from ..materials import LinearElastic
+from . import compat
+from .mesh import Facets
+from .petsc_algebra import PetscMatrix
+from .space import FemSpace
+
+log = logging.getLogger(__name__)
+HELD = 1e-12  # of all: a share of the dashpots' resistance that is none
+
+
+@dataclass(frozen=True)
+class Dashpots:
+    """Absorbing dashpots on facets. ``material``: that of the adjacent cells when None, or the half-space's behind it.
+
+    ``normal``, ``tangential``: factors of rho c_P and rho c_S, to mistune or leave one out. InputError when negative.
+    """
+
+    facets: Facets
+    material: LinearElastic | None = None
+    normal: float = 1.0
+    tangential: float = 1.0
+
+    def __post_init__(self) -> None:
+        for name in ("normal", "tangential"):
+            value = getattr(self, name)
+            if not isinstance(value, Real) or not isfinite(value) or value < 0.0:
+                raise InputError(f"{type(self).__name__} factor {name} is {value!r}: give zero or a positive number")
+
+    @property
+    def expects(self) -> str:
+        """Which motion this boundary expects, for the log."""
+        return "takes no motion: waves leave, nothing comes in"
+
+
+@dataclass(frozen=True, kw_only=True)
+class CompliantBase(Dashpots):
+    """Dashpots and the upgoing wave ``motion``: t [s] -> v_up (d,) [m/s], half the outcrop velocity (``upgoing``)."""
+
+    motion: Callable[[float], Array] = field(repr=False)
+
+    @property
+    def expects(self) -> str:
+        return "expects the upgoing motion, half the velocity of an outcrop (not the within motion of its depth)"
+
+
+class DashpotMatrix:
+    """The full matrix D of some dashpots (PETSc), with n·D v the force that resists them.
+
+    InputError for facets that are not on the outer boundary, or prescribed in a direction that the dashpots resist.
+    """
+
+    def __init__(self, space: FemSpace, forms: Any, dashpots: Dashpots) -> None:
+        self.space, self.dashpots = space, dashpots
+        self._normal, self._tangential = _resistances(forms, dashpots)
+        self.mat = self._matrix(dashpots.facets.indices)
+        self._refuse_held()
+
+    def _matrix(self, facets: Any) -> Any:
+        """∫ over some facets."""
+        u, v = ufl.TrialFunction(self.space.V), ufl.TestFunction(self.space.V)
+        n = ufl.FacetNormal(self.space.mesh)
+        along = ufl.dot(u, n) * ufl.dot(v, n)
+        density = self._normal * along + self._tangential * (ufl.inner(u, v) - along)
+        measure = compat.measure(self.space.mesh, self.space.mesh.topology.dim - 1, facets)
+        return compat.assemble_matrix(compat.compile_form(density * measure))
+
+    def _resistance(self, mat: Any) -> Array:
+        """∫ e_c·D e_c of every direction c, on all ranks."""
+        whole, count = PetscMatrix(mat), len(self.space.nodes)
+        directions = [np.tile(e, count) for e in np.eye(self.space.dimension)]
+        return self.space.comm.sum(np.array([e @ (whole @ e) for e in directions]))
+
+    def _refuse_held(self) -> None:
+        name, total = self.dashpots.facets.name, self._resistance(self.mat).sum()
+        if total == 0.0:
+            raise InputError(f"dashpots on '{name}' resist nothing: choose facets of the outer boundary and a positive "
+                             "factor")
+        for condition in self.space.prescribed:
+            both = np.intersect1d(self.dashpots.facets.indices, condition.facets.indices)
+            resisted = self._resistance(self._matrix(both)) > HELD * total
+            held = range(self.space.dimension) if condition.components is None else condition.components
+            if any(resisted[c] for c in held):
+                raise InputError(
+                    f"boundary '{name}' has dashpots in a direction that is prescribed on '{condition.facets.name}': "
+                    "never hold and damp one component, leave out the one or the other"
+                )
+
+    def moved_by(self, motion: Callable[[float], Array], factor: float) -> Callable[[float], Array]:
+        """factor Pᵀ D v(t), v the same at all nodes."""
+        count, whole = len(self.space.nodes), PetscMatrix(self.mat)
+        rows = [self.space.pull(whole @ np.tile(e, count)) for e in np.eye(self.space.dimension)]
+        columns, name = factor * np.column_stack(rows), type(self.dashpots).__name__
+
+        def load(t: float) -> Array:
+            v = np.asarray(motion(t), dtype=float)
+            if v.shape != (len(rows),) or not np.all(np.isfinite(v)):
+                raise InputError(f"{name}: motion({t:g}) is {v}: return {len(rows)} finite velocities")
+            return np.asarray(columns @ v)
+
+        return load
+
+
+def _resistances(forms: Any, dashpots: Dashpots) -> tuple[Any, Any]:
+    """Cellwise fields: thickness · (normal rho c_P, tangential rho c_S) of the cells or of the given material."""
+    lame, shear, rho = (forms.fields[name].x.array for name in ("lame", "shear", "rho"))  # times the thickness
+    if dashpots.material is not None:
+        thickness, rho = forms.section.thickness, forms.section.thickness * dashpots.material.rho
+        lame, shear = (thickness * value for value in forms.section.elastic_constants(dashpots.material))
+    fields = []
+    for factor, modulus in ((dashpots.normal, lame + 2.0 * shear), (dashpots.tangential, shear)):
+        field_ = compat.function(compat.cell_space(forms.space.mesh))
+        field_.x.array[:] = factor * np.sqrt(modulus * rho)
+        fields.append(field_)
+    return fields[0], fields[1]
+
+
+def incoming(absorbers: Sequence[DashpotMatrix]) -> tuple[Callable[[float], Array], ...]:
+    """The loads of upgoing waves, 2 Pᵀ D v_up."""
+    return tuple(
+        one.moved_by(one.dashpots.motion, 2.0) for one in absorbers if isinstance(one.dashpots, CompliantBase)
+    )
+
+
+def tell(boundaries: Sequence[Dashpots], rank: int) -> tuple[str, ...]:
+    """What each boundary expects, logged on rank 0."""
+    notes = tuple(f"{type(one).__name__} on '{one.facets.name}' {one.expects}" for one in boundaries)
+    for note in notes if rank == 0 else ():
+        log.info("%s", note)
+    return notes

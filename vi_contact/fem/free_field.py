@@ -1,0 +1,174 @@
+"""Sides behind which level ground goes on: dashpots on the difference to the free field, and the free field's stress.
+
+On a vertical side with outward normal n, v_ff(y, t) and sigma_ff the motion and stress of the ground far away,
+
+    traction = sigma_ff·n - D (v - v_ff),    D v = rho c_P v_n n + rho c_S v_t
+
+(FLAC and PLAXIS free-field boundaries; OpenSees ASDAbsorbingBoundary2D). Without a structure v = v_ff and the side is
+not there: exact here to round-off, as the column has the heights and materials of the side's own elements and is
+marched with the run's scheme. Waves that a structure sends out leave through the dashpots. No static load is
+held: for a gravity stage put the sides on rollers, then ``release`` them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..algebra import Array
+from ..alongside import Alongside
+from ..base_motion import BaseMotion
+from ..errors import InputError
+from ..excitation import Excitation
+from ..materials import Section
+from ..schemes.trapezoidal import Trapezoidal
+from ..soil_column import SoilColumn
+from ..step import Scheme
+from ..time_steps import Schedule
+from . import compat
+from .dashpots import CompliantBase, DashpotMatrix, Dashpots
+from .petsc_algebra import PetscMatrix
+from .space import FemSpace
+
+Base = Excitation | Sequence[Excitation] | BaseMotion | CompliantBase
+
+
+@dataclass(frozen=True, kw_only=True)
+class FreeField(Dashpots):
+    """One vertical side of a body in the plane, its lowest node at the base.
+
+    ``base``: the run's excitations (rigid base, frame of the ground), its ``BaseMotion`` (prescribed base) or its
+    ``CompliantBase``. ``dt`` [s] and ``scheme`` (Trapezoidal() when None) must be those of the run, from t = 0.
+    """
+
+    base: Base = field(repr=False)
+    dt: float | Schedule
+    scheme: Scheme | None = None
+
+    @property
+    def expects(self) -> str:
+        if isinstance(self.base, CompliantBase):
+            return "expects the upgoing motion of the compliant base"
+        return "expects the motion of the rigid base itself (within motion)"
+
+
+class FreeFieldSide:
+    """The column beside one side, and the forces it puts on the body.
+
+    InputError for a body that is not in the plane, a side that is not vertical, or a lowest node that is not held on a
+    rigid base, or held on a compliant one.
+    """
+
+    def __init__(self, absorber: DashpotMatrix, forms: Any) -> None:
+        assert isinstance(absorber.dashpots, FreeField)
+        self.space, self.given = absorber.space, absorber.dashpots
+        if self.space.dimension != 2:
+            raise InputError("FreeField is for bodies in the plane: tie the sides of others, or put dashpots on them")
+        self._section: Section = forms.section
+        self._dashpots = PetscMatrix(absorber.mat)
+        self.column, self._sign = _column(self.space, forms, self.given)
+        blocks = self.space.facet_blocks(self.given.facets.indices)
+        self._rows = np.abs(self.space.points[blocks, 1][:, None] - self.column.heights).argmin(axis=1)
+        self._blocks = blocks
+        self._check_foot()
+
+    def _check_foot(self) -> None:
+        held = self.space.held[self._blocks[self._rows == 0]].astype(float).sum()
+        held = float(self.space.comm.sum(np.array([held]))[0])
+        name, compliant = self.given.facets.name, isinstance(self.given.base, CompliantBase)
+        if not compliant and held < 2:
+            raise InputError(f"the lowest node of free-field side '{name}' is not held: clamp or prescribe the base, "
+                             "or give the side its CompliantBase")
+        if compliant and held:
+            raise InputError(f"the lowest node of free-field side '{name}' is held, but its base is compliant: leave "
+                             "the base free")
+
+    @cached_property
+    def _march(self) -> Alongside:
+        base, column = self.given.base, self.column
+        if isinstance(base, CompliantBase):
+            shear, normal = _foot(column, base, self._section)
+            problem = column.on_dashpots(shear, normal, base.motion)
+        elif isinstance(base, BaseMotion):
+            problem = column.on_rigid_base(lambda t: base.at(t)[2], lambda t: base.at(t)[1])
+        else:
+            shaken = tuple(base) if isinstance(base, Sequence) else (base,)
+            problem = column.on_rigid_base(lambda t: np.sum([one(t) for one in shaken], axis=0))
+        return Alongside(problem, scheme=self.given.scheme or Trapezoidal(), dt=self.given.dt)
+
+    def motion(self, t: float) -> tuple[Array, Array]:
+        """(u_ff, v_ff) at the heights of the column, (n+1, 2), in the frame of the run."""
+        base, foot = self.given.base, np.zeros((1, 2))
+        u, v = (x.reshape(-1, 2) for x in self._march.at(t))
+        if isinstance(base, CompliantBase):
+            return u, v
+        u, v = np.vstack([foot, u]), np.vstack([foot, v])
+        if isinstance(base, BaseMotion):
+            ground = base.at(t)
+            u, v = u + ground[0], v + ground[1]
+        return u, v
+
+    def elastic(self, t: float) -> Array:
+        """Pᵀ of the nodal forces of sigma_ff·n."""
+        return self._nodal(self.column.stress(self.motion(t)[0]))
+
+    def viscous(self, t: float) -> Array:
+        """Pᵀ D v_ff, and the nodal forces of the damping stresses."""
+        v = self.motion(t)[1]
+        far = np.zeros((len(self.space.nodes), 2))
+        far[self._blocks] = v[self._rows]
+        damping = self.column.beta[:, None] * self.column.stress(v)
+        return self.space.pull(self._dashpots @ far.ravel()) + self._nodal(damping)
+
+    def _nodal(self, stress: Array) -> Array:
+        """Pᵀ of ∫ sigma·n phi_i over the side, sigma (n, 2) constant on every element."""
+        halves = 0.5 * self._sign * np.diff(self.column.heights)[:, None] * stress
+        at_nodes = np.zeros((len(self.column.heights), 2))
+        at_nodes[:-1] += halves
+        at_nodes[1:] += halves
+        force = np.zeros((len(self.space.nodes), 2))
+        force[self._blocks] = at_nodes[self._rows]
+        return self.space.pull(force.ravel())
+
+
+def free_field_loads(
+    absorbers: Sequence[DashpotMatrix], forms: Any
+) -> tuple[tuple[Callable[[float], Array], ...], tuple[Callable[[float], Array], ...]]:
+    """(elastic, viscous) loads of the free-field sides among the absorbing boundaries."""
+    sides = [FreeFieldSide(one, forms) for one in absorbers if isinstance(one.dashpots, FreeField)]
+    return tuple(side.elastic for side in sides), tuple(side.viscous for side in sides)
+
+
+def _foot(column: SoilColumn, base: CompliantBase, section: Section) -> tuple[float, float]:
+    """Impedances (rho c_S, rho c_P) below the column, with the thickness, as in the column's own moduli."""
+    lame, shear, rho = column.lame[0], column.shear[0], column.rho[0]
+    if base.material is not None:
+        rho = section.thickness * base.material.rho
+        lame, shear = (section.thickness * value for value in section.elastic_constants(base.material))
+    return base.tangential * float(np.sqrt(shear * rho)), base.normal * float(np.sqrt((lame + 2.0 * shear) * rho))
+
+
+def _column(space: FemSpace, forms: Any, given: FreeField) -> tuple[SoilColumn, float]:
+    """The column beside the side, the same on every rank, and the sign of the side's outward normal."""
+    mesh, name = space.mesh, given.facets.name
+    owned = given.facets.indices[given.facets.indices < mesh.topology.index_map(1).size_local]
+    mesh.topology.create_connectivity(1, 2)
+    cells = np.array([mesh.topology.connectivity(1, 2).links(facet)[0] for facet in owned], dtype=np.int64)
+    ends = mesh.geometry.x[compat.entities_to_geometry(mesh, 1, owned)][:, :, :2]
+    middles = np.array([mesh.geometry.x[compat.geometry_dofmap(mesh)[cell], 0].mean() for cell in cells])
+    values = [forms.fields[key].x.array[cells] for key in ("lame", "shear", "rho", "alpha_rho", "beta")]
+    low, high = ends[:, :, 1].min(axis=1), ends[:, :, 1].max(axis=1)
+    mine = np.column_stack([low, high, *values, ends[:, 0, 0], ends[:, 1, 0], middles]).reshape(-1, 10)
+    rows = np.concatenate(space.comm.bcast(space.comm.gather(mine)))
+    rows = rows[np.argsort(rows[:, 0])]
+    x, close = rows[:, 7:9], 1e-9 * space.size
+    if np.ptp(x) > close or np.any(np.abs(rows[1:, 0] - rows[:-1, 1]) > close):
+        raise InputError(f"free-field side '{name}' is not one vertical line of facets: give a straight side of "
+                         "the body")
+    lame, shear, rho, alpha_rho, beta = rows[:, 2:7].T
+    column = SoilColumn(np.append(rows[:, 0], rows[-1, 1]), lame, shear, rho, alpha_rho / rho, beta)
+    return column, 1.0 if x[0, 0] > rows[0, 9] else -1.0

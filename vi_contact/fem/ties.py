@@ -1,0 +1,86 @@
+"""Boundaries whose opposite nodes move together: tied sides of a soil layer, one period of a periodic body.
+
+    u(x) = u(x + a),  x on the first boundary, a the distance between the two
+
+The nodes of the second boundary are eliminated: P of u_full = P u_free + U gets, in their rows, the ones of their
+partners, and Pᵀ adds their forces to them. Exact, no penalty. Tied sides reproduce the one-dimensional motion of a
+layered soil exactly and send every other wave through: what leaves on the right comes back in from the left.
+Source: Zienkiewicz, Bicanic and Shen (1988); compared with others by Kontoe et al. (2007).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..algebra import Array, Indices
+from ..errors import InputError
+from .mesh import Facets
+
+if TYPE_CHECKING:
+    from .space import FemSpace
+
+CLOSE = 1e-6  # of the body's size: nodes farther from the place of their partner have none
+
+
+@dataclass(frozen=True)
+class Tied:
+    """The nodes of ``second`` move with those of ``first`` that face them: in all components, or in those given."""
+
+    first: Facets
+    second: Facets
+    components: tuple[int, ...] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Pairs:
+    """Original numbers of nodes that move together, the same on every rank; ``components`` they share."""
+
+    first: Indices
+    second: Indices
+    components: tuple[int, ...]
+
+
+def paired(space: FemSpace, tied: Sequence[Tied]) -> list[Pairs]:
+    """The nodes of every tie. Collective.
+
+    InputError when nodes have no partner, when a node is tied twice, or a component that does not exist.
+    """
+    found = [_pairs(space, tie) for tie in tied]
+    seconds = [number * space.dimension + c for one in found for number in one.second for c in one.components]
+    firsts = [number * space.dimension + c for one in found for number in one.first for c in one.components]
+    if len(set(seconds)) < len(seconds) or set(seconds) & set(firsts):
+        raise InputError("a node is on several tied boundaries: tie a corner once, and no boundary to two others")
+    return found
+
+
+def _pairs(space: FemSpace, tie: Tied) -> Pairs:
+    first, second = (_nodes(space, facets) for facets in (tie.first, tie.second))
+    names = f"'{tie.first.name}' and '{tie.second.name}'"
+    if len(first[0]) != len(second[0]) or not len(first[0]):
+        raise InputError(f"tied boundaries {names} have {len(first[0])} and {len(second[0])} nodes: mesh them alike")
+    components = tuple(range(space.dimension)) if tie.components is None else tuple(tie.components)
+    for c in components:
+        if not 0 <= c < space.dimension:
+            raise InputError(f"tied component {c} does not exist: give numbers from 0 to {space.dimension - 1}")
+    apart = second[1].mean(axis=0) - first[1].mean(axis=0)
+    distance = np.linalg.norm(first[1][:, None] + apart - second[1][None, :], axis=2)
+    partner = distance.argmin(axis=1)
+    worst = int(distance.min(axis=1).argmax())
+    if distance[worst, partner[worst]] > CLOSE * space.size or len(set(partner)) < len(partner):
+        where = ", ".join(f"{x:g}" for x in first[1][worst])
+        raise InputError(f"node ({where}) of tied boundaries {names} has no partner at the same height on the other: "
+                         "mesh both sides alike")
+    return Pairs(first[0], second[0][partner], components)
+
+
+def _nodes(space: FemSpace, facets: Facets) -> tuple[Indices, Array]:
+    """(original numbers, points) of the nodes of facets, ascending, on every rank."""
+    blocks = space.facet_blocks(facets.indices)
+    parts = space.comm.bcast(space.comm.gather((space.nodes[blocks], space.points[blocks])))
+    numbers, points = (np.concatenate([part[i] for part in parts]) for i in (0, 1))
+    order = np.argsort(numbers)
+    return numbers[order], points[order]

@@ -1,0 +1,66 @@
+"""Upgoing waves out of recorded motions: what a compliant base expects.
+
+A record from an outcrop, where up- and downgoing waves are equal, is twice the upgoing wave; a record from within a
+profile holds what came back down and is of no use here without deconvolution. Wording as in PLAXIS: a fixed base
+expects the *within* motion, a compliant base the *upgoing* one (Mejia and Dawson 2006).
+"""
+
+from __future__ import annotations
+
+import math
+from numbers import Real
+
+import numpy as np
+
+from .algebra import Array
+from .errors import InputError
+from .excitation import Excitation, GroundMotion
+from .ground_motion import Record
+
+
+class UpgoingVelocity:
+    """v_up(t) [m/s], (d,): a share of the velocity of an excitation that is at rest before t = 0.
+
+    Exact where the acceleration is a straight line between multiples of dt, with k dt + s between them:
+    v = v_k + a_k s + (a_{k+1} - a_k) s²/(2 dt).
+    """
+
+    def __init__(self, excitation: Excitation, dt: float, share: float) -> None:
+        self.excitation, self.dt, self.share = excitation, dt, share
+        self._a, self._v = [excitation.acceleration(0.0)], [0.0]
+
+    def __call__(self, t: float) -> Array:
+        return self.share * self._speed(t) * np.asarray(self.excitation.direction, dtype=float)
+
+    def _speed(self, t: float) -> float:
+        """Integral of the acceleration from 0 to t."""
+        if t <= 0.0:
+            return 0.0
+        k = int(t / self.dt)
+        while len(self._v) < k + 2:
+            self._a.append(self.excitation.acceleration(len(self._a) * self.dt))
+            self._v.append(self._v[-1] + 0.5 * self.dt * (self._a[-2] + self._a[-1]))
+        s = t - k * self.dt
+        return self._v[k] + self._a[k] * s + 0.5 * (self._a[k + 1] - self._a[k]) / self.dt * s**2
+
+
+def upgoing(
+    motion: Record | Excitation,
+    *,
+    direction: tuple[float, ...] = (1.0, 0.0),
+    dt: float | None = None,
+    outcrop: bool = True,
+) -> UpgoingVelocity:
+    """The upgoing velocity of a motion: half its velocity, or all of it when ``outcrop`` is False (already upgoing).
+
+    motion: a record, along ``direction``, or an excitation, which has its own. dt: step of the integration [s], of the
+    record when None. A record keeps its drift: correct its baseline first (``baseline_corrected``).
+    InputError for an excitation other than a record without dt, or a dt that is not positive.
+    """
+    excitation = GroundMotion(motion, direction=direction) if isinstance(motion, Record) else motion
+    if dt is None and isinstance(excitation, GroundMotion):
+        dt = excitation.record.dt
+    if not isinstance(dt, Real) or not math.isfinite(dt) or dt <= 0.0:
+        raise InputError(f"upgoing: dt is {dt!r}; give the step in seconds with which {type(excitation).__name__} is "
+                         "to be integrated")
+    return UpgoingVelocity(excitation, float(dt), 0.5 if outcrop else 1.0)
