@@ -58,14 +58,14 @@ def _add_actions(parsers: dict[str, argparse.ArgumentParser]) -> None:
     transfer.add_argument("--bandwidth", type=float, default=40.0, metavar="B",
                           help="of Konno and Ohmachi's smoothing (default 40), 0: none")
     transfer.add_argument("--frequencies", type=float, nargs=3, metavar=("FROM", "TO", "N"),
-                          help="logarithmically spaced [Hz] (default: 200 from 4/duration to sampling/4)")
+                          help="logarithmically spaced [Hz] (default: 200 from 4/duration to 1/(4 dt), raw: all)")
     loop.add_argument("deformation", metavar="DEFORMATION", help="column such as u_x_top or theta_base")
     loop.add_argument("force", metavar="FORCE", help="column such as reaction_x_base or M_base")
     loop.add_argument("--turn", action="store_true", help="turn the sign of the force")
 
 
 def _report(options: argparse.Namespace) -> str:
-    from .peaks import peaks, write_peaks
+    from .peak_values import peaks, write_peaks
     from .plotting_report import plot_report
     from .run_folder import read_run
 
@@ -79,7 +79,7 @@ def _report(options: argparse.Namespace) -> str:
 
 
 def _peaks(options: argparse.Namespace) -> str:
-    from .peaks import peaks, write_peaks
+    from .peak_values import peaks, write_peaks
     from .run_folder import read_run
 
     run = read_run(options.folder)
@@ -125,17 +125,15 @@ def _spectrum(options: argparse.Namespace) -> str:
 
 
 def _transfer(options: argparse.Namespace) -> str:
-    import numpy as np
-
     from .floor_spectra import transfer_function
     from .plotting_engineering import plot_transfer
     from .run_folder import read_run
 
     run, table = read_run(options.folder), _table_path(options)
-    t = run.history["t"]
-    given = options.frequencies or (4.0 / (t[-1] - t[0]), 0.25 / float(np.median(np.diff(t))), 200)
-    found = transfer_function(run.history, options.surface, options.base, bandwidth=options.bandwidth or None,
-                              frequencies=_spaced("--frequencies", given))
+    given = None if options.frequencies is None else _spaced("--frequencies", options.frequencies)
+    found = transfer_function(
+        run.history, options.surface, options.base, bandwidth=options.bandwidth or None, frequencies=given
+    )
     _write(table, ["frequency_Hz", "amplitude"], ([f"{x:.8g}" for x in row] for row in
                                                   zip(found.frequencies, found.amplitude, strict=True)))
     picture = plot_transfer(found, table.with_suffix(".png"), title=f"|{options.surface}| / |{options.base}|")
@@ -144,7 +142,7 @@ def _transfer(options: argparse.Namespace) -> str:
 
 
 def _loop(options: argparse.Namespace) -> str:
-    from .peaks import hysteresis
+    from .peak_values import hysteresis
     from .plotting_engineering import plot_loop
     from .run_folder import read_run
 

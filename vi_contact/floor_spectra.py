@@ -16,7 +16,7 @@ import numpy as np
 from .algebra import Array
 from .errors import InputError
 from .ground_motion import Record, ResponseSpectrum, response_spectrum
-from .peaks import column_of
+from .peak_values import column_of
 
 BANDWIDTH = 40.0
 
@@ -82,14 +82,17 @@ def transfer_function(
 
     Amplitudes are smoothed with Konno and Ohmachi's window (1998), both alike, before they are divided; it widens
     peaks, ``bandwidth=None`` takes the raw ones. The motion has to die away before the run ends (or be a periodic one),
-    else its cut end leaks into all frequencies. The amplitudes at ``frequencies`` (all of the transform above zero when
-    None) are nan where the smoothed base has less than ``floor`` of its largest amplitude.
+    else its cut end leaks into all frequencies. ``frequencies`` None: 200 of them, from four periods in the run to four
+    samples in a period; raw all of the transform. nan where the base has less than ``floor`` of its largest amplitude.
     InputError for a base without motion.
     """
     top, below = recorded_motion(history, surface), recorded_motion(history, base)
     raw = np.fft.rfftfreq(len(top.acceleration), top.dt)[1:]
     spectra = [np.abs(np.fft.rfft(one.acceleration))[1:] for one in (top, below)]
-    wanted = raw if frequencies is None else np.atleast_1d(np.asarray(frequencies, dtype=float))
+    if frequencies is None:
+        wanted = raw if bandwidth is None else np.geomspace(4.0 * raw[0], 0.5 * raw[-1], 200)
+    else:
+        wanted = np.atleast_1d(np.asarray(frequencies, dtype=float))
     if np.any(wanted <= 0.0) or np.any(wanted > raw[-1] * (1.0 + 1e-9)):
         raise InputError(f"transfer_function: give frequencies above 0 and up to {raw[-1]:.4g} Hz, half the sampling")
     if bandwidth is None:

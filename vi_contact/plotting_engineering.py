@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from .floor_spectra import TransferFunction
-from .peaks import Loop
+from .peak_values import Loop
 from .plotting import _STYLE, _save, _scaled
 
 

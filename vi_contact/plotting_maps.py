@@ -75,5 +75,6 @@ def draw_map(
     image = axis.pcolormesh(
         _edges(t), _edges(position[order]), shown.T, cmap=palette, vmin=low, vmax=size, rasterized=True
     )
-    axis.figure.colorbar(image, ax=axis, label=f"[{prefixed}]")
-    axis.set(xlabel="time [s]", ylabel=axis_label, title=f"{title} (white: none)")
+    axis.figure.colorbar(image, ax=axis, label=f"[{prefixed}]", pad=0.02, fraction=0.06)
+    axis.set(xlabel="time [s]", ylabel=axis_label)
+    axis.set_title(f"{title} (white: none)", loc="left")

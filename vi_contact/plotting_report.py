@@ -13,13 +13,15 @@ import numpy as np
 from .errors import InputError
 from .floor_spectra import recorded_motion
 from .ground_motion import STANDARD_GRAVITY, response_spectrum
-from .peaks import Peak, peaks
+from .peak_values import Peak, peaks
 from .plotting import _LEDGER, _STYLE, _log, _scaled
 from .plotting_maps import arc_position, draw_map, thinned
 from .run_folder import RunFolder
 
 PAGE = (8.27, 11.69)  # inches, A4
-TABLE_ROWS = 13
+SIDES = (0.085, 0.95)  # of the page's width
+TABLE_ROWS, OF_A_KIND = 14, 3
+NOTHING = 1e-6  # of the largest energy: terms below it are not drawn
 _GROUPS = (  # (title, prefixes of columns); the first four that move are drawn
     ("displacement", ("u_",)),
     ("contact force", ("contact_resultant", "N_", "contact_force_")),
@@ -34,8 +36,9 @@ _GROUPS = (  # (title, prefixes of columns); the first four that move are drawn
 )
 _LINES = 4  # of a panel: those that move most
 _PEAKS = (
-    "a_g_", "u_", "a_x_", "a_y_", "racking_", "theta_", "contact_resultant", "contact_uplift", "contact_max_pressure",
-    "contact_max_slip", "uplift_", "opening_", "slip_", "N_", "T_", "V_", "M_", "height_", "reaction_",
+    "a_g_", "u_", "a_x_", "contact_uplift", "contact_resultant", "contact_max_pressure", "reaction_x_", "reaction_M",
+    "N_", "V_", "M_", "racking_", "theta_", "opening_", "slip_", "contact_max_slip", "uplift_", "height_", "T_", "a_y_",
+    "reaction_y_",
 )
 
 
@@ -65,16 +68,18 @@ def plot_report(
     rows = table_rows(run)
     panels = _panels_of(run, columns)
     lines = (len(panels) + 1) // 2
-    table = 0.3 + 0.155 * (len(rows) + 1)
+    table = 0.15 * (len(rows) + 1) / PAGE[1]  # of the page's height
     with matplotlib.rc_context(_STYLE | {"font.size": 7, "axes.titlesize": 8, "axes.labelsize": 7}):
-        figure = Figure(figsize=PAGE, layout="constrained")
-        heights = [1.25, *[(PAGE[1] - 1.55 - table) / lines] * lines, table]
-        grid = figure.add_gridspec(lines + 2, 2, height_ratios=heights)
-        _header(figure.add_subplot(grid[0, :]), run, title or f"Run {run.folder.resolve().name}")
+        figure = Figure(figsize=PAGE)
+        grid = figure.add_gridspec(
+            lines, 2, left=SIDES[0], right=SIDES[1], top=0.87, bottom=table + 0.06, hspace=0.66, wspace=0.24
+        )
+        _header(figure, run, title or f"Run {run.folder.resolve().name}")
         for i, panel in enumerate(panels):
             last_alone = i == len(panels) - 1 and i % 2 == 0
-            panel.draw(figure.add_subplot(grid[1 + i // 2, :] if last_alone else grid[1 + i // 2, i % 2]))
-        _table(figure.add_subplot(grid[lines + 1, :]), rows)
+            panel.draw(figure.add_subplot(grid[i // 2, :] if last_alone else grid[i // 2, i % 2]))
+        if rows:
+            _table(figure.add_axes((SIDES[0], 0.015, SIDES[1] - SIDES[0], table)), rows)
         figure.savefig(path, dpi=150)
     return path
 
@@ -94,7 +99,7 @@ def _panels_of(run: RunFolder, columns: Sequence[Sequence[str]] | None) -> list[
         panels += [
             Panel(lambda axis: _map(axis, run, "pressure", "Pa")), Panel(lambda axis: _map(axis, run, "gap", "m"))
         ]
-    if "energy_defect" in run.history:
+    if "energy_defect" in run.history and np.any(run.history["energy_kinetic"] + run.history["energy_strain"]):
         panels.append(Panel(lambda axis: _energies(axis, run)))
     panels.append(Panel(lambda axis: _certificate(axis, run)))
     return panels
@@ -136,9 +141,17 @@ def _lines(axis: Any, run: RunFolder, names: Sequence[str], title: str) -> None:
     values, unit = _scaled(np.array([run.history[name] for name in names]), run.columns[names[0]][0])
     for one, name in zip(values, names, strict=True):
         axis.plot(run.history["t"], one, lw=0.7, label=name)
-    axis.legend(fontsize=6, ncol=2, loc="upper right", framealpha=0.7, handlelength=1.2)
+    _label(axis, title)
     axis.margins(x=0.0)
-    axis.set(xlabel="time [s]", ylabel=f"[{unit}]" if unit != "-" else "[-]", title=title)
+    axis.set(xlabel="time [s]", ylabel=f"[{unit}]")
+
+
+def _label(axis: Any, title: str, rows: int = 1) -> None:
+    """Title on the left, legend beside it."""
+    axis.set_title(title, loc="left")
+    columns = -(-len(axis.get_lines()) // rows)
+    axis.legend(fontsize=6 if columns < 4 else 5.5, ncol=columns, loc="lower right", bbox_to_anchor=(1.0, 0.99),
+                frameon=False, handlelength=0.8, handletextpad=0.4, columnspacing=0.7, borderpad=0.1)
 
 
 def _spectrum(axis: Any, run: RunFolder, names: Sequence[str]) -> None:
@@ -149,9 +162,9 @@ def _spectrum(axis: Any, run: RunFolder, names: Sequence[str]) -> None:
         periods = periods[periods <= 10.0] if record.duration > 1.0 else periods
         spectrum = response_spectrum(record, periods)
         axis.semilogx(periods, spectrum.psa / STANDARD_GRAVITY, lw=0.9, label=name)
-    axis.legend(fontsize=6)
+    _label(axis, "response spectrum of the ground, 5 %")
     axis.set_ylim(bottom=0.0)
-    axis.set(xlabel="period [s]", ylabel="PSA [g]", title="response spectrum of the ground, 5 %")
+    axis.set(xlabel="period [s]", ylabel="pseudo-acceleration [g]")
 
 
 def _map(axis: Any, run: RunFolder, column: str, unit: str) -> None:
@@ -165,16 +178,14 @@ def _map(axis: Any, run: RunFolder, column: str, unit: str) -> None:
 
 
 def _energies(axis: Any, run: RunFolder) -> None:
-    present = [entry for entry in _LEDGER if np.any(run.history.get(entry[0], 0.0))]
-    if not present:
-        axis.text(0.5, 0.5, "no energy at all", ha="center")
-        return
+    sizes = {name: float(np.max(np.abs(run.history[name]))) for name, *_ in _LEDGER if name in run.history}
+    present = [entry for entry in _LEDGER if sizes.get(entry[0], 0.0) > NOTHING * max(sizes.values())]
     values, unit = _scaled(np.array([run.history[name] for name, *_ in present]), "J")
     for one, (_, label, colour, style) in zip(values, present, strict=True):
         axis.plot(run.history["t"], one, color=colour, ls=style, lw=0.8, label=label)
-    axis.legend(fontsize=6, ncol=2)
+    _label(axis, "energy", rows=1 if len(present) < 7 else 2)
     axis.margins(x=0.0)
-    axis.set(xlabel="time [s]", ylabel=f"[{unit}]", title="energies and works since the start")
+    axis.set(xlabel="time [s]", ylabel=f"[{unit}]")
 
 
 def _certificate(axis: Any, run: RunFolder) -> None:
@@ -182,19 +193,20 @@ def _certificate(axis: Any, run: RunFolder) -> None:
     tolerance = run.facts.get("tolerance")
     if tolerance:
         axis.axhline(tolerance, color="tab:red", ls="--", lw=0.8, label=f"tolerance {tolerance:g}")
-        axis.legend(fontsize=6)
+        _label(axis, "certificate of every step")
+    else:
+        axis.set_title("certificate of every step", loc="left")
     axis.margins(x=0.0)
-    axis.set(xlabel="time [s]", ylabel="worst residual [-]", title="certificate of every step")
+    axis.set(xlabel="time [s]", ylabel="worst residual [-]")
 
 
-def _header(axis: Any, run: RunFolder, title: str) -> None:
+def _header(figure: Any, run: RunFolder, title: str) -> None:
     """Facts in two columns."""
-    axis.set_axis_off()
-    axis.text(0.0, 1.0, title, fontsize=13, weight="bold", va="top", transform=axis.transAxes)
+    figure.text(0.04, 0.985, title, fontsize=13, weight="bold", va="top")
     for k, (name, value) in enumerate(header_facts(run)):
-        x, y = (0.0, 0.74 - 0.135 * k) if k < 6 else (0.62, 0.74 - 0.135 * (k - 6))
-        axis.text(x, y, name, color="0.35", va="top", transform=axis.transAxes)
-        axis.text(x + (0.1 if k < 6 else 0.14), y, value, va="top", transform=axis.transAxes)
+        x, y = (0.04 if k < 6 else 0.68), 0.96 - 0.0115 * (k % 6)
+        figure.text(x, y, name, color="0.35", va="top")
+        figure.text(x + (0.09 if k < 6 else 0.13), y, value, va="top")
 
 
 def header_facts(run: RunFolder) -> list[tuple[str, str]]:
@@ -208,9 +220,9 @@ def header_facts(run: RunFolder) -> list[tuple[str, str]]:
     dt = facts.get("dt")
     iterations = (facts.get("iterations_per_step") or {}).get("mean")
     return [
-        ("scheme", shorten(fact("scheme"), 62, placeholder=" …")),
-        ("mass", shorten(fact("mass"), 62, placeholder=" …")),
-        ("solver", shorten(fact("solver"), 62, placeholder=" …")),
+        ("scheme", shorten(fact("scheme"), 78, placeholder=" …")),
+        ("mass", shorten(fact("mass"), 78, placeholder=" …")),
+        ("solver", shorten(fact("solver"), 78, placeholder=" …")),
         ("time step", dt if isinstance(dt, str) else "-" if dt is None else f"{dt:.6g} s"),
         ("steps", f"{len(t) - 1}, t = {t[0]:g} to {t[-1]:g} s"),
         ("version", f"vi_contact {(facts.get('versions') or {}).get('vi_contact', '-')}, ranks {fact('ranks')}"),
@@ -228,7 +240,7 @@ def table_rows(run: RunFolder) -> list[Peak]:
     kinds: list[list[str]] = []
     for prefix in _PEAKS:
         names = [name for name in run.columns if name.startswith(prefix) and _range(run, name) > 0.0]
-        kinds.append(sorted(names, key=lambda name: -_range(run, name)))
+        kinds.append(sorted(names, key=lambda name: -_range(run, name))[:OF_A_KIND])
     chosen: list[str] = []
     for place in range(max(map(len, kinds), default=0)):  # the first of every kind before the second of any
         chosen += [names[place] for names in kinds if len(names) > place and names[place] not in chosen]
@@ -238,16 +250,18 @@ def table_rows(run: RunFolder) -> list[Peak]:
 
 def _table(axis: Any, rows: Sequence[Peak]) -> None:
     axis.set_axis_off()
-    if not rows:
-        return
     cells = [
-        [row.name, shorten(row.quantity, 66, placeholder=" …"), row.unit, f"{row.max:.4g}", f"{row.t_max:.4g}",
+        [row.name, shorten(row.quantity, 62, placeholder=" …"), row.unit, f"{row.max:.4g}", f"{row.t_max:.4g}",
          f"{row.min:.4g}", f"{row.t_min:.4g}"]
         for row in rows
     ]
     table = axis.table(
         cellText=cells, colLabels=["column", "quantity", "unit", "max", "at t [s]", "min", "at t [s]"],
-        colWidths=[0.18, 0.42, 0.06, 0.09, 0.08, 0.09, 0.08], cellLoc="left", loc="upper center", edges="horizontal",
+        colWidths=[0.18, 0.42, 0.06, 0.09, 0.08, 0.09, 0.08], cellLoc="left", colLoc="left",
+        bbox=(0.0, 0.0, 1.0, 1.0), edges="horizontal",
     )
+    for cell in table.get_celld().values():
+        cell.set_linewidth(0.3)
+        cell.PAD = 0.02
     table.auto_set_font_size(False)
     table.set_fontsize(6.5)

@@ -113,7 +113,7 @@ class Part:
     def opening(self, active: Mask, gap: Array, slip: Array | None) -> dict[str, Array]:
         """Uplift ratio, largest gap and, with slips, the largest slip of every row."""
         found = {
-            "uplift": 1.0 - active[:, self.mask] @ self.weights / self.weights.sum(),
+            "uplift": (~active[:, self.mask]) @ self.weights / self.weights.sum(),
             "opening": gap[:, self.mask].max(axis=1),
         }
         if slip is not None and slip.shape[2]:
