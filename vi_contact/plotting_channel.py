@@ -1,0 +1,232 @@
+"""Pictures of the buried channel from recorded histories: as Figs. 7, 8 and 9 of seed 000, and along its outline."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .algebra import Array, Mask
+from .errors import InputError
+from .plotting import _STYLE, History, _edges, _panels, _save, _scaled
+from .plotting_maps import thinned
+
+SHOWN = {  # panels of plot_openings: point -> outward normal of the channel there
+    "tops of the walls": {"19": (-1.0, 0.0), "13": (1.0, 0.0)},
+    "middles of the walls": {"16": (-1.0, 0.0), "10": (1.0, 0.0)},
+    "feet of the walls": {"1": (-1.0, 0.0), "7": (1.0, 0.0)},
+    "under the slab": {"1": (0.0, -1.0), "4": (0.0, -1.0), "7": (0.0, -1.0)},
+}
+_COLOURS = {(-1.0, 0.0): "tab:blue", (1.0, 0.0): "tab:red"}
+_BELOW = ("tab:blue", "black", "tab:red")
+_RUNS = ("black", "tab:red", "tab:green", "tab:purple")
+CLIPPED = 98.0  # per cent of the closed points whose pressure the colours of a map tell apart
+_LEGEND: dict[str, Any] = {"fontsize": 8, "loc": "lower right", "bbox_to_anchor": (1.0, 0.98), "frameon": False}
+
+
+@dataclass(frozen=True)
+class Outline:
+    """Where the contact conditions are on the channel: ``arc`` (m,) [m] along its outline, down the left wall, along
+    the base, up the right wall; ``sides``: name -> mask (m,). Corners have a condition on both sides."""
+
+    arc: Array
+    sides: Mapping[str, Mask]
+
+    def along(self) -> list[tuple[str, Array]]:
+        """(name, its conditions in the order of the arc) of the sides in the order of the arc."""
+        order = np.argsort(self.arc)
+        parts = [(name, order[mask[order]]) for name, mask in self.sides.items()]
+        return sorted(parts, key=lambda part: float(np.mean(self.arc[part[1]])))
+
+    def places(self) -> Array:
+        """(m,) the arc lengths with a corner's two conditions a micrometre apart, in the order of their sides [m]."""
+        apart = np.zeros(len(self.arc))
+        for rank, (_, conditions) in enumerate(self.along()):
+            apart[conditions] = 1e-6 * rank
+        return self.arc + apart
+
+    def corners(self) -> list[float]:
+        """Arc lengths at which one side ends and the next one starts [m]."""
+        return [float(self.arc[one].max()) for _, one in self.along()[:-1]]
+
+
+def _unit(size: float) -> tuple[float, str]:
+    """(metres per unit, name): millimetres from 0.1 mm on, as engineers draw soil and concrete."""
+    if size >= 1.0:
+        return 1.0, "m"
+    return (1e-3, "mm") if size >= 1e-4 or size == 0.0 else (1e-6, "µm")
+
+
+def opening(history: History, label: str, normal: Sequence[float]) -> Array:
+    """(u_soil - u_channel)·n (rows,) [m] at a point that the probes <label> and <label>_soil record.
+
+    ``normal``: outward normal of the channel; never negative in unilateral contact.
+    """
+    names = [f"u_{axis}_{label}" for axis in "xy"]
+    missing = [name for one in names for name in (one, f"{one}_soil") if name not in history]
+    if missing:
+        raise InputError(f"the history has no column '{missing[0]}': record point {label} on channel and soil")
+    return np.asarray(sum(n * (history[f"{one}_soil"] - history[one]) for n, one in zip(normal, names, strict=True)))
+
+
+def plot_openings(history: History, path: str | Path, *, title: str) -> Path:
+    """Fig. 7: bedrock acceleration, and the openings between channel and soil at its points, left blue, right red."""
+    found = {
+        name: [(label, opening(history, label, normal), normal) for label, normal in points.items()]
+        for name, points in SHOWN.items()
+    }
+    metres, unit = _unit(max(float(np.abs(one).max()) for rows in found.values() for _, one, _ in rows))
+    figure, axes = _panels(len(found) + 1, (9.0, 9.6))
+    for component, colour in (("x", "black"), ("y", "0.6")):
+        values = history.get(f"a_g_{component}")
+        if values is not None and np.any(values):
+            axes[0].plot(history["t"], values, color=colour, lw=0.9, label=f"$a_{{g,{component}}}$")
+    axes[0].set_ylabel("acceleration [m/s²]")
+    axes[0].set_title("bedrock", fontsize=9, loc="left")
+    for axis, (name, rows) in zip(axes[1:], found.items(), strict=True):
+        for below, (label, values, normal) in zip(_BELOW, rows, strict=False):
+            colour = _COLOURS.get(normal, below)
+            axis.plot(history["t"], values / metres, color=colour, lw=0.9, label=f"point {label}")
+        axis.set_ylabel(f"opening [{unit}]")
+        axis.set_title(name, fontsize=9, loc="left")
+    axes[0].set_xlim(history["t"][0], history["t"][-1])
+    for axis in axes:
+        axis.axhline(0.0, color="0.3", lw=0.6)
+        if len(axis.lines) > 1:
+            axis.legend(ncol=3, **_LEGEND)
+    figure.suptitle(title)
+    return _save(figure, path)
+
+
+def plot_rocking(history: History, path: str | Path, *, title: str, corners: Sequence[str] = ("1", "7")) -> Path:
+    """Fig. 8: u_y of the bottom corners with their static settlement; what of it is rocking and what is common."""
+    left, right = (np.asarray(history[f"u_y_{label}"]) for label in corners)
+    t = history["t"]
+    metres, unit = _unit(float(max(np.abs(left).max(), np.abs(right).max())))
+    figure, (top, bottom) = _panels(2, (9.0, 5.6), height_ratios=(3, 2))
+    for label, values, colour in zip(corners, (left, right), ("tab:blue", "tab:red"), strict=True):
+        top.plot(t, values / metres, color=colour, lw=0.9, label=f"point {label}")
+    top.axhline(left[0] / metres, color="black", ls="--", lw=0.8, label="static, before the shaking")
+    top.set_ylabel(f"$u_y$ [{unit}]")
+    bottom.plot(t, 0.5 * (right - left) / metres, color="black", lw=0.9, label="rocking, half the difference")
+    common = 0.5 * (left + right)
+    bottom.plot(t, (common - common[0]) / metres, color="tab:green", lw=1.2, label="common, mean less static")
+    bottom.set_ylabel(f"parts of $u_y$ [{unit}]")
+    top.set_xlim(t[0], t[-1])
+    for axis in (top, bottom):
+        axis.legend(ncol=3, **_LEGEND)
+    figure.suptitle(title)
+    return _save(figure, path)
+
+
+def plot_beside(
+    runs: Mapping[str, History], reference: str, path: str | Path, *, title: str, points: Sequence[str] = ("1", "19")
+) -> Path:
+    """Fig. 9: u_x and u_y of the channel's points in several runs, the one named ``reference`` grey and thick."""
+    columns = [(f"u_{axis}_{label}", f"$u_{axis}$, point {label}") for label in points for axis in "xy"]
+    figure, axes = _panels(len(columns), (9.0, 2.1 * len(columns) + 1.0))
+    for axis, (column, label) in zip(axes, columns, strict=True):
+        metres, unit = _unit(max(float(np.abs(run[column]).max()) for run in runs.values()))
+        bare = runs[reference]
+        axis.plot(bare["t"], bare[column] / metres, color="0.7", lw=2.2, label=reference)
+        for colour, name in zip(_RUNS, (name for name in runs if name != reference), strict=False):
+            axis.plot(runs[name]["t"], runs[name][column] / metres, color=colour, lw=0.9, label=name)
+        axis.set_ylabel(f"{label} [{unit}]")
+    axes[0].set_xlim(bare["t"][0], bare["t"][-1])
+    axes[0].legend(ncol=len(runs), **_LEGEND)
+    figure.suptitle(title)
+    return _save(figure, path)
+
+
+def plot_interface(runs: Mapping[str, History], outline: Outline, path: str | Path, *, title: str) -> Path:
+    """Map over time and arc length, a panel per run: pressure where closed (root scale), opening where open."""
+    import matplotlib
+    from matplotlib.colors import Normalize, PowerNorm
+
+    parts = np.concatenate([conditions for _, conditions in outline.along()])
+    arc = outline.arc[parts]
+    maps = {name: _reduced(run, parts) for name, run in runs.items()}
+    closed = np.concatenate([pressure[pressure > 0.0] for _, pressure, _ in maps.values()])
+    most = np.array([np.percentile(closed, CLIPPED) if len(closed) else 1.0])
+    kilo, unit = _scaled(most, "Pa")
+    widest = max(float(gap.max()) for *_, gap in maps.values())
+    metres, length = _unit(widest)
+    drawn = {
+        f"opening [{length}], where open": ("Blues", Normalize(0.0, widest / metres or 1.0), "neither"),
+        f"pressure [{unit}], where closed": ("YlOrRd", PowerNorm(0.5, 0.0, float(kilo[0])), "max"),
+    }
+    figure, axes = _panels(len(maps), (10.0, 2.9 * len(maps) + 1.0))
+    for axis, (name, (t, pressure, gap)) in zip(axes, maps.items(), strict=True):
+        axis.grid(False)
+        edges = _edges(t), np.clip(_edges(arc), arc.min(), arc.max())
+        values = np.where(gap > 0.0, gap / metres, np.nan), np.where(gap > 0.0, np.nan, pressure * kilo[0] / most[0])
+        images = [
+            axis.pcolormesh(*edges, one.T, cmap=matplotlib.colormaps[colours], norm=norm, rasterized=True)
+            for one, (colours, norm, _) in zip(values, drawn.values(), strict=True)
+        ]
+        _mark_sides(axis, outline)
+        axis.set(xlim=(t[0], t[-1]), ylim=(arc.max(), arc.min()), ylabel="arc length [m]")
+        axis.set_title(name, fontsize=10, loc="left")
+    for image, (label, (*_, extend)) in zip(images, drawn.items(), strict=True):
+        figure.colorbar(image, ax=axes, label=label, pad=0.01, fraction=0.04, aspect=35, extend=extend)
+    figure.suptitle(title)
+    return _save(figure, path)
+
+
+def _reduced(run: History, parts: Any) -> tuple[Array, Array, Array]:
+    """(t, pressure, gap) of the conditions ``parts``; of a long run the peaks of neighbouring steps."""
+    rows = len(run["t"])
+    pressure, gap = (np.reshape(run[name], (rows, -1))[:, parts] for name in ("pressure", "gap"))
+    gap = np.where(np.reshape(run["active"], (rows, -1))[:, parts] > 0.0, 0.0, gap)
+    t, pressure = thinned(run["t"], pressure)
+    return t, pressure, thinned(run["t"], gap)[1]
+
+
+def _mark_sides(axis: Any, outline: Outline) -> None:
+    """Corners as lines across a map, and the names of the sides."""
+    for corner in outline.corners():
+        axis.axhline(corner, color="black", lw=0.8)
+    for name, conditions in outline.along():
+        middle = 0.5 * float(outline.arc[conditions].min() + outline.arc[conditions].max())
+        axis.text(0.004, middle, name, rotation=90, fontsize=8, va="center", transform=axis.get_yaxis_transform())
+
+
+def plot_envelope(runs: Mapping[str, History], outline: Outline, path: str | Path, *, title: str) -> Path:
+    """Along the arc: largest pressure and that of the static stage (dotted), largest opening, share of time open."""
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    keys = ("pressure", "gap", "active")
+    rows = {name: [np.reshape(run[key], (len(run["t"]), -1)) for key in keys] for name, run in runs.items()}
+    size = np.array([max(float(pressure.max()) for pressure, *_ in rows.values())])
+    shown, unit = _scaled(size, "Pa")
+    factor = shown[0] / size[0] if size[0] else 1.0
+    metres, length = _unit(max(float(gap.max()) for _, gap, _ in rows.values()))
+    with matplotlib.rc_context(_STYLE):
+        figure = Figure(figsize=(9.0, 8.0), layout="constrained")
+        axes = figure.subplots(3, 1, sharex=True)
+    for colour, (name, (pressure, gap, active)) in zip(_RUNS, rows.items(), strict=False):
+        shares = np.mean(active[1:] == 0.0, axis=0)
+        for side, (_, one) in enumerate(outline.along()):
+            label = name if side == 0 else None
+            style: dict[str, Any] = {"color": colour, "lw": 1.1, "marker": ".", "ms": 4}
+            axes[0].plot(outline.arc[one], factor * pressure.max(axis=0)[one], label=label, **style)
+            axes[0].plot(outline.arc[one], factor * pressure[0, one], color=colour, lw=0.9, ls=":")
+            axes[1].plot(outline.arc[one], gap.max(axis=0)[one] / metres, **style)
+            axes[2].plot(outline.arc[one], shares[one], **style)
+    axes[0].plot([], [], color="0.3", lw=0.9, ls=":", label="static, before the shaking")
+    axes[0].legend(fontsize=8)
+    axes[0].set_ylabel(f"largest pressure [{unit}]")
+    axes[1].set_ylabel(f"largest opening [{length}]")
+    axes[2].set(ylabel="share of time open [-]", ylim=(-0.03, 1.03), xlabel="arc length [m]")
+    for axis in axes:
+        for corner in outline.corners():
+            axis.axvline(corner, color="black", lw=0.8)
+    for name, one in outline.along():
+        axes[0].text(float(np.mean(outline.arc[one])), 1.01, name, ha="center", va="bottom", fontsize=9,
+                     transform=axes[0].get_xaxis_transform())
+    figure.suptitle(title)
+    return _save(figure, path)

@@ -1,0 +1,236 @@
+"""Pictures of the buried channel's mesh: Fig. 6 of seed 000, the deformed bodies with their contact, an animation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .algebra import Array, Indices, Mask
+from .errors import InputError
+from .meshes.channel import ChannelMesh
+from .plotting import _STYLE, History, _save, _scaled
+from .plotting_deformed import Frames, Tractions, read_frames, read_tractions
+
+SOIL, CONCRETE, CONTACT = "#efe3c8", "#9aa3ab", "tab:red"
+MAP = "YlOrRd"  # colours of pressures
+INWARDS = 0.25  # of a wall's thickness: how far inside the channel the points are that show its contact
+AROUND = 0.8  # heights of the channel that are shown beside and below it
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """Frames of a run with what belongs to the channel: masks of ``cells`` (c,), the channel's node of every contact
+    condition ``nodes`` (m,)."""
+
+    frames: Frames
+    tractions: Tractions
+    cells: Mask
+    nodes: Indices
+
+
+def read_bodies(folder: str | Path, shape: ChannelMesh) -> Bodies:
+    """From the folder of a run with fields and the recorder Contact(). InputError without them."""
+    frames, tractions = read_frames(folder), read_tractions(folder)
+    centres = frames.points[frames.cells].mean(axis=1)
+    x, y = shape.x, shape.y
+    cells = (x[1] < centres[:, 0]) & (centres[:, 0] < x[4]) & (centres[:, 1] > y[1])
+    own = np.unique(frames.cells[cells])
+    nearest = [np.argmin(np.sum((frames.points[own] - point) ** 2, axis=1)) for point in tractions.points]
+    return Bodies(frames, tractions, cells, own[np.array(nearest, dtype=np.int64)])
+
+
+def plot_layout(
+    folder: str | Path, shape: ChannelMesh, points: Mapping[str, Sequence[float]], path: str | Path, *,
+    title: str, soil: str, concrete: str, ends: str,
+) -> Path:
+    """Fig. 6: the mesh of a run with bodies, numbered points, bedrock and ends of the layer.
+
+    ``soil``, ``concrete``, ``ends``: what is written about the materials and the ends of the layer.
+    """
+    bodies = read_bodies(folder, shape)
+    figure, axis = _plane((11.0, 4.9))
+    cells, x, y = bodies.frames.points[bodies.frames.cells], shape.x, shape.y
+    _fill(axis, cells[~bodies.cells], SOIL)
+    _fill(axis, cells[bodies.cells], CONCRETE)
+    axis.plot([x[1], x[1], x[4], x[4]], [y[3], y[1], y[1], y[3]], color=CONTACT, lw=2.0, label="contact")
+    _bedrock(axis, shape)
+    for end, outside in ((x[0], -0.18), (x[5], 0.18)):
+        up = np.unique(bodies.frames.points[np.isclose(bodies.frames.points[:, 0], end), 1])
+        axis.plot(np.full_like(up, end + outside), up, "o", ms=4, mfc="white", mec="black", mew=0.8)
+    _number(axis, shape, points)
+    middle, half = 0.5 * (x[1] + x[4]), 0.5 * shape.depth
+    box = {"fc": "white", "ec": "0.5", "boxstyle": "round,pad=0.6"}
+    for across, up, text, more in (
+        (0.5 * x[1], half, soil, {"fontsize": 9, "bbox": box}),
+        (0.5 * (x[4] + x[5]), half, ends, {"fontsize": 9, "bbox": box}),
+        (middle, 0.5 * (y[2] + y[3]), concrete, {"fontsize": 8}),
+        (middle, -0.11 * shape.depth, "motion of the bedrock $a_g(t)$", {"fontsize": 9}),
+    ):
+        axis.text(across, up, text, ha="center", va="center", **more)
+    ends_of_arrow = [(middle + side * 0.8 * shape.outer_width, -0.16 * shape.depth) for side in (-1.0, 1.0)]
+    axis.annotate("", *ends_of_arrow, arrowprops={"arrowstyle": "<->", "lw": 1.5})
+    axis.legend(fontsize=8, loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
+    axis.set(xlim=(-0.7, x[5] + 0.7), ylim=(-0.2 * shape.depth, 1.04 * shape.depth), title=title, xlabel="x [m]",
+             ylabel="y [m]")
+    return _save(figure, path)
+
+
+def _number(axis: Any, shape: ChannelMesh, points: Mapping[str, Sequence[float]]) -> None:
+    """Points of the outline with their labels outside of it."""
+    for label, (across, up) in points.items():
+        sideways = (across >= shape.x[4]) - 1.0 * (across <= shape.x[1])
+        outward = np.array([sideways, -1.0 if up <= shape.y[1] else 0.0])
+        axis.plot(across, up, "o", ms=3.5, color="black", zorder=4)
+        axis.annotate(label, (across, up), xytext=9.0 * outward, textcoords="offset points", fontsize=9, zorder=4,
+                      weight="bold", ha="center", va="center",
+                      bbox={"fc": "white", "ec": "none", "pad": 0.6, "alpha": 0.8})
+
+
+def plot_moments(
+    folders: Mapping[str, str | Path], shape: ChannelMesh, times: Sequence[float], path: str | Path, *,
+    title: str, magnified: float,
+) -> Path:
+    """A row per run (name -> folder), a column per time [s]: the bodies around the channel, their displacements less
+    the channel's mean drawn ``magnified`` times; contact points coloured by their pressure, open ones white."""
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    runs = {name: read_bodies(folder, shape) for name, folder in folders.items()}
+    colours = Colours.of(np.concatenate([run.tractions.at(t)[0] for run in runs.values() for t in times]))
+    with matplotlib.rc_context(_STYLE | {"axes.grid": False}):
+        figure = Figure(figsize=(3.7 * len(times) + 1.3, 2.75 * len(runs) + 0.7), layout="constrained")
+        axes = figure.subplots(len(runs), len(times), sharex=True, sharey=True, squeeze=False)
+    for row, (name, run) in zip(axes, runs.items(), strict=True):
+        for axis, t in zip(row, times, strict=True):
+            shown = draw_bodies(axis, run, shape, t, magnified=magnified, colours=colours, follow=True)
+            axis.set_title(f"{name}, t = {shown:.4g} s", fontsize=9)
+    reach = AROUND * shape.height
+    axes[0, 0].set(xlim=(shape.x[1] - reach, shape.x[4] + reach), ylim=(shape.y[1] - reach, 1.07 * shape.depth))
+    colours.bar(figure, axes)
+    figure.supxlabel("x [m]", fontsize=10)
+    figure.supylabel("y [m]", fontsize=10)
+    figure.suptitle(f"{title} (displacements x {magnified:g})")
+    return _save(figure, path)
+
+
+@dataclass(frozen=True)
+class Colours:
+    """Of contact pressures: pressure times ``factor`` is in ``unit``, and ``norm`` a root scale of it."""
+
+    factor: float
+    unit: str
+    norm: Any
+
+    @classmethod
+    def of(cls, pressures: Array) -> Colours:
+        """For all pressures [Pa] that are drawn."""
+        from matplotlib.colors import PowerNorm
+
+        most = np.array([float(pressures.max(initial=0.0)) or 1.0])
+        shown, unit = _scaled(most, "Pa")
+        return cls(float(shown[0] / most[0]), unit, PowerNorm(0.5, 0.0, float(shown[0])))
+
+    def bar(self, figure: Any, axes: Any) -> None:
+        """The colour bar beside axes."""
+        from matplotlib.cm import ScalarMappable
+
+        label = f"contact pressure [{self.unit}] (open points white)"
+        figure.colorbar(ScalarMappable(self.norm, MAP), ax=axes, label=label, fraction=0.04, aspect=35, pad=0.01)
+
+
+def draw_bodies(
+    axis: Any, bodies: Bodies, shape: ChannelMesh, t: float, *, magnified: float, colours: Colours, follow: bool = False
+) -> float:
+    """Draws the frame next to t; returns its time [s]. ``follow``: displacements less the mean of the channel's."""
+    frames, tractions = bodies.frames, bodies.tractions
+    shown, u, _ = frames.at(t)
+    own = np.unique(frames.cells[bodies.cells])
+    moved = frames.points + magnified * (u - u[own].mean(axis=0) if follow else u)
+    _fill(axis, moved[frames.cells[~bodies.cells]], SOIL, lw=0.3)
+    _fill(axis, moved[frames.cells[bodies.cells]], CONCRETE)
+    pressure, _ = tractions.at(shown)
+    places = moved[bodies.nodes] - INWARDS * shape.wall * tractions.normals
+    dots: dict[str, Any] = {"s": 26, "edgecolors": "black", "linewidths": 0.5, "norm": colours.norm, "cmap": MAP}
+    closed = pressure > 0.0
+    axis.scatter(*places[~closed].T, s=26, c="white", edgecolors="black", linewidths=0.5, zorder=4)
+    axis.scatter(*places[closed].T, c=colours.factor * pressure[closed], zorder=5, **dots)
+    return shown
+
+
+def animate(
+    folder: str | Path, shape: ChannelMesh, path: str | Path, *,
+    title: str, magnified: float, history: History, times: Sequence[float], openings: Mapping[str, Array],
+    fps: int = 10,
+) -> Path:
+    """Writes a GIF of the frames at ``times`` [s]: bodies, displaced relative to the bedrock, and contact; below the
+    bedrock's acceleration and ``openings`` (name -> values (rows,) [m] of ``history``) with the moment marked.
+
+    InputError for another kind of file.
+    """
+    from matplotlib.animation import PillowWriter
+
+    path = Path(path)
+    if path.suffix != ".gif":
+        raise InputError(f"animations are GIF files: name '{path.name}' so, or draw single moments with plot_moments")
+    bodies = read_bodies(folder, shape)
+    colours = Colours.of(np.concatenate([bodies.tractions.at(t)[0] for t in times]))
+    figure, (top, bottom) = _plane((6.6, 6.0), heights=(3.6, 1.0))
+    colours.bar(figure, top)
+    marker = _traces(bottom, history, openings, (times[0], times[-1]))
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")  # the same places in every frame, laid out once
+    writer = PillowWriter(fps=fps)
+    with writer.saving(figure, str(path), dpi=95):
+        for t in times:
+            top.clear()
+            shown = draw_bodies(top, bodies, shape, t, magnified=magnified, colours=colours)
+            _bedrock(top, shape)
+            reach = 2.0 * AROUND * shape.height
+            top.set(xlim=(max(shape.x[1] - reach, 0.0), min(shape.x[4] + reach, shape.width)),
+                    ylim=(-0.05 * shape.depth, 1.07 * shape.depth), xlabel="x [m]", ylabel="y [m]")
+            top.set_title(f"{title}, t = {shown:.3f} s (displacements x {magnified:g})", fontsize=10)
+            marker.set_xdata([shown, shown])
+            writer.grab_frame()
+    return path
+
+
+def _traces(axis: Any, history: History, openings: Mapping[str, Array], span: tuple[float, float]) -> Any:
+    """Openings and, dashed, the acceleration during the animation; the line that marks a moment."""
+    for colour, (name, values) in zip(("tab:blue", "tab:red", "black"), openings.items(), strict=False):
+        axis.plot(history["t"], 1e3 * values, color=colour, lw=1.0, label=name)
+    axis.set(xlabel="time [s]", ylabel="opening [mm]", xlim=span)
+    behind = axis.twinx()
+    behind.plot(history["t"], history["a_g_x"], color="0.6", lw=0.9, ls="--")
+    behind.set_ylabel("$a_g$ [m/s²]", color="0.4")
+    axis.legend(fontsize=7, ncol=2, loc="lower right", bbox_to_anchor=(1.0, 0.97), frameon=False)
+    return axis.axvline(span[0], color="black", lw=1.2)
+
+
+def _plane(size: tuple[float, float], heights: Sequence[float] = (1.0,)) -> tuple[Any, Any]:
+    """(figure, axes above each other); the first one without distortion."""
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    with matplotlib.rc_context(_STYLE | {"axes.grid": False}):
+        figure = Figure(figsize=size, layout="constrained")
+        axes = figure.subplots(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
+    axes[0].set_aspect("equal")
+    return figure, axes if len(heights) > 1 else axes[0]
+
+
+def _fill(axis: Any, cells: Array, colour: str, lw: float = 0.4) -> None:
+    from matplotlib.collections import PolyCollection
+
+    axis.add_collection(PolyCollection(list(cells), facecolor=colour, edgecolor="0.45", linewidth=lw))
+    axis.set_aspect("equal")
+
+
+def _bedrock(axis: Any, shape: ChannelMesh) -> None:
+    """The bedrock's line, hatched below."""
+    axis.axhline(0.0, color="black", lw=1.5, zorder=3)
+    axis.fill_between([-1.0, shape.width + 1.0], -0.05 * shape.depth, 0.0, facecolor="none", edgecolor="0.4",
+                      hatch="////", lw=0.0)
