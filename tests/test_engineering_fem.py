@@ -13,6 +13,7 @@ from vi_contact import fem
 from vi_contact.algebra import Array
 from vi_contact.base_motion import base_motion
 from vi_contact.errors import InputError
+from vi_contact.fem import compat
 from vi_contact.static import initial_state
 
 WIDTH, HEIGHT = 0.5, 4.0
@@ -54,7 +55,7 @@ def test_section_forces_are_those_of_equilibrium(comm: Any, simplices: bool) -> 
     assert row["M_back"] == pytest.approx(-row["M_middle"], rel=1e-10)
 
 
-def test_reactions_carry_all_loads(comm: Any) -> None:
+def test_reactions_carry_all_loads(comm: Any, caplog: pytest.LogCaptureFixture) -> None:
     """Force and moment of the clamped foot balance tip, wind and weight, the part on the held nodes included."""
     problem, tags, loads = cantilever(comm, False)
     state = vc.static_equilibrium(problem, solver=vc.Condensed())
@@ -63,9 +64,31 @@ def test_reactions_carry_all_loads(comm: Any) -> None:
     assert row["reaction_x_foot"] == pytest.approx(-whole["V"], rel=1e-10)
     assert row["reaction_y_foot"] == pytest.approx(-whole["N"], rel=1e-10)
     assert row["reaction_M_foot"] == pytest.approx(-whole["M"], rel=1e-10)
+    assert "give the loads" not in caplog.text
     without = fem.Reactions("foot", tags["bottom"], (0.5 * WIDTH, 0.0)).start(problem, state)
+    assert ("give the loads of fem.assemble" in caplog.text) == (comm.rank == 0)
     share = WEIGHT[1] * 0.5 * 0.5 * WIDTH  # of the lowest row of elements, half its height
     assert without["reaction_y_foot"] == pytest.approx(-whole["N"] + share, rel=1e-10)
+
+
+def test_weight_as_gravity(comm: Any) -> None:
+    """Two materials under ``with_weight``: the foot carries both, a cut what is above it."""
+    mesh, tags = block(comm, lengths=(WIDTH, HEIGHT), divisions=(2, 8))
+    heavy = vc.LinearElastic(E=3.0e10, nu=0.1, rho=7800.0)
+    low = mesh.geometry.x[compat.geometry_dofmap(mesh)][:, :, 1].mean(axis=1) < 2.0
+    parts = [(fem.Cells("low", np.flatnonzero(one).astype(np.int32), mesh), material)
+             for one, material in ((low, heavy), (~low, CONCRETE))]
+    problem = linear(vc.with_weight(fem.assemble(mesh, parts, clamped=tags["bottom"])))
+    state = vc.static_equilibrium(problem, solver=vc.Condensed())
+    g = (0.0, -9.80665)
+    held = fem.Reactions("foot", tags["bottom"], (0.0, 0.0), gravity=g).start(problem, state)
+    cuts = {"joint": ((0.0, 2.0), (WIDTH, 2.0)), "low": ((0.0, 1.0), (WIDTH, 1.0))}
+    row = fem.SectionForces(cuts, cells=tags["block"], gravity=g).start(problem, state)
+    column = 9.80665 * WIDTH
+    assert held["reaction_y_foot"] == pytest.approx(column * 2.0 * (2400.0 + 7800.0), rel=1e-10)
+    assert held["reaction_M_foot"] == pytest.approx(column * 2.0 * (2400.0 + 7800.0) * 0.5 * WIDTH, rel=1e-10)
+    assert row["N_joint"] == pytest.approx(-column * 2.0 * 2400.0, rel=1e-10)
+    assert row["N_low"] == pytest.approx(-column * (2.0 * 2400.0 + 7800.0), rel=1e-10)
 
 
 CUTS = {

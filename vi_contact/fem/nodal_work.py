@@ -7,6 +7,7 @@ the absolute acceleration and f their loads. For a nodal field r, rᵀq is a num
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
@@ -22,6 +23,8 @@ from . import compat
 from .loads import BodyForce, TangentialTraction, Traction, as_tuple, evaluate, is_constant
 from .space import FemSpace
 
+log = logging.getLogger(__name__)
+
 Loads = Traction | BodyForce | Sequence[Traction | BodyForce]
 
 
@@ -31,13 +34,17 @@ class NodalWork:
     Args:
         problem: its system is made by ``fem.assemble``; InputError otherwise.
         loads: those given to ``fem.assemble``: what acts on cells of the group belongs to their balance.
+        gravity: acceleration (d,) [m/s²] of ``with_weight``, which acts on the mass of the cells.
     """
 
-    def __init__(self, problem: ContactProblem, loads: Loads = ()) -> None:
+    def __init__(self, problem: ContactProblem, loads: Loads = (), gravity: Sequence[float] | None = None) -> None:
         space = problem.system.space
         if not isinstance(space, FemSpace) or space.forms is None:
             raise InputError("reactions and section forces need a system made by fem.assemble")
         self._problem, self.space, self._loads = problem, space, as_tuple(loads)
+        self._gravity = np.zeros(space.dimension) if gravity is None else np.asarray(gravity, dtype=float)
+        if self._gravity.shape != (space.dimension,):
+            raise InputError(f"gravity has {self._gravity.size} components: give {space.dimension}")
         self._r, self._inside = compat.function(space.V), compat.function(compat.cell_space(space.mesh))
         self._forms = [None if form is None else compat.compile_form(form) for form in self._motions()]
         self._load_forms = [compat.compile_form(self._load(load)) for load in self._loads]
@@ -62,15 +69,28 @@ class NodalWork:
         ds = compat.measure(mesh, mesh.topology.dim - 1, load.facets.indices)
         return thickness * self._inside * ufl.inner(self._r, acting) * ds
 
+    def known(self, name: str) -> None:
+        """Warns when the system has constant loads and none were given: who forgets the weight measures reactions that
+        do not carry it. Collective."""
+        system, space = self._problem.system, self.space
+        theirs = space.comm.sum(system.influence.T @ system.load.constant)
+        if theirs.any() and not (self._loads or self._gravity.any()) and space.comm.rank == 0:
+            text = ", ".join(f"{x:.4g}" for x in theirs)
+            log.warning("%s: the system has constant loads of (%s) N in all and none were given: if they act on these "
+                        "elements give the loads of fem.assemble, or the gravity of with_weight", name, text)
+
     def add(self, r: Array, cells: Mask | None = None) -> None:
         """A field r (owned nodes, d) and the group (mask of the local cells, ghosts too; all when None). Collective."""
-        self._r.x.array[: r.size] = r.ravel()
-        self._r.x.scatter_forward()
-        self._inside.x.array[:] = 1.0 if cells is None else cells
+        self._virtual(r, cells)
         for rows, form in zip(self._rows, [*self._forms, *self._load_forms], strict=True):
             if form is not None:
                 rows.append(sp.csr_matrix(compat.assemble_vector(form).array_r))
         self._stacked: list[Any] | None = None
+
+    def _virtual(self, r: Array, cells: Mask | None) -> None:
+        self._r.x.array[: r.size] = r.ravel()
+        self._r.x.scatter_forward()
+        self._inside.x.array[:] = 1.0 if cells is None else cells
 
     def _matrices(self) -> list[Any]:
         if self._stacked is None:
@@ -81,7 +101,7 @@ class NodalWork:
         """Of a state without acceleration, (count,): a static one, or the start of a run before the ground moves."""
         problem, space, t = self._problem, self.space, state.t
         motion = [space.expand(problem.cartesian(x), t, k) for k, x in enumerate((state.u, state.v))]
-        return self._sum([*motion, np.zeros_like(motion[0])], lambda one: one(t))
+        return self._sum([*motion, np.zeros_like(motion[0]) - self._gravity], lambda one: one(t))
 
     def of_step(self, report: Report) -> Array:
         """Of the equation of motion of a step (``Report.balance``), with absolute accelerations, (count,).
@@ -99,7 +119,7 @@ class NodalWork:
         for k, x in enumerate((balance.u, balance.v, balance.a)):
             free = problem.cartesian(x)
             motion.append(between(partial(_expanded, space, free, k)) if moves else space.expand(free, t1, k))
-        motion[2] = motion[2] + between(problem.ground_acceleration)
+        motion[2] = motion[2] + between(problem.ground_acceleration) - self._gravity
         return self._sum(motion, between)
 
     def _place(self, report: Report) -> float:

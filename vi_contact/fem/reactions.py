@@ -38,6 +38,7 @@ class Reactions:
     Args:
         facets: a boundary with prescribed components; other components of its nodes are not counted.
         loads: those given to ``assemble``: their part on the held nodes goes straight into the support.
+        gravity: acceleration (d,) [m/s²] of ``with_weight``, (0, -9.80665) for example: likewise.
     Raises:
         InputError: nothing is prescribed on the facets.
     """
@@ -46,6 +47,7 @@ class Reactions:
     facets: Facets
     centre: Sequence[float]
     loads: Loads = ()
+    gravity: Sequence[float] | None = None
 
     def __post_init__(self) -> None:
         if not re.fullmatch(r"\w+", self.name, re.ASCII):
@@ -66,7 +68,8 @@ class Reactions:
 
     def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
         """Prepares the work of rigid motions of the held nodes; the row of the state at rest. Collective."""
-        self._work = NodalWork(problem, self.loads)
+        self._work = NodalWork(problem, self.loads, self.gravity)
+        self._work.known(f"reactions '{self.name}'")
         space: FemSpace = self._work.space
         if len(self.centre) != space.dimension:
             raise InputError(f"reactions '{self.name}': the centre has {len(self.centre)} coordinates, give "

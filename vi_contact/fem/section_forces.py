@@ -39,7 +39,7 @@ class SectionForces:
 
     Args:
         cells: the group that is cut, the whole mesh when None: a cut of a wall with soil on both sides needs it.
-        loads: those given to ``assemble``.
+        loads: those given to ``assemble``. gravity: acceleration (d,) [m/s²] of ``with_weight``, if these cells weigh.
     Raises:
         InputError: a cut that crosses elements, leaves the group or ends inside it; meshes that are not plane.
     """
@@ -47,6 +47,7 @@ class SectionForces:
     cuts: Mapping[str, tuple[Sequence[float], Sequence[float]]]
     cells: Cells | None = None
     loads: Loads = ()
+    gravity: Sequence[float] | None = None
 
     def __post_init__(self) -> None:
         for label in self.cuts:
@@ -63,10 +64,11 @@ class SectionForces:
 
     def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
         """Finds the cuts; the row of the state at rest, of a static stage for example. Collective."""
-        work = self._work = NodalWork(problem, self.loads)
+        work = self._work = NodalWork(problem, self.loads, self.gravity)
         space, signs = work.space, []
         if space.dimension != 2:
             raise InputError(f"section forces are of plane meshes, this one has {space.dimension} dimensions")
+        work.known("section forces")
         for label, ends in self.cuts.items():
             check_labels("section", {label: ends[0]}, 2)
             check_labels("section", {label: ends[1]}, 2)
