@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 import vi_contact
-from vi_contact.cli import _impact, main, parser, split_petsc
+from vi_contact.cli import main, parser, split_petsc
+from vi_contact.cli_options import impact_law
 from vi_contact.errors import InputError
 from vi_contact.impact import ComponentReset, Inelastic, MassProjection, Newton, NoImpact
 
@@ -104,12 +105,12 @@ def test_units_must_be_said(record, capsys):
 
 
 def test_impact_laws_by_name():
-    assert _impact("none", False) == NoImpact()
-    assert _impact("inelastic", False) == Inelastic(ComponentReset())
-    assert isinstance(_impact("inelastic", True).reading, MassProjection)
-    assert _impact("elastic", False) == Newton(1.0) and _impact("0.25", False) == Newton(0.25)
+    assert impact_law("none", False) == NoImpact()
+    assert impact_law("inelastic", False) == Inelastic(ComponentReset())
+    assert isinstance(impact_law("inelastic", True).reading, MassProjection)
+    assert impact_law("elastic", False) == Newton(1.0) and impact_law("0.25", False) == Newton(0.25)
     with pytest.raises(InputError, match="give inelastic, elastic, none or a restitution"):
-        _impact("bouncy", False)
+        impact_law("bouncy", False)
 
 
 def test_petsc_options_are_told_from_ours():

@@ -4,7 +4,8 @@
 Physical groups: cells "channel", "soil"; boundary "bedrock" (y = 0), "left_side", "right_side" (x = 0, width),
 "surface" (y = depth); the interface from both sides, "channel_left", "channel_base", "channel_right" and "soil_left",
 "soil_base", "soil_right", divided alike; "channel_inside" (what the water wets) and "channel_top" (the tops of the
-walls). The channel is open at the surface, with which its walls end. Nodes of the channel come first.
+walls). The channel is open at the surface, with which its walls end. Of two nodes at one place the channel's comes
+first.
 """
 
 from __future__ import annotations

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from ..fem.loads import Prescribed
+from ..fem.ties import Tied
 
 ENDS = ("left_side", "right_side")
 
@@ -41,3 +42,12 @@ class Fixed:
 
     def conditions(self, tags: Any, motion: Mapping[str, Any]) -> dict[str, Any]:
         return {"prescribed": [Prescribed(tags[end], **motion) for end in ENDS]}
+
+
+@dataclass(frozen=True)
+class TiedSides:
+    """Both ends move together in both directions: the exact free field of horizontal layers under horizontal and
+    vertical shaking; what leaves at one end comes back at the other."""
+
+    def conditions(self, tags: Any, motion: Mapping[str, Any]) -> dict[str, Any]:
+        return {"tied": [Tied(tags["left_side"], tags["right_side"])]}

@@ -90,11 +90,12 @@ def number_of_steps(run: RunOptions, dt: float, shaking: Sequence[Excitation]) -
     return 400 if duration == float("inf") or dt <= 0.0 else int(duration / dt) + 1
 
 
-def solvers(run: RunOptions) -> tuple[Solver, CrossChecked | None]:
-    """The solver; with ``cross_check`` the other route accompanies every step."""
+def solvers(
+    run: RunOptions, *, reference: Solver = SOLVERS["volume-reference"]
+) -> tuple[Solver, CrossChecked | None]:
+    """The solver; with ``cross_check`` the other route accompanies every step: the reference, or the condensed one."""
     solver = SOLVERS[run.solver]
     if not run.cross_check:
         return solver, None
-    other = "condensed" if run.solver.startswith("volume") else "volume-reference"
-    checked = CrossChecked(solver, (SOLVERS[other],))
+    checked = CrossChecked(solver, (SOLVERS["condensed"] if run.solver.startswith("volume") else reference,))
     return checked, checked
