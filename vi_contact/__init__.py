@@ -99,6 +99,16 @@ _CONTENTS = {
     "cross_check": ("CrossChecked", "cross_check"),
     "verify": ("energy_balance", "kkt_residual"),
     "modal": ("lowest_frequency",),
+    # contact in a boundary layer (seed 001)
+    "boundary_layer.layer": ("Layer",),
+    "boundary_layer.particle": ("ParticleImpact", "layer_for"),
+    "boundary_layer.metric": ("Metric",),
+    "boundary_layer.motion": ("ConstrainedSystem",),
+    "boundary_layer.trajectory": ("layer_motion",),
+    "boundary_layer.rigid_body": ("Ellipsoid", "RigidBody"),
+    "boundary_layer.bilateral": ("bilateral_motion",),
+    "boundary_layer.contact_law": ("ContactLayer", "contact_layer"),
+    "boundary_layer.scheme": ("BoundaryLayer",),
 }
 _HOME = {name: module for module, names in _CONTENTS.items() for name in names}
 __all__ = ["__version__", *sorted(_HOME)]

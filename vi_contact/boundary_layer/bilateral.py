@@ -37,7 +37,7 @@ class BilateralMotion:
     reaction: Array
 
 
-def integrate_bilateral(
+def bilateral_motion(
     systems: Sequence[ConstrainedSystem], *, q0: Array, v0: Array, times: Array, rtol: float = 1e-11
 ) -> BilateralMotion:
     """The motion with phi^R = 0 held, at the given times (the first is the start).

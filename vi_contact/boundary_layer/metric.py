@@ -8,8 +8,8 @@ With the covector A = d rho in the coordinates of the velocities and M = [g_IJ]:
 ĝ and Λ̂ are added to the metric and to the affinities of the manifold without boundary. Λ̂^1_11 is the Levi-Civita
 affinity of ĝ_11 with g_11 constant, so that the covariant derivative of the normal momentum is ĝ_11 (ρ̈ - ρ̇²/ρ).
 
-What a point on its way through the layer is subject to can be read in two ways, and in a third that finite elements
-need; ``Metric`` says which. All of them move M q̈ + ... = f + Aᵀ lambda, and momenta along the boundary are unchanged.
+What a point on its way through the layer is subject to can be read in two ways, and finite elements need two more;
+``Metric`` says which. All of them move M q̈ + ... = f + Aᵀ lambda, and momenta along the boundary are unchanged.
 """
 
 from __future__ import annotations
@@ -31,18 +31,20 @@ class Metric(Enum):
         continuous where the layer begins.
     BLENDED: g_11 ρ̈ + delta ĝ_11 (ρ̈ - ρ̇²/ρ) = f̂_1 + n. The same with the metric's terms cut off like the force, so that
         the reaction is a smooth function of state; FULL in the limit a -> b.
+    FLAT: g_11 ρ̈ = f̂_1 + n. The boundary force alone; what is left when the law is a potential and a damper.
     """
 
     DOMINANT = "dominant"
     FULL = "full"
     BLENDED = "blended"
+    FLAT = "flat"
 
     def reaction(self, layer: Layer, g: float, rho: float, rate: float, free: float) -> float:
         """lambda [N] with g ρ̈ = g ``free`` + lambda; g = g_11 [kg], ``free`` the acceleration [m/s²] without layer."""
         force, ratio = float(layer.force(rho, rate)), (layer.width / rho) ** 2
         if self is Metric.DOMINANT:
             return g * (rate**2 / rho + force / (g * ratio) + free / ratio - free)
-        ratio *= float(layer.cut_off(rho)) if self is Metric.BLENDED else 1.0
+        ratio *= {Metric.FULL: 1.0, Metric.FLAT: 0.0}.get(self, float(layer.cut_off(rho)))
         return (force - g * ratio * (free - rate**2 / rho)) / (1.0 + ratio)
 
 

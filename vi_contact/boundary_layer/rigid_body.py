@@ -119,7 +119,7 @@ class RigidBody:
         return np.asarray(v - along * (1.0 + e) * (A @ v) / (A @ along))
 
     def system(self) -> ConstrainedSystem:
-        """For ``integrate``: coordinates (7,), velocities (6,)."""
+        """For ``layer_motion``: coordinates (7,), velocities (6,)."""
         turning: Callable[[Array, Array], float] | None = None
         if not callable(self.point):
             turning = self._turning

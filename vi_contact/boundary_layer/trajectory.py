@@ -51,7 +51,7 @@ class Trajectory:
     contacts: Sequence[Contact]
 
 
-def integrate(
+def layer_motion(
     system: ConstrainedSystem,
     layer: Layer,
     *,

@@ -1,0 +1,158 @@
+"""The boundary layer as a contact law of finite elements: the reaction of a node over one time step.
+
+Per unit area of the contact boundary, rho = gap > 0, y = ln rho (seed 001 with the blended metric, see ``Metric``):
+
+    p = delta(rho)/rho · b² [k - (c/V) ẏ - gamma ÿ],        ÿ = ρ̈/rho - ρ̇²/rho²
+
+gamma [kg/m²] is g_11 per area: -gamma b² ÿ/rho is the reaction of the metric, -ĝ_11 (ρ̈ - ρ̇²/rho). At rest p = k b²/rho:
+the law is a logarithmic barrier, and tends to the exact inequality 0 <= p ⊥ rho >= 0 as b -> 0. The mean over a step
+from rho_0 to rho_1 is that of the midpoint rule in y:
+
+    p̄ = (Y_1 - Y_0)/(rho_1 - rho_0) · b² [k - (c/V)(y_1 - y_0)/dt - gamma (w_1 - w_0)/dt],   Y' = delta/rho, Y(b) = 0
+    (w_0 + w_1)/2 = (y_1 - y_0)/dt,    w_0 = ẏ = ρ̇/rho where the step begins outside the layer, carried on inside it
+
+Order 2. Energy: the part with k does exactly the work of a potential -k b² Y; the part with gamma, where delta = 1,
+that of a kinetic energy ½ gamma b² w²; the part with c never gives any. Where the metric is cut off the part with gamma
+gives ½ gamma (ẋ_in² - ẋ_out²) to a body that returns more slowly than it came: nothing to a stiff body without loss,
+O(b) with gamma = O(b). However large the step, p̄ is unbounded as rho_1 -> 0: the gap stays open. w is carried because
+ρ̇/rho from the velocities of the body would leave order 1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.integrate import cumulative_trapezoid
+from scipy.interpolate import CubicHermiteSpline
+from scipy.optimize import brentq
+
+from ..algebra import Array
+from ..errors import InputError
+from ..surfaces import ContactSurface
+from .layer import Layer, positive
+from .metric import Metric
+from .motion import ConstrainedSystem
+from .particle import damping_ratio
+from .trajectory import layer_motion
+
+NEAR = 1e-5  # |rho_1 - rho_0| over rho below which the quotient is the derivative in the middle
+
+
+@dataclass(frozen=True)
+class ContactLayer:
+    """The law of a contact boundary.
+
+    Attributes:
+        layer: width b, start a < b [m]; k [N/m per m²], c [N per m²]; its speed V [m/s] must be given.
+        mass: gamma >= 0 [kg/m²] of the metric's terms: for a stiff body its mass over its contact area; 0: without
+            them, a potential and a damper, which never give energy.
+    InputError for values outside their range, a layer without V or without a transition from a to b.
+    """
+
+    layer: Layer
+    mass: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.mass < np.inf:
+            raise InputError(f"the law's mass per area is {self.mass}: give zero or a positive finite number in kg/m²")
+        if self.layer.speed is None:
+            raise InputError("a contact law needs the layer's speed V: give Layer(speed=...), the speed of approach")
+        if self.layer.a >= self.layer.width:
+            raise InputError("a contact law needs a force that fades out: give the layer a start a below its width b")
+
+    @cached_property
+    def _fading(self) -> CubicHermiteSpline:
+        """Y on [a, b] as a function of ln rho, to ten digits; its derivative there is delta."""
+        y = np.linspace(np.log(self.layer.a), np.log(self.layer.width), 801)
+        delta = self.layer.cut_off(np.exp(y))
+        middle = self.layer.cut_off(np.exp(0.5 * (y[1:] + y[:-1])))
+        trapezia = cumulative_trapezoid(delta, y, initial=0.0)
+        Y = np.append(0.0, np.cumsum(4.0 * middle)) * (y[1] - y[0]) / 6.0 + trapezia / 3.0  # Simpson's rule
+        return CubicHermiteSpline(y, Y - Y[-1], delta)
+
+    def set_back(self, surface: ContactSurface) -> ContactSurface:
+        """The surface with its obstacle moved back by b: a body that touched its face now touches the layer's edge."""
+        return replace(surface, gap0=surface.gap0 + self.layer.width)
+
+    def potential(self, rho: Array) -> Array:
+        """Y <= 0; -k b² Y is the energy stored per area when nothing moves [J/m²]."""
+        a, b = np.log(self.layer.a), np.log(self.layer.width)
+        y = np.log(rho)
+        return np.where(y < a, self._fading(a) + y - a, np.where(y < b, self._fading(np.clip(y, a, b)), 0.0))
+
+    def mean_pressure(self, rho: Array, old: Array, rate: Array, dt: float) -> tuple[Array, Array]:
+        """(p̄ [Pa], d p̄/d rho_1) of a step from gap ``old`` and rate w_0 [1/s] to gap ``rho``; arrays (m,)."""
+        layer, gamma = self.layer, self.mass
+        b2, damper = layer.width**2, layer.c / layer.v / dt + 2.0 * gamma / dt**2
+        bracket = b2 * (layer.k - damper * np.log(rho / old) + 2.0 * gamma / dt * rate)
+        quotient, slope = self._quotient(rho, old)
+        return quotient * bracket, slope * bracket - quotient * b2 * damper / rho
+
+    def _quotient(self, rho: Array, old: Array) -> tuple[Array, Array]:
+        """((Y_1 - Y_0)/(rho_1 - rho_0), its derivative with respect to rho_1)."""
+        step, middle = rho - old, 0.5 * (rho + old)
+        near = np.abs(step) < NEAR * middle
+        step = np.where(near, middle, step)
+        cut = self.layer.cut_off
+        quotient = np.where(near, cut(middle) / middle, (self.potential(rho) - self.potential(old)) / step)
+        h = 1e-4 * middle
+        bend = 0.5 * (cut(middle + h) / (middle + h) - cut(middle - h) / (middle - h)) / (2.0 * h)
+        return quotient, np.where(near, bend, (cut(rho) / rho - quotient) / step)
+
+    def rebound(self, mass: float, speed: float) -> float:
+        """e of a rigid body that enters with this speed: one equation in time. mass: of the body [kg/m²]; a law with
+        metric knows one, its own, and InputError for another."""
+        if self.mass not in (0.0, mass):
+            raise InputError(f"the law's metric is that of {self.mass} kg/m²: ask for the rebound of that mass")
+        return _rebound(self.layer, mass, speed, Metric.BLENDED if self.mass else Metric.FLAT)
+
+
+def contact_layer(
+    e: float,
+    *,
+    mass: float,
+    speed: float,
+    width: float,
+    start: float | None = None,
+    strength: float = 1.0,
+    metric: Metric = Metric.BLENDED,
+) -> ContactLayer:
+    """The law from which a rigid body of ``mass`` [kg/m²] returns with e times its ``speed`` [m/s], 0 < e <= 1.
+
+    strength: k b²/(mass V²), how soon the body is turned back. start: a [m], half the width when None. metric: BLENDED,
+    gamma = mass, or FLAT, gamma = 0. InputError for another and for values outside their range.
+    """
+    for name, value, unit in (("mass per area", mass, "kg/m²"), ("speed", speed, "m/s"), ("layer width", width, "m"),
+                              ("strength k b²/(mass V²)", strength, "units of one")):
+        positive(f"the {name}", value, unit)
+    if metric not in (Metric.BLENDED, Metric.FLAT):
+        raise InputError(f"a contact law cannot have {metric}: give Metric.BLENDED or Metric.FLAT")
+    a = 0.5 * width if start is None else start
+    k = strength * mass * speed**2 / width**2
+
+    def layer(s: float) -> Layer:
+        return Layer(width, k=k, c=s * width * k, speed=speed, start=a)
+
+    def excess(s: float) -> float:
+        return _rebound(layer(s), mass, speed, metric) - e
+
+    s, low = damping_ratio(e), 0.0
+    if s > 0.0:
+        while excess(s) > 0.0:
+            low, s = s, 2.0 * s
+        s = float(brentq(excess, low, s, xtol=1e-14, rtol=1e-9))
+    return ContactLayer(layer(s), mass if metric is Metric.BLENDED else 0.0)
+
+
+def _rebound(layer: Layer, mass: float, speed: float, metric: Metric) -> float:
+    """e of a rigid body."""
+    body = ConstrainedSystem(np.array([[mass]]), lambda q: float(q[0]), lambda q: np.ones(1))
+    found = layer_motion(
+        body, layer, q0=np.array([layer.width]), v0=np.array([-speed]), t_end=1e6 * layer.width / speed,
+        metric=metric, contacts=1, rtol=1e-9,
+    )
+    if not found.contacts:
+        raise InputError("the layer holds the body back for ever: give it more k or less c")
+    return found.contacts[0].restitution

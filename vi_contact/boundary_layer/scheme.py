@@ -1,0 +1,140 @@
+"""The midpoint rule with the boundary layer in the place of the exact inequality.
+
+    u1 - u0 = ½ dt (v0 + v1)
+    M (v1 - v0)/dt + ½ C (v0 + v1) + ½ K (u0 + u1) = f(t0 + ½ dt) - B_nᵀ r̄_n,    r̄_n = weight · p̄(gap1; gap0, rate0)
+
+p̄ is ``ContactLayer.mean_pressure``. The contact points' part is solved first, by Newton's method in their gaps on the
+compliance G = B A⁻¹ Bᵀ; its reactions are loads of the step, which then goes to the solver as any other. The exact
+inequality stays on behind the layer as a guard and never closes: the certificate certifies the equilibrium, with the
+layer's reactions, and an open gap.
+
+Order 2. Energy: r̄_n does the work of a potential, of the damper (never positive) and of the metric's inertia, all of it
+booked as contact work; what the layer holds at a time comes back when the gap opens.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from ..algebra import Array
+from ..errors import InputError, StepFailure
+from ..impact import NoImpact
+from ..schemes.midpoint import Midpoint
+from ..solvers.condensed import Condensed
+from ..step import ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
+from .contact_law import ContactLayer
+
+ITERATIONS, HALVINGS = 60, 30
+RATE = "layer_rate"  # in a state's memory: d ln(gap)/dt of the contact points [1/s]
+CLOSE = 1e-11  # change of the gaps relative to the gaps
+
+
+@dataclass(frozen=True)
+class LayeredStep(StepProblem):
+    """A step whose loads contain the layer's mean reactions (m,) [N]."""
+
+    layer: Array | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class BoundaryLayer(Midpoint):
+    """See the module's equations. Without friction, on rigid supports at rest, with mass at the contact nodes.
+
+    InputError for anything else, and for a start that is not inside the admissible set; StepFailure, naming the step,
+    when Newton's method does not converge.
+    """
+
+    law: ContactLayer
+
+    def check(self, problem: ContactProblem) -> None:
+        """InputError for what the law does not cover."""
+        super().check(problem)
+        surface = problem.surface
+        if problem.frictional:
+            raise InputError(f"BoundaryLayer is a law without friction: leave {problem.friction} out")
+        if problem.impact is not None and not isinstance(problem.impact, NoImpact):
+            raise InputError(f"BoundaryLayer makes the rebound itself: leave the impact law {problem.impact} out")
+        if np.any(surface.bilateral) or np.any(surface.compliance != 0.0):
+            raise InputError("BoundaryLayer needs unilateral contact on rigid supports: leave held points, springs out")
+        if surface.motion is not None:
+            raise InputError("BoundaryLayer needs an obstacle at rest: move the body's support instead")
+
+    def start(self, problem: ContactProblem, state: State, dt: float) -> State:
+        """InputError where the layer would have to begin behind the obstacle."""
+        surface = problem.surface
+        gap = surface.gap(state.t) - surface.normal_values(state.u)
+        if surface.count and not gap.min() > 0.0:
+            where = int(np.argmin(gap))
+            raise InputError(
+                f"contact point {where} starts with gap {gap[where]:.3g} m, outside the admissible set of the layer, "
+                "gap > 0: move the obstacle back by the layer's width, for example with ContactLayer.set_back(surface)"
+            )
+        return state
+
+    def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem:
+        """The midpoint step with the layer's reactions among the loads."""
+        step = super().step(problem, state, A, dt)
+        surface = problem.surface
+        if surface.count == 0:
+            return step
+        old = surface.gap(state.t) - surface.normal_values(state.u)
+        free = step.bound - surface.normal_values(A.factor.solve(step.b))
+        rate, pressure = self._rate(problem, state, old), np.zeros(surface.count)
+        if min(old.min(), free.min()) < self.law.layer.width:
+            G = _compliance(problem, A, step.scale) * (step.scale * surface.weights)
+            pressure = self._pressure(step, G, free, old, rate, dt)
+        reaction = surface.weights * pressure
+        b = step.b - step.scale * surface.reaction_load(reaction, len(step.b))
+        fields = {name: getattr(step, name) for name in StepProblem.__dataclass_fields__}
+        return LayeredStep(**fields | {"b": b, "active": np.zeros(surface.count, dtype=bool)}, layer=reaction)
+
+    def _rate(self, problem: ContactProblem, state: State, gap: Array) -> Array:
+        """ẏ = w_0 [1/s]: carried inside the layer, from the velocities outside."""
+        rate = -problem.surface.normal_values(state.v) / gap
+        return np.where(gap < self.law.layer.width, state.memory.get(RATE, rate), rate)
+
+    def _pressure(self, step: StepProblem, G: Array, free: Array, old: Array, rate: Array, dt: float) -> Array:
+        """p̄ (m,): gap = free + G p̄(gap) by Newton's method, in steps that leave a tenth of every gap at least."""
+        law = self.law
+        rho = old * np.maximum(1.0 + dt * rate, 0.2)
+        p, slope = law.mean_pressure(rho, old, rate, dt)
+        residual = rho - free - G @ p
+        for _ in range(ITERATIONS):
+            change = -np.linalg.solve(np.eye(len(rho)) - G * slope, residual)
+            if np.all(np.abs(change) <= CLOSE * rho):
+                return p
+            share = 1.0 / max(1.0, float(np.max(-change / (0.9 * rho))))
+            size = float(np.linalg.norm(residual))
+            for _ in range(HALVINGS):
+                p, slope = law.mean_pressure(rho + share * change, old, rate, dt)
+                residual = rho + share * change - free - G @ p
+                if np.linalg.norm(residual) < size:
+                    break
+                share *= 0.5
+            rho = rho + share * change
+        raise StepFailure(
+            f"the layer's reactions of step {step.k} at t = {step.t:.6g} s were not found in {ITERATIONS} Newton "
+            "steps: reduce the time step, or make the layer wider"
+        )
+
+    def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
+        """The midpoint's state; its reactions are the layer's, its active points those inside the layer."""
+        new = super().finish(problem, state, step, result, dt)
+        reaction = step.layer if isinstance(step, LayeredStep) else None
+        if reaction is None:
+            return new
+        surface = problem.surface
+        gap, old = (surface.gap(t) - surface.normal_values(u) for t, u in ((step.t, new.u), (state.t, state.u)))
+        rate = 2.0 / dt * np.log(gap / old) - self._rate(problem, state, old)
+        return replace(new, r_n=new.r_n + reaction, active=gap < self.law.layer.width, memory={RATE: rate})
+
+
+def _compliance(problem: ContactProblem, A: EffectiveMatrix, scale: float) -> Array:
+    """B A⁻¹ Bᵀ (m, m), made once for every A."""
+    kept: WeakKeyDictionary[EffectiveMatrix, Array] = problem.equations.kept("boundary layer", WeakKeyDictionary)
+    if A not in kept:
+        kept[A] = np.asarray(Condensed().prepare(A, problem.surface, scale).delassus)
+    return kept[A]
