@@ -13,7 +13,7 @@ from vi_contact.beam.algorithm import BeamRun, BeamStepper, run_beam
 from vi_contact.beam.contract import beam_problem, rod_problem, rubbing_problem
 from vi_contact.beam.coupling import rod_forces
 from vi_contact.beam.elements import Elements
-from vi_contact.beam.readings import published_beam, published_mu, published_start
+from vi_contact.beam.source_data import published_beam, published_mu, published_start
 from vi_contact.beam.tip import ExactFriction, RegularisedFriction
 from vi_contact.beam.values import Rod, Start, TimoshenkoBeam
 from vi_contact.errors import InputError

@@ -11,7 +11,7 @@ from scipy.sparse.linalg import eigsh, spsolve
 
 from vi_contact.algebra import Array
 from vi_contact.beam.elements import Elements, beam_matrices, rod_matrices
-from vi_contact.beam.readings import published_elements
+from vi_contact.beam.source_data import published_elements
 from vi_contact.beam.values import Rod, TimoshenkoBeam
 
 pytestmark = pytest.mark.serial

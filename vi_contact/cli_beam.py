@@ -47,7 +47,7 @@ def _run(options: argparse.Namespace) -> str:
     from .algebra import SerialComm
     from .beam.algorithm import BeamStepper, run_beam
     from .beam.elements import Elements
-    from .beam.readings import published_elements, published_mu, published_start
+    from .beam.source_data import published_elements, published_mu, published_start
     from .beam.tip import ExactFriction, RegularisedFriction, TipFriction
     from .beam.values import TimoshenkoBeam
     from .output import run_folder
@@ -73,7 +73,7 @@ def _run(options: argparse.Namespace) -> str:
 def _force(options: argparse.Namespace, elements: Any, steps: int) -> Any:
     """t -> |r_N|."""
     from .beam.coupling import rod_forces
-    from .beam.readings import readings
+    from .beam.source_data import readings
     from .beam.values import Rod
 
     if options.force is not None:

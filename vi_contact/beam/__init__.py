@@ -4,7 +4,7 @@ from .algorithm import BeamRun, BeamStepper, Snapshot, run_beam
 from .contract import beam_problem, rod_problem, rubbing_problem
 from .coupling import StepForces, rod_forces
 from .elements import Elements
-from .readings import (
+from .source_data import (
     published_beam,
     published_elements,
     published_friction,
