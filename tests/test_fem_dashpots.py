@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+from collections import deque
 
 import numpy as np
 import pytest
@@ -98,7 +99,7 @@ def test_oblique_waves(comm, wave, angle, length):
     )
     dt = 0.5 * period / nx / packet.speed
     steps = round(11.5 * length / (packet.speed * math.cos(slope)) / dt)
-    *_, (state, _) = vc.march(linear(system), dt=dt, steps=steps)
+    ((state, _),) = deque(vc.march(linear(system), dt=dt, steps=steps), maxlen=1)
     left = system.kinetic_energy(state.v) + system.strain_energy(state.u)
     share = left / (system.kinetic_energy(system.v0) + system.strain_energy(system.u0))
     assert share == pytest.approx(vc.dashpot_energy(material, slope, wave=wave), rel=0.2)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import deque
+
 import numpy as np
 import pytest
 from fem_problems import linear
@@ -75,7 +77,7 @@ def test_waves_of_a_structure_leave(comm):
         dashpots = [fem.FreeField(tags[n], base=quiet, dt=DT) for n in ("left", "right")] if sides else []
         tied = () if sides else fem.Tied(tags["left"], tags["right"])
         system = fem.assemble(mesh, SOIL, clamped=tags["bottom"], dashpots=dashpots, tied=tied, loads=push)
-        *_, (state, _) = vc.march(linear(system), dt=DT, steps=60)
+        ((state, _),) = deque(vc.march(linear(system), dt=DT, steps=60), maxlen=1)
         left.append(system.kinetic_energy(state.v) + system.strain_energy(state.u))
     assert left[0] < 0.1 * left[1]
 

@@ -13,7 +13,7 @@ _HOME = {
     "Tied": "ties", "Dashpots": "dashpots", "CompliantBase": "dashpots", "FreeField": "free_field",
     "contact_surface": "trace",
     "contact_pair": "pairs", "NodeToNode": "matching", "DualMortar": "mortar", "together": "joined",
-    "geometric_stiffness": "gravity",
+    "geometric_stiffness": "gravity", "release": "staging",
     "XDMF": "fields",
     "Reactions": "reactions", "SectionForces": "section_forces",
 }
