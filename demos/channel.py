@@ -28,11 +28,10 @@ from vi_contact import fem
 from vi_contact import plotting_channel as pictures
 from vi_contact.meshes.channel import ChannelMesh
 from vi_contact.models.channel import Channel, ChannelModel, build
+from vi_contact.models.channel_run import REFERENCE
 from vi_contact.plotting import History, plot_energy, plot_excitation
 from vi_contact.plotting_channel_mesh import animate, plot_layout, plot_moments
 from vi_contact.plotting_friction import plot_states
-from vi_contact.solvers.volume import Volume
-from vi_contact.solvers.volume_snes import ReducedNewton
 from vi_contact.static import static_equilibrium
 
 # Parameters ----------------------------------------------------------------------------------------------------------
@@ -61,7 +60,7 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
             problem, scheme=scheme, dt=dt, steps=40 if quick else STEPS, state=weighing, record=model.recorders(),
             fields=fem.XDMF(every=FRAMES_EVERY), out=folder(out, name), progress=progress,
         )
-        routes = vc.CrossChecked(vc.Condensed(), [Volume(method=ReducedNewton())])  # two routes to every step
+        routes = vc.CrossChecked(vc.Condensed(), [REFERENCE])  # two routes to every step
         vc.simulate(problem, scheme=scheme, solver=routes, dt=dt, steps=4 if quick else CHECKED, state=weighing,
                     progress=False)
         histories[name] = solution.history

@@ -23,13 +23,15 @@ AROUND = 0.8  # heights of the channel that are shown beside and below it
 
 @dataclass(frozen=True)
 class Bodies:
-    """Frames of a run with what belongs to the channel: masks of ``cells`` (c,), the channel's node of every contact
-    condition ``nodes`` (m,)."""
+    """Frames of a run with what belongs to the channel: mask of ``cells`` (c,), its node of every contact condition
+    ``nodes`` (m,), and where from there a condition is drawn ``inwards`` (m, 2): at corners those of both sides apart,
+    each towards the middle of its side."""
 
     frames: Frames
     tractions: Tractions
     cells: Mask
     nodes: Indices
+    inwards: Array
 
 
 def read_bodies(folder: str | Path, shape: ChannelMesh) -> Bodies:
@@ -40,7 +42,17 @@ def read_bodies(folder: str | Path, shape: ChannelMesh) -> Bodies:
     cells = (x[1] < centres[:, 0]) & (centres[:, 0] < x[4]) & (centres[:, 1] > y[1])
     own = np.unique(frames.cells[cells])
     nearest = [np.argmin(np.sum((frames.points[own] - point) ** 2, axis=1)) for point in tractions.points]
-    return Bodies(frames, tractions, cells, own[np.array(nearest, dtype=np.int64)])
+    nodes = own[np.array(nearest, dtype=np.int64)]
+    return Bodies(frames, tractions, cells, nodes, _inwards(tractions, nodes, shape))
+
+
+def _inwards(tractions: Tractions, nodes: Indices, shape: ChannelMesh) -> Array:
+    """(m, 2) opposite to the normals; at nodes of two conditions also twice towards the middle of the side."""
+    _, where, counts = np.unique(nodes, return_inverse=True, return_counts=True)
+    base = tractions.normals[:, 1] < -0.5
+    middle = 0.5 * np.array([shape.x[1] + shape.x[4], shape.y[1] + shape.y[3]])
+    along = np.where(base[:, None], [1.0, 0.0], [0.0, 1.0]) * np.sign(middle - tractions.points)
+    return np.asarray(np.where((counts[where] > 1)[:, None], 2.0 * along, 0.0) - tractions.normals)
 
 
 def plot_layout(
@@ -134,12 +146,13 @@ class Colours:
         shown, unit = _scaled(most, "Pa")
         return cls(float(shown[0] / most[0]), unit, PowerNorm(0.5, 0.0, float(shown[0])))
 
-    def bar(self, figure: Any, axes: Any) -> None:
+    def bar(self, figure: Any, axes: Any, shrink: float = 1.0) -> None:
         """The colour bar beside axes."""
         from matplotlib.cm import ScalarMappable
 
-        label = f"contact pressure [{self.unit}] (open points white)"
-        figure.colorbar(ScalarMappable(self.norm, MAP), ax=axes, label=label, fraction=0.04, aspect=35, pad=0.01)
+        label = f"contact pressure [{self.unit}], open points white"
+        figure.colorbar(ScalarMappable(self.norm, MAP), ax=axes, label=label, fraction=0.04, aspect=35, pad=0.01,
+                        shrink=shrink)
 
 
 def draw_bodies(
@@ -153,7 +166,7 @@ def draw_bodies(
     _fill(axis, moved[frames.cells[~bodies.cells]], SOIL, lw=0.3)
     _fill(axis, moved[frames.cells[bodies.cells]], CONCRETE)
     pressure, _ = tractions.at(shown)
-    places = moved[bodies.nodes] - INWARDS * shape.wall * tractions.normals
+    places = moved[bodies.nodes] + INWARDS * shape.wall * bodies.inwards
     dots: dict[str, Any] = {"s": 26, "edgecolors": "black", "linewidths": 0.5, "norm": colours.norm, "cmap": MAP}
     closed = pressure > 0.0
     axis.scatter(*places[~closed].T, s=26, c="white", edgecolors="black", linewidths=0.5, zorder=4)
@@ -179,7 +192,7 @@ def animate(
     bodies = read_bodies(folder, shape)
     colours = Colours.of(np.concatenate([bodies.tractions.at(t)[0] for t in times]))
     figure, (top, bottom) = _plane((6.6, 6.0), heights=(3.6, 1.0))
-    colours.bar(figure, top)
+    colours.bar(figure, top, shrink=0.85)
     marker = _traces(bottom, history, openings, (times[0], times[-1]))
     figure.draw_without_rendering()
     figure.set_layout_engine("none")  # the same places in every frame, laid out once
