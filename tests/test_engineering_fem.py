@@ -14,7 +14,11 @@ from vi_contact.algebra import Array
 from vi_contact.base_motion import base_motion
 from vi_contact.errors import InputError
 from vi_contact.fem import compat
+from vi_contact.fem.frames import block_of
+from vi_contact.models.channel import Channel, build
+from vi_contact.resultants import tangent_vectors
 from vi_contact.static import initial_state
+from vi_contact.surfaces import nodal_frames
 
 WIDTH, HEIGHT = 0.5, 4.0
 TIP, WIND, WEIGHT = (2000.0, -5000.0), 700.0, (300.0, -24000.0)  # Pa, Pa, N/m³
@@ -264,6 +268,43 @@ def test_ranks_agree(comm: Any) -> None:
             assert np.abs(values - alone[name]).max() < 1e-10 * size, name
 
 
+@pytest.mark.serial
+def test_tangents_are_those_of_the_surfaces() -> None:
+    """Of axes and inclined directions in the plane and in space, as ``fem.frames`` makes them."""
+    rng = np.random.default_rng(3)
+    for d in (2, 3):
+        inclined = rng.normal(size=(40, d))
+        inclined[:10, 0] = 0.0
+        directions = np.vstack([np.eye(d), -np.eye(d), inclined / np.linalg.norm(inclined, axis=1)[:, None]])
+        frames = nodal_frames(directions)
+        for found, frame in zip(tangent_vectors(directions), frames, strict=True):
+            column, block_ = block_of(frame)
+            assert np.array_equal(found, np.delete(block_, column, axis=1))
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.5 * np.pi, np.pi, 1.5 * np.pi, 0.7], ids="{:.2f}".format)
+def test_friction_of_walls_in_all_directions(comm: Any, angle: float) -> None:
+    """Forces of a rubbing face that looks down, right, up, left or askew, against Contact's friction force."""
+    mesh, tags = block(comm, lengths=(2.0, 1.0), divisions=(4, 2), angle=angle)
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    push = fem.Traction(tags["top"], tuple(turn @ [3.0e4, -1.0e5]))
+    system = fem.assemble(mesh, CONCRETE, clamped=tags["left"], loads=push)
+    ground = vc.HalfSpace(point=(0.0, 0.0), normal=tuple(turn @ [0.0, 1.0]))
+    problem = vc.ContactProblem(
+        system, fem.contact_surface(system, tags["bottom"], obstacle=ground), friction=vc.Coulomb(0.3)
+    )
+    state = vc.static_equilibrium(problem, solver=vc.Condensed(vc.FrictionNewton()))
+    whole = vc.Contact().start(problem, state)
+    row = vc.Resultants("base", tuple(turn @ [1.0, 0.0])).start(problem, state)
+    size = row["N_base"]
+    assert row["T_base"] < -0.05 * size  # against the push, along t = (-n_y, n_x) of the face
+    for axis in "xy":
+        total = whole[f"contact_force_{axis}"] + whole[f"friction_force_{axis}"]
+        assert row[f"force_{axis}_base"] == pytest.approx(total, abs=1e-12 * size)
+    held = fem.Reactions("left", tags["left"], tuple(turn @ [1.0, 0.0]), push).start(problem, state)
+    assert row["M_base"] + held["reaction_M_left"] == pytest.approx(6.0e4, rel=1e-8)
+
+
 def test_friction_resultants_are_the_recorded_forces(comm: Any) -> None:
     """N, T, force and M of a rubbing surface against Contact's forces; M is what the reactions and loads leave."""
     mesh, tags = block(comm, lengths=(2.0, 1.0), divisions=(4, 2))
@@ -289,3 +330,30 @@ def test_friction_resultants_are_the_recorded_forces(comm: Any) -> None:
         for name, mask in (("a", lambda x, n: x[:, 0] <= 1.0), ("b", lambda x, n: x[:, 0] > 1.0))
     ]
     assert halves[0]["M_a"] + halves[1]["M_b"] == pytest.approx(row["M_base"], rel=1e-12)
+
+
+@pytest.mark.serial
+def test_wall_of_the_channel_is_in_equilibrium(comm: Any) -> None:
+    """Buried channel after gravity, with friction: its weight is the contact force on base and walls, and N, V, M at
+    the foot of a wall are those of the wall's weight and of the contact forces above the cut."""
+    model = build(Channel(), comm)
+    x, y = model.channel.shape.x, model.channel.shape.y
+    left, inner, top_of_slab = x[1], x[2], y[2]
+    problem = model.problem(friction=vc.Coulomb(0.5))
+    state = vc.static_equilibrium(problem, solver=vc.Condensed(vc.FrictionNewton()))
+    middle = (0.5 * (left + inner), top_of_slab)
+    whole = vc.Resultants("all", middle, normal=(0.0, -1.0)).start(problem, state)
+    above_cut = vc.Resultants(
+        "wall", middle, where=lambda p, n: (n[:, 0] < -0.5) & (p[:, 1] > top_of_slab + 1e-6)
+    ).start(problem, state)
+    cut = {"foot": ((left, top_of_slab), (inner, top_of_slab))}
+    g = 9.80665
+    section = fem.SectionForces(cut, cells=model.tags["channel"], gravity=(0.0, -g)).start(problem, state)
+    area = (x[4] - x[1]) * (y[3] - y[1]) - (x[3] - x[2]) * (y[3] - y[2])
+    weight = 2400.0 * g * area
+    wall = 2400.0 * g * (inner - left) * (y[3] - top_of_slab)
+    assert whole["force_y_all"] == pytest.approx(weight, rel=1e-8)
+    assert whole["force_x_all"] == pytest.approx(0.0, abs=1e-8 * weight)
+    assert section["N_foot"] == pytest.approx(above_cut["force_y_wall"] - wall, rel=1e-8)
+    assert section["V_foot"] == pytest.approx(above_cut["force_x_wall"], rel=1e-8)
+    assert section["M_foot"] == pytest.approx(above_cut["M_wall"], rel=1e-8)

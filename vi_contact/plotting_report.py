@@ -138,7 +138,9 @@ def _range(run: RunFolder, name: str) -> float:
 
 def _lines(axis: Any, run: RunFolder, names: Sequence[str], title: str) -> None:
     """Histories in one unit, with a prefix that fits."""
-    values, unit = _scaled(np.array([run.history[name] for name in names]), run.columns[names[0]][0])
+    values, unit = np.array([run.history[name] for name in names]), run.columns[names[0]][0]
+    if unit != "-":
+        values, unit = _scaled(values, unit)
     for one, name in zip(values, names, strict=True):
         axis.plot(run.history["t"], one, lw=0.7, label=name)
     _label(axis, title)
@@ -156,6 +158,8 @@ def _label(axis: Any, title: str, rows: int = 1) -> None:
 
 def _spectrum(axis: Any, run: RunFolder, names: Sequence[str]) -> None:
     """Pseudo-acceleration of the ground's motion, 5 % damping, over periods that its steps resolve."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
     for name in names:
         record = recorded_motion(run.history, name)
         periods = np.geomspace(max(10.0 * record.dt, 0.01 * record.duration), max(2.0 * record.duration, 1.0), 100)
@@ -163,6 +167,9 @@ def _spectrum(axis: Any, run: RunFolder, names: Sequence[str]) -> None:
         spectrum = response_spectrum(record, periods)
         axis.semilogx(periods, spectrum.psa / STANDARD_GRAVITY, lw=0.9, label=name)
     _label(axis, "response spectrum of the ground, 5 %")
+    axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.xaxis.set_minor_formatter(NullFormatter())
     axis.set_ylim(bottom=0.0)
     axis.set(xlabel="period [s]", ylabel="pseudo-acceleration [g]")
 
@@ -183,7 +190,7 @@ def _energies(axis: Any, run: RunFolder) -> None:
     values, unit = _scaled(np.array([run.history[name] for name, *_ in present]), "J")
     for one, (_, label, colour, style) in zip(values, present, strict=True):
         axis.plot(run.history["t"], one, color=colour, ls=style, lw=0.8, label=label)
-    _label(axis, "energy", rows=1 if len(present) < 7 else 2)
+    _label(axis, "energy", rows=1 if len(present) < 6 else 2)
     axis.margins(x=0.0)
     axis.set(xlabel="time [s]", ylabel=f"[{unit}]")
 

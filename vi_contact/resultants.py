@@ -63,7 +63,7 @@ class Part:
         self.mask, self.weights = mask, geometry.weights[mask]
         self.normals, self.arms = normals[mask], points[mask] - self.centre
         self.normal = self._direction(name, normal)
-        self.frames = nodal_frames(self.normals)
+        self.tangents = tangent_vectors(self.normals)
         self.shared = len(np.unique(points[mask], axis=0)) < int(mask.sum())
         self.name, self.dimension = name, points.shape[1]
 
@@ -84,7 +84,7 @@ class Part:
                     f"part '{self.name}' has points with two contact directions, whose friction has no frame of its "
                     "own in three dimensions: leave them out of the mask"
                 )
-            at_points = at_points - np.einsum("rkc,kdc->rkd", r_t[:, self.mask], self.frames[:, :, 1:])
+            at_points = at_points - np.einsum("rkc,kdc->rkd", r_t[:, self.mask], self.tangents)
         force = 0.0 + at_points.sum(axis=1)
         thrust = r_n.sum(axis=1)
         raised = np.full(len(thrust), np.nan)
@@ -128,6 +128,25 @@ class Part:
         modes = np.column_stack([self.normals, turn])
         motion = np.linalg.lstsq(root[:, None] * modes, root * u_n[self.mask], rcond=1e-9)[0]
         return {"theta": float(motion[2] / size), "settlement": float(motion[:2] @ self.normal)}
+
+
+def tangent_vectors(normals: Array) -> Array:
+    """(m, d, d - 1) tangents in which surfaces of finite elements have slip and r_t, for contact directions (m, d).
+
+    A direction along an axis has the other axes; another one has the tangents of ``nodal_frames``, in three dimensions
+    in the order of the axes that they are nearest to (``fem.frames``). Points with several directions are not covered:
+    in the plane nothing rubs there.
+    """
+    m, d = normals.shape
+    tangents = np.empty((m, d, max(d - 1, 0)))
+    for k, (direction, frame) in enumerate(zip(normals, nodal_frames(normals), strict=True)):
+        c = int(np.argmax(np.abs(direction)))
+        if np.count_nonzero(direction) == 1:
+            tangents[k] = np.delete(np.eye(d), c, axis=1)
+            continue
+        others = sorted((i for i in range(d) if i != c), key=lambda i: abs(direction[i]))
+        tangents[k] = frame[:, 1:][:, np.argsort(others)]
+    return tangents
 
 
 _MEANING = {
