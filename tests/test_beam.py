@@ -165,6 +165,7 @@ BAD: dict[str, tuple[Callable[[], object], str]] = {
     "steps": (lambda: run(0.0, source.no_force, steps=0, m=4), "steps is 0"),
     "force": (lambda: run(0.0, lambda t: -1.0, m=4), r"normal_force\(0 s\) is -1 N; return"),
     "mu": (lambda: run(0.0, lambda t: 1.0, m=4, mu=lambda t, rate: np.nan), r"mu\(0 s, 5 m/s\) is nan; return"),
+    "load": (lambda: run(0.0, source.no_force, m=4, load=lambda t: np.inf), r"load\(0 s\) is inf N/m; return"),
     "start": (lambda: run(0.0, source.no_force, m=4, start=Start(u=lambda x: x[:2])), r"u\(x\) has shape \(2,\)"),
 }
 

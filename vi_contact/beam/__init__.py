@@ -1,6 +1,6 @@
 """Rod and Timoshenko beam of seed 002: contact and friction at the tip of a beam, with numpy and scipy only."""
 
-from .algorithm import BeamRun, BeamStepper, Snapshot, run_beam
+from .algorithm import BeamRun, BeamStep, BeamStepper, Snapshot, run_beam
 from .contract import beam_problem, rod_problem, rubbing_problem
 from .coupling import StepForces, rod_forces
 from .elements import Elements
@@ -19,8 +19,8 @@ from .tip import ExactFriction, RegularisedFriction, Slip, TipFriction
 from .values import Rod, Start, TimoshenkoBeam
 
 __all__ = [
-    "BeamRun", "BeamStepper", "Elements", "ExactFriction", "RegularisedFriction", "Rod", "Slip", "Snapshot", "Start",
-    "StepForces", "TimoshenkoBeam", "TipFriction", "beam_problem", "published_beam", "published_elements",
-    "published_friction", "published_mu", "published_start", "reading_a", "reading_b", "reading_c", "readings",
-    "rod_forces", "rod_problem", "rubbing_problem", "run_beam",
+    "BeamRun", "BeamStep", "BeamStepper", "Elements", "ExactFriction", "RegularisedFriction", "Rod", "Slip",
+    "Snapshot", "Start", "StepForces", "TimoshenkoBeam", "TipFriction", "beam_problem", "published_beam",
+    "published_elements", "published_friction", "published_mu", "published_start", "reading_a", "reading_b",
+    "reading_c", "readings", "rod_forces", "rod_problem", "rubbing_problem", "run_beam",
 ]

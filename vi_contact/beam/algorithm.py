@@ -23,14 +23,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import count, islice
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from ..algebra import Array, SerialFactor, SerialMatrix
 from ..errors import InputError, StepFailure
-from .elements import Elements, beam_matrices
+from .elements import BeamMatrices, Elements, beam_matrices
 from .tip import ExactFriction, Slip, TipFriction
 from .values import Start, TimoshenkoBeam
 
@@ -91,6 +92,20 @@ class BeamRun:
 
 
 @dataclass(frozen=True)
+class BeamStep:
+    """What a step led to: time t [s], y and w there, increment of y, slip of the tip; |r_N| [N], mu and load [N/m]."""
+
+    t: float
+    y: Array
+    w: Array
+    increment: Array
+    slip: Slip
+    normal_force: float
+    mu: float
+    load: float
+
+
+@dataclass(frozen=True)
 class BeamStepper:
     """The condensed step. ``normal_force``: t -> |r_N| >= 0 [N]; ``mu``: (t, slip rate [m/s] >= 0) -> coefficient;
     ``load``: t -> uniform force along the beam [N/m], or None. InputError for dt <= 0."""
@@ -106,27 +121,24 @@ class BeamStepper:
     def __post_init__(self) -> None:
         if not (math.isfinite(self.dt) and self.dt > 0.0):
             raise InputError(f"the time step dt is {self.dt!r} s; give a positive number")
-        object.__setattr__(self, "_matrices", beam_matrices(self.beam, self.elements))
 
-    @property
-    def matrices(self) -> Any:
+    @cached_property
+    def matrices(self) -> BeamMatrices:
         """M, S and the unit load."""
-        return self._matrices  # type: ignore[attr-defined]
+        return beam_matrices(self.beam, self.elements)
 
-    def steps(self, y: Array, w: Array) -> Iterator[tuple[Array, Array, Slip, float, float, float]]:
-        """Endless (y1, w1, slip, |r_N|, mu, f) from y, w at t = 0. InputError for a bad force or coefficient;
-        StepFailure with the number of the step and its time."""
+    def steps(self, y: Array, w: Array) -> Iterator[BeamStep]:
+        """Endless, from y, w at t = 0. InputError for a bad force or coefficient; StepFailure with the number of the
+        step and its time."""
         M, S, dt = self.matrices.M, self.matrices.S, self.dt
         P = ((2.0 / dt**2) * M + (self.beam.viscosity / dt + 0.5) * S).tocsr()
         T = SerialFactor(SerialMatrix(P[:-1, :-1]))
         p = P[:-1, -1].toarray().ravel()
         column = T.solve(p)
         c = float(P[-1, -1] - p @ column)
-        k = 0
-        while True:
+        for k in count():
             t = k * dt
-            N, mu = self._limits(t, abs(float(w[-1])))
-            f = 0.0 if self.load is None else float(self.load(t))
+            N, mu, f = self._given(t, abs(float(w[-1])))
             r = (2.0 / dt) * (M @ w) - S @ y + f * self.matrices.load
             free = T.solve(r[:-1])
             g = float(r[-1] - p @ free)
@@ -136,17 +148,19 @@ class BeamStepper:
                 raise StepFailure(f"step {k + 1}, t = {t + dt:.6g} s: {failure}") from None
             increment = np.append(free - slip.s * column, slip.s)
             y, w = y + increment, (2.0 / dt) * increment - w
-            k += 1
-            yield y, w, slip, N, mu, f
+            yield BeamStep((k + 1) * dt, y, w, increment, slip, N, mu, f)
 
-    def _limits(self, t: float, rate: float) -> tuple[float, float]:
-        """(|r_N|, mu) at a time, checked."""
+    def _given(self, t: float, rate: float) -> tuple[float, float, float]:
+        """(|r_N|, mu, load) at a time, checked."""
         N, mu = float(self.normal_force(t)), float(self.mu(t, rate))
+        f = 0.0 if self.load is None else float(self.load(t))
         if not (math.isfinite(N) and N >= 0.0):
             raise InputError(f"normal_force({t:.6g} s) is {N:g} N; return |r_N|, zero or a positive finite number")
         if not (math.isfinite(mu) and mu >= 0.0):
             raise InputError(f"mu({t:.6g} s, {rate:.6g} m/s) is {mu:g}; return zero or a positive finite number")
-        return N, mu
+        if not math.isfinite(f):
+            raise InputError(f"load({t:.6g} s) is {f:g} N/m; return a finite number")
+        return N, mu, f
 
 
 def run_beam(stepper: BeamStepper, start: Start, *, steps: int, every: int = 0) -> BeamRun:
@@ -161,11 +175,10 @@ def run_beam(stepper: BeamStepper, start: Start, *, steps: int, every: int = 0) 
     w = np.concatenate([start.at("omega", x), start.at("v", x)])
     ledger = _Ledger(stepper, y, w)
     snapshots = [_snapshot(0.0, y, w)] if every else []
-    for k, (y1, w1, slip, N, mu, f) in zip(range(1, steps + 1), stepper.steps(y, w), strict=False):
-        ledger.add(k, y1 - y, f, slip, N, mu, y1, w1)
-        y, w = y1, w1
+    for k, step in enumerate(islice(stepper.steps(y, w), steps), start=1):
+        ledger.add(step)
         if every and k % every == 0:
-            snapshots.append(_snapshot(k * stepper.dt, y, w))
+            snapshots.append(_snapshot(step.t, step.y, step.w))
     return BeamRun(np.insert(x, 0, 0.0), ledger.columns(), tuple(snapshots))
 
 
@@ -194,17 +207,17 @@ class _Ledger:
         matrices = self._stepper.matrices
         return 0.5 * float(w @ (matrices.M @ w)), 0.5 * float(y @ (matrices.S @ y))
 
-    def add(self, k: int, dy: Array, f: float, slip: Slip, N: float, mu: float, y: Array, w: Array) -> None:
+    def add(self, step: BeamStep) -> None:
         """The row of a step."""
-        matrices, stepper = self._stepper.matrices, self._stepper
-        damping = stepper.beam.viscosity / stepper.dt * float(dy @ (matrices.S @ dy))
-        self._sums += f * float(matrices.load @ dy), damping, slip.force * slip.s
-        kinetic, strain = self._energies(y, w)
+        matrices, stepper, slip = self._stepper.matrices, self._stepper, step.slip
+        damping = stepper.beam.viscosity / stepper.dt * float(step.increment @ (matrices.S @ step.increment))
+        self._sums += step.load * float(matrices.load @ step.increment), damping, slip.force * slip.s
+        kinetic, strain = self._energies(step.y, step.w)
         work, viscous, friction = self._sums
         defect = kinetic + strain - self._start - (work - viscous - friction)
         self._rows.append((
-            k * stepper.dt, y[-1], w[-1], slip.force, slip.s, N, mu, slip.updates, kinetic, strain, work, viscous,
-            friction, defect,
+            step.t, step.y[-1], step.w[-1], slip.force, slip.s, step.normal_force, step.mu, slip.updates, kinetic,
+            strain, work, viscous, friction, defect,
         ))
 
     def columns(self) -> dict[str, Array]:
