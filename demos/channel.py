@@ -31,6 +31,7 @@ from vi_contact.models.channel import Channel, ChannelModel, build
 from vi_contact.models.channel_run import REFERENCE
 from vi_contact.plotting import History, plot_energy, plot_excitation
 from vi_contact.plotting_channel_mesh import animate, plot_layout, plot_moments
+from vi_contact.plotting_channel_run import illustrate
 from vi_contact.plotting_friction import plot_states
 from vi_contact.static import static_equilibrium
 
@@ -64,13 +65,14 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
         vc.simulate(problem, scheme=scheme, solver=routes, dt=dt, steps=4 if quick else CHECKED, state=weighing,
                     progress=False)
         histories[name] = solution.history
-        numbers |= {f"{name}: {key}": value for key, value in key_numbers(solution.history).items()} | {
-            f"{name}: certificate": solution.facts["worst_certificate"],
-            f"{name}: energy defect": solution.facts["energy_defect"],
-            f"{name}: cross-check": routes.worst,
+        found = key_numbers(solution.history) | {
+            "certificate": solution.facts["worst_certificate"], "energy defect": solution.facts["energy_defect"],
+            "cross-check": routes.worst,
         }
+        numbers |= {f"{name}: {key}": value for key, value in found.items()}
         if comm.rank == 0:
             print(f"\n{name}\n{solution.summary()}")
+            print("\n".join(f"  {key:<26} {value:.6g}" for key, value in found.items()))
     if comm.rank == 0:
         draw(model, histories, out, quick)
         print(f"\nFigures and the film are in {out}, histories and ParaView files in folders below it.")
@@ -89,12 +91,9 @@ def key_numbers(history: History) -> dict[str, float]:
     u_1, u_7 = history["u_y_1"], history["u_y_7"]
     tiny = 1e-9 * max(left.max(), right.max())
     return {
-        "opening left": float(history["opening_left"].max()),
-        "opening right": float(history["opening_right"].max()),
+        "opening left": float(history["opening_left"].max()), "opening right": float(history["opening_right"].max()),
         "both tops open": float(np.mean((left > tiny) & (right > tiny))) if tiny > 0.0 else 0.0,
-        "settlement": float(u_1[0]),
-        "u_y of point 1, min": float(u_1.min()),
-        "u_y of point 1, max": float(u_1.max()),
+        "settlement": float(u_1[0]), "u_y of point 1, min": float(u_1.min()), "u_y of point 1, max": float(u_1.max()),
         "correlation of 1 and 7": float(np.corrcoef(u_1, u_7)[0, 1]),
         "pressure": float(np.max(history["pressure"])),
     }
@@ -104,11 +103,10 @@ def draw(model: ChannelModel, runs: Mapping[str, History], out: Path, quick: boo
     """All figures and the film."""
     sliding, coulomb, bilateral = runs
     unilateral = {name: runs[name] for name in (sliding, coulomb)}
-    names = {"base": "base", "left": "left wall", "right": "right wall"}
-    outline = pictures.Outline(model.arc, {names[side]: mask for side, mask in model.sides.items()})
-    shape, points = CHANNEL.shape, {str(number): CHANNEL.point(number) for number in range(1, 20)}
+    outline = pictures.Outline.of(model.surface.points, model.surface.normals)
+    points = {str(number): CHANNEL.point(number) for number in range(1, 20)}
     plot_layout(
-        folder(out, sliding), shape, points, out / "layout.png", title="The channel in its layer (compare Fig. 6)",
+        folder(out, sliding), points, out / "layout.png", title="The channel in its layer (compare Fig. 6)",
         soil=f"soil\n{describe(CHANNEL.soil)}", concrete=f"concrete\n{describe(CHANNEL.concrete)}",
         ends="ends of the layer\n$u_y$ = 0, $u_x$ free",
     )
@@ -121,11 +119,11 @@ def draw(model: ChannelModel, runs: Mapping[str, History], out: Path, quick: boo
     plot_states(runs[coulomb], out / "states.png", position=outline.places(), axis_label="arc length [m]",
                 title=f"Interface, {coulomb}")
     times, film = (TIMES, np.arange(*FILM, 0.025)) if not quick else ((0.2, 0.4), (0.2, 0.3, 0.4))
-    plot_moments({name: folder(out, name) for name in unilateral}, shape, times, out / "moments.png",
+    plot_moments({name: folder(out, name) for name in unilateral}, times, out / "moments.png",
                  title="Channel and soil", magnified=500.0)
     tops = {"top of the left wall": pictures.opening(runs[sliding], "19", (-1.0, 0.0)),
             "of the right wall": pictures.opening(runs[sliding], "13", (1.0, 0.0))}
-    animate(folder(out, sliding), shape, out / "channel.gif", title=sliding, magnified=300.0, history=runs[sliding],
+    animate(folder(out, sliding), out / "channel.gif", title=sliding, magnified=300.0, history=runs[sliding],
             times=film, openings=tops)
     for name, history in runs.items():
         plot_energy(history, folder(out, name) / "energy.png", title=f"Energy ledger, {name}")
@@ -142,6 +140,11 @@ def describe(material: vc.LinearElastic) -> str:
 if __name__ == "__main__":
     if len(sys.argv) > 1:
         from vi_contact.cli import main as command
+        from vi_contact.cli import parser
 
-        raise SystemExit(command(["channel", *sys.argv[1:]]))
+        arguments = ["channel", *sys.argv[1:]]
+        failed = command(arguments)
+        if not failed and MPI.COMM_WORLD.rank == 0:
+            illustrate(parser().parse_args(arguments).out)
+        sys.exit(failed)
     main()

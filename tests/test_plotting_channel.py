@@ -25,6 +25,7 @@ from vi_contact.plotting_channel import (
     plot_rocking,
 )
 from vi_contact.plotting_channel_mesh import animate, plot_layout, plot_moments, read_bodies
+from vi_contact.plotting_channel_run import film, illustrate
 from vi_contact.static import static_equilibrium
 
 pytestmark = pytest.mark.serial
@@ -65,7 +66,7 @@ def figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
 
 
 def outline(model: ChannelModel) -> Outline:
-    return Outline(model.arc, {"base": model.sides["base"], "left": model.sides["left"], "right": model.sides["right"]})
+    return Outline.of(model.surface.points, model.surface.normals)
 
 
 def check(path: Path, figure: Any) -> None:
@@ -80,8 +81,12 @@ def check(path: Path, figure: Any) -> None:
 
 def test_the_outline_runs_down_along_and_up(run: Any) -> None:
     """Left wall 0 to 3 m, base to 7 m, right wall to 10 m; conditions at a corner in the order of their sides."""
-    found = outline(run[0])
-    assert [name for name, _ in found.along()] == ["left", "base", "right"]
+    model, _, _ = run
+    found = outline(model)
+    np.testing.assert_allclose(found.arc, model.arc, atol=1e-12)
+    for name, side in (("left wall", "left"), ("base", "base"), ("right wall", "right")):
+        assert np.array_equal(found.sides[name], model.sides[side])
+    assert [name for name, _ in found.along()] == ["left wall", "base", "right wall"]
     assert found.corners() == pytest.approx([3.0, 7.0])
     order = np.argsort(found.places())
     names = [name for i in order for name, mask in found.sides.items() if mask[i]]
@@ -144,16 +149,16 @@ def test_maps_and_envelopes(run: Any, tmp_path: Path, figures: list[Any]) -> Non
 def test_layout_and_moments(run: Any, tmp_path: Path, figures: list[Any]) -> None:
     """V4.2, Fig. 6: all cells, each in its body; 19 numbers; moments name the frames' own times."""
     model, _, folder = run
-    bodies = read_bodies(folder, SHAPE)
+    bodies = read_bodies(folder)
     sizes = np.ptp(bodies.frames.points[bodies.frames.cells[bodies.cells]], axis=1)
     assert np.sum(np.prod(sizes, axis=1)) == pytest.approx(4.0 * 3.0 - 3.0 * 2.5)  # m² of concrete
     np.testing.assert_allclose(bodies.frames.points[bodies.nodes], model.surface.points, atol=1e-12)
     points = {str(number): model.channel.point(number) for number in range(1, 20)}
-    path = plot_layout(folder, SHAPE, points, tmp_path / "layout.png", title="Layout", soil="soil", concrete="c",
+    path = plot_layout(folder, points, tmp_path / "layout.png", title="Layout", soil="soil", concrete="c",
                        ends="ends")
     check(path, figures[0])
     assert {text.get_text() for text in figures[0].axes[0].texts} >= set(points)
-    path = plot_moments({"one": folder, "two": folder}, SHAPE, (0.1, 0.21), tmp_path / "moments.png", title="Moments",
+    path = plot_moments({"one": folder, "two": folder}, (0.1, 0.21), tmp_path / "moments.png", title="Moments",
                         magnified=300.0)
     check(path, figures[1])
     assert figures[1].axes[1].get_title() == "one, t = 0.2 s"
@@ -168,7 +173,7 @@ def test_the_film(run: Any, tmp_path: Path) -> None:
         "title": "film", "magnified": 300.0, "history": history, "times": (0.05, 0.15, 0.2),
         "openings": {"top": opening(history, "19", (-1.0, 0.0))},
     }
-    path = animate(folder, SHAPE, tmp_path / "channel.gif", **arguments)
+    path = animate(folder, tmp_path / "channel.gif", **arguments)
     with Image.open(path) as film:
         assert film.n_frames == 3 and path.stat().st_size < 500_000
         shots = []
@@ -177,4 +182,24 @@ def test_the_film(run: Any, tmp_path: Path) -> None:
             shots.append(np.asarray(film.convert("L"), dtype=float))
     assert min(np.mean(np.abs(one - two)) for one, two in zip(shots, shots[1:], strict=False)) > 0.5
     with pytest.raises(InputError, match=r"'film\.mp4'"):
-        animate(folder, SHAPE, tmp_path / "film.mp4", **arguments)
+        animate(folder, tmp_path / "film.mp4", **arguments)
+
+
+def test_all_pictures_from_the_folder_alone(run: Any, figures: list[Any], tmp_path: Path) -> None:
+    """What a run of the command left is enough; a folder of something else is refused in one sentence."""
+    import shutil
+
+    _, history, folder = run
+    copy = tmp_path / "copy"
+    shutil.copytree(folder, copy)
+    drawn = illustrate(copy)
+    names = ["openings.png", "rocking.png", "interface.png", "envelope.png", "channel.gif"]
+    assert [path.name for path in drawn] == names and all(path.stat().st_size > 10_000 for path in drawn)
+    top = {line.get_label(): line.get_ydata() for line in figures[0].axes[1].lines}
+    np.testing.assert_allclose(top["point 19"], 1e3 * opening(history, "19", (-1.0, 0.0)), atol=1e-12)
+    times, magnified = film(copy, 0.1)
+    assert len(times) == 1 + STEPS // 4
+    assert magnified in {step * 10.0**power for step in (1, 2, 5) for power in (1, 2, 3)}
+    (copy / "history.h5").unlink()
+    with pytest.raises(InputError, match="buried channel"):
+        illustrate(copy)

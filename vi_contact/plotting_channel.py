@@ -35,6 +35,16 @@ class Outline:
     arc: Array
     sides: Mapping[str, Mask]
 
+    @classmethod
+    def of(cls, points: Array, normals: Array) -> Outline:
+        """Left wall, base and right wall of contact at ``points`` (m, 2) [m] with outward ``normals`` (m, 2)."""
+        low, high = points.min(axis=0), points.max(axis=0)
+        left, right = normals[:, 0] < -0.5, normals[:, 0] > 0.5
+        height = high[1] - low[1]
+        right_wall = height + high[0] - low[0] + points[:, 1] - low[1]
+        arc = np.select([left, right], [high[1] - points[:, 1], right_wall], height + points[:, 0] - low[0])
+        return cls(arc, {"left wall": left, "base": ~(left | right), "right wall": right})
+
     def along(self) -> list[tuple[str, Array]]:
         """(name, its conditions in the order of the arc) of the sides in the order of the arc."""
         order = np.argsort(self.arc)

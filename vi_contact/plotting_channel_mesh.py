@@ -11,91 +11,92 @@ import numpy as np
 
 from .algebra import Array, Indices, Mask
 from .errors import InputError
-from .meshes.channel import ChannelMesh
 from .plotting import _STYLE, History, _save, _scaled
 from .plotting_deformed import Frames, Tractions, read_frames, read_tractions
 
 SOIL, CONCRETE, CONTACT = "#efe3c8", "#9aa3ab", "tab:red"
 MAP = "YlOrRd"  # colours of pressures
-INWARDS = 0.25  # of a wall's thickness: how far inside the channel the points are that show its contact
+INWARDS = 0.04  # of the channel's height: how far inside the channel the points are that show its contact
 AROUND = 0.8  # heights of the channel that are shown beside and below it
 
 
 @dataclass(frozen=True)
 class Bodies:
     """Frames of a run with what belongs to the channel: mask of ``cells`` (c,), its node of every contact condition
-    ``nodes`` (m,), and where from there a condition is drawn ``inwards`` (m, 2): at corners those of both sides apart,
-    each towards the middle of its side."""
+    ``nodes`` (m,), and where from there a condition is drawn ``inwards`` (m, 2) [m]: at corners those of both sides
+    apart, each towards the middle of its side. ``low``, ``high`` (2,): corners of the channel's outline [m]."""
 
     frames: Frames
     tractions: Tractions
     cells: Mask
     nodes: Indices
     inwards: Array
+    low: Array
+    high: Array
+
+    @property
+    def height(self) -> float:
+        """Of the channel [m]."""
+        return float(self.high[1] - self.low[1])
 
 
-def read_bodies(folder: str | Path, shape: ChannelMesh) -> Bodies:
-    """From the folder of a run with fields and the recorder Contact(). InputError without them."""
+def read_bodies(folder: str | Path) -> Bodies:
+    """From the folder of a run of the channel with fields and the recorder Contact(). InputError without them."""
     frames, tractions = read_frames(folder), read_tractions(folder)
+    low, high = tractions.points.min(axis=0), tractions.points.max(axis=0)
     centres = frames.points[frames.cells].mean(axis=1)
-    x, y = shape.x, shape.y
-    cells = (x[1] < centres[:, 0]) & (centres[:, 0] < x[4]) & (centres[:, 1] > y[1])
+    cells = np.all((low < centres) & (centres < high), axis=1)
     own = np.unique(frames.cells[cells])
     nearest = [np.argmin(np.sum((frames.points[own] - point) ** 2, axis=1)) for point in tractions.points]
     nodes = own[np.array(nearest, dtype=np.int64)]
-    return Bodies(frames, tractions, cells, nodes, _inwards(tractions, nodes, shape))
-
-
-def _inwards(tractions: Tractions, nodes: Indices, shape: ChannelMesh) -> Array:
-    """(m, 2) opposite to the normals; at nodes of two conditions also twice towards the middle of the side."""
     _, where, counts = np.unique(nodes, return_inverse=True, return_counts=True)
     base = tractions.normals[:, 1] < -0.5
-    middle = 0.5 * np.array([shape.x[1] + shape.x[4], shape.y[1] + shape.y[3]])
-    along = np.where(base[:, None], [1.0, 0.0], [0.0, 1.0]) * np.sign(middle - tractions.points)
-    return np.asarray(np.where((counts[where] > 1)[:, None], 2.0 * along, 0.0) - tractions.normals)
+    along = np.where(base[:, None], [1.0, 0.0], [0.0, 1.0]) * np.sign(0.5 * (low + high) - tractions.points)
+    inwards = np.where((counts[where] > 1)[:, None], 2.0 * along, 0.0) - tractions.normals
+    return Bodies(frames, tractions, cells, nodes, INWARDS * (high[1] - low[1]) * inwards, low, high)
 
 
 def plot_layout(
-    folder: str | Path, shape: ChannelMesh, points: Mapping[str, Sequence[float]], path: str | Path, *,
+    folder: str | Path, points: Mapping[str, Sequence[float]], path: str | Path, *,
     title: str, soil: str, concrete: str, ends: str,
 ) -> Path:
     """Fig. 6: the mesh of a run with bodies, numbered points, bedrock and ends of the layer.
 
     ``soil``, ``concrete``, ``ends``: what is written about the materials and the ends of the layer.
     """
-    bodies = read_bodies(folder, shape)
+    bodies = read_bodies(folder)
     figure, axis = _plane((11.0, 4.9))
-    cells, x, y = bodies.frames.points[bodies.frames.cells], shape.x, shape.y
+    cells, low, high = bodies.frames.points[bodies.frames.cells], bodies.low, bodies.high
+    width, depth = bodies.frames.points.max(axis=0)
     _fill(axis, cells[~bodies.cells], SOIL)
     _fill(axis, cells[bodies.cells], CONCRETE)
-    axis.plot([x[1], x[1], x[4], x[4]], [y[3], y[1], y[1], y[3]], color=CONTACT, lw=2.0, label="contact")
-    _bedrock(axis, shape)
-    for end, outside in ((x[0], -0.18), (x[5], 0.18)):
+    axis.plot([low[0], low[0], high[0], high[0]], [high[1], low[1], low[1], high[1]], color=CONTACT, lw=2.0,
+              label="contact")
+    _bedrock(axis, bodies)
+    for end, outside in ((0.0, -0.18), (width, 0.18)):
         up = np.unique(bodies.frames.points[np.isclose(bodies.frames.points[:, 0], end), 1])
         axis.plot(np.full_like(up, end + outside), up, "o", ms=4, mfc="white", mec="black", mew=0.8)
-    _number(axis, shape, points)
-    middle, half = 0.5 * (x[1] + x[4]), 0.5 * shape.depth
-    box = {"fc": "white", "ec": "0.5", "boxstyle": "round,pad=0.6"}
+    _number(axis, bodies, points)
+    middle, box = 0.5 * (low[0] + high[0]), {"fc": "white", "ec": "0.5", "boxstyle": "round,pad=0.6"}
     for across, up, text, more in (
-        (0.5 * x[1], half, soil, {"fontsize": 9, "bbox": box}),
-        (0.5 * (x[4] + x[5]), half, ends, {"fontsize": 9, "bbox": box}),
-        (middle, 0.5 * (y[2] + y[3]), concrete, {"fontsize": 8}),
-        (middle, -0.11 * shape.depth, "motion of the bedrock $a_g(t)$", {"fontsize": 9}),
+        (0.5 * low[0], 0.5 * depth, soil, {"fontsize": 9, "bbox": box}),
+        (0.5 * (high[0] + width), 0.5 * depth, ends, {"fontsize": 9, "bbox": box}),
+        (middle, low[1] + 0.6 * bodies.height, concrete, {"fontsize": 8}),
+        (middle, -0.11 * depth, "motion of the bedrock $a_g(t)$", {"fontsize": 9}),
     ):
         axis.text(across, up, text, ha="center", va="center", **more)
-    ends_of_arrow = [(middle + side * 0.8 * shape.outer_width, -0.16 * shape.depth) for side in (-1.0, 1.0)]
+    ends_of_arrow = [(middle + side * 0.8 * (high[0] - low[0]), -0.16 * depth) for side in (-1.0, 1.0)]
     axis.annotate("", *ends_of_arrow, arrowprops={"arrowstyle": "<->", "lw": 1.5})
     axis.legend(fontsize=8, loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
-    axis.set(xlim=(-0.7, x[5] + 0.7), ylim=(-0.2 * shape.depth, 1.04 * shape.depth), title=title, xlabel="x [m]",
-             ylabel="y [m]")
+    axis.set(xlim=(-0.7, width + 0.7), ylim=(-0.2 * depth, 1.04 * depth), title=title, xlabel="x [m]", ylabel="y [m]")
     return _save(figure, path)
 
 
-def _number(axis: Any, shape: ChannelMesh, points: Mapping[str, Sequence[float]]) -> None:
+def _number(axis: Any, bodies: Bodies, points: Mapping[str, Sequence[float]]) -> None:
     """Points of the outline with their labels outside of it."""
     for label, (across, up) in points.items():
-        sideways = (across >= shape.x[4]) - 1.0 * (across <= shape.x[1])
-        outward = np.array([sideways, -1.0 if up <= shape.y[1] else 0.0])
+        sideways = float(across >= bodies.high[0]) - float(across <= bodies.low[0])
+        outward = np.array([sideways, -1.0 if up <= bodies.low[1] else 0.0])
         axis.plot(across, up, "o", ms=3.5, color="black", zorder=4)
         axis.annotate(label, (across, up), xytext=9.0 * outward, textcoords="offset points", fontsize=9, zorder=4,
                       weight="bold", ha="center", va="center",
@@ -103,25 +104,24 @@ def _number(axis: Any, shape: ChannelMesh, points: Mapping[str, Sequence[float]]
 
 
 def plot_moments(
-    folders: Mapping[str, str | Path], shape: ChannelMesh, times: Sequence[float], path: str | Path, *,
-    title: str, magnified: float,
+    folders: Mapping[str, str | Path], times: Sequence[float], path: str | Path, *, title: str, magnified: float
 ) -> Path:
     """A row per run (name -> folder), a column per time [s]: the bodies around the channel, their displacements less
     the channel's mean drawn ``magnified`` times; contact points coloured by their pressure, open ones white."""
     import matplotlib
     from matplotlib.figure import Figure
 
-    runs = {name: read_bodies(folder, shape) for name, folder in folders.items()}
+    runs = {name: read_bodies(folder) for name, folder in folders.items()}
     colours = Colours.of(np.concatenate([run.tractions.at(t)[0] for run in runs.values() for t in times]))
     with matplotlib.rc_context(_STYLE | {"axes.grid": False}):
         figure = Figure(figsize=(3.7 * len(times) + 1.3, 2.75 * len(runs) + 0.7), layout="constrained")
         axes = figure.subplots(len(runs), len(times), sharex=True, sharey=True, squeeze=False)
     for row, (name, run) in zip(axes, runs.items(), strict=True):
         for axis, t in zip(row, times, strict=True):
-            shown = draw_bodies(axis, run, shape, t, magnified=magnified, colours=colours, follow=True)
+            shown = draw_bodies(axis, run, t, magnified=magnified, colours=colours, follow=True)
             axis.set_title(f"{name}, t = {shown:.4g} s", fontsize=9)
-    reach = AROUND * shape.height
-    axes[0, 0].set(xlim=(shape.x[1] - reach, shape.x[4] + reach), ylim=(shape.y[1] - reach, 1.07 * shape.depth))
+    reach = AROUND * run.height
+    axes[0, 0].set(xlim=(run.low[0] - reach, run.high[0] + reach), ylim=(run.low[1] - reach, run.high[1] + 0.2 * reach))
     colours.bar(figure, axes)
     figure.supxlabel("x [m]", fontsize=10)
     figure.supylabel("y [m]", fontsize=10)
@@ -156,7 +156,7 @@ class Colours:
 
 
 def draw_bodies(
-    axis: Any, bodies: Bodies, shape: ChannelMesh, t: float, *, magnified: float, colours: Colours, follow: bool = False
+    axis: Any, bodies: Bodies, t: float, *, magnified: float, colours: Colours, follow: bool = False
 ) -> float:
     """Draws the frame next to t; returns its time [s]. ``follow``: displacements less the mean of the channel's."""
     frames, tractions = bodies.frames, bodies.tractions
@@ -166,7 +166,7 @@ def draw_bodies(
     _fill(axis, moved[frames.cells[~bodies.cells]], SOIL, lw=0.3)
     _fill(axis, moved[frames.cells[bodies.cells]], CONCRETE)
     pressure, _ = tractions.at(shown)
-    places = moved[bodies.nodes] + INWARDS * shape.wall * bodies.inwards
+    places = moved[bodies.nodes] + bodies.inwards
     dots: dict[str, Any] = {"s": 26, "edgecolors": "black", "linewidths": 0.5, "norm": colours.norm, "cmap": MAP}
     closed = pressure > 0.0
     axis.scatter(*places[~closed].T, s=26, c="white", edgecolors="black", linewidths=0.5, zorder=4)
@@ -175,8 +175,8 @@ def draw_bodies(
 
 
 def animate(
-    folder: str | Path, shape: ChannelMesh, path: str | Path, *,
-    title: str, magnified: float, history: History, times: Sequence[float], openings: Mapping[str, Array],
+    folder: str | Path, path: str | Path, *,
+    title: str, history: History, openings: Mapping[str, Array], times: Sequence[float], magnified: float,
     fps: int = 10,
 ) -> Path:
     """Writes a GIF of the frames at ``times`` [s]: bodies, displaced relative to the bedrock, and contact; below the
@@ -189,8 +189,9 @@ def animate(
     path = Path(path)
     if path.suffix != ".gif":
         raise InputError(f"animations are GIF files: name '{path.name}' so, or draw single moments with plot_moments")
-    bodies = read_bodies(folder, shape)
+    bodies = read_bodies(folder)
     colours = Colours.of(np.concatenate([bodies.tractions.at(t)[0] for t in times]))
+    reach = 2.0 * AROUND * bodies.height
     figure, (top, bottom) = _plane((6.6, 6.0), heights=(3.6, 1.0))
     colours.bar(figure, top, shrink=0.85)
     marker = _traces(bottom, history, openings, (times[0], times[-1]))
@@ -200,11 +201,10 @@ def animate(
     with writer.saving(figure, str(path), dpi=95):
         for t in times:
             top.clear()
-            shown = draw_bodies(top, bodies, shape, t, magnified=magnified, colours=colours)
-            _bedrock(top, shape)
-            reach = 2.0 * AROUND * shape.height
-            top.set(xlim=(max(shape.x[1] - reach, 0.0), min(shape.x[4] + reach, shape.width)),
-                    ylim=(-0.05 * shape.depth, 1.07 * shape.depth), xlabel="x [m]", ylabel="y [m]")
+            shown = draw_bodies(top, bodies, t, magnified=magnified, colours=colours)
+            _bedrock(top, bodies)
+            top.set(xlim=(bodies.low[0] - reach, bodies.high[0] + reach), xlabel="x [m]", ylabel="y [m]",
+                    ylim=(-0.15 * reach, bodies.high[1] + 0.15 * reach))
             top.set_title(f"{title}, t = {shown:.3f} s (displacements x {magnified:g})", fontsize=10)
             marker.set_xdata([shown, shown])
             writer.grab_frame()
@@ -242,8 +242,8 @@ def _fill(axis: Any, cells: Array, colour: str, lw: float = 0.4) -> None:
     axis.set_aspect("equal")
 
 
-def _bedrock(axis: Any, shape: ChannelMesh) -> None:
+def _bedrock(axis: Any, bodies: Bodies) -> None:
     """The bedrock's line, hatched below."""
+    width, depth = bodies.frames.points.max(axis=0)
     axis.axhline(0.0, color="black", lw=1.5, zorder=3)
-    axis.fill_between([-1.0, shape.width + 1.0], -0.05 * shape.depth, 0.0, facecolor="none", edgecolor="0.4",
-                      hatch="////", lw=0.0)
+    axis.fill_between([-1.0, width + 1.0], -0.05 * depth, 0.0, facecolor="none", edgecolor="0.4", hatch="////", lw=0.0)

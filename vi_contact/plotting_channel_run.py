@@ -1,0 +1,62 @@
+"""All pictures of one run of the buried channel, from its folder alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from .algebra import Array
+from .errors import InputError
+from .plotting_channel import Outline, opening, plot_envelope, plot_interface, plot_openings, plot_rocking
+from .plotting_channel_mesh import animate, read_bodies
+from .run_folder import read_run
+
+FILM_FRAMES = 48  # at most: a film of two megabytes
+DRAWN = 0.15  # of the channel's height: how large its largest displacement is drawn
+
+
+def illustrate(folder: str | Path, *, title: str = "Buried channel") -> list[Path]:
+    """Draws openings.png, rocking.png, interface.png and envelope.png into the folder of a finished run of
+    ``vi-contact channel`` or of its model's recorders, and with fields channel.gif, around the widest opening.
+
+    Returns what was drawn. InputError for the folder of another run.
+    """
+    run, folder = read_run(folder), Path(folder)
+    if run.contact is None or "pressure" not in run.history or "u_x_19_soil" not in run.history:
+        raise InputError(f"'{folder}' is not of a finished run of the buried channel: give the folder of one")
+    outline = Outline.of(run.contact.points, run.contact.normals)
+    drawn = [
+        plot_openings(run.history, folder / "openings.png", title=f"{title}, openings of the interface"),
+        plot_rocking(run.history, folder / "rocking.png", title=f"{title}, bottom corners"),
+        plot_interface({"": run.history}, outline, folder / "interface.png", title=f"{title}, interface"),
+        plot_envelope({title: run.history}, outline, folder / "envelope.png", title=f"{title}, envelopes"),
+    ]
+    if (folder / "fields" / "mesh.h5").is_file():
+        tops = {
+            "top of the left wall": opening(run.history, "19", (-1.0, 0.0)),
+            "of the right wall": opening(run.history, "13", (1.0, 0.0)),
+        }
+        widest = float(run.history["t"][int(np.argmax(sum(tops.values())))])
+        times, magnified = film(folder, widest)
+        drawn.append(animate(
+            folder, folder / "channel.gif", title=title, history=run.history, openings=tops, times=times.tolist(),
+            magnified=magnified,
+        ))
+    return drawn
+
+
+def film(folder: Path, around: float) -> tuple[Array, float]:
+    """(times of the frames next to a moment [s], a round factor that makes their displacements visible)."""
+    bodies = read_bodies(folder)
+    frames = bodies.frames
+    first = int(np.argmin(np.abs(frames.t - around))) - FILM_FRAMES // 2
+    first = max(min(first, len(frames.t) - FILM_FRAMES), 0)
+    times = frames.t[first : first + FILM_FRAMES]
+    own = np.unique(frames.cells[bodies.cells])
+    largest = max(float(np.abs(frames.at(t)[1][own]).max()) for t in times)
+    if largest == 0.0:
+        return times, 1.0
+    factor = DRAWN * bodies.height / largest
+    power = 10.0 ** np.floor(np.log10(factor))
+    return times, float(max(step for step in (1.0, 2.0, 5.0) if step * power <= factor) * power)
