@@ -259,5 +259,6 @@ def test_arc_position_of_lines_and_channels() -> None:
 def test_thinned_maps_keep_peaks() -> None:
     values = np.zeros((10007, 2))
     values[7003, 1] = 5.0
+    values[7004, 0] = -4.0
     t, shown = thinned(np.arange(10007.0), values)
-    assert len(t) == len(shown) == 1200 and shown[:, 1].max() == 5.0
+    assert len(t) == len(shown) == 1200 and shown[:, 1].max() == 5.0 and shown[:, 0].min() == -4.0

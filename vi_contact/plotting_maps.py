@@ -52,11 +52,12 @@ def chain(points: Array) -> Indices:
 
 
 def thinned(t: Array, values: Array, rows: int = ROWS) -> tuple[Array, Array]:
-    """At most so many instants: of each run of neighbours the largest value of every point, so that peaks stay."""
+    """At most so many instants: of neighbours the value of every point that is largest in size, so that peaks stay."""
     if len(t) <= rows:
         return t, values
     starts = np.linspace(0, len(t), rows, endpoint=False).astype(int)
-    return t[starts], np.maximum.reduceat(values, starts, axis=0)
+    high, low = np.maximum.reduceat(values, starts, axis=0), np.minimum.reduceat(values, starts, axis=0)
+    return t[starts], np.where(high >= -low, high, low)
 
 
 def draw_map(
@@ -75,6 +76,6 @@ def draw_map(
     image = axis.pcolormesh(
         _edges(t), _edges(position[order]), shown.T, cmap=palette, vmin=low, vmax=size, rasterized=True
     )
-    axis.figure.colorbar(image, ax=axis, label=f"[{prefixed}]", pad=0.02, fraction=0.06)
+    axis.figure.colorbar(image, ax=axis, pad=0.02, fraction=0.06)
     axis.set(xlabel="time [s]", ylabel=axis_label)
-    axis.set_title(f"{title} (white: none)", loc="left")
+    axis.set_title(f"{title} [{prefixed}] (white: none)", loc="left")

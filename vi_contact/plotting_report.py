@@ -19,9 +19,11 @@ from .plotting_maps import arc_position, draw_map, thinned
 from .run_folder import RunFolder
 
 PAGE = (8.27, 11.69)  # inches, A4
-SIDES = (0.085, 0.95)  # of the page's width
+SIDES, TOP = (0.085, 0.95), 0.87  # of the page's width and height: where the panels are
+GAP = 0.72  # inches between panels above each other
 TABLE_ROWS, OF_A_KIND = 14, 3
-NOTHING = 1e-6  # of the largest energy: terms below it are not drawn
+NOTHING = 1e-6  # of the largest energy: terms below it are not drawn; of the size of a column: that is constant
+NO_GAP = 1e-15  # of the length of the contact line
 _GROUPS = (  # (title, prefixes of columns); the first four that move are drawn
     ("displacement", ("u_",)),
     ("contact force", ("contact_resultant", "N_", "contact_force_")),
@@ -69,10 +71,12 @@ def plot_report(
     panels = _panels_of(run, columns)
     lines = (len(panels) + 1) // 2
     table = 0.15 * (len(rows) + 1) / PAGE[1]  # of the page's height
+    height = (TOP - table - 0.06) * PAGE[1] / lines - GAP
     with matplotlib.rc_context(_STYLE | {"font.size": 7, "axes.titlesize": 8, "axes.labelsize": 7}):
         figure = Figure(figsize=PAGE)
         grid = figure.add_gridspec(
-            lines, 2, left=SIDES[0], right=SIDES[1], top=0.87, bottom=table + 0.06, hspace=0.66, wspace=0.24
+            lines, 2, left=SIDES[0], right=SIDES[1], top=TOP, bottom=table + 0.06 + GAP / PAGE[1] - 0.05,
+            hspace=GAP / height, wspace=0.24,
         )
         _header(figure, run, title or f"Run {run.folder.resolve().name}")
         for i, panel in enumerate(panels):
@@ -91,18 +95,28 @@ def _panels_of(run: RunFolder, columns: Sequence[Sequence[str]] | None) -> list[
         panels.append(Panel(lambda axis: _lines(axis, run, shaken, "ground acceleration")))
     if shaken and len(run.history["t"]) > 2:
         panels.append(Panel(lambda axis: _spectrum(axis, run, shaken)))
-    groups = _given(run, columns) if columns is not None else _moving(run)
+    maps = _maps(run)
+    mapped = ("contact pressure",) if maps else ()
+    groups = _given(run, columns) if columns is not None else _moving(run, without=mapped)
     for name, found in groups:
         panels.append(Panel(lambda axis, name=name, found=found: _lines(axis, run, found, name)))  # type: ignore[misc]
-    contact = run.contact
-    if contact is not None and "pressure" in run.history and contact.points.shape[1] == 2 and len(contact.points) > 2:
-        panels += [
-            Panel(lambda axis: _map(axis, run, "pressure", "Pa")), Panel(lambda axis: _map(axis, run, "gap", "m"))
-        ]
+    panels += maps
     if "energy_defect" in run.history and np.any(run.history["energy_kinetic"] + run.history["energy_strain"]):
         panels.append(Panel(lambda axis: _energies(axis, run)))
     panels.append(Panel(lambda axis: _certificate(axis, run)))
     return panels
+
+
+def _maps(run: RunFolder) -> list[Panel]:
+    """Of contact lines: pressure, and opening where there is one."""
+    contact, history = run.contact, run.history
+    if contact is None or "pressure" not in history or contact.points.shape[1] != 2 or len(contact.points) < 3:
+        return []
+    found = [Panel(lambda axis: _map(axis, run, "pressure", "Pa"))] if np.any(history["pressure"]) else []
+    size = float(np.ptp(contact.points, axis=0).max())
+    if float(np.max(history["gap"])) > NO_GAP * size:
+        found.append(Panel(lambda axis: _map(axis, run, "gap", "m")))
+    return found
 
 
 def _given(run: RunFolder, columns: Sequence[Sequence[str]]) -> list[tuple[str, list[str]]]:
@@ -115,17 +129,18 @@ def _given(run: RunFolder, columns: Sequence[Sequence[str]]) -> list[tuple[str, 
     return [(", ".join(group) if len(group) < 3 else run.columns[group[0]][1], list(group)) for group in columns]
 
 
-def _moving(run: RunFolder) -> list[tuple[str, list[str]]]:
-    """Up to four groups, each with the columns that vary most."""
+def _moving(run: RunFolder, without: Sequence[str]) -> list[tuple[str, list[str]]]:
+    """Up to four groups, each with the columns of one unit that vary most."""
     groups = []
-    for title, prefixes in _GROUPS:
+    for title, prefixes in (group for group in _GROUPS if group[0] not in without):
         found: list[str] = []
         for prefix in prefixes:
             if not found:
                 found = [name for name in run.columns if name.startswith(prefix) and _range(run, name) > 0.0]
         if found:
             found.sort(key=lambda name: -_range(run, name))
-            groups.append((title, found[:_LINES]))
+            unit = run.columns[found[0]][0]
+            groups.append((title, [name for name in found if run.columns[name][0] == unit][:_LINES]))
     return groups[:4]
 
 
@@ -133,7 +148,8 @@ def _range(run: RunFolder, name: str) -> float:
     values = run.history.get(name)
     if values is None or values.ndim != 1 or np.isnan(values).all():
         return 0.0
-    return float(np.nanmax(values) - np.nanmin(values))
+    way = float(np.nanmax(values) - np.nanmin(values))
+    return way if way > NOTHING * float(np.nanmax(np.abs(values))) else 0.0
 
 
 def _lines(axis: Any, run: RunFolder, names: Sequence[str], title: str) -> None:
