@@ -357,3 +357,18 @@ def test_wall_of_the_channel_is_in_equilibrium(comm: Any) -> None:
     assert section["N_foot"] == pytest.approx(above_cut["force_y_wall"] - wall, rel=1e-8)
     assert section["V_foot"] == pytest.approx(above_cut["force_x_wall"], rel=1e-8)
     assert section["M_foot"] == pytest.approx(above_cut["M_wall"], rel=1e-8)
+
+
+def test_reactions_in_space(comm: Any) -> None:
+    """A block on its foot under weight and a drag along its top: force and moment vectors about a corner."""
+    mesh, tags = block(comm, lengths=(2.0, 1.0, 1.5), divisions=(2, 2, 2))
+    loads = [fem.BodyForce((0.0, -2.4e4, 0.0)), fem.Traction(tags["top"], (0.0, 0.0, 5.0e3))]
+    problem = linear(fem.assemble(mesh, CONCRETE, clamped=tags["bottom"], loads=loads))
+    state = vc.static_equilibrium(problem, solver=vc.Condensed())
+    row = fem.Reactions("foot", tags["bottom"], (0.0, 0.0, 0.0), loads).start(problem, state)
+    weight, drag = 2.4e4 * 3.0, 5.0e3 * 3.0  # N, at (1, .5, .75) and (1, 1, .75)
+    expected = {"x": 0.0, "y": weight, "z": -drag, "M_x": -drag * 1.0 - weight * 0.75, "M_y": drag, "M_z": weight}
+    found = {part: row[f"reaction_{part}_foot"] for part in expected}
+    assert found == pytest.approx(expected, rel=1e-10, abs=1e-10 * weight)
+    with pytest.raises(InputError, match="plane meshes"):
+        fem.SectionForces({"a": ((0.0, 0.0), (1.0, 0.0))}).start(problem, state)

@@ -20,7 +20,7 @@ from .run_folder import RunFolder
 
 PAGE = (8.27, 11.69)  # inches, A4
 SIDES, TOP = (0.085, 0.95), 0.87  # of the page's width and height: where the panels are
-GAP = 0.72  # inches between panels above each other
+GAP = 0.62  # inches between panels above each other
 TABLE_ROWS, OF_A_KIND = 14, 3
 NOTHING = 1e-6  # of the largest energy: terms below it are not drawn; of the size of a column: that is constant
 NO_GAP = 1e-15  # of the length of the contact line

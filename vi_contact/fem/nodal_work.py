@@ -86,6 +86,7 @@ class NodalWork:
             if form is not None:
                 rows.append(sp.csr_matrix(compat.assemble_vector(form).array_r))
         self._stacked: list[Any] | None = None
+        self._still: dict[int, Array] = {}
 
     def _virtual(self, r: Array, cells: Mask | None) -> None:
         self._r.x.array[: r.size] = r.ravel()
@@ -135,19 +136,23 @@ class NodalWork:
         for matrix, x in zip(matrices, motion, strict=False):
             if matrix is not None:
                 total += matrix @ x.ravel()
-        for matrix, load in zip(matrices[len(self._forms) :], self._loads, strict=True):
-            total -= matrix @ self._values(load, at).ravel()
+        for k, load in enumerate(self._loads):
+            total -= self._of_load(k, load, at)
         return self.space.comm.sum(total)
 
-    def _values(self, load: Traction | BodyForce, at: Callable[[Callable[[float], Any]], Any]) -> Array:
-        """Nodal values (owned, d) of a load."""
+    def _of_load(self, k: int, load: Traction | BodyForce, at: Callable[[Callable[[float], Any]], Any]) -> Array:
+        """Its rᵀf on this rank, (count,); what does not change with time is evaluated once."""
+        matrix = self._matrices()[len(self._forms) + k]
 
-        def nodal(t: float) -> Array:
-            return evaluate(type(load).__name__, load.value, self.space.points, t, self.space.comm)
+        def work(t: float) -> Array:
+            values = evaluate(type(load).__name__, load.value, self.space.points, t, self.space.comm)
+            return np.asarray(matrix @ values.ravel())
 
-        if load.history is not None:
-            return np.asarray(at(load.history) * nodal(0.0))
-        return np.asarray(nodal(0.0) if is_constant(load) else at(nodal))
+        if load.history is None and not is_constant(load):
+            return np.asarray(at(work))
+        if k not in self._still:
+            self._still[k] = work(0.0)
+        return self._still[k] if load.history is None else np.asarray(at(load.history) * self._still[k])
 
 
 def _expanded(space: FemSpace, free: Array, derivative: int, t: float) -> Array:
