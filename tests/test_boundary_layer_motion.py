@@ -96,6 +96,8 @@ def test_events_flight_and_several_contacts():
     slower = restitution(0.5 * damping_ratio(0.5))  # c/V fixed: half the speed halves s; V of each impact: s stays
     assert second == pytest.approx([slower, 0.5], abs=1e-5)
     assert np.all(motion.rho > 0.0) and np.all(np.diff(motion.t) >= 0.0) and motion.t[-1] == pytest.approx(1.2)
+    fine = layer_motion(ball, layer, q0=[1.0 + b], v0=[0.0], t_end=0.4, refine=5)
+    assert fine.rho == pytest.approx(1.0 + b - 0.5 * g * fine.t**2, abs=1e-12) and len(fine.t) % 5 == 1
 
 
 # Rigid body ----------------------------------------------------------------------------------------------------------

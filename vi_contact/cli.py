@@ -12,6 +12,7 @@ from .cli_beam import add_beam_command
 from .cli_case import add_case_commands
 from .cli_channel import add_channel_commands
 from .cli_ida import add_ida_commands
+from .cli_layer import add_layer_command
 from .cli_motion import add_motion_commands
 from .cli_options import add_output, add_shaking, add_step, chosen, impact_law
 from .cli_report import add_report_commands
@@ -38,6 +39,7 @@ def parser() -> argparse.ArgumentParser:
     add_case_commands(commands)
     add_channel_commands(commands)
     add_ida_commands(commands)
+    add_layer_command(commands)
     add_motion_commands(commands)
     add_beam_command(commands)
     add_report_commands(commands)

@@ -142,7 +142,7 @@ def contact_layer(
     if s > 0.0:
         while excess(s) > 0.0:
             low, s = s, 2.0 * s
-        s = float(brentq(excess, low, s, xtol=1e-14, rtol=1e-9))
+        s = float(brentq(excess, low, s, xtol=1e-14, rtol=1e-8))
     return ContactLayer(layer(s), mass if metric is Metric.BLENDED else 0.0)
 
 
@@ -151,7 +151,7 @@ def _rebound(layer: Layer, mass: float, speed: float, metric: Metric) -> float:
     body = ConstrainedSystem(np.array([[mass]]), lambda q: float(q[0]), lambda q: np.ones(1))
     found = layer_motion(
         body, layer, q0=np.array([layer.width]), v0=np.array([-speed]), t_end=1e6 * layer.width / speed,
-        metric=metric, contacts=1, rtol=1e-9,
+        metric=metric, contacts=1, rtol=1e-8,
     )
     if not found.contacts:
         raise InputError("the layer holds the body back for ever: give it more k or less c")

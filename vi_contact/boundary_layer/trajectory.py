@@ -62,10 +62,12 @@ def layer_motion(
     contacts: int | None = None,
     rtol: float = 1e-11,
     method: str = "DOP853",
+    refine: int = 1,
 ) -> Trajectory:
     """The motion from (q0, v0) at t = 0 to t_end, or to the end of so many contacts.
 
-    ``metric``: the reading of the law. ``rtol``: relative tolerance of scipy's solve_ivp.
+    ``metric``: the reading of the law. ``rtol``: relative tolerance of scipy's solve_ivp; ``refine``: rows of the
+    trajectory for each of its steps, which are large, by its own interpolation.
 
     Raises:
         InputError: the start is not inside the admissible set (rho > 0), or in the layer while V is not known.
@@ -77,7 +79,7 @@ def layer_motion(
         raise InputError(f"the motion starts at distance rho = {rho:g}, outside the admissible set: start at rho > 0")
     if not 0.0 < t_end < np.inf:
         raise InputError(f"t_end is {t_end}: give a positive time in s")
-    passages = _Passages(system, layer, metric, {"rtol": rtol, "method": method})
+    passages = _Passages(system, layer, metric, {"rtol": rtol, "method": method}, refine)
     inside = rho < layer.width or (rho == layer.width and system.normal_rate(q, v) < 0.0)
     t = 0.0
     while t < t_end and (contacts is None or len(passages.contacts) < contacts):
@@ -95,8 +97,11 @@ class _Passages:
     resolved beside a q of 1 m.
     """
 
-    def __init__(self, system: ConstrainedSystem, layer: Layer, metric: Metric, options: dict[str, Any]) -> None:
-        self._system, self._layer, self._metric, self._options = system, layer, metric, options
+    def __init__(
+        self, system: ConstrainedSystem, layer: Layer, metric: Metric, options: dict[str, Any], refine: int
+    ) -> None:
+        self._system, self._layer, self._metric = system, layer, metric
+        self._options, self._refine = options | {"dense_output": refine > 1}, refine
         self._parts: list[tuple[Array, Array, Array, Array, Array]] = []
         self.contacts: list[Contact] = []
 
@@ -133,7 +138,9 @@ class _Passages:
                 f"{system.rho(q + found.y[:n, -1]):.3g}: give a larger rtol or another method ({found.message})"
             )
         places, speeds = q + found.y[:n].T, found.y[n:].T
-        self._keep(start + found.t, places, speeds, layer, inside)
+        t = np.interp(np.arange(self._refine * (len(found.t) - 1) + 1) / self._refine, np.arange(len(found.t)), found.t)
+        y = found.sol(t) if self._refine > 1 else found.y
+        self._keep(start + t, q + y[:n].T, y[n:].T, layer, inside)
         crossed = found.status == 1
         if inside and crossed:
             rate = system.normal_rate(q, v), system.normal_rate(places[-1], speeds[-1])

@@ -1,0 +1,100 @@
+"""The demos of the boundary layer and ``vi-contact layer``: key numbers, figures, one sentence for bad input."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from test_demos import demo
+
+from vi_contact.cli import main
+from vi_contact.plotting_layer import plot_thin_limit
+
+serial = pytest.mark.serial
+
+
+def is_picture(path: Path) -> bool:
+    """A PNG with something in it."""
+    return path.read_bytes().startswith(b"\x89PNG") and path.stat().st_size > 5000
+
+
+@serial
+def test_the_particle_demo(tmp_path: Path, capsys: Any) -> None:
+    """V5.1: Figs. 1 to 3 and their numbers."""
+    numbers = demo("particle_layer").main(quick=True, out=tmp_path, progress=False)
+    assert numbers["closed form - integration"] < 1e-9
+    assert (numbers["e 2 5"], numbers["t_f 2 5"]) == pytest.approx((0.352379, 0.676189), abs=5.001e-7)
+    assert numbers["DOMINANT 0.8"] == pytest.approx(numbers["DOMINANT 1"], abs=1e-8)
+    assert numbers["FULL 1"] == pytest.approx(0.56918, abs=5.1e-6)
+    assert numbers["wanted"] == pytest.approx(0.7, abs=1e-12)
+    assert all(is_picture(tmp_path / f"figure_{number}.png") for number in (1, 2, 3))
+    assert "0.593624" in capsys.readouterr().out  # k = c = 2
+
+
+@serial
+def test_the_rigid_body_demo(tmp_path: Path) -> None:
+    """V5.2: the loss, order 1 in the width; the ellipsoid's bounce."""
+    numbers = demo("rigid_body_layer").main(quick=True, out=tmp_path, progress=False)
+    assert numbers["loss"] == pytest.approx(0.310982436, abs=5e-7)
+    assert numbers["order"] == pytest.approx(1.0, abs=0.01)
+    assert numbers["contacts"] == 2.0 and numbers["worst_restitution"] < 2e-4 and numbers["energy_error"] < 1e-4
+    assert is_picture(tmp_path / "thin_limit.png") and is_picture(tmp_path / "tumbling.png")
+
+
+def test_the_bar_demo(comm: Any, shared_tmp: Path) -> None:
+    """V1.1 in layers of 1 and ½ m: errors halve; the stiff block rebounds with ½ within 1 %."""
+    numbers = demo("bar_layer").main(quick=True, out=shared_tmp, progress=False)
+    for metric in ("BLENDED", "FLAT"):
+        assert numbers[f"{metric} e 0.5"] == pytest.approx(0.5, rel=1e-2)
+        ratio = numbers[f"{metric} b 1: error"] / numbers[f"{metric} b 0.5: error"]
+        assert 1.8 < ratio < 2.2 and numbers[f"{metric} b 0.5: error"] > numbers["exact inequality: error"]
+        assert numbers[f"{metric} b 0.5: pressure"] == pytest.approx(300.0, rel=5e-3)
+    if comm.rank == 0:
+        assert is_picture(shared_tmp / "bar.png") and is_picture(shared_tmp / "bar_limit.png")
+
+
+@serial
+def test_the_command(tmp_path: Path, capsys: Any) -> None:
+    """Closed form, other readings, a wanted restitution, the picture."""
+
+    def rows(*arguments: str) -> list[list[float]]:
+        assert main(["layer", *arguments]) == 0
+        lines = capsys.readouterr().out.splitlines()
+        return [[float(word) for word in line.split()] for line in lines[1:] if line[:12].strip()[:1].isdigit()]
+
+    assert rows("--k", "1", "--c", "0", "5") == [
+        [1.0, 0.0, 1.0, 1.0, 1.0, 2.0, 0.606531], [1.0, 5.0, 0.196980, 0.204157, 0.358352, 1.19698, 0.879563]
+    ]
+    (near,) = rows("--k", "1", "--c", "1", "--start", "0.99")
+    assert near[2] == 0.593624 and near[5] == pytest.approx(1.60709, abs=5.1e-6)
+    (full,) = rows("--c", "1", "--metric", "full")
+    assert full[2] == pytest.approx(0.56918, abs=5.1e-6) and full[5:] == pytest.approx([2.70353, 0.55461], abs=5.1e-6)
+    wanted = rows("--restitution", "0.7", "--mass", "80", "--speed", "3", "--width", "1e-3",
+                  "--out", str(tmp_path / "new" / "p.png"))[0]
+    assert wanted[2] == 0.7 and wanted[6] == 5e-4 and is_picture(tmp_path / "new" / "p.png")
+
+
+@serial
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        (["--metric", "round"], "unknown metric 'round'"),
+        (["--restitution", "1.5"], "restitution coefficient e is 1.5"),
+        (["--restitution", "0.5", "--metric", "full"], "are for the closed form"),
+        (["--k", "0", "--c", "1"], "parameter k is zero"),
+        (["--width", "-1"], "layer width b is -1.0"),
+    ],
+)
+def test_the_command_refuses(arguments: list[str], word: str, capsys: Any) -> None:
+    assert main(["layer", *arguments]) == 1
+    printed = capsys.readouterr()
+    assert word in printed.err and not printed.out
+
+
+@serial
+def test_thin_limit_figure(tmp_path: Path) -> None:
+    """One curve is enough."""
+    widths = np.array([1.0, 0.1])
+    assert is_picture(plot_thin_limit({"x": (widths, widths)}, tmp_path / "a.png", quantity="error [m]"))
