@@ -10,6 +10,7 @@ import pytest
 
 from vi_contact.algebra import Array, Mask
 from vi_contact.errors import InputError, StepFailure
+from vi_contact.solvers import friction_linear
 from vi_contact.solvers.active_set import ActiveSet
 from vi_contact.solvers.extrapolation import Aitken, Anderson, Plain
 from vi_contact.solvers.fixed_point import FixedPoint, contraction
@@ -171,6 +172,32 @@ def test_newton_remembers_factors_not_answers(d: int) -> None:
     again = used.solve(q, none, mu, guess)
     fresh = FrictionNewton().prepare(G, bilateral).solve(q, none, mu, guess)
     assert np.array_equal(again.r, fresh.r) and again.iterations == fresh.iterations
+
+
+@pytest.mark.parametrize("law", ["coulomb", "tresca", "both"])
+def test_bordered_problems_are_the_problems_themselves(law: str, monkeypatch: Any) -> None:
+    """Newton with one factor a run, whatever the states differ by, and with one for every set: the same to rounding,
+    from a guess that is far off; some sets are solved both ways."""
+    bordered = []
+    solve = friction_linear.Bordered.solve
+
+    def counted(*arguments: Any) -> Any:
+        bordered.append(solve(*arguments))
+        return bordered[-1]
+
+    monkeypatch.setattr(friction_linear.Bordered, "solve", counted)
+    for seed in range(30):
+        G, q, bilateral = small(300 + seed, 12, 2)
+        slope = np.full(12, 0.4 if law != "tresca" else 0.0)
+        cohesion = G[1::2, 1::2].diagonal() ** -0.5 * (0.2 if law != "coulomb" else 0.0)
+        results = []
+        for share in (0.0, 10.0):
+            monkeypatch.setattr(friction_linear, "LARGE", 1)
+            monkeypatch.setattr(friction_linear, "SHARE", share)
+            results.append(FrictionNewton().prepare(G, bilateral).solve(q, cohesion, slope, seed % 3 < np.arange(12)))
+        assert energy_norm(results[1].r - results[0].r, G) <= 1e-12 * energy_norm(results[0].r, G)
+        assert results[1].residual <= 1e-13
+    assert len(bordered) > 30
 
 
 def test_newton_is_exact_in_few_steps_from_any_guess() -> None:

@@ -50,10 +50,11 @@ class PreparedFixedPoint:
         """See PreparedFriction."""
         step = self.blocks.step(q, cohesion, slope)
         constant = np.zeros_like(slope)
-        limit, unit = cohesion, self.blocks.scale[:, -1]
+        start = step.start(guess) * self.blocks.scale
+        limit, unit = cohesion + slope * np.maximum(start[:, 0], 0.0), self.blocks.scale[:, -1]
         sequence = self.method.extrapolation.start()
         history: list[float] = []
-        found = self._tresca.solve(q, limit, constant, guess)
+        found = self._tresca.solve(q, limit, constant, start)
         while len(history) < self.method.max_iterations:
             new = cohesion + slope * np.maximum(found.r[:, 0], 0.0)
             change, size = largest((new - limit) / unit), max(largest(new / unit), largest(limit / unit))

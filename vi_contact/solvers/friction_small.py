@@ -115,20 +115,35 @@ class Step:
         return np.column_stack([r_n, project(r[:, 1:], self.limit(r_n))])
 
     def start(self, guess: Array | Mask | None) -> Array:
-        """Reactions to start from: those guessed, or what opens the guessed set row by row."""
+        """Reactions to start from: those guessed; or what opens the guessed set row by row, times the number that
+        makes ½ rᵀG r + qᵀr least."""
         if guess is None:
             return np.zeros_like(self.q)
-        if guess.dtype == bool:
-            held = guess & np.isfinite(self.q[:, 0])
-            return self.admissible(np.where(held[:, None], -self.q, 0.0))
-        return self.admissible(guess / self.blocks.scale)
+        if guess.dtype != bool:
+            return self.admissible(guess / self.blocks.scale)
+        held = guess & np.isfinite(self.q[:, 0])
+        r = self.admissible(np.where(held[:, None], -self.q, 0.0))
+        carried = r != 0.0
+        if carried.any():
+            r *= -(self.q[carried] @ r[carried]) / np.vdot(self.moved(r), r)
+        return r
 
     def result(
-        self, r: Array, *, iterations: int, method: object, tolerance: float, history: tuple[float, ...] = ()
+        self,
+        r: Array,
+        *,
+        iterations: int,
+        method: object,
+        tolerance: float,
+        history: tuple[float, ...] = (),
+        w: Array | None = None,
     ) -> FrictionResult:
-        """Back to newtons; StepFailure when the residual is above ``tolerance`` and above rounding."""
-        r = self.admissible(r)
-        w = self.w(r)
+        """Back to newtons; StepFailure when the residual is above ``tolerance`` and above rounding. ``w`` of r, when
+        it is known."""
+        inside = self.admissible(r)
+        if w is None or not np.array_equal(inside, r):
+            w = self.w(inside)
+        r = inside
         residual, unit = self.residual(r, w), self.unit or 1.0
         rounding = self.rounding(r)
         if not residual <= max(tolerance * unit, rounding):
