@@ -236,7 +236,8 @@ def test_s3_7_winkler_moment_and_rotation(comm: Any) -> None:
 def test_s3_7_lift_off_and_uplift_under_a_horizontal_load(comm: Any) -> None:
     """S3.7: a block with its weight at height h lifts off at a/g = b/(3h), later uplift = 1 - 3(1 - e/b)/2, e = h a/g.
 
-    Load controlled: held by contact alone and a roller along its base. M is W h a/g to round-off, R_x is -W a/g.
+    Load controlled: held by contact alone and a roller along its base. M is W h a/g, R_x -W a/g
+    to what the static stage of a body without supports leaves (1e-9 of the elastic forces of a stiff body).
     """
     h = 0.5 * BLOCK_HEIGHT
     for ratio, uplift in ((0.99, 0.0), (1.06, 0.09), (2.0, 0.5)):
@@ -249,10 +250,10 @@ def test_s3_7_lift_off_and_uplift_under_a_horizontal_load(comm: Any) -> None:
         state = vc.static_equilibrium(problem, solver=vc.Condensed())
         row = vc.Resultants("base", (B, 0.0)).start(problem, state)
         held = fem.Reactions("base", tags["bottom"], (B, 0.0), load).start(problem, state)
-        assert row["N_base"] == pytest.approx(BLOCK_WEIGHT, rel=1e-8)
-        assert row["M_base"] == pytest.approx(BLOCK_WEIGHT * h * part, rel=1e-8)
-        assert row["e_base"] == pytest.approx(h * part, rel=1e-8)
-        assert held["reaction_x_base"] == pytest.approx(-BLOCK_WEIGHT * part, rel=1e-8)
+        assert row["N_base"] == pytest.approx(BLOCK_WEIGHT, rel=1e-6)
+        assert row["M_base"] == pytest.approx(BLOCK_WEIGHT * h * part, rel=1e-6)
+        assert row["e_base"] == pytest.approx(h * part, rel=1e-6)
+        assert held["reaction_x_base"] == pytest.approx(-BLOCK_WEIGHT * part, rel=1e-6)
         assert row["uplift_base"] == pytest.approx(1.0 - 1.5 * (1.0 - h * part / B) if uplift else 0.0, abs=1.0 / 40)
         assert (row["uplift_base"] > 0.0) == (ratio > 1.0)
 
