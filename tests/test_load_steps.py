@@ -14,7 +14,7 @@ from column import column, rubbing_mass, two_component_system
 
 from vi_contact.algebra import Array, SerialComm
 from vi_contact.errors import InputError
-from vi_contact.friction import Coulomb, FrictionLaw, Tresca
+from vi_contact.friction import Coulomb, ExponentialDecay, FrictionLaw, SlipRateCoulomb, StaticKinetic, Tresca
 from vi_contact.load_steps import quasi_static
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.nsgs import NSGS
@@ -168,6 +168,13 @@ def test_another_friction_method():
 def test_times_must_increase(times):
     with pytest.raises(InputError, match="give times that increase, none before the start"):
         quasi_static(slider(lambda t: 0.0), times, solver=Condensed())
+
+
+@pytest.mark.parametrize("mu", [ExponentialDecay(0.6, 0.4, v_c=0.1), StaticKinetic(0.6, 0.4)], ids=repr)
+def test_friction_that_asks_for_a_rate_is_refused(mu):
+    problem = replace(slider(lambda t: t), friction=SlipRateCoulomb(mu))
+    with pytest.raises(InputError, match="SlipRateCoulomb.*has no rate; use Coulomb .*or march"):
+        quasi_static(problem, [1.0], solver=Condensed())
 
 
 def test_a_load_beyond_friction_is_refused_when_it_comes():

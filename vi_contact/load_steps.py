@@ -6,7 +6,8 @@ the stage before (slip rate times time step, implicit Euler):
     K u_k = f(t_k) - B_nᵀ r_n - B_tᵀ r_t,    r_t against B_t (u_k - u_{k-1}),    |r_t| <= limit(r_n)
 
 so that t only orders the loads: histories of ``Traction`` and ``BodyForce``, ``Prescribed`` displacements, and
-obstacles that move. Without friction every stage is the equilibrium of its own loads.
+obstacles that move. Without friction every stage is the equilibrium of its own loads. Slip between stages has no rate,
+so a law that asks for one is refused: its value at rest would be wrong for points in motion wherever it jumps there.
 """
 
 from __future__ import annotations
@@ -41,9 +42,15 @@ def quasi_static(
         state: where the history starts, from ``static_equilibrium`` or an earlier history; u0 at t = 0 without
             reactions when None. A body pressed without friction first: the state of that problem.
     Raises:
-        InputError: times that do not increase; loads that drive a rigid motion which nothing stops.
+        InputError: times that do not increase; friction that depends on the slip rate; loads that drive a rigid motion
+            which nothing stops.
         StepFailure: no answer below the certificate tolerance.
     """
+    if problem.friction.at(np.zeros(problem.surface.count)) is not problem.friction:
+        raise InputError(
+            f"load steps with {problem.friction}: slip between them has no rate; use Coulomb with the coefficient of "
+            "slow sliding, or march through the history in time"
+        )
     state = initial_state(problem) if state is None else state
     order = _checked(times, state.t)
     return _stages(Equilibria(problem, solver=solver, tolerance=tolerance), state, order)
