@@ -76,6 +76,21 @@ def test_contact_between_tied_sides(comm):
         fem.contact_surface(system, tags["bottom"])
 
 
+def test_mass_beside_a_tie_is_handed_over_alike(comm):
+    """A periodic block falls on a plane: left and right contact points press alike, mass and energy are kept."""
+    mesh, tags = block(comm, lengths=(2.0, 1.0), divisions=(4, 4))
+    system = fem.assemble(mesh, SOIL, tied=fem.Tied(tags["left"], tags["right"]), initial_velocity=(0.0, -0.5))
+    plane = vc.HalfSpace((0.0, -1e-4), (0.0, 1.0))
+    surface = fem.contact_surface(system, tags["bottom"], points=[(x, 0.0) for x in (0.5, 1.0, 1.5)], obstacle=plane)
+    problem = vc.ContactProblem(system, surface, mass=vc.Redistributed())
+    for r in problem.equations.influence.T:
+        mass = problem.equations.algebra.dot(r, problem.equations.M @ r)
+        assert np.isclose(mass, 2.0 * SOIL.rho, rtol=1e-12)
+    reactions = np.array([state.r_n for state, _ in vc.march(problem, dt=2e-5, steps=200)])
+    assert reactions.max() > 0.0
+    assert np.abs(reactions[:, 0] - reactions[:, 2]).max() < 1e-10 * reactions.max()
+
+
 def test_what_does_not_fit_is_refused(comm):
     """Sides meshed differently, held on one side only, tied twice, components that do not exist."""
     def bent(x):

@@ -26,12 +26,15 @@ def from_neighbours(system: SemiDiscreteSystem, massless: Mask, contact: Mask, n
     """The matrices P_k of v = P_0 P_1 … v that replace massless unknowns; contact: all unknowns of contact nodes.
 
     Contact nodes with neighbours behind the surface come last in the product, those with contact nodes around them
-    only, in corners, follow these. InputError when some have no material behind them at all.
+    only, in corners, follow these. Tied nodes carry nothing: they are in two places. InputError when some contact
+    nodes have no material behind them at all.
     """
     algebra, comm = system.algebra, system.algebra.comm
     node = np.asarray(system.space.ids) // system.influence.shape[1]
     levels: list[Matrix] = []
     left, donors, exact = massless.copy(), ~contact, True
+    if system.tied is not None:
+        donors &= ~system.tied
     while comm.max(np.array([float(left.any())]))[0]:
         rows = _rows(system, left, donors, nodal, exact=exact)
         if comm.max(np.array([float(len(rows))]))[0]:

@@ -49,7 +49,8 @@ class Redistributed:
     coordinates times those of M and of the order of (mesh size / body size)², restore what the lumping changed: the
     mass matrix of rigid motions (total mass, centre of mass, all moments and products of inertia) of every body; in 1D
     also what the shift by one element changed, centre and second moment. Damping sees the same velocities, C* = PᵀCP:
-    a force on massless unknowns that depends on their rate would ring.
+    a force on massless unknowns that depends on their rate would ring. Bodies with tied sides cannot turn: of them the
+    total mass is kept.
 
     ``lumping`` 0.4 balances the dispersion of mesh and time step: consistent mass sends high frequencies ahead of
     the wave, lumped mass leaves them behind (table in docs/schemes.md). InputError for lumping outside [0, 1], a
@@ -144,6 +145,8 @@ def _inertia_correction(system: SemiDiscreteSystem, moved: Matrix, inner: Mask, 
     low = -comm.max(np.max(-points[body], axis=0, initial=-np.inf))
     x = (points - 0.5 * (low + high)) / max(float(np.max(high - low)), 1e-300)
     R = _motions(system, x) * body[:, None]
+    if system.tied is not None and comm.max(np.array([float((body & system.tied).any())]))[0]:
+        R = R[:, :d]
     upper = np.triu_indices(R.shape[1])
     wanted = R.T @ np.column_stack([system.M @ mode - moved @ mode for mode in R.T])
     powers = np.column_stack([np.ones(len(x)), *x.T] + [x[:, i] * x[:, j] for i in range(d) for j in range(i, d)])

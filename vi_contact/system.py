@@ -92,6 +92,8 @@ class SemiDiscreteSystem:
         space: what the unknowns mean.
         massless: unknowns without inertia (rows and columns of M are zero), None when there are none.
         floating: True when some rigid motion is not held by prescribed displacements (static stages refuse it).
+        tied: unknowns of nodes that move together with others elsewhere, None when there are none: they have no one
+            place, and a body with such nodes cannot turn.
         notes: which motion its boundaries expect, for log and summary of a run.
         absolute: True when a boundary lets waves in: displacements are those of space, and nothing else may shake it.
     """
@@ -108,6 +110,7 @@ class SemiDiscreteSystem:
     floating: bool = False
     massless: Mask | None = None
     base_mass: Array | None = None
+    tied: Mask | None = None
     notes: tuple[str, ...] = ()
     absolute: bool = False
     _cache: dict[str, Any] = field(default_factory=dict, compare=False, repr=False)

@@ -99,6 +99,7 @@ def assemble(
         v0=_initial(space, "initial velocity", initial_velocity),
         space=space,
         floating=floats(space),
+        tied=space.tied_unknowns,
         notes=tell(boundaries, mesh.comm.rank),
         absolute=any(isinstance(one, CompliantBase) for one in boundaries),
     )

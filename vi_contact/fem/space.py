@@ -128,6 +128,13 @@ class FemSpace:
         return P
 
     @property
+    def tied_unknowns(self) -> Mask | None:
+        """Free unknowns of nodes that move together with others; None when no boundaries are tied."""
+        if self._P is None:
+            return None
+        return np.repeat(np.isin(self.nodes, self.tied_nodes), self.dimension)[self.free]
+
+    @property
     def coordinates(self) -> Array:
         """Positions (rows, d) of the nodes of the free unknowns [m]."""
         return np.asarray(np.repeat(self.points, self.dimension, axis=0)[self.free])
