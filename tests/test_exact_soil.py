@@ -111,6 +111,22 @@ def test_the_column_answers_like_the_layer(f):
     assert ratio == pytest.approx(float(vc.SoilLayer(30.0, SOIL, xi=0.05).on_rigid_base(f)), rel=1e-2)
 
 
+@pytest.mark.parametrize("speed, peak", [(1000.0, 3.141), (2000.0, 5.041)])
+def test_the_column_on_rock_answers_like_the_layer(speed, peak):
+    """Seismic practice 3.2: largest amplification of an outcrop motion, 20 m on two rocks, damping 5 % there: 1 %."""
+    soil = vc.LinearElastic.from_wave_speeds(600.0, 300.0, 2000.0)
+    rock = vc.LinearElastic.from_wave_speeds(2.0 * speed, speed, 2500.0)
+    layer, fine = vc.SoilLayer(20.0, soil, xi=0.05), np.linspace(2.0, 5.0, 601)
+    f = float(fine[np.argmax(layer.on_elastic_base(fine, rock))])
+    column = column_of(soil, np.linspace(0.0, 20.0, 31), beta=0.05 / (np.pi * f))
+    up = vc.upgoing(vc.Harmonic(1.0, f, phase=0.5 * np.pi), dt=1.0 / (400.0 * f))
+    problem = column.on_dashpots(rock.rho * rock.c_s, rock.rho * rock.c_p, up)
+    rows = [(s.t, s.v[-2]) for s, _ in vc.march(problem, dt=1.0 / (80.0 * f), steps=80 * 20)][-80 * 3:]
+    t, top = np.array(rows).T
+    ratio = harmonic_amplitude(top, t, f) * 2.0 * np.pi * f  # the outcrop's velocity has 1/w
+    assert ratio == pytest.approx(peak, rel=1e-2)
+
+
 def test_upgoing_velocity():
     """Half the integral of a record, exact between its samples; all of it when it is upgoing already."""
     record = Record(np.array([0.0, 2.0, -1.0, 0.0]), 0.1)
