@@ -54,8 +54,8 @@ def _draw(axis: Any, panel: Panel) -> None:
     marks = "osv^D"
     for number, (record, (intensity, demand)) in enumerate(panel.curves.items()):
         label = record if few else "a record" if number == 0 else None
-        mark = marks[number] if few else ""
-        axis.plot(factor * demand, intensity, mark, ls="-", color="0.65", lw=0.9, ms=4, label=label)
+        mark = marks[number] if few else None
+        axis.plot(factor * demand, intensity, marker=mark, color="0.65", lw=0.9, ms=4, label=label)
     if len(panel.levels) > 1:
         for values, (name, colour, style) in zip(panel.fractiles.T, _FRACTILES, strict=True):
             axis.plot(factor * values, panel.levels, color=colour, ls=style, lw=1.6, label=name)

@@ -98,8 +98,8 @@ def run_ida(
     """Makes the runs that have not finished yet, and the table and figure of all that are in ``out``; returns its rows.
 
     Each run is a process of its own; what it cannot do is told in its row, and the others go on. Called again it keeps
-    finished runs, continues interrupted ones from their checkpoints, and tries failed ones again. Table and figure are
-    made anew after every run, the table in one piece.
+    finished runs, continues interrupted ones from their checkpoints, and tries failed ones again. The table is
+    made anew after every run, in one piece, the figure at the end.
 
     Args:
         jobs: runs at the same time.
@@ -120,10 +120,10 @@ def run_ida(
     left = [run for run in mine if run.done() is None]
     say(f"{len(every)} runs, {len(mine)} of them here, {len(mine) - len(left)} finished before")
     for number, row in enumerate(executed(left, jobs, launch), start=1):
-        _publish(study, out)
+        _tell(study, out)
         say(f"[{number}/{len(left)}] {row['record']} x {_shown(row['scale'])}: {row['status']}"
             + (f": {row['reason']}" if row["reason"] else ""))
-    return _publish(study, out)
+    return _tell(study, out, draw=True)
 
 
 def _shown(value: float | None) -> str:
@@ -154,8 +154,8 @@ def _digest(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
-def _publish(study: IDA, out: Path) -> list[Row]:
-    """Writes table, units and figure of all runs in the folder."""
+def _tell(study: IDA, out: Path, *, draw: bool = False) -> list[Row]:
+    """Writes table and units of all runs in the folder, and draws the figure."""
     rows, units = tabulated(study.case, out / RUNS, study.measure, study.wanted)
     text = io.StringIO()
     table = csv.DictWriter(text, list(units), lineterminator="\n")
@@ -164,7 +164,7 @@ def _publish(study: IDA, out: Path) -> list[Row]:
     described = {name: {"unit": unit, "meaning": meaning} for name, (unit, meaning) in units.items()}
     write_atomically(out / TABLE, text.getvalue().encode())
     write_atomically(out / COLUMNS, to_json(described).encode())
-    if any(row["status"] == "finished" for row in rows):
+    if draw and any(row["status"] == "finished" for row in rows):
         panels = [_panel(rows, study.measure.name, one.name, units[one.name]) for one in study.wanted]
         plot_ida(panels, out / FIGURE, intensity=f"{study.measure.meaning} [{study.measure.unit}]")
     return rows

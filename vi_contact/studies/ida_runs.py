@@ -10,6 +10,7 @@ import sys
 import threading
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -22,6 +23,7 @@ from ..output import CHECKPOINT, SUMMARY, to_json, write_atomically
 from .case import Case, read_case
 
 ROW = "row.json"
+SAID = "failure.txt"
 _MPI = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_RANK")  # in the environment of what mpirun has started
 
 
@@ -126,15 +128,18 @@ class OneRun:
         return [*launch, *own, *made, *(["--restart"] if (self.folder / CHECKPOINT).is_file() else [])]
 
     def keep(self, said: str, code: int) -> dict[str, Any]:
-        """Writes the row of a run that ended with this status, having said this on standard error."""
+        """Writes the row of a run that ended with this status, having said this; failed ones leave that in a file."""
         facts = read_json(self.folder / SUMMARY) or {}
         finished = code == 0 and facts.get("status") == "finished"
         row = {
             "record": self.shaking.name, "files": [str(path) for path in self.shaking.files], "scale": self.factor,
             "status": "finished" if finished else "failed", "reason": "" if finished else _sentence(said, code),
-            "certificate": facts.get("worst_certificate"), "steps": facts.get("steps"),
+            "certificate": facts.get("worst_certificate"), "energy_created": facts.get("energy_created"),
+            "steps": facts.get("steps"),
         }
         self.folder.mkdir(parents=True, exist_ok=True)
+        if not finished:
+            write_atomically(self.folder / SAID, said.encode())
         write_atomically(self.folder / ROW, to_json(row).encode())
         return row
 
@@ -148,7 +153,7 @@ class OneRun:
         try:
             return subprocess.Popen(
                 self.command(launch), env=environment, text=True, encoding="utf-8", errors="replace",
-                stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, start_new_session=True,
+                stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True,
             )
         except OSError as error:
             raise InputError(f"'{error.filename}' cannot be started ({error.strerror}): give another launch") from None
@@ -159,20 +164,26 @@ def executed(runs: Sequence[OneRun], jobs: int, launch: Sequence[str]) -> Iterat
     stopped, lock = threading.Event(), threading.Lock()
     going: set[subprocess.Popen[str]] = set()
 
-    def one(run: OneRun) -> dict[str, Any]:
-        if run.wrong:
-            return run.keep(f"vi-contact: {run.wrong}", 1)
+    def attempt(run: OneRun) -> tuple[str, int]:
         with lock:
             if stopped.is_set():
                 raise KeyboardInterrupt
             process = run.start(launch)
             going.add(process)
-        said = process.communicate()[1]
+        said = process.communicate()[0]
         with lock:
             going.discard(process)
             if stopped.is_set():
                 raise KeyboardInterrupt
-        return run.keep(said, process.returncode)
+        return said, process.returncode
+
+    def one(run: OneRun) -> dict[str, Any]:
+        if run.wrong:
+            return run.keep(f"vi-contact: {run.wrong}", 1)
+        said, code = attempt(run)
+        if code > 0 and not said.strip():  # MPI on a busy machine sometimes does not start, without a word
+            said, code = attempt(run)
+        return run.keep(said, code)
 
     with ThreadPoolExecutor(jobs) as pool:
         futures = [pool.submit(one, run) for run in runs]
@@ -182,8 +193,9 @@ def executed(runs: Sequence[OneRun], jobs: int, launch: Sequence[str]) -> Iterat
         finally:
             with lock:
                 stopped.set()
-                for process in going:
-                    process.send_signal(signal.SIGINT)  # the run keeps what it has
+                for process in going:  # with all they have started; a run keeps what it has
+                    with suppress(ProcessLookupError):
+                        os.killpg(process.pid, signal.SIGINT)
             for future in futures:
                 future.cancel()
 

@@ -36,6 +36,7 @@ def tabulated(case: Case, out: Path, measure: Intensity, demands: Sequence[Deman
         measure.name: (measure.unit, f"{measure.meaning} of the scaled motion"),
     } | {one.name: ("", one.meaning) for one in demands} | {
         "certificate": ("-", "worst certificate of the run"),
+        "energy_created": ("-", "energy that contact and time scheme created, over the largest; with Energy() only"),
         "steps": ("-", "steps of the run"),
         "status": ("-", "finished or failed"),
         "reason": ("-", "why a run failed"),

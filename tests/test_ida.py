@@ -1,0 +1,249 @@
+"""Incremental dynamic analysis: the example of docs/studies.md, its table, going on after a stop, failures as rows."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import time
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("dolfinx")
+
+from vi_contact.cli import main
+from vi_contact.errors import InputError
+from vi_contact.ground_motion import Record, arias, pga, psa, read_record, scaled, tapered
+from vi_contact.plotting_ida import Panel, plot_ida
+from vi_contact.studies import IDA, read_case, run_ida
+from vi_contact.studies.ida_runs import OneRun, Shaking, executed, quoted
+from vi_contact.studies.measures import demand, fractiles, intensity
+
+pytestmark = pytest.mark.serial
+ROOT = Path(__file__).resolve().parents[1]
+MOTIONS = ("motion_1.at2", "motion_2.at2")
+DEMANDS = ("contact_uplift:max", "u_x_top:min")
+
+
+def blocks(language: str) -> list[str]:
+    """The fenced blocks of docs/studies.md."""
+    text = (ROOT / "docs" / "studies.md").read_text(encoding="utf-8")
+    return re.findall(rf"^```{language}\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+
+
+@pytest.fixture(scope="module")
+def example(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """The folder in which the whole example of docs/studies.md has run in a shell, and what it printed."""
+    folder = tmp_path_factory.mktemp("ida")
+    (case,), (make, read), commands = blocks("toml"), blocks("python"), blocks("sh")
+    (folder / "wall.toml").write_text(case, encoding="utf-8")
+    (folder / "make.py").write_text(make, encoding="utf-8")
+    (folder / "read.py").write_text(read, encoding="utf-8")
+    lines = ["set -e", 'vi-contact() { "$0" -m vi_contact "$@"; }', '"$0" make.py', *commands, '"$0" read.py']
+    done = subprocess.run(
+        ["bash", "-c", "\n".join(lines), sys.executable], cwd=folder, capture_output=True, encoding="utf-8",
+        timeout=300, env=os.environ | {"PYTHONPATH": str(ROOT), "PYTHONIOENCODING": "utf-8"},
+    )
+    assert done.returncode == 0, done.stderr
+    return folder, done.stdout
+
+
+@pytest.fixture
+def study(example: tuple[Path, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of its folder to spoil; the case and the records stay where they were."""
+    monkeypatch.chdir(example[0])
+    return Path(shutil.copytree(example[0] / "results" / "ida", tmp_path / "ida"))
+
+
+def table(folder: Path) -> list[dict[str, str]]:
+    with open(folder / "ida.csv", encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def again(folder: Path, **more: object) -> tuple[list[dict[str, object]], list[str]]:
+    """The study of the example from Python: (rows, what it says)."""
+    said: list[str] = []
+    asked: dict[str, object] = {
+        "motions": MOTIONS, "demands": DEMANDS, "scales": (0.5, 1.0, 2.0), "intensity": "sa:0.1",
+    }
+    running = {key: more.pop(key) for key in ("jobs", "part", "launch") if key in more}
+    return run_ida(IDA(read_case("wall.toml"), **(asked | more)), folder, say=said.append, **running), said
+
+
+def test_the_example_gives_a_tidy_table(example: tuple[Path, str]) -> None:
+    """Six rows in order, all certified; intensities and demands are those of record and run."""
+    folder, printed = example
+    assert "wall.toml: A wall beside the ground: the file is in order" in printed
+    assert "6 rows, 0 of failed runs" in printed and "6 runs, 6 finished" in printed
+    rows = table(folder / "results" / "ida")
+    assert list(rows[0]) == ["record", "scale", "sa_0.1", "contact_uplift_max", "u_x_top_min", "certificate",
+                             "energy_created", "steps", "status", "reason"]
+    assert [(row["record"], float(row["scale"])) for row in rows] == [
+        (f"motion_{seed}", scale) for seed in (1, 2) for scale in (0.5, 1.0, 2.0)
+    ]
+    for row in rows:
+        record = tapered(read_record(folder / f"{row['record']}.at2"), fraction=0.05)
+        assert float(row["sa_0.1"]) == pytest.approx(float(row["scale"]) * psa(record, 0.1), rel=1e-12)
+        run = folder / "results" / "ida" / "runs" / f"{row['record']}_x{float(row['scale'])}"
+        history = np.genfromtxt(run / "history.csv", delimiter=",", names=True)
+        assert float(row["u_x_top_min"]) == history["u_x_top"].min() < 0.0
+        assert np.abs(history["a_g_x"]).max() == pytest.approx(float(row["scale"]) * pga(record), rel=1e-12)
+        assert 0.0 < float(row["certificate"]) < 1e-9 and 0.0 <= float(row["energy_created"]) < 0.01
+        assert row["steps"] == "400" and row["status"] == "finished"
+    units = json.loads((folder / "results" / "ida" / "columns.json").read_text(encoding="utf-8"))
+    assert list(units) == list(rows[0]) and units["u_x_top_min"]["unit"] == "m" and units["sa_0.1"]["unit"] == "m/s²"
+    assert (folder / "results" / "ida" / "ida.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_finished_runs_are_kept(study: Path) -> None:
+    """Nothing runs again; the table is the same to the byte, also from rows that a killed study had not written."""
+    before = (study / "ida.csv").read_bytes()
+    (study / "runs" / "motion_1_x0.5" / "row.json").unlink()
+    rows, said = again(study)
+    assert said == ["6 runs, 6 of them here, 6 finished before"] and len(rows) == 6
+    assert (study / "ida.csv").read_bytes() == before
+
+
+def test_other_demands_and_measures_need_no_runs(study: Path) -> None:
+    rows, said = again(study, demands=("contact_resultant:max", "u_x_top:last"), intensity="arias")
+    assert said[-1].endswith("6 finished before")
+    assert rows[2]["arias"] == pytest.approx(16.0 * rows[0]["arias"], rel=1e-9)
+    assert rows[2]["contact_resultant_max"] > rows[0]["contact_resultant_max"] > 0.0
+    with pytest.raises(InputError, match="the run has no column 'u_y_foot': record it, or choose one of t, "):
+        again(study, demands=("u_y_foot",))
+
+
+def test_an_interrupted_run_goes_on_and_failures_are_rows(study: Path, tmp_path: Path) -> None:
+    """A run with a checkpoint at half its way and no row continues there; a record that is none has a row that says so,
+    and the others go on. The row of a failed run is tried again."""
+    folder = study / "runs" / "motion_1_x1.0"
+    expected = (folder / "history.csv").read_bytes()
+    for path in folder.iterdir():
+        path.unlink() if path.is_file() else shutil.rmtree(path)
+    settings = Shaking("motion_1", (Path("motion_1.at2").resolve(),)).settings(read_case("wall.toml"))
+    set_words = [word for setting in (*settings, "run.steps=200") for word in ("--set", setting)]
+    assert main(["run", "wall.toml", "--quiet", "--out", str(folder), *set_words]) == 0
+    (folder / "summary.json").unlink()
+    (tmp_path / "bad.txt").write_text("0 1\n0.1 x\n")
+    rows, said = again(study, motions=(*MOTIONS, tmp_path / "bad.txt"), scales=(1.0,), jobs=2)
+    assert said[0] == "3 runs, 3 of them here, 1 finished before" and len(rows) == 7
+    (bad,) = (row for row in rows if row["status"] == "failed")
+    assert bad["record"] == "bad" and bad["u_x_top_min"] is None and bad["sa_0.1"] is None
+    assert bad["reason"].endswith("bad.txt, line 2: 'x' is not a number; correct or remove it")
+    assert any(line.endswith("] motion_1 x 1: finished") for line in said)
+    assert json.loads((folder / "summary.json").read_text(encoding="utf-8"))["restarted_from_step"] == 200
+    assert (folder / "history.csv").read_bytes() == expected
+    assert table(study)[0]["reason"] == bad["reason"] and table(study)[0]["u_x_top_min"] == ""
+    assert again(study, motions=(tmp_path / "bad.txt",), scales=(1.0,))[1][0].endswith("0 finished before")
+
+
+def test_parts_levels_and_runs_that_die(study: Path) -> None:
+    """--part takes every n-th run; levels scale every record to the intensity; a process that dies is a row."""
+    asked = {"scales": (), "levels": (2.0, 4.0), "intensity": "arias"}
+    rows, said = again(study, part=(2, 3), launch=("false",), **asked)
+    assert said[0] == "4 runs, 1 of them here, 0 finished before"
+    assert said[1] == f"[1/1] motion_1 x {rows[3]['scale']:g}: failed: ended with status 1"
+    (row,) = (row for row in rows if row["status"] == "failed")
+    record = scaled(tapered(read_record("motion_1.at2"), fraction=0.05), factor=row["scale"])
+    assert row["arias"] == pytest.approx(4.0, rel=1e-12) and arias(record) == pytest.approx(4.0, rel=1e-12)
+    rows, said = again(study, part=(2, 3), launch=("sh", "-c", "kill -9 $$"), **asked)
+    assert said[1].endswith("failed: ended by SIGKILL") and len(rows) == 7
+    with pytest.raises(InputError, match="'no-such-program' cannot be started"):
+        again(study, part=(2, 3), launch=("no-such-program",), **asked)
+
+
+def test_stopping_stops_the_runs(study: Path) -> None:
+    """Ctrl-C between two rows: processes that go on are told to stop, and leave no row."""
+    case, shaking = read_case("wall.toml"), Shaking("motion_1", (Path("motion_1.at2"),))
+    wrong = OneRun(case, shaking, 1.0, study / "runs" / "wrong", "it cannot")
+    long = OneRun(case, shaking, 1.0, study / "runs" / "long")
+    start = time.monotonic()
+    rows = executed([long, wrong], 2, ("sh", "-c", "sleep 60"))
+    assert next(rows)["reason"] == "it cannot"
+    with pytest.raises(KeyboardInterrupt):
+        rows.throw(KeyboardInterrupt())
+    assert time.monotonic() - start < 30.0 and not (long.folder / "row.json").exists()
+
+
+def test_another_study_is_refused(study: Path) -> None:
+    with pytest.raises(InputError, match="holds runs from before the case was changed: choose another folder"):
+        run_ida(IDA(read_case("wall.toml", ["friction.mu=0.4"]), MOTIONS, DEMANDS, scales=(1.0,)), study)
+    shutil.copy("motion_2.at2", study / "motion_1.at2")
+    with pytest.raises(InputError, match="before the record 'motion_1' was changed"):
+        again(study, motions=(study / "motion_1.at2",))
+
+
+@pytest.mark.parametrize(("more", "said"), [
+    ({"scales": ()}, "either scales or levels"),
+    ({"levels": (1.0,)}, "either scales or levels"),
+    ({"scales": (1.0, 1.0)}, "different positive numbers"),
+    ({"scales": (-1.0,)}, "different positive numbers"),
+    ({"demands": ()}, "no demands"),
+    ({"demands": ("u:most",)}, "WAY one of max, min, absmax, last"),
+    ({"motions": ()}, "no motions"),
+    ({"motions": ("a/m.at2", "b/m.at2")}, "two motions are called 'm'"),
+    ({"motions": (("h.at2", "v.at2"),)}, "the case has 1 ground motion"),
+    ({"intensity": "pgx"}, "unknown intensity 'pgx': choose one of pga"),
+    ({"intensity": "sa:x"}, "give the period after the colon"),
+    ({"jobs": 0}, "at least one job"),
+    ({"part": (3, 2)}, "1 <= i <= n"),
+])
+def test_wrong_studies(study: Path, more: dict[str, object], said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        again(study, **more)
+
+
+def test_what_has_no_record_to_replace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    case = read_case(ROOT / "demos" / "cases" / "wall.toml")
+    with pytest.raises(InputError, match=r"\[excitation.1\] is no GroundMotion with a record file"):
+        IDA(case, ["a.at2"], ["t"], scales=(1.0,))
+    case = read_case(ROOT / "demos" / "cases" / "wall_record.toml")
+    monkeypatch.setenv("OMPI_COMM_WORLD_SIZE", "2")
+    with pytest.raises(InputError, match="start it without mpirun"):
+        run_ida(IDA(case, ["a.at2"], ["t"], scales=(1.0,)), tmp_path)
+    assert not any(tmp_path.iterdir())
+
+
+def test_measures() -> None:
+    """Degrees: f times the motion has f**degree of the measure. Demands skip what is no number."""
+    record = Record(np.sin(0.3 * np.arange(400)), 0.01)
+    for word in ("pga", "pgv", "pgd", "arias", "cav", "housner", "sa:0.3"):
+        measure = intensity(word)
+        found = measure.of(scaled(record, factor=measure.scale(record, 2.5)))
+        assert found == pytest.approx(2.5, rel=1e-9), word
+        grown = 3.0**measure.degree * measure.of(record)
+        assert measure.of(scaled(record, factor=3.0)) == pytest.approx(grown, rel=1e-9)
+    values = {"x": np.array([1.0, np.nan, -4.0, 2.0])}
+    found = [demand(f"x{way}").of(values) for way in ("", ":absmax", ":max", ":min", ":last")]
+    assert found == [4.0, 4.0, 2.0, -4.0, 2.0]
+
+
+def test_fractiles_of_straight_curves() -> None:
+    """EDP = c IM with c = 1, 2, 3: median 2 IM, fractiles linear between the records (numpy's quantile): 1.32, 2.68."""
+    curves = {str(c): (np.array([3.0, 1.0, 2.0 + c]), c * np.array([3.0, 1.0, 2.0 + c])) for c in (1, 2, 3)}
+    levels, values = fractiles(curves, (0.16, 0.5, 0.84))
+    assert levels.tolist() == [1.0, 3.0]
+    assert values == pytest.approx(np.outer(levels, [1.32, 2.0, 2.68]))
+    assert len(fractiles({"1": curves["1"]}, (0.5,))[0]) == 0
+    apart = {"1": (np.array([1.0, 2.0]), np.ones(2)), "2": (np.array([3.0, 4.0]), np.ones(2))}
+    assert len(fractiles(apart, (0.5,))[0]) == 0
+
+
+def test_the_picture_of_many_records(tmp_path: Path) -> None:
+    """Without names where records are many, with crosses for failed runs, also when there is nothing to scale."""
+    curves = {str(k): (np.arange(3.0), k * np.arange(3.0)) for k in range(8)}
+    panels = [Panel("a", "m", curves, *fractiles(curves, (0.16, 0.5, 0.84)), (1.5,)),
+              Panel("b", "-", {"0": (np.ones(1), np.zeros(1))}, np.zeros(0), np.zeros((0, 3)))]
+    assert plot_ida(panels, tmp_path / "ida.png", intensity="PGA [m/s²]").stat().st_size > 20_000
+
+
+def test_paths_are_quoted_for_toml() -> None:
+    for text in ('a "b" \\ c', "ä ☃ 😀", "tab\tline\n\x7f"):
+        assert tomllib.loads(f"x = {quoted(text)}")["x"] == text
