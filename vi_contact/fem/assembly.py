@@ -77,22 +77,18 @@ def assemble(
     absorbers = [DashpotMatrix(space, forms, one) for one in boundaries]
     damper = forms.total([damper, *(one.mat for one in absorbers)])
     load = assemble_loads(space, section, as_tuple(loads), (stiffness, damper, mass))
-    elastic, viscous = free_field_loads(absorbers, forms)
-    load = replace(load, general=load.general + elastic, viscous=load.viscous + incoming(absorbers) + viscous)
 
     def reduced(full: Any) -> PetscMatrix:
         return PetscMatrix(full.PtAP(space.selection))
 
-    rigid = np.zeros((len(space.ids), space.dimension))
-    for direction in range(space.dimension):
-        rigid[:, direction] = space.restrict(np.tile(np.eye(space.dimension)[direction], (len(space.nodes), 1)))
+    rigid = np.column_stack([space.restrict(np.tile(e, (len(space.nodes), 1))) for e in np.eye(space.dimension)])
     M = reduced(mass)
     system = SemiDiscreteSystem(
         algebra=algebra,
         M=M,
         C=None if damper is None else reduced(damper),
         K=reduced(stiffness),
-        load=load,
+        load=with_waves(load, absorbers, forms),
         influence=rigid,
         base_mass=_base_mass(space, PetscMatrix(mass), M, rigid) if base_inertia else None,
         u0=_initial(space, "initial displacement", initial_displacement),
@@ -105,6 +101,12 @@ def assemble(
     )
     space.forms = forms
     return system
+
+
+def with_waves(load: Load, absorbers: Sequence[DashpotMatrix], forms: ElasticForms) -> Load:
+    """The load with what comes in through absorbing boundaries."""
+    elastic, viscous = free_field_loads(absorbers, forms)
+    return replace(load, general=load.general + elastic, viscous=load.viscous + incoming(absorbers) + viscous)
 
 
 def _base_mass(space: FemSpace, full: PetscMatrix, M: PetscMatrix, rigid: Array) -> Array:
