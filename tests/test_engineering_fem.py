@@ -75,6 +75,7 @@ def test_reactions_carry_all_loads(comm: Any, caplog: pytest.LogCaptureFixture) 
     assert without["reaction_y_foot"] == pytest.approx(-whole["N"] + share, rel=1e-10)
 
 
+@pytest.mark.serial
 def test_weight_as_gravity(comm: Any) -> None:
     """Two materials under ``with_weight``: the foot carries both, a cut what is above it."""
     mesh, tags = block(comm, lengths=(WIDTH, HEIGHT), divisions=(2, 8))
@@ -112,6 +113,7 @@ def test_cuts_that_are_none_are_refused(comm: Any, reason: str) -> None:
             fem.SectionForces({"bad": cut}).start(problem, state)
 
 
+@pytest.mark.serial
 def test_what_cannot_be_measured_is_refused(comm: Any) -> None:
     problem, tags, _ = cantilever(comm, False)
     state = vc.static_equilibrium(problem, solver=vc.Condensed())
@@ -202,6 +204,7 @@ def block_on_springs(comm: Any, divisions: int, stiffness: float, **data: Any) -
     return vc.ContactProblem(system, surface), tags
 
 
+@pytest.mark.serial
 def test_s3_7_winkler_moment_and_rotation(comm: Any) -> None:
     """S3.7: M/(W b) = 1/3, .5286, .6667, .7892, .9333 at theta/theta_cr = 1, 2, 4, 10, 100, N = W, contact c/2b.
 
@@ -233,6 +236,7 @@ def test_s3_7_winkler_moment_and_rotation(comm: Any) -> None:
     assert np.abs(found["uplift"] - (1.0 - 1.0 / np.sqrt(ratios))).max() < 1.5 / 160
 
 
+@pytest.mark.serial
 def test_s3_7_lift_off_and_uplift_under_a_horizontal_load(comm: Any) -> None:
     """S3.7: a block with its weight at height h lifts off at a/g = b/(3h), later uplift = 1 - 3(1 - e/b)/2, e = h a/g.
 
@@ -283,7 +287,10 @@ def test_tangents_are_those_of_the_surfaces() -> None:
             assert np.array_equal(found, np.delete(block_, column, axis=1))
 
 
-@pytest.mark.parametrize("angle", [0.0, 0.5 * np.pi, np.pi, 1.5 * np.pi, 0.7], ids="{:.2f}".format)
+ANGLES = [pytest.param(turns * np.pi, marks=pytest.mark.serial) for turns in (0.0, 0.5, 1.0, 1.5)]
+
+
+@pytest.mark.parametrize("angle", [*ANGLES, 0.7], ids="{:.2f}".format)
 def test_friction_of_walls_in_all_directions(comm: Any, angle: float) -> None:
     """Forces of a rubbing face that looks down, right, up, left or askew, against Contact's friction force."""
     mesh, tags = block(comm, lengths=(2.0, 1.0), divisions=(4, 2), angle=angle)
