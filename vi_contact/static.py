@@ -123,20 +123,22 @@ class _Proximal:
         self.tolerance = tolerance
 
     def solve(self, step: StepProblem) -> StepResult:
-        """Iterates to the tolerance and on until the residual of the problem itself has not fallen twice running."""
+        """Iterates to the tolerance and on until neither the residual of the problem itself nor the step has got
+        smaller twice running: the residual of a stiff body is at its round-off long before soft motions are."""
         self.step, near = step, replace(step, A=self.A)
         u, active = step.guess, step.active
         best: StepResult | None = None
-        least, vain, old = np.inf, 0, None
+        least, slowest, vain, old = np.inf, np.inf, 0, None
         for _ in range(ITERATIONS):
             b = step.b + self.eps * (self.system.M @ u)
             result, _, _ = self.certified.solve(replace(near, b=b, guess=u, active=active))
             worst = kkt_residual(step, result).worst
-            vain = 0 if worst < least else vain + 1
-            least, best = (worst, result) if worst < least else (least, best)
+            new = self._motion(result, u)
+            better = worst < least or (worst <= self.tolerance and new.pace < slowest)
+            vain, best = (0, result) if better else (vain + 1, best)
+            least, slowest = min(worst, least), min(new.pace, slowest)
             if vain == 2 and best is not None and least <= self.tolerance:
                 return best
-            new = self._motion(result, u)
             if least > self.tolerance:
                 self._refuse_flight(new)
             ahead = 0.0 if old is None else self._ahead(old, new, result)

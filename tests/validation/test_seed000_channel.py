@@ -68,7 +68,7 @@ def test_v4_2_both_routes(friction):
     """The volume route, which shares A and b only, gives the same step from the same state, to 1e-9."""
     problem = model().problem(friction=friction)
     start = vc.static_equilibrium(problem, solver=vc.Condensed())
-    steps = 40 if friction is None else 10
+    steps = 40 if friction is None else 7
     checked = vc.cross_check(
         problem, scheme=SCHEME, solvers=(vc.Condensed(), REFERENCE), dt=DT, steps=steps, state=start
     )
@@ -104,10 +104,11 @@ def test_fig_8_rocking():
         assert one.min() < 0.0 < one.max() and abs(one.mean()) < 0.1 * one.std()
 
 
-def test_mirror_symmetry():
+@pytest.mark.parametrize("contact", ["sliding", "rubbing"])
+def test_mirror_symmetry(contact):
     """-a_g: u_y(1) <-> u_y(7) and u_x -> -u_x to 1e-12 of the largest displacement; the other points to 1e-11, which
     is what 400 steps leave of round-off where the walls are slender."""
-    one, two = shaken("sliding").history, shaken("sliding", amplitude=-2.0).history
+    one, two = shaken(contact).history, shaken(contact, amplitude=-2.0).history
     image = {"1": "7", "7": "1", "4": "4", "10": "16", "16": "10", "13": "19", "19": "13"}
     for label, other in image.items():
         tolerance = (EXACT if label in "17" else 10.0 * EXACT) * largest(one)
@@ -153,8 +154,8 @@ VERTICAL = vc.Harmonic(1.0, 3.0, direction=(0.0, 1.0))
 
 @pytest.mark.parametrize(
     "friction, excitation",
-    [(None, CHANNEL.harmonic()), (FRICTION, CHANNEL.harmonic()), (FRICTION, (CHANNEL.harmonic(), VERTICAL))],
-    ids=["sliding", "rubbing", "rubbing-both-directions"],
+    [(None, CHANNEL.harmonic()), (FRICTION, (CHANNEL.harmonic(), VERTICAL))],
+    ids=["sliding", "rubbing, vertical motion too"],
 )
 def test_frame_invariance(friction, excitation):
     """An inertia load in the frame of the bedrock and a moved bedrock: the same contact forces, to 1e-8."""
@@ -167,10 +168,11 @@ def test_frame_invariance(friction, excitation):
     assert np.ptp(absolute["u_x_1"]) > 3.0 * np.ptp(relative["u_x_1"])  # the ground's own motion is in it
 
 
-def test_one_quiet_second_after_gravity():
+@pytest.mark.parametrize("friction", [None, FRICTION], ids=["sliding", "rubbing"])
+def test_one_quiet_second_after_gravity(friction):
     """Nothing moves by more than 1e-12 of the largest static displacement."""
     one = model()
-    history = follow(one, one.problem(excitation=()), 80).history
+    history = follow(one, one.problem(friction=friction, excitation=()), 80).history
     for name in displacements(history):
         assert np.abs(history[name] - history[name][0]).max() < EXACT * largest(history), name
 
