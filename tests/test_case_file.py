@@ -24,6 +24,7 @@ from vi_contact.models.wall import Wall, build
 from vi_contact.studies import Case, read_case, run_case
 from vi_contact.studies.toml_file import with_settings
 from vi_contact.studies.words import words
+from vi_contact.surfaces import empty_surface
 
 ROOT = Path(__file__).resolve().parents[1]
 WALL = ROOT / "demos" / "cases" / "wall.toml"
@@ -189,6 +190,67 @@ def test_the_channel_by_its_name(shared_tmp: Path) -> None:
                          "shape = {size = 1.0, wall = 1.0, slab = 1.0}").replace("steps = 30", "steps = 2")
     history = run_case(write(shared_tmp, text), COMM, progress=False).history
     assert history["contact_resultant"][0] > 0.0 and "u_x_1_soil" in history
+
+
+GROUND = """
+[mesh]
+type = "BlockMesh"
+lengths = [6.0, 8.0]
+divisions = [4, 8]
+
+[material.soil]
+type = "LinearElastic.from_wave_speeds"
+c_p = 400
+c_s = 200
+rho = 2000
+
+[[record]]
+type = "Probe"
+points = {top = [3.0, 8.0]}
+
+[run]
+dt = 0.004
+steps = 20
+"""
+BASE = """{type = "CompliantBase", facets = "bottom",
+ motion = {motion = {type = "Ricker", amplitude = 2.0, frequency = 4.0}, dt = 0.004}}""".replace("\n", "")
+COMPLIANT = GROUND + f"""
+[system]
+dashpots = [{BASE}, {{type = "FreeField", facets = "left", base = {BASE}}},
+            {{type = "FreeField", facets = "right", base = {BASE}}}]
+"""
+RIGID = GROUND + """
+[system]
+clamped = "bottom"
+dashpots = [{type = "FreeField", facets = "left"}, {type = "FreeField", facets = "right"}]
+
+[excitation]
+type = "Ricker"
+amplitude = 2.0
+frequency = 4.0
+"""
+
+
+def test_soil_boundaries(shared_tmp: Path) -> None:
+    """A compliant base and free-field sides, which learn time step and scheme from the case; on a rigid base they take
+    its excitations."""
+    found = run_case(write(shared_tmp, COMPLIANT), COMM, progress=False)
+    mesh, tags = fem.build_mesh(BlockMesh(lengths=(6.0, 8.0), divisions=(4, 8)), COMM)
+    base = fem.CompliantBase(tags["bottom"], motion=vc.upgoing(vc.Ricker(2.0, 4.0), dt=0.004))
+    sides = [fem.FreeField(tags[side], base=base, dt=0.004) for side in ("left", "right")]
+    soil = vc.LinearElastic.from_wave_speeds(400.0, 200.0, 2000.0)
+    system = fem.assemble(mesh, soil, dashpots=[base, *sides])
+    problem = vc.ContactProblem(system, empty_surface(system.algebra.comm, 2))
+    probe = vc.Probe({"top": (3.0, 8.0)})
+    expected = vc.simulate(problem, dt=0.004, steps=20, record=[probe], progress=False)
+    assert np.abs(found.history["u_x_top"]).max() > 0.0
+    assert_same(found.history, expected.history)
+    rigid = run_case(write(shared_tmp, RIGID, "rigid.toml"), COMM, progress=False)
+    shaking = vc.Ricker(2.0, 4.0)
+    sides = [fem.FreeField(tags[side], base=(shaking,), dt=0.004) for side in ("left", "right")]
+    system = fem.assemble(mesh, soil, dashpots=sides, clamped=tags["bottom"])
+    problem = vc.ContactProblem(system, empty_surface(system.algebra.comm, 2), excitation=shaking)
+    assert_same(rigid.history, vc.simulate(problem, dt=0.004, steps=20, record=[probe], progress=False).history)
 
 
 def test_weight_is_the_body_force_of_the_density(comm: Any) -> None:

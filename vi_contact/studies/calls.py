@@ -6,7 +6,8 @@
 
 ``read`` turns a value of the file into a node by the type hint of the parameter it is for, and refuses what does not
 fit in one sentence with file, table and key. ``node.build(context)`` makes the calls; the context supplies what no file
-holds: communicator, mesh, its groups, system. Nothing of the file is ever evaluated as code.
+holds: communicator, mesh, its groups, system; excitations, time step and scheme for what must know them. Nothing of the
+file is ever evaluated as code.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from typing import Any, Protocol, get_type_hints
 from ..errors import InputError
 
 Context = Mapping[str, Any]
-GIVEN = ("comm", "mesh", "system")  # parameters that the context supplies
+GIVEN = ("comm", "mesh", "system", "excitations", "time_step", "time_scheme")  # parameters that the context supplies
 
 
 class Node(Protocol):

@@ -36,9 +36,10 @@ from ..weight import with_weight
 from ..writer import FieldWriter
 from .calls import Callee, Named, Node, Spot, callee
 from .models import Parts
+from .plain import MeshFile
 from .reading import Words, arguments, nearest, read
 from .toml_file import read_toml, with_settings
-from .words import MeshFile, words
+from .words import words
 
 COPY = "case.toml"
 _HINTS: dict[str, Any] = {
@@ -143,7 +144,10 @@ class Case:
         script = self._made("mesh")
         given = read_mesh(script.path, comm) if isinstance(script, MeshFile) else build_mesh(script, comm)
         mesh, tags = given
-        system = self._made("system", mesh=mesh, tags=tags)
+        system = self._made(
+            "system", mesh=mesh, tags=tags, excitations=self.excitations(), time_step=self._made("run")["dt"],
+            time_scheme=self._made("scheme"),
+        )
         system = self._made("gravity", system=system) if "gravity" in self.nodes else system
         surfaces = self._several("contact", system=system, tags=tags)
         surface = together(*surfaces) if len(surfaces) > 1 else (*surfaces, None)[0]

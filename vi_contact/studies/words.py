@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from .. import excitation, friction, impact, mass, materials, recorders, surfaces, time_steps
 from ..cross_check import CrossChecked
+from ..fem.dashpots import CompliantBase, Dashpots
 from ..fem.fields import XDMF
 from ..fem.loads import BodyForce, Prescribed, TangentialTraction, Traction
 from ..fem.matching import Matching, NodeToNode
 from ..fem.mesh import Cells, Facets
 from ..fem.mortar import DualMortar
-from ..fem.pairs import contact_pair
-from ..fem.trace import contact_surface
-from ..ground_motion import Processing, Record, read_record, synthetic
+from ..ground_motion import Record, synthetic
 from ..meshes.ball import BallMesh
 from ..meshes.block import BlockMesh
 from ..meshes.channel import ChannelMesh
@@ -51,50 +50,12 @@ from ..solvers.volume_snes import ReducedNewton, SemismoothNewton
 from ..solvers.volume_tao import TaoBnls, TaoTron
 from ..step import Recorder, Scheme, Solver
 from ..surfaces import ContactSurface
-from ..system import SemiDiscreteSystem
+from ..upgoing import UpgoingVelocity, upgoing
 from ..writer import FieldWriter
+from . import plain
 from .calls import Callee, callee
 from .models import MODELS, Parts
 from .reading import Words
-
-
-class MeshFile:
-    """What [mesh] makes of type = "read_mesh": the path of a file for ``fem.read_mesh``."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-
-
-def _record(
-    path: Path, units: str | None = None, *, dt: float | None = None, resample_dt: float | None = None,
-    channel: int | None = None, processing: Processing | None = None,
-) -> Record:
-    """``read_record``, then ``processing``."""
-    record = read_record(path, units, dt=dt, resample_dt=resample_dt, channel=channel)
-    return record if processing is None else processing(record)
-
-
-def _surface(
-    system: SemiDiscreteSystem, facets: Facets, *, obstacle: surfaces.Obstacle | None = None,
-    points: Sequence[tuple[float, ...]] | None = None, held: bool = False, springs: float | None = None,
-) -> ContactSurface:
-    """``contact_surface``; held: ``.held()``; springs: ``.on_springs(stiffness)``."""
-    found = contact_surface(system, facets, obstacle=obstacle, points=points)
-    found = found if springs is None else found.on_springs(springs)
-    return found.held() if held else found
-
-
-def _pair(
-    system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *, matching: Matching | None = None,
-    points: Sequence[tuple[float, ...]] | None = None, held: bool = False,
-) -> ContactSurface:
-    """``contact_pair``; held: ``.held()``."""
-    found = contact_pair(system, facets1, facets2, matching=matching, points=points)
-    return found.held() if held else found
-
-
-def _slip_rate(mu: friction.ExponentialDecay | friction.StaticKinetic) -> friction.SlipRateCoulomb:
-    return friction.SlipRateCoulomb(mu)
 
 
 def _named(*functions: Any) -> dict[str, Callee]:
@@ -106,11 +67,12 @@ def _choices() -> dict[Any, Mapping[str, Callee]]:
     """Type -> word -> what it calls."""
     frictional = _named(FrictionNewton, NSGS, FixedPoint, GivenForces, Uzawa)
     scripts = _named(WallMesh, ChannelMesh, BlockMesh, TwoBlocks, Blocks, DiskMesh, BallMesh, CutOpen, Welded)
-    rate = {"SlipRateCoulomb": callee(_slip_rate, name="SlipRateCoulomb")}
+    rate = {"SlipRateCoulomb": callee(plain.slip_rate, name="SlipRateCoulomb")}
+    compliant = {"CompliantBase": callee(plain.compliant_base, name="CompliantBase")}
     return {
         Parts: MODELS,
         MeshScript: scripts,
-        MeshFile: {"read_mesh": callee(MeshFile, name="read_mesh")},
+        plain.MeshFile: {"read_mesh": callee(plain.MeshFile, name="read_mesh")},
         materials.LinearElastic: _named(materials.LinearElastic, materials.LinearElastic.from_wave_speeds),
         materials.Section: _named(materials.PlaneStrain, materials.PlaneStress, materials.Solid),
         materials.Damping: _named(
@@ -119,9 +81,12 @@ def _choices() -> dict[Any, Mapping[str, Callee]]:
         Prescribed: _named(Prescribed),
         Traction: _named(Traction, TangentialTraction),
         BodyForce: _named(BodyForce),
+        Dashpots: _named(Dashpots) | compliant | {"FreeField": callee(plain.free_field, name="FreeField")},
+        CompliantBase: compliant,
+        UpgoingVelocity: _named(upgoing),
         ContactSurface: {
-            "contact_surface": callee(_surface, name="contact_surface"),
-            "contact_pair": callee(_pair, name="contact_pair"),
+            "contact_surface": callee(plain.surface, name="contact_surface"),
+            "contact_pair": callee(plain.pair, name="contact_pair"),
         },
         surfaces.Obstacle: _named(surfaces.Touching, surfaces.HalfSpace),
         channel_sides.Sides: _named(channel_sides.Rollers, channel_sides.Fixed, channel_sides.TiedSides),
@@ -134,7 +99,7 @@ def _choices() -> dict[Any, Mapping[str, Callee]]:
             excitation.Harmonic, excitation.Ricker, excitation.HalfSine, excitation.FullSine, excitation.Rectangular,
             excitation.Tabulated, excitation.GroundMotion,
         ),
-        Record: {"read_record": callee(_record, name="read_record"), "synthetic": callee(synthetic)},
+        Record: {"read_record": callee(plain.record, name="read_record"), "synthetic": callee(synthetic)},
         Scheme: _named(
             Trapezoidal, ZienkiewiczWoodTaylor, SS22, Midpoint, Newmark, HHT, GeneralisedAlpha,
             GeneralisedAlpha.spectral_radius, Houbolt, ContactStabilisedNewmark, MoreauJean, LinearMultistep,
@@ -156,6 +121,6 @@ def words(folder: Path) -> Words:
     """The words of a case file in this folder, to which its relative paths belong."""
     default = {
         materials.LinearElastic: "LinearElastic", Record: "read_record", ContactSurface: "contact_surface",
-        Traction: "Traction",
+        Traction: "Traction", Dashpots: "Dashpots",
     }
     return Words(folder, _choices(), default, (Facets, Cells), short={Record: "path"})

@@ -1,0 +1,74 @@
+"""Functions of the public interface in the form in which tables can call them: no functions among their arguments."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from .. import friction, materials, surfaces
+from ..fem.dashpots import CompliantBase
+from ..fem.free_field import FreeField
+from ..fem.matching import Matching
+from ..fem.mesh import Facets
+from ..fem.pairs import contact_pair
+from ..fem.trace import contact_surface
+from ..ground_motion import Processing, Record, read_record
+from ..surfaces import ContactSurface
+from ..system import SemiDiscreteSystem
+from ..upgoing import UpgoingVelocity
+
+
+class MeshFile:
+    """What [mesh] makes of type = "read_mesh": the path of a file for ``fem.read_mesh``."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+
+def record(
+    path: Path, units: str | None = None, *, dt: float | None = None, resample_dt: float | None = None,
+    channel: int | None = None, processing: Processing | None = None,
+) -> Record:
+    """``read_record``, then ``processing``."""
+    found = read_record(path, units, dt=dt, resample_dt=resample_dt, channel=channel)
+    return found if processing is None else processing(found)
+
+
+def surface(
+    system: SemiDiscreteSystem, facets: Facets, *, obstacle: surfaces.Obstacle | None = None,
+    points: Sequence[tuple[float, ...]] | None = None, held: bool = False, springs: float | None = None,
+) -> ContactSurface:
+    """``contact_surface``; held: ``.held()``; springs: ``.on_springs(stiffness)``."""
+    found = contact_surface(system, facets, obstacle=obstacle, points=points)
+    found = found if springs is None else found.on_springs(springs)
+    return found.held() if held else found
+
+
+def pair(
+    system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *, matching: Matching | None = None,
+    points: Sequence[tuple[float, ...]] | None = None, held: bool = False,
+) -> ContactSurface:
+    """``contact_pair``; held: ``.held()``."""
+    found = contact_pair(system, facets1, facets2, matching=matching, points=points)
+    return found.held() if held else found
+
+
+def compliant_base(
+    facets: Facets, *, motion: UpgoingVelocity, material: materials.LinearElastic | None = None, normal: float = 1.0,
+    tangential: float = 1.0,
+) -> CompliantBase:
+    return CompliantBase(facets, material, normal, tangential, motion=motion)
+
+
+def free_field(
+    excitations: Any, time_step: Any, time_scheme: Any, facets: Facets, *, base: CompliantBase | None = None,
+    material: materials.LinearElastic | None = None, normal: float = 1.0, tangential: float = 1.0,
+) -> FreeField:
+    """On the base of the run's excitations, or a compliant one; with its time step and scheme."""
+    foot = excitations if base is None else base
+    return FreeField(facets, material, normal, tangential, base=foot, dt=time_step, scheme=time_scheme)
+
+
+def slip_rate(mu: friction.ExponentialDecay | friction.StaticKinetic) -> friction.SlipRateCoulomb:
+    return friction.SlipRateCoulomb(mu)
