@@ -229,6 +229,22 @@ def test_floor_spectrum_and_its_frame(resting: dict[str, Array]) -> None:
         vc.recorded_motion(resting, "u_x_top")
 
 
+def test_velocities_know_the_jumps_of_impacts() -> None:
+    """A chain between walls: the integral of the motion from velocities ends where the velocity does, jumps included;
+    without an impact law both columns are the same motion."""
+    for impact, same in ((vc.Inelastic(), False), (None, True)):
+        problem = chain_problem(
+            3, gap=1e-3, left_gap=2e-3, excitation=vc.Ricker(3.0, 6.0, direction=(1.0,)), impact=impact, consistent=True
+        )
+        probe = vc.Probe({"end": (3.0,)}, velocity=True, acceleration=True)
+        scheme = vc.ZienkiewiczWoodTaylor()
+        rows = vc.simulate(problem, scheme=scheme, dt=5e-3, steps=200, record=[probe], progress=False).history
+        a, v = (vc.recorded_motion(rows, f"{kind}_x_end", relative=True).acceleration for kind in "av")
+        assert 5e-3 * v.sum() == pytest.approx(rows["v_x_end"][-1], abs=1e-12 * np.abs(rows["v_x_end"]).max())
+        difference = np.abs(a - v)[1:].max() / np.abs(v).max()
+        assert difference < 1e-10 if same else difference > 1e-2
+
+
 def test_uneven_steps_are_brought_to_even_ones() -> None:
     """A line stays a line."""
     t = np.array([0.0, 0.1, 0.2, 0.25, 0.3, 0.4, 0.5])

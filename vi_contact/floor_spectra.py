@@ -27,30 +27,36 @@ def recorded_motion(history: Mapping[str, Array], column: str, *, relative: bool
     Uneven steps (halved at impacts) are interpolated linearly to the most frequent one. Columns a_<axis>_<label> are
     means over the step that ends at t, so their instants are half a step before t; spectra and ratios of columns of the
     same kind do not see that, and a_g_<axis> is brought to the same instants.
+    A column v_<axis>_<label> of ``Probe(..., velocity=True)`` gives the same from differences of velocities, with the
+    jumps that an impact law makes: they are not in a_<axis>_<label>, whose integral drifts off.
     ``relative``: minus the ground acceleration a_g_<axis> of the run. InputError for columns that are no accelerations.
     """
-    parts = column.split("_")
-    if parts[0] != "a" or len(parts) < 3:
+    kind, _, rest = column.partition("_")
+    axis = rest.partition("_")[2 if rest.startswith("g_") else 0]
+    if kind not in ("a", "v") or "_" not in rest:
         raise InputError(f"column '{column}' is no acceleration: record Probe(..., acceleration=True), "
                          "and give a_x_<label>, or a_g_x for the ground")
     values, t = column_of(history, column), column_of(history, "t")
-    ground = column if parts[1] == "g" else f"a_g_{parts[1]}"
     if len(t) < 3:
         raise InputError(f"the history has {len(t)} rows: spectra need three or more")
-    if ground in history:
-        # means of the steps, as the probes have them; row 0 is the state at the start
-        mean = np.asarray(history[ground], dtype=float).copy()
-        mean[1:] = 0.5 * (mean[1:] + mean[:-1])
-        if parts[1] == "g":
-            values = mean
-        values = values - mean if relative else values
+    ground = _mean_of_steps(np.asarray(history.get(f"a_g_{axis}", np.zeros(len(t))), dtype=float))
+    if kind == "v":
+        values = np.append(0.0, np.diff(values) / np.diff(t)) + ground
+    elif column == f"a_g_{axis}":
+        values = ground
+    values = values - ground if relative else values
     steps = np.diff(t)
     dt = float(np.median(steps))
     if np.ptp(steps) > 1e-6 * dt:
         even = t[0] + dt * np.arange(int(np.floor((t[-1] - t[0]) / dt * (1.0 + 1e-12))) + 1)
         values = np.interp(even, t, values)
-    kind = "relative" if relative else "absolute"
-    return Record(values, dt, title=f"{column}, {kind}", source=column, notes=(f"{kind} acceleration of a run",))
+    frame = "relative" if relative else "absolute"
+    return Record(values, dt, title=f"{column}, {frame}", source=column, notes=(f"{frame} acceleration of a run",))
+
+
+def _mean_of_steps(values: Array) -> Array:
+    """Of end values the means over the steps, as probes have them; row 0 is the state at the start."""
+    return np.append(values[:1], 0.5 * (values[1:] + values[:-1]))
 
 
 def floor_spectrum(
