@@ -48,7 +48,7 @@ def add_report_commands(commands: Any) -> None:
 def _add_actions(parsers: dict[str, argparse.ArgumentParser]) -> None:
     parsers["peaks"].add_argument("columns", metavar="COLUMN", nargs="*", help="default: all")
     spectrum, transfer, loop = parsers["spectrum"], parsers["transfer"], parsers["loop"]
-    spectrum.add_argument("columns", metavar="COLUMN", nargs="+", help="a_x_top, a_g_x, ...; with an impact law v_x_top")
+    spectrum.add_argument("columns", metavar="COLUMN", nargs="+", help="a_x_top, a_g_x; with an impact law v_x_top")
     spectrum.add_argument("--damping", type=float, default=0.05, metavar="Z", help="ratio (default 0.05)")
     spectrum.add_argument("--periods", type=float, nargs=3, default=(0.02, 4.0, 200), metavar=("FROM", "TO", "N"),
                           help="logarithmically spaced [s] (default 0.02 4 200)")

@@ -43,11 +43,16 @@ def plot_transfer(
     found: TransferFunction, path: str | Path, *, title: str, theory: TransferFunction | None = None
 ) -> Path:
     """Amplitude over frequency, both logarithmic; a theory dashed."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
     figure, axis = _panel((7.5, 4.5))
     axis.loglog(found.frequencies, found.amplitude, color="black", lw=1.0, label="computed")
     if theory is not None:
         axis.loglog(theory.frequencies, theory.amplitude, "--", color="tab:red", lw=1.0, label="theory")
         axis.legend(fontsize=8)
+    axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.xaxis.set_minor_formatter(NullFormatter())
     axis.axhline(1.0, color="0.6", lw=0.6)
     frequency, amplitude = found.peak
     axis.plot(frequency, amplitude, "o", color="tab:blue", ms=4)
