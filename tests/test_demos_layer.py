@@ -43,16 +43,17 @@ def test_the_rigid_body_demo(tmp_path: Path) -> None:
     assert is_picture(tmp_path / "thin_limit.png") and is_picture(tmp_path / "tumbling.png")
 
 
-def test_the_bar_demo(comm: Any, shared_tmp: Path) -> None:
+def test_the_contact_layer_demo(comm: Any, shared_tmp: Path) -> None:
     """V1.1 in layers of 1 and ½ m: errors halve; the stiff block rebounds with ½ within 1 %."""
-    numbers = demo("bar_layer").main(quick=True, out=shared_tmp, progress=False)
-    for metric in ("BLENDED", "FLAT"):
-        assert numbers[f"{metric} e 0.5"] == pytest.approx(0.5, rel=1e-2)
-        ratio = numbers[f"{metric} b 1: error"] / numbers[f"{metric} b 0.5: error"]
-        assert 1.8 < ratio < 2.2 and numbers[f"{metric} b 0.5: error"] > numbers["exact inequality: error"]
-        assert numbers[f"{metric} b 0.5: pressure"] == pytest.approx(300.0, rel=5e-3)
+    numbers = demo("contact_layer").main(quick=True, out=shared_tmp, progress=False)
+    assert numbers["BLENDED e 0.5"] == pytest.approx(0.5, rel=1e-2)
+    ratio = numbers["FLAT b 1: error"] / numbers["FLAT b 0.5: error"]
+    assert 1.8 < ratio < 2.2 and numbers["FLAT b 0.5: error"] > numbers["exact inequality: error"]
+    assert numbers["FLAT b 0.5: pressure"] == pytest.approx(300.0, rel=5e-3)
+    assert numbers["wall b 8e-06: error"] < 0.05 * numbers["wall: largest displacement"]
+    assert 0.0 < numbers["wall b 8e-06: deepest"] < 8e-6
     if comm.rank == 0:
-        assert is_picture(shared_tmp / "bar.png") and is_picture(shared_tmp / "bar_limit.png")
+        assert all(is_picture(shared_tmp / f"{name}.png") for name in ("bar", "bar_limit", "wall_limit"))
 
 
 @serial

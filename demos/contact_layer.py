@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""The boundary layer in the place of the exact inequality: a stiff block and an elastic bar of finite elements.
+"""The boundary layer in the place of the exact inequality: a stiff block, an elastic bar and the shaken wall.
 
-The block is stiff: it rebounds with the restitution that its layer was made for. The bar is thrown at the wall with
+The block is stiff: it rebounds with the restitution that its layer was made for. The bar is thrown at a rigid wall with
 10 m/s (V1.1): in thinner and thinner layers its motion tends to that of the exact inequality, which is known in closed
-form.
+form. So does that of the wall of seed 000 beside the ground.
 
-    bash demos/run.sh bar_layer             # into results/bar_layer
-    bash demos/run.sh -n 2 bar_layer        # the same on two ranks
+    bash demos/run.sh contact_layer             # into results/contact_layer
+    bash demos/run.sh -n 2 contact_layer        # the same on two ranks
 
 All quantities are SI; docs/boundary_layer.md explains them.
 """
@@ -14,6 +14,7 @@ All quantities are SI; docs/boundary_layer.md explains them.
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the source tree without installing
@@ -22,6 +23,7 @@ import numpy as np
 from mpi4py import MPI
 
 import vi_contact as vc
+from vi_contact.models import wall
 from vi_contact.models.bar import Bar, build
 from vi_contact.plotting_layer import plot_layered_bar, plot_thin_limit
 
@@ -30,30 +32,39 @@ BAR = Bar(vc.ThrownBar(), elements=100, dimension=1)
 WIDTHS = (1.0, 0.5, 0.25, 0.1)  # b [m] of the bar's layers
 BLOCK = Bar(vc.ThrownBar(length=0.3, E=1e9, rho=1.0, height=0.02, speed=10.0), elements=3, dimension=2)
 WANTED = (1.0, 0.8, 0.5, 0.2)  # restitutions of the block
+METRICS = (vc.Metric.BLENDED, vc.Metric.FLAT)
 PASSAGE = 20  # time steps per b/V
-OUT = Path("results/bar_layer")
+WALL_WIDTHS, WALL_SPEED = (4e-6, 2e-6, 1e-6, 5e-7), 1e-2  # b [m], V [m/s] of the wall's layers
+WALL_STEPS, WALL_PERIODS = 640, 1.5  # time steps per period of the shaking
+OUT = Path("results/contact_layer")
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """Block and bar (``quick``: one restitution, two wide layers, 40 elements); returns the key numbers."""
+    """Block, bar and wall (``quick``: one restitution, two wide layers, one metric, a period); the key numbers."""
     comm = MPI.COMM_WORLD
     if comm.rank == 0:
         out.mkdir(parents=True, exist_ok=True)
-    numbers = rebounds(WANTED[2:3] if quick else WANTED)
-    numbers |= thin_limit(Bar(BAR.case, elements=40) if quick else BAR, WIDTHS[:2] if quick else WIDTHS, out)
+    if quick:
+        numbers = rebounds(WANTED[2:3], METRICS[:1])
+        numbers |= thin_limit(Bar(BAR.case, elements=40), WIDTHS[:2], METRICS[1:], out)
+        numbers |= shaken_wall((8e-6,), 80, 1, out)
+    else:
+        numbers = rebounds(WANTED, METRICS)
+        numbers |= thin_limit(BAR, WIDTHS, METRICS, out)
+        numbers |= shaken_wall(WALL_WIDTHS, WALL_STEPS, WALL_PERIODS, out)
     if comm.rank == 0 and progress:
         print(f"\nFigures are in {out}.")
     comm.Barrier()
     return numbers
 
 
-def rebounds(wanted: tuple[float, ...]) -> dict[str, float]:
+def rebounds(wanted: tuple[float, ...], metrics: tuple[vc.Metric, ...]) -> dict[str, float]:
     """The block's velocity after the impact over the one before."""
     model, numbers, width = build(BLOCK, MPI.COMM_WORLD), {}, 0.01
     problem = model.problem(mass=vc.ConsistentMass())
     case, system = BLOCK.case, model.system
     weight = case.rho * case.length  # mass over contact area
-    for metric in (vc.Metric.BLENDED, vc.Metric.FLAT):
+    for metric in metrics:
         for e in wanted:
             law = vc.contact_layer(e, mass=weight, speed=case.speed, width=width, metric=metric)
             dt = width / case.speed / PASSAGE
@@ -67,13 +78,15 @@ def rebounds(wanted: tuple[float, ...]) -> dict[str, float]:
     return numbers
 
 
-def thin_limit(bar: Bar, widths: tuple[float, ...], out: Path) -> dict[str, float]:
+def thin_limit(
+    bar: Bar, widths: tuple[float, ...], metrics: tuple[vc.Metric, ...], out: Path
+) -> dict[str, float]:
     """The bar's foot and pressure for every width, and beside them the exact inequality on the same mesh."""
     model, numbers, case = build(bar, MPI.COMM_WORLD), {}, bar.case
     problem = model.problem(mass=vc.ConsistentMass())
     impedance = np.sqrt(case.E * case.rho)
     runs, errors = {}, {}
-    for metric in (vc.Metric.BLENDED, vc.Metric.FLAT):
+    for metric in metrics:
         found = []
         for width in widths:
             law = vc.contact_layer(
@@ -100,6 +113,34 @@ def thin_limit(bar: Bar, widths: tuple[float, ...], out: Path) -> dict[str, floa
         curve = (fine, case.height + case.displacement(0.0, fine), case.force(fine))
         plot_layered_bar(dict(list(runs.items())[::2]), curve, out / "bar.png")
         plot_thin_limit(errors, out / "bar_limit.png", quantity="rms error of the foot [m]")
+    return numbers
+
+
+def shaken_wall(widths: tuple[float, ...], steps: int, periods: float, out: Path) -> dict[str, float]:
+    """Case b of the wall: distance of its contact points from those of the midpoint rule with gap >= 0."""
+    model = wall.build(wall.Wall(), MPI.COMM_WORLD)
+    exact = model.problem("b", impact=vc.NoImpact(), mass=vc.ConsistentMass())
+    concrete, dt = model.wall.material, 1.0 / (model.harmonic().frequency * steps)
+    numbers, errors = {}, []
+
+    def displacements(problem: vc.ContactProblem, scheme) -> np.ndarray:
+        found = vc.march(problem, scheme=scheme, dt=dt, steps=round(periods * steps))
+        return np.array([problem.surface.normal_values(state.u) for state, _ in found])
+
+    reference = displacements(exact, vc.Midpoint())
+    numbers["wall: largest displacement"] = float(np.max(np.abs(reference)))
+    for width in widths:
+        mass = np.sqrt(concrete.E * concrete.rho) * width / WALL_SPEED
+        law = vc.contact_layer(0.5, mass=mass, speed=WALL_SPEED, width=width, metric=vc.Metric.FLAT)
+        found = displacements(replace(exact, surface=law.set_back(exact.surface)), vc.BoundaryLayer(law=law))
+        errors.append(float(np.sqrt(np.mean((found - reference) ** 2))))
+        numbers |= {f"wall b {width:g}: error": errors[-1], f"wall b {width:g}: deepest": float(found.max())}
+        if MPI.COMM_WORLD.rank == 0:
+            print(f"wall, b = {1e6 * width:g} µm: rms distance to the exact inequality {1e6 * errors[-1]:.3f} µm, "
+                  f"into it {1e6 * found.max():.3f} µm (amplitude {1e6 * np.max(np.abs(reference)):.1f} µm)")
+    if MPI.COMM_WORLD.rank == 0:
+        plot_thin_limit({"wall, case b": (np.array(widths), np.array(errors))}, out / "wall_limit.png",
+                        quantity="rms distance of the contact points [m]")
     return numbers
 
 
