@@ -1,11 +1,13 @@
 #!/usr/bin/env python3
 """What a unilateral step costs, as a multiple of a plain linear step with the same matrix, in one run.
 
-    python3 benchmarks/step_cost.py [--sizes 1e3 2e3 2e4 2e5] [--steps 60] [--json FILE]
+    python3 benchmarks/step_cost.py [--model wall] [--sizes 1e3 2e3 2e4 2e5] [--steps 60] [--json FILE]
+    python3 benchmarks/step_cost.py --model channel [--sizes 2e4 2e5]
 
-The wall of seed 000 with its whole right side in possible contact, harmonic motion, Zienkiewicz-Wood-Taylor step,
-impact rule and certificate on, no records. A linear step is right-hand side, one back-substitution and update, timed
-beside every unilateral one. Figures are medians and means over the steps that have contact, one thread, one rank.
+The wall of seed 000 with its whole right side in possible contact, or its buried channel after the gravity stage,
+harmonic motion, Zienkiewicz-Wood-Taylor step, impact rule and certificate on, no records. A linear step is right-hand
+side, one back-substitution and update, timed beside every unilateral one. Figures are medians and means over the steps
+that have contact, one thread, one rank.
 """
 
 from __future__ import annotations
@@ -28,6 +30,8 @@ import numpy as np  # noqa: E402
 from mpi4py import MPI  # noqa: E402
 
 import vi_contact as vc  # noqa: E402
+from vi_contact.meshes.channel import ChannelMesh  # noqa: E402
+from vi_contact.models import channel  # noqa: E402
 from vi_contact.models.wall import Wall, build  # noqa: E402
 from vi_contact.solvers.volume import Volume  # noqa: E402
 from vi_contact.solvers.volume_factorised import OneFactorisation  # noqa: E402
@@ -42,6 +46,9 @@ ROUTES: dict[str, Any] = {
     "volume, reference": Volume(method=ReducedNewton()),
 }
 SLOW = {"volume, reference": 1e5}  # not run at or above this size
+CELLS = {1e3: 0.65, 2e3: 0.45, 2e4: 0.14, 2e5: 0.0436}  # of the channel's mesh [m]; up to 232 contact points
+RUBBING = "condensed, Coulomb 0.4"
+CHANNEL_ROUTES = {name: solver for name, solver in ROUTES.items() if name not in SLOW} | {RUBBING: vc.Condensed()}
 
 
 def memory() -> float:
@@ -72,10 +79,10 @@ class LinearSteps:
 
 
 def unilateral_steps(
-    problem: vc.ContactProblem, solver: Any, dt: float, count: int, linear: LinearSteps
+    problem: vc.ContactProblem, solver: Any, dt: float, count: int, linear: LinearSteps, state: vc.State | None = None
 ) -> dict[str, Any]:
     """Times ``count`` steps with contact after a third as many to warm up, each beside a linear step."""
-    loop = vc.march(problem, scheme=SCHEME, solver=solver, dt=dt, steps=100 * count)
+    loop = vc.march(problem, scheme=SCHEME, solver=solver, dt=dt, steps=100 * count, state=state)
     set_up, _ = timed(lambda: next(loop))
     seconds, plain, iterations, active, worst = [], [], [], [], 0.0
     warm_up = count // 3
@@ -124,6 +131,22 @@ def measure(size: float, steps: int) -> dict[str, Any]:
     return row
 
 
+def measure_channel(size: float, steps: int) -> dict[str, Any]:
+    """One size of the buried channel, after its gravity stage: sliding by both routes, and rubbing."""
+    model = channel.build(channel.Channel(ChannelMesh(size=CELLS[size])), MPI.COMM_WORLD)
+    dt, row = model.channel.time_step(), {"unknowns": model.system.space.unknowns, "routes": {}}
+    for name, solver in CHANNEL_ROUTES.items():
+        problem = model.problem(friction=vc.Coulomb(0.4) if name == RUBBING else None)
+        gravity, state = timed(lambda one=problem: vc.static_equilibrium(one, solver=vc.Condensed()))
+        linear = LinearSteps(problem, SCHEME.effective_matrix(problem, dt), dt)
+        linear()  # factorises
+        found = unilateral_steps(problem, solver, dt, steps, linear, state) | {"gravity_seconds": gravity}
+        row["routes"][name] = found
+        row["contact_points"] = problem.surface.count
+        print(line(row, name, found), flush=True)
+    return row
+
+
 COLUMNS = (  # title, width, format, key
     ("linear ms", 9, ".3f", "linear_ms"),
     ("ms median", 9, ".3f", "median_ms"),
@@ -159,15 +182,20 @@ def seed_wall(steps: int = 400) -> float:
 def main() -> None:
     """Prints the table and writes it with --json."""
     arguments = argparse.ArgumentParser(description=__doc__.split("\n")[0] if __doc__ else None)
+    arguments.add_argument("--model", default="wall", choices=("wall", "channel"))
     arguments.add_argument("--sizes", type=float, nargs="+", default=list(DIVISIONS), choices=list(DIVISIONS))
     arguments.add_argument("--steps", type=int, default=60, help="steps with contact that are timed")
     arguments.add_argument("--json", metavar="FILE")
     options = arguments.parse_args()
-    seconds = seed_wall()
-    print(f"the seed's wall, 400 steps, mesh to last step: {seconds:.2f} s\n\n{HEADER}", flush=True)
-    rows = [measure(size, options.steps) for size in options.sizes]
+    whole: dict[str, Any] = {}
+    if options.model == "wall":
+        whole["seed_wall_seconds"] = seed_wall()
+        print(f"the seed's wall, 400 steps, mesh to last step: {whole['seed_wall_seconds']:.2f} s\n")
+    print(HEADER, flush=True)
+    one = measure if options.model == "wall" else measure_channel
+    whole["rows"] = [one(size, options.steps) for size in options.sizes]
     if options.json:
-        Path(options.json).write_text(json.dumps({"seed_wall_seconds": seconds, "rows": rows}, indent=1) + "\n")
+        Path(options.json).write_text(json.dumps(whole, indent=1) + "\n")
 
 
 if __name__ == "__main__":

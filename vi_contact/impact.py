@@ -21,7 +21,7 @@ from typing import Protocol
 
 import numpy as np
 
-from .algebra import Array, Indices, Mask
+from .algebra import Array, Factor, Indices, Mask
 from .errors import InputError
 from .surfaces import ContactSurface
 from .system import SemiDiscreteSystem
@@ -41,6 +41,9 @@ class Impact:
     v_n: Array
     active: Mask
     closing: Mask
+
+
+STORED_ENTRIES = 200_000  # of M⁻¹Bᵀ over all ranks: beyond it a back-substitution is cheaper than the product
 
 
 class ImpactLaw(Protocol):
@@ -74,19 +77,24 @@ class ComponentReset:
 
 
 class MassProjection:
-    """The M-orthogonal reading: an impulse on the chosen contact unknowns. Keeps M⁻¹Bᵀ, one solve per contact point."""
+    """The M-orthogonal reading: an impulse on the chosen contact unknowns. Keeps the factor of M, and M⁻¹Bᵀ when it is
+    small: one back-substitution per contact point at first, then one per impact or a dense product."""
 
     def __init__(self) -> None:
         self._system: SemiDiscreteSystem | None = None
-        self._columns: Array = np.zeros((0, 0))
+        self._factor: Factor
+        self._columns: Array | None = None
         self._delassus: Array = np.zeros((0, 0))
 
     def _prepare(self, system: SemiDiscreteSystem, surface: ContactSurface) -> None:
-        factor = system.algebra.factor(system.M)
-        self._columns = factor.solve_units(surface.owned, surface.slots, surface.count)
+        comm = system.algebra.comm
+        self._factor = system.algebra.factor(system.M)
+        columns = self._factor.solve_units(surface.owned, surface.slots, surface.count)
         rows = np.zeros((surface.count, surface.count))
-        rows[surface.slots] = self._columns[surface.owned]
-        self._delassus = system.algebra.comm.sum(rows)
+        rows[surface.slots] = columns[surface.owned]
+        self._delassus = comm.sum(rows)
+        entries = float(comm.sum(np.array([float(columns.size)]))[0])
+        self._columns = columns if entries <= STORED_ENTRIES else None
         self._system = system
 
     def __call__(self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array) -> Array:
@@ -96,8 +104,11 @@ class MassProjection:
         if self._system is not system:
             self._prepare(system, surface)
         jump = target[chosen] - surface.normal_values(v)[chosen]
-        impulse = np.linalg.solve(self._delassus[np.ix_(chosen, chosen)], jump)
-        return np.asarray(v + self._columns[:, chosen] @ impulse)
+        impulse = np.zeros(surface.count)
+        impulse[chosen] = np.linalg.solve(self._delassus[np.ix_(chosen, chosen)], jump)
+        if self._columns is not None:
+            return np.asarray(v + self._columns @ impulse)
+        return np.asarray(v + self._factor.solve(surface.reaction_load(impulse, system.rows)))
 
 
 @dataclass(frozen=True)
