@@ -40,7 +40,10 @@ def plot_ida(panels: Sequence[Panel], path: str | Path, *, intensity: str) -> Pa
         _draw(axis, panel)
     axes[0].set_ylabel(intensity)
     axes[0].set_ylim(bottom=0.0)
-    axes[0].legend(fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncol=6, frameon=False)
+    handles, labels = axes[0].get_legend_handles_labels()
+    figure.suptitle(" ", fontsize=20)  # keeps room for the legend, which the layout of matplotlib 3.6 does not
+    columns = min(len(labels), 3 * len(panels))
+    figure.legend(handles, labels, loc="upper center", ncol=columns, fontsize=8, frameon=False)
     figure.savefig(path, dpi=130)
     return Path(path)
 
