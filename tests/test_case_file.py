@@ -113,6 +113,23 @@ type = "GroundMotion"
 record = {path = "motion.txt", units = "g", processing = {pga = 4.0}}
 scale = 1.5
 
+[[record]]
+type = "Energy"
+
+[[record]]
+type = "Contact"
+
+[[record]]
+type = "Reactions"
+name = "foot"
+facets = "lower_bottom"
+centre = [1.0, 0.0]
+
+[[record]]
+type = "Resultants"
+name = "joint"
+centre = [1.0, 1.0]
+
 [run]
 dt = 0.005
 """
@@ -139,7 +156,11 @@ def test_a_pair_with_weight_and_record_to_the_last_bit(shared_tmp: Path) -> None
         system, surface, friction=vc.Coulomb(0.3), excitation=vc.GroundMotion(record, scale=1.5)
     )
     rest = vc.static_equilibrium(problem, solver=vc.Condensed())
-    expected = vc.simulate(problem, dt=0.005, t_end=0.1, state=rest, progress=False)
+    foot = fem.Reactions("foot", tags["lower_bottom"], (1.0, 0.0))
+    expected = vc.simulate(
+        problem, dt=0.005, t_end=0.1, state=rest, progress=False,
+        record=[vc.Energy(), vc.Contact(), foot, vc.Resultants("joint", (1.0, 1.0))],
+    )
     assert len(found.history["t"]) == 21 and np.abs(found.history["a_g_x"]).max() == pytest.approx(6.0, rel=1e-12)
     weight = 9.81 * (2000.0 * 1.0) + 1e3
     assert found.history["contact_resultant"][0] == pytest.approx(weight, rel=1e-9)
@@ -383,7 +404,8 @@ def test_case_files_know_the_public_names() -> None:
         name for module, names in vc._CONTENTS.items() for name in names
         if module.split(".")[0] in ("friction", "impact", "mass", "materials", "excitation", "schemes", "recorders")
     }
-    wanted |= {"Condensed", "Hildreth", "NSGS", "FixedPoint", "Anderson", "CrossChecked", "Schedule", "HalvedAtImpact"}
+    wanted |= {"Resultants", "Racking", "Reactions", "SectionForces", "CompliantBase", "FreeField", "Schedule",
+               "HalvedAtImpact", "Condensed", "CrossChecked", "Hildreth", "NSGS", "FixedPoint", "Anderson"}
     missing = wanted - known - {"ExponentialDecay", "StaticKinetic", "completed"}  # arguments of others; no table
     assert missing == set()
 

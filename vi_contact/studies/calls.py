@@ -153,3 +153,12 @@ class Call:
             return self.callee.function(**supplied, **arguments)
         except InputError as error:
             raise self.spot.inside(f"{error}") from error
+
+
+def needs_mesh(node: Node) -> bool:
+    """Whether groups of the mesh are named in it."""
+    if isinstance(node, Call):
+        return any(needs_mesh(one) for one in node.arguments.values())
+    if isinstance(node, Items):
+        return any(needs_mesh(one) for one in node.items)
+    return isinstance(node, Group) or (isinstance(node, Named) and any(needs_mesh(one) for one in node.items.values()))

@@ -34,7 +34,7 @@ from ..step import ContactProblem, Recorder, Scheme, Solver
 from ..surfaces import ContactSurface, empty_surface
 from ..weight import with_weight
 from ..writer import FieldWriter
-from .calls import Callee, Named, Node, Spot, callee
+from .calls import Callee, Named, Node, Spot, callee, needs_mesh
 from .models import Parts
 from .plain import MeshFile
 from .reading import Words, arguments, nearest, read
@@ -96,7 +96,8 @@ class Case:
     def check(self) -> None:
         """Makes everything that needs no mesh, so that a wrong value or record file is told at once; InputError."""
         for table in ("material", *TABLES[TABLES.index("friction") :]):
-            self._made(table)
+            if table in self.nodes and not needs_mesh(self.nodes[table]):
+                self._made(table)
 
     def problem(self, comm: Any) -> ContactProblem:
         """The contact problem; collective."""
@@ -123,7 +124,7 @@ class Case:
             self._keep(run_folder(comm, folder), comm)
         return simulate(
             problem, scheme=self._made("scheme"), solver=solver, state=state, out=folder, restart=restart,
-            record=self._several("record") if "record" in self.nodes else parts.recorders,
+            record=self._several("record", tags=parts.tags) if "record" in self.nodes else parts.recorders,
             escalation=self._several("escalation"), fields=self._made("fields"), progress=progress,
             cross_check=solver if isinstance(solver, CrossChecked) else None, **own,
         )
@@ -153,7 +154,7 @@ class Case:
         surface = together(*surfaces) if len(surfaces) > 1 else (*surfaces, None)[0]
         if surface is None:
             surface = empty_surface(system.algebra.comm, system.space.dimension)
-        return Parts(system, surface, "gravity" in self.nodes)
+        return Parts(system, surface, tags, "gravity" in self.nodes)
 
     def _problem(self, parts: Parts) -> ContactProblem:
         return ContactProblem(

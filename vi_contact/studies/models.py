@@ -18,18 +18,22 @@ from .calls import Callee
 
 @dataclass(frozen=True)
 class Parts:
-    """What a problem is made of; ``weighted``: it carries its weight, and starts from its equilibrium; ``recorders``:
-    of a case that names none."""
+    """What a problem is made of.
+
+    tags: groups of the mesh; weighted: it carries its weight, and starts from its equilibrium; recorders: of a case
+    that names none.
+    """
 
     system: SemiDiscreteSystem
     surface: ContactSurface
+    tags: Any
     weighted: bool = False
     recorders: tuple[Recorder, ...] | None = None
 
 
 def _wall(shape: wall.Wall, comm: Any, *, case: str = "b", weight: bool = False) -> Parts:
     model = wall.build(shape, comm, weight=weight)
-    return Parts(model.system, model.surface(case), weight, (Energy(), Contact(), Probe(model.probes())))
+    return Parts(model.system, model.surface(case), model.tags, weight, (Energy(), Contact(), Probe(model.probes())))
 
 
 def _channel(
@@ -38,7 +42,7 @@ def _channel(
 ) -> Parts:
     model = channel.build(shape, comm, sides=sides, weighing=weighing)
     surface = model.surface.held() if held else model.surface
-    return Parts(model.system, surface, bool(weighing), tuple(model.recorders()))
+    return Parts(model.system, surface, model.tags, bool(weighing), tuple(model.recorders()))
 
 
 def model(shape: type, build: Callable[..., Parts]) -> Callee:

@@ -14,6 +14,8 @@ from ..fem.loads import BodyForce, Prescribed, TangentialTraction, Traction
 from ..fem.matching import Matching, NodeToNode
 from ..fem.mesh import Cells, Facets
 from ..fem.mortar import DualMortar
+from ..fem.reactions import Reactions
+from ..fem.section_forces import SectionForces
 from ..ground_motion import Record, synthetic
 from ..meshes.ball import BallMesh
 from ..meshes.block import BlockMesh
@@ -24,6 +26,8 @@ from ..meshes.gmsh_session import MeshScript
 from ..meshes.two_blocks import Blocks, TwoBlocks
 from ..meshes.wall import WallMesh
 from ..models import channel_sides
+from ..racking import Racking
+from ..resultants import Resultants
 from ..schemes.contact_stabilised import ContactStabilisedNewmark
 from ..schemes.generalised_alpha import GeneralisedAlpha
 from ..schemes.hht import HHT
@@ -112,7 +116,9 @@ def _choices() -> dict[Any, Mapping[str, Callee]]:
         volume.Method: _named(OneFactorisation, ReducedNewton, SemismoothNewton, TaoTron, TaoBnls),
         time_steps.Schedule: _named(time_steps.Schedule),
         time_steps.HalvedAtImpact: _named(time_steps.HalvedAtImpact),
-        Recorder: _named(recorders.Energy, recorders.Contact, recorders.Probe),
+        Recorder: _named(
+            recorders.Energy, recorders.Contact, recorders.Probe, Resultants, Racking, Reactions, SectionForces
+        ),
         FieldWriter: _named(XDMF),
     }
 
