@@ -24,8 +24,8 @@ from vi_contact.solvers.extrapolation import Anderson
 
 ROUTES: dict[str, Any] = {
     "FrictionNewton": vc.Condensed(),
-    "FixedPoint": vc.Condensed(friction_method=vc.FixedPoint(tolerance=1e-12)),
-    "FixedPoint, Anderson": vc.Condensed(friction_method=vc.FixedPoint(tolerance=1e-12, extrapolation=Anderson())),
+    "FixedPoint": vc.Condensed(friction_method=vc.FixedPoint()),
+    "FixedPoint, Anderson": vc.Condensed(friction_method=vc.FixedPoint(extrapolation=Anderson())),
 }
 HEADER = (
     f"{'unknowns':>9} {'points':>6} {'route':<21} {'linear ms':>9} {'step ms':>9} {'ratio':>6} {'mean':>6} {'iter':>5}"

@@ -79,10 +79,10 @@ class Step:
         return len(self.cohesion)
 
     def moved(self, r: Array) -> Array:
-        """G r (m, d), from the rows that carry something."""
+        """G r (m, d), from the rows that carry something when they are few."""
         carried = np.flatnonzero(r)
         matrix = self.blocks.matrix
-        product = matrix @ r.ravel() if len(carried) > 0.5 * r.size else r.ravel()[carried] @ matrix[carried]
+        product = matrix @ r.ravel() if len(carried) > 0.25 * r.size else r.ravel()[carried] @ matrix[carried]
         return np.asarray(product.reshape(r.shape))
 
     def w(self, r: Array) -> Array:
