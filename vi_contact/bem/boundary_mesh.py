@@ -1,0 +1,196 @@
+"""Boundary of a plane body as closed loops of straight elements, with its two spaces and their mass matrices.
+
+The body lies to the left of its boundary: outer loops run counter-clockwise, holes clockwise, and the normal points out
+of the body. `exterior=True` means the unbounded outside of the loops: everything reversed. Element i starts at node i.
+
+Displacements: continuous P1, values (2, n) (component, node). Tractions: discontinuous P1, values (2, n, 2) (component,
+element, end), so that a corner carries two tractions. Flattened in that order they are the unknowns of the matrices.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import InputError
+from .loops import check_orientation, check_simple, ordered_loops
+
+Array = NDArray[np.float64]
+P1_MASS = np.array([[2.0, 1.0], [1.0, 2.0]]) / 6.0
+
+
+@dataclass(frozen=True, eq=False)
+class BoundaryMesh:
+    """Closed loops of straight elements.
+
+    points: (n, 2) nodes [m], loop after loop, in the direction that keeps the body on the left.
+    loop_sizes: nodes of each loop. labels: (n,) integer of each element, to name parts of the boundary.
+    exterior: the body is the unbounded outside. Raises InputError for fewer than three nodes in a loop, elements of no
+    length, a boundary that crosses itself or runs the wrong way round.
+    """
+
+    points: Array
+    loop_sizes: tuple[int, ...] = ()
+    labels: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
+    exterior: bool = False
+
+    def __post_init__(self) -> None:
+        points = np.array(self.points, float)
+        if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
+            raise InputError(f"BoundaryMesh: points have shape {points.shape}; give finite plane coordinates (n, 2)")
+        sizes = tuple(int(size) for size in self.loop_sizes) or (len(points),)
+        if min(sizes) < 3 or sum(sizes) != len(points):
+            raise InputError(f"BoundaryMesh: loops of {sizes} nodes, {len(points)} points; a loop has three or more")
+        labels = np.array(self.labels, np.int64) if len(self.labels) else np.zeros(len(points), np.int64)
+        if labels.shape != (len(points),):
+            raise InputError(f"BoundaryMesh: {len(labels)} labels for {len(points)} elements; give one per element")
+        for name, value in (("points", points), ("loop_sizes", sizes), ("labels", labels)):
+            object.__setattr__(self, name, value)
+        if self.lengths.min() <= 1e-12 * self.size:
+            raise InputError(f"BoundaryMesh: element {int(self.lengths.argmin())} has no length; remove doubled points")
+        check_simple(points, self.after)
+        check_orientation(points, sizes, exterior=self.exterior)
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    @cached_property
+    def after(self) -> NDArray[np.int64]:
+        """(n,) the node (and element) that follows each; element i goes from node i to node after[i]."""
+        after = np.arange(1, len(self.points) + 1)
+        ends = np.cumsum(self.loop_sizes)
+        after[ends - 1] = ends - self.loop_sizes
+        return after
+
+    @cached_property
+    def elements(self) -> NDArray[np.int64]:
+        """(n, 2) first and last node of each element."""
+        return np.stack([np.arange(len(self.points)), self.after], axis=1)
+
+    @cached_property
+    def lengths(self) -> Array:
+        """(n,) length of each element [m]."""
+        return np.hypot(*(self.points[self.after] - self.points).T)
+
+    @cached_property
+    def tangents(self) -> Array:
+        """(n, 2) unit tangents tau = (-n_2, n_1), in the direction of the loop."""
+        return (self.points[self.after] - self.points) / self.lengths[:, None]
+
+    @cached_property
+    def normals(self) -> Array:
+        """(n, 2) unit normals, out of the body."""
+        return np.stack([self.tangents[:, 1], -self.tangents[:, 0]], axis=1)
+
+    @cached_property
+    def size(self) -> float:
+        """Diagonal of the box around the boundary [m]."""
+        return float(np.hypot(*np.ptp(self.points, axis=0)))
+
+    @cached_property
+    def area(self) -> float:
+        """Area inside the loops, holes taken off [m²]; negative for an exterior body."""
+        return float(0.5 * np.sum(self.lengths * np.sum(self.normals * self.midpoints, axis=1)))
+
+    @cached_property
+    def midpoints(self) -> Array:
+        """(n, 2) middles of the elements [m]."""
+        return 0.5 * (self.points + self.points[self.after])
+
+    @cached_property
+    def mass(self) -> Array:
+        """(4n, 2n) <u, psi>: continuous displacements tested with discontinuous tractions [m]."""
+        n = len(self)
+        mass = np.zeros((2, n, 2, 2, n))
+        for a in range(2):
+            for b in range(2):
+                for c in range(2):
+                    mass[c, np.arange(n), a, c, self.elements[:, b]] = self.lengths * P1_MASS[a, b]
+        return mass.reshape(4 * n, 2 * n)
+
+    @property
+    def lumped(self) -> Array:
+        """(n,) length that belongs to each node, half of its two elements [m]."""
+        return self.node_lengths(np.ones(len(self), bool))
+
+    def elements_where(self, chosen: Callable[[Array], ArrayLike]) -> NDArray[np.bool_]:
+        """(n,) elements with both ends where `chosen`((m, 2) points) is true."""
+        inside = np.asarray(chosen(self.points), bool)
+        return inside & inside[self.after]
+
+    def nodes_of(self, elements: ArrayLike) -> NDArray[np.bool_]:
+        """(n,) nodes that touch one of the elements (n,) given as a boolean mask."""
+        mask = np.asarray(elements, bool)
+        nodes = mask.copy()
+        nodes[self.after[mask]] = True
+        return nodes
+
+    def node_lengths(self, elements: ArrayLike) -> Array:
+        """(n,) half the lengths of the masked elements that meet at each node [m]."""
+        half = 0.5 * self.lengths * np.asarray(elements, bool)
+        return half + np.bincount(self.after, half, len(self))
+
+    def node_normals(self, elements: ArrayLike) -> Array:
+        """(n, 2) unit normals at nodes, the mean over the masked elements weighted with their lengths; else zero."""
+        weighted = self.normals * (self.lengths * np.asarray(elements, bool))[:, None]
+        sums = weighted + np.stack([np.bincount(self.after, w, len(self)) for w in weighted.T], axis=1)
+        length = np.hypot(*sums.T)
+        return sums / np.where(length > 0.0, length, 1.0)[:, None]
+
+
+def polygon(corners: ArrayLike, h: float | Sequence[int], *, exterior: bool = False) -> BoundaryMesh:
+    """Mesh of a polygon; label of an element = number of its side, side i from corner i to corner i + 1.
+
+    corners: (m, 2) [m], counter-clockwise (clockwise for an exterior body). h: greatest element length [m], or the
+    number of elements of every side.
+    """
+    start = np.asarray(corners, float)
+    sides = np.roll(start, -1, axis=0) - start
+    if isinstance(h, (int, float)):
+        if not 0.0 < h < np.inf:
+            raise InputError(f"polygon: the element length is {h!r}; give a length above zero")
+        counts = np.maximum(1, np.ceil(np.hypot(*sides.T) / h - 1e-9).astype(int))
+    else:
+        counts = np.asarray(h, int)
+    if counts.shape != (len(start),) or counts.min() < 1:
+        raise InputError(f"polygon: {len(start)} sides need as many numbers of elements, at least 1 each")
+    fractions = [np.arange(count)[:, None] / count for count in counts]
+    points = np.concatenate([p + f * side for p, f, side in zip(start, fractions, sides, strict=True)])
+    return BoundaryMesh(points, labels=np.repeat(np.arange(len(start)), counts), exterior=exterior)
+
+
+def smooth_curve(curve: Callable[[Array], Array], count: int, *, exterior: bool = False) -> BoundaryMesh:
+    """Mesh of a closed curve: `count` chords at equal steps of its parameter in [0, 1), curve(parameters) -> (m, 2)."""
+    return BoundaryMesh(np.asarray(curve(np.arange(count) / count), float), exterior=exterior)
+
+
+def circle(radius: float, count: int, *, centre: ArrayLike = (0.0, 0.0), exterior: bool = False) -> BoundaryMesh:
+    """A disk of `count` chords, starting at its lowest point; exterior: the space around a round hole."""
+    turn = -2.0 * np.pi if exterior else 2.0 * np.pi
+
+    def point(t: Array) -> Array:
+        angle = turn * t - 0.5 * np.pi
+        return np.asarray(centre, float) + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+    return smooth_curve(point, count, exterior=exterior)
+
+
+def from_segments(
+    points: ArrayLike, segments: ArrayLike, *, labels: ArrayLike | None = None, exterior: bool = False
+) -> BoundaryMesh:
+    """Mesh from loose segments, for example the facets of a finite element boundary, in any order and direction.
+
+    points: (p, 2) or (p, 3) coordinates [m]; segments: (n, 2) indices of points; labels: (n,) e.g. facet tags. Loops
+    are joined and turned so that the body is on the left. Raises InputError when a curve is open or branches.
+    """
+    coordinates = np.asarray(points, float)[:, :2]
+    pairs = np.asarray(segments, np.int64).reshape(-1, 2)
+    order, sizes = ordered_loops(coordinates, pairs, exterior=exterior)
+    tags = np.zeros(len(pairs), np.int64) if labels is None else np.asarray(labels, np.int64)
+    if tags.shape != (len(pairs),):
+        raise InputError(f"from_segments: {len(tags)} labels for {len(pairs)} segments; give one per segment")
+    return BoundaryMesh(coordinates[order[:, 0]], sizes, tags[order[:, 1]], exterior)

@@ -1,0 +1,178 @@
+"""Galerkin matrices of the four boundary operators from radial kernels of either domain, density 1.
+
+With M u = d/dtau (-u_2, u_1), mu = c_S², x - y = d and normals n_x, n_y (regularised as in docs/bem.md; nothing is
+worse than a logarithm on a closed curve):
+
+    V p  = ∫ G p                                                                                  single layer
+    K u  = ∫ dPhi_S/dn_y u - Phi_S M u + grad_y(Phi_P - Phi_S) (n_y.u) + 2 mu G M u              double layer
+    <K' p, v> = <p, K v>                                                                         adjoint
+    <D u, v> = ∫∫ - [inertia_P (n_x.v)(n_y.u) + inertia_S (tau_x.v)(tau_y.u)] - 4 mu Phi_S u'.v' + 4 mu² Mv.G Mu
+               + 2 mu [(v.Mu) dPhi_S/dn_x + (u.Mv) dPhi_S/dn_y]
+               + 2 mu [(n_x.v) grad_x(Phi_P - Phi_S).Mu + (n_y.u) grad_y(Phi_P - Phi_S).Mv]      hypersingular
+
+in u/2 = V p - K u and p/2 = K' p - D u. For density rho: V/rho, K, rho D.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .boundary_mesh import BoundaryMesh
+from .element_pairs import ElementPairs
+from .fundamental_solution import KernelSet
+from .quadrature import Orders, point_sets
+
+Array = NDArray[np.float64]
+TURN = np.array([[0.0, -1.0], [1.0, 0.0]])  # M u = TURN du/dtau
+SLOPE = np.array([-1.0, 1.0])  # derivative of the two shape functions times the length
+N_SINGLE, N_DOUBLE, N_HYPER = 3, 8, 10
+
+
+@dataclass(frozen=True)
+class OperatorMatrices:
+    """single: (4n, 4n) <V p, psi>; double: (4n, 2n) <K u, psi>; hyper: (2n, 2n) <D u, v>; None if not asked for."""
+
+    single: NDArray | None
+    double: NDArray | None
+    hyper: NDArray | None
+
+    @property
+    def adjoint(self) -> NDArray | None:
+        """(2n, 4n) <K' p, v>, the transposed double layer."""
+        return None if self.double is None else self.double.T
+
+
+class Galerkin:
+    """Integrates radial kernels over all pairs of elements of one mesh.
+
+    kernels(r (m,)) -> KernelSet are of density 1 and speeds (c_p, c_s); fronts: distances [m] at which they have kinks,
+    the greatest being where they end.
+    """
+
+    def __init__(self, mesh: BoundaryMesh, c_s: float, orders: Orders = Orders()) -> None:
+        self.mesh, self.shear, self.orders = mesh, c_s**2, orders
+        self.pairs = ElementPairs(mesh)
+
+    def assemble(self, kernels: Callable[[Array], KernelSet], fronts: Sequence[float] = ()) -> OperatorMatrices:
+        """The matrices of the operators whose kernels are not None."""
+        moments, which = self._moments(kernels, fronts)
+        parts: list[NDArray | None] = []
+        for method, count in ((self._single, N_SINGLE), (self._double, N_DOUBLE), (self._hyper, N_HYPER)):
+            present = which[len(parts)]
+            parts.append(method(moments[:count]) if present else None)
+            moments = moments[count if present else 0 :]
+        return OperatorMatrices(*parts)
+
+    def _moments(self, kernels: Callable, fronts: Sequence[float]) -> tuple[NDArray, tuple[bool, ...]]:
+        """(k, pairs, 2, 2) integrals [m²] of the stacked kernels against phi_a(x) phi_b(y)."""
+        total, which = None, (False, False, False)
+        for points in point_sets(self.pairs, fronts, self.orders):
+            kernel_set = kernels(points.r)
+            values = stacked(kernel_set, points.d, points.r)
+            if total is None:
+                total = np.zeros((len(values), len(self.pairs), 4), values.dtype)
+                which = (kernel_set.single is not None, kernel_set.double is not None, kernel_set.hyper is not None)
+            total[:, points.pairs] += points.integrate(values)
+        assert total is not None
+        total *= (np.hypot(*self.pairs.a) * np.hypot(*self.pairs.b))[:, None]
+        return total.reshape(len(total), -1, 2, 2), which
+
+    def _single(self, moments: NDArray) -> NDArray:
+        n, e, f = len(self.mesh), self.pairs.first, self.pairs.second
+        matrix = np.empty((2, n, 2, 2, n, 2), moments.dtype)
+        for c in range(2):
+            for k in range(2):
+                matrix[c, e, :, k, f, :] = moments[c + k]
+                matrix[c, f, :, k, e, :] = moments[c + k].swapaxes(1, 2)
+        return matrix.reshape(4 * n, 4 * n)
+
+    def _double(self, moments: NDArray) -> NDArray:
+        n, e, f = len(self.mesh), self.pairs.first, self.pairs.second
+        local = np.empty((2, n, 2, 2, n, 2), moments.dtype)
+        swapped = moments.swapaxes(2, 3) * np.array([-1, -1, -1, -1, 1, 1, 1, 1])[:, None, None, None]
+        for x, y, m in ((e, f, moments), (f, e, swapped)):
+            values = self._double_local(m, y)
+            for c in range(2):
+                for k in range(2):
+                    local[c, x, :, k, y, :] = values[c, k]
+        return self._joined(local, 4).reshape(4 * n, 2 * n)
+
+    def _double_local(self, m: NDArray, y: NDArray[np.int64]) -> NDArray:
+        """(2, 2, p, 2, 2): component of K u, component of u, pair, shape function of x, of y."""
+        normal, slopes = self.mesh.normals[y].T[:, :, None, None], SLOPE / self.mesh.lengths[y][:, None, None]
+        phi, g = m[4].sum(2)[..., None], _tensor(m[5:8].sum(3))[..., None]
+        by_normal = (m[0:2] * normal).sum(0)
+        values = np.empty((2, 2, *m.shape[1:]), m.dtype)
+        for c in range(2):
+            for k in range(2):
+                along = -TURN[c, k] * phi + 2.0 * self.shear * (g[c, 0] * TURN[0, k] + g[c, 1] * TURN[1, k])
+                values[c, k] = along * slopes - m[2 + c] * normal[k]
+                if c == k:
+                    values[c, k] -= by_normal
+        return values
+
+    def _hyper(self, moments: NDArray) -> NDArray:
+        n, e, f = len(self.mesh), self.pairs.first, self.pairs.second
+        values = self._hyper_local(moments)
+        local = np.empty((2, n, 2, 2, n, 2), moments.dtype)
+        for c in range(2):
+            for k in range(2):
+                local[c, e, :, k, f, :] = values[c, k]
+                local[k, f, :, c, e, :] = values[c, k].swapaxes(1, 2)
+        columns = self._joined(local, 4)
+        return self._joined(columns, 1).reshape(2 * n, 2 * n)
+
+    def _hyper_local(self, m: NDArray) -> NDArray:
+        """(2, 2, p, 2, 2): component of v on the first element, of u on the second, pair, shape of v, of u."""
+        mesh, e, f = self.mesh, self.pairs.first, self.pairs.second
+        n_x, n_y = mesh.normals[e].T[:, :, None, None], mesh.normals[f].T[:, :, None, None]
+        t_x, t_y = mesh.tangents[e].T[:, :, None, None], mesh.tangents[f].T[:, :, None, None]
+        dv = SLOPE[:, None] / mesh.lengths[e][:, None, None]
+        du = SLOPE / mesh.lengths[f][:, None, None]
+        phi, g = m[2].sum((1, 2))[:, None, None], _tensor(m[3:6].sum((2, 3)))[..., None, None]
+        sum_u, sum_v = m[6:10].sum(3)[..., None], m[6:10].sum(2)[:, :, None, :]  # summed over shapes of u; of v
+        across_x, across_y = (sum_u[:2] * n_x).sum(0), (sum_v[:2] * n_y).sum(0)
+        mu, turned = self.shear, TURN.T @ np.moveaxis(g, (0, 1), (-2, -1)) @ TURN
+        values = np.empty((2, 2, *m.shape[1:]), m.dtype)
+        for c in range(2):
+            for k in range(2):
+                one = -(n_x[c] * n_y[k] * m[0] + t_x[c] * t_y[k] * m[1])
+                two = 4.0 * mu**2 * turned[..., c, k] - (4.0 * mu * phi if c == k else 0.0)
+                grad_u = sum_u[2] * TURN[0, k] + sum_u[3] * TURN[1, k]
+                grad_v = sum_v[2] * TURN[0, c] + sum_v[3] * TURN[1, c]
+                three = (TURN[c, k] * across_x + n_x[c] * grad_u) * du - (TURN[k, c] * across_y + n_y[k] * grad_v) * dv
+                values[c, k] = one + two * dv * du + 2.0 * mu * three
+        return values
+
+    def _joined(self, local: NDArray, axis: int) -> NDArray:
+        """Shape functions (element at `axis`, end at axis + 1) added up at the nodes; the end axis goes."""
+        start, end = np.take(local, 0, axis + 1), np.take(local, 1, axis + 1)
+        before = np.empty_like(self.mesh.after)
+        before[self.mesh.after] = np.arange(len(before))
+        return start + np.take(end, before, axis)
+
+
+def _tensor(m: NDArray) -> NDArray:
+    """(2, 2, ...) from the components xx, xy, yy."""
+    return np.stack([np.stack([m[0], m[1]]), np.stack([m[1], m[2]])])
+
+
+def stacked(kernels: KernelSet, d: Array, r: Array) -> NDArray:
+    """(k, m) integrands of the wanted operators at d = x - y, in the order their methods read them."""
+    xx, xy, yy = d[0] ** 2 / r**2, d[0] * d[1] / r**2, d[1] ** 2 / r**2
+    rows: list[NDArray] = []
+    if kernels.single is not None:
+        g1, g2 = kernels.single
+        rows += [g1 - g2 * xx, -g2 * xy, g1 - g2 * yy]
+    if kernels.double is not None:
+        phi, dphi, ddiff, g1, g2 = kernels.double
+        rows += [dphi * d[0], dphi * d[1], ddiff * d[0], ddiff * d[1], phi, g1 - g2 * xx, -g2 * xy, g1 - g2 * yy]
+    if kernels.hyper is not None:
+        phi, dphi, ddiff, g1, g2, inertia_p, inertia_s = kernels.hyper
+        rows += [inertia_p, inertia_s, phi, g1 - g2 * xx, -g2 * xy, g1 - g2 * yy,
+                 dphi * d[0], dphi * d[1], ddiff * d[0], ddiff * d[1]]
+    return np.stack(rows)

@@ -1,0 +1,50 @@
+"""Pairs of boundary elements, each once, with the distances that decide how they are integrated."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .boundary_mesh import BoundaryMesh
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+NEAR = 3.0  # pairs closer than this many element lengths get the finer rule
+
+
+class ElementPairs:
+    """All pairs first <= second: x = point + a xi on the first, y on the second, x - y = offset + a xi - b eta.
+
+    offset, a, b: (2, p) [m]; r_min, r_max: least and greatest distance [m]; h: the longer element [m];
+    same, corner, near: boolean masks; shares_end: the common corner is the end of the first element.
+    """
+
+    def __init__(self, mesh: BoundaryMesh) -> None:
+        first, second = np.triu_indices(len(mesh))
+        starts, ends = mesh.points, mesh.points[mesh.after]
+        self.first: Index = first
+        self.second: Index = second
+        self.a: Array = (ends - starts)[first].T
+        self.b: Array = (ends - starts)[second].T
+        self.offset: Array = (starts[first] - starts[second]).T
+        self.h: Array = np.maximum(mesh.lengths[first], mesh.lengths[second])
+        corners = np.stack([
+            np.hypot(*(p[first] - q[second]).T) for p in (starts, ends) for q in (starts, ends)
+        ])
+        self.r_max: Array = corners.max(axis=0)
+        self.same = first == second
+        self.shares_end = mesh.after[first] == second
+        self.corner = self.shares_end | (mesh.after[second] == first)
+        to_second = [_distance(p[first], starts[second], ends[second]) for p in (starts, ends)]
+        to_first = [_distance(p[second], starts[first], ends[first]) for p in (starts, ends)]
+        self.r_min: Array = np.where(self.same | self.corner, 0.0, np.min(to_second + to_first, axis=0))
+        self.near = self.r_min < NEAR * self.h
+
+    def __len__(self) -> int:
+        return len(self.first)
+
+
+def _distance(x: Array, start: Array, end: Array) -> Array:
+    along = end - start
+    share = np.clip(((x - start) * along).sum(1) / (along**2).sum(1), 0.0, 1.0)
+    return np.hypot(*(x - start - share[:, None] * along).T)

@@ -1,0 +1,182 @@
+"""Radial functions of the fundamental solution of plane-strain elastodynamics, in both domains, for density 1.
+
+With (Δ - s²/c_a²) Phi_a = -delta, that is Phi_a = K0(s r/c_a) / (2 pi), a = P, S (Laplace domain),
+
+    G(x - y) = 1/s² [(s/c_S)² Phi_S I - grad grad (Phi_S - Phi_P)] = g1 I - g2 r̂ r̂ᵀ,        r̂ = (x - y)/r.
+
+For another density rho divide G by rho; the functions Phi do not depend on it. In the time domain everything is
+integrated n times in time and closed (square roots, logarithms): F_n = n-fold integral of H(t - r/c)/sqrt(t² - r²/c²),
+
+    F_1 = ln((t + R) c/r),  F_2 = t F_1 - R,  (n-1)² F_n = (2n-3) t F_(n-1) - R² F_(n-2),   R = sqrt(t² - r²/c²).
+
+Ahead of its front (r >= c t) every function is zero. Derivation: docs/bem.md; n = 0 is Achenbach, Wave Propagation in
+Elastic Solids, section 3.10.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import kv
+
+Array = NDArray[np.float64]
+TWO_PI = 2.0 * np.pi
+EULER = float(np.euler_gamma)
+SMALL = 0.7  # below this the Bessel function minus its pole is summed as a power series
+
+
+class SingleLayerKernels(NamedTuple):
+    """G = g1 I - g2 r̂ r̂ᵀ (density 1); arrays of the shape of r."""
+
+    g1: Array
+    g2: Array
+
+
+class DoubleLayerKernels(NamedTuple):
+    """phi = Phi_S, dphi = Phi_S'/r, ddiff = (Phi_P - Phi_S)'/r and G; a prime is d/dr."""
+
+    phi: Array
+    dphi: Array
+    ddiff: Array
+    g1: Array
+    g2: Array
+
+
+class HypersingularKernels(NamedTuple):
+    """As for the double layer, and inertia_a = s² Phi_a (in time: Phi_a integrated twice less)."""
+
+    phi: Array
+    dphi: Array
+    ddiff: Array
+    g1: Array
+    g2: Array
+    inertia_p: Array
+    inertia_s: Array
+
+
+class KernelSet(NamedTuple):
+    """What the Galerkin layer integrates; an operator whose kernels are None is not assembled."""
+
+    single: SingleLayerKernels | None = None
+    double: DoubleLayerKernels | None = None
+    hyper: HypersingularKernels | None = None
+
+
+@dataclass(frozen=True)
+class LaplaceKernels:
+    """Kernels at one complex frequency s [1/s], Re s > 0; call with distances r [m] > 0."""
+
+    s: complex
+    c_p: float
+    c_s: float
+
+    def __call__(self, r: Array) -> KernelSet:
+        """All three operators share the same seven functions."""
+        s, ratio2 = self.s, (self.c_s / self.c_p) ** 2
+        z_s, z_p = s * r / self.c_s, s * r / self.c_p
+        k0_s, k0_p, kappa_s, kappa_p = kv(0, z_s), kv(0, z_p), kappa(z_s), kappa(z_p)
+        scale = TWO_PI * self.c_s**2
+        g1 = (k0_s + kappa_s - ratio2 * kappa_p) / scale
+        g2 = (k0_s + 2.0 * kappa_s - ratio2 * (k0_p + 2.0 * kappa_p)) / scale
+        phi = k0_s / TWO_PI
+        dphi = -((s / self.c_s) ** 2 * kappa_s + 1.0 / r**2) / TWO_PI
+        ddiff = ((s / self.c_s) ** 2 * kappa_s - (s / self.c_p) ** 2 * kappa_p) / TWO_PI
+        return KernelSet(
+            SingleLayerKernels(g1, g2),
+            DoubleLayerKernels(phi, dphi, ddiff, g1, g2),
+            HypersingularKernels(phi, dphi, ddiff, g1, g2, s**2 * k0_p / TWO_PI, s**2 * phi),
+        )
+
+
+def kappa(z: NDArray) -> NDArray:
+    """K1(z)/z - 1/z², the part of K1(z)/z that stays logarithmic at z = 0; by its power series where |z| < 0.7."""
+    z = np.asarray(z, complex)
+    small = np.abs(z) < SMALL
+    safe = np.where(small, 1.0, z)
+    values = kv(1, safe) / safe - 1.0 / safe**2
+    if small.any():
+        values[small] = _kappa_series(z[small])
+    return values
+
+
+def _kappa_series(z: NDArray) -> NDArray:
+    logarithm = 0.5 * (np.log(0.5 * z) + EULER)
+    total, term, harmonic = np.zeros_like(z), np.ones_like(z), 0.0
+    for k in range(10):
+        total += term * (logarithm - 0.25 * (2.0 * harmonic + 1.0 / (k + 1)))
+        harmonic += 1.0 / (k + 1)
+        term *= 0.25 * z**2 / ((k + 1) * (k + 2))
+    return total
+
+
+@dataclass(frozen=True)
+class TimeKernels:
+    """Kernels at one time t [s]: G integrated once (single layer), twice (double), three times (hypersingular).
+
+    That is what functions constant in time (traction) and linear in time (displacement) need.
+    """
+
+    t: float
+    c_p: float
+    c_s: float
+    hyper: bool = True
+
+    def __call__(self, r: Array) -> KernelSet:
+        """Kernels at distances r [m] > 0; zero where r >= c_p t."""
+        t, slow, fast = self.t, 1.0 / self.c_s**2, 1.0 / self.c_p**2
+        root_s, f1_s = front_functions(r, t, self.c_s)
+        root_p, f1_p = front_functions(r, t, self.c_p)
+        inverse = 1.0 / r**2
+        dq2 = np.where(root_s > 0.0, (slow - fast) / np.maximum(root_s + root_p, 1e-300), root_p * inverse)
+        dq3 = 0.5 * (f1_s * slow - f1_p * fast + t * dq2)
+        single = tensor(f1_s * slow, f1_p * fast, dq3)
+        f2_s, f2_p = t * f1_s - root_s, t * f1_p - root_p
+        # (n-1)² dQ_n = (2n-3) t dQ_(n-1) - t² dQ_(n-2) + [(r F'_(n-2) + 2 F_(n-2))/c²] S minus P, where
+        # r F_n' = (n-1) F_n - t F_(n-1) and Q_n = F_n'/r, dQ_n = Q_n^S - Q_n^P
+        dq4 = (5.0 * t * dq3 - t**2 * dq2 + slow * (3.0 * f2_s - t * f1_s) - fast * (3.0 * f2_p - t * f1_p)) / 9.0
+        double = DoubleLayerKernels(
+            f2_s / TWO_PI, -root_s * inverse / TWO_PI, -dq2 / TWO_PI, *tensor(f2_s * slow, f2_p * fast, dq4)
+        )
+        if not self.hyper:
+            return KernelSet(single, double)
+        f3_s = 0.25 * (3.0 * t * f2_s - root_s**2 * f1_s)
+        f3_p = 0.25 * (3.0 * t * f2_p - root_p**2 * f1_p)
+        dq5 = (7.0 * t * dq4 - t**2 * dq3 + slow * (4.0 * f3_s - t * f2_s) - fast * (4.0 * f3_p - t * f2_p)) / 16.0
+        hyper = HypersingularKernels(
+            f3_s / TWO_PI, (2.0 * f3_s - t * f2_s) * inverse / TWO_PI, -dq3 / TWO_PI,
+            *tensor(f3_s * slow, f3_p * fast, dq5), f1_p / TWO_PI, f1_s / TWO_PI,
+        )
+        return KernelSet(single, double, hyper)
+
+
+def front_functions(r: Array, t: float, c: float) -> tuple[Array, Array]:
+    """(R, F_1) = (sqrt(t² - r²/c²), ln((t + R) c/r)), both zero ahead of the front."""
+    q = np.minimum(r / (c * t), 1.0)
+    root = np.sqrt((1.0 - q) * (1.0 + q))
+    return t * root, np.log((1.0 + root) / q)
+
+
+def tensor(f_s: Array, f_p: Array, dq: Array) -> SingleLayerKernels:
+    """(g1, g2) from F_n^S/c_S², F_n^P/c_P² and dQ_(n+2)."""
+    return SingleLayerKernels((f_s - dq) / TWO_PI, (f_s - f_p - 2.0 * dq) / TWO_PI)
+
+
+def displacement_tensor(d: Array, t: float, c_p: float, c_s: float) -> Array:
+    """G(x - y, t) itself, density 1: (..., 2, 2) for d = x - y of shape (..., 2); the textbook form, not integrated.
+
+    Infinite at the fronts. It is here to check the integrated kernels, not to integrate with.
+    """
+    r2 = (d**2).sum(-1)
+    unit = d[..., :, None] * d[..., None, :] / r2[..., None, None]
+    total = np.zeros((*r2.shape, 2, 2))
+    for c, sign in ((c_p, 1.0), (c_s, -1.0)):
+        q2 = c**2 * t**2 - r2
+        q = np.sqrt(np.where(q2 > 0.0, q2, np.inf))
+        along = np.where(q2 > 0.0, (2.0 * c**2 * t**2 - r2) / (r2 * q), 0.0)
+        across = np.where(q2 > 0.0, q2 / (r2 * q) if sign > 0 else c**2 * t**2 / (r2 * q), 0.0)
+        term = along[..., None, None] * unit - across[..., None, None] * np.eye(2)
+        total += sign * term / (TWO_PI * c)
+    return total

@@ -1,0 +1,42 @@
+"""Nodal forces of surface tractions, averaged over each time step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .boundary_mesh import BoundaryMesh
+from .quadrature import gauss
+
+Array = NDArray[np.float64]
+
+
+def traction_forces(
+    mesh: BoundaryMesh,
+    traction: Callable[[Array, Array, float], ArrayLike],
+    *,
+    dt: float,
+    steps: int,
+    elements: ArrayLike | None = None,
+    order: int = 4,
+) -> Array:
+    """(steps, 2, n) nodal forces [N/m], mean over each step, of traction(points, normals, t) -> (m, 2) [Pa].
+
+    points, normals: (m, 2); elements: mask (n,) of the loaded elements, all if None; order: Gauss points in time and
+    along an element.
+    """
+    chosen = np.arange(len(mesh)) if elements is None else np.flatnonzero(np.asarray(elements, bool))
+    x, w = gauss(order)
+    start, end = mesh.points[chosen, None], mesh.points[mesh.after[chosen], None]
+    places = (start * (1.0 - x)[:, None] + end * x[:, None]).reshape(-1, 2)
+    normals = np.repeat(mesh.normals[chosen], order, axis=0)
+    weight = mesh.lengths[chosen, None] * w
+    forces = np.zeros((steps, 2, len(mesh)))
+    for k in range(steps):
+        at_times = [np.asarray(traction(places, normals, (k + xt) * dt), float) for xt in x]
+        loads = np.tensordot(w, np.stack(at_times), 1).reshape(len(chosen), order, 2) * weight[:, :, None]
+        for nodes, shape in ((chosen, 1.0 - x), (mesh.after[chosen], x)):
+            forces[k][:, nodes] += np.einsum("eqc,q->ce", loads, shape)
+    return forces

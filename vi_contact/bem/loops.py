@@ -1,0 +1,99 @@
+"""Closed loops of segments: put in order, turned the right way round, checked for crossings."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+
+def signed_area(points: Array) -> float:
+    """Area inside one loop, positive when it runs counter-clockwise [m²]."""
+    x, y = (points - points[0]).T
+    return float(0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+
+
+def inside(point: Array, loop: Array) -> bool:
+    """Whether the point lies inside the loop, by counting crossings of a ray."""
+    a, b = loop, np.roll(loop, -1, axis=0)
+    spans = (a[:, 1] > point[1]) != (b[:, 1] > point[1])
+    a, b = a[spans], b[spans]
+    at = a[:, 0] + (point[1] - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0])
+    return bool(np.count_nonzero(at > point[0]) % 2)
+
+
+def should_run_forward(loops: list[Array], *, exterior: bool) -> list[bool]:
+    """Whether each loop has to run counter-clockwise: outer loops do, holes do not; an exterior body reverses all."""
+    depths = [sum(inside(loop[0], other) for other in loops if other is not loop) for loop in loops]
+    return [(depth % 2 == 0) != exterior for depth in depths]
+
+
+def check_orientation(points: Array, sizes: tuple[int, ...], *, exterior: bool) -> None:
+    """Raise InputError when a loop does not keep the body on its left."""
+    loops = np.split(points, np.cumsum(sizes)[:-1])
+    for i, (loop, forward) in enumerate(zip(loops, should_run_forward(loops, exterior=exterior), strict=True)):
+        if (signed_area(loop) > 0.0) != forward:
+            raise InputError(
+                f"BoundaryMesh: loop {i} has the wrong orientation, normals would point into the body; "
+                f"reverse its points or set exterior={not exterior}"
+            )
+
+
+def check_simple(points: Array, after: Index) -> None:
+    """Raise InputError when two elements that are not neighbours cross or touch."""
+    a, b = points, points[after]
+
+    def side(p: Array, q: Array, x: Array) -> Array:
+        return (q[:, None, 0] - p[:, None, 0]) * (x[None, :, 1] - p[:, None, 1]) - (
+            q[:, None, 1] - p[:, None, 1]
+        ) * (x[None, :, 0] - p[:, None, 0])
+
+    splits = side(a, b, a) * side(a, b, b) < 0.0
+    index = np.arange(len(points))
+    neighbours = (after[:, None] == index) | (after[None, :] == index[:, None]) | np.eye(len(points), dtype=bool)
+    crossing = splits & splits.T & ~neighbours
+    if crossing.any():
+        i, j = np.argwhere(crossing)[0]
+        raise InputError(f"BoundaryMesh: elements {i} and {j} cross; give a boundary that does not meet itself")
+
+
+def ordered_loops(points: Array, segments: Index, *, exterior: bool) -> tuple[Index, tuple[int, ...]]:
+    """((n, 2) start point and number of each segment, loop after loop; sizes of the loops), body on the left."""
+    ends = np.bincount(segments.ravel(), minlength=len(points))
+    if len(segments) == 0 or (ends[np.unique(segments)] != 2).any():
+        bad = int(np.argmax((ends != 2) & (ends > 0)))
+        raise InputError(
+            f"the boundary curve is open or branches at point {bad} ({points[bad].tolist()}), where {int(ends[bad])} "
+            "segments meet; give every segment of closed curves"
+        )
+    at_point: dict[int, list[int]] = {}
+    for number, pair in enumerate(segments.tolist()):
+        for point in pair:
+            at_point.setdefault(point, []).append(number)
+    left = set(range(len(segments)))
+    loops: list[list[tuple[int, int]]] = []
+    while left:
+        number = min(left)
+        point, loop = int(segments[number, 0]), []
+        while number in left:
+            left.discard(number)
+            loop.append((point, number))
+            point = int(segments[number].sum()) - point
+            number = next((n for n in at_point[point] if n != number), number)
+        loops.append(loop)
+    return _turned(points, loops, exterior)
+
+
+def _turned(points: Array, loops: list[list[tuple[int, int]]], exterior: bool) -> tuple[Index, tuple[int, ...]]:
+    chains = [np.array(loop, np.int64) for loop in loops]
+    curves = [points[chain[:, 0]] for chain in chains]
+    turned = []
+    for chain, curve, forward in zip(chains, curves, should_run_forward(curves, exterior=exterior), strict=True):
+        if (signed_area(curve) > 0.0) != forward:
+            chain = np.stack([np.roll(chain[::-1, 0], 1), chain[::-1, 1]], axis=1)
+        turned.append(chain)
+    return np.concatenate(turned), tuple(len(chain) for chain in turned)

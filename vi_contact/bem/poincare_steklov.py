@@ -1,0 +1,176 @@
+"""Poincaré-Steklov operator of one body, boundary value problems with it, and what contact needs to know of them.
+
+S maps the history of boundary displacements to nodal forces. Symmetric form S = (K' + 1/2) V⁻¹ (K + 1/2) - D (default:
+its space-time matrix is positive definite), unsymmetric form S = V⁻¹ (K + 1/2) (seed 003; positivity not guaranteed).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import InputError
+from .boundary_mesh import BoundaryMesh
+from .energetic import EnergeticBlocks, Marching, Motion, summed
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class PoincareSteklov:
+    """S of a body of density rho [kg/m³] from blocks of density 1."""
+
+    blocks: EnergeticBlocks
+    rho: float
+    symmetric: bool = True
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.rho) and self.rho > 0.0):
+            raise InputError(f"PoincareSteklov: the mass density is {self.rho!r}; give a number above zero [kg/m³]")
+
+    @property
+    def mesh(self) -> BoundaryMesh:
+        """The boundary."""
+        return self.blocks.mesh
+
+    def apply(self, displacement: ArrayLike) -> Array:
+        """(steps, 2, n) nodal forces [N/m] of displacements (steps, 2, n) at t_1, t_2, ...; 0 at t_0."""
+        u = np.asarray(displacement, float)
+        everything = np.ones(2 * len(self.mesh), bool)
+        flat = u.reshape(len(u), -1, 1)
+        motion = Marching(self.blocks, everything, symmetric=self.symmetric).run(np.zeros_like(flat), flat)
+        return self.rho * motion.forces.reshape(u.shape)
+
+    def solve(self, forces: ArrayLike) -> Array:
+        """(steps, 2, n) displacements under nodal forces (steps, 2, n): the inverse, no support anywhere."""
+        f = np.asarray(forces, float)
+        free = np.zeros(2 * len(self.mesh), bool)
+        motion = Marching(self.blocks, free, symmetric=self.symmetric).run(f.reshape(len(f), -1, 1) / self.rho)
+        return motion.displacement.reshape(f.shape)
+
+
+@dataclass(frozen=True)
+class BoundaryMotion:
+    """Answer of a boundary value problem.
+
+    times: (steps,) ends of the steps [s]; displacement: (steps, 2, n) there [m]; traction: (steps, 2, n, 2) in each
+    step [Pa], at both ends of each element; forces: (steps, 2, n) nodal forces [N/m], reactions included.
+    """
+
+    times: Array
+    displacement: Array
+    traction: Array
+    forces: Array
+
+    @property
+    def work(self) -> Array:
+        """(steps,) work of all forces up to each time [J/m], the energy of the body (symmetric form: >= 0)."""
+        increments = np.diff(self.displacement, axis=0, prepend=0.0)
+        return np.cumsum((self.forces * increments).sum(axis=(1, 2)))
+
+    def work_on(self, nodes: ArrayLike) -> Array:
+        """(steps,) the part of the work done at masked nodes (n,) [J/m]."""
+        increments = np.diff(self.displacement, axis=0, prepend=0.0)
+        return np.cumsum((self.forces * increments)[:, :, np.asarray(nodes, bool)].sum(axis=(1, 2)))
+
+
+@dataclass(frozen=True)
+class CondensedCompliance:
+    """u_c at t_(k+1) = sum_(l<=k) W[k-l] lam[l] + u_free[k], all that contact needs to know.
+
+    W: (steps, 2m, 2m) [m²/N], displacement of the contact unknowns (x of all nodes, then y) at the end of step j after
+    a unit nodal force [N/m] during step 0; u_free: (steps, 2m) [m] without contact forces; nodes: (m,) numbers in the
+    mesh; points, normals: (m, 2) places [m] and outward unit normals; lengths: (m,) [m] of contact boundary that
+    belongs to a node, traction = force / length; dt [s]. Rows and columns of supported unknowns are zero.
+    """
+
+    W: Array
+    u_free: Array
+    nodes: NDArray[np.int64]
+    points: Array
+    normals: Array
+    lengths: Array
+    dt: float
+
+    def displacement(self, forces: Array) -> Array:
+        """(steps, 2m) displacements under nodal contact forces (steps, 2m)."""
+        past = [summed(self.W[k::-1], forces[: k + 1, :, None])[:, 0] for k in range(len(forces))]
+        return self.u_free[: len(forces)] + np.array(past)
+
+
+@dataclass(frozen=True, eq=False)
+class BoundaryProblem:
+    """A body with supports, loads and a boundary that may come into contact.
+
+    operator: its S; forces: (steps, 2, n) nodal forces of the loads [N/m] (loads.py); fixed: (2, n) supported unknowns;
+    prescribed: (steps, 2, n) their displacement [m], zero if None; contact: (n,) mask of the elements of the contact
+    boundary. Everything else is free of traction.
+    """
+
+    operator: PoincareSteklov
+    forces: Array
+    fixed: Mask | None = None
+    prescribed: Array | None = None
+    contact: Mask | None = None
+
+    def __post_init__(self) -> None:
+        n, steps = len(self.operator.mesh), len(self.forces)
+        shapes = {"forces": (steps, 2, n), "fixed": (2, n), "prescribed": (steps, 2, n), "contact": (n,)}
+        for name, shape in shapes.items():
+            value = getattr(self, name)
+            if value is not None and np.shape(value) != shape:
+                raise InputError(f"BoundaryProblem: {name} has shape {np.shape(value)}; this boundary needs {shape}")
+
+    @cached_property
+    def marching(self) -> Marching:
+        """The factored system."""
+        n = len(self.operator.mesh)
+        fixed = np.zeros(2 * n, bool) if self.fixed is None else np.asarray(self.fixed, bool).ravel()
+        return Marching(self.operator.blocks, fixed, symmetric=self.operator.symmetric)
+
+    @property
+    def times(self) -> Array:
+        """(steps,) ends of the steps [s]."""
+        return self.operator.blocks.dt * np.arange(1, len(self.forces) + 1)
+
+    @cached_property
+    def contact_nodes(self) -> NDArray[np.int64]:
+        """(m,) numbers of the nodes of the contact boundary."""
+        if self.contact is None or not np.any(self.contact):
+            raise InputError("BoundaryProblem: no contact boundary; give `contact`, the mask of its elements")
+        return np.flatnonzero(self.operator.mesh.nodes_of(self.contact))
+
+    def solve(self, contact_forces: ArrayLike | None = None) -> BoundaryMotion:
+        """Motion under the loads and nodal contact forces (steps, 2m) in the order of CondensedCompliance."""
+        n, rho = len(self.operator.mesh), self.operator.rho
+        forces = np.array(self.forces, float)
+        if contact_forces is not None:
+            forces[:, :, self.contact_nodes] += np.asarray(contact_forces, float).reshape(len(forces), 2, -1)
+        prescribed = None if self.prescribed is None else np.asarray(self.prescribed).reshape(len(forces), 2 * n, 1)
+        motion: Motion = self.marching.run(forces.reshape(len(forces), 2 * n, 1) / rho, prescribed)
+        return BoundaryMotion(
+            self.times, motion.displacement.reshape(-1, 2, n), rho * motion.traction.reshape(-1, 2, n, 2),
+            rho * motion.forces.reshape(-1, 2, n),
+        )
+
+    def condensed(self) -> CondensedCompliance:
+        """Compliance of the contact unknowns and their motion without contact, in one march with 2m + 1 columns."""
+        mesh, nodes, steps = self.operator.mesh, self.contact_nodes, len(self.forces)
+        n, unknowns = len(mesh), np.concatenate([nodes, nodes + len(mesh)])
+        forces = np.zeros((steps, 2 * n, len(unknowns) + 1))
+        forces[0, unknowns, np.arange(len(unknowns))] = 1.0 / self.operator.rho
+        forces[:, :, -1] = self.forces.reshape(steps, -1) / self.operator.rho
+        prescribed = None
+        if self.prescribed is not None:
+            prescribed = np.zeros_like(forces)
+            prescribed[:, :, -1] = np.asarray(self.prescribed).reshape(steps, -1)
+        u = self.marching.run(forces, prescribed).displacement[:, unknowns]
+        elements = np.asarray(self.contact, bool)
+        return CondensedCompliance(
+            np.ascontiguousarray(u[:, :, :-1]), np.ascontiguousarray(u[:, :, -1]), nodes, mesh.points[nodes],
+            mesh.node_normals(elements)[nodes], mesh.node_lengths(elements)[nodes], self.operator.blocks.dt,
+        )
