@@ -211,6 +211,23 @@ def test_what_has_no_record_to_replace(tmp_path: Path, monkeypatch: pytest.Monke
     assert not any(tmp_path.iterdir())
 
 
+def test_two_motions_and_their_settings(tmp_path: Path) -> None:
+    """Horizontal and vertical record, as text or as table, each with its own scale times the factor."""
+    case = read_case(ROOT / "demos" / "cases" / "channel.toml", ["excitation.2.scale=0.5"])
+    (one,) = IDA(case, [("h.at2", "v.at2")], ["contact_uplift"], scales=(2.0,)).shakings
+    h, v = (Path(name).resolve() for name in ("h.at2", "v.at2"))
+    assert one.name == "h" and one.settings(case, 2.0) == (
+        f'excitation.1.record="{h}"', "excitation.1.scale=2.0", f'excitation.2.record="{v}"', "excitation.2.scale=1.0"
+    )
+    made = read_case(case.path, (*case.settings, *one.settings(case, 2.0)))
+    assert [table["scale"] for table in made.tables["excitation"]] == [2.0, 1.0]
+    single = tmp_path / "single.toml"
+    single.write_text('[model]\ntype = "Wall"\n[excitation]\ntype = "GroundMotion"\nrecord = {path = "r"}\n'
+                      "[run]\ndt = 1\n")
+    (one,) = IDA(read_case(single), ["h.at2"], ["t"], scales=(2.0,)).shakings
+    assert one.settings(read_case(single)) == (f'excitation.record.path="{h}"', "excitation.scale=1.0")
+
+
 def test_measures() -> None:
     """Degrees: f times the motion has f**degree of the measure. Demands skip what is no number."""
     record = Record(np.sin(0.3 * np.arange(400)), 0.01)
