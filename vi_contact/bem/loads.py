@@ -30,7 +30,7 @@ def traction_forces(
     chosen = np.arange(len(mesh)) if elements is None else np.flatnonzero(np.asarray(elements, bool))
     x, w = gauss(order)
     start, end = mesh.points[chosen, None], mesh.points[mesh.after[chosen], None]
-    places = (start * (1.0 - x)[:, None] + end * x[:, None]).reshape(-1, 2)
+    places = (start + x[:, None] * (end - start)).reshape(-1, 2)
     normals = np.repeat(mesh.normals[chosen], order, axis=0)
     weight = mesh.lengths[chosen, None] * w
     forces = np.zeros((steps, 2, len(mesh)))
