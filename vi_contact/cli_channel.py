@@ -36,11 +36,15 @@ def add_channel_arguments(channel: argparse.ArgumentParser) -> None:
     contact.add_argument("--gravity", default="channel", help="what weighs: channel (default), all, none")
     contact.add_argument(
         "--sides", help="ends of the soil: rollers (u_y = 0; default), tied (default with --vertical), "
-        "vertical-rollers (u_x = 0), fixed"
+        "free-field, dashpots, vertical-rollers (u_x = 0), fixed"
     )
     contact.add_argument(
         "--base", default="relative",
-        help="relative (default): inertia load in the frame of the bedrock; prescribed: the bedrock is moved",
+        help="relative (default): inertia load in the frame of the bedrock; prescribed: the bedrock is moved; both "
+        "expect the motion under the layer. compliant: the motion is that of an outcrop, half its velocity comes up",
+    )
+    contact.add_argument(
+        "--rock", type=float, nargs=3, metavar=("E", "NU", "RHO"), help="under a compliant base (default: the soil's)"
     )
     add_shaking(channel, harmonic="2 m/s2")
     add_step(channel, dt="1/80")
@@ -55,6 +59,7 @@ def add_channel_arguments(channel: argparse.ArgumentParser) -> None:
 def _channel(options: argparse.Namespace) -> str:
     from mpi4py import MPI
 
+    from .materials import LinearElastic
     from .meshes.channel import ChannelMesh
     from .models.channel import Channel
     from .models.channel_run import ChannelRun, run_channel
@@ -65,6 +70,7 @@ def _channel(options: argparse.Namespace) -> str:
         mu=options.mu,
         channel=Channel(ChannelMesh(triangles=options.triangles, **lengths)),
         base=options.base,
+        rock=LinearElastic(*options.rock) if options.rock else None,
         sides=options.sides,
         gravity=options.gravity,
         impact=impact_law(options.impact, projection=options.impact is not None),

@@ -32,7 +32,7 @@ from ..step import ContactProblem, ImpactLaw, Recorder
 from ..surfaces import ContactSurface
 from ..system import SemiDiscreteSystem
 from .channel_points import Openings, SoilProbe
-from .channel_sides import Rollers, Sides
+from .channel_sides import RockBelow, Rollers, Sides
 from .wall import STANDARD_GRAVITY
 
 BODIES = ("channel", "soil")  # in the order of their nodes
@@ -152,7 +152,8 @@ def build(
     *,
     sides: Sides | None = None,
     weighing: Sequence[str] = ("channel",),
-    base: BaseMotion | None = None,
+    base: BaseMotion | RockBelow | None = None,
+    meshed: tuple[Any, Any] | None = None,
 ) -> ChannelModel:
     """Meshes and assembles channel and soil; collective.
 
@@ -160,20 +161,26 @@ def build(
         sides: the ends of the soil layer; by default Rollers(), which hold them vertically (CHOSEN).
         weighing: the bodies, of BODIES, that have weight. CHOSEN: the channel only, so that the soil's own settlement
             is not in the figures; without any weight a channel with smooth sides drifts up without bound.
-        base: moves the bedrock, in the frame of an observer at rest; its problems take excitation=(). By default the
-            bedrock is at rest and what shakes it is an inertia load, in the frame of the bedrock.
+        base: moves the bedrock, or lets waves in from below, in the frame of an observer at rest; its problems take
+            excitation=(). By default the bedrock is at rest and what shakes it is an inertia load, in the frame of the
+            bedrock.
+        meshed: (mesh, tags) of another model of this channel, for stages on one mesh.
     """
-    mesh, tags = build_mesh(channel.shape, comm)
-    motion: dict[str, Any] = {} if base is None else {
-        "displacement": base.displacement, "velocity": base.velocity, "acceleration": base.acceleration
-    }
+    mesh, tags = meshed or build_mesh(channel.shape, comm)
+    moves = ("displacement", "velocity", "acceleration")
+    motion = {name: getattr(base, name) for name in moves} if isinstance(base, BaseMotion) else {}
     ends = (sides or Rollers()).conditions(tags, motion)
-    held = [*as_tuple(ends.pop("prescribed", ())), Prescribed(tags["bedrock"], **motion)]  # the bedrock has its corners
+    held, absorbing = [*as_tuple(ends.pop("prescribed", ()))], [*as_tuple(ends.pop("dashpots", ()))]
+    if isinstance(base, RockBelow):
+        absorbing.append(base.absorber(tags))
+    else:
+        held.append(Prescribed(tags["bedrock"], **motion))  # last: the corners are its own
     system = assemble(
         mesh,
         [(tags["channel"], channel.concrete), (tags["soil"], channel.soil)],
         section=PlaneStrain(),
         prescribed=held,
+        dashpots=absorbing,
         damping=channel.damping,
         **ends,
     )

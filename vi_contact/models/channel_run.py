@@ -7,22 +7,26 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..algebra import Array
-from ..base_motion import base_motion
+from ..base_motion import BaseMotion, base_motion
 from ..errors import InputError
 from ..excitation import Excitation
 from ..fem.fields import XDMF
 from ..friction import Coulomb
 from ..impact import ImpactLaw, Inelastic, MassProjection
+from ..materials import LinearElastic
 from ..plotting import plot_certificate, plot_contact, plot_energy, plot_excitation, plot_points
 from ..simulate import Solution, simulate
 from ..solvers.volume import Volume
 from ..solvers.volume_snes import ReducedNewton
-from ..static import static_equilibrium
-from ..step import ContactProblem, State
-from .channel import Channel, ChannelModel, build
-from .channel_sides import Fixed, Rollers, Sides, TiedSides
-from .choices import SCHEMES, SOLVERS, SchemeChoice
+from ..step import Scheme
+from ..upgoing import upgoing
+from .channel import Channel, ChannelModel
+from .channel_sides import DashpotSides, Fixed, FreeFieldSides, RockBelow, Rollers, Sides, TiedSides
+from .channel_stages import AtRest, at_rest
+from .choices import SCHEMES, SOLVERS
 from .run_options import check_options, check_word, excitations, number_of_steps, records, solvers
 
 CONTACTS = {
@@ -31,10 +35,12 @@ CONTACTS = {
     "bilateral": "Buried channel, bilateral contact, free sliding",
 }
 SIDES: dict[str, Sides] = {
-    "rollers": Rollers(), "vertical-rollers": Rollers(component=0), "tied": TiedSides(), "fixed": Fixed()
-}
+    "rollers": Rollers(), "vertical-rollers": Rollers(component=0), "tied": TiedSides(), "fixed": Fixed(),
+    "dashpots": DashpotSides(),
+}  # fmt: skip
+FREE_FIELD = "free-field"
 GRAVITY: dict[str, tuple[str, ...]] = {"channel": ("channel",), "all": ("channel", "soil"), "none": ()}
-BASES = ("relative", "prescribed")
+BASES = ("relative", "prescribed", "compliant")
 REFERENCE = Volume(method=ReducedNewton(), petsc_options={"snes_linesearch_type": "l2"})
 """The volume route to compare with and to fall back on. Without a line search its active set runs in circles in some
 steps of the channel: M/dt² of a consistent mass couples neighbours with the sign that sets need to settle reversed."""
@@ -45,8 +51,10 @@ class ChannelRun:
     """Options of a run. ``motion``: a record file; without one the harmonic of Fig. 7 shakes the bedrock for 400 steps.
 
     contact: one of CONTACTS; ``mu`` with "coulomb". gravity: which bodies weigh, of GRAVITY; a static stage with
-    contact active comes first. sides: of SIDES; None is "rollers", with a vertical record "tied". base: "relative", an
-    inertia load in the frame of the bedrock, or "prescribed", a moved bedrock: the same contact forces.
+    contact active comes first. sides: of SIDES, or "free-field"; None is "rollers", with a vertical record "tied".
+    base: "relative", an inertia load in the frame of the bedrock, or "prescribed", a moved bedrock: the same contact
+    forces, both expect the motion of the bedrock under the layer (within); "compliant", with ``rock`` (the soil's own
+    material when None): takes the motion as that of an outcrop, and half its velocity comes up.
     scheme: "zwt" with the inelastic rule as an M-orthogonal impulse takes energy out at every dt, never in; the stiff
     channel's own waves are far from resolved at the dt of ground motions. ``impact`` None: that rule for schemes that
     the source could have used, none for the others.
@@ -62,6 +70,7 @@ class ChannelRun:
     pga: float | None = None
     resample: float | None = None
     base: str = "relative"
+    rock: LinearElastic | None = None
     sides: str | None = None
     gravity: str = "channel"
     solver: str = "condensed"
@@ -78,10 +87,12 @@ class ChannelRun:
         check_word("base", self.base, BASES)
         check_word("gravity", self.gravity, list(GRAVITY))
         if self.sides is not None:
-            check_word("sides", self.sides, list(SIDES))
+            check_word("sides", self.sides, [*SIDES, FREE_FIELD])
         check_options(self)
         if (self.contact == "coulomb") != (self.mu is not None):
             raise InputError("contact 'coulomb' needs its friction coefficient mu, the other contacts take none")
+        if self.rock is not None and self.base != "compliant":
+            raise InputError("rock is what is under a compliant base: give base='compliant' too, or leave rock out")
 
 
 def run_channel(run: ChannelRun, comm: Any, out: str | Path, *, progress: bool = True) -> Solution:
@@ -97,7 +108,7 @@ def run_channel(run: ChannelRun, comm: Any, out: str | Path, *, progress: bool =
         record=ready.model.recorders(),
         fields=XDMF(every=run.fields_every) if run.fields_every else None,
         out=out,
-        state=_start(run, ready.problem),
+        state=ready.start,
         escalation=(REFERENCE, SOLVERS["hildreth"]),
         cross_check=checked,
         restart=run.restart,
@@ -110,50 +121,46 @@ def run_channel(run: ChannelRun, comm: Any, out: str | Path, *, progress: bool =
 
 
 @dataclass(frozen=True)
-class Prepared:
-    """What a run marches: the assembled model, its problem, the time step [s] and the number of steps."""
+class Prepared(AtRest):
+    """What a run marches: model, problem, first state, time step [s] and number of steps."""
 
-    model: ChannelModel
-    problem: ContactProblem
     dt: float
     steps: int
 
 
 def prepared(run: ChannelRun, comm: Any) -> Prepared:
-    """The model and the problem of a run; collective. InputError for records that cannot be read."""
+    """Model, problem and gravity stage of a run; collective. InputError for records that cannot be read."""
     shaking = excitations(records(run), lambda: run.channel.harmonic(2.0 * run.scale))
     dt = run.dt if run.dt is not None else run.channel.time_step()
     choice = SCHEMES[run.scheme]
-    model = _model(run, comm, shaking, dt, choice)
-    return Prepared(model, _problem(run, model, shaking, choice), dt, number_of_steps(run, dt, shaking))
-
-
-def _model(
-    run: ChannelRun, comm: Any, shaking: Sequence[Excitation], dt: float, choice: SchemeChoice
-) -> ChannelModel:
-    sides = run.sides or ("rollers" if run.vertical is None else "tied")
-    base = base_motion(shaking, dt, choice.scheme) if run.base == "prescribed" else None
-    return build(run.channel, comm, sides=SIDES[sides], weighing=GRAVITY[run.gravity], base=base)
-
-
-def _problem(
-    run: ChannelRun, model: ChannelModel, shaking: Sequence[Excitation], choice: SchemeChoice
-) -> ContactProblem:
     impact = run.impact
     if impact is None:
         impact = Inelastic(MassProjection()) if isinstance(choice.impact, Inelastic) else choice.impact
-    return model.problem(
-        friction=None if run.mu is None else Coulomb(run.mu),
-        bilateral=run.contact == "bilateral",
-        excitation=() if run.base == "prescribed" else shaking,
-        impact=impact,
-        mass=choice.mass,
-    )
+    base = _base(run, shaking, dt, choice.scheme)
+    rest = at_rest(
+        run.channel, comm, sides=_sides(run, base or shaking, dt, choice.scheme), weighing=GRAVITY[run.gravity],
+        base=base, solver=SOLVERS[run.solver],
+        friction=None if run.mu is None else Coulomb(run.mu), bilateral=run.contact == "bilateral",
+        excitation=shaking if base is None else (), impact=impact, mass=choice.mass,
+    )  # fmt: skip
+    return Prepared(rest.model, rest.problem, rest.start, dt, number_of_steps(run, dt, shaking))
 
 
-def _start(run: ChannelRun, problem: ContactProblem) -> State | None:
-    """The gravity stage, when something weighs."""
-    return None if run.gravity == "none" else static_equilibrium(problem, solver=SOLVERS[run.solver])
+def _base(
+    run: ChannelRun, shaking: Sequence[Excitation], dt: float, scheme: Scheme
+) -> BaseMotion | RockBelow | None:
+    """What moves the bottom of the layer, if not an inertia load."""
+    if run.base == "relative":
+        return None
+    if run.base == "prescribed":
+        return base_motion(shaking, dt, scheme)
+    waves = [upgoing(one, dt=getattr(getattr(one, "record", None), "dt", 0.1 * dt)) for one in shaking]
+    return RockBelow(lambda t: np.asarray(sum(wave(t) for wave in waves)), run.rock)
+
+
+def _sides(run: ChannelRun, base: Any, dt: float, scheme: Scheme) -> Sides:
+    name = run.sides or ("rollers" if run.vertical is None else "tied")
+    return SIDES.get(name) or FreeFieldSides(base, dt, scheme)
 
 
 def draw(history: Mapping[str, Array], model: ChannelModel, out: Path, *, title: str) -> None:

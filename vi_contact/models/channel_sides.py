@@ -1,19 +1,44 @@
-"""What holds the two ends of the soil layer beside a channel."""
+"""What stands at the two ends and at the bottom of the soil layer around a channel."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, Protocol
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Protocol
 
+from ..algebra import Array
+from ..base_motion import BaseMotion
+from ..excitation import Excitation
+from ..fem.dashpots import CompliantBase, Dashpots
+from ..fem.free_field import FreeField
 from ..fem.loads import Prescribed
 from ..fem.ties import Tied
+from ..materials import LinearElastic
+from ..step import Scheme
+from ..time_steps import Schedule
 
 ENDS = ("left_side", "right_side")
 
 
+@dataclass(frozen=True)
+class RockBelow:
+    """Rock under the layer that lets waves through: ``motion``, t [s] -> upgoing velocity (2,) [m/s] (``upgoing``), and
+    its ``rock``, the soil above when None."""
+
+    motion: Callable[[float], Array] = field(repr=False)
+    rock: LinearElastic | None = None
+
+    def absorber(self, tags: Any) -> CompliantBase:
+        """The boundary condition on the bedrock of a ChannelMesh."""
+        return CompliantBase(tags["bedrock"], self.rock, motion=self.motion)
+
+
 class Sides(Protocol):
-    """Conditions at the ends of the layer."""
+    """Conditions at the ends of the layer. ``firm``: whether they hold static loads; others need a gravity stage on
+    firm ones (``channel_stages.staged``)."""
+
+    @property
+    def firm(self) -> bool: ...
 
     def conditions(self, tags: Any, motion: Mapping[str, Any]) -> dict[str, Any]:
         """Arguments of fem.assemble, for the groups of a ChannelMesh.
@@ -30,6 +55,7 @@ class Rollers:
     horizontally only (component 1 held) follow the free field exactly; under vertical shaking those with component 0
     held do."""
 
+    firm: ClassVar[bool] = True
     component: int = 1
 
     def conditions(self, tags: Any, motion: Mapping[str, Any]) -> dict[str, Any]:
@@ -40,6 +66,8 @@ class Rollers:
 class Fixed:
     """The ends move with the bedrock: a box."""
 
+    firm: ClassVar[bool] = True
+
     def conditions(self, tags: Any, motion: Mapping[str, Any]) -> dict[str, Any]:
         return {"prescribed": [Prescribed(tags[end], **motion) for end in ENDS]}
 
@@ -49,5 +77,32 @@ class TiedSides:
     """Both ends move together in both directions: the exact free field of horizontal layers under horizontal and
     vertical shaking; what leaves at one end comes back at the other."""
 
+    firm: ClassVar[bool] = True
+
     def conditions(self, tags: Any, motion: Mapping[str, Any]) -> dict[str, Any]:
         return {"tied": [Tied(tags["left_side"], tags["right_side"])]}
+
+
+@dataclass(frozen=True)
+class DashpotSides:
+    """Lysmer and Kuhlemeyer's dashpots only: waves leave, but the ends do not follow the free field (Kontoe 2007)."""
+
+    firm: ClassVar[bool] = False
+
+    def conditions(self, tags: Any, motion: Mapping[str, Any]) -> dict[str, Any]:
+        return {"dashpots": [Dashpots(tags[end]) for end in ENDS]}
+
+
+@dataclass(frozen=True)
+class FreeFieldSides:
+    """Dashpots on the difference to the free field, and its stresses: exact for level ground, waves from the channel
+    leave. ``base``, ``dt`` [s] and ``scheme`` are those of the run, as fem.FreeField wants them."""
+
+    firm: ClassVar[bool] = False
+    base: Excitation | Sequence[Excitation] | BaseMotion | RockBelow = field(repr=False)
+    dt: float | Schedule
+    scheme: Scheme | None = None
+
+    def conditions(self, tags: Any, motion: Mapping[str, Any]) -> dict[str, Any]:
+        base = self.base.absorber(tags) if isinstance(self.base, RockBelow) else self.base
+        return {"dashpots": [FreeField(tags[end], base=base, dt=self.dt, scheme=self.scheme) for end in ENDS]}

@@ -1,0 +1,58 @@
+"""The buried channel at rest under its weight, whatever its boundaries: a gravity stage, then those of the shaking."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ..base_motion import BaseMotion
+from ..fem.staging import release
+from ..solvers.condensed import Condensed
+from ..static import static_equilibrium
+from ..step import ContactProblem, Solver, State
+from .channel import Channel, ChannelModel, build
+from .channel_sides import RockBelow, Rollers, Sides
+
+
+@dataclass(frozen=True)
+class AtRest:
+    """The model, its problem and the state from which to shake it; None where nothing weighs: from zero."""
+
+    model: ChannelModel
+    problem: ContactProblem
+    start: State | None
+
+
+def at_rest(
+    channel: Channel,
+    comm: Any,
+    *,
+    sides: Sides | None = None,
+    weighing: Sequence[str] = ("channel",),
+    base: BaseMotion | RockBelow | None = None,
+    solver: Solver | None = None,
+    **contact: Any,
+) -> AtRest:
+    """Builds the channel and brings it to rest with contact active; collective.
+
+    Ends or a bottom that hold no static load come after the gravity stage, which has rollers and a firm bedrock in
+    their places: what these carried goes on as forces (``fem.release``).
+
+    Args:
+        sides, weighing, base: as in ``build``.
+        solver: of the gravity stage, Condensed() when None.
+        contact: arguments of ``ChannelModel.problem``.
+    """
+    ends, solver = sides or Rollers(), solver or Condensed()
+    if ends.firm and not isinstance(base, RockBelow):
+        model = build(channel, comm, sides=ends, weighing=weighing, base=base)
+        problem = model.problem(**contact)
+        return AtRest(model, problem, static_equilibrium(problem, solver=solver) if weighing else None)
+    firm = build(channel, comm, sides=ends if ends.firm else None, weighing=weighing)
+    model = build(channel, comm, sides=ends, weighing=weighing, base=base, meshed=(firm.mesh, firm.tags))
+    problem = model.problem(**contact)
+    if not weighing:
+        return AtRest(model, problem, None)
+    static = firm.problem(**(contact | {"excitation": ()}))
+    return AtRest(model, *release(static, static_equilibrium(static, solver=solver), problem))
