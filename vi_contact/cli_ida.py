@@ -56,7 +56,8 @@ def _ida(options: argparse.Namespace) -> str:
         read_case(options.case, options.settings), [_files(motion) for motion in options.motions], options.edp,
         scales=options.scales or (), levels=options.levels or (), intensity=options.im,
     )
-    signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGINT))  # a scheduler's end of time is as Ctrl-C
+    for signum in (signal.SIGINT, signal.SIGTERM):  # a scheduler's end of time is as Ctrl-C, also in the background
+        signal.signal(signum, signal.default_int_handler)
     try:
         rows = run_ida(
             study, options.out, jobs=options.jobs, part=options.part, launch=shlex.split(options.launch),

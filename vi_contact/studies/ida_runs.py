@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import suppress
@@ -24,6 +25,7 @@ from .case import Case, read_case
 
 ROW = "row.json"
 SAID = "failure.txt"
+PATIENCE = 20.0  # seconds for a run to save its state
 _MPI = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_RANK")  # in the environment of what mpirun has started
 
 
@@ -193,11 +195,22 @@ def executed(runs: Sequence[OneRun], jobs: int, launch: Sequence[str]) -> Iterat
         finally:
             with lock:
                 stopped.set()
-                for process in going:  # with all they have started; a run keeps what it has
-                    with suppress(ProcessLookupError):
-                        os.killpg(process.pid, signal.SIGINT)
+                left = list(going)
+            _stop(left)
             for future in futures:
                 future.cancel()
+
+
+def _stop(processes: Sequence[subprocess.Popen[str]]) -> None:
+    """Ends them with all they have started: as by Ctrl-C, on which a run saves its state; else by SIGTERM."""
+    for signum in (signal.SIGINT, signal.SIGTERM):
+        for process in processes:
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signum)
+        deadline = time.monotonic() + PATIENCE
+        for process in processes:
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(max(deadline - time.monotonic(), 0.0))
 
 
 def refuse_mpirun() -> None:
