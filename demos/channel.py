@@ -118,14 +118,14 @@ def draw(model: ChannelModel, runs: Mapping[str, History], out: Path, quick: boo
     pictures.plot_envelope(unilateral, outline, out / "envelope.png", title="Envelopes along the outline")
     plot_states(runs[coulomb], out / "states.png", position=outline.places(), axis_label="arc length [m]",
                 title=f"Interface, {coulomb}")
-    times, film = (TIMES, np.arange(*FILM, 0.025)) if not quick else ((0.2, 0.4), (0.2, 0.3, 0.4))
+    times, film = (TIMES, np.arange(*FILM, 0.025)) if not quick else ((0.4,), (0.2, 0.4))
     plot_moments({name: folder(out, name) for name in unilateral}, times, out / "moments.png",
                  title="Channel and soil", magnified=500.0)
     tops = {"top of the left wall": pictures.opening(runs[sliding], "19", (-1.0, 0.0)),
             "of the right wall": pictures.opening(runs[sliding], "13", (1.0, 0.0))}
     animate(folder(out, sliding), out / "channel.gif", title=sliding, magnified=300.0, history=runs[sliding],
             times=film, openings=tops)
-    for name, history in runs.items():
+    for name, history in () if quick else runs.items():
         plot_energy(history, folder(out, name) / "energy.png", title=f"Energy ledger, {name}")
 
 

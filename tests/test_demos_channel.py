@@ -38,7 +38,6 @@ def test_the_channel_demo(comm: Any, shared_tmp: Path) -> None:
         summary = json.loads((module.folder(shared_tmp, name) / "summary.json").read_text(encoding="utf-8"))
         assert summary["status"] == "finished" and summary["ranks"] == comm.size
         assert (summary["unknowns"], summary["contact_points"], summary["steps"]) == (1528, 23, 40)
-        assert (module.folder(shared_tmp, name) / "energy.png").stat().st_size > 5000
     for name in (sliding, coulomb):
         assert min(numbers[f"{name}: opening left"], numbers[f"{name}: opening right"]) > 4e-4
         assert numbers[f"{name}: both tops open"] < 0.05
