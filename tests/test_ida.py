@@ -159,8 +159,9 @@ def test_parts_levels_and_runs_that_die(study: Path) -> None:
         again(study, part=(2, 3), launch=("no-such-program",), **asked)
 
 
-def test_stopping_stops_the_runs(study: Path) -> None:
-    """Ctrl-C between two rows: processes that go on are told to stop, and leave no row."""
+def test_stopping_stops_the_runs(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ctrl-C between two rows: processes that go on are told to stop, also where SIGINT is ignored, and leave no row."""
+    monkeypatch.setattr("vi_contact.studies.ida_runs.PATIENCE", 1.0)
     case, shaking = read_case("wall.toml"), Shaking("motion_1", (Path("motion_1.at2"),))
     wrong = OneRun(case, shaking, 1.0, study / "runs" / "wrong", "it cannot")
     long = OneRun(case, shaking, 1.0, study / "runs" / "long")
