@@ -24,6 +24,9 @@ from vi_contact.impact import Inelastic, NoImpact
 from vi_contact.march import march
 from vi_contact.mass import ConsistentMass
 from vi_contact.schemes.midpoint import Midpoint
+from vi_contact.simulate import simulate
+from vi_contact.static import initial_state
+from vi_contact.time_steps import Schedule
 
 serial = pytest.mark.serial
 IMPEDANCE = 30.0  # rho c of the bar of V1.1 [kg/(m² s)]
@@ -153,6 +156,21 @@ def test_continuing_from_a_state():
 
 
 @serial
+def test_restart_and_change_of_step(tmp_path):
+    """A run continued from its checkpoint is the straight run, to the last bit; steps may change their length."""
+    problem = bar(2, E=1e6, gap=0.12, v0=lambda x: np.full_like(x, -10.0))
+    scheme = BoundaryLayer(law=law_of(0.5))
+    straight = simulate(problem, scheme=scheme, dt=5e-4, steps=30, progress=False)
+    simulate(problem, scheme=scheme, dt=5e-4, steps=13, out=tmp_path, progress=False)
+    again = simulate(problem, scheme=scheme, dt=5e-4, steps=30, out=tmp_path, restart=True, progress=False)
+    assert np.array_equal(again.state.u, straight.state.u) and np.array_equal(again.state.v, straight.state.v)
+    assert straight.facts["energy_defect"] < 1e-10 and straight.history["contact_active"].max() == 1
+    plan = Schedule(((5e-4, 5e-3), (2.5e-4, np.inf)))
+    finer = simulate(problem, scheme=scheme, dt=plan, t_end=0.015, progress=False)
+    assert finer.state.v == pytest.approx(straight.state.v, abs=0.1) and finer.state.k == 50
+
+
+@serial
 @pytest.mark.parametrize(
     ("make", "word"),
     [
@@ -200,6 +218,15 @@ def test_a_step_that_does_not_converge_is_named(monkeypatch):
     with pytest.raises(StepFailure, match=r"reactions of step 2 at t = 0\.02 s were not found in 1 Newton steps"):
         for _ in run(problem, BoundaryLayer(law=law), dt=1e-2, steps=5):
             pass
+
+
+@serial
+def test_a_gap_lost_to_rounding_is_named():
+    """A layer that is thinner than the last digit of the displacements."""
+    problem = thrown(2)
+    scheme, state = BoundaryLayer(law=law_of(0.5)), initial_state(problem)
+    with pytest.raises(StepFailure, match=r"step 1 at t = 0\.001 s begins with a gap of .* make the layer wider"):
+        scheme.step(problem, replace(state, u=np.r_[5.0, -5.0, -5.0]), scheme.effective_matrix(problem, 1e-3), 1e-3)
 
 
 # Finite elements -----------------------------------------------------------------------------------------------------

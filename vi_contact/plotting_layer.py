@@ -128,5 +128,5 @@ def plot_layered_bar(
         force.plot(t, p, color=colour, lw=1.0)
     height.set(xlabel="time [s]", ylabel="height of the foot [m]")
     force.set(xlabel="time [s]", ylabel="contact pressure [Pa]")
-    height.legend(fontsize=8)
+    height.legend(fontsize=8, ncol=3, frameon=False, loc="lower left", bbox_to_anchor=(0.0, 1.0))
     return _save(figure, path)

@@ -22,7 +22,7 @@ from scipy.integrate import solve_ivp
 
 from ..algebra import Array
 from ..errors import InputError, StepFailure
-from .motion import STEP, ConstrainedSystem
+from .motion import ConstrainedSystem
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ def _along(system: ConstrainedSystem, t: float, q: Array, v: Array, c: Array) ->
         return np.zeros(c.shape[1]), np.zeros(c.shape[1]), np.zeros(c.shape[1])
     values = np.empty((3, c.shape[1]))
     for R, way in enumerate(c.T):
-        h, w = (STEP * max(1.0, float(np.max(np.abs(x)))) / float(np.max(np.abs(way))) for x in (q, v))
+        h, w = (system.difference(x) / float(np.max(np.abs(way))) for x in (q, v))
         values[0, R] = -way @ (force(t, q, v + w * way) - force(t, q, v - w * way)) / (2.0 * w)
         values[1, R] = -way @ (force(t, q + h * way, v) - force(t, q - h * way, v)) / (2.0 * h)
         values[2, R] = way @ force(t, q, v)
@@ -109,7 +109,7 @@ def _slope(systems: Sequence[ConstrainedSystem], q: Array, v: Array) -> Array:
     size = float(np.max(np.abs(v)))
     if size == 0.0:
         return np.zeros(len(systems))
-    h = STEP * max(1.0, float(np.max(np.abs(q)))) / size
+    h = systems[0].difference(q) / size
 
     def masses(place: Array) -> Array:
         M = systems[0].matrix(place)

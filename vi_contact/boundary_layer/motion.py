@@ -19,6 +19,7 @@ import numpy as np
 
 from ..algebra import Array
 from ..errors import InputError
+from .layer import positive
 
 STEP = 6e-6  # of a central difference over the size of its argument: eps to the power 1/3
 
@@ -34,6 +35,7 @@ class ConstrainedSystem:
         force: (t, q, v) -> f (n,): applied forces and, for quasi-velocities, gyroscopic ones; None: no forces.
         rates: (q, v) -> q̇; None: v are the rates of q.
         gradient_rate: (q, v) -> Ȧ v; None: by a central difference, to ten digits.
+        scale: a typical size of the coordinates, which central differences are taken over 6e-6 of.
     """
 
     mass: Array | Callable[[Array], Array]
@@ -42,8 +44,10 @@ class ConstrainedSystem:
     force: Callable[[float, Array, Array], Array] | None = None
     rates: Callable[[Array, Array], Array] | None = None
     gradient_rate: Callable[[Array, Array], float] | None = None
+    scale: float = 1.0
 
     def __post_init__(self) -> None:
+        positive("the scale of the coordinates", self.scale, "their units")
         if not callable(self.mass):
             M = np.asarray(self.mass, dtype=float)
             if M.ndim != 2 or not np.allclose(M, M.T) or np.min(np.linalg.eigvalsh(M)) <= 0.0:
@@ -69,14 +73,18 @@ class ConstrainedSystem:
         size = float(np.max(np.abs(rate), initial=0.0))
         if size == 0.0:
             return 0.0
-        h = STEP * max(1.0, float(np.max(np.abs(q)))) / size
+        h = self.difference(q) / size
         change = np.asarray(self.gradient(q + h * rate)) - np.asarray(self.gradient(q - h * rate))
         return float(change @ v) / (2.0 * h)
 
     def generalised_force(self, t: float, q: Array, v: Array) -> Array:
         """f - Γ(v, v), (n,)."""
         f = np.zeros_like(v) if self.force is None else np.asarray(self.force(t, q, v), dtype=float)
-        return f - _inertia(self.mass, q, v) if callable(self.mass) else f
+        return f - _inertia(self.mass, q, v, self.difference(q)) if callable(self.mass) else f
+
+    def difference(self, q: Array) -> float:
+        """The way over which to take a central difference at q."""
+        return STEP * max(self.scale, float(np.max(np.abs(q))))
 
     def accelerations(self, t: float, q: Array, v: Array) -> tuple[Array, Array, float, float]:
         """(v̇ without layer, M⁻¹Aᵀ, g_11, ρ̈ without layer)."""
@@ -86,9 +94,8 @@ class ConstrainedSystem:
         return free, along, float(1.0 / (A @ along)), float(A @ free) + self.turning(q, v)
 
 
-def _inertia(mass: Callable[[Array], Array], q: Array, v: Array) -> Array:
+def _inertia(mass: Callable[[Array], Array], q: Array, v: Array, h: float) -> Array:
     """Γ(v, v) by central differences of M, for v = q̇."""
-    h = STEP * max(1.0, float(np.max(np.abs(q))))
     slopes = np.empty((len(q), len(v), len(v)))  # ∂M_IJ/∂q_K in [K, I, J]
     for K in range(len(q)):
         side = np.zeros_like(q)

@@ -29,7 +29,7 @@ from .contact_law import ContactLayer
 
 ITERATIONS, HALVINGS = 60, 30
 RATE = "layer_rate"  # in a state's memory: d ln(gap)/dt of the contact points [1/s]
-CLOSE = 1e-11  # change of the gaps relative to the gaps
+CLOSE, ROUNDING = 1e-11, 1e-15  # change of the gaps relative to the gaps, and to what they are a difference of
 
 
 @dataclass(frozen=True)
@@ -81,6 +81,11 @@ class BoundaryLayer(Midpoint):
         if surface.count == 0:
             return step
         old = surface.gap(state.t) - surface.normal_values(state.u)
+        if not old.min() > 0.0:
+            raise StepFailure(
+                f"step {step.k} at t = {step.t:.6g} s begins with a gap of {old.min():.1e} m, a rounding error beside "
+                f"displacements of {float(np.max(np.abs(step.bound - old))):.1e} m: make the layer wider"
+            )
         free = step.bound - surface.normal_values(A.factor.solve(step.b))
         rate, pressure = self._rate(problem, state, old), np.zeros(surface.count)
         if min(old.min(), free.min()) < self.law.layer.width:
@@ -104,7 +109,7 @@ class BoundaryLayer(Midpoint):
         residual = rho - free - G @ p
         for _ in range(ITERATIONS):
             change = -np.linalg.solve(np.eye(len(rho)) - G * slope, residual)
-            if np.all(np.abs(change) <= CLOSE * rho):
+            if np.all(np.abs(change) <= CLOSE * rho + ROUNDING * np.abs(free)):
                 return p
             share = 1.0 / max(1.0, float(np.max(-change / (0.9 * rho))))
             size = float(np.linalg.norm(residual))
