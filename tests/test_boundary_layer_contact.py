@@ -26,6 +26,7 @@ from vi_contact.mass import ConsistentMass
 from vi_contact.schemes.midpoint import Midpoint
 from vi_contact.simulate import simulate
 from vi_contact.static import initial_state
+from vi_contact.step import ContactProblem
 from vi_contact.time_steps import Schedule
 
 serial = pytest.mark.serial
@@ -267,3 +268,24 @@ def test_wall_tends_to_the_exact_inequality(comm):
         errors.append(float(np.sqrt(np.mean((found - reference) ** 2))))
     assert errors[0] < 0.05 * np.max(np.abs(reference))
     assert errors[1] < 0.65 * errors[0]
+
+
+def test_two_stiff_blocks(comm):
+    """A layer between two bodies: with the reduced mass they part with e, and keep their momentum."""
+    from two_bodies import blocks, momenta, two_blocks
+    from two_bodies import thrown as with_velocities
+
+    from vi_contact.fem.pairs import contact_pair
+    from vi_contact.materials import LinearElastic
+
+    mesh = blocks(2, upper=(2, 1), lower=(2, 1), gap=0.02)
+    system, tags = two_blocks(comm, mesh, LinearElastic(1e11, 0.0, 1000.0))
+    system = with_velocities(system, np.zeros_like, lambda x: np.tile([0.0, -10.0], (len(x), 1)))
+    pair = contact_pair(system, *(tags[side] for side in mesh.interface))
+    problem = ContactProblem(system, pair, mass=ConsistentMass())
+    law = contact_layer(0.5, mass=0.5 * 1000.0, speed=10.0, width=0.01)
+    for state, _ in march(problem, scheme=BoundaryLayer(law=law), dt=5e-5, steps=140):
+        pass
+    before, after = (momenta(problem, v)[:, 1] for v in (problem.equations.v0, state.v))
+    assert (after[1] - after[0]) / (before[1] - before[0]) == pytest.approx(-0.5, rel=1e-2)
+    assert after.sum() == pytest.approx(before.sum(), rel=1e-11)
