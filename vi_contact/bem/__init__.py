@@ -8,9 +8,11 @@ from .loads import traction_forces
 from .operators import Operators
 from .poincare_steklov import BoundaryMotion, BoundaryProblem, CondensedCompliance, PoincareSteklov
 from .quadrature import Orders
+from .storage import load_blocks, save_blocks, stored_blocks
 
 __all__ = [
     "BoundaryMesh", "BoundaryMotion", "BoundaryProblem", "CondensedCompliance", "EnergeticBlocks", "Galerkin",
     "LaplaceKernels", "Marching", "OperatorMatrices", "Operators", "Orders", "PoincareSteklov", "TimeKernels",
-    "circle", "energetic_blocks", "from_segments", "polygon", "smooth_curve", "traction_forces",
+    "circle", "energetic_blocks", "from_segments", "load_blocks", "polygon", "save_blocks", "smooth_curve",
+    "stored_blocks", "traction_forces",
 ]

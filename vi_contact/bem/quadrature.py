@@ -32,7 +32,7 @@ class Orders:
     far: int = 4
     near: int = 8
     outer: int = 6
-    inner: int = 6
+    inner: int = 8
     touching: int = 12
 
 
