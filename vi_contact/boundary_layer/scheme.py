@@ -133,7 +133,7 @@ class BoundaryLayer(Midpoint):
             return new
         surface = problem.surface
         gap, old = (surface.gap(t) - surface.normal_values(u) for t, u in ((step.t, new.u), (state.t, state.u)))
-        rate = 2.0 / dt * np.log(gap / old) - self._rate(problem, state, old)
+        rate = 2.0 / dt * np.log(np.maximum(gap / old, 1e-300)) - self._rate(problem, state, old)
         return replace(new, r_n=new.r_n + reaction, active=gap < self.law.layer.width, memory={RATE: rate})
 
 
