@@ -83,7 +83,7 @@ class Equilibria:
         problem = self._problem
         step = StepProblem(
             A=self._K,
-            b=problem.static_load.load(t),
+            b=problem.static_load.load.at_rest(t),
             bound=problem.surface.gap(t),
             surface=problem.surface,
             scale=1.0,
@@ -144,6 +144,8 @@ class _Proximal:
             ahead = 0.0 if old is None else self._ahead(old, new, result)
             u, active = result.x + ahead * new.d, result.active
             old = new if ahead == 0.0 else None
+        if best is not None and least <= self.tolerance:
+            return best
         raise StepFailure(
             f"the static stage of a body held by contact alone stayed at the residual {least:.1e} after {ITERATIONS} "
             "iterations: start closer to the obstacle, use stiffer supports, or hold a part of the body"

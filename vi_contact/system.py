@@ -39,22 +39,31 @@ class Space(Protocol):
 
 @dataclass(frozen=True)
 class Load:
-    """f(t) = constant + sum_i vector_i * history_i(t) + sum_j general_j(t) + sum_k viscous_k(t) [N].
+    """f(t) = constant + sum vector * history(t) + sum general(t) + sum viscous(t) + sum inertial(t), in newtons.
 
-    Separable parts cost one vector update a step; the others are evaluated anew at every time. Viscous parts are the
-    share in C u' of what moves in a given way (a base, a free field): a mass law that changes C changes them alike.
+    Separable parts cost one vector update a step; the others are evaluated anew at every time. Viscous and inertial
+    parts are the shares in C u' and M u'' of what moves in a given way (a base, a free field): a mass law that changes
+    C changes the former alike, and a body at rest feels neither.
     """
 
     constant: Array
     separable: tuple[tuple[Array, Callable[[float], float]], ...] = ()
     general: tuple[Callable[[float], Array], ...] = ()
     viscous: tuple[Callable[[float], Array], ...] = ()
+    inertial: tuple[Callable[[float], Array], ...] = ()
 
     def __call__(self, t: float) -> Array:
+        total = self.at_rest(t)
+        for function in self.viscous + self.inertial:
+            total += function(t)
+        return total
+
+    def at_rest(self, t: float) -> Array:
+        """The load of a static stage at time t: what moves in a given way stands still where it then is."""
         total = self.constant.copy()
         for vector, history in self.separable:
             total += history(t) * vector
-        for function in self.general + self.viscous:
+        for function in self.general:
             total += function(t)
         return total
 
@@ -65,6 +74,7 @@ class Load:
             tuple((T.transpose_apply(vector), history) for vector, history in self.separable),
             tuple(_turned(T, function) for function in self.general),
             tuple(_turned(T, function) for function in self.viscous),
+            tuple(_turned(T, function) for function in self.inertial),
         )
 
     def handed_over(self, P: Matrix) -> Load:

@@ -189,6 +189,7 @@ def assemble_loads(space: FemSpace, section: Section, loads: tuple[Any, ...], fu
     separable: list[tuple[Array, Callable[[float], float]]] = []
     general: list[Callable[[float], Array]] = []
     viscous: list[Callable[[float], Array]] = []
+    inertial: list[Callable[[float], Array]] = []
     for load in loads:
         integrate = _integrator(space, section, load)
         name = type(load).__name__
@@ -200,10 +201,11 @@ def assemble_loads(space: FemSpace, section: Section, loads: tuple[Any, ...], fu
             general.append(_field_load(space, name, load.value, integrate))
     if any(condition.moves for condition in space.prescribed):
         stiffness, damper, mass = full
-        general.append(_prescribed_load(space, ((0, stiffness), (2, mass))))
+        general.append(_prescribed_load(space, 0, stiffness))
+        inertial.append(_prescribed_load(space, 2, mass))
         if damper is not None:
-            viscous.append(_prescribed_load(space, ((1, damper),)))
-    return Load(constant, tuple(separable), tuple(general), tuple(viscous))
+            viscous.append(_prescribed_load(space, 1, damper))
+    return Load(constant, tuple(separable), tuple(general), tuple(viscous), tuple(inertial))
 
 
 def _field_load(
@@ -230,17 +232,10 @@ def _integrator(space: FemSpace, section: Section, load: Traction | BodyForce) -
     return integrate
 
 
-def _prescribed_load(space: FemSpace, full: tuple[tuple[int, Any], ...]) -> Callable[[float], Array]:
-    """The parts of -Pᵀ(K U + C U' + M U''), given as pairs (derivative, matrix)."""
-    parts = [(derivative, PetscMatrix(mat)) for derivative, mat in full]
-
-    def load(t: float) -> Array:
-        pull = np.zeros(len(space.ids))
-        for derivative, matrix in parts:
-            pull -= space.pull(matrix @ space.prescribed_values(t, derivative))
-        return pull
-
-    return load
+def _prescribed_load(space: FemSpace, derivative: int, full: Any) -> Callable[[float], Array]:
+    """A part of -Pᵀ(K U + C U' + M U''): that of a derivative and its matrix."""
+    matrix = PetscMatrix(full)
+    return lambda t: -space.pull(matrix @ space.prescribed_values(t, derivative))
 
 
 def _initial(space: FemSpace, name: str, value: Initial) -> Array:

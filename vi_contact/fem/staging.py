@@ -42,7 +42,7 @@ def release(static: ContactProblem, state: State, problem: ContactProblem) -> tu
     u0 = after.restrict(nodal)
     _refuse_moved(after, nodal, u0)
     system = replace(problem.system, u0=u0, v0=np.zeros_like(u0), _cache={})
-    still = system.load(0.0) - np.sum([one(0.0) for one in system.load.viscous], axis=0)
+    still = system.load.at_rest(0.0)
     force = system.K @ u0 - still + _contact_force(problem, state)
     was_held = (before.held | before.tied).ravel()[after.free]
     missing = after.comm.max(np.array([max_abs(force[~was_held]), max_abs(system.K @ u0), max_abs(force)]))
