@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from typing import Any
 
 from .cli_options import add_output, add_shaking, add_step, chosen, impact_law
+from .materials import Damping, LinearElastic, NoDamping, Rayleigh
 
 _SHAPE = (  # option, default, meaning
     ("width", 24.0, "width of the soil layer"), ("depth", 8.0, "depth of the soil layer"),
@@ -46,6 +48,10 @@ def add_channel_arguments(channel: argparse.ArgumentParser) -> None:
     contact.add_argument(
         "--rock", type=float, nargs=3, metavar=("E", "NU", "RHO"), help="under a compliant base (default: the soil's)"
     )
+    contact.add_argument(
+        "--damping", type=float, nargs=3, metavar=("XI", "F1", "F2"),
+        help="Rayleigh damping of soil and channel: ratio XI at the frequencies F1 and F2 [Hz] (default none)",
+    )
     add_shaking(channel, harmonic="2 m/s2")
     add_step(channel, dt="1/80")
     mesh = channel.add_argument_group("geometry and mesh")
@@ -56,10 +62,16 @@ def add_channel_arguments(channel: argparse.ArgumentParser) -> None:
     add_output(channel, out="results/channel")
 
 
+def _damping(given: Sequence[float] | None) -> Damping:
+    if given is None:
+        return NoDamping()
+    xi, f1, f2 = given
+    return Rayleigh.from_frequencies(f1, f2, xi1=xi, xi2=xi)
+
+
 def _channel(options: argparse.Namespace) -> str:
     from mpi4py import MPI
 
-    from .materials import LinearElastic
     from .meshes.channel import ChannelMesh
     from .models.channel import Channel
     from .models.channel_run import ChannelRun, run_channel
@@ -68,7 +80,7 @@ def _channel(options: argparse.Namespace) -> str:
     run = ChannelRun(
         contact=options.contact,
         mu=options.mu,
-        channel=Channel(ChannelMesh(triangles=options.triangles, **lengths)),
+        channel=Channel(ChannelMesh(triangles=options.triangles, **lengths), damping=_damping(options.damping)),
         base=options.base,
         rock=LinearElastic(*options.rock) if options.rock else None,
         sides=options.sides,
