@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from soil import SOIL, history, strip
+from soil import SOIL, strip
 
 import vi_contact as vc
 from vi_contact import fem
