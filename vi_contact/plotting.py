@@ -60,12 +60,13 @@ def plot_points(
     *,
     title: str,
     component: str = "x",
-    unilateral: Sequence[str] = (),
+    unilateral: Sequence[str] | None = (),
     reference: History | None = None,
 ) -> Path:
     """One panel per point: displacement against time, as Figs. 4 and 5 of seed 000.
 
-    unilateral: labels of contact points, drawn with their bound at zero. reference: another run, drawn in grey.
+    unilateral: labels of contact points on a support at rest, drawn with their bound at zero; None for points of bodies
+    that touch each other. reference: another run, drawn in grey.
     """
     names = [f"u_{component}_{label}" for label in labels]
     size = max(float(np.max(np.abs(history[name]), initial=0.0)) for name in names)
@@ -75,12 +76,12 @@ def plot_points(
         if reference is not None:
             axis.plot(reference["t"], reference[name] / metres, color="0.65", lw=0.8, label="no contact")
         axis.plot(history["t"], history[name] / metres, color="black", lw=0.9, label="with contact")
-        kind = "free point"
-        if label in unilateral:
-            kind = "contact point"
+        kind = "" if unilateral is None else " (free point)"
+        if unilateral is not None and label in unilateral:
+            kind = " (contact point)"
             axis.axhline(0.0, color="tab:red", lw=0.8, ls="--")
         axis.set_ylabel(f"$u_{component}$ [{unit}]")
-        axis.set_title(f"point {label} ({kind})", fontsize=9, loc="left")
+        axis.set_title(f"point {label}{kind}", fontsize=9, loc="left")
     if reference is not None:
         axes[0].legend(fontsize=8, ncol=2, loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
     figure.suptitle(title)

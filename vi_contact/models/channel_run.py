@@ -168,7 +168,8 @@ def draw(history: Mapping[str, Array], model: ChannelModel, out: Path, *, title:
     labels = list(model.channel.probes())
     plot_excitation(history, out / "excitation.png")
     for component in "xy":
-        plot_points(history, labels, out / f"displacements_{component}.png", title=title, component=component)
+        path = out / f"displacements_{component}.png"
+        plot_points(history, labels, path, title=title, component=component, unilateral=None)
     plot_energy(history, out / "energy.png")
     plot_certificate(history, out / "certificate.png")
     label = "arc length, left wall, base, right wall [m]"
