@@ -1,0 +1,195 @@
+"""Contact of a body whose boundary is condensed by boundary elements: what it may touch, how it rubs, its steps.
+
+The condensed body is u_c[k] = sum_(l<=k) W[k-l] lam[l] + u_free[k] (CondensedCompliance). In the frames of its nodes,
+v = N u with the contact direction n and the tangent as rows of N, lam = -Nᵀ r, it is a row of the project's contract
+(step.py): force scheme, gap at the end of the step, history on the right-hand side,
+
+    A v_k = b_k - r_k,   A = (N W[0] Nᵀ)⁻¹,   b_k = A N (u_free[k] + sum_(l<k) W[k-l] lam[l])
+    0 <= r_n  ⊥  gap - v_n >= 0,    |r_t| <= limit(r_n), along the slip v_t[k] - v_t[k-1]
+
+so that every method for the small problem and the certificate of a step serve here too. Reactions r = (r_n, r_t) are
+those of the body on its support, nodal forces [N/m] held during a step; traction = force / length.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..algebra import Array, Indices, Mask, SerialAlgebra, SerialComm, SerialMatrix
+from ..errors import InputError
+from ..friction import FrictionLaw, Frictionless
+from ..step import EffectiveMatrix, StepProblem
+from ..surfaces import ContactSurface, Obstacle, Touching, admissible_gap, nodal_frames
+from .boundary_mesh import BoundaryMesh
+from .energetic import summed
+from .poincare_steklov import CondensedCompliance
+
+Motion = Callable[[float], float | Array]
+ASYMMETRIC = 1e-8  # of W[0], beyond which there is no small problem to solve
+HELD = 1e-12  # of the largest flexibility: supported unknowns
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """One contact condition per row: the contact node (row of CondensedCompliance), its outward normal, its length.
+
+    nodes: (c,); normals: (c, 2); lengths: (c,) [m]. A node may have two conditions: the corner of a box in a notch.
+    """
+
+    nodes: Indices
+    normals: Array
+    lengths: Array
+
+
+def conditions_on(mesh: BoundaryMesh, compliance: CondensedCompliance, *sides: ArrayLike) -> Conditions:
+    """Conditions of several sides, each a mask of elements (n,): a node of two sides gets one for each of them.
+
+    Raises InputError for a side with nodes that were not condensed, and for more than two sides at a node.
+    """
+    place = np.full(len(mesh), -1)
+    place[compliance.nodes] = np.arange(len(compliance.nodes))
+    chosen = [np.flatnonzero(mesh.nodes_of(side)) for side in sides]
+    nodes = place[np.concatenate(chosen)]
+    if (nodes < 0).any() or np.bincount(nodes).max() > 2:
+        raise InputError("conditions_on: sides must belong to the contact boundary, and at most two may share a node")
+    normals = [mesh.node_normals(side)[found] for side, found in zip(sides, chosen, strict=True)]
+    lengths = [mesh.node_lengths(side)[found] for side, found in zip(sides, chosen, strict=True)]
+    return Conditions(nodes, np.concatenate(normals), np.concatenate(lengths))
+
+
+@dataclass(frozen=True, eq=False)
+class BoundaryContact:
+    """A condensed body and its support.
+
+    obstacle: its gaps and directions, a fitting rigid support by default; friction: the law; towards, along: how far
+    the obstacle has moved towards the body and along its tangents at time t [m]; bilateral: every point is held on the
+    obstacle; conditions: None for one per contact node. Points with two conditions do not rub.
+
+    Raises InputError for a compliance W[0] that is not symmetric and positive definite (the unsymmetric form is not),
+    supports that hold a contact direction, and bodies that penetrate their obstacle.
+    """
+
+    compliance: CondensedCompliance
+    obstacle: Obstacle = field(default_factory=Touching)
+    friction: FrictionLaw = field(default_factory=Frictionless)
+    towards: Motion | None = None
+    along: Motion | None = None
+    bilateral: bool = False
+    conditions: Conditions | None = None
+
+    @property
+    def count(self) -> int:
+        """Number of contact nodes m."""
+        return len(self.compliance.nodes)
+
+    @property
+    def frictional(self) -> bool:
+        """Whether there can be tangential reactions."""
+        return not isinstance(self.friction, Frictionless)
+
+    @cached_property
+    def _rows(self) -> Conditions:
+        if self.conditions is not None:
+            return self.conditions
+        return Conditions(np.arange(self.count), self.compliance.normals, self.compliance.lengths)
+
+    @cached_property
+    def _directions(self) -> Array:
+        rows = self._rows
+        return self.obstacle.directions(self.compliance.points[rows.nodes], rows.normals)
+
+    @cached_property
+    def _second(self) -> Mask:
+        """(c,) conditions of nodes that have one already."""
+        second = np.ones(len(self._rows.nodes), bool)
+        second[np.unique(self._rows.nodes, return_index=True)[1]] = False
+        return second
+
+    @cached_property
+    def frames(self) -> Array:
+        """N (2m, 2m): v = N u, first the contact directions of all nodes, then tangents or second directions."""
+        m, rows, second = self.count, self._rows, self._second
+        frames = np.tile(np.eye(2), (m, 1, 1))
+        frames[rows.nodes[~second]] = nodal_frames(self._directions[~second]).swapaxes(1, 2)
+        frames[rows.nodes[second], 1] = self._directions[second]
+        N = np.zeros((2, m, 2, m))
+        N[:, np.arange(m), :, np.arange(m)] = frames
+        return N.reshape(2 * m, 2 * m)
+
+    @cached_property
+    def kept(self) -> Mask:
+        """(2m,) unknowns v that are not supported."""
+        flexibility = (self.frames @ self.compliance.W[0] @ self.frames.T).diagonal()
+        return np.asarray(flexibility > HELD * flexibility.max(initial=0.0))
+
+    @cached_property
+    def W(self) -> Array:
+        """(steps, f, f) compliance of the f kept unknowns v."""
+        turned = np.matmul(np.matmul(self.frames, self.compliance.W), self.frames.T)
+        return np.ascontiguousarray(turned[:, self.kept][:, :, self.kept])
+
+    @cached_property
+    def v_free(self) -> Array:
+        """(steps, f) motion of the kept unknowns without contact."""
+        return np.ascontiguousarray((self.compliance.u_free @ self.frames.T)[:, self.kept])
+
+    @cached_property
+    def surface(self) -> ContactSurface:
+        """The conditions as the contract has them; its unknowns are the kept ones."""
+        rows, second, points = self._rows, self._second, self.compliance.points
+        number = np.where(self.kept, np.cumsum(self.kept) - 1, -1)
+        owned = number[rows.nodes + self.count * second]
+        if (owned < 0).any():
+            raise InputError("BoundaryContact: a support holds a contact node in its contact direction; leave the node "
+                             "out of the contact boundary, or free that direction")
+        tangents = np.where(np.isin(rows.nodes, rows.nodes[second]), -1, number[rows.nodes + self.count])
+        size = float(np.ptp(points, axis=0).max())
+        gap = self.obstacle.gap(points[rows.nodes], rows.normals)
+        count = len(rows.nodes)
+        surface = ContactSurface(
+            SerialComm(), points[rows.nodes], self._directions, rows.lengths,
+            admissible_gap(gap, points[rows.nodes], size), np.full(count, self.bilateral), np.zeros(count),
+            owned, np.arange(count), tangents[:, None],
+        )
+        return surface.moving(self.towards, self.along)
+
+    @cached_property
+    def matrix(self) -> EffectiveMatrix:
+        """A."""
+        first = self.W[0]
+        if np.abs(first - first.T).max() > ASYMMETRIC * np.abs(first).max():
+            raise InputError("BoundaryContact: the compliance of one step is not symmetric, so there is no small "
+                             "problem to solve; use the symmetric Poincaré-Steklov operator")
+        first = 0.5 * (first + first.T)
+        if np.linalg.eigvalsh(first)[0] <= 0.0:
+            raise InputError("BoundaryContact: the compliance of one step is not positive definite; use the symmetric "
+                             "Poincaré-Steklov operator, and supports along contact directions or tangents only")
+        return EffectiveMatrix(SerialMatrix(np.linalg.inv(first)), SerialAlgebra())
+
+    def step(self, k: int, loads: Array, before: Array, active: Mask) -> StepProblem:
+        """Step k (from 0) after loads (k, f) = -B_nᵀ r_n - B_tᵀ r_t of the steps before; before: v at its beginning."""
+        dt, surface = self.compliance.dt, self.surface
+        past = self.v_free[k] + summed(self.W[k:0:-1], loads[:k, :, None])[:, 0] if k else self.v_free[0]
+        slip0 = None
+        if self.frictional:
+            slip0 = surface.tangential_values(before)
+            sliding = surface.sliding(k * dt, (k + 1) * dt)
+            slip0 = slip0 if sliding is None else slip0 + sliding
+        return StepProblem(
+            A=self.matrix, b=self.matrix @ past, bound=surface.gap((k + 1) * dt), surface=surface, scale=1.0,
+            guess=before, active=active, t=(k + 1) * dt, k=k + 1, friction=self.friction, slip0=slip0,
+            rate_factor=1.0 / dt,
+        )
+
+    def load(self, r_n: Array, r_t: Array | None) -> Array:
+        """(f,) forces of the support on the kept unknowns, -B_nᵀ r_n - B_tᵀ r_t."""
+        return -self.surface.reaction_load(r_n, int(self.kept.sum()), r_t)
+
+    def cartesian(self, loads: Array) -> Array:
+        """(steps, 2m) nodal forces lam on the body, x of all contact nodes, then y, of loads (steps, f)."""
+        return np.asarray(loads @ self.frames[self.kept])

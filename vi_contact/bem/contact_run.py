@@ -1,0 +1,138 @@
+"""Answers of contact problems on a condensed boundary: histories, resultants, works."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..algebra import Array, Mask
+from ..step import Certificate, StepProblem, StepResult
+from ..verify import kkt_residual
+from .contact import BoundaryContact
+from .poincare_steklov import BoundaryMotion
+
+
+@dataclass(frozen=True)
+class ContactRun:
+    """Histories of c conditions at m contact nodes over all steps.
+
+    times: (steps,) ends of the steps [s]; r_n: (steps, c), r_t: (steps, c) reactions [N/m] on the support during each
+    step, normal and along the tangent; gap: (steps, c) at the ends [m]; slip: (steps, c) in each step [m];
+    displacement: (steps, 2m) of the contact nodes at the ends and forces: (steps, 2m) on the body [N/m] in the order of
+    CondensedCompliance; active: (steps, c). certificates: of each step; iterations: (steps,) of the method in a step,
+    or (1,) of a method for all steps; history: what such a method logs.
+    """
+
+    contact: BoundaryContact
+    times: Array
+    r_n: Array
+    r_t: Array
+    gap: Array
+    slip: Array
+    displacement: Array
+    forces: Array
+    active: Mask
+    certificates: tuple[Certificate, ...]
+    iterations: Array
+    history: tuple[float, ...] = ()
+
+    @property
+    def worst(self) -> float:
+        """The worst residual of any step."""
+        return max(certificate.worst for certificate in self.certificates)
+
+    @property
+    def resultant(self) -> Array:
+        """(steps, 2) force of the support on the body [N/m]."""
+        return np.asarray(self.forces.reshape(len(self.times), 2, -1).sum(axis=2))
+
+    @property
+    def impulse(self) -> Array:
+        """(steps, 2) of that force up to each time [N s/m]."""
+        return np.cumsum(self.resultant, axis=0) * self.contact.compliance.dt
+
+    @property
+    def pressure(self) -> Array:
+        """(steps, c) normal traction r_n / length [Pa]."""
+        return self.r_n / self.contact.surface.weights
+
+    @property
+    def shear(self) -> Array:
+        """(steps, c) tangential traction r_t / length [Pa] of the body on the support."""
+        return self.r_t / self.contact.surface.weights
+
+    @property
+    def work(self) -> Array:
+        """(steps,) work of all contact forces on the body up to each time [J/m]."""
+        increments = np.diff(self.displacement, axis=0, prepend=0.0)
+        return np.cumsum((self.forces * increments).sum(axis=1))
+
+    @property
+    def friction_loss(self) -> Array:
+        """(steps,) energy that friction has taken, sum r_t slip, never negative in a step [J/m]."""
+        return np.cumsum((self.r_t * self.slip).sum(axis=1))
+
+
+@dataclass(frozen=True)
+class ContactLedger:
+    """Works up to each time (steps,) [J/m] from boundary data alone: energy = load + contact + support to round-off.
+
+    energy: of the body; load: of the tractions; contact: of the contact forces, friction included; support: of what
+    holds prescribed unknowns; friction: what friction took (in ``contact`` already).
+    """
+
+    energy: Array
+    load: Array
+    contact: Array
+    support: Array
+    friction: Array
+
+    @property
+    def defect(self) -> float:
+        """|energy - load - contact - support| over the largest of them."""
+        terms = (self.energy, self.load, self.contact, self.support)
+        size = max(float(np.abs(term).max(initial=0.0)) for term in terms)
+        return float(np.abs(self.energy - self.load - self.contact - self.support).max()) / (size or 1.0)
+
+
+def ledger(run: ContactRun, motion: BoundaryMotion, loads: Array, *, supported: Mask | None = None) -> ContactLedger:
+    """Works of a run with its whole boundary motion, BoundaryProblem.solve(run.forces); loads: (steps, 2, n).
+
+    supported: (2, n), the ``fixed`` of the problem.
+    """
+    increments = np.diff(motion.displacement, axis=0, prepend=0.0)
+    support = np.zeros(len(run.times))
+    if supported is not None:
+        support = np.cumsum((motion.forces * increments * supported).sum(axis=(1, 2)))
+        loads = np.where(supported, 0.0, loads)
+    load = np.cumsum((loads * increments).sum(axis=(1, 2)))
+    return ContactLedger(motion.work, load, run.work, support, run.friction_loss)
+
+
+def run_of(
+    contact: BoundaryContact,
+    steps: Sequence[StepProblem],
+    results: Sequence[StepResult],
+    *,
+    iterations: Array | None = None,
+    history: tuple[float, ...] = (),
+) -> ContactRun:
+    """The run of solved steps, certified."""
+    surface, count = contact.surface, contact.surface.count
+    v = np.array([result.x for result in results])
+    loads = np.array([contact.load(result.r_n, result.r_t) for result in results])
+    nothing = np.zeros((count, 1))
+    normal = np.array([step.bound - surface.normal_values(x) for step, x in zip(steps, v, strict=True)])
+    slip = [nothing if step.slip0 is None else surface.tangential_values(x) - step.slip0
+            for step, x in zip(steps, v, strict=True)]
+    forces = contact.cartesian(loads)
+    return ContactRun(
+        contact, np.array([step.t for step in steps]), np.array([result.r_n for result in results]),
+        np.array([nothing if result.r_t is None else result.r_t for result in results])[:, :, 0],
+        normal, np.array(slip)[:, :, 0], contact.compliance.displacement(forces), forces,
+        np.array([result.active for result in results]),
+        tuple(kkt_residual(step, result) for step, result in zip(steps, results, strict=True)),
+        np.array([result.iterations for result in results]) if iterations is None else iterations, history,
+    )

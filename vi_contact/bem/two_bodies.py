@@ -1,0 +1,138 @@
+"""Two bodies with matching boundary nodes: contact on one part of their interface, welds on another (seed 003).
+
+Each body has its own mesh, material and operator; only the condensed motion of interface nodes meets. With the forces
+lam on body 1 and -lam on body 2 the relative displacement is
+
+    w = u_1 - u_2 = (W_1 + W_2) * lam + (u_1,free - u_2,free)
+
+the condensed motion of one body on a rigid support. Welded nodes have w = 0 in both directions at the end of every
+step; their forces are eliminated, and what is left is a CondensedCompliance of the contact nodes alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from ..algebra import Array, Indices, Mask
+from ..errors import InputError
+from .energetic import summed
+from .poincare_steklov import BoundaryMotion, BoundaryProblem, CondensedCompliance
+
+MATCH = 1e-9  # of the extent of the interface: distance of matching nodes
+HELD = 1e-12  # of the largest flexibility: supported unknowns
+
+
+@dataclass(frozen=True, eq=False)
+class TwoBodies:
+    """Two boundary value problems whose ``contact`` elements face each other, node on node.
+
+    welded: (n_1,) elements of body 1 on the transmission interface, part of its ``contact``; nodes that touch one of
+    them are welded. Raises InputError for nodes without a partner, different steps, and welds outside the interface.
+    """
+
+    one: BoundaryProblem
+    two: BoundaryProblem
+    welded: Mask | None = None
+
+    @cached_property
+    def relative(self) -> CondensedCompliance:
+        """W_1 + W_2 on all interface nodes, in the order and with the normals of body 1."""
+        one, two = self.one.condensed(), self.two.condensed()
+        if one.W.shape != two.W.shape or abs(one.dt - two.dt) > 1e-12 * one.dt:
+            raise InputError(f"TwoBodies: {len(one.W)} steps of {one.dt:.6g} s and {len(one.nodes)} nodes face "
+                             f"{len(two.W)} of {two.dt:.6g} s and {len(two.nodes)}; give both the same")
+        partner = matching(one.points, two.points)
+        unknowns = np.concatenate([partner, partner + len(partner)])
+        return replace(one, W=one.W + two.W[:, unknowns][:, :, unknowns], u_free=one.u_free - two.u_free[:, unknowns])
+
+    @cached_property
+    def _weld(self) -> Weld:
+        relative, interface = self.relative, np.asarray(self.one.contact, bool)
+        elements = np.zeros(len(interface), bool) if self.welded is None else np.asarray(self.welded, bool)
+        if elements.shape != interface.shape or (elements & ~interface).any():
+            raise InputError("TwoBodies: `welded` must be a mask of elements of body 1 that are in its `contact`, too")
+        mesh = self.one.operator.mesh
+        contact = interface & ~elements
+        relative = replace(relative, lengths=mesh.node_lengths(contact)[relative.nodes],
+                           normals=mesh.node_normals(contact)[relative.nodes])
+        return weld(relative, mesh.nodes_of(elements)[relative.nodes])
+
+    def condensed(self) -> CondensedCompliance:
+        """Of the contact nodes, for BoundaryContact; ``normals`` point from body 1 to body 2."""
+        return self._weld.contact
+
+    def interface_forces(self, forces: Array) -> Array:
+        """(steps, 2m) forces on body 1 at all interface nodes, of contact forces (steps, 2m_c) and their welds."""
+        return self._weld.forces(forces)
+
+    def solve(self, forces: Array | None = None) -> tuple[BoundaryMotion, BoundaryMotion]:
+        """Motions of both bodies under their loads, contact forces (steps, 2m_c) on body 1, and the welds."""
+        relative = self.relative
+        if forces is None:
+            forces = np.zeros((len(relative.W), self.condensed().W.shape[1]))
+        on_one = self.interface_forces(forces)
+        two_nodes = self.two.operator.mesh.points[self.two.contact_nodes]
+        back = matching(two_nodes, relative.points)
+        return self.one.solve(on_one), self.two.solve(-on_one[:, np.concatenate([back, back + len(back)])])
+
+
+def matching(points: Array, others: Array) -> Indices:
+    """(m,) number of the point of ``others`` (m, 2) at each of ``points`` (m, 2); InputError where there is none."""
+    distance = np.hypot(*(points[:, None] - others).transpose(2, 0, 1))
+    nearest = distance.argmin(axis=1)
+    away = distance.min(axis=1)
+    worst = int(away.argmax())
+    if len(points) != len(others) or away[worst] > MATCH * np.ptp(points, axis=0).max():
+        raise InputError(f"TwoBodies: the node at ({points[worst, 0]:g}, {points[worst, 1]:g}) has no partner on the "
+                         "other body; give both interfaces the same nodes")
+    return nearest
+
+
+@dataclass(frozen=True, eq=False)
+class Weld:
+    """Weld forces eliminated: ``contact`` is what is left. Masks (2m,) of unknowns; held: (steps, |I|, 2m_c + 1) weld
+    forces after unit contact forces in step 0, and, in the last column, without any."""
+
+    contact: CondensedCompliance
+    welded: Mask
+    touching: Mask
+    held: Array
+
+    def forces(self, contact_forces: Array) -> Array:
+        """(steps, 2m): contact forces (steps, 2m_c) and the weld forces that go with them."""
+        everything = np.zeros((len(contact_forces), len(self.welded)))
+        everything[:, self.touching] = contact_forces
+        if self.welded.any():
+            for k in range(len(contact_forces)):
+                follow = summed(self.held[k::-1, :, :-1], contact_forces[: k + 1, :, None])[:, 0]
+                everything[k, self.welded] = self.held[k, :, -1] + follow
+        return everything
+
+
+def weld(compliance: CondensedCompliance, nodes: Mask) -> Weld:
+    """Holds the relative displacement of masked nodes (m,) at zero from the first step on."""
+    W, steps = compliance.W, len(compliance.W)
+    flexibility = W[0].diagonal()
+    welded = np.tile(nodes, 2) & (flexibility > HELD * flexibility.max())
+    touching = np.tile(~nodes, 2)
+    inner, cross, across = W[:, welded][:, :, welded], W[:, welded][:, :, touching], W[:, touching][:, :, welded]
+    known = np.concatenate([cross, compliance.u_free[:, welded, None]], axis=2)
+    held = np.zeros_like(known)
+    if welded.any():
+        factor = cho_factor(0.5 * (inner[0] + inner[0].T))
+        for k in range(steps):
+            early = summed(inner[k:0:-1], held[:k]) if k else 0.0
+            held[k] = -cho_solve(factor, known[k] + early)
+    left = np.concatenate([W[:, touching][:, :, touching], compliance.u_free[:, touching, None]], axis=2)
+    if welded.any():
+        left += np.array([summed(across[k::-1], held[: k + 1]) for k in range(steps)])
+    contact = replace(
+        compliance, W=np.ascontiguousarray(left[:, :, :-1]), u_free=np.ascontiguousarray(left[:, :, -1]),
+        nodes=compliance.nodes[~nodes], points=compliance.points[~nodes], normals=compliance.normals[~nodes],
+        lengths=compliance.lengths[~nodes],
+    )
+    return Weld(contact, welded, touching, held)
