@@ -31,7 +31,6 @@ from vi_contact.models.channel import Channel, ChannelModel, build
 from vi_contact.models.channel_run import REFERENCE
 from vi_contact.plotting import History, plot_energy, plot_excitation
 from vi_contact.plotting_channel_mesh import animate, plot_layout, plot_moments
-from vi_contact.plotting_channel_run import illustrate
 from vi_contact.plotting_friction import plot_states
 from vi_contact.static import static_equilibrium
 
@@ -140,11 +139,6 @@ def describe(material: vc.LinearElastic) -> str:
 if __name__ == "__main__":
     if len(sys.argv) > 1:
         from vi_contact.cli import main as command
-        from vi_contact.cli import parser
 
-        arguments = ["channel", *sys.argv[1:]]
-        failed = command(arguments)
-        if not failed and MPI.COMM_WORLD.rank == 0:
-            illustrate(parser().parse_args(arguments).out)
-        sys.exit(failed)
+        sys.exit(command(["channel", *sys.argv[1:]]))
     main()

@@ -74,7 +74,8 @@ def _channel(options: argparse.Namespace) -> str:
 
     from .meshes.channel import ChannelMesh
     from .models.channel import Channel
-    from .models.channel_run import ChannelRun, run_channel
+    from .models.channel_run import CONTACTS, ChannelRun, run_channel
+    from .plotting_channel_run import illustrate
 
     lengths = {name.replace("-", "_"): getattr(options, name.replace("-", "_")) for name, _, _ in _SHAPE}
     run = ChannelRun(
@@ -89,5 +90,7 @@ def _channel(options: argparse.Namespace) -> str:
         **chosen(options),
     )
     solution = run_channel(run, MPI.COMM_WORLD, options.out, progress=not options.quiet)
-    text = f"Channel, {options.contact}\n{solution.summary()}\noutput: {options.out}"
-    return text if MPI.COMM_WORLD.rank == 0 else ""
+    if MPI.COMM_WORLD.rank != 0:
+        return ""
+    illustrate(options.out, title=CONTACTS[run.contact])
+    return f"Channel, {options.contact}\n{solution.summary()}\noutput: {options.out}"

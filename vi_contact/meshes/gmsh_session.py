@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import inspect
 import os
 from collections.abc import Iterator
@@ -11,6 +12,7 @@ from typing import Any, Protocol
 
 from vi_contact.errors import InputError
 
+M_PERTURB = -6  # of malloc.h
 _OPTIONS = {
     "General.Terminal": 0,
     "General.NumThreads": 1,  # with the seed: the same mesh every time
@@ -89,11 +91,24 @@ def _is_initialised(gmsh: Any) -> bool:
     """Gmsh 4.8 (Debian 12) cannot be asked: it lists no model before initialize() and complains after finalize()."""
     if hasattr(gmsh, "isInitialized"):
         return bool(gmsh.isInitialized())
-    with _silent_stderr():
+    with _silent_stderr(), _zeroed_memory():
         try:
             return bool(gmsh.model.list())
         except Exception:  # the only class Gmsh raises
             return False
+
+
+@contextmanager
+def _zeroed_memory() -> Iterator[None]:
+    """Gmsh 4.8 complains by an option that it has not set yet, and ends the process when that happens to be 4."""
+    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)  # of glibc: large new blocks are filled with ~0xFF
+    if mallopt:
+        mallopt(M_PERTURB, 0xFF)
+    try:
+        yield
+    finally:
+        if mallopt:
+            mallopt(M_PERTURB, 0)
 
 
 @contextmanager
