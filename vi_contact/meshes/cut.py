@@ -146,7 +146,8 @@ def _on_first_side(
     across = centres[other] - centres[one]
     ahead = across @ way
     if np.any(np.abs(ahead) <= 1e-9 * np.linalg.norm(across, axis=1) * np.linalg.norm(way)):
-        raise InputError(f"towards={tuple(float(x) for x in way)} runs along '{group}' somewhere: say inside=a cell group instead")
+        given = tuple(float(x) for x in way)
+        raise InputError(f"towards={given} runs along '{group}' somewhere: say inside=a cell group instead")
     return np.asarray(ahead > 0.0)
 
 
