@@ -1,0 +1,118 @@
+#!/usr/bin/env python3
+"""Boundary elements: accuracy and cost against the numbers of elements and steps; boundedness over long times.
+
+    python3 benchmarks/bem.py [--sides 5 10 20 40] [--steps 60 120 240] [--long]
+
+Unit square, c_P = 1, c_S = 1/2, rho = 1, k elements a side, c_P dt = h, symmetric form; one thread; a row is a process
+of its own, seconds are processor time. Errors are relative L2 norms over all nodes and steps: oblique plane pulses of
+duration 2 up to T = 4 without supports; top of a rod between rollers under a step and a sin² load up to T = 6. --steps
+adds rows with k = 10 and other numbers of steps; --long the rod up to T = 60 for c_P dt / h from 0.1 to 4.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import resource
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ[name] = "1"
+ROOT = Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
+
+import numpy as np  # noqa: E402
+from plane_waves import MATERIAL, SQUARE, pulse  # noqa: E402
+from test_bem_energetic import echoes, rod, smooth_integral, smooth_load  # noqa: E402
+
+from vi_contact import bem  # noqa: E402
+
+COLUMNS = ("k", "steps", "assembly", "march", "condense", "blocks MB", "peak MB")
+ERRORS = ("pulse P", "pulse S", "step", "sin²", "base", "max base")
+
+
+def row(k: int, steps: int, *, errors: bool) -> dict[str, float]:
+    """Times [s], memory and errors of one size."""
+    start = time.process_time()
+    blocks = bem.energetic_blocks(bem.polygon(SQUARE, 1.0 / k), MATERIAL, dt=1.0 / k, steps=steps)
+    result = {"k": k, "steps": steps, "assembly": time.process_time() - start}
+    if errors:
+        result |= wave_errors(blocks, k) | rod_errors(blocks)
+    problem = rod(blocks, smooth_load)
+    start = time.process_time()
+    problem.solve()
+    result["march"] = time.process_time() - start
+    start = time.process_time()
+    problem.condensed()
+    result["condense"] = time.process_time() - start
+    result["blocks MB"] = sum(part.nbytes for part in (blocks.single, blocks.double, blocks.hyper)) / 1e6
+    return result | {"peak MB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0 * 1.048576}
+
+
+def wave_errors(blocks: bem.EnergeticBlocks, k: int) -> dict[str, float]:
+    errors = {}
+    for name, shear in (("pulse P", False), ("pulse S", True)):
+        wave, mesh = pulse(shear=shear), blocks.mesh
+        forces = bem.traction_forces(mesh, wave.traction, dt=blocks.dt, steps=4 * k)
+        exact = np.array([wave.displacement(mesh.points, blocks.dt * (j + 1)).T for j in range(4 * k)])
+        found = bem.PoincareSteklov(blocks, 1.0).solve(forces)
+        errors[name] = float(np.linalg.norm(found - exact) / np.linalg.norm(exact))
+    return errors
+
+
+def rod_errors(blocks: bem.EnergeticBlocks) -> dict[str, float]:
+    errors, mesh = {}, blocks.mesh
+    loads = {"step": (lambda t: 1.0, lambda t: np.maximum(t, 0.0)), "sin²": (smooth_load, smooth_integral)}
+    for name, (load, integral) in loads.items():
+        motion = rod(blocks, load).solve()
+        exact = echoes(motion.times, integral)[:, None]
+        top = motion.displacement[:, 1][:, mesh.nodes_of(mesh.labels == 2)]
+        errors[name] = float(np.linalg.norm(top - exact) / np.linalg.norm(np.broadcast_to(exact, top.shape)))
+        if name == "step":
+            base = -motion.forces[:, 1][:, mesh.nodes_of(mesh.labels == 0)].sum(axis=1)
+            middle = motion.times - 0.5 * blocks.dt
+            exact_base = np.where((middle > 1.0) & ((middle - 1.0) % 4.0 < 2.0), 2.0, 0.0)
+            errors["base"] = float(np.linalg.norm(base - exact_base) / np.linalg.norm(exact_base))
+            errors["max base"] = float(base.max())
+    return errors
+
+
+def long_run(ratio: float, *, k: int = 5, end: float = 60.0) -> str:
+    """Greatest displacement (exact: 1) and work after the load in the first and last ten time units."""
+    dt = ratio / k
+    blocks = bem.energetic_blocks(bem.polygon(SQUARE, 1.0 / k), MATERIAL, dt=dt, steps=round(end / dt))
+    motion = rod(blocks, smooth_load).solve()
+    size = np.abs(motion.displacement[:, 1]).max(axis=1)
+    early, late = (motion.times > 2.0) & (motion.times < 12.0), motion.times > end - 10.0
+    return (f"{ratio:5.2f} {blocks.steps:5d}  {size[early].max():.4f} {size[late].max():.4f}  "
+            f"{motion.work[early].max():.4f} {motion.work[late].max():.4f}")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--sides", type=int, nargs="*", default=[5, 10, 20])
+    parser.add_argument("--steps", type=int, nargs="*", default=[60, 120, 240])
+    parser.add_argument("--long", action="store_true")
+    parser.add_argument("--one", type=int, nargs=3, help=argparse.SUPPRESS)
+    chosen = parser.parse_args()
+    if chosen.one:
+        print(json.dumps(row(chosen.one[0], chosen.one[1], errors=bool(chosen.one[2]))))
+        return
+    sizes = [(k, 6 * k, 1) for k in chosen.sides] + [(10, steps, 0) for steps in chosen.steps]
+    print(*(f"{name:>9}" for name in COLUMNS + ERRORS))
+    for size in sizes:
+        command = [sys.executable, __file__, "--one", *map(str, size)]
+        result = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+        print(*(f"{result[name]:9.4g}" if name in result else f"{'':>9}" for name in COLUMNS + ERRORS), flush=True)
+    if chosen.long:
+        print("\nc_P dt/h, steps, greatest displacement early and late, work early and late")
+        for ratio in (0.1, 0.25, 1.0, 4.0):
+            print(long_run(ratio), flush=True)
+
+
+if __name__ == "__main__":
+    main()
