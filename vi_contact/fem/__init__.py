@@ -14,6 +14,7 @@ _HOME = {
     "contact_surface": "trace",
     "contact_pair": "pairs", "NodeToNode": "matching", "DualMortar": "mortar", "together": "joined",
     "geometric_stiffness": "gravity", "release": "staging",
+    "boundary_curve": "boundary_elements",
     "XDMF": "fields",
     "Reactions": "reactions", "SectionForces": "section_forces",
 }
