@@ -1,0 +1,286 @@
+"""Convolution quadrature: weights, table of radial functions, rods and pulses in time, contact, passivity."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from plane_waves import MATERIAL, SQUARE, pulse
+from scipy.linalg import expm
+
+from vi_contact import LinearElastic, Tresca
+from vi_contact.bem import (
+    BDF2,
+    BoundaryProblem,
+    ConvolutionOperator,
+    ConvolutionProblem,
+    ConvolutionQuadrature,
+    Galerkin,
+    LaplaceKernels,
+    PoincareSteklov,
+    RadauIIA,
+    Trapezoid,
+    convolution_operator,
+    energetic_blocks,
+    polygon,
+    traction_forces,
+)
+from vi_contact.bem.contact import BoundaryContact
+from vi_contact.bem.contact_march import march_contact
+from vi_contact.bem.contact_run import ledger
+from vi_contact.bem.radial_table import RadialTable
+from vi_contact.bem.uzawa_space_time import SpaceTimeUzawa
+from vi_contact.errors import InputError
+
+pytestmark = pytest.mark.serial
+METHODS = {"BDF2": BDF2(), "trapezoid": Trapezoid(), "Radau": RadauIIA()}
+
+
+@pytest.fixture(scope="module")
+def operators() -> dict[tuple[str, int], ConvolutionOperator]:
+    """Squares of 5 and 10 elements a side, c_P dt = h, six crossings of the square."""
+    return {
+        (name, k): convolution_operator(polygon(SQUARE, 1.0 / k), MATERIAL, quadrature=ConvolutionQuadrature(method),
+                                        dt=1.0 / k, steps=6 * k)
+        for name, method in METHODS.items() for k in (5, 10)
+    }
+
+
+def smooth_load(t: float) -> float:
+    return float(np.sin(0.5 * np.pi * t) ** 2) if t < 2.0 else 0.0
+
+
+def top_of_rod(t: np.ndarray, integral) -> np.ndarray:
+    """The load's integral and its echoes from the fixed base."""
+    return integral(t) + 2.0 * sum((-1) ** j * integral(t - 2.0 * j) for j in range(1, int(t.max() / 2) + 1))
+
+
+def smooth_integral(t: np.ndarray) -> np.ndarray:
+    return np.where(t <= 0.0, 0.0, np.where(t < 2.0, 0.5 * t - np.sin(np.pi * t) / (2.0 * np.pi), 1.0))
+
+
+def rod(operator: ConvolutionOperator, load) -> ConvolutionProblem:
+    """The square between rollers on a fixed base, pulled at its top by load(t): a rod with c = 1, length 1."""
+    mesh = operator.mesh
+    fixed = np.zeros((2, len(mesh)), bool)
+    fixed[1] = mesh.nodes_of(mesh.labels == 0)
+    fixed[0] = mesh.nodes_of(np.isin(mesh.labels, (1, 3)))
+
+    def forces(dt: float, steps: int) -> np.ndarray:
+        return traction_forces(mesh, lambda x, n, t: n * load(t), dt=dt, steps=steps, elements=mesh.labels == 2)
+
+    quadrature = ConvolutionQuadrature(operator.frequencies.method)
+    means = quadrature.substep_means(forces, dt=operator.dt, steps=operator.steps)
+    return ConvolutionProblem(operator, means, fixed, contact=mesh.labels == 0)
+
+
+def top_error(operator: ConvolutionOperator, load, integral) -> float:
+    motion, mesh = rod(operator, load).solve(), operator.mesh
+    exact = top_of_rod(motion.times, integral)[:, None]
+    top = motion.displacement[:, 1][:, mesh.nodes_of(mesh.labels == 2)]
+    return float(np.sqrt(np.mean((top - exact) ** 2) / np.mean(exact**2)))
+
+
+@pytest.mark.parametrize(("name", "order"), [("BDF2", 2), ("trapezoid", 2), ("Radau", 3)])
+def test_weights_of_an_oscillator(name, order):
+    """C(s) = 1/(s² + 0.6 s + 9) under sin⁴ t against the exact answer: the order of the method; held g: order 2."""
+    w2, damping, end, errors, held = 9.0, 0.6, 4.0, [], []
+    quadrature = ConvolutionQuadrature(METHODS[name])
+
+    def transfer(s):
+        return 1.0 / (s**2 + damping * s + w2)
+
+    def means(dt: float, steps: int) -> np.ndarray:
+        t = dt * np.arange(steps + 1)
+        return np.diff(3.0 * t / 8.0 - np.sin(2.0 * t) / 4.0 + np.sin(4.0 * t) / 32.0) / dt
+
+    for steps in (80, 160):
+        dt = end / steps
+        exact = oscillator(w2, damping, dt * np.arange(1, steps + 1))
+        weights = quadrature.weights(transfer, dt=dt, steps=steps)
+        held.append(np.abs(np.convolve(weights, means(dt, steps))[:steps] - exact).max() / np.abs(exact).max())
+        table = quadrature.frequencies(dt=dt, steps=steps)
+        modes = table.s * transfer(table.s) * table.impulses(quadrature.substep_means(means, dt=dt, steps=steps))
+        errors.append(np.abs(table.at_ends(modes) - exact).max() / np.abs(exact).max())
+    assert errors[1] < 6e-3 and np.log2(errors[0] / errors[1]) > order - 0.1
+    assert held[1] < 6e-3 and np.log2(held[0] / held[1]) > 1.9
+
+
+def oscillator(w2: float, damping: float, times: np.ndarray) -> np.ndarray:
+    """u'' + damping u' + w2 u = sin⁴ t = 3/8 - cos(2t)/2 + cos(4t)/8 at equal steps, by the matrix exponential."""
+    a = np.zeros((7, 7))  # u, u', 1, cos 2t, sin 2t, cos 4t, sin 4t
+    a[0, 1], a[1, :4], a[1, 5] = 1.0, (-w2, -damping, 0.375, -0.5), 0.125
+    a[3, 4], a[4, 3], a[5, 6], a[6, 5] = -2.0, 2.0, -4.0, 4.0
+    step, state, u = expm(a * times[0]), np.array([0.0, 0.0, 1.0, 1.0, 0.0, 1.0, 0.0]), []
+    for _ in times:
+        state = step @ state
+        u.append(state[0])
+    return np.array(u)
+
+
+def test_table_of_radial_functions(operators):
+    """The matrices from the table are those of the Galerkin layer at all frequencies; the trapezoidal rule has the
+    greatest, |s| dt up to 14 here, where the matrices are small."""
+    mesh = polygon([(0, 0), (1, 0.1), (0.2, 0.8)], 0.2)
+    table, plain = RadialTable(mesh, 0.5, 0.15), Galerkin(mesh, 0.5)
+    for name, tolerance in (("BDF2", 1e-10), ("Radau", 1e-10), ("trapezoid", 1e-6)):
+        for s in operators[name, 5].frequencies.s.ravel()[::5]:
+            kernels = LaplaceKernels(complex(s), 1.0, 0.5)
+            few, exact = table.assemble(kernels), plain.assemble(kernels)
+            for which in ("single", "double", "hyper"):
+                a, b = getattr(few, which), getattr(exact, which)
+                assert np.abs(a - b).max() < tolerance * np.abs(b).max(), (name, s, which)
+
+
+@pytest.mark.parametrize(("name", "fine", "order"), [
+    ("BDF2", 0.12, 1.3), ("trapezoid", 0.04, 1.8), ("Radau", 3.4e-3, 2.4)])
+def test_rod_under_a_smooth_load(operators, name, fine, order):
+    """B8: top displacement, 10 elements a side; order from 5 to 10 (that of BDF2 is 1.8 from 10 to 20)."""
+    errors = [top_error(operators[name, k], smooth_load, smooth_integral) for k in (5, 10)]
+    assert errors[1] < fine and np.log2(errors[0] / errors[1]) > order
+
+
+@pytest.mark.parametrize(("name", "top", "pressure", "greatest"), [
+    ("BDF2", 0.11, 0.4, 2.5), ("trapezoid", 0.066, 0.4, 2.7), ("Radau", 0.026, 0.25, 2.25)])
+def test_rod_under_a_step(operators, name, top, pressure, greatest):
+    """B8: top displacement, reaction of the base (exactly 0 or 2) and its greatest value; fronts smear and ring."""
+    operator, mesh = operators[name, 10], operators[name, 10].mesh
+    assert top_error(operator, lambda t: 1.0, lambda t: np.maximum(t, 0.0)) < top
+    motion = rod(operator, lambda t: 1.0).solve()
+    base = -motion.forces[:, 1][:, mesh.nodes_of(mesh.labels == 0)].sum(axis=1)
+    middle = motion.times - 0.5 * operator.dt
+    exact = np.where((middle > 1.0) & (np.mod(middle - 1.0, 4.0) < 2.0), 2.0, 0.0)
+    assert np.linalg.norm(base - exact) < pressure * np.linalg.norm(exact) and base.max() < greatest
+    elements = mesh.labels == 0
+    by_traction = -(motion.traction[:, 1, elements].mean(axis=2) * mesh.lengths[elements]).sum(axis=1)
+    assert np.abs(by_traction - base).max() < 0.1 * greatest
+    assert motion.work.min() > 0.0 and 1.8 < motion.work[19] < 2.02  # exactly 2; numerical damping takes up to 7 %
+
+
+@pytest.mark.parametrize("shear", [False, True])
+@pytest.mark.parametrize(("name", "fine", "order"), [
+    ("BDF2", 0.2, 1.2), ("trapezoid", 0.09, 1.7), ("Radau", 0.03, 2.0)])
+def test_plane_pulses(operators, name, fine, order, shear):
+    """B8: displacement of the whole boundary under the tractions of an oblique pulse, T = 4."""
+    wave, errors = pulse(shear=shear), []
+    for k in (5, 10):
+        operator = operators[name, k]
+        forces = traction_forces(operator.mesh, wave.traction, dt=operator.dt, steps=operator.steps)
+        exact = np.array([wave.displacement(operator.mesh.points, operator.dt * (j + 1)).T for j in range(4 * k)])
+        found = operator.solve(forces)[: 4 * k]
+        errors.append(np.linalg.norm(found - exact) / np.linalg.norm(exact))
+    assert errors[1] < fine and np.log2(errors[0] / errors[1]) > order
+
+
+def test_energetic_and_convolution_agree(operators):
+    """B7: top of the rod under the smooth load, Radau against energetic, 10 elements a side (B7 asks it of 20)."""
+    problem = rod(operators["Radau", 10], smooth_load)
+    blocks = energetic_blocks(problem.operator.mesh, MATERIAL, dt=0.1, steps=60)
+    means = np.tensordot([1.0 / 3.0, 2.0 / 3.0], problem.forces, (0, 1))
+    energetic = BoundaryProblem(PoincareSteklov(blocks, 1.0), means, problem.fixed).solve()
+    convolution = problem.solve()
+    difference = energetic.displacement - convolution.displacement
+    assert np.linalg.norm(difference) < 5e-3 * np.linalg.norm(energetic.displacement)
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_compliance_is_the_inverse_seen_from_the_contact(operators, name):
+    """u_c = W * lam + u_free is what solve() gives, to what wraps around; supported unknowns zero; W_0 symmetric."""
+    problem = rod(operators[name, 5], smooth_load)
+    lam = np.random.default_rng(1).standard_normal(problem.condensed().u_free.shape)
+    for fixed in (problem.fixed, None):
+        case = replace(problem, fixed=fixed)
+        compliance = case.condensed()
+        direct = case.solve(lam).displacement[:, :, compliance.nodes].reshape(len(lam), -1)
+        assert np.abs(compliance.displacement(lam) - direct).max() < 1e-6 * np.abs(direct).max()
+    assert np.abs(compliance.W[0] - compliance.W[0].T).max() < 1e-12
+    values = np.linalg.eigvalsh(compliance.W[0])
+    assert values[0] > 0.9 and values[-1] < 5.5
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_work_of_contact_forces_is_never_negative(operators, name):
+    """B6: forces held in each step and the displacement increments: their work is a positive quadratic form."""
+    w = replace(rod(operators[name, 5], smooth_load), fixed=None).condensed().W[:20]
+    increments = np.diff(w, axis=0, prepend=0.0)
+    size = w.shape[1]
+    form = np.zeros((20 * size, 20 * size))
+    for k in range(20):
+        for step in range(k + 1):
+            form[k * size : (k + 1) * size, step * size : (step + 1) * size] = increments[k - step]
+    values = np.linalg.eigvalsh(0.5 * (form + form.T))
+    assert values[0] > -1e-6 * values[-1]
+
+
+@pytest.mark.parametrize(("name", "tolerance"), [("BDF2", 6e-3), ("trapezoid", 1e-2), ("Radau", 1.2e-3)])
+def test_contact_runs_on_it(operators, name, tolerance):
+    """V7.1: the pressed square with Tresca's friction: no penetration, impulse at t = 4 (4.6737 energetic); Uzawa."""
+    operator, mesh = operators[name, 10], operators[name, 10].mesh
+    forces = traction_forces(mesh, lambda x, n, t: -n, dt=0.1, steps=60, elements=mesh.labels == 2)
+    problem = ConvolutionProblem(operator, forces, contact=mesh.labels == 0)
+    contact = BoundaryContact(problem.condensed(), friction=Tresca(0.05))
+    run = march_contact(contact)
+    assert run.impulse[39, 1] == pytest.approx(4.6737, rel=tolerance) and run.gap.min() > -1e-12
+    assert (np.abs(run.shear) <= 0.05 * (1.0 + 1e-9)).all() and run.friction_loss[-1] > 0.04
+    motion = problem.solve(run.forces)
+    on_contact = motion.displacement[:, :, contact.compliance.nodes].reshape(60, -1)
+    assert np.abs(on_contact - run.displacement).max() < 1e-6 * np.abs(on_contact).max()
+    work = ledger(run, motion, forces)
+    assert work.defect < 1e-6 and work.energy.min() > 0.0
+    assert np.abs(SpaceTimeUzawa().solve(contact).r_n - run.r_n).max() < 1e-6 * run.r_n.max()
+
+
+@pytest.mark.parametrize("name", ["BDF2", "trapezoid"])
+def test_prescribed_motion_gives_the_forces_back(operators, name):
+    """The motion under forces, prescribed on a side or everywhere, has these forces as its reactions."""
+    operator, mesh = operators[name, 5], operators[name, 5].mesh
+    forces = np.moveaxis(np.random.default_rng(3).standard_normal((2, len(mesh), operator.steps)), -1, 0)
+    u = operator.solve(forces)
+    assert np.abs(operator.apply(u) - forces).max() < 1e-5 * np.abs(forces).max()
+    fixed = np.tile(mesh.nodes_of(mesh.labels == 1), (2, 1))
+    motion = ConvolutionProblem(operator, np.where(fixed, 0.0, forces), fixed, u).solve()
+    assert np.abs(motion.displacement - u).max() < 1e-6 * np.abs(u).max()
+    assert np.abs(motion.forces - forces).max() < 1e-5 * np.abs(forces).max()
+
+
+def test_density_and_the_unsymmetric_form(operators):
+    """Twice the density at the same speeds halves the compliance; the unsymmetric form converges to the same rod."""
+    mesh, quadrature = operators["BDF2", 5].mesh, ConvolutionQuadrature(BDF2())
+    heavy = LinearElastic.from_wave_speeds(1.0, 0.5, 2.0)
+    light, twice = (
+        rod(convolution_operator(mesh, material, quadrature=quadrature, dt=0.2, steps=8), smooth_load).condensed()
+        for material in (MATERIAL, heavy)
+    )
+    assert np.allclose(2.0 * twice.W, light.W)
+    other = convolution_operator(polygon(SQUARE, 0.1), MATERIAL, quadrature=ConvolutionQuadrature(Trapezoid()), dt=0.1,
+                                 steps=60, symmetric=False)
+    assert top_error(other, smooth_load, smooth_integral) < 0.04
+
+
+def test_errors(operators):
+    """One sentence each, naming the thing and the remedy."""
+    operator = operators["BDF2", 5]
+    n, steps = len(operator.mesh), operator.steps
+    forces, bdf2 = np.zeros((steps, 2, n)), ConvolutionQuadrature(BDF2())
+    with pytest.raises(InputError, match="give BDF2"):
+        ConvolutionQuadrature("bdf2")
+    with pytest.raises(InputError, match="above zero"):
+        bdf2.frequencies(dt=-1.0, steps=3)
+    for count in (0, 2.5):
+        with pytest.raises(InputError, match="at least one"):
+            bdf2.frequencies(dt=0.1, steps=count)
+    for dt, remedy in ((1e-3, "enlarge"), (10.0, "reduce")):
+        with pytest.raises(InputError, match=remedy):
+            convolution_operator(operator.mesh, MATERIAL, quadrature=bdf2, dt=dt, steps=3)
+    with pytest.raises(InputError, match="forces have shape"):
+        ConvolutionProblem(operator, forces[1:])
+    with pytest.raises(InputError, match="prescribed has shape"):
+        ConvolutionProblem(operator, forces, prescribed=forces[1:])
+    for wrong in ("clamped", np.zeros((2, n)), np.arange(n)):
+        with pytest.raises(InputError, match="fixed is no boolean mask"):
+            ConvolutionProblem(operator, forces, fixed=wrong)
+    with pytest.raises(InputError, match="contact is no boolean mask"):
+        ConvolutionProblem(operator, forces, contact=np.array([1, 2]))
+    with pytest.raises(InputError, match="no contact boundary"):
+        ConvolutionProblem(operator, forces).condensed()

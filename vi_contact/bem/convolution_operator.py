@@ -1,0 +1,190 @@
+"""The Poincaré-Steklov operator of convolution quadrature, boundary value problems with it, and its contact compliance.
+
+At each frequency s the body is a matrix S(s), nodal displacements to nodal forces, in the symmetric form
+(M/2 + K)ᵀ V⁻¹ (M/2 + K) - D or the unsymmetric Mᵀ V⁻¹ (M/2 + K). Every answer is a set of small dense systems, one per
+frequency, and a Fourier transform; nothing is marched. Answers are objects of the energetic route, so that contact does
+not see the difference: forces are means over steps, displacements are at the ends of steps.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import InputError
+from ..materials import LinearElastic
+from .boundary_mesh import BoundaryMesh
+from .convolution_quadrature import ConvolutionQuadrature, Frequencies
+from .energetic import check_time_step
+from .fundamental_solution import LaplaceKernels
+from .poincare_steklov import BoundaryMotion, CondensedCompliance
+from .quadrature import Orders
+from .radial_table import RadialTable
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+PANEL = 1.5  # width of the panels of the radial table, in c_S dt: functions there are exp(-s r/c_S), |s| dt up to 4
+
+
+@dataclass(frozen=True, eq=False)
+class ConvolutionOperator:
+    """S of a body at the frequencies of a convolution quadrature, of the material's own density.
+
+    steklov: (L, stages, 2n, 2n) S(s); to_traction: (L, stages, 4n, 2n) V⁻¹ (M/2 + K); L = steps/2 + 1.
+    """
+
+    mesh: BoundaryMesh
+    frequencies: Frequencies
+    steklov: NDArray
+    to_traction: NDArray
+
+    @property
+    def steps(self) -> int:
+        """Number of time steps, that of every history."""
+        return self.frequencies.steps
+
+    @property
+    def dt(self) -> float:
+        """Time step [s]."""
+        return self.frequencies.dt
+
+    def apply(self, displacement: ArrayLike) -> Array:
+        """(steps, 2, n) mean nodal forces [N/m] of displacements (steps, 2, n) at t_1, t_2, ...; 0 at t_0."""
+        u = np.asarray(displacement, float)
+        everywhere = np.ones((2, len(self.mesh)), bool)
+        return ConvolutionProblem(self, np.zeros_like(u), everywhere, u).solve().forces
+
+    def solve(self, forces: ArrayLike) -> Array:
+        """(steps, 2, n) displacements under nodal forces (steps, 2, n): the inverse, no support anywhere."""
+        return ConvolutionProblem(self, np.asarray(forces, float)).solve().displacement
+
+
+def convolution_operator(
+    mesh: BoundaryMesh,
+    material: LinearElastic,
+    *,
+    quadrature: ConvolutionQuadrature,
+    dt: float,
+    steps: int,
+    symmetric: bool = True,
+    orders: Orders = Orders(),
+) -> ConvolutionOperator:
+    """Assemble S for `steps` time steps of dt [s]; memory 96 steps stages n² bytes.
+
+    Raises InputError for a time step far too small or large for the mesh, or for less than one step.
+    """
+    table = quadrature.frequencies(dt=dt, steps=steps)
+    check_time_step(mesh, material.c_p, dt)
+    n, rho, count = len(mesh), material.rho, table.s.size
+    galerkin = RadialTable(mesh, material.c_s, PANEL * material.c_s * dt, orders)
+    steklov, to_traction = np.empty((count, 2 * n, 2 * n), complex), np.empty((count, 4 * n, 2 * n), complex)
+    for i, s in enumerate(table.s.ravel()):
+        unit = galerkin.assemble(LaplaceKernels(complex(s), material.c_p, material.c_s))
+        assert unit.single is not None and unit.double is not None and unit.hyper is not None
+        right = unit.double + 0.5 * mesh.mass
+        to_traction[i] = rho * np.linalg.solve(unit.single, right)
+        steklov[i] = (right.T @ to_traction[i] - rho * unit.hyper) if symmetric else mesh.mass.T @ to_traction[i]
+    shape = (*table.s.shape, -1, 2 * n)
+    return ConvolutionOperator(mesh, table, steklov.reshape(shape), to_traction.reshape(shape))
+
+
+@dataclass(frozen=True, eq=False)
+class ConvolutionProblem:
+    """What BoundaryProblem is for the energetic method: a body with supports, loads and perhaps contact.
+
+    forces: nodal forces of the loads [N/m], (steps, 2, n) means over the steps, or (steps, stages, 2, n) means between
+    the stages (ConvolutionQuadrature.substep_means); fixed: (2, n) mask of supported unknowns; prescribed: their
+    displacement (steps, 2, n) [m] at the ends of the steps, zero if None; contact: (n,) mask of the elements of the
+    contact boundary. Everything else is free of traction. Raises InputError for wrong shapes and what is no mask.
+    """
+
+    operator: ConvolutionOperator
+    forces: Array
+    fixed: Mask | None = None
+    prescribed: Array | None = None
+    contact: Mask | None = None
+
+    def __post_init__(self) -> None:
+        n, steps, stages = len(self.operator.mesh), self.operator.steps, self.operator.frequencies.s.shape[1]
+        if np.shape(self.forces) not in ((steps, 2, n), (steps, stages, 2, n)):
+            raise InputError(f"ConvolutionProblem: forces have shape {np.shape(self.forces)}; this operator needs "
+                             f"{(steps, 2, n)}, one mean for each of its steps")
+        if self.prescribed is not None and np.shape(self.prescribed) != (steps, 2, n):
+            raise InputError(f"ConvolutionProblem: prescribed has shape {np.shape(self.prescribed)}; this operator "
+                             f"needs {(steps, 2, n)}")
+        for name, mask, shape, what in (("fixed", self.fixed, (2, n), "(component, node)"),
+                                        ("contact", self.contact, (n,), "(element,)")):
+            if mask is not None and (np.shape(mask) != shape or np.asarray(mask).dtype != bool):
+                raise InputError(f"ConvolutionProblem: {name} is no boolean mask of shape {shape}; give one, {what}; "
+                                 "a boundary is fixed, in contact or free")
+
+    @property
+    def times(self) -> Array:
+        """(steps,) ends of the steps [s]."""
+        return self.operator.dt * np.arange(1, self.operator.steps + 1)
+
+    @property
+    def contact_nodes(self) -> NDArray[np.int64]:
+        """(m,) numbers of the nodes of the contact boundary."""
+        if self.contact is None or not np.any(self.contact):
+            raise InputError("ConvolutionProblem: no contact boundary; give `contact`, the mask of its elements")
+        return np.flatnonzero(self.operator.mesh.nodes_of(self.contact))
+
+    @property
+    def _free(self) -> Mask:
+        n = len(self.operator.mesh)
+        return np.ones(2 * n, bool) if self.fixed is None else ~np.asarray(self.fixed).ravel()
+
+    def solve(self, contact_forces: ArrayLike | None = None) -> BoundaryMotion:
+        """Motion under the loads and nodal contact forces (steps, 2m) in the order of CondensedCompliance."""
+        table, steps, n = self.operator.frequencies, self.operator.steps, len(self.operator.mesh)
+        forces = np.asarray(self.forces, float)
+        forces = forces.reshape(steps, -1, 2, n).copy()
+        if contact_forces is not None:
+            forces[..., self.contact_nodes] += np.asarray(contact_forces, float).reshape(steps, 1, 2, -1)
+        u = self._displacement_modes(table.impulses(forces.reshape(steps, -1, 2 * n)))
+        over_s = u[..., None] / table.s[..., None, None]
+        traction = table.step_means((self.operator.to_traction @ over_s)[..., 0])
+        reaction = table.step_means((self.operator.steklov @ over_s)[..., 0])
+        given = forces.reshape(steps, -1, 2 * n).transpose(0, 2, 1) @ self._stage_widths(forces.shape[1])
+        total = np.where(self._free, given, reaction)
+        return BoundaryMotion(self.times, table.at_ends(u).reshape(-1, 2, n), traction.reshape(-1, 2, n, 2),
+                              total.reshape(-1, 2, n))
+
+    def condensed(self) -> CondensedCompliance:
+        """Compliance of the contact unknowns, from inverses at the frequencies, and their motion without contact."""
+        mesh, nodes, table, free = self.operator.mesh, self.contact_nodes, self.operator.frequencies, self._free
+        unknowns = np.concatenate([nodes, nodes + len(mesh)])
+        moving = free[unknowns]
+        places = np.searchsorted(np.flatnonzero(free), unknowns[moving])
+        units = np.eye(int(free.sum()))[:, places]
+        transform = np.zeros((len(table.s), len(unknowns), len(unknowns)), complex)
+        for at_z, matrices, factors in zip(transform, self.operator.steklov, table.held, strict=True):
+            inverse = np.linalg.solve(matrices[:, free][:, :, free], units[None])[:, places]
+            at_z[np.ix_(moving, moving)] = np.einsum("i,icd->cd", factors, inverse)
+        u_free = self.solve().displacement.reshape(len(self.times), -1)[:, unknowns]
+        elements = np.asarray(self.contact, bool)
+        return CondensedCompliance(
+            table.contour.backward(transform), u_free, nodes, mesh.points[nodes],
+            mesh.node_normals(elements)[nodes], mesh.node_lengths(elements)[nodes], self.operator.dt,
+        )
+
+    def _displacement_modes(self, impulses: NDArray) -> NDArray:
+        """(L, stages, 2n) displacements at the frequencies; prescribed ones move evenly during each step."""
+        table, free = self.operator.frequencies, self._free
+        u = np.zeros_like(impulses)
+        load = impulses * table.s[..., None]
+        if self.prescribed is not None:
+            ends = np.asarray(self.prescribed, float).reshape(self.operator.steps, -1) * ~free
+            u = table.impulses(np.diff(ends, axis=0, prepend=0.0)[:, None] / table.dt)
+            load = load - (self.operator.steklov @ u[..., None])[..., 0]
+        if free.any():
+            matrices = self.operator.steklov[:, :, free][..., free]
+            u[..., free] = np.linalg.solve(matrices, load[..., free, None])[..., 0]
+        return u
+
+    def _stage_widths(self, pieces: int) -> Array:
+        abscissae = self.operator.frequencies.method.abscissae
+        return np.diff(abscissae, prepend=0.0) if pieces > 1 else np.ones(1)

@@ -1,0 +1,108 @@
+"""Galerkin matrices for many complex frequencies: the radial functions are interpolated, the geometry integrated once.
+
+On each panel of distances a function f(r) is the polynomial through its values at Chebyshev points r_q, so every
+integral of the Galerkin layer is a fixed sum over the points:
+
+    ∫∫ f(r) a(x, y) phi_i(x) phi_j(y) = sum_q [∫∫ L_q(r) a(x, y) phi_i phi_j] f(r_q).
+
+The brackets are sparse matrices that depend on the mesh alone. A frequency then costs some hundred Bessel functions
+and one sparse product. Panels are dyadic towards r = 0, where the functions are logarithmic (the pole -1/(2 pi r²) of
+Phi_S'/r is integrated on its own), and of equal width further out, where they are like exp(-s r/c_S).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.polynomial.chebyshev import chebvander
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix, vstack
+
+from .boundary_mesh import BoundaryMesh
+from .boundary_operators import Galerkin
+from .fundamental_solution import TWO_PI, KernelSet
+from .quadrature import Orders, PointSet, point_sets
+
+Array = NDArray[np.float64]
+POINTS = 16  # Chebyshev points of a panel
+SMALLEST = 1e-9  # end of the dyadic panels, relative to the shortest element
+
+
+class RadialTable(Galerkin):
+    """The Galerkin layer for kernels without fronts, interpolated on panels of distance no wider than `width` [m].
+
+    `assemble(LaplaceKernels(s, c_p, c_s))` as before, with all three operators. Memory: 10 kB per pair of elements.
+    """
+
+    def __init__(self, mesh: BoundaryMesh, c_s: float, width: float, orders: Orders = Orders()) -> None:
+        super().__init__(mesh, c_s, orders)
+        far = float(self.pairs.r_max.max())
+        dyadic = width * 0.5 ** np.arange(np.ceil(np.log2(width / (SMALLEST * mesh.lengths.min()))), 0.0, -1.0)
+        self.edges: Array = np.concatenate([dyadic, width * np.arange(1.0, np.ceil(far / width * (1.0 + 1e-9)) + 1.0)])
+        reference = np.cos(np.pi * (np.arange(POINTS) + 0.5) / POINTS)
+        self._to_coefficients = np.linalg.inv(chebvander(reference, POINTS - 1))
+        self.nodes: Array = (self.edges[:-1, None] + np.diff(self.edges)[:, None] * 0.5 * (1.0 + reference)).ravel()
+        self._matrices, self._pole = self._integrated()
+
+    def interpolation(self, r: Array) -> csr_matrix:
+        """(m, nodes) matrix that takes values at the nodes to values at distances r (m,)."""
+        panel = np.clip(np.searchsorted(self.edges, r) - 1, 0, len(self.edges) - 2)
+        low, high = self.edges[panel], self.edges[panel + 1]
+        weights = chebvander((2.0 * r - low - high) / (high - low), POINTS - 1) @ self._to_coefficients
+        columns = panel[:, None] * POINTS + np.arange(POINTS)
+        rows = np.arange(0, weights.size + 1, POINTS)
+        return csr_matrix((weights.ravel(), columns.ravel(), rows), shape=(len(r), len(self.nodes)))
+
+    def _integrated(self) -> tuple[list[csr_matrix], Array]:
+        """(4 pairs, nodes) for each factor 1, d_x²/r², d_x d_y/r², d_y²/r², d_x, d_y; the pole's two integrals."""
+        blocks: list[list[csr_matrix]] = [[] for _ in range(6)]
+        poles, order = [], []
+        for points in point_sets(self.pairs, (), self.orders):
+            shapes, inverse = _shapes(points), 1.0 / points.r**2
+            interpolation = self.interpolation(points.r)
+            for block, factor in zip(blocks, _factors(points.d, inverse), strict=True):
+                block.append(shapes.multiply(factor).tocsr() @ interpolation)
+            poles.append(np.stack([shapes @ (-d * inverse / TWO_PI) for d in points.d]))
+            order.append((4 * points.pairs[:, None] + np.arange(4)).ravel())
+        back = np.argsort(np.concatenate(order))
+        jacobian = np.repeat(np.hypot(*self.pairs.a) * np.hypot(*self.pairs.b), 4)
+        matrices = [vstack(block).tocsr()[back].multiply(jacobian[:, None]).tocsr() for block in blocks]
+        return matrices, np.concatenate(poles, axis=1)[:, back] * jacobian
+
+    def _moments(self, kernels: Callable, fronts: Sequence[float]) -> tuple[NDArray, tuple[bool, ...]]:
+        kernel_set: KernelSet = kernels(self.nodes)
+        assert kernel_set.hyper is not None and not len(fronts)
+        phi, dphi, ddiff, g1, g2, inertia_p, inertia_s = kernel_set.hyper
+        one, xx, xy, yy, d_x, d_y = self._matrices
+        smooth = dphi + 1.0 / (TWO_PI * self.nodes**2)
+        phi, inertia_p, inertia_s, isotropic = _product(one, [phi, inertia_p, inertia_s, g1])
+        tensor = [isotropic - _product(xx, [g2])[0], -_product(xy, [g2])[0], isotropic - _product(yy, [g2])[0]]
+        along = [_product(d, [smooth, ddiff]) for d in (d_x, d_y)]
+        normal = [along[0][0] + self._pole[0], along[1][0] + self._pole[1]]
+        gradient = [along[0][1], along[1][1]]
+        rows = [*tensor, *normal, *gradient, phi, *tensor, inertia_p, inertia_s, phi, *tensor, *normal, *gradient]
+        return np.stack(rows).reshape(len(rows), -1, 2, 2), (True, True, True)
+
+
+def _product(matrix: csr_matrix, columns: list[NDArray]) -> NDArray:
+    """(k, rows) of a real matrix times k complex columns, without a complex copy of the matrix."""
+    values = np.ascontiguousarray(np.stack(columns, axis=1), complex)
+    return np.asarray(matrix @ values.view(float)).view(complex).T
+
+
+def _factors(d: Array, inverse: Array) -> tuple[Array, ...]:
+    return np.ones_like(inverse), d[0] ** 2 * inverse, d[0] * d[1] * inverse, d[1] ** 2 * inverse, d[0], d[1]
+
+
+def _shapes(points: PointSet) -> csr_matrix:
+    """(4 pairs, m) weighted shape functions: their product with values at the points integrates them."""
+    xi, eta, weight, owner = points.xi, points.eta, points.weight, points.owner
+    if owner is None:
+        repeats = len(points.pairs)
+        owner = np.repeat(np.arange(repeats), len(xi))
+        xi, eta, weight = np.tile(xi, repeats), np.tile(eta, repeats), np.tile(weight, repeats)
+    values = np.stack([(1 - xi) * (1 - eta), (1 - xi) * eta, xi * (1 - eta), xi * eta], axis=1) * weight[:, None]
+    rows, columns = 4 * owner[:, None] + np.arange(4), np.repeat(np.arange(len(owner))[:, None], 4, axis=1)
+    shape = (4 * len(points.pairs), len(owner))
+    return csr_matrix((values.ravel(), (rows.ravel(), columns.ravel())), shape=shape)
