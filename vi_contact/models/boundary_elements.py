@@ -1,0 +1,107 @@
+"""The four examples of seed 003 as boundary element problems: numpy and scipy only, the same data as square, disk and
+embedded have for finite elements."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from ..algebra import Array, Mask
+from ..bem.boundary_mesh import BoundaryMesh, circle, polygon
+from ..bem.contact import BoundaryContact, conditions_on
+from ..bem.energetic import energetic_blocks
+from ..bem.loads import traction_forces
+from ..bem.poincare_steklov import BoundaryProblem, PoincareSteklov
+from ..bem.two_bodies import TwoBodies
+from ..friction import FrictionLaw, Frictionless
+from ..materials import LinearElastic
+from ..surfaces import HalfSpace
+
+Load = Callable[[float], float]
+BOTTOM, RIGHT, TOP, LEFT = range(4)  # sides of a box
+
+
+def steklov(mesh: BoundaryMesh, material: LinearElastic, *, dt: float, steps: int) -> PoincareSteklov:
+    """The symmetric Poincaré-Steklov operator of a homogeneous body."""
+    return PoincareSteklov(energetic_blocks(mesh, material, dt=dt, steps=steps), material.rho)
+
+
+def pressed(operator: PoincareSteklov, *, pressure: Load, top: int, contact: Mask, **more: Any) -> BoundaryProblem:
+    """Pressure [Pa] at time t on the elements labelled ``top``; contact: mask of elements; more: fixed, prescribed."""
+    blocks, mesh = operator.blocks, operator.mesh
+
+    def traction(points: Array, normals: Array, t: float) -> Array:
+        return -pressure(t) * normals
+
+    loads = traction_forces(mesh, traction, dt=blocks.dt, steps=blocks.steps, elements=mesh.labels == top)
+    return BoundaryProblem(operator, loads, contact=contact, **more)
+
+
+def unloaded(operator: PoincareSteklov, *, contact: Mask, **more: Any) -> BoundaryProblem:
+    """A body that is moved by contact or supports only."""
+    loads = np.zeros((operator.blocks.steps, 2, len(operator.mesh)))
+    return BoundaryProblem(operator, loads, contact=contact, **more)
+
+
+def square_problem(
+    elements: int,
+    material: LinearElastic,
+    *,
+    dt: float,
+    steps: int,
+    pressure: Load = lambda t: 1.0,
+    side: float = 1.0,
+) -> BoundaryProblem:
+    """[-a/2, a/2]² of ``elements`` per side, pressed on its top; its bottom may come into contact (V7.1, V7.2)."""
+    a = 0.5 * side
+    mesh = polygon([(-a, -a), (a, -a), (a, a), (-a, a)], side / elements)
+    operator = steklov(mesh, material, dt=dt, steps=steps)
+    return pressed(operator, pressure=pressure, top=TOP, contact=mesh.labels == BOTTOM)
+
+
+def disk_problem(elements: int, material: LinearElastic, *, dt: float, steps: int, radius: float) -> BoundaryProblem:
+    """A disk around (0, radius) of ``elements`` chords; its foot, 60° to each side, may come into contact (V7.3)."""
+    mesh = circle(radius, elements, centre=(0.0, radius))
+    foot = mesh.elements_where(lambda points: points[:, 1] <= radius * (1.0 - 0.5) * (1.0 + 1e-9))
+    return unloaded(steklov(mesh, material, dt=dt, steps=steps), contact=foot)
+
+
+def disk_contact(problem: BoundaryProblem, push: Load, friction: FrictionLaw | None = None) -> BoundaryContact:
+    """The disk on the plane y = push(t)."""
+    plane = HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))
+    return BoundaryContact(problem.condensed(), obstacle=plane, friction=friction or Frictionless(), towards=push)
+
+
+@dataclass(frozen=True, eq=False)
+class EmbeddedBox:
+    """A box [-a/2, a/2]² in the notch of a block [-3a/2, 3a/2] x [-2a, 0], clamped at its bottom (V7.3)."""
+
+    bodies: TwoBodies
+
+    def contact(self, friction: FrictionLaw | None = None) -> BoundaryContact:
+        """Floor, left and right wall of the notch; a corner of the box has two conditions and does not rub."""
+        condensed, mesh = self.bodies.condensed(), self.bodies.one.operator.mesh
+        in_notch = np.asarray(self.bodies.one.contact)
+        sides = [in_notch & (mesh.labels == side) for side in (BOTTOM, LEFT, RIGHT)]
+        rows = conditions_on(mesh, condensed, *sides)
+        return BoundaryContact(condensed, friction=friction or Frictionless(), conditions=rows)
+
+
+def embedded_problem(
+    elements: int, material: LinearElastic, *, dt: float, steps: int, pressure: Load, side: float = 1.0
+) -> EmbeddedBox:
+    """``elements``, an even number, along a side of the box."""
+    a, h = 0.5 * side, side / elements
+    box = polygon([(-a, -a), (a, -a), (a, a), (-a, a)], h)
+    corners = [(-3, -4), (3, -4), (3, 0), (1, 0), (1, -1), (-1, -1), (-1, 0), (-3, 0)]
+    block = polygon(a * np.array(corners, float), h)
+    make = partial(steklov, dt=dt, steps=steps)
+    in_notch = box.elements_where(lambda points: points[:, 1] <= 1e-9 * side)
+    one = pressed(make(box, material), pressure=pressure, top=TOP, contact=in_notch)
+    clamped = np.tile(block.nodes_of(block.labels == 0), (2, 1))
+    notch = (block.labels >= 3) & (block.labels <= 5)
+    return EmbeddedBox(TwoBodies(one, unloaded(make(block, material), contact=notch, fixed=clamped)))
