@@ -180,9 +180,8 @@ class ConvolutionProblem:
             ends = np.asarray(self.prescribed, float).reshape(self.operator.steps, -1) * ~free
             u = table.impulses(np.diff(ends, axis=0, prepend=0.0)[:, None] / table.dt)
             load = load - (self.operator.steklov @ u[..., None])[..., 0]
-        if free.any():
-            matrices = self.operator.steklov[:, :, free][..., free]
-            u[..., free] = np.linalg.solve(matrices, load[..., free, None])[..., 0]
+        for at_z, matrices, right in zip(u, self.operator.steklov, load, strict=True):
+            at_z[:, free] = np.linalg.solve(matrices[:, free][:, :, free], right[:, free, None])[..., 0]
         return u
 
     def _stage_widths(self, pieces: int) -> Array:
