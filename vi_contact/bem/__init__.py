@@ -6,6 +6,7 @@ from .convolution_operator import ConvolutionOperator, ConvolutionProblem, convo
 from .convolution_quadrature import ConvolutionQuadrature, Frequencies
 from .energetic import EnergeticBlocks, Marching, energetic_blocks
 from .fundamental_solution import LaplaceKernels, TimeKernels
+from .interior import interior_displacement
 from .loads import traction_forces
 from .operators import Operators
 from .poincare_steklov import BoundaryMotion, BoundaryProblem, CondensedCompliance, PoincareSteklov
@@ -19,5 +20,5 @@ __all__ = [
     "ConvolutionProblem", "ConvolutionQuadrature", "EnergeticBlocks", "Frequencies", "Galerkin", "LaplaceKernels",
     "Marching", "OperatorMatrices", "Operators", "Orders", "PoincareSteklov", "RadauIIA", "RadialTable",
     "TimeKernels", "TimeMethod", "Trapezoid", "circle", "convolution_operator", "energetic_blocks", "from_segments",
-    "load_blocks", "polygon", "save_blocks", "smooth_curve", "stored_blocks", "traction_forces",
+    "interior_displacement", "load_blocks", "polygon", "save_blocks", "smooth_curve", "stored_blocks", "traction_forces",
 ]

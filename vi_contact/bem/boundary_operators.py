@@ -95,25 +95,11 @@ class Galerkin:
         local = np.empty((2, n, 2, 2, n, 2), moments.dtype)
         swapped = moments.swapaxes(2, 3) * np.array([-1, -1, -1, -1, 1, 1, 1, 1])[:, None, None, None]
         for x, y, m in ((e, f, moments), (f, e, swapped)):
-            values = self._double_local(m, y)
+            values = double_local(self.mesh, self.shear, m, y)
             for c in range(2):
                 for k in range(2):
                     local[c, x, :, k, y, :] = values[c, k]
-        return self._joined(local, 4).reshape(4 * n, 2 * n)
-
-    def _double_local(self, m: NDArray, y: NDArray[np.int64]) -> NDArray:
-        """(2, 2, p, 2, 2): component of K u, component of u, pair, shape function of x, of y."""
-        normal, slopes = self.mesh.normals[y].T[:, :, None, None], SLOPE / self.mesh.lengths[y][:, None, None]
-        phi, g = m[4].sum(2)[..., None], _tensor(m[5:8].sum(3))[..., None]
-        by_normal = (m[0:2] * normal).sum(0)
-        values = np.empty((2, 2, *m.shape[1:]), m.dtype)
-        for c in range(2):
-            for k in range(2):
-                along = -TURN[c, k] * phi + 2.0 * self.shear * (g[c, 0] * TURN[0, k] + g[c, 1] * TURN[1, k])
-                values[c, k] = along * slopes - m[2 + c] * normal[k]
-                if c == k:
-                    values[c, k] -= by_normal
-        return values
+        return joined(self.mesh, local, 4).reshape(4 * n, 2 * n)
 
     def _hyper(self, moments: NDArray) -> NDArray:
         n, e, f = len(self.mesh), self.pairs.first, self.pairs.second
@@ -123,8 +109,8 @@ class Galerkin:
             for k in range(2):
                 local[c, e, :, k, f, :] = values[c, k]
                 local[k, f, :, c, e, :] = values[c, k].swapaxes(1, 2)
-        columns = self._joined(local, 4)
-        return self._joined(columns, 1).reshape(2 * n, 2 * n)
+        columns = joined(self.mesh, local, 4)
+        return joined(self.mesh, columns, 1).reshape(2 * n, 2 * n)
 
     def _hyper_local(self, m: NDArray) -> NDArray:
         """(2, 2, p, 2, 2): component of v on the first element, of u on the second, pair, shape of v, of u."""
@@ -148,12 +134,31 @@ class Galerkin:
                 values[c, k] = one + two * dv * du + 2.0 * mu * three
         return values
 
-    def _joined(self, local: NDArray, axis: int) -> NDArray:
-        """Shape functions (element at `axis`, end at axis + 1) added up at the nodes; the end axis goes."""
-        start, end = np.take(local, 0, axis + 1), np.take(local, 1, axis + 1)
-        before = np.empty_like(self.mesh.after)
-        before[self.mesh.after] = np.arange(len(before))
-        return start + np.take(end, before, axis)
+
+def double_local(mesh: BoundaryMesh, shear: float, m: NDArray, y: NDArray[np.int64]) -> NDArray:
+    """(2, 2, p, a, 2): component of K u, component of u, pair, shape function of x, of y on the elements y (p,).
+
+    m: (8, p, a, 2) moments of the stacked kernels of the double layer; shear: c_S².
+    """
+    normal, slopes = mesh.normals[y].T[:, :, None, None], SLOPE / mesh.lengths[y][:, None, None]
+    phi, g = m[4].sum(2)[..., None], _tensor(m[5:8].sum(3))[..., None]
+    by_normal = (m[0:2] * normal).sum(0)
+    values = np.empty((2, 2, *m.shape[1:]), m.dtype)
+    for c in range(2):
+        for k in range(2):
+            along = -TURN[c, k] * phi + 2.0 * shear * (g[c, 0] * TURN[0, k] + g[c, 1] * TURN[1, k])
+            values[c, k] = along * slopes - m[2 + c] * normal[k]
+            if c == k:
+                values[c, k] -= by_normal
+    return values
+
+
+def joined(mesh: BoundaryMesh, local: NDArray, axis: int) -> NDArray:
+    """Shape functions (element at `axis`, end at axis + 1) added up at the nodes; the end axis goes."""
+    start, end = np.take(local, 0, axis + 1), np.take(local, 1, axis + 1)
+    before = np.empty_like(mesh.after)
+    before[mesh.after] = np.arange(len(before))
+    return start + np.take(end, before, axis)
 
 
 def _tensor(m: NDArray) -> NDArray:

@@ -1,0 +1,102 @@
+"""Displacement inside the body from the histories on its boundary: u(x) = V p - K u, in time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import csc_matrix
+
+from ..errors import InputError
+from .boundary_mesh import BoundaryMesh
+from .boundary_operators import N_SINGLE, double_local, joined, stacked
+from .fundamental_solution import TimeKernels
+from .poincare_steklov import BoundaryMotion, PoincareSteklov
+from .quadrature import pieces, roots, smoothed
+
+Array = NDArray[np.float64]
+ORDER, CLOSEST = 8, 1e-3  # points a piece; least distance from the boundary in element lengths
+
+
+def interior_displacement(
+    operator: PoincareSteklov, motion: BoundaryMotion, points: ArrayLike, *, steps: Sequence[int] | None = None
+) -> Array:
+    """(len(steps), m, 2) displacement [m] at the times motion.times[steps] (all if None) of points (m, 2) in the body.
+
+    Without quadrature in time, with the elements split at the wave fronts. Raises InputError for points on the boundary
+    or outside the body.
+    """
+    mesh, blocks = operator.mesh, operator.blocks
+    x = np.asarray(points, float).reshape(-1, 2)
+    _check_inside(mesh, x)
+    wanted = np.arange(len(motion.times)) if steps is None else np.asarray(steps, int)
+    traction = motion.traction.reshape(len(motion.times), -1) / operator.rho
+    increments = np.diff(motion.displacement, axis=0, prepend=0.0).reshape(len(motion.times), -1)
+    total = np.zeros((len(wanted), 2 * len(x)))
+    single, double = np.zeros((2 * len(x), 4 * len(mesh))), np.zeros((2 * len(x), 2 * len(mesh)))
+    for j in range(int(wanted.max(initial=-1)) + 1):
+        single_now, double_now = _matrices(mesh, x, (j + 1) * blocks.dt, blocks.c_p, blocks.c_s)
+        reached = wanted >= j
+        past = wanted[reached] - j
+        total[reached] += traction[past] @ (single_now - single).T
+        total[reached] -= increments[past] @ (double_now - double).T / blocks.dt
+        single, double = single_now, double_now
+    return total.reshape(len(wanted), 2, len(x)).swapaxes(1, 2)
+
+
+def _matrices(mesh: BoundaryMesh, x: Array, t: float, c_p: float, c_s: float) -> tuple[Array, Array]:
+    """(2m, 4n) of V integrated once, (2m, 2n) of K integrated twice, both up to t; density 1."""
+    m, n = len(x), len(mesh)
+    moments = np.concatenate(list(_moments(mesh, x, t, c_p, c_s)), axis=1)
+    point, element = np.repeat(np.arange(m), n), np.tile(np.arange(n), m)
+    single = np.empty((2, m, 2, n, 2))
+    double = np.empty((2, m, 2, n, 2))
+    values = double_local(mesh, c_s**2, moments[N_SINGLE:, :, None, :], element)
+    for c in range(2):
+        for k in range(2):
+            single[c, point, k, element] = moments[c + k]
+            double[c, point, k, element] = values[c, k][:, 0]
+    return single.reshape(2 * m, 4 * n), joined(mesh, double, 3).reshape(2 * m, 2 * n)
+
+
+def _moments(mesh: BoundaryMesh, x: Array, t: float, c_p: float, c_s: float) -> Iterator[Array]:
+    """(k, points * n, 2) integrals over each element of the stacked kernels against its shape functions, in groups."""
+    n, along = len(mesh), mesh.points[mesh.after] - mesh.points
+    group = max(1, 4000 // n)
+    kernels = TimeKernels(t, c_p, c_s, hyper=False)
+    nodes, weights = smoothed(ORDER)
+    for first in range(0, len(x), group):
+        count = len(x[first : first + group])
+        offset = (x[first : first + group, None] - mesh.points).reshape(-1, 2)
+        b = np.tile(along, (count, 1))
+        b2, projection, d2 = (b**2).sum(1), (b * offset).sum(1), (offset**2).sum(1)
+        fronts = [roots(b2, -2.0 * projection, d2 - (c * t) ** 2) for c in (c_p, c_s)]
+        row, low, length = pieces(np.concatenate([*fronts, (projection / b2)[:, None]], axis=1))
+        eta = (low[:, None] + length[:, None] * nodes).ravel()
+        owner = np.repeat(row, ORDER)
+        weight = (length[:, None] * weights).ravel() * np.sqrt(b2)[owner]
+        d = (offset[owner] - eta[:, None] * b[owner]).T
+        r = np.hypot(*d)
+        heard = r < c_p * t
+        d, r, eta, owner, weight = d[:, heard], r[heard], eta[heard], owner[heard], weight[heard]
+        values = stacked(kernels(r), d, r)
+        shapes = np.stack([1.0 - eta, eta], axis=1) * weight[:, None]
+        rows = 2 * owner[:, None] + np.arange(2)
+        matrix = csc_matrix((shapes.ravel(), rows.ravel(), np.arange(0, 2 * len(r) + 1, 2)), (2 * count * n, len(r)))
+        yield np.asarray(matrix @ values.T).T.reshape(len(values), count * n, 2)
+
+
+def _check_inside(mesh: BoundaryMesh, x: Array) -> None:
+    """Winding number 1 (0 for an exterior body), and not on the boundary."""
+    along = mesh.points[mesh.after] - mesh.points
+    offset = x[:, None] - mesh.points
+    share = np.clip((offset * along).sum(2) / mesh.lengths**2, 0.0, 1.0)
+    distance = np.hypot(*np.moveaxis(offset - share[..., None] * along, 2, 0)) / mesh.lengths
+    start, end = -offset, along - offset
+    turn = np.arctan2(start[..., 0] * end[..., 1] - start[..., 1] * end[..., 0], (start * end).sum(2)).sum(1)
+    winding = np.rint(turn / (2.0 * np.pi)) + (1.0 if mesh.exterior else 0.0)
+    bad = (distance.min(axis=1) < CLOSEST) | (winding != 1.0)
+    if bad.any():
+        raise InputError(f"interior_displacement: the point {x[int(bad.argmax())].tolist()} lies on the boundary or "
+                         "outside the body; give points inside and take boundary values from the motion")
