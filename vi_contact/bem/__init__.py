@@ -20,5 +20,6 @@ __all__ = [
     "ConvolutionProblem", "ConvolutionQuadrature", "EnergeticBlocks", "Frequencies", "Galerkin", "LaplaceKernels",
     "Marching", "OperatorMatrices", "Operators", "Orders", "PoincareSteklov", "RadauIIA", "RadialTable",
     "TimeKernels", "TimeMethod", "Trapezoid", "circle", "convolution_operator", "energetic_blocks", "from_segments",
-    "interior_displacement", "load_blocks", "polygon", "save_blocks", "smooth_curve", "stored_blocks", "traction_forces",
+    "interior_displacement", "load_blocks", "polygon", "save_blocks", "smooth_curve", "stored_blocks",
+    "traction_forces",
 ]
