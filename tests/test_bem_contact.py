@@ -213,3 +213,28 @@ def test_bad_input():
         TwoBodies(problem, below).condensed()
     with pytest.raises(InputError, match="welded"):
         TwoBodies(problem, problem, welded=mesh.labels == 1).condensed()
+
+
+@pytest.mark.parametrize("law", ["none", "Tresca"])
+def test_a_third_opinion(law):
+    """cross_check takes the boundary element run: impulses within 2 % of 20 x 20 finite elements although meshes and
+    steps differ; another problem is noticed; an opinion in space is refused."""
+    from mpi4py import MPI
+
+    from vi_contact.models.square import Square, build
+
+    problem = build(Square(cells=20, pressure=1.0), MPI.COMM_WORLD).problem(friction=LAWS[law])
+    wrong = run("Coulomb")
+    checked = vc.cross_check(
+        problem, solvers=[vc.Condensed()], dt=0.05, steps=100, opinions=[run(law), wrong], bound=0.02
+    )
+    mine, other = checked.opinions
+    assert 0.0 < mine.impulse < 0.02 and 0.0 < mine.towards < 0.02 and mine.agrees
+    assert not other.agrees and other.impulse > 2.0 * mine.impulse
+    assert set(checked.report()["boundary elements"]) == {"impulse", "towards"}
+    with pytest.raises(InputError, match="2 components each"):
+        vc.cross_check(problem, solvers=[vc.Condensed()], dt=0.05, steps=2, opinions=[InSpace()])
+
+
+class InSpace:
+    name, times, impulse, mean_towards = "ball", np.array([0.05]), np.zeros((1, 3)), np.zeros(1)

@@ -1,6 +1,7 @@
 """Independent routes to the same step, compared step by step from the same state (design idea 4).
 
-Whole runs of an energy-growing scheme may drift apart by round-off; single steps from one state must not.
+Whole runs of an energy-growing scheme may drift apart by round-off; single steps from one state must not. Answers of
+another method, boundary elements for example, have other steps: ``opinions`` are compared over the whole run.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from .march import march
 from .step import ContactProblem, EffectiveMatrix, PreparedSolver, Scheme, Solver, State, StepProblem, StepResult
 from .surfaces import ContactSurface
 from .time_steps import TimeSteps
+from .whole_run import Opinion, Overall, WholeRun
 
 
 @dataclass
@@ -60,12 +62,14 @@ class Disagreement:
 class CrossChecked:
     """A solver that also asks others at every step and remembers how far they are off; returns the primary's answer.
 
-    ``found`` does not count attempts that ``HalvedAtImpact`` threw away.
+    ``found`` does not count attempts that ``HalvedAtImpact`` threw away; ``opinions``: what ``cross_check`` found
+    about answers of other methods.
     """
 
     primary: Solver
     others: Sequence[Solver]
     found: list[Disagreement] = field(default_factory=list)
+    opinions: list[Overall] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.found = [Disagreement() for _ in self.others]
@@ -89,7 +93,7 @@ class CrossChecked:
 
     def report(self) -> Mapping[str, Mapping[str, float]]:
         """method -> relative differences in u, r_n and, with friction, r_t, iterations per step: what summary.json
-        shows. A name that comes again gets a number.
+        shows. A name that comes again gets a number. Opinions: impulse and mean displacement over the whole run.
         """
         names = [one.method for one in self.found]
         return {
@@ -97,11 +101,11 @@ class CrossChecked:
             | ({"r_t": one.relative_r_t} if one.rubbed else {})
             | {"iterations_per_step": one.iterations / max(one.steps, 1)}
             for rank, (name, one) in enumerate(zip(names, self.found, strict=True), start=1)
-        }
+        } | {one.name: {"impulse": one.impulse, "towards": one.towards} for one in self.opinions}
 
     @property
     def worst(self) -> float:
-        """The largest relative difference of any solver in u, r_n or r_t."""
+        """The largest relative difference of any solver in u, r_n or r_t, step by step; not of opinions."""
         return max((one.worst for one in self.found), default=0.0)
 
 
@@ -143,12 +147,18 @@ def cross_check(
     dt: TimeSteps,
     steps: int,
     state: State | None = None,
+    opinions: Sequence[Opinion] = (),
+    bound: float = 0.01,
 ) -> CrossChecked:
     """Marches with the first solver and compares the others with it at every step; see ``worst`` and ``report()``.
 
     ``dt`` and ``steps`` as in ``march``: ``steps`` counts base steps, the statistics all accepted ones.
+    ``opinions``: answers of other methods to the same problem, a ``bem.ContactRun`` for a homogeneous body for example;
+    impulses and mean displacements are compared over the whole run and should agree within ``bound``, relative.
     """
-    checked = CrossChecked(solvers[0], tuple(solvers[1:]))
-    for _ in march(problem, scheme=scheme, solver=checked, dt=dt, steps=steps, state=state):
-        pass
+    checked, whole = CrossChecked(solvers[0], tuple(solvers[1:])), WholeRun()
+    for _, report in march(problem, scheme=scheme, solver=checked, dt=dt, steps=steps, state=state):
+        if opinions:
+            whole.add(report)
+    checked.opinions = [whole.compare(opinion, bound) for opinion in opinions]
     return checked

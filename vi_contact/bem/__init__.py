@@ -2,6 +2,9 @@
 
 from .boundary_mesh import BoundaryMesh, circle, from_segments, polygon, smooth_curve
 from .boundary_operators import Galerkin, OperatorMatrices
+from .contact import BoundaryContact, Conditions, conditions_on
+from .contact_march import march_contact
+from .contact_run import ContactLedger, ContactRun, ledger
 from .convolution_operator import ConvolutionOperator, ConvolutionProblem, convolution_operator
 from .convolution_quadrature import ConvolutionQuadrature, Frequencies
 from .energetic import EnergeticBlocks, Marching, energetic_blocks
@@ -14,12 +17,15 @@ from .quadrature import Orders
 from .radial_table import RadialTable
 from .storage import load_blocks, save_blocks, stored_blocks
 from .time_methods import BDF2, RadauIIA, TimeMethod, Trapezoid
+from .two_bodies import TwoBodies
+from .uzawa_space_time import SpaceTimeUzawa
 
 __all__ = [
-    "BDF2", "BoundaryMesh", "BoundaryMotion", "BoundaryProblem", "CondensedCompliance", "ConvolutionOperator",
-    "ConvolutionProblem", "ConvolutionQuadrature", "EnergeticBlocks", "Frequencies", "Galerkin", "LaplaceKernels",
-    "Marching", "OperatorMatrices", "Operators", "Orders", "PoincareSteklov", "RadauIIA", "RadialTable",
-    "TimeKernels", "TimeMethod", "Trapezoid", "circle", "convolution_operator", "energetic_blocks", "from_segments",
-    "interior_displacement", "load_blocks", "polygon", "save_blocks", "smooth_curve", "stored_blocks",
-    "traction_forces",
+    "BDF2", "BoundaryContact", "BoundaryMesh", "BoundaryMotion", "BoundaryProblem", "CondensedCompliance",
+    "Conditions", "ContactLedger", "ContactRun", "ConvolutionOperator", "ConvolutionProblem",
+    "ConvolutionQuadrature", "EnergeticBlocks", "Frequencies", "Galerkin", "LaplaceKernels", "Marching",
+    "OperatorMatrices", "Operators", "Orders", "PoincareSteklov", "RadauIIA", "RadialTable", "SpaceTimeUzawa",
+    "TimeKernels", "TimeMethod", "Trapezoid", "TwoBodies", "circle", "conditions_on", "convolution_operator",
+    "energetic_blocks", "from_segments", "interior_displacement", "ledger", "load_blocks", "march_contact",
+    "polygon", "save_blocks", "smooth_curve", "stored_blocks", "traction_forces",
 ]

@@ -54,6 +54,18 @@ class ContactRun:
         return np.cumsum(self.resultant, axis=0) * self.contact.compliance.dt
 
     @property
+    def name(self) -> str:
+        """What ``cross_check`` calls it."""
+        return "boundary elements"
+
+    @property
+    def mean_towards(self) -> Array:
+        """(steps,) displacement towards the support at the ends, mean over the contact boundary [m]."""
+        surface = self.contact.surface
+        gap = np.array([surface.gap(t) for t in self.times])
+        return np.asarray((gap - self.gap) @ surface.weights / surface.weights.sum())
+
+    @property
     def pressure(self) -> Array:
         """(steps, c) normal traction r_n / length [Pa]."""
         return self.r_n / self.contact.surface.weights
