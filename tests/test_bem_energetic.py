@@ -10,12 +10,14 @@ from plane_waves import MATERIAL, SQUARE, pulse
 
 from vi_contact import LinearElastic
 from vi_contact.bem import (
+    BoundaryMesh,
     BoundaryProblem,
     EnergeticBlocks,
     Marching,
     PoincareSteklov,
     circle,
     energetic_blocks,
+    from_segments,
     load_blocks,
     polygon,
     save_blocks,
@@ -44,6 +46,30 @@ def test_plane_pulses(blocks, symmetric, shear, fine):
         found = PoincareSteklov(b, 1.0, symmetric).solve(forces)
         errors.append(np.linalg.norm(found - exact) / np.linalg.norm(exact))
     assert errors[1] < fine and np.log2(errors[0] / errors[1]) > 1.85
+
+
+def with_hole(k: int) -> BoundaryMesh:
+    """The square less one of 0.4 a side in its middle."""
+    outer, inner = polygon(SQUARE, 1.0 / k), polygon(0.4 * np.array(SQUARE[::-1]), 1.0 / k, exterior=True)
+    return from_segments(np.concatenate([outer.points, inner.points]),
+                         np.concatenate([outer.elements, inner.elements + len(outer)]))
+
+
+def triangle(k: int) -> BoundaryMesh:
+    return polygon([(-0.5, -0.4), (0.5, -0.3), (-0.3, 0.4)], 1.0 / k)
+
+
+@pytest.mark.parametrize(("shape", "fine"), [(with_hole, 1.4e-2), (triangle, 2.8e-2)])
+def test_plane_pulses_in_other_shapes(shape, fine):
+    """B4: several loops, re-entrant and acute corners, elements at all angles to the fronts."""
+    wave, errors = pulse(), []
+    for k in (5, 10):
+        mesh = shape(k)
+        forces = traction_forces(mesh, wave.traction, dt=1.0 / k, steps=4 * k)
+        exact = np.array([wave.displacement(mesh.points, (j + 1) / k).T for j in range(4 * k)])
+        b = energetic_blocks(mesh, MATERIAL, dt=1.0 / k, steps=4 * k)
+        errors.append(np.linalg.norm(PoincareSteklov(b, 1.0).solve(forces) - exact) / np.linalg.norm(exact))
+    assert errors[1] < fine and np.log2(errors[0] / errors[1]) > 1.8
 
 
 def rod(blocks: EnergeticBlocks, load, *, symmetric: bool = True, rho: float = 1.0) -> BoundaryProblem:

@@ -132,10 +132,9 @@ class Marching:
             raise InputError(f"boundary elements: loads for {steps} steps, but the operator has {self.blocks.steps}; "
                              "assemble it with more steps")
         u, p = np.zeros((steps, unknowns, count)), np.empty((steps, 2 * unknowns, count))
-        total, place = forces.copy(), np.zeros((steps, unknowns, count))
+        total, before = forces.copy(), np.zeros((unknowns, count))
         q = np.empty_like(p) if self.symmetric else p
         for k in range(steps):
-            before = place[k - 1] if k else np.zeros((unknowns, count))
             early = 0.5 * self.mass @ before - self._past_first(k, p, u)
             v0_early = cho_solve(self.v0, early)
             known = self.left @ v0_early + self._past_second(k, p, q, u)
@@ -148,8 +147,8 @@ class Marching:
             total[k] = np.where(self.free[:, None], forces[k], known + self.s0 @ u[k])
             if self.symmetric:
                 q[k] = p[k] - p[k - 1] if k else p[k]
-            place[k] = before + u[k]
-        return Motion(place, p, total)
+            before = before + u[k]
+        return Motion(np.cumsum(u, axis=0, out=u), p, total)
 
     def _past_first(self, k: int, p: Array, u: Array) -> Array:
         """sum over earlier steps of V p - K u."""
