@@ -98,14 +98,24 @@ def test_uzawa_on_the_whole_history_is_the_march(law):
     assert away(slow, run(law)) < 1e-5 and slow.iterations[0] > 2 * found.iterations[0]
 
 
+@pytest.mark.parametrize("window", [1, 7])
+def test_uzawa_in_windows(window):
+    """B10: windows of the history one after the other, the past known, give the same run."""
+    contact = BoundaryContact(condensed(), friction=LAWS["weak Coulomb"])
+    found = SpaceTimeUzawa(tolerance=1e-10, window=window).solve(contact)
+    assert away(found, run("weak Coulomb")) < 1e-6
+    assert len(found.iterations) == -(-30 // window) and found.iterations.sum() == len(found.history)
+
+
 def test_uzawa_fails_in_words():
     """B10: rho above 2/lambda_max(W[0]) does not converge; slip rates and rho = 0 are refused."""
     contact = BoundaryContact(condensed(), friction=LAWS["Tresca"])
     rho = 2.2 / float(np.linalg.eigvalsh(contact.W[0])[-1])
     with pytest.raises(StepFailure, match="take a fifth of this rho"):
         SpaceTimeUzawa(rho=rho, max_iterations=300).solve(contact)
-    with pytest.raises(InputError, match="rho is 0"):
-        SpaceTimeUzawa(rho=0.0)
+    for wrong, words in (({"rho": 0.0}, "rho is 0"), ({"window": 0}, "window of 0 steps")):
+        with pytest.raises(InputError, match=words):
+            SpaceTimeUzawa(**wrong)
     rates = BoundaryContact(condensed(), friction=vc.SlipRateCoulomb(lambda v: 0.1 + 0.0 * v))
     with pytest.raises(InputError, match="slip rate"):
         SpaceTimeUzawa().solve(rates)

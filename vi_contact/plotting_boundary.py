@@ -67,7 +67,7 @@ def plot_boundary_snapshots(rows: Mapping[str, Sequence[Shot]], path: str | Path
         for axis, shot in zip(row, shots, strict=True):
             _draw(axis, shot, longest / (ARROW * size), size)
             axis.set(xlim=(low[0] - 0.1 * size, high[0] + 0.1 * size))
-            axis.set(ylim=(low[1] - 0.35 * size, high[1] + 0.1 * size))
+            axis.set(ylim=(low[1] - (0.1 if shot.support is None else 0.35) * size, high[1] + 0.1 * size))
             axis.set_title(f"{name}\n{shot.title}", fontsize=8)
             axis.tick_params(labelsize=7)
     figure.supxlabel("x [m]", fontsize=10)

@@ -22,7 +22,7 @@ class ContactRun:
     step, normal and along the tangent; gap: (steps, c) at the ends [m]; slip: (steps, c) in each step [m];
     displacement: (steps, 2m) of the contact nodes at the ends and forces: (steps, 2m) on the body [N/m] in the order of
     CondensedCompliance; active: (steps, c). certificates: of each step; iterations: (steps,) of the method in a step,
-    or (1,) of a method for all steps; history: what such a method logs.
+    or one per window of a method for many steps; history: what such a method logs.
     """
 
     contact: BoundaryContact

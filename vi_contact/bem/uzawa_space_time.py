@@ -6,7 +6,8 @@
 
 The normal multiplier meets the gap at the end of each step, the tangential one the slip of the step; F is Tresca's
 threshold or Coulomb's limit of the r_n just found. rho = 1/lambda_max(W[0]) by default: that of one step. The operator
-of all steps is not normal, changes grow before they shrink, and rho near 2/lambda_max may not converge at all.
+of all steps is not normal, so that changes grow before they shrink, the more the more steps there are, until rounding
+errors win: long runs are cut into windows, one after the other, the past of which is known.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from ..friction import project
 from ..step import StepResult
 from .contact import BoundaryContact
 from .contact_run import ContactRun, run_of
+from .energetic import summed
 
 GROWN = 1e12  # change over the first one: diverged
 
@@ -29,55 +31,72 @@ GROWN = 1e12  # change over the first one: diverged
 @dataclass(frozen=True)
 class SpaceTimeUzawa:
     """Settings. tolerance: relative change of the multiplier at which it stops (the source's 1e-n); rho > 0 [N/m²] or
-    None: 1/lambda_max(W[0]). The run's ``iterations`` has one entry, ``history`` the relative changes.
+    None: 1/lambda_max(W[0]); window: steps that are solved at once, all of them if None. The run's ``iterations`` has
+    one entry per window, ``history`` the relative changes.
 
-    Raises InputError for rho <= 0 and for a law that depends on the slip rate.
+    Raises InputError for rho <= 0, window < 1 and a law that depends on the slip rate.
     """
 
     tolerance: float = 1e-8
     rho: float | None = None
     max_iterations: int = 5000
+    window: int | None = None
 
     def __post_init__(self) -> None:
         if self.rho is not None and not 0.0 < self.rho < np.inf:
             raise InputError(f"SpaceTimeUzawa: rho is {self.rho!r}; give a positive number, or None")
+        if self.window is not None and self.window < 1:
+            raise InputError(f"SpaceTimeUzawa: a window of {self.window!r} steps; give one step or more, or None")
 
     def solve(self, contact: BoundaryContact) -> ContactRun:
         """The run; StepFailure when ``max_iterations`` do not reach the tolerance."""
         if contact.frictional and contact.friction.at(np.ones(contact.surface.count)) is not contact.friction:
             raise InputError(f"SpaceTimeUzawa: {contact.friction} depends on the slip rate; use march_contact")
-        problem = _SpaceTime(contact)
-        rho = self.rho or problem.default_rho
-        r, history = np.zeros((len(contact.v_free), 2, contact.surface.count)), list[float]()
-        while len(history) < self.max_iterations:
+        total = len(contact.v_free)
+        length = min(self.window or total, total)
+        problem = _SpaceTime(contact, length)
+        r, history, counts = np.zeros((total, 2, contact.surface.count)), list[float](), list[int]()
+        for first in range(0, total, length):
+            window = slice(first, min(first + length, total))
+            problem.enter(window, r)
+            r[window], changes = self._window(problem, np.zeros_like(r[window]))
+            history += changes
+            counts.append(len(changes))
+        return problem.run(r, np.array(counts), tuple(history))
+
+    def _window(self, problem: _SpaceTime, r: Array) -> tuple[Array, list[float]]:
+        """Multipliers (steps, 2, c) of the window that was entered, and the relative changes on the way."""
+        rho, unit = self.rho or problem.default_rho, float(np.linalg.norm(problem.violation(r)))
+        changes: list[float] = []
+        while len(changes) < self.max_iterations:
             new = problem.projected(r + rho * problem.violation(r))
             size = float(np.linalg.norm(new))
             change = float(np.linalg.norm(new - r)) / (size or 1.0)
-            history.append(change)
+            changes.append(change)
             r = new
             if change <= self.tolerance:
-                return problem.run(r, tuple(history))
-            if not np.isfinite(change) or size > GROWN * problem.unit * rho:
+                return r, changes
+            if not np.isfinite(change) or size > GROWN * unit * rho:
                 break
-        raise StepFailure(f"{self} stopped after {len(history)} iterations with a change of {history[-1]:.1e} at "
-                          f"rho = {rho:.3g}: take a fifth of this rho, or march_contact")
+        raise StepFailure(f"{self} stopped after {len(changes)} iterations with a change of {changes[-1]:.1e} at "
+                          f"rho = {rho:.3g}: take a fifth of this rho, a window of fewer steps, or march_contact")
 
 
 class _SpaceTime:
-    """The whole history as one problem in r (steps, 2, c): normal, tangential."""
+    """A window of the history as one problem in r (steps, 2, c): normal, tangential."""
 
-    def __init__(self, contact: BoundaryContact) -> None:
+    def __init__(self, contact: BoundaryContact, window: int) -> None:
         self.contact, surface = contact, contact.surface
-        self._steps = steps = len(contact.v_free)
+        self._total = steps = len(contact.v_free)
         tangents = surface.tangents[:, 0]
         self._rubs = (tangents >= 0) & contact.frictional
         places = np.concatenate([surface.owned, np.where(self._rubs, tangents, 0)])
         present = np.concatenate([np.ones(surface.count, bool), self._rubs])
         W = contact.W[:, places][:, :, places] * (present[:, None] & present)
         self.default_rho = 1.0 / float(np.linalg.eigvalsh(0.5 * (W[0] + W[0].T))[-1])
-        self._length = next_fast_len(2 * steps, real=True)
-        self._kernel = rfft(W, self._length, axis=0)
-        self._free = contact.v_free[:, places] * present
+        self._W, self._v_free = W, contact.v_free[:, places] * present
+        self._length = next_fast_len(2 * window, real=True)
+        self._kernel = rfft(W[:window], self._length, axis=0)
         times = contact.compliance.dt * np.arange(steps + 1)
         self._gap = np.array([surface.gap(t) for t in times[1:]])
         self._sliding = np.zeros((steps, surface.count))
@@ -87,15 +106,25 @@ class _SpaceTime:
                 self._sliding[k] = sliding[:, 0] * self._rubs
         self._still = contact.friction.limit(np.zeros(surface.count), surface.weights, 1.0)
         self._slope = contact.friction.slope(surface.weights)
-        self.unit = float(np.linalg.norm(self.violation(np.zeros((steps, 2, surface.count)))))
+
+    def enter(self, window: slice, r: Array) -> None:
+        """Makes a window current; r (all steps, 2, c) is final before it."""
+        first, lam = window.start, -r.reshape(self._total, -1, 1)
+        self._window, self._free = window, self._v_free[window].copy()
+        self._before = np.zeros(r.shape[2])
+        if first:
+            self._free += np.array([summed(self._W[k : k - first : -1], lam[:first])[:, 0]
+                                    for k in range(first, window.stop)])
+            v = self._v_free[first - 1] + summed(self._W[first - 1 :: -1], lam[:first])[:, 0]
+            self._before = v.reshape(2, -1)[1]
 
     def violation(self, r: Array) -> Array:
         """(steps, 2, c): v_n - gap at the ends of the steps, slip in them."""
-        loads = rfft(r.reshape(self._steps, -1), self._length, axis=0)
-        moved = irfft(np.matmul(self._kernel, loads[:, :, None])[:, :, 0], self._length, axis=0)[: self._steps]
+        loads = rfft(r.reshape(len(r), -1), self._length, axis=0)
+        moved = irfft(np.matmul(self._kernel, loads[:, :, None])[:, :, 0], self._length, axis=0)[: len(r)]
         v = (self._free - moved).reshape(r.shape)
-        slip = np.diff(v[:, 1], axis=0, prepend=0.0) - self._sliding
-        return np.stack([v[:, 0] - self._gap, slip * self._rubs], axis=1)
+        slip = np.diff(v[:, 1], axis=0, prepend=self._before[None]) - self._sliding[self._window]
+        return np.stack([v[:, 0] - self._gap[self._window], slip * self._rubs], axis=1)
 
     def projected(self, w: Array) -> Array:
         """Pr_C."""
@@ -103,17 +132,17 @@ class _SpaceTime:
         limit = (self._still + self._slope * np.maximum(normal, 0.0)) * self._rubs
         return np.stack([normal, project(w[:, 1].reshape(-1, 1), limit.ravel()).reshape(normal.shape)], axis=1)
 
-    def run(self, r: Array, history: tuple[float, ...]) -> ContactRun:
+    def run(self, r: Array, counts: Array, history: tuple[float, ...]) -> ContactRun:
         """The steps of these multipliers with their certificates."""
         contact, steps, results = self.contact, [], []
         v, active = np.zeros(int(contact.kept.sum())), contact.surface.gap(0.0) <= 0.0
         loads = np.zeros_like(contact.v_free)
-        for k in range(self._steps):
+        for k in range(self._total):
             r_t = r[k, 1][:, None] if contact.frictional else None
             step = contact.step(k, loads, v, active)
             loads[k] = contact.load(r[k, 0], r_t)
             v = contact.matrix.factor.solve(step.b + loads[k])
             active = (r[k, 0] > 0.0) | contact.bilateral
             steps.append(step)
-            results.append(StepResult(v, r[k, 0], active, len(history), "space-time Uzawa", r_t))
-        return run_of(contact, steps, results, iterations=np.array([len(history)]), history=history)
+            results.append(StepResult(v, r[k, 0], active, int(counts.sum()), "space-time Uzawa", r_t))
+        return run_of(contact, steps, results, iterations=counts, history=history)
