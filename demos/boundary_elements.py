@@ -13,10 +13,10 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the source tree without installing
 
@@ -54,8 +54,7 @@ COLOURS = ("black", "tab:blue", "tab:red")
 OUT = Path("results/boundary_elements")
 
 
-@dataclass(frozen=True, eq=False)
-class Answer:
+class Answer(NamedTuple):
     """One law of one example by boundary elements and by finite elements (``fem``: its history)."""
 
     run: bem.ContactRun
@@ -93,7 +92,7 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
                 print(f"{TITLES[name]}, {law}: done", flush=True)
     if comm.rank == 0:
         out.mkdir(parents=True, exist_ok=True)
-        draw(answers, out)
+        draw(answers, out, slice(None, None, 3 if quick else None))
         print(table(numbers))
         print(f"\nFigures are in {out}.")
     comm.Barrier()
@@ -174,9 +173,10 @@ def uzawa(run: bem.ContactRun, window: int | None) -> dict[str, float]:
     return {"uzawa": float(found.iterations.mean()), "uzawa off": float(off)}
 
 
-def draw(answers: dict[str, dict[str, Answer]], out: Path) -> None:
+def draw(answers: dict[str, dict[str, Answer]], out: Path, chosen_shots: slice) -> None:
     """Snapshots with friction, tractions of both methods, energies with and without friction."""
-    rows = {TITLES[name]: shots(name, list(laws.values())[-1]) for name, laws in answers.items()}
+    rows = {TITLES[name]: shots(name, list(laws.values())[-1], SHOTS[name][chosen_shots])
+            for name, laws in answers.items()}
     plot_boundary_snapshots(rows, out / "snapshots.png", title="Boundary elements, Coulomb friction: deformed bodies "
                             "and what the support does to them")
     chosen = (("square", "Tresca 0.05", (1.5, 2.5, 3.5)), ("square", "Coulomb 0.5", (1.5, 2.5, 3.5)),
@@ -189,10 +189,10 @@ def draw(answers: dict[str, dict[str, Answer]], out: Path) -> None:
                 title="Energy with and without friction: boundary elements (lines), finite elements (dots)")
 
 
-def shots(name: str, answer: Answer) -> list[Shot]:
-    """The deformed bodies at the times of SHOTS."""
+def shots(name: str, answer: Answer, times: Sequence[float]) -> list[Shot]:
+    """The deformed bodies at some times."""
     run, contact, scale = answer.run, answer.run.contact, MAGNIFIED[name]
-    steps = [int(np.argmin(np.abs(run.times - t))) for t in SHOTS[name]]
+    steps = [int(np.argmin(np.abs(run.times - t))) for t in times]
     inside = [points_inside(problem.operator.mesh) for problem, _ in answer.bodies]
     moved = [bem.interior_displacement(problem.operator, motion, x, steps=steps)
              for x, (problem, motion) in zip(inside, answer.bodies, strict=True)]
