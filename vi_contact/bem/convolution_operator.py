@@ -25,6 +25,7 @@ from .radial_table import RadialTable
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+ORDERS = Orders(far=6, near=8, touching=32)  # |s| h/c_S reaches 100 with small steps; points cost nothing per frequency
 PANEL = 1.5  # width of the panels of the radial table, in c_S dt: functions there are exp(-s r/c_S), |s| dt up to 4
 
 
@@ -69,14 +70,19 @@ def convolution_operator(
     dt: float,
     steps: int,
     symmetric: bool = True,
-    orders: Orders = Orders(),
+    orders: Orders = ORDERS,
 ) -> ConvolutionOperator:
     """Assemble S for `steps` time steps of dt [s]; memory 96 steps stages n² bytes.
 
-    Raises InputError for a time step far too small or large for the mesh, or for less than one step.
+    Raises InputError for a time step too small (c_P dt/h < 0.05, for the trapezoidal rule 0.5) or too large (> 8) for
+    the mesh, or for less than one step.
     """
     table = quadrature.frequencies(dt=dt, steps=steps)
     check_time_step(mesh, material.c_p, dt)
+    ratio = material.c_p * dt / float(mesh.lengths.max())
+    if ratio < quadrature.method.smallest_ratio * (1.0 - 1e-9):
+        raise InputError(f"convolution_operator: c_P dt / h is {ratio:.3g}, too small for {quadrature.method}, which "
+                         f"needs {quadrature.method.smallest_ratio:g}; enlarge the time step or refine the mesh")
     n, rho, count = len(mesh), material.rho, table.s.size
     galerkin = RadialTable(mesh, material.c_s, PANEL * material.c_s * dt, orders)
     steklov, to_traction = np.empty((count, 2 * n, 2 * n), complex), np.empty((count, 4 * n, 2 * n), complex)

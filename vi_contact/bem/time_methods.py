@@ -24,6 +24,11 @@ class TimeMethod(Protocol):
         """Stages within a step, as shares of it; the last is 1."""
         ...
 
+    @property
+    def smallest_ratio(self) -> float:
+        """Least c_P dt/h, h the longest element, with which histories stay bounded."""
+        ...
+
     def delta(self, z: NDArray) -> NDArray:
         """(L, stages, stages) matrices dt d/dt at shifts z (L,), |z| < 1."""
         ...
@@ -38,6 +43,11 @@ class BDF2:
         """Stages within a step."""
         return (1.0,)
 
+    @property
+    def smallest_ratio(self) -> float:
+        """Least c_P dt/h."""
+        return 0.05
+
     def delta(self, z: NDArray) -> NDArray:
         """(L, 1, 1)."""
         return np.asarray(1.5 - 2.0 * z + 0.5 * z**2)[:, None, None]
@@ -45,12 +55,20 @@ class BDF2:
 
 @dataclass(frozen=True)
 class Trapezoid:
-    """Trapezoidal rule, order 2: delta = 2 (1 - z)/(1 + z). No numerical damping, so fronts ring."""
+    """Trapezoidal rule, order 2: delta = 2 (1 - z)/(1 + z).
+
+    No numerical damping: fronts ring, and below c_P dt/h = 0.5 the errors of integration over elements grow in time.
+    """
 
     @property
     def abscissae(self) -> tuple[float, ...]:
         """Stages within a step."""
         return (1.0,)
+
+    @property
+    def smallest_ratio(self) -> float:
+        """Least c_P dt/h."""
+        return 0.5
 
     def delta(self, z: NDArray) -> NDArray:
         """(L, 1, 1)."""
@@ -65,6 +83,11 @@ class RadauIIA:
     def abscissae(self) -> tuple[float, ...]:
         """Stages within a step."""
         return (1.0 / 3.0, 1.0)
+
+    @property
+    def smallest_ratio(self) -> float:
+        """Least c_P dt/h."""
+        return 0.05
 
     def delta(self, z: NDArray) -> NDArray:
         """(L, 2, 2)."""
