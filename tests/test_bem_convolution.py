@@ -136,7 +136,7 @@ def test_table_of_radial_functions(operators):
 @pytest.mark.parametrize(("name", "fine", "order"), [
     ("BDF2", 0.12, 1.3), ("trapezoid", 0.04, 1.8), ("Radau", 3.4e-3, 2.4)])
 def test_rod_under_a_smooth_load(operators, name, fine, order):
-    """B8: top displacement, 10 elements a side; order from 5 to 10 (that of BDF2 is 1.8 from 10 to 20)."""
+    """B11: top displacement, 10 elements a side; order from 5 to 10 (that of BDF2 is 1.8 from 10 to 20)."""
     errors = [top_error(operators[name, k], smooth_load, smooth_integral) for k in (5, 10)]
     assert errors[1] < fine and np.log2(errors[0] / errors[1]) > order
 
@@ -144,7 +144,7 @@ def test_rod_under_a_smooth_load(operators, name, fine, order):
 @pytest.mark.parametrize(("name", "top", "pressure", "greatest"), [
     ("BDF2", 0.11, 0.4, 2.5), ("trapezoid", 0.066, 0.4, 2.7), ("Radau", 0.026, 0.25, 2.25)])
 def test_rod_under_a_step(operators, name, top, pressure, greatest):
-    """B8: top displacement, reaction of the base (exactly 0 or 2) and its greatest value; fronts smear and ring."""
+    """B11: top displacement, reaction of the base (exactly 0 or 2) and its greatest value; fronts smear and ring."""
     operator, mesh = operators[name, 10], operators[name, 10].mesh
     assert top_error(operator, lambda t: 1.0, lambda t: np.maximum(t, 0.0)) < top
     motion = rod(operator, lambda t: 1.0).solve()
@@ -160,7 +160,7 @@ def test_rod_under_a_step(operators, name, top, pressure, greatest):
 
 @pytest.mark.parametrize(("method", "ratio", "end"), [(Trapezoid(), 0.5, 60.0), (RadauIIA(), 0.1, 20.0)])
 def test_small_steps_stay_bounded(method, ratio, end):
-    """B8: the rod (top exactly 1 at most) with |s| h/c_S up to 100; fewer points on touching elements give 250."""
+    """B11: the rod (top exactly 1 at most) with |s| h/c_S up to 100; fewer points on touching elements give 250."""
     dt = 0.5 * ratio
     operator = convolution_operator(polygon(SQUARE, 0.5), MATERIAL, quadrature=ConvolutionQuadrature(method), dt=dt,
                                     steps=round(end / dt))
@@ -172,7 +172,7 @@ def test_small_steps_stay_bounded(method, ratio, end):
 @pytest.mark.parametrize(("name", "fine", "order"), [
     ("BDF2", 0.2, 1.2), ("trapezoid", 0.09, 1.7), ("Radau", 0.03, 2.0)])
 def test_plane_pulses(operators, name, fine, order, shear):
-    """B8: displacement of the whole boundary under the tractions of an oblique pulse, T = 4."""
+    """B11: displacement of the whole boundary under the tractions of an oblique pulse, T = 4."""
     wave, errors = pulse(shear=shear), []
     for k in (5, 10):
         operator = operators[name, k]
@@ -184,7 +184,7 @@ def test_plane_pulses(operators, name, fine, order, shear):
 
 
 def test_energetic_and_convolution_agree(operators):
-    """B8: top of the rod under the smooth load, Radau against energetic, 10 elements a side."""
+    """B11: top of the rod under the smooth load, Radau against energetic, 10 elements a side."""
     problem = rod(operators["Radau", 10], smooth_load)
     blocks = energetic_blocks(problem.operator.mesh, MATERIAL, dt=0.1, steps=60)
     means = np.tensordot([1.0 / 3.0, 2.0 / 3.0], problem.forces, (0, 1))
@@ -211,7 +211,7 @@ def test_compliance_is_the_inverse_seen_from_the_contact(operators, name):
 
 @pytest.mark.parametrize("name", METHODS)
 def test_work_of_contact_forces_is_never_negative(operators, name):
-    """B8: forces held in each step and the displacement increments: their work is a positive quadratic form."""
+    """B11: forces held in each step and the displacement increments: their work is a positive quadratic form."""
     w = replace(rod(operators[name, 5], smooth_load), fixed=None).condensed().W[:20]
     increments = np.diff(w, axis=0, prepend=0.0)
     size = w.shape[1]
