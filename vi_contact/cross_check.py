@@ -148,7 +148,7 @@ def cross_check(
     steps: int,
     state: State | None = None,
     opinions: Sequence[Opinion] = (),
-    bound: float = 0.01,
+    bound: float = 0.02,
 ) -> CrossChecked:
     """Marches with the first solver and compares the others with it at every step; see ``worst`` and ``report()``.
 
