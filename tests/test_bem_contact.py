@@ -9,7 +9,15 @@ import numpy as np
 import pytest
 
 import vi_contact as vc
-from vi_contact.bem import BoundaryProblem, PoincareSteklov, polygon
+from vi_contact.bem import (
+    BoundaryProblem,
+    ConvolutionProblem,
+    ConvolutionQuadrature,
+    PoincareSteklov,
+    RadauIIA,
+    convolution_operator,
+    polygon,
+)
 from vi_contact.bem.contact import BoundaryContact, conditions_on
 from vi_contact.bem.contact_march import march_contact
 from vi_contact.bem.contact_run import ContactRun, ledger
@@ -248,3 +256,15 @@ def test_a_third_opinion(law):
 
 class InSpace:
     name, times, impulse, mean_towards = "ball", np.array([0.05]), np.zeros((1, 3)), np.zeros(1)
+
+
+@pytest.mark.parametrize("law", ["none", "Tresca"])
+def test_contact_with_convolution_quadrature(law):
+    """The condensed compliance of the other time discretisation serves as well: impulse until t = 4 within 0.5 %."""
+    mesh, loads = square().operator.mesh, square().forces[:20]
+    operator = convolution_operator(mesh, MATERIAL, quadrature=ConvolutionQuadrature(RadauIIA()), dt=0.2, steps=20)
+    problem = ConvolutionProblem(operator, loads, contact=square().contact)
+    found = march_contact(BoundaryContact(problem.condensed(), friction=LAWS[law]))
+    assert found.worst < 1e-12 and found.gap.min() >= 0.0
+    assert found.impulse[-1, 1] == pytest.approx(run(law).impulse[19, 1], rel=5e-3)
+    assert found.friction_loss[-1] == pytest.approx(run(law).friction_loss[19], abs=5e-3)
