@@ -93,8 +93,11 @@ def number_of_steps(run: RunOptions, dt: float, shaking: Sequence[Excitation]) -
 def solvers(
     run: RunOptions, *, reference: Solver = SOLVERS["volume-reference"]
 ) -> tuple[Solver, CrossChecked | None]:
-    """The solver; with ``cross_check`` the other route accompanies every step: the reference, or the condensed one."""
-    solver = SOLVERS[run.solver]
+    """The solver; with ``cross_check`` the other route accompanies every step: the reference, or the condensed one.
+
+    ``reference``: what "volume-reference" means to a model.
+    """
+    solver = reference if run.solver == "volume-reference" else SOLVERS[run.solver]
     if not run.cross_check:
         return solver, None
     checked = CrossChecked(solver, (SOLVERS["condensed"] if run.solver.startswith("volume") else reference,))
