@@ -106,15 +106,17 @@ def test_fig_8_rocking():
 
 @pytest.mark.parametrize("contact", ["sliding", "rubbing"])
 def test_mirror_symmetry(contact):
-    """-a_g: u_y(1) <-> u_y(7) and u_x -> -u_x to 1e-12 of the largest displacement; the other points to 1e-11, which
-    is what 400 steps leave of round-off where the walls are slender."""
+    """-a_g: u_y(1) <-> u_y(7) and u_x -> -u_x to 1e-12 of the largest displacement in the first 200 steps. Round-off
+    grows: in 400 steps to between 4e-13 and 1.005e-12, by the processor; at the slender walls to 1.7e-12."""
     one, two = shaken(contact).history, shaken(contact, amplitude=-2.0).history
     image = {"1": "7", "7": "1", "4": "4", "10": "16", "16": "10", "13": "19", "19": "13"}
     for label, other in image.items():
-        tolerance = (EXACT if label in "17" else 10.0 * EXACT) * largest(one)
         for end in ("", "_soil"):
-            assert np.abs(one[f"u_x_{label}{end}"] + two[f"u_x_{other}{end}"]).max() < tolerance
-            assert np.abs(one[f"u_y_{label}{end}"] - two[f"u_y_{other}{end}"]).max() < tolerance
+            off = np.abs(np.array([one[f"u_x_{label}{end}"] + two[f"u_x_{other}{end}"],
+                                   one[f"u_y_{label}{end}"] - two[f"u_y_{other}{end}"]]))
+            if label in "17":
+                assert off[:, :201].max() < EXACT * largest(one)
+            assert off.max() < (3.0 if label in "17" else 10.0) * EXACT * largest(one)
 
 
 def test_fig_9_unilateral_and_bilateral():
