@@ -141,7 +141,8 @@ class _Proximal:
                 return best
             if least > self.tolerance:
                 self._refuse_flight(new)
-            ahead = 0.0 if old is None else self._ahead(old, new, result)
+            # once the tolerance is met steps are round-off: to go far along one would shift the body
+            ahead = 0.0 if old is None or least <= self.tolerance else self._ahead(old, new, result)
             u, active = result.x + ahead * new.d, result.active
             old = new if ahead == 0.0 else None
         if best is not None and least <= self.tolerance:
