@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
-from step_cost import DIVISIONS, SCHEME, LinearSteps, memory, timed  # first: it sets the number of threads
+from step_cost import DIVISIONS, SCHEME, LinearSteps, StepsWithContact, memory  # first: it sets the number of threads
 
 import vi_contact as vc
 from vi_contact.models.wall import Wall, build
@@ -35,26 +35,15 @@ HEADER = (
 
 def measured(problem: vc.ContactProblem, solver: Any, dt: float, count: int, linear: LinearSteps) -> dict[str, Any]:
     """``count`` steps with contact, each beside a linear step; a third as many before them are not counted."""
-    loop = vc.march(problem, scheme=SCHEME, solver=solver, dt=dt, steps=100 * count)
-    set_up, _ = timed(lambda: next(loop))
-    seconds: list[float] = []
-    plain, iterations, closed, slipping, worst = [], [], [], [], 0.0
-    warm_up = count // 3
-    while len(seconds) < count:
-        spent, (_, report) = timed(lambda: next(loop))
-        worst = max(worst, report.certificate.worst)
-        if report.new.active.any():
-            warm_up -= 1
-            if warm_up >= 0:
-                continue
-            seconds.append(spent)
-            plain.append(timed(linear)[0])
-            result = report.result
-            iterations.append(result.iterations)
-            closed.append(int(result.active.sum()))
-            if problem.frictional:
-                moved = problem.surface.tangential_values(result.x) != report.step.slip0
-                slipping.append(int((result.active & moved[:, 0]).sum()))
+    steps = StepsWithContact(problem, solver, dt, count, linear)
+    iterations, slipping = [], []
+    for report in steps:
+        result = report.result
+        iterations.append(result.iterations)
+        if problem.frictional:
+            moved = problem.surface.tangential_values(result.x) != report.step.slip0
+            slipping.append(int((result.active & moved[:, 0]).sum()))
+    set_up, seconds, plain, closed, worst = steps.set_up, steps.seconds, steps.plain, steps.active, steps.worst
     return {
         "set_up": set_up, "linear": 1e3 * float(np.median(plain)), "step": 1e3 * float(np.median(seconds)),
         "ratio": float(np.median(seconds) / np.median(plain)), "mean": float(np.mean(seconds) / np.mean(plain)),

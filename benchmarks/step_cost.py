@@ -18,7 +18,7 @@ import os
 import resource
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -78,25 +78,49 @@ class LinearSteps:
         self.state = SCHEME.finish(self.problem, self.state, step, result, self.dt)
 
 
+class StepsWithContact:
+    """Iterates over the reports of ``count`` steps with contact, each timed beside a linear step; a third as many
+    before them warm up: the one factorisation makes its columns as points come into contact.
+
+    set_up: seconds of the first step; seconds, plain: of the steps and of the linear ones; active: points in contact;
+    worst: certificate of all steps.
+    """
+
+    def __init__(
+        self, problem: vc.ContactProblem, solver: Any, dt: float, count: int, linear: LinearSteps,
+        state: vc.State | None = None,
+    ) -> None:
+        self.loop = vc.march(problem, scheme=SCHEME, solver=solver, dt=dt, steps=100 * count, state=state)
+        self.set_up, _ = timed(lambda: next(self.loop))
+        self.count, self.linear = count, linear
+        self.seconds: list[float] = []
+        self.plain: list[float] = []
+        self.active: list[int] = []
+        self.worst = 0.0
+
+    def __iter__(self) -> Iterator[vc.Report]:
+        warm_up = self.count // 3
+        while len(self.seconds) < self.count:
+            spent, (_, report) = timed(lambda: next(self.loop))
+            self.worst = max(self.worst, report.certificate.worst)
+            if not report.new.active.any():
+                continue
+            warm_up -= 1
+            if warm_up >= 0:
+                continue
+            self.seconds.append(spent)
+            self.plain.append(timed(self.linear)[0])
+            self.active.append(int(report.new.active.sum()))
+            yield report
+
+
 def unilateral_steps(
     problem: vc.ContactProblem, solver: Any, dt: float, count: int, linear: LinearSteps, state: vc.State | None = None
 ) -> dict[str, Any]:
     """Times ``count`` steps with contact after a third as many to warm up, each beside a linear step."""
-    loop = vc.march(problem, scheme=SCHEME, solver=solver, dt=dt, steps=100 * count, state=state)
-    set_up, _ = timed(lambda: next(loop))
-    seconds, plain, iterations, active, worst = [], [], [], [], 0.0
-    warm_up = count // 3
-    while len(seconds) < count:
-        spent, (_, report) = timed(lambda: next(loop))
-        worst = max(worst, report.certificate.worst)
-        if report.new.active.any():
-            warm_up -= 1
-            if warm_up >= 0:  # the one factorisation makes its columns as points come into contact
-                continue
-            seconds.append(spent)
-            plain.append(timed(linear)[0])
-            iterations.append(report.result.iterations)
-            active.append(int(report.new.active.sum()))
+    steps = StepsWithContact(problem, solver, dt, count, linear, state)
+    iterations = [report.result.iterations for report in steps]
+    set_up, seconds, plain, active, worst = steps.set_up, steps.seconds, steps.plain, steps.active, steps.worst
     return {
         "set_up_seconds": set_up,
         "linear_ms": 1e3 * float(np.median(plain)),

@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 import ufl
-from petsc4py import PETSc
 
 from ..algebra import Array, Mask
 from ..errors import InputError
@@ -25,7 +24,7 @@ from .dashpots import CompliantBase, DashpotMatrix, Dashpots, incoming, tell
 from .free_field import free_field_loads
 from .loads import BodyForce, Prescribed, TangentialTraction, Traction, as_tuple, evaluate, is_constant
 from .mesh import Cells, Facets
-from .petsc_algebra import PetscAlgebra, PetscMatrix
+from .petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc
 from .space import FemSpace
 from .ties import Tied
 
@@ -75,7 +74,8 @@ def assemble(
     mass, stiffness, damper = forms.matrices()
     boundaries = as_tuple(dashpots)
     absorbers = [DashpotMatrix(space, forms, one) for one in boundaries]
-    damper = forms.total([damper, *(one.mat for one in absorbers)])
+    dampers = [(1.0, PetscMatrix(one)) for one in (damper, *(one.mat for one in absorbers)) if one is not None]
+    damper = as_petsc(algebra.combine(dampers)).mat if dampers else None
     load = assemble_loads(space, section, as_tuple(loads), (stiffness, damper, mass))
 
     def reduced(full: Any) -> PetscMatrix:
@@ -150,17 +150,6 @@ class ElasticForms:
         damper = self.fields["alpha_rho"] * ufl.inner(u, v) * ufl.dx
         damper += beta * ufl.inner(self.stress(u), ufl.sym(ufl.grad(v))) * ufl.dx
         return M, K, compat.assemble_matrix(compat.compile_form(damper))
-
-    @staticmethod
-    def total(matrices: Sequence[Any]) -> Any | None:
-        """The sum of those that are not None."""
-        found = [matrix for matrix in matrices if matrix is not None]
-        if not found:
-            return None
-        total = found[0].copy()
-        for matrix in found[1:]:
-            total.axpy(1.0, matrix, structure=PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
-        return total
 
 
 def cell_materials(mesh: Any, material: Materials) -> list[tuple[Any, LinearElastic]]:
