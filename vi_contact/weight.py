@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from .algebra import Array
 from .errors import InputError
+from .ground_motion import STANDARD_GRAVITY
 from .system import SemiDiscreteSystem
-
-STANDARD_GRAVITY = 9.80665  # m/s²
 
 
 def with_weight(
@@ -18,8 +18,19 @@ def with_weight(
     """The same system under its own weight, f + M r g: whatever its materials and densities.
 
     acceleration: g [m/s²]; direction: where it acts, of length one, (0, -1) or (0, 0, -1) by default, in one dimension
-    (-1,). It is the load of ``BodyForce`` with the density of every material. InputError for a direction of another
-    length or number of components, and for a system without ``base_inertia``, which has lost the mass at held nodes.
+    (-1,). It is the load of ``BodyForce`` with the density of every material. InputError as for ``own_weight``.
+    """
+    load = replace(system.load, constant=system.load.constant + own_weight(system, acceleration, direction))
+    return replace(system, load=load, _cache={})
+
+
+def own_weight(
+    system: SemiDiscreteSystem, acceleration: float = STANDARD_GRAVITY, direction: tuple[float, ...] | None = None
+) -> Array:
+    """M r g [N] on the unknowns; see ``with_weight``.
+
+    InputError for a direction of another length or number of components, and for a system without ``base_inertia``,
+    which has lost the mass at held nodes.
     """
     d = system.influence.shape[1]
     way = np.array([0.0] * (d - 1) + [-1.0]) if direction is None else np.array(direction, dtype=float)
@@ -27,5 +38,4 @@ def with_weight(
         raise InputError(f"the direction {tuple(way)} of gravity: give {d} components of a vector of length one")
     if system.base_mass is None:
         raise InputError("the weight needs the mass at held nodes: assemble with base_inertia=True")
-    load = replace(system.load, constant=system.load.constant + system.inertia(acceleration * way))
-    return replace(system, load=load, _cache={})
+    return system.inertia(acceleration * way)

@@ -31,9 +31,9 @@ from ..recorders import Contact, Energy, Probe
 from ..step import ContactProblem, ImpactLaw, Recorder
 from ..surfaces import ContactSurface
 from ..system import SemiDiscreteSystem
+from ..weight import own_weight
 from .channel_points import Openings, SoilProbe
 from .channel_sides import RockBelow, Rollers, Sides
-from .wall import STANDARD_GRAVITY
 
 BODIES = ("channel", "soil")  # in the order of their nodes
 SIDES = ("base", "left", "right")  # of the contact, in the order of its conditions
@@ -194,7 +194,6 @@ def weighted(system: SemiDiscreteSystem, weighing: Sequence[str]) -> SemiDiscret
     for name in weighing:
         if name not in BODIES:
             raise InputError(f"unknown body '{name}': {' and '.join(BODIES)} may have weight")
-    down = -STANDARD_GRAVITY * system.inertia(np.array([0.0, 1.0]))
     heavy = np.isin(system.space.bodies, [BODIES.index(name) for name in weighing])
-    load = replace(system.load, constant=system.load.constant + np.where(heavy, down, 0.0))
+    load = replace(system.load, constant=system.load.constant + np.where(heavy, own_weight(system), 0.0))
     return replace(system, load=load, _cache={})

@@ -15,7 +15,7 @@ from ..errors import InputError
 from ..excitation import Excitation
 from ..fem.fields import XDMF
 from ..friction import Coulomb
-from ..impact import ImpactLaw, Inelastic, MassProjection
+from ..impact import Inelastic, MassProjection
 from ..materials import LinearElastic
 from ..plotting import plot_certificate, plot_contact, plot_energy, plot_excitation, plot_points
 from ..simulate import Solution, simulate
@@ -27,7 +27,7 @@ from .channel import Channel, ChannelModel
 from .channel_sides import DashpotSides, Fixed, FreeFieldSides, RockBelow, Rollers, Sides, TiedSides
 from .channel_stages import AtRest, at_rest
 from .choices import SCHEMES, SOLVERS
-from .run_options import check_options, check_word, excitations, number_of_steps, records, solvers
+from .run_options import RunOptions, check_options, check_word, excitations, number_of_steps, records, solvers
 
 CONTACTS = {
     "sliding": "Buried channel, unilateral contact, free sliding",
@@ -47,7 +47,7 @@ steps of the channel: M/dt² of a consistent mass couples neighbours with the si
 
 
 @dataclass(frozen=True)
-class ChannelRun:
+class ChannelRun(RunOptions):
     """Options of a run. ``motion``: a record file; without one the harmonic of Fig. 7 shakes the bedrock for 400 steps.
 
     contact: one of CONTACTS; ``mu`` with "coulomb". gravity: which bodies weigh, of GRAVITY; a static stage with
@@ -63,24 +63,10 @@ class ChannelRun:
     contact: str = "sliding"
     mu: float | None = None
     channel: Channel = field(default_factory=Channel)
-    motion: str | None = None
-    vertical: str | None = None
-    units: str | None = None
-    scale: float = 1.0
-    pga: float | None = None
-    resample: float | None = None
     base: str = "relative"
     rock: LinearElastic | None = None
     sides: str | None = None
     gravity: str = "channel"
-    solver: str = "condensed"
-    scheme: str = "zwt"
-    impact: ImpactLaw | None = None
-    dt: float | None = None
-    steps: int | None = None
-    cross_check: bool = False
-    fields_every: int = 10
-    restart: bool = False
 
     def __post_init__(self) -> None:
         check_word("contact", self.contact, list(CONTACTS))

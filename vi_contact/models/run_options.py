@@ -3,41 +3,37 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Protocol
+from dataclasses import dataclass
 
 from ..cross_check import CrossChecked
 from ..errors import InputError
 from ..excitation import Excitation, GroundMotion
 from ..ground_motion import Record, pga, read_record, resampled, scaled, scaled_to_pga
-from ..step import Solver
+from ..step import ImpactLaw, Solver
 from .choices import SCHEMES, SOLVERS
 
 
-class RunOptions(Protocol):
-    """Options by the names of the command line. ``motion``: a record file; without one a harmonic shakes the model."""
+@dataclass(frozen=True, kw_only=True)
+class RunOptions:
+    """Options by the names of the command line. ``motion``: a record file; without one a harmonic shakes the model.
 
-    @property
-    def motion(self) -> str | None: ...
-    @property
-    def vertical(self) -> str | None: ...
-    @property
-    def units(self) -> str | None: ...
-    @property
-    def scale(self) -> float: ...
-    @property
-    def pga(self) -> float | None: ...
-    @property
-    def resample(self) -> float | None: ...
-    @property
-    def solver(self) -> str: ...
-    @property
-    def scheme(self) -> str: ...
-    @property
-    def steps(self) -> int | None: ...
-    @property
-    def cross_check(self) -> bool: ...
-    @property
-    def fields_every(self) -> int: ...
+    ``impact`` None: seed 000's inelastic rule for the schemes that seed could have used, none for the others.
+    """
+
+    motion: str | None = None
+    vertical: str | None = None
+    units: str | None = None
+    scale: float = 1.0
+    pga: float | None = None
+    resample: float | None = None
+    solver: str = "condensed"
+    scheme: str = "zwt"
+    impact: ImpactLaw | None = None
+    dt: float | None = None
+    steps: int | None = None
+    cross_check: bool = False
+    fields_every: int = 10
+    restart: bool = False
 
 
 def check_options(run: RunOptions) -> None:

@@ -16,6 +16,7 @@ from ..fem.loads import BodyForce
 from ..fem.mesh import Facets, build_mesh
 from ..fem.petsc_algebra import MpiComm
 from ..fem.trace import contact_surface
+from ..ground_motion import STANDARD_GRAVITY
 from ..impact import Inelastic
 from ..mass import ConsistentMass, MassLaw
 from ..materials import Damping, LinearElastic, NoDamping, PlaneStress
@@ -25,7 +26,6 @@ from ..step import ContactProblem, ImpactLaw
 from ..surfaces import ContactSurface, HalfSpace, empty_surface
 from ..system import SemiDiscreteSystem
 
-STANDARD_GRAVITY = 9.80665  # m/s²
 CASES = {
     "a": (4, 7, 10),  # the three labelled points of Fig. 2
     "b": tuple(range(2, 13)),  # eleven points; CHOSEN 2..12, the source says only how many

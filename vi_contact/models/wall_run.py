@@ -13,10 +13,10 @@ from ..plotting import plot_certificate, plot_contact, plot_energy, plot_excitat
 from ..recorders import Contact, Energy, Probe
 from ..simulate import Solution, simulate
 from ..static import static_equilibrium
-from ..step import ContactProblem, ImpactLaw, State
+from ..step import ContactProblem, State
 from ..surfaces import ContactSurface
 from .choices import SCHEMES, SOLVERS
-from .run_options import check_options, check_word, excitations, number_of_steps, records, solvers
+from .run_options import RunOptions, check_options, check_word, excitations, number_of_steps, records, solvers
 from .wall import CASES, Wall, build
 
 TITLES = {
@@ -29,29 +29,12 @@ TITLES = {
 
 
 @dataclass(frozen=True)
-class WallRun:
-    """Options of a run. ``motion``: a record file; without one the harmonic of Fig. 3 shakes the wall for 400 steps.
-
-    ``impact`` None: seed 000's inelastic rule for the schemes that seed could have used, none for the others.
-    """
+class WallRun(RunOptions):
+    """Options of a run; without a record the harmonic of Fig. 3 shakes the wall for 400 steps."""
 
     case: str = "a"
     wall: Wall = field(default_factory=Wall)
-    motion: str | None = None
-    vertical: str | None = None
-    units: str | None = None
-    scale: float = 1.0
-    pga: float | None = None
-    resample: float | None = None
-    solver: str = "condensed"
-    scheme: str = "zwt"
-    impact: ImpactLaw | None = None
     gravity: bool = False
-    dt: float | None = None
-    steps: int | None = None
-    cross_check: bool = False
-    fields_every: int = 10
-    restart: bool = False
 
     def __post_init__(self) -> None:
         check_word("case", self.case, (*CASES, "face"))
