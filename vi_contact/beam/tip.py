@@ -15,8 +15,8 @@ import math
 from dataclasses import dataclass
 from typing import Protocol
 
+from ..checks import attributes
 from ..errors import InputError, StepFailure
-from ..exact.numbers import check
 
 
 @dataclass(frozen=True)
@@ -63,9 +63,9 @@ class RegularisedFriction:
     safeguard: bool = True
 
     def __post_init__(self) -> None:
-        check(self, positive=("eps", "tolerance"))
+        attributes(self, positive=("eps", "tolerance"))
         if self.absolute is not None:
-            check(self, positive=("absolute",))
+            attributes(self, positive=("absolute",))
         if self.max_iterations < 1:
             raise InputError(f"RegularisedFriction: max_iterations is {self.max_iterations}; give a number from 1 on")
 

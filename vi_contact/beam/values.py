@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..algebra import Array
+from ..checks import attributes
 from ..errors import InputError
-from ..exact.numbers import check
 
 Profile = Callable[[Array], Array]
 
@@ -36,7 +36,7 @@ class TimoshenkoBeam:
 
     def __post_init__(self) -> None:
         positive = ("length", "rho", "area", "inertia", "E", "G", "shear_factor")
-        check(self, positive=positive, not_negative=("viscosity",))
+        attributes(self, positive=positive, not_negative=("viscosity",))
 
     @property
     def bending_stiffness(self) -> float:
@@ -69,7 +69,7 @@ class Rod:
     end_force: Callable[[float], float] | None = None
 
     def __post_init__(self) -> None:
-        check(self, positive=("length", "rho", "area", "E"), not_negative=("viscosity", "gap"))
+        attributes(self, positive=("length", "rho", "area", "E"), not_negative=("viscosity", "gap"))
         for name in ("body_force", "end_force"):
             if getattr(self, name) is not None and not callable(getattr(self, name)):
                 raise InputError(f"Rod: {name} is {getattr(self, name)!r}; give a function of the time, or None")

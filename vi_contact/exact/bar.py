@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..algebra import Array
-from .numbers import check
+from ..checks import attributes
 
 # of PeriodicBar: u = c0 + c1 x + c2 s in [phase][zone]
 _PERIOD_THREE = 0.5 * np.array([
@@ -45,7 +45,7 @@ class ThrownBar:
     speed: float = 10.0
 
     def __post_init__(self) -> None:
-        check(self, positive=("length", "E", "rho", "speed"), not_negative=("height",))
+        attributes(self, positive=("length", "E", "rho", "speed"), not_negative=("height",))
 
     @property
     def wave_speed(self) -> float:

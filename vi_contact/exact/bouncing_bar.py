@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..algebra import Array
+from ..checks import attributes
 from ..errors import InputError
-from .numbers import check
 
 SAME = 1e-12  # events and piece ends closer than this, relative to the problem's own scales, are the same
 
@@ -46,7 +46,7 @@ class BouncingBar:
     gravity: float = 10.0
 
     def __post_init__(self) -> None:
-        check(self, positive=("length", "E", "rho", "gravity"), not_negative=("height",))
+        attributes(self, positive=("length", "E", "rho", "gravity"), not_negative=("height",))
 
     @property
     def wave_speed(self) -> float:

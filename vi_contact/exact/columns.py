@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..algebra import Array
+from ..checks import attributes
 from ..materials import LinearElastic
-from .numbers import check
 from .waves import History, reflected
 
 
@@ -36,7 +36,7 @@ class ObliqueImpact:
     mu: float
 
     def __post_init__(self) -> None:
-        check(self, positive=("height", "speed_n"), not_negative=("speed_t", "mu"))
+        attributes(self, positive=("height", "speed_n"), not_negative=("speed_t", "mu"))
 
     @property
     def duration(self) -> float:
@@ -113,7 +113,7 @@ class ShearColumn:
     tau_y: float
 
     def __post_init__(self) -> None:
-        check(self, positive=("height", "speed", "tau_y"))
+        attributes(self, positive=("height", "speed", "tau_y"))
 
     @property
     def crossing(self) -> float:

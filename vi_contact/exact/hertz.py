@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..algebra import Array
+from ..checks import attributes
 from ..errors import InputError
-from .numbers import check
 
 
 def contact_modulus(*bodies: tuple[float, float]) -> float:
@@ -59,7 +59,7 @@ class HertzLine:
     radius: float
 
     def __post_init__(self) -> None:
-        check(self, positive=("force", "modulus", "radius"))
+        attributes(self, positive=("force", "modulus", "radius"))
 
     @property
     def half_width(self) -> float:
@@ -91,7 +91,7 @@ class HertzPoint:
     radius: float
 
     def __post_init__(self) -> None:
-        check(self, positive=("force", "modulus", "radius"))
+        attributes(self, positive=("force", "modulus", "radius"))
 
     @classmethod
     def from_approach(cls, approach: float, *, modulus: float, radius: float) -> HertzPoint:
@@ -136,7 +136,7 @@ class HertzImpact:
     radius: float
 
     def __post_init__(self) -> None:
-        check(self, positive=("mass", "speed", "modulus", "radius"))
+        attributes(self, positive=("mass", "speed", "modulus", "radius"))
 
     @property
     def approach(self) -> float:

@@ -19,8 +19,8 @@ from numpy.typing import ArrayLike
 from scipy.integrate import quad
 
 from ..algebra import Array
+from ..checks import attributes
 from ..errors import InputError
-from .numbers import check
 
 REST = 1e-30  # phi below which the rest of the motion lasts less than round-off of what has passed
 
@@ -39,7 +39,7 @@ class HousnerBlock:
     gravity: float = 9.81
 
     def __post_init__(self) -> None:
-        check(self, positive=("width", "height", "gravity"))
+        attributes(self, positive=("width", "height", "gravity"))
         if self.restitution <= 0.0:
             raise InputError(f"HousnerBlock: width {self.width} is too large for height {self.height}, the first "
                              "impact stops the block; give a width below sqrt(2) times the height")

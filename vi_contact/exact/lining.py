@@ -23,9 +23,9 @@ from functools import cached_property
 import numpy as np
 
 from ..algebra import Array
+from ..checks import attributes
 from ..errors import InputError
 from ..materials import LinearElastic
-from .numbers import check
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class ThinLining:
     soil: LinearElastic
 
     def __post_init__(self) -> None:
-        check(self, positive=("radius", "thickness"))
+        attributes(self, positive=("radius", "thickness"))
 
     @property
     def compressibility(self) -> float:
@@ -89,7 +89,7 @@ class ThickLining:
     slip: bool = True
 
     def __post_init__(self) -> None:
-        check(self, positive=("inner", "outer"))
+        attributes(self, positive=("inner", "outer"))
         if not self.inner < self.outer:
             raise InputError(f"ThickLining: inner radius {self.inner!r} m, outer {self.outer!r} m; give inner < outer")
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..algebra import Array
-from .numbers import check
+from ..checks import attributes
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class StripPunch:
     force: float
 
     def __post_init__(self) -> None:
-        check(self, positive=("half_width", "force"))
+        attributes(self, positive=("half_width", "force"))
 
     def pressure(self, x: ArrayLike) -> Array:
         """p(x) [Pa] at the distance x from the centre line, 0 beside the punch, infinite at its edge."""
@@ -45,7 +45,7 @@ class RoundPunch:
     modulus: float
 
     def __post_init__(self) -> None:
-        check(self, positive=("radius", "force", "modulus"))
+        attributes(self, positive=("radius", "force", "modulus"))
 
     @property
     def depth(self) -> float:

@@ -12,8 +12,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..checks import attributes
 from ..errors import InputError
-from .numbers import check
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class BoxFrame:
     invert: float
 
     def __post_init__(self) -> None:
-        check(self, positive=("width", "height", "wall", "roof", "invert"))
+        attributes(self, positive=("width", "height", "wall", "roof", "invert"))
 
     def flexibility(self, shear_modulus: float) -> float:
         """F = G H W²/(12 E I_roof) psi, psi = [3 a2² + 2 (1 + a1) a2 + a1]/(1 + a1 + 6 a2), a1 = I_roof/I_invert,
@@ -47,7 +47,7 @@ class ChannelFrame:
     slab: float
 
     def __post_init__(self) -> None:
-        check(self, positive=("width", "height", "wall", "slab"))
+        attributes(self, positive=("width", "height", "wall", "slab"))
 
     def flexibility(self, shear_modulus: float) -> float:
         """F = G/12 [2 H² W/(E I_wall) + H W²/(E I_slab)]."""

@@ -21,8 +21,8 @@ from numpy.typing import ArrayLike
 from scipy.special import zeta
 
 from ..algebra import Array
+from ..checks import attributes
 from ..errors import InputError
-from .numbers import check
 
 CATALAN = 0.915965594177219
 TERMS = 4000  # of the series of p: its tail is below 3e-5 of p
@@ -47,7 +47,7 @@ class RigidWall:
     flexibility: float = 0.0
 
     def __post_init__(self) -> None:
-        check(self, positive=("height", "rho"), not_negative=("nu", "flexibility"))
+        attributes(self, positive=("height", "rho"), not_negative=("nu", "flexibility"))
         if self.nu >= 0.5:
             raise InputError(f"RigidWall: nu is {self.nu!r}; give a Poisson's ratio from 0 to below 0.5")
 

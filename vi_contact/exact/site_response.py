@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..algebra import Array
+from ..checks import attributes
 from ..materials import LinearElastic
-from .numbers import check
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class SoilLayer:
     xi: float = 0.0
 
     def __post_init__(self) -> None:
-        check(self, positive=("height",), not_negative=("xi",))
+        attributes(self, positive=("height",), not_negative=("xi",))
 
     def frequency(self, n: int = 1) -> float:
         """f_n = (2n - 1) c_S / 4H [Hz] on a rigid base."""

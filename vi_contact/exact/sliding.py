@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..algebra import Array
+from ..checks import attributes
 from ..errors import InputError
-from .numbers import check
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class SlidingBlock:
     gravity: float = 9.81
 
     def __post_init__(self) -> None:
-        check(self, positive=("gravity",), not_negative=("mu",))
+        attributes(self, positive=("gravity",), not_negative=("mu",))
 
     @property
     def onset_acceleration(self) -> float:

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..algebra import Array
+from ..checks import attributes
 from ..errors import InputError
-from .numbers import check
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class TwoBars:
     speed: float = 1.0
 
     def __post_init__(self) -> None:
-        check(self, positive=("length1", "length2", "z1", "z2", "c1", "c2", "speed"))
+        attributes(self, positive=("length1", "length2", "z1", "z2", "c1", "c2", "speed"))
         first, second = (self.length1 / self.c1, self.z1), (self.length2 / self.c2, self.z2)
         if min(first, second)[1] > max(first, second)[1]:
             raise InputError("TwoBars: the bar crossed first has the larger impedance, so that contact outlives the "

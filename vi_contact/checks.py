@@ -1,0 +1,108 @@
+"""Checks of what a user gives: one sentence that names the owner, the field, the value and the remedy.
+
+Every constructor and every entry point of the package asks here, before any work is done. A check returns the value in
+the type that the caller goes on with, so that one line reads and checks an argument.
+"""
+
+from __future__ import annotations
+
+import math
+from numbers import Integral, Real
+from typing import Any
+
+import numpy as np
+
+from .algebra import Array
+from .errors import InputError
+
+SHOWN = 60  # characters of a value in a sentence
+
+
+def number(
+    owner: str, meaning: str, value: Any, *, positive: bool = False, not_negative: bool = False, unit: str = ""
+) -> float:
+    """Return a finite real number as a float; InputError for texts, NaN, infinity, truth values and wrong signs."""
+    kind = "a finite number above zero" if positive else "zero or a positive finite number"
+    wanted = (kind if positive or not_negative else "a finite number") + (f" in {unit}" if unit else "")
+    found = _real(value)
+    if not math.isfinite(found) or found < 0.0 and (positive or not_negative) or found == 0.0 and positive:
+        raise InputError(f"{owner}: {meaning} is {shown(value)}; give {wanted}")
+    return found
+
+
+def whole(owner: str, meaning: str, value: Any, *, least: int = 0, most: int | None = None) -> int:
+    """Return a whole number between ``least`` and ``most`` as an int; 3.0 counts as one, True does not."""
+    found = _real(value)
+    if not math.isfinite(found) or found != int(found) or found < least or (most is not None and found > most):
+        upper = "" if most is None else f" and at most {most}"
+        raise InputError(f"{owner}: {meaning} is {shown(value)}; give a whole number of at least {least}{upper}")
+    return int(value)
+
+
+def attributes(
+    owner: object, *, finite: tuple[str, ...] = (), positive: tuple[str, ...] = (), not_negative: tuple[str, ...] = ()
+) -> None:
+    """InputError naming the first attribute of ``owner`` that is not a finite number, or not > 0, or not >= 0."""
+    for name in finite + positive + not_negative:
+        number(
+            type(owner).__name__, name, getattr(owner, name),
+            positive=name in positive, not_negative=name in not_negative,
+        )
+
+
+def instance(owner: str, meaning: str, value: Any, kinds: type | tuple[type, ...], remedy: str) -> Any:
+    """Return an object of one of these types; InputError for a class instead of an object, and for anything else."""
+    if isinstance(value, kinds):
+        return value
+    raise InputError(f"{owner}: {meaning} is {shown(value)}; {_called(value)}{remedy}")
+
+
+def provides(owner: str, meaning: str, value: Any, names: tuple[str, ...], remedy: str) -> Any:
+    """Return an object that has these attributes (a protocol's); InputError for a class, and for anything else."""
+    if not isinstance(value, type) and all(hasattr(value, name) for name in names):
+        return value
+    raise InputError(f"{owner}: {meaning} is {shown(value)}; {_called(value)}{remedy}")
+
+
+def array(owner: str, meaning: str, value: Any, shape: tuple[int | None, ...], *, unit: str = "") -> Array:
+    """Return finite real values as a float array of this shape; None stands for any length along an axis."""
+    unit = f" in {unit}" if unit else ""
+    wanted = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ("," if len(shape) == 1 else "") + ")"
+    try:
+        raw = np.asarray(value)
+        if raw.dtype.kind not in "iuf":
+            raise ValueError
+        found = raw.astype(float)
+    except (TypeError, ValueError):
+        raise InputError(f"{owner}: {meaning} is {shown(value)}; give real numbers of shape {wanted}{unit}") from None
+    if found.ndim != len(shape) or any(n is not None and n != m for n, m in zip(shape, found.shape, strict=True)):
+        raise InputError(f"{owner}: {meaning} has shape {found.shape}; give numbers of shape {wanted}")
+    if not np.all(np.isfinite(found)):
+        place = tuple(int(i) for i in np.argwhere(~np.isfinite(found))[0])
+        raise InputError(f"{owner}: {meaning} is {found[place]} at {place}; give finite numbers")
+    return found
+
+
+def shown(value: Any) -> str:
+    """The value for a sentence: short, on one line, also where its own repr fails."""
+    if isinstance(value, type):
+        return f"the class {value.__name__}"
+    try:
+        text = " ".join(repr(value).split())
+    except Exception:  # a number of more digits than Python prints, an object with a broken repr
+        text = f"an object of type {type(value).__name__}"
+    return text if len(text) <= SHOWN else text[: SHOWN - 1] + "…"
+
+
+def _called(value: Any) -> str:
+    return f"make an object of it, {value.__name__}(…), or " if isinstance(value, type) else ""
+
+
+def _real(value: Any) -> float:
+    """The value as a float, NaN for what is no real number; integers too large for a float are infinite."""
+    if isinstance(value, bool | np.bool_) or not isinstance(value, Real | Integral):
+        return math.nan
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf
