@@ -169,7 +169,8 @@ def surface_of(space: FemSpace, parts: Sequence[Conditions], **data: Any) -> Fem
     frames = Frames(parts)
     d, count = space.dimension, len(frames.place)
     where = space._where(frames.numbers)
-    index = np.where(where[:, None] >= 0, space.free_index.reshape(-1, d)[where], -1)
+    index = np.full((len(where), d), -1, dtype=np.int64)
+    index[where >= 0] = space.free_index.reshape(-1, d)[where[where >= 0]]  # a rank may own no node at all
     slots = np.flatnonzero(where[frames.place] >= 0)
     place, column = frames.place[slots], frames.column[slots]
     tangents = np.array([np.delete(index[p], c) for p, c in zip(place, column, strict=True)], dtype=np.int64)

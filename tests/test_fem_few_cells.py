@@ -1,0 +1,70 @@
+"""Bodies of fewer cells and nodes than there are ranks: a rank that owns nothing takes part in everything."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("dolfinx")
+
+from fem_problems import CONCRETE, block
+
+from vi_contact.excitation import Harmonic
+from vi_contact.fem.assembly import assemble
+from vi_contact.fem.fields import XDMF
+from vi_contact.fem.trace import contact_surface
+from vi_contact.friction import Coulomb, Frictionless
+from vi_contact.mass import ConsistentMass
+from vi_contact.recorders import Contact, Energy, Probe
+from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
+from vi_contact.simulate import Solution, simulate
+from vi_contact.solvers.condensed import Condensed
+from vi_contact.solvers.volume import Volume
+from vi_contact.step import ContactProblem
+from vi_contact.surfaces import HalfSpace
+
+FEW = {
+    "bar": {"lengths": (2.0,), "divisions": (1,)},
+    "triangles": {"lengths": (2.0, 1.0), "divisions": (1, 1), "simplices": True},
+    "turned": {"lengths": (2.0, 1.0), "divisions": (2, 1), "angle": 0.3},
+    "hexahedra": {"lengths": (2.0, 1.0, 1.0), "divisions": (2, 1, 1)},
+}
+
+
+def shaken(comm: Any, spec: dict[str, Any], out: Path | None, steps: int, **more: Any) -> Solution:
+    """The body, clamped on its left, beside a rough half-space on its right, with all recorders."""
+    mesh, tags = block(comm, **spec)
+    d, angle = len(spec["lengths"]), spec.get("angle", 0.0)
+    across = np.array([np.cos(angle), np.sin(angle), 0.0][:d])
+    system = assemble(mesh, CONCRETE, clamped=tags["left"])
+    wall = HalfSpace(point=tuple(2.000001 * across), normal=tuple(-across))
+    surface = contact_surface(system, tags["right"], obstacle=wall)
+    friction = Coulomb(0.3) if d > 1 and not isinstance(more["solver"], Volume) else Frictionless()
+    shake = Harmonic(30.0, 40.0, direction=tuple(across + 0.3 * np.eye(d)[-1]))
+    problem = ContactProblem(system, surface, friction=friction, excitation=shake, mass=ConsistentMass())
+    record = [Energy(), Contact(), Probe({"end": tuple(2.0 * across)}, acceleration=True)]
+    return simulate(
+        problem, scheme=ZienkiewiczWoodTaylor(), dt=5e-4, steps=steps, record=record, out=out, progress=False,
+        fields=None if out is None else XDMF(every=5), **more,
+    )
+
+
+CASES = [("bar", Condensed()), ("bar", Volume()), ("triangles", Condensed()), ("turned", Condensed()),
+         ("turned", Volume()), ("hexahedra", Condensed())]
+
+
+@pytest.mark.parametrize(("name", "solver"), CASES, ids=[f"{name} {type(solver).__name__}" for name, solver in CASES])
+def test_a_rank_without_nodes(comm: Any, shared_tmp: Path, name: str, solver: Any) -> None:
+    """Assembly, contact, recorders, fields, checkpoint and restart, as on one rank."""
+    from mpi4py import MPI
+
+    shaken(comm, FEW[name], shared_tmp, 20, solver=solver)
+    spread = shaken(comm, FEW[name], shared_tmp, 40, solver=solver, restart=True).history
+    alone = shaken(MPI.COMM_SELF, FEW[name], None, 40, solver=solver).history
+    assert alone["contact_active"].max() > 0
+    for column in ("u_x_end", "contact_resultant", "energy_kinetic", "a_x_end"):
+        size = np.abs(alone[column]).max()
+        assert np.abs(spread[column] - alone[column]).max() < 1e-9 * size, column
