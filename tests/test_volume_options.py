@@ -28,6 +28,7 @@ from vi_contact.solvers.volume import (
     TaoTron,
     Volume,
 )
+from vi_contact.solvers.volume_reasons import NOT_A_NUMBER, raised, stopped
 from vi_contact.verify import kkt_residual
 
 METHODS = (ReducedNewton(), OneFactorisation(), SemismoothNewton(), TaoTron(), TaoBnls())
@@ -234,9 +235,37 @@ def test_iteration_limit_is_a_failure_in_words(pushed: Case, method: Any) -> Non
 @pytest.mark.parametrize("method", METHODS)
 def test_nan_load_is_a_failure(pushed: Case, method: Any) -> None:
     prepared = prepare(pushed, Volume(method=method))
-    with pytest.raises(StepFailure, match="not a number|Inf or NaN"):
+    with pytest.raises(StepFailure, match="not a number.* for NaN"):
         prepared.solve(replace(pushed.step, b=pushed.step.b * np.nan))
     assert kkt_residual(pushed.step, prepared.solve(pushed.step)).worst <= 1e-9
+
+
+@pytest.mark.serial
+def test_reasons_of_every_petsc_have_words() -> None:
+    """PETSc 3.25 renamed the reason of a residual that is not a number, and words its error 83 in its own way."""
+    old = type("Old", (), {"DIVERGED_FNORM_NAN": NOT_A_NUMBER})
+    new = type("New", (), {"DIVERGED_FUNCTION_NANORINF": NOT_A_NUMBER})
+    for reasons in (old, new, PETSc.SNES.ConvergedReason):
+        assert "(the residual is not a number): check the load" in str(stopped("Volume", reasons, NOT_A_NUMBER, 1, 0.5))
+    for words in ("Inf or NaN detected", "User provided compute function generated infinity or NaN"):
+        assert "check the load" in str(raised("Volume", RuntimeError(words)))
+    assert "check that A" in str(raised("Volume", RuntimeError("Nanometres are too long")))
+
+
+@pytest.mark.serial
+def test_the_objective_keeps_its_digits_near_its_origin() -> None:
+    """A line search needs f(y) - f(origin), which is 1e-12 of f and less than f's round-off allows."""
+    c = pushed_block()
+    scaled = prepare(c, Volume(method=TaoTron()))._scaled
+    y = np.linspace(0.5, 1.0, len(c.step.b))
+    scaled.set(c.step, y * 0.0)
+    gradient, small = PETSc.Vec().createSeq(len(y)), 2.0**-40 * y[::-1]
+    values = []
+    for origin in (y, y + small):
+        scaled.measure_from(origin)
+        values.append(scaled.objective(None, PETSc.Vec().createWithArray(y + small), gradient))
+    change = small @ (scaled.residual(y) + 0.5 * (scaled.residual(y + small) - scaled.residual(y)))
+    assert values[0] == pytest.approx(change, rel=1e-12) and values[1] == 0.0
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -1,16 +1,23 @@
-"""PETSc's reasons for stopping, in words, and the StepFailure made of them."""
+"""PETSc's reasons for stopping, in words, and the StepFailure made of them.
+
+PETSc 3.25 has other names for some reasons and other words for some errors; both are settled here.
+"""
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 from ..errors import StepFailure
 
+NOT_A_NUMBER = -4  # SNES_DIVERGED_FNORM_NAN, in PETSc 3.25 SNES_DIVERGED_FUNCTION_NANORINF: the number stayed
 WORDS = {
     "DIVERGED_FUNCTION_DOMAIN": "the residual could not be evaluated",
     "DIVERGED_FUNCTION_COUNT": "too many residual evaluations",
     "DIVERGED_LINEAR_SOLVE": "a linear system could not be solved",
     "DIVERGED_FNORM_NAN": "the residual is not a number",
+    "DIVERGED_FUNCTION_NANORINF": "the residual is not a number",
+    "DIVERGED_OBJECTIVE_NANORINF": "the objective is not a number",
     "DIVERGED_MAX_IT": "the iteration limit was reached",
     "DIVERGED_LINE_SEARCH": "the line search found no descent",
     "DIVERGED_INNER": "the inner solve failed",
@@ -22,10 +29,10 @@ WORDS = {
     "DIVERGED_LS_FAILURE": "the line search found no descent",
     "DIVERGED_TR_REDUCTION": "the trust region shrank to nothing",
 }
+CHECK_NUMBERS = "check the load, the guess and the bound of this step for NaN"
 ADVICE = {
     "DIVERGED_LINEAR_SOLVE": "check that the body is held or that mass enters A, and that A is positive definite",
-    "DIVERGED_FNORM_NAN": "check the load, the guess and the bound of this step for NaN",
-    "DIVERGED_NAN": "check the load, the guess and the bound of this step for NaN",
+    **dict.fromkeys((name for name, words in WORDS.items() if words.endswith("not a number")), CHECK_NUMBERS),
 }
 GENERAL_ADVICE = "check that the body is held, try a smaller dt, another method, or a larger iteration limit"
 
@@ -48,10 +55,11 @@ def stopped(method: str, reasons: type, reason: int, iterations: int, worst: flo
 
 def raised(method: str, error: Any) -> StepFailure:
     """The failure of a PETSc call that raised."""
-    return StepFailure(
-        f"{method} stopped with PETSc error {getattr(error, 'ierr', 'unknown')} ({last_line(error)}): "
-        "check that A is positive definite and that load, guess and bound are finite, or try another method"
-    )
+    said = last_line(error)
+    advice = "check that A is positive definite and that load, guess and bound are finite, or try another method"
+    if re.search(r"\bnan\b", said, re.IGNORECASE):  # error 72, "Inf or NaN", or 83, "generated infinity or NaN"
+        said, advice = f"not a number: {said}", CHECK_NUMBERS
+    return StepFailure(f"{method} stopped with PETSc error {getattr(error, 'ierr', 'unknown')} ({said}): {advice}")
 
 
 def last_line(error: Any) -> str:

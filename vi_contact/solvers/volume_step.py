@@ -14,6 +14,7 @@ from petsc4py import PETSc
 
 from ..algebra import Array, Mask, max_abs
 from ..step import StepProblem
+from .volume_reasons import NOT_A_NUMBER
 from .volume_system import BoundedSystem
 
 ROUND_OFF = 1e-14  # backward error |A z - b| / (|A| |z| + |b|), largest entries, of a solve that cannot be improved
@@ -60,12 +61,19 @@ class ScaledStep:
         F.array[:] = self.last
 
     def objective(self, _solver: Any, y: Any, G: Any) -> float:
-        """½ y·Hy - y·b/r_ref and its gradient F(y), for TAO; H = A x_ref / r_ref."""
+        """f(y) - f(origin) and the gradient F(y), for TAO; f(y) = ½ y·Hy - y·b/r_ref, H = A x_ref / r_ref.
+
+        A line search compares values, which agree in all their digits where the gradient still has eight to lose.
+        """
         values = y.array_r
         F = self.residual(values)
         G.array[:] = F
-        energy = 0.5 * (values @ (F - self.b / self.r_ref))
+        energy = 0.5 * ((values - self._zero[0]) @ (F + self._zero[1]))
         return float(self.system.surface.comm.sum(np.array([energy]))[0])
+
+    def measure_from(self, y: Array) -> None:
+        """Take y as the origin of the objective."""
+        self._zero = y, self.residual(y)
 
     def active(self, y: Array, F: Array) -> Mask:
         """(local) the natural map's choice: where the reaction exceeds the remaining gap."""
@@ -100,7 +108,7 @@ class ScaledStep:
         """
         force, gap, backward = self.errors(y, F)
         if np.isnan(force):
-            return int(PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN)
+            return NOT_A_NUMBER
         worst, before = max(force, gap), self._worst
         self._worst = worst
         if backward <= ROUND_OFF and worst <= self.tolerance and gap <= ROUND_OFF:

@@ -93,12 +93,19 @@ class TaoDriver:
         """(y, F(y), PETSc's reason, iterations) of the scaled step."""
         scaled, tao = self._scaled, self.solver
         self._hessian.rescale(scaled.x_ref / scaled.r_ref)
-        self._y.array[:] = np.clip(scaled.start, scaled.lower, scaled.upper)
+        y = np.clip(scaled.start, scaled.lower, scaled.upper)
         write_bounds(scaled, self._vectors[2], self._vectors[3])
-        with self._layers.in_force():
-            tao.solve(self._y)
-        y = np.array(self._y.array_r)
-        return y, scaled.residual(y), tao.getConvergedReason(), tao.getIterationNumber()
+        iterations, before = 0, np.inf
+        while True:
+            scaled.measure_from(y)
+            self._y.array[:] = y
+            with self._layers.in_force():
+                tao.solve(self._y)
+            y, reason = np.array(self._y.array_r), tao.getConvergedReason()
+            F, iterations = scaled.residual(y), iterations + tao.getIterationNumber()
+            if reason != PETSc.TAO.Reason.DIVERGED_LS_FAILURE or scaled.accepts(y, F) or scaled.worst > 0.5 * before:
+                return y, F, reason, iterations
+            before = scaled.worst  # the values compared were round-off: measured from here they have all digits again
 
     def destroy(self) -> None:
         """Free the PETSc objects; collective."""
