@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import faulthandler
 import functools
+import itertools
 import os
 import shutil
 import tempfile
 import time
+from collections import Counter
 from collections.abc import Generator, Iterator
 from pathlib import Path
 from typing import Any, TextIO
@@ -21,8 +23,9 @@ import pytest
 
 RANK = int(os.environ.get("OMPI_COMM_WORLD_RANK", os.environ.get("PMI_RANK", "0")))
 SIZE = int(os.environ.get("OMPI_COMM_WORLD_SIZE", os.environ.get("PMI_SIZE", "1")))
-TEST_SECONDS = 600  # a test that takes longer is taken to be stuck
+TEST_SECONDS = 600  # a test that takes longer on an idle machine is taken to be stuck
 MEETING_SECONDS = 30  # patience of a rank that has failed: the others are probably waiting for it in a collective call
+SLOWEST_FILES = 10  # told at the end of a run
 
 _stderr = pytest.StashKey[TextIO]()
 _collection_errors: list[str] = []
@@ -33,6 +36,11 @@ def _comm() -> Any:
     from mpi4py import MPI  # here: pure numpy tests need no MPI
 
     return MPI.COMM_WORLD.Dup()
+
+
+def _patience(seconds: float) -> float:
+    """Seconds for what takes `seconds` on an idle machine, when others are at work here too."""
+    return seconds * max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))
 
 
 def _meet(config: pytest.Config, mine: str, *, where: str, seconds: float) -> list[str]:
@@ -77,14 +85,14 @@ def pytest_collection_finish(session: pytest.Session) -> None:
     if SIZE == 1:
         return
     mine = "\n".join([*_collection_errors, *(item.nodeid for item in session.items)])
-    texts = _meet(session.config, mine, where="collection", seconds=TEST_SECONDS)
+    texts = _meet(session.config, mine, where="collection", seconds=_patience(TEST_SECONDS))
     if any(text != mine for text in texts):
         _abort(session.config, f"ranks collected different tests:\n{mine}")
 
 
 @pytest.hookimpl(hookwrapper=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, Any, None]:
-    faulthandler.dump_traceback_later(TEST_SECONDS, exit=True, file=item.config.stash[_stderr])
+    faulthandler.dump_traceback_later(_patience(TEST_SECONDS), exit=True, file=item.config.stash[_stderr])
     yield
     faulthandler.cancel_dump_traceback_later()
 
@@ -100,7 +108,7 @@ def _agree(config: pytest.Config, report: pytest.TestReport) -> None:
     """Make a phase that did not end alike on all ranks a failure on all ranks, told with the failing ranks' texts."""
     failed = report.outcome == "failed"
     mine = report.outcome + ("\n" + report.longreprtext if failed else "")
-    patience = MEETING_SECONDS if failed else TEST_SECONDS
+    patience = _patience(MEETING_SECONDS if failed else TEST_SECONDS)
     texts = _meet(config, mine, where=f"{report.nodeid} ({report.when})", seconds=patience)
     outcomes = [text.split("\n", 1)[0] for text in texts]
     if len(set(outcomes)) > 1 and not failed:
@@ -114,10 +122,26 @@ def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
         session.exitstatus = pytest.ExitCode.OK  # all were serial: they ran on one rank
 
 
+def _seconds_by_file(stats: dict[str, list[Any]]) -> list[tuple[float, str]]:
+    """(seconds of all phases of all tests, file), the slowest first."""
+    seconds: Counter[str] = Counter()
+    for report in itertools.chain.from_iterable(stats.values()):
+        if isinstance(report, pytest.TestReport):
+            seconds[report.nodeid.split("::")[0]] += report.duration
+    return [(total, file) for file, total in seconds.most_common()]
+
+
 def pytest_terminal_summary(terminalreporter: Any) -> None:
-    """Leave the counts where tests/run.sh sums them."""
+    """Tell the slowest files, and leave the counts where tests/run.sh sums them."""
+    stats = terminalreporter.stats
+    times = [f"{total:8.1f} s  {file}" for total, file in _seconds_by_file(stats)]
+    if len(times) > 1:
+        terminalreporter.section("slowest files")
+        terminalreporter.write_line("\n".join(times[:SLOWEST_FILES]))
+    if table := os.environ.get("VI_CONTACT_TIMES"):
+        with open(table, "a") as file:
+            file.writelines(f"{SIZE} {line}\n" for line in times)
     if tally := os.environ.get("VI_CONTACT_TALLY"):
-        stats = terminalreporter.stats
         passed, skipped = len(stats.get("passed", [])), len(stats.get("skipped", []))
         failed = len(stats.get("failed", [])) + len(stats.get("error", []))
         Path(tally).write_text(f"{passed} {failed} {skipped}\n")

@@ -1,7 +1,9 @@
 #!/usr/bin/env bash
-# bash tests/run.sh [arguments of pytest…]     the whole suite on 1, 2 and 3 ranks; installs what is missing on Debian 12 or 13
+# bash tests/run.sh [--quick] [arguments of pytest…]     the whole suite on 1, 2 and 3 ranks; installs what is missing on Debian
+#   --quick                     one rank, without the tests marked slow: about a minute
 #   VI_CONTACT_RANKS="1 2"      other numbers of ranks
-#   VI_CONTACT_TIMEOUT=1800     seconds for all of them together
+#   VI_CONTACT_TIMES=FILE       appends "ranks seconds file" for every test file
+#   VI_CONTACT_TIMEOUT=1800     seconds for all of them together; without it only single tests have a limit (tests/conftest.py)
 # Last line: "N passed, N failed, N skipped", summed over the runs.
 set -uo pipefail
 tests=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
@@ -11,18 +13,28 @@ cd "$vi_root" || exit 1
 
 export PETSC_OPTIONS="-no_signal_handler ${PETSC_OPTIONS:-}"  # a crash is then told by Python, with the line it came from
 [ -t 1 ] && colour=auto || colour=no  # mpirun gives its processes a terminal, even when its own output is a file
-seconds=${VI_CONTACT_TIMEOUT:-1800} passed=0 failed=0 skipped=0 status=0 child=
+seconds=${VI_CONTACT_TIMEOUT:-} passed=0 failed=0 skipped=0 status=0 child=
+ranks=${VI_CONTACT_RANKS:-1 2 3}
+if [ "${1:-}" = --quick ]; then shift; ranks=1; set -- -m "not slow" "$@"; fi
 tally=$(mktemp)
 trap 'rm -f "$tally"' EXIT
 trap 'kill "$child"; wait; exit 130' INT TERM
 
+# One rank leaves cores idle: whole files go to as many processes (a few: each takes two gigabytes), unless somebody wants to
+# see a test talk.
+share() {
+  local cores argument; cores=$(env -u OMP_NUM_THREADS nproc)
+  for argument; do case $argument in -s | --capture=no | --pdb | --trace | -n*) return ;; esac; done
+  [ "$cores" -lt 2 ] || echo "-n $((cores < 4 ? cores : 4)) --dist loadfile --max-worker-restart 2"
+}
+
 run() {  # on $1 ranks, with pytest's arguments
-  local ranks=$1 launch=() code=0 p=0 f=0 s=0; shift
+  local ranks=$1 launch=() limit=() code=0 p=0 f=0 s=0; shift
   # --capture=sys: a library that calls exit() on one rank takes what pytest has captured from it along
-  [ "$ranks" -eq 1 ] || { launch=(mpirun -n "$ranks"); set -- --capture=sys "$@"; }
+  if [ "$ranks" -eq 1 ]; then set -- $(share "$@") "$@"; else launch=(mpirun -n "$ranks"); set -- --capture=sys "$@"; fi
+  [ -z "$seconds" ] || limit=(timeout -k 10 "$((SECONDS < seconds ? seconds - SECONDS : 1))")
   : >"$tally"
-  VI_CONTACT_TALLY=$tally timeout -k 10 "$((SECONDS < seconds ? seconds - SECONDS : 1))" \
-    "${launch[@]}" "$vi_python" -m pytest --color="$colour" "$@" </dev/null &
+  VI_CONTACT_TALLY=$tally "${limit[@]}" "${launch[@]}" "$vi_python" -m pytest --color="$colour" "$@" </dev/null &
   child=$!
   wait "$child" || code=$?
   case $code in 124 | 137) echo "vi_contact: stopped, the $seconds s of VI_CONTACT_TIMEOUT are over" >&2 ;; esac
@@ -32,9 +44,9 @@ run() {  # on $1 ranks, with pytest's arguments
   passed=$((passed + p)) failed=$((failed + f)) skipped=$((skipped + s))
 }
 
-for ranks in ${VI_CONTACT_RANKS:-1 2 3}; do
-  echo "vi_contact: the suite on $ranks $([ "$ranks" -eq 1 ] && echo rank || echo ranks)"
-  run "$ranks" "$@"
+for count in $ranks; do
+  echo "vi_contact: the suite on $count $([ "$count" -eq 1 ] && echo rank || echo ranks)"
+  run "$count" "$@"
 done
 echo "$passed passed, $failed failed, $skipped skipped"
 exit "$status"

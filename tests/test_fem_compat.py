@@ -44,3 +44,9 @@ def test_assembled_mass_is_symmetric_and_weighs_the_block(comm):
     product.axpy(-1.0, b)
     assert product.norm() < 1e-14 * b.norm() * 10
     assert M.isSymmetric(1e-15)
+
+
+def test_waiting_for_another_process_that_compiles_has_patience():
+    """A form takes seconds to compile, on a machine with eight other processes five times as many."""
+    options = getattr(dolfinx.jit, "get_options", None) or dolfinx.jit.get_parameters
+    assert options()["timeout"] >= 300
