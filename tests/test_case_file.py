@@ -342,8 +342,8 @@ def test_wrong_values_are_told_without_a_mesh(tmp_path: Path, old: str, new: str
 
 @pytest.mark.serial
 @pytest.mark.parametrize(("old", "new", "said"), [
-    ('clamped = "base"', 'clamped = "foot"', "[system] clamped is 'foot', but the mesh has no boundary group 'foot'"),
-    ('clamped = "base"', 'clamped = ["wall"]', "[system] clamped[1] is 'wall', a group of other things: give the name"),
+    ('clamped = "base"', 'clamped = "foot"', "[system] clamped is 'foot', but the mesh has no group 'foot'"),
+    ('clamped = "base"', 'clamped = ["wall"]', "[system] clamped[1] is 'wall', a cell group: give the name"),
     ("steps = 400", "", "[run] has neither steps nor t_end, and the excitation has no end: give one"),
 ])
 def test_mistakes_that_need_the_mesh(tmp_path: Path, old: str, new: str, said: str) -> None:

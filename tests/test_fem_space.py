@@ -138,7 +138,7 @@ def test_inertia_load_of_an_excitation_is_the_body_force_of_the_relative_frame()
 
 def test_unknown_boundary_is_told_with_the_known_ones():
     _, tags = block(COMM, lengths=(2.0, 2.0), divisions=(4, 4))
-    with pytest.raises(InputError, match="mesh has no boundary group 'botom'; it has .*bottom"):
+    with pytest.raises(InputError, match="mesh has no group 'botom'; its boundary groups are .*bottom"):
         tags["botom"]
 
 

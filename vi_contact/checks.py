@@ -16,6 +16,8 @@ from .algebra import Array
 from .errors import InputError
 
 SHOWN = 60  # characters of a value in a sentence
+LARGEST = 50_000_000  # numbers in one array that an input may ask for: 400 MB
+MOST_CELLS = 20_000_000  # of a mesh made here: Gmsh takes some kilobytes for each
 
 
 def number(
@@ -36,6 +38,14 @@ def whole(owner: str, meaning: str, value: Any, *, least: int = 0, most: int | N
     if not math.isfinite(found) or found != int(found) or found < least or (most is not None and found > most):
         upper = "" if most is None else f" and at most {most}"
         raise InputError(f"{owner}: {meaning} is {shown(value)}; give a whole number of at least {least}{upper}")
+    return int(value)
+
+
+def counted(owner: str, asked: str, value: Any, things: str = "samples", *, most: int = LARGEST) -> int:
+    """Return how many things an input asks for, before memory is taken for them; InputError above ``most``, and NaN."""
+    found = _real(value)
+    if not found <= most:
+        raise InputError(f"{owner}: {asked} asks for {found:.3g} {things}, and {most:.3g} are the most; ask for fewer")
     return int(value)
 
 

@@ -57,16 +57,17 @@ class Tags(dict[str, Any]):
         facets = [key for key, group in self.items() if isinstance(group, Facets)]
         cells = [key for key, group in self.items() if isinstance(group, Cells)]
         raise InputError(
-            f"mesh has no boundary group '{name}'; it has {', '.join(facets) or 'none'}"
-            f" (and cell groups {', '.join(cells)}): name it in Gmsh as a physical group"
+            f"mesh has no group '{name}'; its boundary groups are {', '.join(facets) or 'none'},"
+            f" its cell groups {', '.join(cells)}: name it in Gmsh as a physical group"
         )
 
 
 def read_mesh(path: str | Path, comm: MPI.Comm) -> tuple[Mesh, Tags]:
     """Read a first-order mesh of intervals, triangles, quadrilaterals, tetrahedra or hexahedra and its physical groups.
 
-    Coordinates in metres; any file format Gmsh reads. Raises InputError, the same on every rank, if the file is
-    missing or holds no usable mesh (all reasons: `vi_contact.meshes.extract.extract`). Collective.
+    Coordinates in metres; a file in Gmsh's own format, MSH 2 to 4, text or binary. Raises InputError, the same on every
+    rank, if the file is missing, a script, or holds no usable mesh
+    (all reasons: `vi_contact.meshes.extract.extract`). Collective.
     """
     return _distribute(comm, lambda: arrays_from_file(path))
 

@@ -23,6 +23,7 @@ import numpy as np
 if not __package__:  # run as a file of the source tree, maybe not installed
     sys.path[0] = str(Path(__file__).resolve().parents[2])
 
+from vi_contact.checks import MOST_CELLS, counted
 from vi_contact.errors import InputError
 from vi_contact.meshes.gmsh_session import write
 
@@ -62,6 +63,8 @@ class BallMesh:
             raise InputError(f"growth {self.growth} of the cells of a ball must be positive: give 0.1 to 0.5")
         if not self.size <= self._largest <= self.radius:
             raise InputError(f"coarsest cell {self.coarsest} m must lie between the size {self.size} m and the radius")
+        cells = (self.foot / self.size) ** 3 + (self.radius / self._largest) ** 3
+        counted("ball", f"a cell size of {self.size} m", cells, "cells", most=MOST_CELLS)
 
     @property
     def _largest(self) -> float:

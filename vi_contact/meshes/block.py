@@ -20,6 +20,7 @@ import numpy as np
 if not __package__:  # run as a file of the source tree, maybe not installed
     sys.path[0] = str(Path(__file__).resolve().parents[2])
 
+from vi_contact.checks import MOST_CELLS, counted
 from vi_contact.errors import InputError
 from vi_contact.meshes.gmsh_session import write
 from vi_contact.meshes.grid import Array, add_grid, lattice
@@ -70,8 +71,9 @@ def check_box(lengths: Sequence[float], divisions: Sequence[int]) -> None:
         raise InputError(f"lengths {tuple(lengths)} and divisions {tuple(divisions)} must both be 1, 2 or 3 numbers")
     if not all(math.isfinite(length) and length > 0.0 for length in lengths):
         raise InputError(f"lengths {tuple(lengths)} must be positive numbers of metres")
-    if not all(n == int(n) and n >= 1 for n in divisions):
+    if not all(n == n // 1 and n >= 1 for n in divisions):
         raise InputError(f"divisions {tuple(divisions)} must be whole numbers of cells, at least 1")
+    counted("mesh", f"divisions {tuple(divisions)}", math.prod(divisions), "cells", most=MOST_CELLS)
 
 
 def _turn(nodes: Array, angle: float) -> Array:

@@ -21,6 +21,7 @@ from typing import Any
 if not __package__:  # run as a file of the source tree, maybe not installed
     sys.path[0] = str(Path(__file__).resolve().parents[2])
 
+from vi_contact.checks import MOST_CELLS, counted
 from vi_contact.errors import InputError
 from vi_contact.meshes.channel_grid import channel_grid
 from vi_contact.meshes.from_arrays import add_arrays
@@ -65,6 +66,10 @@ class ChannelMesh:
             raise InputError(f"channel {ends} needs soil on both sides: keep it between 0 and {self.width} m")
         if self.far is not None and self.far < self.size:
             raise InputError(f"cells of {self.far} m far from the channel: give at least those at it, {self.size} m")
+        grid = self.width / self.size * (self.depth / self.size)
+        around = (self.outer_width + 2.0 * self.height) / self.size + self.width / (self.far or self.size)
+        cells = grid if self.far is None else max(around, self.width / self.far * (self.depth / self.far))
+        counted("channel", f"a cell size of {self.size} m", cells, "cells", most=MOST_CELLS)
 
     @property
     def x(self) -> tuple[float, ...]:

@@ -21,6 +21,7 @@ import numpy.typing as npt
 if not __package__:  # run as a file of the source tree, maybe not installed
     sys.path[0] = str(Path(__file__).resolve().parents[2])
 
+from vi_contact.checks import MOST_CELLS, counted
 from vi_contact.errors import InputError
 from vi_contact.meshes.gmsh_session import write
 
@@ -43,6 +44,7 @@ class DiskMesh:
         if not (math.isfinite(self.radius) and 0.0 < self.size <= 0.5 * self.radius):
             raise InputError(f"disk of radius {self.radius} m with cells of {self.size} m: give a positive radius and"
                              " cells of at most half of it")
+        counted("disk", f"a cell size of {self.size} m", (self.radius / self.size) ** 2, "cells", most=MOST_CELLS)
         if not self.size / self.radius <= self.foot < 0.5 * math.pi:
             raise InputError(f"foot of a disk is {self.foot} rad: give an angle from one cell to less than pi/2")
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from scipy.spatial import cKDTree
 from vi_contact.errors import InputError
 from vi_contact.meshes.checks import Array, check_cells, check_folds, check_sides
 from vi_contact.meshes.gmsh_session import MeshScript, session
+from vi_contact.meshes.mesh_file import copied
 from vi_contact.meshes.rows import Rows, number_alike
 
 Mask = npt.NDArray[np.bool_]
@@ -50,18 +52,17 @@ class _Elements:
 
 
 def arrays_from_file(path: str | Path) -> MeshArrays:
-    """Read a mesh file of any format Gmsh reads. InputError if missing or unreadable, and like `extract`."""
+    """Read a mesh file in Gmsh's own format, MSH 2 to 4, text or binary. InputError like `copied` and `extract`."""
     file = Path(path)
-    if not file.is_file():
-        raise InputError(f"mesh file {file} does not exist: check the path or write it with a script of folder meshes")
-    if file.stat().st_size == 0:
-        raise InputError(f"mesh file {file} is empty: write it again")
-    with session(file.stem) as gmsh:
-        try:
-            gmsh.merge(str(file))
-        except Exception as error:  # the only class Gmsh raises
-            raise InputError(f"Gmsh cannot read mesh file {file}: {error}") from error
-        return extract(gmsh, str(file))
+    with TemporaryDirectory(prefix="vi_contact-") as folder:
+        copy = copied(file, Path(folder))
+        with session() as gmsh:
+            try:
+                gmsh.merge(str(copy))
+            except Exception as error:  # the only class Gmsh raises
+                said = str(error).replace(str(copy), file.name)
+                raise InputError(f"Gmsh cannot read mesh file {file}: {said}") from error
+            return extract(gmsh, str(file))
 
 
 def arrays_from_script(mesh: MeshScript) -> MeshArrays:

@@ -18,6 +18,7 @@ from typing import Any
 if not __package__:  # run as a file of the source tree, maybe not installed
     sys.path[0] = str(Path(__file__).resolve().parents[2])
 
+from vi_contact.checks import MOST_CELLS, counted
 from vi_contact.errors import InputError
 from vi_contact.meshes.block import check_box
 from vi_contact.meshes.gmsh_session import write
@@ -47,6 +48,9 @@ class WallMesh:
         check_box((self.width, self.height), self.divisions or _PUBLISHED)
         if self.size is not None and not (math.isfinite(self.size) and 0.0 < self.size <= min(self.width, self.height)):
             raise InputError(f"cell size {self.size} m must be positive and no larger than the wall's sides")
+        if self.size is not None:
+            cells = self.width / self.size * (self.height / self.size)
+            counted("wall", f"a cell size of {self.size} m", cells, "cells", most=MOST_CELLS)
 
     def build(self, gmsh: Any) -> None:
         """Add the wall to Gmsh's current model."""

@@ -84,9 +84,17 @@ class Group:
         except InputError as error:
             raise self.spot.wrong(f"is '{self.name}', but the {error}") from None
         if not isinstance(found, self.kind):
-            wanted = GROUP[self.kind.__name__]
-            raise self.spot.wrong(f"is '{self.name}', a group of other things: give the name of {wanted}")
+            raise self.spot.wrong(f"is '{self.name}', {GROUP[type(found).__name__]}: {self._remedy(found)}")
         return found
+
+    def _remedy(self, found: Any) -> str:
+        """Give the other kind; or, where a boundary was saved without the body it bounds, save the body too."""
+        way = f"give the name of {GROUP[self.kind.__name__]}"
+        dim = found.mesh.topology.dim
+        if self.kind.__name__ == "Cells" or dim > 2:
+            return way
+        body = "Physical Volume" if dim == 2 else "Physical Surface"
+        return f"{way}, or, if it bounds the body, the mesh has no {dim + 1}D cells: add a {body} in Gmsh"
 
 
 GROUP = {"Facets": "a boundary group", "Cells": "a cell group"}

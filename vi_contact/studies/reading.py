@@ -31,6 +31,8 @@ class Words:
 def read(value: Any, hint: Any, spot: Spot, words: Words) -> Node:
     """The node of a value for a parameter with this hint. InputError when it does not fit."""
     members = list(_members(hint))
+    if any(_is_path(member) for member in members):  # a text is the path then, and belongs to the case file's folder
+        members = [member for member in members if member is not str]
     if isinstance(value, dict):
         return _table(value, members, spot, words)
     if isinstance(value, list):

@@ -1,0 +1,92 @@
+"""A mesh file on its way to Gmsh: only what is certainly a mesh, under a name and in a folder of our own.
+
+Gmsh runs as a script whatever it does not recognise as a mesh, and a script may run any command of the shell. It decides by the
+name of a file, else by the first word in it; FILE.opt beside a mesh is run too, and a name that ends in .gz reaches a shell.
+So a mesh file is read only if its first bytes are those of Gmsh's own format, and from a copy called mesh.msh, alone in
+a new folder.
+"""
+
+from __future__ import annotations
+
+import mmap
+import re
+import shutil
+import struct
+from pathlib import Path
+
+from vi_contact.checks import shown
+from vi_contact.errors import InputError
+
+MAGIC = b"$MeshFormat"
+_SCRIPTS = (".geo", ".geo_unrolled", ".opt", ".pos", ".script")
+_SECTION = re.compile(rb"\n\$(End)?(PhysicalNames|Entities|Nodes|Elements)\b")
+SHORT = 80  # bytes in which what comes first is found
+
+
+def copied(file: Path, folder: Path) -> Path:
+    """A copy of a mesh file in this folder, safe for Gmsh to read.
+
+    InputError for a file that is missing, empty, no MSH file (a script most of all), cut short, or that announces more
+    nodes or cells than it has bytes.
+    """
+    if not file.is_file():
+        what = str(file) if "\0" not in str(file) else shown(str(file))
+        raise InputError(f"mesh file {what} does not exist: check the path or write it with a script of folder meshes")
+    copy = folder / "mesh.msh"
+    try:
+        shutil.copyfile(file, copy)
+    except OSError as error:
+        raise InputError(f"mesh file {file} cannot be read ({error.strerror}): check its permissions") from None
+    if copy.stat().st_size == 0:
+        raise InputError(f"mesh file {file} is empty: write it again")
+    with open(copy, "rb") as opened, mmap.mmap(opened.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        _check_magic(data, file)
+        _check_sections(data, file)
+    return copy
+
+
+def _check_magic(data: mmap.mmap, file: Path) -> None:
+    if data[: len(MAGIC)] == MAGIC:
+        return
+    if file.suffix.lower() in _SCRIPTS:
+        raise InputError(
+            f"mesh file {file} is a Gmsh script, which may run commands, and is not read: mesh it yourself and give the"
+            f" result, as by gmsh -2 {file.name} -o {file.stem}.msh (-3 for a body in space)"
+        )
+    raise InputError(
+        f"mesh file {file} does not begin with $MeshFormat, so it is no mesh of Gmsh's own format: write it from Gmsh"
+        f" as .msh, or convert it as by gmsh -save {file.name} -o {file.stem}.msh if you trust it"
+    )
+
+
+def _check_sections(data: mmap.mmap, file: Path) -> None:
+    """What is opened is closed, and no more is announced than the file can hold: Gmsh makes room before it reads."""
+    version, binary = (data[:SHORT].split() + [b"", b""])[1:3]
+    opened, name = b"", b""
+    for section in _SECTION.finditer(data):
+        closes, name = section[1] is not None, section[2]
+        if closes != (opened != b"") or (closes and name != opened):
+            break
+        if not closes:
+            ahead = data[section.end() : section.end() + SHORT]
+            counts = _packed(ahead) if binary == b"1" and name != b"PhysicalNames" else _written(ahead)
+            if max(counts[:1] if version.startswith(b"2") else counts) > len(data):
+                what = name.decode().lower()
+                raise InputError(f"mesh file {file} announces more {what} than it can hold: write it again from Gmsh")
+        opened = b"" if closes else name
+    else:
+        if not opened:
+            return
+    raise InputError(f"mesh file {file} is cut short or damaged near {name.decode()}: write it again from Gmsh")
+
+
+def _written(ahead: bytes) -> tuple[int, ...]:
+    """The first two numbers after the name of a section: of format 4 blocks and items, of format 2 items, and more."""
+    return tuple(int(word) if word.isdigit() else 0 for word in ahead.split()[:2]) or (0,)
+
+
+def _packed(ahead: bytes) -> tuple[int, ...]:
+    """The same of a binary file: 8 bytes each, in the order of bytes that makes them smaller; of format 2 in text."""
+    head = ahead[1:17]
+    both = [struct.unpack(order, head) for order in ("<2Q", ">2Q")] if len(head) == 16 else []
+    return min([*both, _written(ahead)] if ahead[1:2].isdigit() else both, key=max, default=(0,))
