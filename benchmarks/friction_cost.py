@@ -54,7 +54,7 @@ def measured(problem: vc.ContactProblem, solver: Any, dt: float, count: int, lin
 
 def measure(size: float, steps: int, mu: float) -> None:
     """One size: without friction, and every route."""
-    model = build(Wall(divisions=DIVISIONS[size]), MPI.COMM_WORLD)
+    model = build(Wall(divisions=DIVISIONS[size]), MPI.COMM_WORLD, base_inertia="catalogue")
     shaken = model.problem("face")
     vertical = vc.Harmonic(3.0, 20.0, direction=(0.0, 1.0))
     plain = replace(shaken, excitation=(*shaken.excitations, vertical))

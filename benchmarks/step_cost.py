@@ -137,7 +137,7 @@ def unilateral_steps(
 
 def measure(size: float, steps: int) -> dict[str, Any]:
     """One size: the linear step and every route."""
-    model = build(Wall(divisions=DIVISIONS[size]), MPI.COMM_WORLD)
+    model = build(Wall(divisions=DIVISIONS[size]), MPI.COMM_WORLD, base_inertia="catalogue")
     problem = model.problem("face")
     dt = model.time_step()
     A = SCHEME.effective_matrix(problem, dt)
@@ -195,7 +195,7 @@ def line(row: dict[str, Any], name: str, found: dict[str, Any]) -> str:
 def seed_wall(steps: int = 400) -> float:
     """Seconds of the seed's 400-step wall, mesh to last step, after imports."""
     def run() -> None:
-        model = build(Wall(), MPI.COMM_WORLD)
+        model = build(Wall(), MPI.COMM_WORLD, base_inertia="catalogue")
         for _ in vc.march(
             model.problem("b"), scheme=SCHEME, solver=vc.Condensed(), dt=model.time_step(), steps=steps
         ):

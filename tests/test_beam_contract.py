@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -184,3 +185,17 @@ def test_bad_input() -> None:
     for x in (5.1, -0.1, 0.5):
         with pytest.raises(InputError, match=r"not all on the moving part of the beam: give x from 0\.625 to 5"):
             problem.system.space.find_nodes(np.array([[x]]))
+
+
+@pytest.mark.parametrize("published", [False, True])
+def test_ground_accelerates_the_mass_shared_with_the_clamp(published: bool) -> None:
+    """The inertia load is that of the whole mass, rho A h at every node and half of it at the tip, along and across,
+    and rotations feel none: what a uniform body force of minus rho A a does."""
+    elements = Elements(4, reduced_shear=not published, published_end=published)
+    rod, beam = Rod(length=2.0, rho=3.0), TimoshenkoBeam(length=2.0, rho=3.0)
+    mass = 3.0 * np.array([0.5, 0.5, 0.5, 0.25])
+    assert rod_problem(rod, elements).system.inertia(np.ones(1)) == pytest.approx(mass, rel=1e-14)
+    problem = rubbing_problem(rod, beam, elements, friction=vc.Coulomb(MU))
+    load = replace(problem, excitation=vc.FullSine(2.0, 1.0, direction=(1.0, -0.5))).equations.load(0.25)
+    expected = -2.0 * np.concatenate([mass, np.zeros(4), -0.5 * mass])
+    assert load == pytest.approx(expected, rel=1e-14, abs=1e-14)

@@ -195,9 +195,10 @@ steps = 30
 
 
 def test_a_model_by_its_name(shared_tmp: Path) -> None:
-    """[model] is the wall of ``models.wall`` with its own probes."""
-    found = run_case(write(shared_tmp, MODEL), COMM, progress=False)
-    model = build(Wall(thickness=0.3), COMM)
+    """[model] is the wall of ``models.wall`` with its own probes and the convention that is named."""
+    text = MODEL.replace("thickness", 'base_inertia = "catalogue"\nthickness')
+    found = run_case(write(shared_tmp, text), COMM, progress=False)
+    model = build(Wall(thickness=0.3), COMM, base_inertia="catalogue")
     expected = vc.simulate(
         model.problem("a", excitation=vc.Harmonic(1.0, 14.0)), scheme=vc.ZienkiewiczWoodTaylor(), dt=0.0018, steps=30,
         record=(vc.Energy(), vc.Contact(), vc.Probe(model.probes())), progress=False,

@@ -10,18 +10,25 @@ import pytest
 
 pytest.importorskip("dolfinx")
 
+from energy_checks import course
 from fem_problems import WALL_DT, run, shaken_wall
 from mpi4py import MPI
 
 from vi_contact.cross_check import cross_check
-from vi_contact.friction import Coulomb
+from vi_contact.fem.assembly import assemble
+from vi_contact.fem.mesh import build_mesh
+from vi_contact.fem.trace import contact_surface
+from vi_contact.friction import Coulomb, Tresca
 from vi_contact.march import march
 from vi_contact.mass import ConsistentMass, Redistributed
+from vi_contact.materials import LinearElastic
+from vi_contact.meshes.block import BlockMesh
 from vi_contact.schemes.contact_stabilised import ContactStabilisedNewmark
 from vi_contact.schemes.moreau_jean import MoreauJean
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.volume import OneFactorisation, ReducedNewton, Volume
 from vi_contact.step import ContactProblem
+from vi_contact.surfaces import HalfSpace
 from vi_contact.time_steps import HalvedAtImpact
 
 STEPS = 80
@@ -74,3 +81,28 @@ def test_ranks_agree_and_contact_opens_and_closes(scheme: Any, law: dict[str, An
     assert together.certificate.max() <= 1e-9
     count = alone.active.sum(axis=1)
     assert count.min() == 0 and count.max() >= 3 and np.sum(np.diff(count) < 0) >= 3
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize(
+    ("scheme", "law", "gain"),
+    [
+        (MoreauJean(e=1.0), Coulomb(0.6), 0.030),
+        (MoreauJean(), Tresca(3.0), 0.0026),
+        (MoreauJean(), Coulomb(0.6), 0.0),
+        (MoreauJean(1.0), Tresca(3.0), 0.0),
+        (MoreauJean(1.0), Coulomb(0.6), 0.0),
+    ],
+)
+def test_friction_of_impulses_may_add_energy(scheme: MoreauJean, law: Any, gain: float) -> None:
+    """V9.3 is about the normal direction: where sliding turns within a step, the mean velocity and the friction at its
+    end may have the same direction. The gains that docs/schemes.md prints; none at theta = 1."""
+    mesh, tags = build_mesh(BlockMesh(lengths=(1.0, 1.0), divisions=(8, 8)), MPI.COMM_SELF)
+    system = assemble(mesh, LinearElastic(E=1000.0, nu=0.3, rho=1.0), initial_velocity=(0.5, -1.0))
+    ground = HalfSpace(point=(0.0, -0.05), normal=(0.0, 1.0))
+    surface = contact_surface(system, tags["bottom"], obstacle=ground)
+    problem = ContactProblem(system, surface, friction=law, mass=ConsistentMass())
+    found = course(problem, scheme, dt=0.02, steps=25)
+    largest = np.array([found.rise, -found.friction]) / found.first
+    assert np.maximum(largest, 0.0) == pytest.approx([gain, gain], rel=0.02, abs=1e-11)
+    assert abs(found.defect) <= 1e-10 * found.largest

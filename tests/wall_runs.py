@@ -39,8 +39,8 @@ class History:
 
 @cache
 def model(wall: Wall = Wall(), *, alone: bool = False) -> WallModel:
-    """The wall on all ranks together, or on this rank alone."""
-    return build(wall, MPI.COMM_SELF if alone else MPI.COMM_WORLD)
+    """The wall by the catalogue's convention, on all ranks together or on this rank alone."""
+    return build(wall, MPI.COMM_SELF if alone else MPI.COMM_WORLD, base_inertia="catalogue")
 
 
 def problem(case: str, *, reading: Any = None, a0: float = 1.0, **one: Any) -> ContactProblem:

@@ -104,7 +104,7 @@ class SemiDiscreteSystem:
         floating: True when some rigid motion is not held by prescribed displacements (static stages refuse it).
         tied: unknowns of nodes that move together with others elsewhere, None when there are none: they have no one
             place, and a body with such nodes cannot turn.
-        notes: which motion its boundaries expect, for log and summary of a run.
+        notes: which motion its boundaries expect and the like, for log and summary of a run.
         absolute: True when a boundary lets waves in: displacements are those of space, and nothing else may shake it.
     """
 

@@ -19,7 +19,7 @@ COMM = MPI.COMM_WORLD
 
 
 def wall() -> WallModel:
-    return build(Wall(), COMM)
+    return build(Wall(), COMM, base_inertia="catalogue")
 
 
 def run(model: WallModel, case: str, name: str, *, refined: int = 1, steps: int = 400, record: Any = ()) -> Solution:

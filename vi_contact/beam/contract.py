@@ -55,7 +55,8 @@ def beam_problem(
     """
     x = elements.nodes(beam.length)
     mass = sp.csr_matrix([[beam.rho * beam.area * beam.length]])
-    point = _Part(mass, None, sp.csr_matrix((1, 1)), ((np.ones(1), normal_force),), np.zeros(1), np.zeros(1))
+    push, rest = ((np.ones(1), normal_force),), np.zeros(1)
+    point = _Part(mass, None, sp.csr_matrix((1, 1)), push, rest, rest, inertia=mass @ np.ones(1))
     return _problem(x, point, _Part.of_beam(beam, elements, start or Start(), load), 0.0, friction)
 
 
@@ -74,10 +75,15 @@ def rubbing_problem(
 
 
 class _Part:
-    """Matrices, loads and initial values of the unknowns along the axis, or of those across."""
+    """Matrices, loads, initial values and mass of the unknowns along the axis, or of those across.
 
-    def __init__(self, M: Any, C: Any, K: Any, loads: tuple[tuple[Array, History], ...], u0: Array, v0: Array) -> None:
-        self.M, self.C, self.K, self.loads, self.u0, self.v0 = M, C, K, loads, u0, v0
+    ``inertia`` [kg]: the force on them when unknowns and clamped node are accelerated together by one.
+    """
+
+    def __init__(
+        self, M: Any, C: Any, K: Any, loads: tuple[tuple[Array, History], ...], u0: Array, v0: Array, inertia: Array
+    ) -> None:
+        self.M, self.C, self.K, self.loads, self.u0, self.v0, self.inertia = M, C, K, loads, u0, v0, inertia
 
     @classmethod
     def of_rod(cls, rod: Rod, elements: Elements, start: Start) -> _Part:
@@ -87,7 +93,9 @@ class _Part:
         tip[-1] = 1.0
         given = ((uniform, rod.body_force), (tip, rod.end_force))
         loads = tuple((vector, history) for vector, history in given if history is not None)
-        return cls(M, rod.viscosity * K if rod.viscosity else None, K, loads, start.at("u", x), start.at("v", x))
+        inertia = rod.rho * rod.area * uniform
+        damper = rod.viscosity * K if rod.viscosity else None
+        return cls(M, damper, K, loads, start.at("u", x), start.at("v", x), inertia)
 
     @classmethod
     def of_beam(cls, beam: TimoshenkoBeam, elements: Elements, start: Start, load: History | None) -> _Part:
@@ -95,7 +103,9 @@ class _Part:
         y = np.concatenate([start.at("theta", x), start.at("u", x)])
         w = np.concatenate([start.at("omega", x), start.at("v", x)])
         loads = () if load is None else ((found.load, load),)
-        return cls(found.M, beam.viscosity * found.S if beam.viscosity else None, found.S, loads, y, w)
+        inertia = beam.rho * beam.area * found.load
+        damper = beam.viscosity * found.S if beam.viscosity else None
+        return cls(found.M, damper, found.S, loads, y, w, inertia)
 
 
 def _problem(x: Array, along: _Part, across: _Part | None, gap: float, friction: FrictionLaw) -> ContactProblem:
@@ -113,13 +123,16 @@ def _problem(x: Array, along: _Part, across: _Part | None, gap: float, friction:
     influence = np.zeros((space.unknowns, space.dimension))
     influence[: sizes[0], 0] = 1.0
     influence[space.unknowns - len(x) :, -1] = 1.0
+    M = SerialMatrix(sp.block_diag([part.M for part in parts]))
+    inertia = sp.block_diag([part.inertia[:, None] for part in parts]).toarray()
     system = SemiDiscreteSystem(
         algebra=SerialAlgebra(),
-        M=SerialMatrix(sp.block_diag([part.M for part in parts])),
+        M=M,
         C=SerialMatrix(sp.block_diag(dampings)) if damped else None,
         K=SerialMatrix(sp.block_diag([part.K for part in parts])),
         load=Load(np.zeros(space.unknowns), tuple(loads)),
         influence=influence,
+        base_mass=inertia - np.column_stack([M @ rigid for rigid in influence.T]),
         u0=np.concatenate([part.u0 for part in parts]),
         v0=np.concatenate([part.v0 for part in parts]),
         space=space,

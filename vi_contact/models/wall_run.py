@@ -17,7 +17,7 @@ from ..step import ContactProblem, State
 from ..surfaces import ContactSurface
 from .choices import SCHEMES, SOLVERS
 from .run_options import RunOptions, check_options, check_word, excitations, number_of_steps, records, solvers
-from .wall import CASES, Wall, build
+from .wall import BASE_INERTIA, CASES, Wall, build
 
 TITLES = {
     "a": "Wall, three possible contact points (Fig. 4)",
@@ -30,21 +30,33 @@ TITLES = {
 
 @dataclass(frozen=True)
 class WallRun(RunOptions):
-    """Options of a run; without a record the harmonic of Fig. 3 shakes the wall for 400 steps."""
+    """Options of a run; without a record the harmonic of Fig. 3 shakes the wall for 400 steps.
+
+    base_inertia: a word of BASE_INERTIA; None for ``convention``.
+    """
 
     case: str = "a"
     wall: Wall = field(default_factory=Wall)
     gravity: bool = False
+    base_inertia: str | None = None
 
     def __post_init__(self) -> None:
         check_word("case", self.case, (*CASES, "face"))
+        check_word("base inertia", self.convention, list(BASE_INERTIA))
         check_options(self)
+
+    @property
+    def convention(self) -> str:
+        """The word asked for; else "whole" under a record, and "catalogue" under the harmonic of the figures."""
+        if self.base_inertia is not None:
+            return self.base_inertia
+        return "catalogue" if self.motion is None and self.vertical is None else "whole"
 
 
 def run_wall(run: WallRun, comm: Any, out: str | Path, *, progress: bool = True) -> Solution:
     """Builds the wall, marches, and writes the run folder ``out``; the solution's summary is for printing."""
     shaking = records(run)  # before anything is computed
-    model = build(run.wall, comm, weight=run.gravity)
+    model = build(run.wall, comm, weight=run.gravity, base_inertia=run.convention)
     excitation = excitations(shaking, lambda: model.harmonic(run.scale))
     dt = run.dt if run.dt is not None else model.time_step()
     choice = SCHEMES[run.scheme]

@@ -31,8 +31,10 @@ class Parts:
     recorders: tuple[Recorder, ...] | None = None
 
 
-def _wall(shape: wall.Wall, comm: Any, *, case: str = "b", weight: bool = False) -> Parts:
-    model = wall.build(shape, comm, weight=weight)
+def _wall(
+    shape: wall.Wall, comm: Any, *, case: str = "b", weight: bool = False, base_inertia: str = "whole"
+) -> Parts:
+    model = wall.build(shape, comm, weight=weight, base_inertia=base_inertia)
     return Parts(model.system, model.surface(case), model.tags, weight, (Energy(), Contact(), Probe(model.probes())))
 
 
