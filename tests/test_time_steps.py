@@ -72,7 +72,7 @@ def test_steps_of_a_constant_dt(dt, steps, t_end, t0, expected):
         (None, 0.3, 0.0, ((4e-3, 50), (1e-3, 100))),
         (110, None, 0.2, ((4e-3, 0), (1e-3, 100), (2.5e-3, 10))),
         (None, 0.4, 0.1999, ((4e-3, 1), (1e-3, 97), (2.5e-3, 40))),  # on from 0.2039: 97 steps reach 0.3
-        (None, 0.4, 0.2 - 1e-12, ((4e-3, 0), (1e-3, 100), (2.5e-3, 41))),  # round-off adds no step to a piece
+        (None, 0.4, 0.2 - 1e-12, ((4e-3, 0), (1e-3, 100), (2.5e-3, 40))),  # round-off adds no step to any piece
     ],
 )
 def test_steps_of_a_schedule(steps, t_end, t0, parts):
@@ -81,6 +81,19 @@ def test_steps_of_a_schedule(steps, t_end, t0, parts):
     assert found.parts == parts and found.steps == sum(count for _, count in parts)
     sizes = [dt for dt, count in parts for _ in range(count)]
     assert [found.dt(base) for base in range(found.steps)] == sizes and found.dt(found.steps + 5) == sizes[-1]
+
+
+@serial
+@pytest.mark.parametrize("t0", [0.0, 0.3, 17.0])
+def test_round_off_of_many_pieces_adds_no_step(t0):
+    """1200 steps of a hundred lengths, each piece a dozen of them, end at the last one's time, wherever they begin."""
+    sizes = [1e-3 * (1.0 + 0.01 * i) for i in range(100)]
+    ends = [t0 + 12.0 * sum(sizes[: i + 1]) for i in range(100)]
+    plan = Schedule(tuple(zip(sizes, ends, strict=True)))
+    assert course(plan, None, ends[-1], t0) == Course(tuple((size, 12) for size in sizes))
+    assert course(plan, None, ends[-1] + 1e-10, t0 - 1e-10).steps == 1200
+    thirds = Schedule(tuple((1.0 / 300.0, t0 + (i + 1) / 25.0) for i in range(100)))
+    assert course(thirds, None, t0 + 4.0, t0).steps == 1200
 
 
 @serial
@@ -98,7 +111,14 @@ def test_steps_of_a_schedule(steps, t_end, t0, parts):
         (0.1, None, -0.5, "t_end after the start"),
         (0.1, None, np.nan, "finite t_end"),
         (0.1, None, np.inf, "finite t_end"),
-        (1e-300, None, 1e300, "infinitely many steps"),
+        (1e-300, None, 1e300, r"the run to t_end = 1e\+300 s has more than 1e\+09 steps of dt = 1e-300 s: give"),
+        (1e-30, None, 1.0, r"the run to t_end = 1 s has more than 1e\+09 steps of dt = 1e-30 s"),
+        (0.1, 10**10, None, r"the run has more than 1e\+09 steps of dt = 0.1 s"),
+        (Schedule(((1e-30, 0.5), (0.1, inf))), None, 1.0, r"more than 1e\+09 steps of dt = 1e-30 s"),
+        (0.1, None, "1", "t_end = '1' s: give a finite"),
+        (0.1, True, None, "steps is True: give a whole number"),
+        (True, 5, None, "dt is True: give a positive time step"),
+        (10**400, 5, None, "dt is 1000.*: give a positive time step"),
         (0.1, 2.5, None, "whole number of steps"),
         (Schedule(((0.1, 1.0), (0.2, 2.0))), None, 2.5, "last piece of the Schedule ends at 2 s, before t_end = 2.5 s"),
         (Schedule(((0.1, 1.0), (0.2, 2.0))), 17, None, "ends at 2 s, before the 2 steps that are left"),

@@ -14,7 +14,7 @@ from .errors import InputError
 from .march import march
 from .mass import ConsistentMass
 from .step import ContactProblem, Scheme
-from .time_steps import Schedule
+from .time_steps import LARGEST, Schedule
 
 
 class Alongside:
@@ -32,7 +32,7 @@ class Alongside:
         system = problem.system
         self._steps = march(
             ContactProblem(system, problem.surface, excitation=problem.excitation, mass=ConsistentMass()),
-            scheme=scheme, dt=dt, steps=10**12,
+            scheme=scheme, dt=dt, steps=LARGEST,
         )
         self._t, self._u, self._v = [0.0], [system.u0.copy()], [system.v0.copy()]
 

@@ -7,15 +7,17 @@ of the plan, whether they were halved or not.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import ceil, inf, isfinite
-from numbers import Integral, Real
 from typing import Any
 
+from .checks import number, shown, whole
 from .errors import InputError
 
 HALVINGS = 20  # at most: a millionth of the base step
 SLACK = 1e-6  # of a step: round-off of the times t + dt + … of a run does not add a step to a piece
+LARGEST = 10**9  # steps of a run: beyond, dt is a mistake
 
 
 @dataclass(frozen=True)
@@ -55,9 +57,8 @@ class HalvedAtImpact:
     def __post_init__(self) -> None:
         if not isinstance(self.dt, Schedule):
             object.__setattr__(self, "dt", _positive(self.dt))
-        if not isinstance(self.halvings, Integral) or not 0 <= self.halvings <= HALVINGS:
-            raise InputError(f"HalvedAtImpact halvings is {self.halvings!r}: give a whole number from 0 to {HALVINGS}")
-        object.__setattr__(self, "halvings", int(self.halvings))
+        remedy = f"HalvedAtImpact halvings is {shown(self.halvings)}: give a whole number from 0 to {HALVINGS}"
+        object.__setattr__(self, "halvings", _read(whole, self.halvings, remedy, most=HALVINGS))
 
 
 TimeSteps = float | Schedule | HalvedAtImpact
@@ -93,28 +94,42 @@ def course(plan: TimeSteps, steps: int | None, t_end: float | None, t0: float = 
     """The base steps from t0 to t_end, or so many; InputError when plan, steps or t_end make no sense.
 
     Counted from the times of the plan, not from those of the run, whose round-off accumulates: a restart, which
-    builds it from the same t0, has the same course.
+    builds it from the same t0, has the same course. A step shorter than a millionth of dt would be round-off of these
+    times, at the end of a piece and of the run alike, and is not made. InputError for more than 1e9 steps.
     """
     halvings = plan.halvings if isinstance(plan, HalvedAtImpact) else 0
     dt = plan.dt if isinstance(plan, HalvedAtImpact) else plan
     pieces = dt.pieces if isinstance(dt, Schedule) else ((_positive(dt), inf),)
     left = _wanted(steps, t_end, t0)
     parts: list[tuple[float, int]] = []
-    t = t0
+    t, made = t0, 0
     for size, until in pieces:
-        last = t_end is not None and t_end <= until
-        wanted = (t_end - t) / size if last and t_end is not None else (until - t) / size - SLACK
-        whole = max(ceil(wanted * (1.0 - 1e-12)), 0) if isfinite(wanted) else left
-        if min(whole, left) == inf:
-            raise InputError(f"the run to t_end = {t_end:g} s has infinitely many steps: give a larger dt")
-        done = int(min(whole, left))
+        last = t_end is not None and t_end <= until + SLACK * size
+        end = t_end if last and t_end is not None else until
+        done = int(min(_reaching(end - t, size), left, LARGEST + 1))
+        made += done
+        _refuse_endless(made, size, t_end)
         if done or not parts:
             parts.append((size, done))
         t, left = t + done * size, 0 if last else left - done
         if left == 0:
             return Course(tuple(parts), halvings)
-    end = f"t_end = {t_end:g} s" if t_end is not None else f"the {left:g} steps that are left"
-    raise InputError(f"the last piece of the Schedule ends at {pieces[-1][1]:g} s, before {end}: end it at math.inf")
+        t = until if abs(t - until) <= SLACK * size else t  # the next piece begins where the plan says
+    rest = f"t_end = {t_end:g} s" if t_end is not None else f"the {left:g} steps that are left"
+    raise InputError(f"the last piece of the Schedule ends at {pieces[-1][1]:g} s, before {rest}: end it at math.inf")
+
+
+def _reaching(span: float, size: float) -> float:
+    """How many steps of a size reach over a span, infinite for an endless one."""
+    wanted = span / size
+    return max(ceil(wanted - max(SLACK, 1e-12 * wanted)), 0) if isfinite(wanted) else inf
+
+
+def _refuse_endless(steps: int, dt: float, t_end: float | None) -> None:
+    """InputError for more steps than any machine takes."""
+    if steps > LARGEST:
+        goal = "the run" if t_end is None else f"the run to t_end = {t_end:g} s"
+        raise InputError(f"{goal} has more than {LARGEST:.0e} steps of dt = {dt:g} s: give a larger dt or end earlier")
 
 
 def _wanted(steps: int | None, t_end: float | None, t0: float) -> float:
@@ -122,26 +137,32 @@ def _wanted(steps: int | None, t_end: float | None, t0: float) -> float:
     if (steps is None) == (t_end is None):
         raise InputError("give either steps or t_end, and not both")
     if t_end is not None:
-        if not isfinite(t_end) or t_end < t0:
-            raise InputError(f"the run goes from {t0:g} s to t_end = {t_end:g} s: give a finite t_end after the start")
+        remedy = f"the run goes from {t0:g} s to t_end = {shown(t_end)} s: give a finite t_end after the start"
+        if _read(number, t_end, remedy) < t0:
+            raise InputError(remedy)
         return inf
-    if steps is None or not isfinite(steps) or steps < 0 or int(steps) != steps:
-        raise InputError(f"steps is {steps}: give a whole number of steps >= 0, or t_end in seconds")
-    return int(steps)
+    return int(_read(whole, steps, f"steps is {shown(steps)}: give a whole number of steps >= 0, or t_end in seconds"))
 
 
 def _positive(dt: Any) -> float:
-    if not isinstance(dt, Real) or not isfinite(dt) or dt <= 0.0:
-        raise InputError(f"dt is {dt}: give a positive time step in seconds, a Schedule or HalvedAtImpact")
-    return float(dt)
+    remedy = f"dt is {shown(dt)}: give a positive time step in seconds, a Schedule or HalvedAtImpact"
+    return float(_read(number, dt, remedy, positive=True))
+
+
+def _read(check: Callable[..., Any], value: Any, remedy: str, **limits: Any) -> Any:
+    """What the check makes of the value; InputError of this sentence when it refuses."""
+    try:
+        return check("", "", value, **limits)
+    except InputError:
+        raise InputError(remedy) from None
 
 
 def _pairs(pieces: Any) -> list[tuple[Any, float]]:
     """The pieces as pairs; InputError when they are something else."""
     try:
         pairs = [(dt, float(until)) for dt, until in pieces]
-    except (TypeError, ValueError):
-        raise InputError(f"Schedule pieces are {pieces!r}: give pairs ((dt, until), …) in seconds") from None
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"Schedule pieces are {shown(pieces)}: give pairs ((dt, until), …) in seconds") from None
     if not pairs:
         raise InputError("Schedule has no pieces: give at least one (dt, until), (dt, math.inf) for a constant dt")
     return pairs
