@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import os
 import re
 import subprocess
@@ -12,6 +13,7 @@ from pathlib import Path
 import pytest
 
 import vi_contact
+from vi_contact.cli import parser
 
 pytestmark = pytest.mark.serial
 ROOT = Path(__file__).resolve().parents[1]
@@ -79,6 +81,23 @@ def test_commands_exist(document: Path) -> None:
         assert (ROOT / "demos" / f"{demo}.py").is_file(), demo
     for script in set(re.findall(r"\bpython3 ((?:meshes|demos|benchmarks)/[\w./]+\.py)", text)):
         assert (ROOT / script).is_file(), script
+
+
+COMMAND = r"\b(?:vi-contact|demos/run\.sh(?: -n \d+)?(?= (?:wall|channel) --)) ((?:\\\n|[^`\n#])+)"
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_options_exist(document: Path) -> None:
+    """Every option that a document gives to a command is one of its parser."""
+    for line in re.findall(COMMAND, document.read_text(encoding="utf-8")):
+        words, command = line.split(), parser()
+        for word in words:
+            below = next((one for one in command._actions if isinstance(one, argparse._SubParsersAction)), None)
+            if below is None or word not in below.choices:
+                break
+            command = below.choices[word]
+        given = {word for word in words if re.fullmatch(r"--[a-z][a-z-]*", word)}
+        assert given - set(command._option_string_actions) == set(), line
 
 
 def test_readme_names_the_two_commands() -> None:
