@@ -19,7 +19,7 @@ from .upgoing import upgoing  # noqa: F401
 __version__ = "0.1.0"
 
 _CONTENTS = {
-    "errors": ("InputError", "StepFailure", "ViContactError"),
+    "errors": ("InputError", "Interrupted", "StepFailure", "ViContactError"),
     # values
     "materials": (
         "LinearElastic", "MassProportional", "NoDamping", "PlaneStrain", "PlaneStress", "Rayleigh", "Solid",

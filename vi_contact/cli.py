@@ -16,7 +16,7 @@ from .cli_layer import add_layer_command
 from .cli_motion import add_motion_commands
 from .cli_options import add_output, add_shaking, add_step, chosen, impact_law
 from .cli_report import add_report_commands
-from .errors import ViContactError
+from .errors import Interrupted, ViContactError
 
 _DESCRIPTION = """Dynamic unilateral contact of elastic structures: exact non-penetration, a closed energy ledger and a
 certificate for every time step. Run under "mpirun -n N" for any number of ranks. Options -vi_contact_volume_... go to
@@ -112,7 +112,7 @@ def split_petsc(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs a command; prints its text, or one sentence on standard error and returns 1."""
+    """Runs a command; prints its text, or one sentence on standard error and returns 1; 128 + n after signal n."""
     own, petsc = split_petsc(sys.argv[1:] if arguments is None else arguments)
     options = parser().parse_args(own)
     if petsc:
@@ -125,6 +125,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if _rank() == 0:
             print(f"vi-contact: {error}", file=sys.stderr, flush=True)
         return 1
+    except KeyboardInterrupt as error:
+        stopped = error if isinstance(error, Interrupted) else Interrupted()
+        if _rank() == 0:
+            print(f"vi-contact: {stopped}", file=sys.stderr, flush=True)
+        return 128 + stopped.number
     if text:
         print(text)
     return 0

@@ -1,6 +1,8 @@
-"""The two ways a run stops early: wrong input, or a time step that no method could certify."""
+"""The ways a run stops early: wrong input, a time step that no method could certify, or somebody asked it to."""
 
 from __future__ import annotations
+
+import signal
 
 
 class ViContactError(Exception):
@@ -13,3 +15,18 @@ class InputError(ViContactError, ValueError):
 
 class StepFailure(ViContactError, RuntimeError):
     """A time step stayed above the certificate tolerance with every method; nothing computed before it is lost."""
+
+
+class Interrupted(KeyboardInterrupt):
+    """A signal ended a run after a step, on all ranks: Ctrl-C, SIGTERM, SIGHUP. What was computed is in its folder.
+
+    Like Ctrl-C itself it is no ``Exception``, so that no loop over runs goes on with the next one. ``number``: of the
+    signal; the command line exits with 128 + number.
+    """
+
+    def __init__(self, message: str = "interrupted", number: int = signal.SIGINT) -> None:
+        super().__init__(message, number)
+        self.number = number
+
+    def __str__(self) -> str:
+        return str(self.args[0])

@@ -99,9 +99,15 @@ def clear(folder: Path) -> None:
         frame.unlink()
 
 
+def remove_litter(folder: Path) -> None:
+    """Removes what killed processes left of files they were about to replace; with the folder's lock only."""
+    for path in [*folder.glob(".*.*[0-9].tmp"), *(folder / FIELDS).glob(".*.*[0-9].tmp")]:
+        path.unlink(missing_ok=True)
+
+
 def write_atomically(path: Path, data: bytes) -> None:
     """The file has its old content or all of the new one, whatever happens; OSError names it."""
-    temporary = path.with_name(f".{path.name}.tmp")
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
         with open(temporary, "wb", buffering=0) as file:
             write_all(file, data)

@@ -7,17 +7,20 @@ import time
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from signal import Signals
 from typing import Any, Protocol
 
 import numpy as np
 
 from .algebra import Array
 from .checkpoint import Place
+from .errors import Interrupted
 from .history import Table
 from .march import March
 from .run_log import Progress, versions
 from .solution import Solution, energy_warning, history_facts
 from .step import ContactProblem, Recorder, Report, Scheme, Solver, State, StepResult
+from .stop_signals import StopSignals
 from .time_steps import Course, TimeSteps, described
 from .writer import Writer
 
@@ -88,17 +91,21 @@ class Run:
 
     def go(self, writer: Writer) -> Solution:
         """The remaining steps and everything that is written before, during and after them."""
+        with StopSignals() as signals:
+            return self._go(writer, signals)
+
+    def _go(self, writer: Writer, signals: StopSignals) -> Solution:
         begin = time.perf_counter()
         self.halved = self.place.halved
         try:
             writer.open(self.place.state)
             self._tell_start()
-            self._march(writer)
+            self._march(writer, signals)
             self._checkpoint(writer)
             linear = self._seconds_per_linear_step()
         except BaseException as error:
             interrupted = isinstance(error, KeyboardInterrupt)
-            reason = "interrupted by the user" if interrupted else str(error) or type(error).__name__
+            reason = str(error) or ("interrupted by the user" if interrupted else type(error).__name__)
             self._rescue(writer, "interrupted" if interrupted else "failed", reason, time.perf_counter() - begin)
             raise
         history = self.table.history()
@@ -109,7 +116,7 @@ class Run:
         writer.close(facts)
         return Solution(history, self.table.columns, self.place.state, facts)
 
-    def _march(self, writer: Writer) -> None:
+    def _march(self, writer: Writer, signals: StopSignals) -> None:
         s, place = self.settings, self.place
         loop = March(
             s.problem, scheme=s.scheme, solvers=[s.solver, *s.escalation], course=self.course, state=place.state,
@@ -127,7 +134,17 @@ class Run:
                     if s.root:
                         progress.step(state.k, state.t, iterations=report.result.iterations, worst=worst)
                 self.seconds.append(time.perf_counter() - begin)
+                if loop.ended and self.left:
+                    self._stop_if_asked(writer, signals)
                 begin = time.perf_counter()
+
+    def _stop_if_asked(self, writer: Writer, signals: StopSignals) -> None:
+        """Interrupted on all ranks, with a checkpoint, when a signal has reached one of them. Collective."""
+        number = signals.asked(self.settings.problem.system.algebra.comm)
+        if number:
+            self._checkpoint(writer)
+            where = f"after step {self.place.state.k}, t = {self.place.state.t:.6g} s"
+            raise Interrupted(f"{Signals(number).name} ended the run {where}: {writer.rest}", number)
 
     def _keep(self, state: State, report: Report, writer: Writer) -> None:
         """Everything that is recorded of a step, be it a base step or a part of one."""

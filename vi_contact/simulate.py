@@ -10,6 +10,7 @@ from typing import Any
 from .certified import TOLERANCE
 from .checkpoint import Place, read_checkpoint
 from .errors import InputError
+from .folder_lock import locked
 from .history import Table, read_rows
 from .output import on_root, run_folder
 from .recorders import Contact, Energy, Row, Steps
@@ -64,7 +65,8 @@ def simulate(
         fields: fem.XDMF(every=10) for ParaView.
         cross_check: whose report() goes into the summary.
     Raises:
-        InputError: before anything is computed or overwritten.
+        InputError: before anything is computed or overwritten; also when another run writes into the folder.
+        Interrupted: after the step in which some rank got SIGINT (Ctrl-C), SIGTERM or SIGHUP, with a checkpoint.
         StepFailure: a step no solver could certify; ViContactError: the disk refused something. All that was computed
             is in the folder then, and summary.json says why the run ended.
     """
@@ -82,6 +84,18 @@ def simulate(
     recorders: list[Any] = [Steps(problem.system.influence.shape[1])]
     recorders += (Energy(), Contact()) if record is None else record
     source = _source(restart, folder)
+    with locked(problem.system.algebra.comm, folder):
+        run = _prepared(settings, recorders, source, state, steps, t_end)
+        continued = source is not None and folder is not None and source.resolve() == folder.resolve()
+        return run.go(Writer(problem, folder, fields, run.table, continued=continued))
+
+
+def _prepared(
+    settings: Settings, recorders: Sequence[Recorder], source: Path | None, state: State | None, steps: int | None,
+    t_end: float | None,
+) -> Run:
+    """The run at its first step, or at the checkpoint in ``source``. Collective."""
+    problem, scheme, dt = settings.problem, settings.scheme, settings.dt
     if source is None:
         place = Place.first(initial_state(problem) if state is None else state)
     else:
@@ -91,9 +105,7 @@ def simulate(
     table = _table(problem, recorders, place.state)
     if source is not None:
         _continue(table, problem, recorders, place.state, source)
-    run = Run(settings, recorders, table, plan, place, None if source is None else place.state.k)
-    continued = source is not None and folder is not None and source.resolve() == folder.resolve()
-    return run.go(Writer(problem, folder, fields, run.table, continued=continued))
+    return Run(settings, recorders, table, plan, place, None if source is None else place.state.k)
 
 
 def _source(restart: bool | str | Path, folder: Path | None) -> Path | None:

@@ -14,7 +14,7 @@ import numpy as np
 from .algebra import Array
 from .checkpoint import Place, write_checkpoint
 from .history import HistoryFiles, Table
-from .output import LOG, SUMMARY, clear, on_root, to_json, write_atomically
+from .output import LOG, SUMMARY, clear, on_root, remove_litter, to_json, write_atomically
 from .recorders import Row
 from .run_log import RunLog
 from .step import ContactProblem, Report, Scheme, State
@@ -55,6 +55,13 @@ class Writer:
         self._log = RunLog(None, append=False)
         self._saved = -1
 
+    @property
+    def rest(self) -> str:
+        """What remains of a run that was ended early, for a sentence."""
+        if self._folder is None:
+            return "without an output folder nothing of it is kept"
+        return f"restart it from its checkpoint in '{self._folder}'"
+
     def open(self, state: State) -> None:
         """Makes the files and writes the first frame."""
         folder = self._folder
@@ -68,6 +75,7 @@ class Writer:
                 self._fields.write(state, np.zeros_like(state.u))
 
     def _make(self, folder: Path) -> None:
+        remove_litter(folder)
         if not self._continued:
             clear(folder)
         self._log = RunLog(folder / LOG, append=self._continued)

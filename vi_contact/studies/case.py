@@ -21,6 +21,7 @@ from ..excitation import Excitation
 from ..fem.assembly import assemble
 from ..fem.joined import together
 from ..fem.mesh import build_mesh, read_mesh
+from ..folder_lock import locked
 from ..friction import FrictionLaw, Frictionless
 from ..impact import ImpactLaw
 from ..mass import MassLaw
@@ -120,14 +121,16 @@ class Case:
             own["t_end"] = self._duration(problem)
         solver = self._made("solver")
         state = static_equilibrium(problem, solver=solver or Condensed()) if parts.weighted else None
-        if folder is not None:
-            self._keep(run_folder(comm, folder), comm)
-        return simulate(
-            problem, scheme=self._made("scheme"), solver=solver, state=state, out=folder, restart=restart,
-            record=self._several("record", tags=parts.tags) if "record" in self.nodes else parts.recorders,
-            escalation=self._several("escalation"), fields=self._made("fields"), progress=progress,
-            cross_check=solver if isinstance(solver, CrossChecked) else None, **own,
-        )
+        ranks = problem.system.algebra.comm
+        with locked(ranks, None if folder is None else run_folder(ranks, folder)):
+            if folder is not None:
+                self._keep(folder, ranks)
+            return simulate(
+                problem, scheme=self._made("scheme"), solver=solver, state=state, out=folder, restart=restart,
+                record=self._several("record", tags=parts.tags) if "record" in self.nodes else parts.recorders,
+                escalation=self._several("escalation"), fields=self._made("fields"), progress=progress,
+                cross_check=solver if isinstance(solver, CrossChecked) else None, **own,
+            )
 
     def _made(self, table: str, **context: Any) -> Any:
         """What a table makes; None where there is none."""

@@ -1,0 +1,61 @@
+"""Signals that ask a run to end: noted when they come, acted on between two steps, by all ranks together.
+
+Ctrl-C (SIGINT), a scheduler's or container's end of time (SIGTERM), a closed terminal (SIGHUP). PETSc has handlers of
+its own for some of them, which print pages and stop; those of the run come after them and win.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from types import FrameType, TracebackType
+from typing import Any
+
+import numpy as np
+
+from .algebra import Comm
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+class StopSignals:
+    """Listens from ``with`` to its end, in the main thread only; other threads never see a signal.
+
+    A signal that was ignored stays so (nohup, jobs in the background), and so do handlers that the caller wrote. A
+    second Ctrl-C ends the process at once. What nobody has acted on in the end is sent again, to the old handlers.
+    """
+
+    def __init__(self) -> None:
+        self._found = 0
+        self._before: dict[int, Any] = {}
+
+    def __enter__(self) -> StopSignals:
+        if threading.current_thread() is threading.main_thread():
+            for number in SIGNALS:
+                before = signal.getsignal(number)
+                if before in (signal.SIG_DFL, signal.default_int_handler, None):
+                    self._before[number] = before or signal.SIG_DFL
+                    signal.signal(number, self._note)
+                elif before == signal.SIG_IGN:
+                    signal.signal(number, signal.SIG_IGN)  # PETSc's handler does not ask
+        return self
+
+    def _note(self, number: int, frame: FrameType | None) -> None:
+        self._found = self._found or number
+        if number == signal.SIGINT:
+            signal.signal(number, signal.SIG_DFL)
+
+    def asked(self, comm: Comm) -> int:
+        """The number of a signal that some rank has got, the same on all ranks; 0 for none. Collective."""
+        number = int(comm.max(np.array([float(self._found)]))[0])
+        self._found = 0 if number else self._found
+        return number
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for number, before in self._before.items():
+            signal.signal(number, before)
+        if self._found and error is None:
+            os.kill(os.getpid(), self._found)
