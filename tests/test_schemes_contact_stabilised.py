@@ -205,9 +205,13 @@ def test_bilateral_points_are_brought_to_the_obstacle_and_stay():
 
 @pytest.mark.parametrize("held", [False, True])
 def test_nan_stops_the_step(held):
-    problem = chain(gap=0.0, v0=np.array([1.0, 1.0, 1.0, 1.0, 1.0, np.nan]))
-    problem = replace(problem, surface=problem.surface.held()) if held else problem
-    with pytest.raises(StepFailure, match="contains NaN"):
+    """In the data, and where an obstacle goes."""
+    with pytest.raises(InputError, match="v0 contains NaN"):
+        chain(gap=0.0, v0=np.array([1.0, 1.0, 1.0, 1.0, 1.0, np.nan]))
+    problem = chain(gap=0.0)
+    surface = problem.surface.moving(lambda t: np.nan if t else 0.0)
+    problem = replace(problem, surface=surface.held() if held else surface)
+    with pytest.raises(InputError, match=r"moving obstacle: towards\(0.01 s\) is nan; return finite metres"):
         list(run(problem, STABILISED, dt=0.01, steps=1))
 
 

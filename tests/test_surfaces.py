@@ -39,7 +39,7 @@ def test_half_space_takes_sides_at_right_angles_but_for_rounding():
     ("obstacle", "word"),
     [
         (lambda: HalfSpace((0.0, 0.0), (0.0, 0.0)), "nonzero normal"),
-        (lambda: HalfSpace((0.0, 0.0), (0.0, np.nan)), "nonzero normal"),
+        (lambda: HalfSpace((0.0, 0.0), (0.0, np.nan)), "give finite numbers"),
         (lambda: HalfSpace((0.0, 0.0, 0.0), (0.0, 1.0)), "same number"),
         (lambda: HalfSpace((0.0, 0.0), (0.0, -1.0)).gap(POINTS, DOWN), "turn its sign"),
         (lambda: HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)).directions(POINTS, DOWN), "one per dimension"),

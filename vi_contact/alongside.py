@@ -14,7 +14,7 @@ from .errors import InputError
 from .march import march
 from .mass import ConsistentMass
 from .step import ContactProblem, Scheme
-from .time_steps import LARGEST, Schedule
+from .time_steps import LARGEST, HalvedAtImpact, Schedule
 
 
 class Alongside:
@@ -26,9 +26,10 @@ class Alongside:
     """
 
     def __init__(self, problem: ContactProblem, *, scheme: Scheme, dt: float | Schedule) -> None:
-        if not isinstance(dt, int | float | Schedule):
+        if isinstance(dt, HalvedAtImpact):
             raise InputError(f"the time step {dt!r} is found while the run goes: a motion computed alongside needs dt "
                              "as a number or a Schedule")
+        self.scheme, self.dt = scheme, dt
         system = problem.system
         self._steps = march(
             ContactProblem(system, problem.surface, excitation=problem.excitation, mass=ConsistentMass()),

@@ -15,19 +15,22 @@ Source: seismic practice, prescribed base; a base moved by (u, v, a) integrated 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.sparse as sp
 
 from .algebra import Array, SerialAlgebra, SerialComm, SerialMatrix
 from .alongside import Alongside
+from .checks import provides
 from .errors import InputError
 from .excitation import Excitation
+from .problem_checks import EXCITATION
+from .run_checks import check_scheme
 from .schemes.trapezoidal import Trapezoidal
 from .step import ContactProblem, Scheme
 from .surfaces import ContactSurface, empty_surface
-from .system import Load, SemiDiscreteSystem
+from .system import Load, Pace, SemiDiscreteSystem
 from .time_steps import Schedule
 
 
@@ -72,6 +75,11 @@ class BaseMotion:
         u, v = self.path.at(t)
         return u, v, np.sum([excitation(t) for excitation in self.excitations], axis=0)
 
+    @property
+    def pace(self) -> Pace:
+        """Whose steps the run must have."""
+        return Pace("base_motion", self.path.scheme, self.path.dt)
+
     def displacement(self, points: Array, t: float) -> Array:
         """u_g at every point."""
         return np.tile(self.at(t)[0], (len(points), 1))
@@ -96,9 +104,10 @@ class BaseMotion:
             rigid = np.array([2.0 * r - surface.coupling @ r for r in rigid])
         normal = np.array([surface.normal_values(r) for r in rigid])
         tangential = np.array([surface.tangential_values(r) for r in rigid])
-        return surface.moving(
+        moved = surface.moving(
             lambda t: -self.at(t)[0] @ normal, lambda t: np.tensordot(self.at(t)[0], tangential, axes=1)
         )
+        return replace(moved, paces=(*surface.paces, self.pace))
 
 
 def base_motion(
@@ -106,11 +115,15 @@ def base_motion(
 ) -> BaseMotion:
     """The ground motion that ``scheme`` (Trapezoidal() when None) makes of an acceleration with time step dt [s].
 
-    Use with the same dt and scheme as the run, from t = 0. What the acceleration leaves behind (a final velocity, a
-    drift) is in it: correct the baseline of a record first (``baseline_corrected``).
+    Use with the same dt and scheme as the run, from t = 0: systems and surfaces that it moves remember them, and
+    ``march`` refuses others (a function of your own around ``at`` hides them). What the acceleration leaves behind (a
+    final velocity, a drift) is in it: correct the baseline of a record first (``baseline_corrected``).
     InputError for no excitation, or excitations of different dimensions.
     """
+    check_scheme("base_motion", scheme)
     excitations = tuple(excitation) if isinstance(excitation, Sequence) else (excitation,)
+    for one in excitations:
+        provides("base_motion", "excitation", one, EXCITATION, "give Harmonic(…), GroundMotion(record) or another")
     sizes = {len(one.direction) for one in excitations}
     if len(sizes) != 1:
         raise InputError("base_motion needs one or more excitations with directions of the same number of components")
@@ -122,4 +135,4 @@ def base_motion(
         floating=True,
     )
     problem = ContactProblem(system, empty_surface(SerialComm(), d))
-    return BaseMotion(excitations, Alongside(problem, scheme=scheme or Trapezoidal(), dt=dt))
+    return BaseMotion(excitations, Alongside(problem, scheme=Trapezoidal() if scheme is None else scheme, dt=dt))

@@ -7,12 +7,14 @@ the type that the caller goes on with, so that one line reads and checks an argu
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Iterable, Sequence
 from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
 
-from .algebra import Array
+from .algebra import Array, Comm
 from .errors import InputError
 
 SHOWN = 60  # characters of a value in a sentence
@@ -26,7 +28,7 @@ def number(
     """Return a finite real number as a float; InputError for texts, NaN, infinity, truth values and wrong signs."""
     kind = "a finite number above zero" if positive else "zero or a positive finite number"
     wanted = (kind if positive or not_negative else "a finite number") + (f" in {unit}" if unit else "")
-    found = _real(value)
+    found = real(value)
     if not math.isfinite(found) or found < 0.0 and (positive or not_negative) or found == 0.0 and positive:
         raise InputError(f"{owner}: {meaning} is {shown(value)}; give {wanted}")
     return found
@@ -34,7 +36,7 @@ def number(
 
 def whole(owner: str, meaning: str, value: Any, *, least: int = 0, most: int | None = None) -> int:
     """Return a whole number between ``least`` and ``most`` as an int; 3.0 counts as one, True does not."""
-    found = _real(value)
+    found = real(value)
     if not math.isfinite(found) or found != int(found) or found < least or (most is not None and found > most):
         upper = "" if most is None else f" and at most {most}"
         raise InputError(f"{owner}: {meaning} is {shown(value)}; give a whole number of at least {least}{upper}")
@@ -50,14 +52,53 @@ def counted(owner: str, asked: str, value: Any, things: str = "samples", *, most
 
 
 def attributes(
-    owner: object, *, finite: tuple[str, ...] = (), positive: tuple[str, ...] = (), not_negative: tuple[str, ...] = ()
+    owner: object,
+    *,
+    finite: tuple[str, ...] = (),
+    positive: tuple[str, ...] = (),
+    not_negative: tuple[str, ...] = (),
+    counts: tuple[str, ...] = (),
+    flags: tuple[str, ...] = (),
 ) -> None:
-    """InputError naming the first attribute of ``owner`` that is not a finite number, or not > 0, or not >= 0."""
+    """InputError naming the first attribute of ``owner`` that is not a finite number, or not > 0, or not >= 0, or no
+    whole number of at least 1 (``counts``), or neither True nor False (``flags``)."""
     for name in finite + positive + not_negative:
         number(
             type(owner).__name__, name, getattr(owner, name),
             positive=name in positive, not_negative=name in not_negative,
         )
+    for name in counts:
+        whole(type(owner).__name__, name, getattr(owner, name), least=1)
+    for name in flags:
+        flag(type(owner).__name__, name, getattr(owner, name))
+
+
+def flag(owner: str, meaning: str, value: Any) -> bool:
+    """Return True or False; InputError for anything else, 0 and 1 too."""
+    if isinstance(value, bool | np.bool_):
+        return bool(value)
+    raise InputError(f"{owner}: {meaning} is {shown(value)}; give True or False")
+
+
+def function(owner: str, meaning: str, value: Any, remedy: str) -> Any:
+    """Return what can be called; InputError for anything else, and for a class."""
+    if callable(value) and not isinstance(value, type):
+        return value
+    raise InputError(f"{owner}: {meaning} is {shown(value)}; {_called(value)}{remedy}")
+
+
+def column_name(kind: str, name: Any) -> str:
+    """Return a name that columns may carry; InputError unless it is made of letters, digits and underscores."""
+    if isinstance(name, str | int) and re.fullmatch(r"\w+", str(name), re.ASCII):
+        return str(name)
+    raise InputError(f"{kind} {shown(name)}: use letters, digits and underscores, it names columns")
+
+
+def several(owner: str, meaning: str, value: Any, remedy: str) -> tuple[Any, ...]:
+    """Return the members of a list or tuple; InputError for one object, a text or a mapping in its place."""
+    if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str | bytes):
+        return tuple(value)
+    raise InputError(f"{owner}: {meaning} is {shown(value)}; {_called(value)}{remedy}")
 
 
 def instance(owner: str, meaning: str, value: Any, kinds: type | tuple[type, ...], remedy: str) -> Any:
@@ -67,9 +108,13 @@ def instance(owner: str, meaning: str, value: Any, kinds: type | tuple[type, ...
     raise InputError(f"{owner}: {meaning} is {shown(value)}; {_called(value)}{remedy}")
 
 
-def provides(owner: str, meaning: str, value: Any, names: tuple[str, ...], remedy: str) -> Any:
-    """Return an object that has these attributes (a protocol's); InputError for a class, and for anything else."""
-    if not isinstance(value, type) and all(hasattr(value, name) for name in names):
+def provides(
+    owner: str, meaning: str, value: Any, names: tuple[str, ...], remedy: str, *, lacks: tuple[str, ...] = ()
+) -> Any:
+    """Return an object that has these attributes (a protocol's) and lacks those, which mark other kinds of objects;
+    InputError for a class, and for anything else."""
+    fits = all(hasattr(value, name) for name in names) and not any(hasattr(value, name) for name in lacks)
+    if fits and not isinstance(value, type):
         return value
     raise InputError(f"{owner}: {meaning} is {shown(value)}; {_called(value)}{remedy}")
 
@@ -108,7 +153,7 @@ def _called(value: Any) -> str:
     return f"make an object of it, {value.__name__}(…), or " if isinstance(value, type) else ""
 
 
-def _real(value: Any) -> float:
+def real(value: Any) -> float:
     """The value as a float, NaN for what is no real number; integers too large for a float are infinite."""
     if isinstance(value, bool | np.bool_) or not isinstance(value, Real | Integral):
         return math.nan
@@ -116,3 +161,11 @@ def _real(value: Any) -> float:
         return float(value)
     except OverflowError:
         return math.inf
+
+
+def refuse(defects: Iterable[str], comm: Comm) -> None:
+    """InputError on all ranks with the first text that is not empty, whichever rank found it; collective."""
+    mine = next((text for text in defects if text), "")
+    if comm.max(np.array([float(bool(mine))]))[0]:
+        found = comm.bcast(comm.gather(mine))
+        raise InputError(next(text for text in found if text))

@@ -14,12 +14,12 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from numbers import Real
 from typing import Protocol
 
 import numpy as np
 
 from .algebra import Array
+from .checks import attributes, instance, number, several
 from .errors import InputError
 from .ground_motion import Record
 
@@ -94,8 +94,8 @@ class Ricker:
 
     def __post_init__(self) -> None:
         _check(self, finite=("amplitude",), positive=("frequency",))
-        if not isinstance(self.peak_time, Real) or not math.isfinite(self.peak_time) or self.peak_time < 0:
-            raise InputError(f"Ricker: delay is {self.delay!r}; give zero or a positive finite time in seconds")
+        if self.delay is not None:
+            number("Ricker", "delay", self.delay, not_negative=True, unit="seconds")
 
     @property
     def peak_time(self) -> float:
@@ -232,8 +232,7 @@ class GroundMotion:
     scale: float = 1.0
 
     def __post_init__(self) -> None:
-        if not isinstance(self.record, Record):
-            raise InputError(f"GroundMotion: record is {self.record!r}; pass a Record, such as read_record(path)")
+        instance("GroundMotion", "record", self.record, Record, "pass a Record, such as read_record(path)")
         _check(self, finite=("scale",))
 
     @property
@@ -256,13 +255,8 @@ class GroundMotion:
 
 def _check(excitation: Excitation, *, finite: tuple[str, ...] = (), positive: tuple[str, ...] = ()) -> None:
     """Raise InputError for a bad number or direction; turn the direction into a tuple of floats."""
+    attributes(excitation, finite=finite, positive=positive)
     owner = type(excitation).__name__
-    for name in finite + positive:
-        value = getattr(excitation, name)
-        if not isinstance(value, Real) or not math.isfinite(value):
-            raise InputError(f"{owner}: {name} is {value!r}; give a finite number")
-        if name in positive and value <= 0:
-            raise InputError(f"{owner}: {name} is {value!r}; give a number above zero")
     direction = _finite_tuple(owner, "direction", excitation.direction)
     if not 1 <= len(direction) <= 3 or not any(direction):
         raise InputError(f"{owner}: direction is {direction!r}; give one to three components, not all zero")
@@ -271,11 +265,5 @@ def _check(excitation: Excitation, *, finite: tuple[str, ...] = (), positive: tu
 
 def _finite_tuple(owner: str, name: str, values: Sequence[float]) -> tuple[float, ...]:
     """`values` as a tuple of floats; InputError naming the first entry that is not a finite number."""
-    try:
-        result = tuple(float(value) for value in values)
-    except (TypeError, ValueError):
-        raise InputError(f"{owner}: {name} is {values!r}; give a sequence of numbers") from None
-    for k, value in enumerate(result):
-        if not math.isfinite(value):
-            raise InputError(f"{owner}: {name}[{k}] is {value!r}; give finite numbers")
-    return result
+    entries = several(owner, name, values, "give a sequence of numbers")
+    return tuple(number(owner, f"{name}[{k}]", value) for k, value in enumerate(entries))

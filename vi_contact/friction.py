@@ -14,12 +14,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from numbers import Real
 from typing import Any, Protocol
 
 import numpy as np
 
 from .algebra import Array
+from .checks import function, real, shown
 from .errors import InputError
 
 
@@ -130,12 +130,11 @@ class SlipRateCoulomb:
     mu: Callable[[Array], Any]
 
     def __post_init__(self) -> None:
-        if not callable(self.mu):
-            raise InputError(f"SlipRateCoulomb: mu is {self.mu!r}; give a function of the slip rate, or use Coulomb()")
+        function("SlipRateCoulomb", "mu", self.mu, "give a function of the slip rate, or use Coulomb()")
 
     def at(self, speed: Array) -> Coulomb:
         """Coulomb's law with the coefficients of these speeds."""
-        found = np.asarray(self.mu(speed), dtype=float)
+        found = _coefficients(self.mu(speed))
         if found.shape not in ((), speed.shape):
             raise InputError(
                 f"SlipRateCoulomb: mu returns shape {found.shape} for {len(speed)} slip rates; return one coefficient "
@@ -159,6 +158,14 @@ class SlipRateCoulomb:
         return self.at(np.zeros(len(weights))).slope(weights)
 
 
+def _coefficients(values: Any) -> Array:
+    """What a user's function has returned as floats; InputError for what are no real numbers."""
+    found = np.asarray(values)
+    if found.dtype.kind not in "iuf":
+        raise InputError(f"SlipRateCoulomb: mu returns {shown(values)}; return real coefficients, one per slip rate")
+    return found.astype(float)
+
+
 @dataclass(frozen=True)
 class ExponentialDecay:
     """mu(v) = mu_k + (mu_s - mu_k) exp(-v/v_c): from static to kinetic friction over the speed v_c [m/s] > 0.
@@ -172,8 +179,9 @@ class ExponentialDecay:
 
     def __post_init__(self) -> None:
         _keep_coefficients(self)
-        if not (isinstance(self.v_c, Real) and 0.0 < self.v_c < math.inf):
-            raise InputError(f"ExponentialDecay: v_c [m/s] is {self.v_c!r}; give a positive speed, or StaticKinetic()")
+        if not 0.0 < real(self.v_c) < math.inf:
+            raise InputError(f"ExponentialDecay: v_c [m/s] is {shown(self.v_c)}; give a positive speed, or "
+                             "StaticKinetic()")
 
     def __call__(self, speed: Array) -> Array:
         """mu of each speed."""
@@ -221,8 +229,9 @@ def _checked(law: str, meaning: str, value: Any) -> Any:
     """The value, or those of a field as a tuple (frozen, comparable)."""
     field = isinstance(value, (tuple, list, np.ndarray)) and np.ndim(value) == 1
     for one in value if field else [value]:
-        if not isinstance(one, Real) or not math.isfinite(one) or one < 0:
-            raise InputError(f"{law}: {meaning} is {one!r}; give zero or a positive finite number, or one per point")
+        if not 0.0 <= real(one) < math.inf:
+            raise InputError(f"{law}: {meaning} is {shown(one)}; give zero or a positive finite number, or one per "
+                             "point")
     return tuple(float(one) for one in value) if field else value
 
 

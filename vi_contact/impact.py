@@ -22,6 +22,7 @@ from typing import Protocol
 import numpy as np
 
 from .algebra import Array, Factor, Indices, Mask
+from .checks import function, real, shown
 from .errors import InputError
 from .surfaces import ContactSurface
 from .system import SemiDiscreteSystem
@@ -44,6 +45,9 @@ class Impact:
 
 
 STORED_ENTRIES = 200_000  # of M⁻¹Bᵀ over all ranks: beyond it a back-substitution is cheaper than the product
+
+
+READING = "give ComponentReset() or MassProjection()"
 
 
 class ImpactLaw(Protocol):
@@ -128,6 +132,9 @@ class Inelastic:
 
     reading: Reading = field(default_factory=ComponentReset)
 
+    def __post_init__(self) -> None:
+        function("Inelastic", "reading", self.reading, READING)
+
     def target(self, impact: Impact) -> Array:
         return np.where(impact.active, 0.0, np.nan)
 
@@ -146,8 +153,10 @@ class Newton:
     reading: Reading = field(default_factory=ComponentReset)
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.e <= 1.0:
-            raise InputError(f"restitution coefficient e is {self.e}: give a number from 0 (inelastic) to 1 (elastic)")
+        if not 0.0 <= real(self.e) <= 1.0:
+            raise InputError(f"restitution coefficient e is {shown(self.e)}: give a number from 0 (inelastic) to 1 "
+                             "(elastic)")
+        function("Newton", "reading", self.reading, READING)
 
     def target(self, impact: Impact) -> Array:
         return np.where(impact.closing, -self.e * np.maximum(impact.before, 0.0), np.nan)

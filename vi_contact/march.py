@@ -9,6 +9,7 @@ import numpy as np
 
 from .certified import TOLERANCE, CertifiedSolver
 from .impact import Impact
+from .run_checks import check_methods, check_pace, check_state, start_time
 from .schemes.choice import completed
 from .solvers.condensed import Condensed
 from .static import initial_state
@@ -37,12 +38,19 @@ def march(
     a halved step are yielded one by one, and ``state.k`` counts them, but they are one of the ``steps``.
     A step whose certificate exceeds ``tolerance`` goes to the solvers of ``escalation`` in turn, then raises
     StepFailure with step, time, residuals and advice. ``state`` continues from a static stage or a checkpoint.
+    InputError, at the call, for arguments of the wrong kind, a state of another problem or inside the obstacle, and
+    motions that were computed with another scheme or dt.
     """
+    check_methods("march", solver, escalation, tolerance)
     problem, scheme = completed(problem, scheme)
-    state = initial_state(problem) if state is None else state
-    plan = course(dt, steps, t_end, state.t)
-    solvers = [solver or Condensed(), *escalation]
-    yield from March(problem, scheme=scheme, solvers=solvers, course=plan, state=state, tolerance=tolerance)
+    plan = course(dt, steps, t_end, start_time("march", state))
+    check_pace(problem, scheme, dt)
+    if state is None:
+        state = initial_state(problem)
+    else:
+        check_state("march", problem, state, dt=plan.dt(0), tolerance=tolerance, scheme=scheme)
+    solvers = [Condensed() if solver is None else solver, *escalation]
+    return iter(March(problem, scheme=scheme, solvers=solvers, course=plan, state=state, tolerance=tolerance))
 
 
 class March:

@@ -10,16 +10,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from .algebra import Array, Comm, Indices, Mask, Matrix, max_abs
+from .checks import provides, real, shown
 from .errors import InputError
 from .handing_over import from_neighbours, rigid_motions
 from .surfaces import ContactSurface
 from .system import SemiDiscreteSystem
 
+LIGHT = 1e-9  # of the diagonal entry of M: a row sum that is no mass
 LARGEST_CORRECTION = 0.35  # of a node's lumped mass: beyond, the mesh is too coarse to move mass about
 
 
@@ -29,6 +31,11 @@ class MassLaw(Protocol):
     def apply(
         self, system: SemiDiscreteSystem, surface: ContactSurface, *, tangential: bool
     ) -> SemiDiscreteSystem: ...
+
+
+def mass_law(owner: str, value: Any) -> None:
+    """InputError unless it is a mass law."""
+    provides(owner, "mass", value, ("apply",), "give Redistributed() or ConsistentMass()", lacks=("target",))
 
 
 @dataclass(frozen=True)
@@ -60,14 +67,15 @@ class Redistributed:
     lumping: float = 0.4
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.lumping <= 1.0:
-            raise InputError(f"lumping is {self.lumping}: give a share from 0 (consistent) to 1 (lumped)")
+        if not 0.0 <= real(self.lumping) <= 1.0:
+            raise InputError(f"lumping is {shown(self.lumping)}: give a share from 0 (consistent) to 1 (lumped)")
 
     def apply(self, system: SemiDiscreteSystem, surface: ContactSurface, *, tangential: bool) -> SemiDiscreteSystem:
         if surface.count == 0:
             return system
         massless, contact = _contact_unknowns(system, surface, tangential)
         nodal = _row_sums(system)
+        _refuse_negative(system, nodal)
         algebra = system.algebra
         every = np.arange(system.rows)
         lumped = algebra.local(every, every, nodal, system.rows)
@@ -121,6 +129,17 @@ def _faced(system: SemiDiscreteSystem, coupling: Matrix, contact: Mask) -> Mask:
 def _row_sums(system: SemiDiscreteSystem) -> Array:
     """Lumped mass of every unknown, in any nodal frames: sum over directions c of r_c (M r_c)."""
     return np.asarray(sum(r * (system.M @ r) for r in system.influence.T))
+
+
+def _refuse_negative(system: SemiDiscreteSystem, nodal: Array) -> None:
+    """InputError for nodal masses that are no masses, as row sums of elements of higher order are. Collective."""
+    own = system.M.diagonal()
+    wrong = int(system.algebra.comm.sum(np.array([float(np.sum((own > 0.0) & (nodal <= LIGHT * own)))]))[0])
+    if wrong:
+        raise InputError(
+            f"redistributed mass needs positive row sums of M and {wrong} unknowns have none: give the problem "
+            "mass=ConsistentMass(), or elements of first order"
+        )
 
 
 def _congruent(system: SemiDiscreteSystem, levels: Sequence[Matrix], A: Matrix) -> Matrix:

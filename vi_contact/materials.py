@@ -7,28 +7,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from numbers import Real
 from typing import ClassVar, Protocol
 
+from .checks import number
 from .errors import InputError
-
-
-def _number(owner: str, meaning: str, value: float) -> None:
-    """Raise InputError unless `value` is a finite real number (not NaN, not infinite, not text)."""
-    if not isinstance(value, Real) or not math.isfinite(value):
-        raise InputError(f"{owner}: {meaning} is {value!r}; give a finite number")
-
-
-def _positive(owner: str, meaning: str, value: float) -> None:
-    _number(owner, meaning, value)
-    if value <= 0:
-        raise InputError(f"{owner}: {meaning} is {value!r}; give a number above zero")
-
-
-def _not_negative(owner: str, meaning: str, value: float) -> None:
-    _number(owner, meaning, value)
-    if value < 0:
-        raise InputError(f"{owner}: {meaning} is {value!r}; give zero or a positive number")
 
 
 @dataclass(frozen=True)
@@ -44,9 +26,9 @@ class LinearElastic:
     rho: float
 
     def __post_init__(self) -> None:
-        _positive("LinearElastic", "Young's modulus E [Pa]", self.E)
-        _number("LinearElastic", "Poisson's ratio nu", self.nu)
-        _positive("LinearElastic", "the mass density rho [kg/m³]", self.rho)
+        number("LinearElastic", "Young's modulus E [Pa]", self.E, positive=True)
+        number("LinearElastic", "Poisson's ratio nu", self.nu)
+        number("LinearElastic", "the mass density rho [kg/m³]", self.rho, positive=True)
         if not -1.0 < self.nu < 0.5:
             raise InputError(f"LinearElastic: Poisson's ratio nu is {self.nu!r}; give a number between -1 and 0.5, "
                              "both excluded (nearly incompressible materials need a mixed method)")
@@ -58,8 +40,8 @@ class LinearElastic:
         nu = (c_p² - 2 c_s²) / (2 (c_p² - c_s²)), shear_modulus = rho c_s², E = 2 shear_modulus (1 + nu).
         Raises InputError unless c_p > sqrt(4/3) c_s > 0, which is nu > -1.
         """
-        _positive("LinearElastic.from_wave_speeds", "c_p [m/s]", c_p)
-        _positive("LinearElastic.from_wave_speeds", "c_s [m/s]", c_s)
+        for name, speed in (("c_p [m/s]", c_p), ("c_s [m/s]", c_s), ("rho [kg/m³]", rho)):
+            number("LinearElastic.from_wave_speeds", name, speed, positive=True)
         if 3.0 * c_p**2 <= 4.0 * c_s**2:
             raise InputError(f"LinearElastic.from_wave_speeds: c_p = {c_p!r} is too slow for c_s = {c_s!r}; "
                              "an elastic solid needs c_p > sqrt(4/3) c_s")
@@ -115,7 +97,7 @@ class PlaneStress:
     thickness: float = 1.0
 
     def __post_init__(self) -> None:
-        _positive("PlaneStress", "the thickness [m]", self.thickness)
+        number("PlaneStress", "the thickness [m]", self.thickness, positive=True)
 
     def elastic_constants(self, material: LinearElastic) -> tuple[float, float]:
         """(lambda_eff, shear_modulus) [Pa]; equal to (E nu / (1 - nu²), E / (2 (1 + nu)))."""
@@ -130,7 +112,7 @@ class PlaneStrain:
     thickness: float = 1.0
 
     def __post_init__(self) -> None:
-        _positive("PlaneStrain", "the thickness [m]", self.thickness)
+        number("PlaneStrain", "the thickness [m]", self.thickness, positive=True)
 
     def elastic_constants(self, material: LinearElastic) -> tuple[float, float]:
         """(lame_lambda, shear_modulus) [Pa]."""
@@ -172,7 +154,7 @@ class MassProportional:
     c: float
 
     def __post_init__(self) -> None:
-        _not_negative("MassProportional", "the damping coefficient c [kg/(m³ s)]", self.c)
+        number("MassProportional", "the damping coefficient c [kg/(m³ s)]", self.c, not_negative=True)
 
     def coefficients(self, material: LinearElastic) -> tuple[float, float]:
         """(c / rho, 0): integrating c against the shape functions is c / rho times the consistent mass."""
@@ -191,8 +173,8 @@ class Rayleigh:
     beta: float
 
     def __post_init__(self) -> None:
-        _not_negative("Rayleigh", "the mass coefficient alpha [1/s]", self.alpha)
-        _not_negative("Rayleigh", "the stiffness coefficient beta [s]", self.beta)
+        number("Rayleigh", "the mass coefficient alpha [1/s]", self.alpha, not_negative=True)
+        number("Rayleigh", "the stiffness coefficient beta [s]", self.beta, not_negative=True)
 
     @classmethod
     def from_frequencies(cls, f1: float, f2: float, *, xi1: float, xi2: float) -> Rayleigh:
@@ -203,9 +185,9 @@ class Rayleigh:
         (seismic.md 2.4). Raises InputError when f1 = f2 or when the solution needs a negative coefficient.
         """
         for name, f in (("f1", f1), ("f2", f2)):
-            _positive("Rayleigh.from_frequencies", f"the frequency {name} [Hz]", f)
+            number("Rayleigh.from_frequencies", f"the frequency {name} [Hz]", f, positive=True)
         for name, xi in (("xi1", xi1), ("xi2", xi2)):
-            _not_negative("Rayleigh.from_frequencies", f"the damping ratio {name}", xi)
+            number("Rayleigh.from_frequencies", f"the damping ratio {name}", xi, not_negative=True)
         if f1 == f2:
             raise InputError(f"Rayleigh.from_frequencies: f1 and f2 are both {f1!r} Hz; give two frequencies")
         w1, w2 = 2.0 * math.pi * min(f1, f2), 2.0 * math.pi * max(f1, f2)
@@ -227,6 +209,6 @@ class Rayleigh:
 
         Smallest at w = sqrt(alpha / beta), where it is sqrt(alpha beta).
         """
-        _positive("Rayleigh.ratio", "the frequency f [Hz]", f)
+        number("Rayleigh.ratio", "the frequency f [Hz]", f, positive=True)
         w = 2.0 * math.pi * f
         return 0.5 * (self.alpha / w + self.beta * w)

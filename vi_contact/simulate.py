@@ -9,12 +9,14 @@ from typing import Any
 
 from .certified import TOLERANCE
 from .checkpoint import Place, read_checkpoint
+from .checks import flag, instance, provides, several, whole
 from .errors import InputError
 from .folder_lock import locked
 from .history import Table, read_rows
 from .output import on_root, run_folder
 from .recorders import Contact, Energy, Row, Steps
 from .run import Comparison, Run, Settings
+from .run_checks import check_methods, check_pace, check_state, start_time
 from .schemes.choice import completed
 from .solution import Solution
 from .solvers.condensed import Condensed
@@ -70,15 +72,16 @@ def simulate(
         StepFailure: a step no solver could certify; ViContactError: the disk refused something. All that was computed
             is in the folder then, and summary.json says why the run ended.
     """
-    if checkpoint_every < 1:
-        raise InputError(f"checkpoint_every is {checkpoint_every}: give a number of steps >= 1")
-    if fields is not None and out is None:
-        raise InputError("fields need an output folder: give out, or leave fields away")
+    _check_outputs(record, out, restart, checkpoint_every, progress, fields, cross_check)
+    check_methods("simulate", solver, escalation, tolerance)
     problem, scheme = completed(problem, scheme)
-    solver = solver or Condensed()
+    solver = Condensed() if solver is None else solver
+    first = course(dt, steps, t_end, start_time("simulate", state)).dt(0)
+    check_pace(problem, scheme, dt)
     scheme.check(problem)
     solver.check(problem)
-    course(dt, steps, t_end, 0.0 if state is None else state.t)
+    if state is not None:
+        check_state("simulate", problem, state, dt=first, tolerance=tolerance, scheme=scheme)
     settings = Settings(problem, scheme, solver, dt, escalation, tolerance, checkpoint_every, cross_check, progress)
     folder = None if out is None else run_folder(problem.system.algebra.comm, out)
     recorders: list[Any] = [Steps(problem.system.influence.shape[1])]
@@ -106,6 +109,26 @@ def _prepared(
     if source is not None:
         _continue(table, problem, recorders, place.state, source)
     return Run(settings, recorders, table, plan, place, None if source is None else place.state.k)
+
+
+def _check_outputs(
+    record: Any, out: Any, restart: Any, checkpoint_every: Any, progress: Any, fields: Any, cross_check: Any
+) -> None:
+    """InputError for what is no recorder, folder, number of steps, writer of fields or cross-check."""
+    owner = "simulate"
+    for one in () if record is None else several(owner, "record", record, "give a list of recorders, or None"):
+        provides(owner, "a recorder", one, ("columns", "start", "row"), "give Energy(), Contact(), Probe(…) or another")
+    if out is not None:
+        instance(owner, "out", out, (str, Path), "give a path, or None")
+    instance(owner, "restart", restart, (bool, str, Path), "give True, False or the path of a run folder")
+    whole(owner, "checkpoint_every", checkpoint_every, least=1)
+    flag(owner, "progress", progress)
+    if fields is not None:
+        if out is None:
+            raise InputError("fields need an output folder: give out, or leave fields away")
+        provides(owner, "fields", fields, ("open",), "give fem.XDMF(every=10), or None")
+    if cross_check is not None:
+        provides(owner, "cross_check", cross_check, ("report",), "give a CrossChecked solver, or None")
 
 
 def _source(restart: bool | str | Path, folder: Path | None) -> Path | None:

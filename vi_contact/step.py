@@ -21,11 +21,11 @@ from typing import Any, Protocol
 import numpy as np
 
 from .algebra import Algebra, Array, Factor, Mask, Matrix
-from .errors import InputError
 from .excitation import Excitation
 from .friction import FrictionLaw, Frictionless
 from .impact import ImpactLaw
 from .mass import MassLaw
+from .problem_checks import check_problem
 from .surfaces import ContactSurface
 from .system import SemiDiscreteSystem
 
@@ -35,7 +35,8 @@ class ContactProblem:
     """A semi-discrete system, a contact surface, what shakes it and how it rubs and rebounds.
 
     The system is turned into the surface's nodal frames once, here. ``impact=None`` leaves velocities alone;
-    ``mass=None`` leaves the choice of the mass matrix to the time scheme.
+    ``mass=None`` leaves the choice of the mass matrix to the time scheme. InputError, on all ranks, for parts of the
+    wrong kind or size, and for a surface that was made for another system. Collective.
     """
 
     system: SemiDiscreteSystem
@@ -46,17 +47,7 @@ class ContactProblem:
     mass: MassLaw | None = None
 
     def __post_init__(self) -> None:
-        if self.system.absolute and self.excitations:
-            raise InputError(
-                "a compliant base is shaken by its own upgoing motion: leave the excitation of the problem out, its "
-                "inertia load is that of a rigid base"
-            )
-        for excitation in self.excitations:
-            if len(excitation.direction) != self.system.influence.shape[1]:
-                raise InputError(
-                    f"excitation direction {excitation.direction} has {len(excitation.direction)} components but the "
-                    f"body has {self.system.influence.shape[1]}: give one component per dimension"
-                )
+        check_problem(self)
 
     @property
     def excitations(self) -> tuple[Excitation, ...]:

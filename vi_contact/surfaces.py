@@ -8,13 +8,16 @@ Sign: the direction n points from the body to the obstacle, u_n = u·n, gap = ga
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Protocol
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol
 
 import numpy as np
 
 from .algebra import Array, Comm, Indices, Mask, Matrix
+from .checks import array, function, real, shown
 from .errors import InputError
+
+Motion = Callable[[float], float | Array]
 
 
 class Obstacle(Protocol):
@@ -46,8 +49,8 @@ class HalfSpace:
     normal: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        length = float(np.linalg.norm(self.normal))
-        if not np.isfinite(length) or length == 0.0 or len(self.point) != len(self.normal):
+        point, normal = (array("HalfSpace", name, getattr(self, name), (None,)) for name in ("point", "normal"))
+        if not normal.any() or not np.isfinite(np.linalg.norm(normal)) or len(point) != len(normal):
             raise InputError(
                 f"HalfSpace(point={self.point}, normal={self.normal}): give a point and a nonzero normal "
                 "with the same number of components"
@@ -86,16 +89,20 @@ class AnalyticGap:
 
     function: Callable[[Array], Array]
 
+    def __post_init__(self) -> None:
+        function("AnalyticGap", "function", self.function, "give a function of points (k, d) that returns gaps (k,)")
+
     def directions(self, points: Array, normals: Array) -> Array:
         return normals
 
     def gap(self, points: Array, normals: Array) -> Array:
-        gap = np.asarray(self.function(points), dtype=float)
-        if gap.shape != (len(points),):
+        gap = np.asarray(self.function(points))
+        if gap.shape != (len(points),) or gap.dtype.kind not in "iuf":
             raise InputError(
-                f"AnalyticGap returned shape {gap.shape} for {len(points)} points: return one gap per point"
+                f"AnalyticGap returned {gap.dtype} of shape {gap.shape} for {len(points)} points: return one gap per "
+                "point, a real number"
             )
-        return gap
+        return gap.astype(float)
 
 
 @dataclass(frozen=True)
@@ -116,6 +123,8 @@ class ContactSurface:
             displacement relative to that side; R - 1 takes from rows of other points only. None on an obstacle.
         motion: how far the obstacle has moved towards the body at time t, (m,) [m]; None for one at rest.
         slide: how far it has moved along the tangents at time t, (m, d-1) [m]; None for one at rest.
+        space: of the systems that it was made for; None when it was made by hand.
+        paces: of motions of the obstacle that were computed with time steps of their own (``system.Pace``).
     """
 
     comm: Comm
@@ -132,6 +141,8 @@ class ContactSurface:
     coupling: Matrix | None = None
     motion: Callable[[float], Array] | None = None
     slide: Callable[[float], Array] | None = None
+    space: Any = field(default=None, repr=False)
+    paces: tuple[Any, ...] = ()
 
     @property
     def count(self) -> int:
@@ -173,19 +184,20 @@ class ContactSurface:
 
     def moving(
         self,
-        towards: Callable[[float], float | Array] | None = None,
-        along: Callable[[float], float | Array] | None = None,
+        towards: Motion | None = None,
+        along: Motion | None = None,
     ) -> ContactSurface:
         """On an obstacle that moves: ``towards`` the body and ``along`` the tangents, t [s] -> [m], one value for all
         points or arrays of shape (m,) and (m, d-1). A moving obstacle is not turned; its points face the same nodes."""
 
-        def spread(function: Callable[[float], float | Array], shape: tuple[int, ...]) -> Callable[[float], Array]:
-            return lambda t: np.broadcast_to(np.asarray(function(t), dtype=float), shape)
+        def spread(name: str, way: Motion, shape: tuple[int, ...]) -> Callable[[float], Array]:
+            function("moving", name, way, "give a function of the time t [s] that returns metres")
+            return lambda t: _spread(name, way(t), shape, t)
 
         return replace(
             self,
-            motion=None if towards is None else spread(towards, (self.count,)),
-            slide=None if along is None else spread(along, (self.count, self.tangents.shape[1])),
+            motion=None if towards is None else spread("towards", towards, (self.count,)),
+            slide=None if along is None else spread("along", along, (self.count, self.tangents.shape[1])),
         )
 
     def held(self) -> ContactSurface:
@@ -197,9 +209,19 @@ class ContactSurface:
 
         Each point presses a fictitious spring k = stiffness * weight, whose far end obeys the unilateral law.
         """
-        if not np.isfinite(stiffness) or stiffness <= 0.0:
-            raise InputError(f"support stiffness is {stiffness}: give a positive foundation modulus in Pa/m")
+        if not 0.0 < real(stiffness) < np.inf:
+            raise InputError(f"support stiffness is {shown(stiffness)}: give a positive foundation modulus in Pa/m")
         return replace(self, compliance=1.0 / (stiffness * self.weights))
+
+
+def _spread(name: str, value: Any, shape: tuple[int, ...], t: float) -> Array:
+    """A value for all points, or one for each; InputError for what are no finite metres."""
+    found = np.asarray(value)
+    alike = all(n in (1, m) for n, m in zip(found.shape[::-1], shape[::-1], strict=False)) and found.ndim <= len(shape)
+    if found.dtype.kind not in "iuf" or not alike or not np.all(np.isfinite(found)):
+        raise InputError(f"a moving obstacle: {name}({t:g} s) is {shown(value)}; return finite metres, one number or "
+                         f"an array of shape {shape}")
+    return np.broadcast_to(found.astype(float), shape)
 
 
 def admissible_gap(gap: Array, points: Array, size: float) -> Array:

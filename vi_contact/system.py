@@ -9,6 +9,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from .algebra import Algebra, Array, Mask, Matrix
+from .checks import instance, provides, shown
+from .errors import InputError
 
 
 class Space(Protocol):
@@ -87,6 +89,16 @@ def _turned(T: Matrix, function: Callable[[float], Array]) -> Callable[[float], 
 
 
 @dataclass(frozen=True)
+class Pace:
+    """Scheme and time steps (a number or a Schedule) that the motion ``name`` was computed with: the run's own, or the
+    motion is another one."""
+
+    name: str
+    scheme: Any
+    dt: Any
+
+
+@dataclass(frozen=True)
 class SemiDiscreteSystem:
     """M u'' + C u' + K u = f(t) on the free unknowns; prescribed displacements are already eliminated into f.
 
@@ -106,6 +118,7 @@ class SemiDiscreteSystem:
             place, and a body with such nodes cannot turn.
         notes: which motion its boundaries expect and the like, for log and summary of a run.
         absolute: True when a boundary lets waves in: displacements are those of space, and nothing else may shake it.
+        paces: of the motions among its loads that were computed with time steps of their own.
     """
 
     algebra: Algebra
@@ -123,7 +136,21 @@ class SemiDiscreteSystem:
     tied: Mask | None = None
     notes: tuple[str, ...] = ()
     absolute: bool = False
+    paces: tuple[Pace, ...] = ()
     _cache: dict[str, Any] = field(default_factory=dict, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        for name in ("M", "K") if self.C is None else ("M", "K", "C"):
+            remedy = "give a SerialMatrix(…) or a PetscMatrix(…)"
+            provides("SemiDiscreteSystem", name, getattr(self, name), ("rows", "transpose_apply"), remedy)
+        names = ("combine", "factor", "dot", "comm")
+        provides("SemiDiscreteSystem", "algebra", self.algebra, names, "give SerialAlgebra() or PetscAlgebra(comm)")
+        instance("SemiDiscreteSystem", "load", self.load, Load, "give Load(constant, …)")
+        provides("SemiDiscreteSystem", "space", self.space, ("dimension", "ids"), "give a space, what unknowns mean")
+        for name, axes in (("u0", 1), ("v0", 1), ("influence", 2)):
+            value = getattr(self, name)
+            if not isinstance(value, np.ndarray) or value.ndim != axes or value.dtype.kind not in "iuf":
+                raise InputError(f"SemiDiscreteSystem: {name} is {shown(value)}; give real numbers along {axes} axes")
 
     @property
     def rows(self) -> int:

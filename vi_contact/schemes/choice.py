@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from ..impact import NoImpact
 from ..mass import ConsistentMass
+from ..run_checks import check_problem_given, check_scheme
 from ..step import ContactProblem, Scheme
 from .trapezoidal import Trapezoidal
 from .zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
@@ -18,6 +19,8 @@ def completed(problem: ContactProblem, scheme: Scheme | None) -> tuple[ContactPr
     asked for, the Zienkiewicz-Wood-Taylor step at phi = ½, which never gains energy. Without a mass: the scheme's own
     choice.
     """
+    check_problem_given("march", problem)
+    check_scheme("march", scheme)
     if scheme is None:
         lawless = problem.impact is None or isinstance(problem.impact, NoImpact)
         massive = problem.mass is not None and isinstance(problem.mass, ConsistentMass)

@@ -27,6 +27,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..algebra import Array, Mask
+from ..checks import flag
 from ..step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
 from .mass_projection import admissible
 from .position_step import position_step
@@ -41,6 +42,9 @@ class ContactStabilisedNewmark(SingleStep):
     """
 
     projected: bool = True
+
+    def __post_init__(self) -> None:
+        flag("ContactStabilisedNewmark", "projected", self.projected)
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
         """A = 4/dt² M + 2/dt C + K."""

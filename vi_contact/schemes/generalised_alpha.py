@@ -33,6 +33,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..algebra import Array
+from ..checks import real, shown
 from ..errors import InputError
 from ..step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
 from .acceleration import consistent_acceleration, without_inertia
@@ -53,13 +54,14 @@ class Weights:
     gamma: float
 
     def __post_init__(self) -> None:
-        least = 0.5 - self.alpha_m + self.alpha_f
-        stable = self.alpha_m <= self.alpha_f + SLACK and self.alpha_f <= 0.5 + SLACK and self.gamma >= least - SLACK
-        if not (stable and np.inf > self.beta >= 0.5 * self.gamma - SLACK and np.isfinite(least + self.gamma)):
+        alpha_m, alpha_f, beta, gamma = (real(getattr(self, name)) for name in self.__dataclass_fields__)
+        least = 0.5 - alpha_m + alpha_f
+        stable = alpha_m <= alpha_f + SLACK and alpha_f <= 0.5 + SLACK and gamma >= least - SLACK
+        if not (stable and np.inf > beta >= 0.5 * gamma - SLACK and np.isfinite(least + gamma)):
+            told = ", ".join(f"{name}={shown(getattr(self, name))}" for name in self.__dataclass_fields__)
             raise InputError(
-                f"alpha_m={self.alpha_m:g}, alpha_f={self.alpha_f:g}, beta={self.beta:g}, gamma={self.gamma:g} are not "
-                "unconditionally stable, and contact has no highest frequency to choose dt by: give alpha_m <= alpha_f "
-                "<= 1/2, gamma >= 1/2 - alpha_m + alpha_f, beta >= gamma/2"
+                f"{told} are not unconditionally stable, and contact has no highest frequency to choose dt by: give "
+                "alpha_m <= alpha_f <= 1/2, gamma >= 1/2 - alpha_m + alpha_f, beta >= gamma/2"
             )
 
 
@@ -168,9 +170,9 @@ class GeneralisedAlpha(AlphaStep):
     @classmethod
     def spectral_radius(cls, rho_inf: float = 0.8) -> GeneralisedAlpha:
         """The member of order 2 with this amplification at infinite frequency, 0 (all damped) to 1 (nothing damped)."""
-        if not 0.0 <= rho_inf <= 1.0:
+        if not 0.0 <= real(rho_inf) <= 1.0:
             raise InputError(
-                f"rho_inf is {rho_inf}: give the amplification at infinite frequency, from 0 to 1 (no damping)"
+                f"rho_inf is {shown(rho_inf)}: give the amplification at infinite frequency, from 0 to 1 (no damping)"
             )
         alpha_m, alpha_f = (2.0 * rho_inf - 1.0) / (1.0 + rho_inf), rho_inf / (1.0 + rho_inf)
         apart = alpha_f - alpha_m

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..checks import real, shown
 from ..errors import InputError
 from .generalised_alpha import AlphaStep, Weights
 
@@ -27,8 +28,8 @@ class HHT(AlphaStep):
     alpha: float = -0.1
 
     def __post_init__(self) -> None:
-        if not -1.0 / 3.0 <= self.alpha <= 0.0:
-            raise InputError(f"HHT alpha is {self.alpha}: give a number from -1/3 to 0, others are not stable")
+        if not -1.0 / 3.0 <= real(self.alpha) <= 0.0:
+            raise InputError(f"HHT alpha is {shown(self.alpha)}: give a number from -1/3 to 0, others are not stable")
 
     @property
     def weights(self) -> Weights:

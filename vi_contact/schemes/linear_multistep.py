@@ -25,6 +25,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..algebra import Array
+from ..checks import array, number
 from ..errors import InputError
 from ..step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
 from .acceleration import consistent_acceleration, without_inertia
@@ -49,6 +50,9 @@ class LinearMultistep(BalanceStep):
     mu: float = 1.0
 
     def __post_init__(self) -> None:
+        for name in ("a", "b", "gamma"):
+            array("LinearMultistep", name, getattr(self, name), (None,))
+        number("LinearMultistep", "mu", self.mu)
         q = len(self.a) - 1
         if q < 1 or len(self.b) != q + 1 or len(self.gamma) != q + 1:
             raise InputError("LinearMultistep a, b and gamma must have the same length q + 1 >= 2 (levels p, ..., p-q)")
@@ -84,6 +88,8 @@ class LinearMultistep(BalanceStep):
     @classmethod
     def newmark(cls, beta: float = 0.25, gamma: float = 0.5) -> LinearMultistep:
         """Newmark(beta, gamma) as the q = 2 member (verification 4.1)."""
+        for name, value in (("beta", beta), ("gamma", gamma)):
+            number("LinearMultistep.newmark", name, value)
         if beta <= 0.0:
             raise InputError(f"Newmark beta is {beta}: give beta > 0, the explicit member cannot hold contact")
         b = (beta, 0.5 + gamma - 2.0 * beta, 0.5 - gamma + beta)

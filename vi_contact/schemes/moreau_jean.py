@@ -28,10 +28,12 @@ Sources: Moreau in Nonsmooth Mechanics and Applications (Springer 1988), 1-82; J
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from ..algebra import Array, Mask, max_abs
+from ..checks import flag, real, shown
 from ..errors import InputError
 from ..impact import NoImpact
 from ..step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
@@ -52,15 +54,17 @@ class MoreauJean(SingleStep):
     InputError for numbers outside these ranges.
     """
 
+    penetrates: ClassVar[bool] = True
     theta: float = 0.5
     e: float = 0.0
     allow_energy_gain: bool = False
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.e <= 1.0:
-            raise InputError(f"MoreauJean e is {self.e}: give a restitution from 0 (inelastic) to 1 (elastic)")
-        if not 0.5 <= self.theta <= 1.0:
-            raise InputError(f"MoreauJean theta is {self.theta}: give a weight from 0.5 to 1, less is unstable")
+        flag("MoreauJean", "allow_energy_gain", self.allow_energy_gain)
+        if not 0.0 <= real(self.e) <= 1.0:
+            raise InputError(f"MoreauJean e is {shown(self.e)}: give a restitution from 0 (inelastic) to 1 (elastic)")
+        if not 0.5 <= real(self.theta) <= 1.0:
+            raise InputError(f"MoreauJean theta is {shown(self.theta)}: give a weight from 0.5 to 1, less is unstable")
         largest = 1.0 / (1.0 + self.e)
         if self.theta > largest + 1e-12 and not self.allow_energy_gain:
             raise InputError(

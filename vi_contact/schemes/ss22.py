@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..checks import real, shown
 from ..errors import InputError
 from ..step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
 from .position_step import position_step
@@ -30,9 +31,9 @@ class SS22(SingleStep):
     theta2: float = 0.5
 
     def __post_init__(self) -> None:
-        if not np.inf > self.theta2 >= self.theta1 >= 0.5:
+        if not np.inf > real(self.theta2) >= real(self.theta1) >= 0.5:
             raise InputError(
-                f"SS22 weights theta1={self.theta1}, theta2={self.theta2}: give theta2 >= theta1 >= 0.5, "
+                f"SS22 weights theta1={shown(self.theta1)}, theta2={shown(self.theta2)}: give theta2 >= theta1 >= 0.5, "
                 "the unconditionally stable range"
             )
 

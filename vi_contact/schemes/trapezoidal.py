@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from ..mass import MassLaw, Redistributed
+from ..mass import MassLaw, Redistributed, mass_law
 from ..step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
 from .contact_layer import at_rest_between, relaxed
 from .guard import contact_in_the_balance, needs_no_impact_law
@@ -30,6 +30,9 @@ class Trapezoidal:
     """See the module's equations. ``mass``: the mass matrix for problems that do not name one."""
 
     mass: MassLaw = field(default_factory=Redistributed)
+
+    def __post_init__(self) -> None:
+        mass_law("Trapezoidal", self.mass)
 
     def check(self, problem: ContactProblem) -> None:
         """InputError for an impact law on massless contact nodes; warns when they have mass."""

@@ -17,6 +17,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..algebra import Array
+from ..checks import real, shown
 from ..errors import InputError
 from ..step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
 from .position_step import position_step
@@ -30,8 +31,9 @@ class ZienkiewiczWoodTaylor(SingleStep):
     phi: float = 0.5
 
     def __post_init__(self) -> None:
-        if not 0.5 <= self.phi <= 1.0:
-            raise InputError(f"ZienkiewiczWoodTaylor phi is {self.phi}: give a weight from 0.5 to 1, less is unstable")
+        if not 0.5 <= real(self.phi) <= 1.0:
+            raise InputError(f"ZienkiewiczWoodTaylor phi is {shown(self.phi)}: give a weight from 0.5 to 1, less is "
+                             "unstable")
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
         """A = M/(phi dt)² + C/(phi dt) + K."""

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import lapack
 
+from ..checks import attributes
 from .lcp import LCP, Array, LCPResult, Mask, check_guess, cholesky, failure, scaled_dense
 
 PATIENCE = 10  # Júdice and Pires, Comput. Oper. Res. 21, 1994
@@ -35,6 +36,9 @@ class ActiveSet:
 
     tolerance: float = 1e-9
     max_iterations: int = 1000
+
+    def __post_init__(self) -> None:
+        attributes(self, positive=("tolerance",), counts=("max_iterations",))
 
     def prepare(self, G: Array, bilateral: Mask) -> PreparedActiveSet:
         """Check and factor G (m, m) once for many right-hand sides. InputError when it is not SPD."""

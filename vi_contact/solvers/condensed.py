@@ -20,13 +20,14 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..algebra import Array, Mask
+from ..checks import instance, provides
 from ..errors import InputError
 from ..step import ContactProblem, EffectiveMatrix, StepProblem, StepResult
 from ..surfaces import ContactSurface
 from .active_set import ActiveSet
 from .friction_condensed import CondensedFriction
 from .friction_newton import FrictionNewton
-from .friction_small import FrictionMethod
+from .friction_small import FrictionMethod, inner_method
 from .lcp import LCPResult
 from .mprgp import ProjectedCG
 from .slip_rate import RateIteration
@@ -53,6 +54,12 @@ class Condensed:
     method: SmallMethod = field(default_factory=ActiveSet)
     friction_method: FrictionMethod = field(default_factory=FrictionNewton)
     rates: RateIteration = field(default_factory=RateIteration)
+
+    def __post_init__(self) -> None:
+        remedy = "give ActiveSet(), Hildreth() or ProjectedCG()"
+        provides("Condensed", "method", self.method, ("prepare", "solve"), remedy, lacks=("check",))
+        inner_method("Condensed", "friction_method", self.friction_method)
+        instance("Condensed", "rates", self.rates, RateIteration, "give RateIteration()")
 
     def check(self, problem: ContactProblem) -> None:
         """InputError for friction without a tangential direction, or of a wrong number of values."""

@@ -14,10 +14,11 @@ plain again, and what was tried before is forgotten.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
+from ..checks import provides, real, shown, whole
 from ..errors import InputError
 from .lcp import Array
 
@@ -34,6 +35,11 @@ class Extrapolation(Protocol):
     """A way to choose the next point: Plain, Aitken or Anderson."""
 
     def start(self) -> Sequence: ...
+
+
+def accelerated(owner: str, value: Any) -> None:
+    """InputError unless it is an extrapolation."""
+    provides(owner, "extrapolation", value, ("start",), "give Plain(), Aitken() or Anderson()", lacks=("step",))
 
 
 @dataclass(frozen=True)
@@ -58,8 +64,8 @@ class Aitken:
     limit: float = 10.0
 
     def __post_init__(self) -> None:
-        if not self.limit > 1.0:
-            raise InputError(f"Aitken: limit is {self.limit}; give the largest relaxation factor, more than 1")
+        if not 1.0 < real(self.limit) < np.inf:
+            raise InputError(f"Aitken: limit is {shown(self.limit)}; give the largest relaxation factor, more than 1")
 
     def start(self) -> Sequence:
         """An empty memory; the first step is plain."""
@@ -90,8 +96,8 @@ class Anderson:
     after: int = 0
 
     def __post_init__(self) -> None:
-        if self.depth < 1 or self.after < 0:
-            raise InputError(f"{self}: give a depth of at least 1 and zero or more plain steps before")
+        whole("Anderson", "depth", self.depth, least=1)
+        whole("Anderson", "after", self.after)
 
     def start(self) -> Sequence:
         """An empty memory."""

@@ -11,9 +11,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .extrapolation import Extrapolation, Plain
+from ..checks import attributes
+from .extrapolation import Extrapolation, Plain, accelerated
 from .friction_newton import FrictionNewton
-from .friction_small import Blocks, FrictionMethod, FrictionResult, observed_contraction
+from .friction_small import Blocks, FrictionMethod, FrictionResult, inner_method, observed_contraction
 from .lcp import Array, Mask, largest
 
 
@@ -32,6 +33,11 @@ class FixedPoint:
     max_iterations: int = 200
     tresca: FrictionMethod = field(default_factory=FrictionNewton)
     extrapolation: Extrapolation = field(default_factory=Plain)
+
+    def __post_init__(self) -> None:
+        attributes(self, positive=("tolerance",), counts=("max_iterations",))
+        inner_method("FixedPoint", "tresca", self.tresca)
+        accelerated("FixedPoint", self.extrapolation)
 
     def prepare(self, G: Array, bilateral: Mask) -> PreparedFixedPoint:
         """Check and scale G (m d, m d)."""

@@ -21,6 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..checks import attributes
 from .friction_linear import Factors, LinearProblems
 from .friction_small import Blocks, FrictionResult, Step
 from .lcp import Array, Mask
@@ -40,6 +41,9 @@ class FrictionNewton:
 
     tolerance: float = 1e-11
     max_iterations: int = 30
+
+    def __post_init__(self) -> None:
+        attributes(self, positive=("tolerance",), counts=("max_iterations",))
 
     def prepare(self, G: Array, bilateral: Mask) -> PreparedNewton:
         """Check and scale G (m d, m d)."""

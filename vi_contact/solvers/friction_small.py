@@ -25,6 +25,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from ..checks import provides
 from ..errors import InputError, StepFailure
 from ..friction import project
 from .lcp import EPS, Array, Mask, check_gap, energy_scale, largest
@@ -62,6 +63,12 @@ class FrictionMethod(Protocol):
     """A method for (1): FrictionNewton, NSGS, FixedPoint, GivenForces or Uzawa."""
 
     def prepare(self, G: Array, bilateral: Mask) -> PreparedFriction: ...
+
+
+def inner_method(owner: str, meaning: str, value: Any) -> None:
+    """InputError unless it is a method for the small problem with friction."""
+    remedy = "give FrictionNewton(), NSGS(), FixedPoint(), GivenForces() or Uzawa()"
+    provides(owner, meaning, value, ("prepare",), remedy, lacks=("solve", "check"))
 
 
 @dataclass(frozen=True)

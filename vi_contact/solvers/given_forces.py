@@ -17,10 +17,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..checks import attributes
 from .active_set import ActiveSet
-from .extrapolation import Extrapolation, Plain
+from .extrapolation import Extrapolation, Plain, accelerated
 from .friction_newton import FrictionNewton
-from .friction_small import Blocks, FrictionMethod, FrictionResult
+from .friction_small import Blocks, FrictionMethod, FrictionResult, inner_method
 from .lcp import Array, Mask, largest
 
 
@@ -36,6 +37,11 @@ class GivenForces:
     max_iterations: int = 1000
     tangential: FrictionMethod = field(default_factory=FrictionNewton)
     extrapolation: Extrapolation = field(default_factory=Plain)
+
+    def __post_init__(self) -> None:
+        attributes(self, positive=("tolerance",), counts=("max_iterations",))
+        inner_method("GivenForces", "tangential", self.tangential)
+        accelerated("GivenForces", self.extrapolation)
 
     def prepare(self, G: Array, bilateral: Mask) -> PreparedGivenForces:
         """Check and scale G (m d, m d)."""

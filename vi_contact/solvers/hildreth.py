@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import lapack
 
+from ..checks import attributes
 from .lcp import EPS, LCP, Array, LCPResult, Mask, cholesky, failure, largest, scaled_dense
 
 
@@ -32,6 +33,9 @@ class Hildreth:
     tolerance: float = 1e-13
     max_sweeps: int = 10_000
     record: bool = False
+
+    def __post_init__(self) -> None:
+        attributes(self, positive=("tolerance",), counts=("max_sweeps",), flags=("primal", "record"))
 
     def prepare(self, G: Array, bilateral: Mask) -> PreparedHildreth:
         """Check G (m, m), and invert it for the primal form. InputError when it is not SPD."""

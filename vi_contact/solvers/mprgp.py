@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..checks import attributes
 from ..errors import InputError
 from .lcp import (
     LCP,
@@ -41,6 +42,9 @@ class ProjectedCG:
 
     tolerance: float = 1e-12
     max_iterations: int = 10_000
+
+    def __post_init__(self) -> None:
+        attributes(self, positive=("tolerance",), counts=("max_iterations",))
 
     def prepare(self, G: Array | Operator, bilateral: Mask) -> PreparedCG:
         """Estimate ‖G‖ by power iteration. G (m, m): an array, or anything with ``shape`` and ``@``."""

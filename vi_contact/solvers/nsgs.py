@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
+from ..checks import attributes
 from .friction_small import Blocks, FrictionResult, Step
 from .lcp import Array, Mask
 
@@ -32,6 +33,9 @@ class NSGS:
 
     tolerance: float = 1e-12
     max_iterations: int = 5000
+
+    def __post_init__(self) -> None:
+        attributes(self, positive=("tolerance",), counts=("max_iterations",))
 
     def prepare(self, G: Array, bilateral: Mask) -> PreparedNSGS:
         """Check and scale G (m d, m d)."""

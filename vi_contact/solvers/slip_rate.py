@@ -18,8 +18,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ..checks import attributes
 from ..errors import StepFailure
-from .extrapolation import Anderson, Extrapolation
+from .extrapolation import Anderson, Extrapolation, accelerated
 from .friction_small import FrictionResult
 from .lcp import Array, largest
 
@@ -34,6 +35,10 @@ class RateIteration:
     tolerance: float = 1e-12
     max_iterations: int = 200
     extrapolation: Extrapolation = field(default_factory=lambda: Anderson(depth=5, after=4))
+
+    def __post_init__(self) -> None:
+        attributes(self, positive=("tolerance",), counts=("max_iterations",))
+        accelerated("RateIteration", self.extrapolation)
 
     def solve(
         self,

@@ -13,10 +13,10 @@ that of friction_small.py's scaled numbers, in which rho is dimensionless. Slow 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from numbers import Real
 
 import numpy as np
 
+from ..checks import attributes, real, shown
 from ..errors import InputError
 from .friction_small import Blocks, FrictionResult
 from .lcp import Array, Mask
@@ -34,8 +34,9 @@ class Uzawa:
     rho: float | None = None
 
     def __post_init__(self) -> None:
-        if self.rho is not None and not (isinstance(self.rho, Real) and 0.0 < self.rho < np.inf):
-            raise InputError(f"Uzawa: rho is {self.rho!r}; give a positive number, or None for an automatic one")
+        attributes(self, positive=("tolerance",), counts=("max_iterations",))
+        if self.rho is not None and not 0.0 < real(self.rho) < np.inf:
+            raise InputError(f"Uzawa: rho is {shown(self.rho)}; give a positive number, or None for an automatic one")
 
     def prepare(self, G: Array, bilateral: Mask) -> PreparedUzawa:
         """Check and scale G (m d, m d)."""

@@ -17,6 +17,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..algebra import Array
+from ..checks import instance, provides, real, shown
 from ..errors import InputError, StepFailure
 from ..step import ContactProblem, EffectiveMatrix, StepProblem, StepResult
 from ..surfaces import ContactSurface
@@ -84,8 +85,13 @@ class Volume:
     tolerance: float = 1e-9
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.tolerance < 1.0:
-            raise InputError(f"Volume tolerance is {self.tolerance}: give a relative error below 1, such as 1e-9")
+        names = ("carries_friction", "defaults", "driver", "start")
+        provides("Volume", "method", self.method, names, "give OneFactorisation(), ReducedNewton() or another")
+        instance("Volume", "petsc_options", self.petsc_options, Mapping, "give a dict of PETSc options without prefix")
+        instance("Volume", "prefix", self.prefix, str, "give a text such as 'vi_contact_volume_'")
+        if not 0.0 < real(self.tolerance) < 1.0:
+            raise InputError(f"Volume tolerance is {shown(self.tolerance)}: give a relative error below 1, such as "
+                             "1e-9")
 
     def check(self, problem: ContactProblem) -> None:
         """InputError for friction that the method cannot carry, without a tangent, or of a wrong number of values."""

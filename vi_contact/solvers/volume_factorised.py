@@ -19,6 +19,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..algebra import Array
+from ..checks import whole
 from ..step import StepProblem
 from .volume_held import HeldInverse
 from .volume_options import OptionLayers, Options, check_own_inverse
@@ -153,6 +154,10 @@ class OneFactorisation:
     carries_friction: ClassVar[bool] = False
     exchanges: int = 5
     limit: int = 5_000_000
+
+    def __post_init__(self) -> None:
+        for name in ("exchanges", "limit"):
+            whole("OneFactorisation", name, getattr(self, name))
 
     def defaults(self, ranks: int) -> Options:
         """Options before the user's."""

@@ -14,6 +14,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..algebra import Array
+from ..checks import instance
 from ..errors import InputError
 from ..step import StepProblem
 from .volume_friction_step import ScaledRubbing
@@ -171,6 +172,7 @@ class Selected:
     petsc_type: str
 
     def __post_init__(self) -> None:
+        instance("Selected", "petsc_type", self.petsc_type, str, "give a PETSc type, such as 'vinewtonrsls'")
         if self.petsc_type not in SNES_TYPES:
             refuse_type(self.petsc_type)
 
