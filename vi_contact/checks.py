@@ -45,7 +45,7 @@ def whole(owner: str, meaning: str, value: Any, *, least: int = 0, most: int | N
 
 def counted(owner: str, asked: str, value: Any, things: str = "samples", *, most: int = LARGEST) -> int:
     """Return how many things an input asks for, before memory is taken for them; InputError above ``most``, and NaN."""
-    found = _real(value)
+    found = real(value)
     if not found <= most:
         raise InputError(f"{owner}: {asked} asks for {found:.3g} {things}, and {most:.3g} are the most; ask for fewer")
     return int(value)
