@@ -67,13 +67,25 @@ def pytest_configure(config: pytest.Config) -> None:
         config.pluginmanager.unregister(name="terminalreporter")
 
 
+def pytest_ignore_collect(collection_path: Path) -> bool | None:
+    """On several ranks files of serial tests are not even imported: that takes longer than many of their tests."""
+    if SIZE > 1 and collection_path.suffix == ".py":
+        return True if "\npytestmark = pytest.mark.serial\n" in collection_path.read_text() else None
+    return None
+
+
+def _left_out(item: pytest.Item) -> bool:
+    """Serial tests on several ranks; on three and more, which seldom have a core each, also those that are slow."""
+    return bool(item.get_closest_marker("serial") or (SIZE > 2 and item.get_closest_marker("slow")))
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     if SIZE == 1:
+        items.sort(key=lambda item: "validation" not in item.path.parts)  # its files are long: not last on one core
         return
-    serial = [item for item in items if item.get_closest_marker("serial")]
-    if serial:
-        items[:] = [item for item in items if not item.get_closest_marker("serial")]
-        config.hook.pytest_deselected(items=serial)
+    if left_out := [item for item in items if _left_out(item)]:
+        items[:] = [item for item in items if not _left_out(item)]
+        config.hook.pytest_deselected(items=left_out)
 
 
 def pytest_collectreport(report: pytest.CollectReport) -> None:

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # bash tests/run.sh [--quick] [arguments of pytest…]     the whole suite on 1, 2 and 3 ranks; installs what is missing on Debian
-#   --quick                     one rank, without the tests marked slow: about a minute
+#   --quick                     one rank, without tests/validation and the tests marked slow: about a minute
 #   VI_CONTACT_RANKS="1 2"      other numbers of ranks
 #   VI_CONTACT_TIMES=FILE       appends "ranks seconds file" for every test file
 #   VI_CONTACT_TIMEOUT=1800     seconds for all of them together; without it only single tests have a limit (tests/conftest.py)
@@ -15,7 +15,7 @@ export PETSC_OPTIONS="-no_signal_handler ${PETSC_OPTIONS:-}"  # a crash is then 
 [ -t 1 ] && colour=auto || colour=no  # mpirun gives its processes a terminal, even when its own output is a file
 seconds=${VI_CONTACT_TIMEOUT:-} passed=0 failed=0 skipped=0 status=0 child=
 ranks=${VI_CONTACT_RANKS:-1 2 3}
-if [ "${1:-}" = --quick ]; then shift; ranks=1; set -- -m "not slow" "$@"; fi
+if [ "${1:-}" = --quick ]; then shift; ranks=1; set -- -m "not slow" --ignore=tests/validation "$@"; fi
 tally=$(mktemp)
 trap 'rm -f "$tally"' EXIT
 trap 'kill "$child"; wait; exit 130' INT TERM

@@ -97,6 +97,7 @@ def difference(pair: tuple[Any, Any], scheme: Any, steps: int = 220, *, rest: bo
     return float(np.max(np.abs(one - other)) / np.max(np.abs(one)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["trapezoidal", "zwt", "newmark"])
 def test_both_frames_give_the_same_contact_forces(comm, name):
     """Horizontal and vertical motion together, with stiffness damping; measured 1e-12."""
@@ -104,6 +105,7 @@ def test_both_frames_give_the_same_contact_forces(comm, name):
     assert difference(pair, SCHEMES[name]) <= 1e-10
 
 
+@pytest.mark.slow
 @pytest.mark.serial
 @pytest.mark.parametrize("name", [name for name in SCHEMES if name not in ("trapezoidal", "zwt", "newmark")])
 def test_other_schemes_too(comm, name):

@@ -51,6 +51,7 @@ def bound(printed: str) -> float:
     return 0.5 * 10.0**-decimals + 1e-6 * abs(float(printed))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", TABLE, ids=lambda case: f"{case[0]}-{case[1]}")
 def test_reference_rows(runs: dict[tuple[float, str], BeamRun], case: tuple[float, str]) -> None:
     """V6.1: every number to half a unit of its last digit (and 1e-6 of it)."""

@@ -119,6 +119,7 @@ def oscillator(w2: float, damping: float, times: np.ndarray) -> np.ndarray:
     return np.array(u)
 
 
+@pytest.mark.slow
 def test_table_of_radial_functions(operators):
     """The matrices from the table are those of the Galerkin layer at all frequencies; the trapezoidal rule has the
     greatest, |s| dt up to 14 here, where the matrices are small."""

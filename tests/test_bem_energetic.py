@@ -59,6 +59,7 @@ def triangle(k: int) -> BoundaryMesh:
     return polygon([(-0.5, -0.4), (0.5, -0.3), (-0.3, 0.4)], 1.0 / k)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("shape", "fine"), [(with_hole, 1.4e-2), (triangle, 2.8e-2)])
 def test_plane_pulses_in_other_shapes(shape, fine):
     """B4: several loops, re-entrant and acute corners, elements at all angles to the fronts."""
@@ -173,6 +174,7 @@ def test_symmetric_form_is_positive_definite(ratio):
     assert 0.0 < eigenvalues[0] < eigenvalues[-1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ratio", [0.1, 0.25, 0.73, 4.0])
 def test_stable_for_small_and_large_time_steps(ratio):
     """B5: the rod stays bounded for c_P dt / h from 0.1 to 4 (to t = 60: benchmarks/bem.py)."""

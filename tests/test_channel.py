@@ -194,6 +194,7 @@ def test_any_number_of_ranks(friction):
             assert np.abs(np.asarray(together[name]) - np.asarray(single[name])).max() < 1e-10 * size, name
 
 
+@pytest.mark.slow
 @serial
 @pytest.mark.parametrize("name", ["triangles", "to one side", "irregular"])
 def test_other_meshes(name):
@@ -207,6 +208,7 @@ def test_other_meshes(name):
 
 # Runs -----------------------------------------------------------------------------------------------------------------
 
+@pytest.mark.slow
 def test_the_command(shared_tmp, capsys):
     """vi-contact channel: histories, fields and figures in the folder, the summary on rank 0."""
     options = ["--contact", "coulomb", "--mu", "0.4", "--damping", "0.05", "1", "10", "--steps", "10", "--quiet"]

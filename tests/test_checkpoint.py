@@ -79,6 +79,7 @@ def equal_files(one: Path, other: Path) -> bool:
         )
 
 
+@pytest.mark.slow
 @pytest.mark.serial
 @pytest.mark.parametrize("scheme", [ZienkiewiczWoodTaylor(0.5), SS22(), NEWMARK], ids=repr)
 @pytest.mark.parametrize("impact", [Inelastic(), Inelastic(MassProjection())], ids=["reset", "projection"])
@@ -248,6 +249,7 @@ def rubbing_box(comm: Any, mass: Any) -> ContactProblem:
 FRICTIONAL = {"impulses": (MoreauJean(), ConsistentMass()), "massless": (Trapezoidal(), None)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("scheme", "mass"), FRICTIONAL.values(), ids=FRICTIONAL.keys())
 def test_restart_with_friction_on_the_same_ranks(comm: Any, shared_tmp: Path, scheme: Any, mass: Any) -> None:
     """A box that lands, rubs and begins to lift; reactions and slips too go on as in the straight run."""

@@ -77,6 +77,7 @@ def test_motion_info(record):
     assert float(lines["Arias intensity"].split()[0]) == pytest.approx(np.pi / (2 * 9.80665) * 2.0, rel=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "word"),
     [

@@ -11,6 +11,7 @@ from test_demos import demo
 pytestmark = pytest.mark.serial
 
 
+@pytest.mark.slow
 def test_the_boundary_elements_demo(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """V7.1 to V7.3 on 4 to 24 elements: energies within 2 % (rms) of coarse finite elements, impulses within 8 % (ball)
     and 1 %; Uzawa's iteration and the march agree; every step certified."""

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 
+import pytest
 from test_demos import demo
 
 
+@pytest.mark.slow
 def test_the_tower_on_soil_demo(comm, shared_tmp, capsys):
     """Amplified by the soil, lifted off, certified; the base moves neither like the outcrop nor like half of it."""
     numbers = demo("tower_on_soil").main(quick=True, out=shared_tmp, progress=False)

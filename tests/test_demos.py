@@ -60,6 +60,7 @@ def check_folder(folder: Path, *, steps: int, frames_every: int) -> dict[str, An
     return summary
 
 
+@pytest.mark.slow
 def test_the_wall_demo(comm: Any, shared_tmp: Path) -> None:
     """V4.1 in its first 40 steps: frequency, dt, the top's displacement at steps 10, 20, 40; both routes agree."""
     numbers = demo("wall").main(quick=True, out=shared_tmp, progress=False)
@@ -104,6 +105,7 @@ def recorded(folder: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.serial
 def test_the_wall_on_a_record(tmp_path: Path) -> None:
     """The ground acceleration of the run is the record in m/s², scaled to 5 m/s², sample k at t = k dt."""
@@ -136,6 +138,7 @@ BAD = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.serial
 @pytest.mark.parametrize("name", BAD)
 def test_bad_input_is_one_sentence(tmp_path: Path, name: str) -> None:
@@ -151,6 +154,7 @@ def test_bad_input_is_one_sentence(tmp_path: Path, name: str) -> None:
     assert sorted(tmp_path.rglob("*")) == before and (tmp_path / "file").read_text() == "in the way"
 
 
+@pytest.mark.slow
 def test_the_bouncing_bar_demo(comm: Any, shared_tmp: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """V1.3, one bounce: every scheme certified, its ledger closed; energy stays, but for Newmark on consistent mass."""
     numbers = demo("bouncing_bar").main(quick=True, out=shared_tmp, progress=False)

@@ -27,6 +27,7 @@ def demo() -> Any:
     return module
 
 
+@pytest.mark.slow
 def test_the_timoshenko_beam_demo(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """V6.1's invariants for every reading, two routes to the exact law, order 1 in eps, figures 8.1 to 8.9."""
     numbers = demo().main(quick=True, out=tmp_path, progress=False)

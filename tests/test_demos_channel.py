@@ -25,6 +25,7 @@ def demo() -> Any:
     return module
 
 
+@pytest.mark.slow
 def test_the_channel_demo(comm: Any, shared_tmp: Path) -> None:
     """V4.2: openings alternate, the corners rock, unilateral exceeds bilateral; both routes agree; all files."""
     module = demo()

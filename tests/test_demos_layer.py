@@ -20,6 +20,7 @@ def is_picture(path: Path) -> bool:
     return path.read_bytes().startswith(b"\x89PNG") and path.stat().st_size > 5000
 
 
+@pytest.mark.slow
 @serial
 def test_the_particle_demo(tmp_path: Path, capsys: Any) -> None:
     """V5.1: Figs. 1 to 3 and their numbers."""
@@ -43,6 +44,7 @@ def test_the_rigid_body_demo(tmp_path: Path) -> None:
     assert is_picture(tmp_path / "thin_limit.png") and is_picture(tmp_path / "tumbling.png")
 
 
+@pytest.mark.slow
 def test_the_contact_layer_demo(comm: Any, shared_tmp: Path) -> None:
     """V1.1 in layers of 1 and ½ m: errors halve; the stiff block rebounds with ½ within 1 %."""
     numbers = demo("contact_layer").main(quick=True, out=shared_tmp, progress=False)

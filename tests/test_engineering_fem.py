@@ -42,6 +42,7 @@ def above(y: float) -> dict[str, float]:
     return {"N": axial, "V": across, "M": -bending}  # bent to the right: tension on the left
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("simplices", [False, True], ids=["quadrilaterals", "triangles"])
 def test_section_forces_are_those_of_equilibrium(comm: Any, simplices: bool) -> None:
     """N, V, M of a cantilever under tip, uniform and body loads to 1e-10, on a mesh two elements wide."""
@@ -367,6 +368,7 @@ def test_wall_of_the_channel_is_in_equilibrium(comm: Any) -> None:
     assert section["M_foot"] == pytest.approx(above_cut["M_wall"], rel=1e-8)
 
 
+@pytest.mark.slow
 def test_reactions_in_space(comm: Any) -> None:
     """A block on its foot under weight and a drag along its top: force and moment vectors about a corner."""
     mesh, tags = block(comm, lengths=(2.0, 1.0, 1.5), divisions=(2, 2, 2))

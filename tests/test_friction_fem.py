@@ -96,6 +96,7 @@ def _self() -> Any:
     return MPI.COMM_SELF
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("d", [2, 3])
 def test_gauss_seidel_agrees(comm: Any, d: int) -> None:
     """An independent method for the small problem: the same run to 1e-8 of the largest displacement."""

@@ -76,6 +76,7 @@ def energy_norm(r: Array, G: Array) -> float:
     return float(np.sqrt(r.ravel() @ G @ r.ravel()))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["coulomb", "tresca", "both"])
 @pytest.mark.parametrize("method", METHODS, ids=NAMES)
 def test_two_dimensions_against_enumeration(method: Any, law: str) -> None:
@@ -95,6 +96,7 @@ def test_two_dimensions_against_enumeration(method: Any, law: str) -> None:
     assert contacts > 25
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mu", [0.3, 0.5, 0.8])
 @pytest.mark.parametrize("d", [2, 3])
 def test_methods_agree(d: int, mu: float) -> None:

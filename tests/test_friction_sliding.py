@@ -108,6 +108,7 @@ LAWS = [Coulomb(0.2), SlipRateCoulomb(ExponentialDecay(0.3, 0.15, 0.05))]
 PERIOD, CYCLES = 100, 9  # steps
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("friction", LAWS, ids=["constant", "slip rate"])
 def test_loop_area_is_friction_work(comm: Any, friction: FrictionLaw) -> None:
     """A block on a table that shakes with 0.4 g and 2 Hz. The last cycle: the area inside the closed loops of

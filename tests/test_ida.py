@@ -77,6 +77,7 @@ def again(folder: Path, **more: object) -> tuple[list[dict[str, object]], list[s
     return run_ida(IDA(read_case("wall.toml"), **(asked | more)), folder, say=said.append, **running), said
 
 
+@pytest.mark.slow
 def test_the_example_gives_a_tidy_table(example: tuple[Path, str]) -> None:
     """Four rows in order, all certified; intensities and demands are those of record and run."""
     folder, printed = example
@@ -120,6 +121,7 @@ def test_other_demands_and_measures_need_no_runs(study: Path) -> None:
         again(study, demands=("u_y_foot",))
 
 
+@pytest.mark.slow
 def test_an_interrupted_run_goes_on_and_failures_are_rows(study: Path, tmp_path: Path) -> None:
     """A run with a checkpoint at half its way and no row continues there; a record that is none has a row that says so,
     and the others go on. The row of a failed run is tried again."""

@@ -104,6 +104,7 @@ def demo() -> Any:
     return module
 
 
+@pytest.mark.slow
 def test_demo(shared_tmp, comm):
     """The quick demo: key numbers of V3.1, run folders and figures."""
     numbers = demo().main(quick=True, out=shared_tmp, progress=False)

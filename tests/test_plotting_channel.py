@@ -185,6 +185,7 @@ def test_the_film(run: Any, tmp_path: Path) -> None:
         animate(folder, tmp_path / "film.mp4", **arguments)
 
 
+@pytest.mark.slow
 def test_all_pictures_from_the_folder_alone(run: Any, figures: list[Any], tmp_path: Path) -> None:
     """What a run of the command left is enough; a folder of something else is refused in one sentence."""
     import shutil

@@ -60,6 +60,7 @@ def test_reading_examples_run_on_its_output(first: tuple[Path, str]) -> None:
     assert picture == "" and (first[0] / "frame.png").stat().st_size > 5000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("document", ["records.md", "solvers.md"])
 def test_other_examples_run_on_its_problem(tmp_path: Path, document: str) -> None:
     """They continue README's example where its problem is ready."""

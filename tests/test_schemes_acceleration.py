@@ -122,6 +122,7 @@ def ledger(problem: ContactProblem, scheme: Any, **marching: Any) -> tuple[float
     return defect / largest, last
 
 
+@pytest.mark.slow
 @schemes
 @pytest.mark.parametrize("mass", [MASSLESS, CONSISTENT], ids=["massless", "consistent"])
 @pytest.mark.parametrize("given", [thrown, bouncing, period_three])
@@ -132,6 +133,7 @@ def test_ledger_closes(given: Any, mass: Any, scheme: Any) -> None:
     assert defect <= 1e-12 and last.certificate.worst <= 1e-10
 
 
+@pytest.mark.slow
 @schemes
 @pytest.mark.parametrize("impact", [None, Inelastic(), Inelastic(MassProjection())], ids=["free", "reset", "project"])
 def test_ledger_closes_with_damping_and_base_motion(scheme: Any, impact: Any) -> None:

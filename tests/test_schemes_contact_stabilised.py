@@ -90,6 +90,7 @@ def test_V11_pressure_does_not_oscillate(courant, oscillation):
         assert energy(problem, reports[-1].new) / 500.0 == pytest.approx(0.9957, abs=5e-5)
 
 
+@pytest.mark.slow
 def test_V12_energy_after_five_periods():
     """Table 1.7: E/E0 = 0.839 after five periods of the bouncing bar at Courant number one."""
     found = course(bouncing(**MASS), STABILISED, dt=1 / 300, steps=8000)
@@ -97,6 +98,7 @@ def test_V12_energy_after_five_periods():
     assert found.rise <= 1e-11 * 500.0 and abs(found.defect) <= 1e-10 * found.largest
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("projected", [True, False])
 @pytest.mark.parametrize("courant", [1.0, 0.5, 0.1])
 @pytest.mark.parametrize("name", BARS)

@@ -59,6 +59,7 @@ def test_radii_outside_the_range_are_refused(rho: float) -> None:
         of(rho)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damping", [0.0, 0.02, 0.5])
 @pytest.mark.parametrize(
     "scheme",

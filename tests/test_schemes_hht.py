@@ -41,6 +41,7 @@ def test_alpha_zero_is_newmark() -> None:
         assert np.array_equal(one.new.u, two.new.u) and np.array_equal(one.new.r_n, two.new.r_n)
 
 
+@pytest.mark.slow
 def test_V92_mass_at_the_contact() -> None:
     """V1.3, four bounces, Courant number one: no gain on consistent mass; with a dt that resolves the highest frequency
     (Courant number 0.1) the energy multiplies. On redistributed mass neither (V9.4)."""

@@ -130,6 +130,7 @@ def test_V11_restitution_of_nodes_chatters(courant, oscillation):
     assert share == pytest.approx(1.0, abs=1e-10)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("scheme", "share"), [(LITERAL, 0.940), (ELASTIC, 1.000)])
 def test_V12_energy_after_five_periods(scheme, share):
     """Table 1.7: E/E0 after five periods of the bouncing bar at Courant number one, with Newton's law to the letter."""
@@ -138,6 +139,7 @@ def test_V12_energy_after_five_periods(scheme, share):
     assert energy(problem, last.new) / 500.0 + 1.0 == pytest.approx(share, abs=5e-4)
 
 
+@pytest.mark.slow
 def test_V12_energy_falls_monotonically_over_five_periods():
     """1.7 (iii): the default is dissipative in every step, at the price of 0.937 instead of 0.940 in the end."""
     found = course(bouncing(**MASS), INELASTIC, dt=1 / 300, steps=8000)
@@ -145,6 +147,7 @@ def test_V12_energy_falls_monotonically_over_five_periods():
     assert found.last / 500.0 + 1.0 == pytest.approx(0.940, abs=4e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", [INELASTIC, ELASTIC, MoreauJean(2.0 / 3.0, 0.5)])
 @pytest.mark.parametrize("courant", [1.0, 0.5, 0.1])
 @pytest.mark.parametrize("name", BARS)
@@ -157,6 +160,7 @@ def test_V93_energy_never_rises_on_bars(name, courant, scheme):
     assert min(found.contact, found.algorithmic) >= -1e-12 * E0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", DISSIPATIVE)
 def test_V93_energy_never_rises_where_points_separate(scheme):
     """V9.3: points that separate within a drifted gap and are caught again create no energy either."""

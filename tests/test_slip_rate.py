@@ -82,6 +82,7 @@ def stick_slip(speed: float, times: Array, *, k: float = 100.0, force: float = 1
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("scheme", "error", "gain"), [(MIDPOINT, 5e-4, 12.0), (vc.MoreauJean(), 0.03, 3.0)],
     ids=["displacements", "velocities"],
@@ -98,6 +99,7 @@ def test_stick_slip_on_a_belt(scheme: Any, error: float, gain: float) -> None:
     assert errors[1] < error and errors[1] < errors[0] / gain
 
 
+@pytest.mark.slow
 def test_oscillator_slides_to_rest() -> None:
     """The friction oscillator of V2.7 with mu falling over v_c = 0.02 m/s: turning points of the differential equation,
     and rest where the spring is weaker than mu_s N."""
@@ -123,6 +125,7 @@ def test_oscillator_slides_to_rest() -> None:
     assert u[-1] == u[-200] == peaks[-1]
 
 
+@pytest.mark.slow
 def test_steady_sliding() -> None:
     """mu = 0.2 + v damps: the mass comes to rest at x = mu(V) N/k, the belt slides on under mu(V) N."""
     for scheme in (MIDPOINT, vc.MoreauJean(), vc.Newmark()):
@@ -141,6 +144,7 @@ LAWS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", [BACKWARD, vc.MoreauJean(1.0)], ids=["displacements", "velocities"])
 @pytest.mark.parametrize("mu", LAWS.values(), ids=LAWS.keys())
 def test_slow_slip_stays_inside_the_cone(mu: Any, scheme: Any) -> None:
@@ -193,14 +197,21 @@ def test_static_and_kinetic_coefficients() -> None:
         assert state.r_t[0, 0] == pytest.approx(min(pull, 6.0), rel=1e-12)
 
 
+@pytest.fixture(scope="module")
+def rubbed() -> list[Report]:
+    """The block of the next test by the default method."""
+    law = SlipRateCoulomb(ExponentialDecay((0.5, 0.6, 0.7), 0.2, 0.1))
+    return reports(rubbing_block(law), 0.1, 15.0, scheme=BACKWARD)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("method", [vc.FrictionNewton(), vc.FixedPoint(), vc.GivenForces(), vc.Uzawa()], ids=repr)
-def test_several_points_with_every_method(method: Any) -> None:
+def test_several_points_with_every_method(method: Any, rubbed: list[Report]) -> None:
     """A block that rubs along a wall with three points: certified with the exact law, the same with all methods; few
     outer iterations, logged with every step."""
     law = SlipRateCoulomb(ExponentialDecay((0.5, 0.6, 0.7), 0.2, 0.1))
     run = reports(rubbing_block(law), 0.1, 15.0, scheme=BACKWARD, friction_method=method)
-    alike = reports(rubbing_block(law), 0.1, 15.0, scheme=BACKWARD)
-    assert np.allclose(run[-1].new.u, alike[-1].new.u, rtol=0.0, atol=1e-8)
+    assert np.allclose(run[-1].new.u, rubbed[-1].new.u, rtol=0.0, atol=1e-8)
     touching = [r for r in run if r.new.r_n.any()]
     assert len(touching) > 20 and max(r.certificate.worst for r in run) <= 1e-10
     assert all(r.result.history[-1] <= 1e-12 for r in touching) and max(len(r.result.history) for r in touching) <= 20

@@ -191,6 +191,7 @@ def with_mass_of(scheme: Any) -> ContactProblem:
     return replace(shaken(Inelastic()), mass=ConsistentMass())
 
 
+@pytest.mark.slow
 @serial
 @pytest.mark.parametrize("plan", [LONG, HalvedAtImpact(LONG, 3), HalvedAtImpact(5e-3, 4)], ids=repr)
 @pytest.mark.parametrize("scheme", [*SCHEMES, Trapezoidal()], ids=repr)
@@ -421,6 +422,7 @@ def test_what_a_run_counts(tmp_path: Path):
 PLANS = [THREE, HalvedAtImpact(5e-3, 3), HalvedAtImpact(Schedule(((5e-3, 0.31), (2.5e-3, 0.4), (4e-3, inf))), 2)]
 
 
+@pytest.mark.slow
 @serial
 @pytest.mark.parametrize("plan", PLANS, ids=repr)
 @pytest.mark.parametrize("scheme", [HALF, NEWMARK, DISSIPATIVE], ids=repr)

@@ -305,6 +305,7 @@ def test_indefinite_matrix_on_the_one_factorisation(predicted: bool) -> None:
         prepare(c, Volume()).solve(replace(c.step, active=np.array([predicted, predicted])))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("closed", [False, True])
 @pytest.mark.parametrize("method", METHODS)
 def test_solvers_are_freed(pushed: Case, method: Any, closed: bool) -> None:

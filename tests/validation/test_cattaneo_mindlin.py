@@ -258,6 +258,7 @@ def test_v2_4_one_body_reversed():
     assert len(found[1].slips(-1.0)) > 0 and len(found[1].slips(1.0)) == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("problem", [sheared, mirrored_pair])
 def test_v2_4_ranks_agree(problem):
     """All ranks together and each alone: nodal forces to 1e-9 P."""

@@ -76,6 +76,7 @@ def test_v2_3_line_contact(name):
     assert np.array_equal(touching, result.x[: len(touching)])  # one patch
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("simplices", [False, True], ids=["quadrilaterals", "triangles"])
 def test_v2_3_pressure_converges_with_h(simplices):
     """L2 error of the pressure: 3.9, 2.0, 1.0 % of its norm at 10, 20, 40 cells across a, order 1 because of the root
@@ -126,6 +127,7 @@ def point_contact(cells: int) -> dict[str, float]:
     }
 
 
+@pytest.mark.serial
 def test_v2_3_point_contact():
     """(iv) a steel sphere of R = 8 mm, 100 N: a = 0.1375 mm, p0 = 2525 MPa. With 5 and 10 cells across a the peak is
     2.9 and 0.7 % off, the radius 1.8 and 0.6 %, the nodal pressures scatter by 11 and 6 %; the force is exact. The

@@ -30,6 +30,7 @@ from vi_contact.schemes.trapezoidal import Trapezoidal
 
 BODIES = {"bar": {"dimension": 1}, "strip": {"dimension": 2}, "triangles": {"dimension": 2, "triangles": True}}
 COURANTS = (1.0, 0.5, 0.1)
+ON_RANKS = (1.0, *(pytest.param(courant, marks=pytest.mark.serial) for courant in COURANTS[1:]))
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,7 @@ def follow(bar: Bar, courant: float, t_end: float, *, scheme: Any = None, mass: 
     return History(t, *(value / bar.section for value in values), dt)
 
 
-@pytest.mark.parametrize("courant", COURANTS)
+@pytest.mark.parametrize("courant", ON_RANKS)
 @pytest.mark.parametrize("body", BODIES)
 def test_thrown_bar(body: str, courant: float) -> None:
     """V1.1: force within 1 % of 300 in the window, contact 2/3 s ± 2 dt, mean rebound 10 ± 2 %, energy within 1 %."""
@@ -108,14 +109,14 @@ def test_bouncing_strip(body: str, courant: float, periods: float, floor: float)
 
 
 @pytest.mark.serial
-@pytest.mark.parametrize("courant, floor", [(1.0, 0.88), (0.5, 0.97), (0.1, 0.99)])
-def test_bouncing_bar_for_ten_periods(courant: float, floor: float) -> None:
-    """V1.2: energy >= 0.88, 0.97, 0.99 of the first after ten periods, at most 1.001 of it; the foot as the exact bar's
-    in the first period, 1.5 % rms of the height (measured 1.4, 1.1 and 0.9 %)."""
+@pytest.mark.parametrize("courant, periods, floor", [(1.0, 10, 0.88), (0.5, 10, 0.97), (0.1, 2, 0.998)])
+def test_bouncing_bar_for_ten_periods(courant: float, periods: int, floor: float) -> None:
+    """V1.2: energy >= 0.88, 0.97 of the first after ten periods, 0.998 after two (of 16 000 steps each), at most 1.001
+    of it; the foot as the exact bar's in the first period, 1.5 % rms of the height (measured 1.4, 1.1 and 0.9 %)."""
     exact, dt = BouncingBar(), courant / 300.0
     problem = bouncing(100, mass=Redistributed())
     lowest, highest, impulse, error = 1.0, 0.0, 0.0, []
-    for report in serial_run(problem, Trapezoidal(), dt=dt, steps=round(10 * exact.period / dt)):
+    for report in serial_run(problem, Trapezoidal(), dt=dt, steps=round(periods * exact.period / dt)):
         t = report.new.t
         if t < 2.5:
             impulse += dt * float(report.balance.r_n.sum())

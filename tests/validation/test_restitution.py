@@ -80,6 +80,7 @@ def test_inelastic_and_elastic_are_the_ends_of_the_range(reading: Any) -> None:
         assert found == pytest.approx(rebound(80, scheme, Newton(e, reading())), rel=1e-9)
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("triangles", [False, True], ids=["quadrilaterals", "triangles"])
 def test_the_rebound_of_a_strip_does_not_know_e(law: str, triangles: bool) -> None:

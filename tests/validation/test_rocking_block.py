@@ -65,6 +65,7 @@ def first_impact(model: rocking.RockingModel, theta0: float) -> float:
     raise AssertionError("the block did not come down")
 
 
+@pytest.mark.serial
 def test_free_rocking(model):
     """V3.1: impact times within 2 %, amplitudes and restitution within 5 %; the rigid limit to 0.3, 0.5 and 0.5 %.
     Every step is certified to 1e-9, and each impact takes 1 - e² of the energy to 2 %."""
@@ -118,6 +119,7 @@ def test_time_step(model):
     assert errors[1] < 0.1 * errors[0]
 
 
+@pytest.mark.slow
 def test_ledger(model):
     """V9.7 for V3.1: the ledger closes to 1e-10 of the largest energy, or to round-off of ½ uᵀKu where that is more.
 
@@ -178,6 +180,7 @@ def test_overturning(model):
     assert overturns(model, 1.02 * SHORTEST)
 
 
+@pytest.mark.serial
 def test_default_scheme_keeps_the_loss_as_vibration(model):
     """The trapezoidal rule on an undamped block in fine steps: rocking loses what the rigid block loses (5 %), but 95 %
     of that energy is still in the body 0.05 s later, which hops on its corner. (Later landings, round-off decides

@@ -62,6 +62,7 @@ def timing(name: str) -> tuple[float, int]:
 
 # Routes ---------------------------------------------------------------------------------------------------------------
 
+@pytest.mark.slow
 @problems
 def test_all_routes_agree_at_every_step(name):
     """Every method against the active set on the condensed problem, from the same states: u and r_n to 1e-9.
@@ -93,6 +94,7 @@ def busiest_step(problem: ContactProblem, dt: float, steps: int) -> StepProblem:
     return found
 
 
+@pytest.mark.slow
 @problems
 def test_warm_start_at_the_solution_costs_nothing(name):
     """A step begun at its own solution: no change of the contact set, no Newton step, no TAO iteration.

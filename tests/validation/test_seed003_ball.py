@@ -166,6 +166,7 @@ def test_bad_input_is_refused():
         Push(rise=0.0)
 
 
+@pytest.mark.slow
 def test_the_tennis_ball_demo(comm: Any, shared_tmp: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """V7.3 with cells of 0.1: certified, ledgers closed, no change of energy in flight; figures drawn."""
     numbers = demo("tennis_ball").main(quick=True, out=shared_tmp, progress=False)

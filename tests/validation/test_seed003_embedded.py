@@ -228,6 +228,7 @@ def test_refusals():
         Embedded(replace(concrete(cells=4), confined=True))
 
 
+@pytest.mark.slow
 def test_the_embedded_demo(comm: Any, shared_tmp: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """V7.3 in the demo, small: certified, ledgers closed, less energy with friction, figures drawn."""
     numbers = demo("concrete_in_concrete").main(quick=True, out=shared_tmp, progress=False)

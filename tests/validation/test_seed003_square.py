@@ -156,6 +156,7 @@ def test_a_square_needs_cells():
         Square(cells=0)
 
 
+@pytest.mark.slow
 def test_the_square_demo(comm: Any, shared_tmp: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """V7.1 on 10 cells: all runs certified with closed ledgers, figures drawn, table printed."""
     numbers = demo("square").main(quick=True, out=shared_tmp, progress=False)

@@ -240,6 +240,7 @@ def test_any_number_of_ranks(friction, scheme, mass):
     assert np.abs(together.r_n - alone.r_n).max() < 1e-9 * alone.r_n.max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("d", [2, 3])
 @routes
 def test_condensed_and_volume_agree(d, scheme, mass):

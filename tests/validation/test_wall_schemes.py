@@ -32,6 +32,7 @@ def run(model: WallModel, case: str, name: str, *, refined: int = 1, steps: int 
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", "ab")
 @pytest.mark.parametrize("name", [name for name in SCHEMES if name != "zienkiewicz-wood-taylor"])
 def test_every_scheme_is_certified_and_closes_its_ledger(name: str, case: str) -> None:
@@ -44,6 +45,7 @@ def test_every_scheme_is_certified_and_closes_its_ledger(name: str, case: str) -
     assert deepest <= (0.5 * size if name == "moreau-jean" else 1e-12 * size)
 
 
+@pytest.mark.serial
 def test_creation_of_energy_is_told() -> None:
     """A wave crosses seven elements in a step of the seed's: the default scheme gains there and says so; with an eighth
     of the step it does not."""
@@ -53,6 +55,7 @@ def test_creation_of_energy_is_told() -> None:
     assert fine.facts["energy_created"] < 0.01 and "WARNING" not in fine.summary()
 
 
+@pytest.mark.serial
 def test_schemes_agree_when_dt_is_fine() -> None:
     """Case b, 2½ periods with a sixteenth of the seed's dt: the extreme displacement of the top, of which five periods
     have no other, within 10 %."""
