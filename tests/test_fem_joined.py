@@ -136,7 +136,7 @@ def corner_run(angle: float, **how: Any) -> tuple[ContactSurface, Array, Array]:
     walls = [contact_surface(system, tags[f"{name}_left"], obstacle=near) for name in ("upper", "lower")]
     ground = contact_surface(system, tags["lower_bottom"])
     surface = together(contact_pair(system, *(tags[side] for side in mesh.interface)), *walls, ground)
-    problem = ContactProblem(system, surface, friction=Coulomb(0.3))
+    problem = ContactProblem(system, surface.with_frictionless_corners(), friction=Coulomb(0.3))
     reports = [report for _, report in march(problem, dt=1e-3, steps=60, **how)]
     assert max(report.certificate.worst for report in reports) <= 1e-9
     return surface, np.array([report.new.r_n for report in reports]), np.array([r.new.active for r in reports])
@@ -182,6 +182,7 @@ def test_redistributed_mass_at_corners():
     sides = [tags[f"{body}_{side}"] for side in ("left", "back") for body in ("upper", "lower")]
     walls = [contact_surface(system, side) for side in sides]
     surface = together(contact_pair(system, *(tags[side] for side in mesh.interface)), *walls)
+    surface = surface.with_frictionless_corners()
     for friction in (Frictionless(), Coulomb(0.3)):
         problem = ContactProblem(system, surface, friction=friction, mass=Redistributed())
         massless = problem.equations.massless
@@ -223,18 +224,23 @@ def test_refusals():
     slope = contact_surface(
         system, tags["upper_left"], obstacle=HalfSpace(point=(-9.0, 0.0), normal=(1.0, 0.5)), points=[(0.0, 1.0)]
     )
+    nearly = contact_surface(
+        system, tags["upper_left"], obstacle=HalfSpace(point=(0.0, -9.0), normal=(0.005, 1.0)), points=[(0.0, 1.0)]
+    )
     other, names = two_blocks(COMM, mesh)
     chain = contact_surface(system, two)
     for surfaces, sentence in (
         ((pair, pair), r"contact node \(0, 1\) is on several contact surfaces with one contact direction: list every"),
         ((wall, wall), "list every boundary and every pair once"),
-        ((pair, slope), r"contact node \(0, 1\) is on several contact surfaces with directions that are not at right"),
+        ((pair, nearly), r"contact node \(0, 1\) has 2 contact directions, not independent in its 2 dimensions: take"),
+        ((pair, wall, slope), r"contact node \(0, 1\) has 3 contact directions, more than its 2 dimensions: take"),
         ((pair, contact_surface(other, names["lower_bottom"])), "together needs surfaces of .* of the same system"),
         ((), "together needs surfaces of"),
         ((pair, empty_surface(system.space.comm, 2)), "together needs surfaces of"),
     ):
         with pytest.raises(InputError, match=sentence):
             together(*surfaces)
+    assert together(pair, slope).dual is not None  # directions at any angle
     assert together(pair, chain).count == 10  # side 2 may touch an obstacle
 
 

@@ -71,7 +71,7 @@ def momenta(problem: ContactProblem, v: Array) -> Array:
 def relative(problem: ContactProblem, u: Array) -> Array:
     """A Cartesian vector in the unknowns of the equations."""
     surface = problem.surface
-    u = u if surface.basis is None else surface.basis.transpose_apply(u)
+    u = surface.in_frames(u)
     return u if surface.coupling is None else 2.0 * u - surface.coupling @ u
 
 
@@ -79,5 +79,4 @@ def forces(problem: ContactProblem, load: Array) -> Array:
     """(nodes, d) Cartesian nodal forces of a load on the unknowns of the equations."""
     surface = problem.surface
     load = load if surface.coupling is None else 2.0 * load - surface.coupling.transpose_apply(load)
-    load = load if surface.basis is None else surface.basis @ load
-    return field(problem.system, load)[1]
+    return field(problem.system, surface.along_axes(load))[1]

@@ -97,9 +97,7 @@ class BaseMotion:
 
         Between two deformable bodies nothing changes: both are moved by the ground.
         """
-        rigid = system.influence.T
-        if surface.basis is not None:
-            rigid = np.array([surface.basis.transpose_apply(r) for r in rigid])
+        rigid = np.array([surface.in_frames(r) for r in system.influence.T])
         if surface.coupling is not None:  # relative to the other side: see SemiDiscreteSystem.in_relative
             rigid = np.array([2.0 * r - surface.coupling @ r for r in rigid])
         normal = np.array([surface.normal_values(r) for r in rigid])

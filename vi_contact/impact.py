@@ -23,6 +23,7 @@ import numpy as np
 
 from .algebra import Array, Factor, Indices, Mask
 from .checks import function, real, shown
+from .corners import with_open_faces
 from .errors import InputError
 from .surfaces import ContactSurface
 from .system import SemiDiscreteSystem
@@ -70,9 +71,14 @@ class Reading(Protocol):
 
 @dataclass(frozen=True)
 class ComponentReset:
-    """The seed's literal rule: overwrite the normal components."""
+    """The seed's literal rule: overwrite the normal components.
+
+    At a corner with oblique faces of which some only are closed the velocity of the node changes along the normals of
+    these, and with it the normal components on its other faces, as at any other node.
+    """
 
     def __call__(self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array) -> Array:
+        target = with_open_faces(surface, v, target)
         wanted = target[surface.slots]
         chosen = ~np.isnan(wanted)
         after = v.copy()

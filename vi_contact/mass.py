@@ -16,6 +16,7 @@ import numpy as np
 
 from .algebra import Array, Comm, Indices, Mask, Matrix, max_abs
 from .checks import provides, real, shown
+from .corners import lumped_entries
 from .errors import InputError
 from .handing_over import from_neighbours, rigid_motions
 from .surfaces import ContactSurface
@@ -77,8 +78,7 @@ class Redistributed:
         nodal = _row_sums(system)
         _refuse_negative(system, nodal)
         algebra = system.algebra
-        every = np.arange(system.rows)
-        lumped = algebra.local(every, every, nodal, system.rows)
+        lumped = algebra.local(*lumped_entries(surface, nodal), system.rows)
         bulk = algebra.combine([(1.0 - self.lumping, system.M), (self.lumping, lumped)])
         levels = from_neighbours(system, massless, contact, nodal)
         moved = _congruent(system, levels, bulk)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .checks import array, instance, provides, refuse
+from .corners import refuse_rubbing
 from .errors import InputError
 from .surfaces import ContactSurface
 from .system import SemiDiscreteSystem
@@ -49,6 +50,8 @@ def check_problem(problem: ContactProblem) -> None:
         raise InputError(f"ContactProblem: the surface is shared by {surface.comm.size} ranks and the system by "
                          f"{system.algebra.comm.size}: make both on the same ranks")
     refuse((*_of_system(system), *_of_surface(surface, system)), surface.comm)
+    if problem.frictional:
+        refuse_rubbing(surface)
 
 
 def _check_excitation(excitation: Any, system: SemiDiscreteSystem) -> None:

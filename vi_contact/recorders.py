@@ -212,8 +212,7 @@ class Contact:
             slip = slip - surface.slide(state.t)
         r_t = np.zeros_like(slip) if state.r_t is None else state.r_t
         load = surface.reaction_load(np.zeros(surface.count), system.rows, r_t)
-        load = load if surface.basis is None else surface.basis @ load
-        force = 0.0 - surface.comm.sum(system.influence.T @ load)
+        force = 0.0 - surface.comm.sum(system.influence.T @ surface.along_axes(load))
         return {f"friction_force_{axis}": float(value) for axis, value in zip(AXES, force, strict=False)} | {
             "contact_max_slip": float(np.linalg.norm(slip, axis=1).max()) if len(slip) else np.nan,
             "traction_t": r_t / surface.weights[:, None],

@@ -73,7 +73,8 @@ class ContactProblem:
 
     @cached_property
     def _turned(self) -> SemiDiscreteSystem:
-        return self.system if self.surface.basis is None else self.system.in_basis(self.surface.basis)
+        surface = self.surface
+        return self.system if surface.basis is None else self.system.in_basis(surface.basis, surface.dual)
 
     def _relative(self, system: SemiDiscreteSystem) -> SemiDiscreteSystem:
         return system if self.surface.coupling is None else system.in_relative(self.surface.coupling)

@@ -7,8 +7,10 @@ Sign: the direction n points from the body to the obstacle, u_n = u·n, gap = ga
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -17,6 +19,7 @@ from .algebra import Array, Comm, Indices, Mask, Matrix
 from .checks import array, function, real, shown
 from .errors import InputError
 
+log = logging.getLogger(__name__)
 Motion = Callable[[float], float | Array]
 
 
@@ -68,7 +71,8 @@ class HalfSpace:
                 f"HalfSpace has {len(self.normal)} components but the body has {points.shape[1]}: "
                 "give one per dimension"
             )
-        if len(points) and np.any(normals @ self.unit_normal > 1e-9):  # a side at right angles may touch with its edge
+        away = normals @ self.unit_normal > 1e-9  # a side at right angles may touch with its edge
+        if np.any(away) and np.any(away & ~np.isin(_alike(points), _alike(points)[~away])):  # a corner has several
             raise InputError(
                 f"HalfSpace normal {self.normal} points away from the body: turn its sign, "
                 "it must point out of the obstacle towards the contact boundary"
@@ -119,12 +123,15 @@ class ContactSurface:
         owned: indices in û of the normal unknowns this rank owns; slots: their rows among the m conditions.
         tangents: (len(owned), d-1) indices in û of the tangential unknowns of the same points; -1 where prescribed.
         basis: T with u = T û, the turn into nodal frames, or None when they already point along the axes.
+        dual: T⁻ᵀ where T is not orthogonal, because some point has contact directions at oblique angles; else None.
         coupling: R with û = R ǔ where the other side deforms too: the unknowns of a contact point are then those of its
             displacement relative to that side; R - 1 takes from rows of other points only. None on an obstacle.
         motion: how far the obstacle has moved towards the body at time t, (m,) [m]; None for one at rest.
         slide: how far it has moved along the tangents at time t, (m, d-1) [m]; None for one at rest.
         space: of the systems that it was made for; None when it was made by hand.
         paces: of motions of the obstacle that were computed with time steps of their own (``system.Pace``).
+        nodes: (m,) numbers of the nodes, to be told apart only: several conditions may be of one. None: one each.
+        frictionless_corners: True when nodes with several conditions are allowed beside friction, see there.
     """
 
     comm: Comm
@@ -143,11 +150,33 @@ class ContactSurface:
     slide: Callable[[float], Array] | None = None
     space: Any = field(default=None, repr=False)
     paces: tuple[Any, ...] = ()
+    dual: Matrix | None = None
+    nodes: Indices | None = None
+    frictionless_corners: bool = False
 
     @property
     def count(self) -> int:
         """Number of contact conditions m."""
         return len(self.gap0)
+
+    @cached_property
+    def corners(self) -> tuple[Indices, ...]:
+        """The conditions of each node that has several, in the order of the nodes."""
+        if self.nodes is None:
+            return ()
+        order = np.argsort(self.nodes, kind="stable")
+        groups = np.split(order, np.flatnonzero(np.diff(self.nodes[order])) + 1)
+        return tuple(group for group in groups if len(group) > 1)
+
+    def in_frames(self, u: Array) -> Array:
+        """T⁻¹ u: displacements along the axes in the nodal frames."""
+        turn = self.basis if self.dual is None else self.dual
+        return u if turn is None else turn.transpose_apply(u)
+
+    def along_axes(self, load: Array) -> Array:
+        """T⁻ᵀ f: a load [N] on the unknowns û as forces along the axes."""
+        turn = self.basis if self.dual is None else self.dual
+        return load if turn is None else turn @ load
 
     def normal_values(self, x: Array) -> Array:
         """B_n x on every rank, shape (m,)."""
@@ -204,6 +233,16 @@ class ContactSurface:
         """The bilateral comparison case: every point stays on the obstacle."""
         return replace(self, bilateral=np.ones(self.count, dtype=bool))
 
+    def with_frictionless_corners(self) -> ContactSurface:
+        """Beside friction, let nodes with several conditions slide freely over their faces; else they are refused.
+
+        What such a node could rub on one face is a force across the other, which the conditions, each a bound on one
+        unknown, do not hold. In space it still rubs along its edge, with the normal force of its first condition.
+        """
+        if self.corners and self.comm.rank == 0:
+            log.info("%d contact nodes with several directions slide freely over their faces", len(self.corners))
+        return replace(self, frictionless_corners=True)
+
     def on_springs(self, stiffness: float) -> ContactSurface:
         """On a linearly deformable support of foundation modulus ``stiffness`` [Pa/m]: the remark after eq. 6.
 
@@ -222,6 +261,11 @@ def _spread(name: str, value: Any, shape: tuple[int, ...], t: float) -> Array:
         raise InputError(f"a moving obstacle: {name}({t:g} s) is {shown(value)}; return finite metres, one number or "
                          f"an array of shape {shape}")
     return np.broadcast_to(found.astype(float), shape)
+
+
+def _alike(points: Array) -> Indices:
+    """A number (k,) for every point, equal where points coincide."""
+    return np.asarray(np.unique(points, axis=0, return_inverse=True)[1], dtype=np.int64).ravel()
 
 
 def admissible_gap(gap: Array, points: Array, size: float) -> Array:

@@ -181,13 +181,13 @@ class SemiDiscreteSystem:
         force = self.M @ (self.influence @ direction)
         return force if self.base_mass is None else force + self.base_mass @ direction
 
-    def in_basis(self, T: Matrix) -> SemiDiscreteSystem:
+    def in_basis(self, T: Matrix, dual: Matrix | None = None) -> SemiDiscreteSystem:
         """The same system in the unknowns û of u = T û: TᵀMT, TᵀCT, TᵀKT, Tᵀf (design idea 3).
 
-        T is orthogonal here (rotated nodal frames), so initial values and influence vectors turn with Tᵀ.
+        Initial values and influence vectors turn with T⁻¹: ``dual`` is T⁻ᵀ, T itself where it is orthogonal (None).
         """
-        turn = self.algebra.congruence
-        influence = np.column_stack([T.transpose_apply(column) for column in self.influence.T])
+        turn, inverse = self.algebra.congruence, (T if dual is None else dual).transpose_apply
+        influence = np.column_stack([inverse(column) for column in self.influence.T])
         return replace(
             self,
             M=turn(T, self.M),
@@ -196,8 +196,8 @@ class SemiDiscreteSystem:
             load=self.load.in_basis(T),
             influence=influence,
             base_mass=_columns(self.base_mass, T.transpose_apply),
-            u0=T.transpose_apply(self.u0),
-            v0=T.transpose_apply(self.v0),
+            u0=inverse(self.u0),
+            v0=inverse(self.v0),
             _cache={},
         )
 

@@ -104,5 +104,4 @@ class WholeRun:
 def _on_body(problem: ContactProblem, load: Array) -> Array:
     """(d,) the contact force on the body [N]."""
     surface, system = problem.surface, problem.system
-    load = load if surface.basis is None else surface.basis @ load
-    return np.asarray(0.0 - surface.comm.sum(system.influence.T @ load))
+    return np.asarray(0.0 - surface.comm.sum(system.influence.T @ surface.along_axes(load)))

@@ -5,7 +5,8 @@ moment, also while the run goes on or after it was killed. Nothing in the files 
 
 Per node: u [m], v [m/s] and a [m/s²] as 3-vectors along the axes, relative to the ground when an excitation shakes the
 body (a: of the step's equation of motion, without the jumps of an impact law; zero in the first frame);
-contact_pressure [Pa]; contact_status: 0 not a contact node, 1 open, 2 closed. Per cell: von_mises [Pa].
+contact_pressure [Pa]; contact_status: 0 not a contact node, 1 open, 2 closed; at nodes with several faces both are of
+the face that is pressed most, or closed. Per cell: von_mises [Pa].
 With friction closed nodes stick (2) or slipped (3) in the step of the frame, those of the first frame stick; and there
 are contact_traction_t [Pa], the tangential traction of the body on its support, and slip [m], the tangential
 displacement on it, of open nodes too: 3-vectors along the axes, zero at other nodes.
@@ -140,7 +141,7 @@ class Frames:
         space, surface = self._space, self._problem.surface
         turned = surface.reaction_load(np.zeros(surface.count), len(space.ids), tangential)
         full = np.zeros(space.free.shape)
-        full[space.free] = turned if surface.basis is None else surface.basis @ turned
+        full[space.free] = surface.along_axes(turned)  # tangents are at right angles to all that is oblique
         return full.reshape(-1, space.dimension)
 
     def _write(self, state: State, vectors: Array, stress: Array, slipping: Mask) -> None:
@@ -158,7 +159,9 @@ class Frames:
     def _contact(self, state: State, slipping: Mask) -> tuple[Array, Any]:
         """Contact pressure and status of all nodes."""
         pressure, status = np.zeros(self._shape[0]), np.zeros(self._shape[0], dtype=np.int32)
-        np.add.at(pressure, self._contact_nodes, state.r_n / self._problem.surface.weights)
+        each = state.r_n / self._problem.surface.weights
+        order = np.argsort(np.abs(each), kind="stable")  # of several faces of a node, the one that is pressed most
+        pressure[self._contact_nodes[order]] = each[order]
         np.maximum.at(status, self._contact_nodes, np.where(state.active, np.where(slipping, 3, 2), 1))
         return pressure, status
 

@@ -1,13 +1,16 @@
 """Nodal frames of contact nodes and what they make of conditions: the bases T and R of a `ContactSurface`.
 
-A condition is a node, a contact direction and, between two bodies, what the node faces. Each node has one frame, with
-the directions of all its conditions among its vectors. Everything here but the matrices is the same on every rank.
+A condition is a node, a contact direction and, between two bodies, what the node faces. Each node has one frame Q, with
+the directions of all its conditions among its vectors, and its unknowns are û = Qᵀu: every u·n is one of them. Forces
+are Q f̂ then, and u = T û with T = Q⁻ᵀ: Q itself, unless directions of the node are oblique. In space a node with two
+directions has the unit vector along its edge as the third. Everything here but the matrices is the same on every rank.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import permutations
 from typing import Any
 
 import numpy as np
@@ -15,12 +18,13 @@ import scipy.sparse as sp
 from petsc4py import PETSc
 
 from ..algebra import Array, Indices, Mask
+from ..corners import PARALLEL, at_right_angles
 from ..errors import InputError
 from ..surfaces import ContactSurface, nodal_frames
 from .petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc
 from .space import FemSpace
 
-PARALLEL = 1e-9  # 1 - cosine of the angle between directions that count as one, cosine between those at right angles
+INDEPENDENT = 0.01  # least singular value of a node's directions: two that turn by 0.8° (CHOSEN; T has 1 over it)
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +42,11 @@ class Nodes:
     def pick(self, rows: Any) -> Nodes:
         """Some of them."""
         return Nodes(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
+
+
+def joined_nodes(parts: Sequence[Nodes]) -> Nodes:
+    """One after the other."""
+    return Nodes(*(np.concatenate([getattr(part, name) for part in parts]) for name in Nodes.__dataclass_fields__))
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,15 +75,16 @@ class FemSurface(ContactSurface):
 
 
 class Frames:
-    """One orthonormal frame per node of the conditions.
+    """One frame of unit vectors per node of the conditions, orthonormal unless the node has oblique directions.
 
     Attributes:
-        numbers: (k,) nodes; blocks: (k, d, d) frames, vectors as columns.
+        numbers: (k,) nodes; blocks: (k, d, d) frames Q, vectors as columns; turns: (k, d, d) Q⁻ᵀ.
         place, column: (m,) node and column of each condition; double: (k,) nodes with several conditions.
+        oblique: whether some node has directions that are not at right angles.
         rubs: (m, d-1) tangential vectors that belong to each condition; what a node with several of them has left, the
             direction of the edge in space, belongs to the first.
     Raises:
-        InputError: a contact direction that is partly prescribed; directions of one node parallel or oblique.
+        InputError: a contact direction that is partly prescribed; directions of one node that depend on one another.
     """
 
     def __init__(self, parts: Sequence[Conditions]) -> None:
@@ -91,8 +101,13 @@ class Frames:
                 self.column[slot], self.blocks[node] = block_of(self.blocks[node])
         for node in np.flatnonzero(self.double):
             slots = np.flatnonzero(self.place == node)
-            self._refuse_skew(slots)
+            self._refuse_dependent(slots)
             self.column[slots], self.blocks[node] = corner_of(self.directions[slots])
+        self.turns = self.blocks.copy()
+        for node in np.flatnonzero(self.double):
+            if not at_right_angles(self.directions[self.place == node]):
+                self.turns[node] = np.linalg.inv(self.blocks[node]).T
+        self.oblique = not np.array_equal(self.turns, self.blocks)
         self.rubs = np.ones((len(numbers), self.blocks.shape[1] - 1), dtype=bool)
         for node in np.flatnonzero(self.double):
             slots = np.flatnonzero(self.place == node)
@@ -113,15 +128,21 @@ class Frames:
                 "free that component or leave the node out of the contact surface"
             )
 
-    def _refuse_skew(self, slots: Indices) -> None:
-        cosines = np.abs(self.directions[slots] @ self.directions[slots].T)[np.triu_indices(len(slots), 1)]
-        where = f"contact node {at(self.points[slots[0]])} is on several contact surfaces"
+    def _refuse_dependent(self, slots: Indices) -> None:
+        directions = self.directions[slots]
+        k, d = directions.shape
+        where = f"contact node {at(self.points[slots[0]])}"
+        cosines = np.abs(directions @ directions.T)[np.triu_indices(k, 1)]
         if np.any(cosines > 1.0 - PARALLEL):
-            raise InputError(f"{where} with one contact direction: list every boundary and every pair once")
-        if np.any(cosines > PARALLEL):
             raise InputError(
-                f"{where} with directions that are not at right angles: leave it out of all but one (points=), or "
-                "round the edge off"
+                f"{where} is on several contact surfaces with one contact direction: list every boundary and every "
+                "pair once"
+            )
+        if k > d or np.linalg.svd(directions, compute_uv=False)[-1] < INDEPENDENT:
+            raise InputError(
+                f"{where} has {k} contact directions, {'more than' if k > d else 'not independent in'} its {d} "
+                "dimensions: take the corner for smooth (a larger feature_angle=), or leave the node out of some of "
+                "its surfaces (points=)"
             )
 
 
@@ -146,16 +167,21 @@ def block_of(frame: Array) -> tuple[int, Array]:
 
 
 def corner_of(directions: Array) -> tuple[list[int], Array]:
-    """(columns, Q): the frame of a node with two or three contact directions (k, d) at right angles."""
-    d = directions.shape[1]
+    """(columns, Q): the frame of a node with two or three independent contact directions (k, d)."""
+    d, square = directions.shape[1], at_right_angles(directions)
     columns: list[int] = []
     for direction in directions:
         order = np.argsort(-np.abs(direction), kind="stable")
         columns.append(next(int(c) for c in order if c not in columns))
+    if not square:  # columns in which no direction vanishes: components that are prescribed keep theirs
+        choices = list(permutations(range(d), len(directions)))
+        sizes = [np.prod([abs(direction[c]) for direction, c in zip(directions, own, strict=True)]) for own in choices]
+        columns = list(choices[int(np.argmax(sizes))])
     block = np.zeros((d, d))
     block[:, columns] = directions.T
     for c in set(range(d)) - set(columns):  # in space, one vector may be missing
-        block[:, c] = np.cross(block[:, (c + 1) % 3], block[:, (c + 2) % 3])
+        edge = np.cross(block[:, (c + 1) % 3], block[:, (c + 2) % 3])
+        block[:, c] = edge if square else edge / np.linalg.norm(edge)
     return columns, block
 
 
@@ -183,7 +209,9 @@ def surface_of(space: FemSpace, parts: Sequence[Conditions], **data: Any) -> Fem
         owned=index[place, column],
         slots=slots,
         tangents=tangents,
-        basis=_turn(space, frames, where >= 0, index),
+        basis=_turn(space, frames.turns, where >= 0, index),
+        dual=_turn(space, frames.blocks, where >= 0, index) if frames.oblique else None,
+        nodes=frames.numbers[frames.place],
         coupling=_coupling(space, parts, frames, index),
         space=space,
         parts=tuple(parts),
@@ -191,16 +219,16 @@ def surface_of(space: FemSpace, parts: Sequence[Conditions], **data: Any) -> Fem
     )
 
 
-def _turn(space: FemSpace, frames: Frames, mine: Mask, index: Indices) -> PetscMatrix | None:
-    """T with u = T û: the identity but for the frames of the contact nodes; None when all point along the axes."""
-    if all(np.array_equal(block, np.eye(space.dimension)) for block in frames.blocks):
+def _turn(space: FemSpace, blocks: Array, mine: Mask, index: Indices) -> PetscMatrix | None:
+    """The identity but for the blocks of the contact nodes (T, or T⁻ᵀ); None when all are the identity too."""
+    if all(np.array_equal(block, np.eye(space.dimension)) for block in blocks):
         return None
     rows = len(space.ids)
     T = PETSc.Mat().createAIJ(((rows, None), (rows, None)), nnz=(space.dimension, 0), comm=space.mesh.comm)
     T.setUp()
     start = T.getOwnershipRange()[0]
     plain = np.ones(rows, dtype=bool)
-    for own, block in zip(index[mine], frames.blocks[mine], strict=True):
+    for own, block in zip(index[mine], blocks[mine], strict=True):
         free = own >= 0
         plain[own[free]] = False
         rotated = (start + own[free]).astype(PETSc.IntType)
@@ -241,11 +269,11 @@ def _coupling(
 
 
 def _turns(frames: Frames, nodes: Nodes) -> Array:
-    """Frames (k, d, d) of nodes that are faced; the axes where they are in contact with nothing else."""
+    """T (k, d, d) of nodes that are faced; the axes where they are in contact with nothing else."""
     turns = np.tile(np.eye(nodes.points.shape[1]), (len(nodes.numbers), 1, 1))
     place = np.minimum(np.searchsorted(frames.numbers, nodes.numbers), len(frames.numbers) - 1)
     known = frames.numbers[place] == nodes.numbers
-    turns[known] = frames.blocks[place[known]]
+    turns[known] = frames.turns[place[known]]
     return turns
 
 

@@ -18,14 +18,14 @@ Motion = Callable[[float], Array]
 def together(*surfaces: ContactSurface) -> ContactSurface:
     """One surface with the conditions of all, in the order given.
 
-    A node that is on several of them, at the edge of a channel, has a condition for each. Their directions must be at
-    right angles: each is one vector of the node's frame. Such a node rubs along the edge only, in space, with the
-    normal force of the first of them: name the surface that carries the body first.
+    A node that is on several of them, at the edge of a channel, has a condition for each, at any angle between them.
+    Beside friction such nodes are refused unless they may slide freely (``with_frictionless_corners``); in space they
+    rub along the edge then, with the normal force of the first of them: name the surface that carries the body first.
     A node of side 2 of a pair may touch an obstacle, but not be on side 1 of another pair.
 
     Raises:
         InputError: surfaces of different systems; directions of a node that are parallel (a boundary or a pair listed
-            twice) or oblique; a node on side 1 of one pair and side 2 of another.
+            twice) or depend on one another; a node on side 1 of one pair and side 2 of another.
     """
     made = [surface for surface in surfaces if isinstance(surface, FemSurface)]
     if not made or len(made) < len(surfaces) or any(surface.space is not made[0].space for surface in made):
@@ -33,13 +33,14 @@ def together(*surfaces: ContactSurface) -> ContactSurface:
     names = ("gap0", "weights", "bilateral", "compliance")
     data: dict[str, Any] = {name: np.concatenate([getattr(surface, name) for surface in made]) for name in names}
     parts = [part for surface in made for part in surface.parts]
-    return surface_of(
+    joined = surface_of(
         made[0].space,
         parts,
         motion=_joined([(surface.motion, (surface.count,)) for surface in made]),
         slide=_slide(made, Frames(parts)),
         **data,
     )
+    return joined.with_frictionless_corners() if all(one.frictionless_corners for one in made) else joined
 
 
 def _joined(motions: Sequence[tuple[Motion | None, tuple[int, ...]]]) -> Motion | None:

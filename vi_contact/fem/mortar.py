@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -40,6 +41,8 @@ class DualMortar:
     Initial gaps are means too; where polygons of the same curve overlap by up to 5 % of a segment the gap is zero.
     InputError in one and three dimensions, and for sides that do not face each other.
     """
+
+    partial: ClassVar[bool] = True  # parts of side 1 in front of nothing have no conditions
 
     def match(self, one: Side, two: Side, size: float) -> Matched:
         if one.nodes.points.shape[1] != 2:

@@ -17,13 +17,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
+import scipy.sparse as sp
 
-from ..algebra import Array
+from ..algebra import Array, Mask
 from ..errors import InputError
 from ..surfaces import ContactSurface
 from ..system import SemiDiscreteSystem
 from . import compat
-from .frames import Conditions, Facing, Frames, Nodes, at, surface_of
+from .faces import FEATURE_ANGLE, Boundary, boundary, checked_angle, split, tell_corners
+from .frames import Conditions, Facing, Frames, Nodes, at, joined_nodes, surface_of
 from .matching import Matched, Matching, NodeToNode, Side
 from .mesh import Facets, node_numbers
 from .space import FemSpace
@@ -39,6 +41,7 @@ def contact_pair(
     *,
     matching: Matching | None = None,
     points: Sequence[Sequence[float]] | None = None,
+    feature_angle: float = FEATURE_ANGLE,
 ) -> ContactSurface:
     """The contact conditions between two boundaries of deformable bodies, or two faces of a crack.
 
@@ -47,9 +50,13 @@ def contact_pair(
     along the normals of side 1. Nodes that both sides share, at the tip of a crack, have no condition; nor have nodes
     clamped on both sides. Prescribed nodes of side 2 move as they are told: a moving obstacle.
 
+    Where side 1 turns by more than the feature angle its faces are matched one by one, and a node on several of them
+    has one condition for each, as if every face were a pair of its own, joined by ``together``.
+
     Args:
         matching: NodeToNode() by default, for sides meshed alike; DualMortar() for others, in 2D.
         points: (k, d) coordinates; only the nodes of side 1 nearest to them, in this order.
+        feature_angle: in radians; facets round a node that turn by less from one another are one smooth face.
     Raises:
         InputError: sides that do not pair or do not face each other, bodies that overlap, sides of one and the same
             boundary, contact directions that are partly prescribed, clamped nodes that face free ones.
@@ -57,6 +64,7 @@ def contact_pair(
     space = system.space
     if not isinstance(space, FemSpace):
         raise InputError("contact_pair needs a system made by fem.assemble")
+    angle = checked_angle("contact_pair", feature_angle)
     one, two = side_of(space, facets1), side_of(space, facets2)
     shared = np.isin(one.nodes.numbers, two.nodes.numbers)
     if shared.all():
@@ -64,14 +72,17 @@ def contact_pair(
             f"'{one.name}' and '{two.name}' are the same nodes, so that nothing can part there: mesh the bodies one by "
             "one, or cut the mesh open (meshes.cut.CutOpen)"
         )
-    matched = (matching or NodeToNode()).match(one, two, space.size)
-    matched = matched.pick(~shared[matched.rows])
-    matched = _unclamped(space, one, two, matched)
-    nodes = replace(one.nodes.pick(matched.rows), weights=matched.weights)
+    faces = _faces(space, one, boundary(space, facets1), angle)
+    nodes, matched = _by_face(faces, two, matching or NodeToNode(), space.size)
+    kept = ~np.isin(nodes.numbers, two.nodes.numbers)
+    nodes, matched = nodes.pick(kept), matched.pick(kept)
+    free = _unclamped(space, one.name, nodes, two, matched)
+    nodes, matched = nodes.pick(free), matched.pick(free)
     if points is not None:
         chosen = listed(space, nodes, points, one.name).numbers
-        rows = np.array([int(np.flatnonzero(nodes.numbers == number)[0]) for number in chosen])
+        rows = np.concatenate([np.flatnonzero(nodes.numbers == number) for number in chosen])
         nodes, matched = nodes.pick(rows), matched.pick(rows)
+    tell_corners(space, one.name, nodes, angle)
     directions = snapped(nodes.normals)
     gap = _gap(space, one.name, two, nodes, directions, matched)
     conditions = Conditions(nodes, directions, Facing(two.nodes, matched.P))
@@ -90,23 +101,87 @@ def side_of(space: FemSpace, facets: Facets) -> Side:
     return Side(facets.name, nodes, np.searchsorted(nodes.numbers, rows[first]))
 
 
-def _unclamped(space: FemSpace, one: Side, two: Side, matched: Matched) -> Matched:
-    """Without the clamped nodes; InputError when one faces a free node, or when none is left."""
-    clamped = one.nodes.held.all(axis=1)
+def _faces(space: FemSpace, one: Side, around: Boundary, angle: float) -> list[tuple[Side, Array]]:
+    """The smooth faces of side 1, each with its own normals and weights, and the nodes' normals over the whole side.
+    Collective."""
+    nodes, facet = split(space, around, one.nodes, angle)
+    if len(nodes.numbers) == len(one.nodes.numbers):
+        return [(one, one.nodes.normals)]
+    face_of, found = around.faces(angle), []
+    for face in range(int(face_of.max()) + 1):
+        facets = one.facets[face_of == face]
+        used = np.unique(facets)
+        inside = np.isin(nodes.numbers, one.nodes.numbers[used]) & ((facet < 0) | (face_of[facet] == face))
+        own = nodes.pick(inside)
+        if len(own.numbers) > len(used):
+            again = own.points[1:][np.diff(own.numbers) == 0][0]
+            raise InputError(
+                f"'{one.name}' turns round and meets itself at {at(again)}: give it as two boundaries (together), or "
+                "take the corner for smooth (a larger feature_angle=)"
+            )
+        found.append((Side(one.name, own, np.searchsorted(used, facets)), one.nodes.normals[used]))
+    return found
+
+
+def _by_face(
+    faces: Sequence[tuple[Side, Array]], two: Side, matching: Matching, size: float
+) -> tuple[Nodes, Matched]:
+    """(nodes with the normals and weights of their faces, what they face), ordered by number. Faces in front of nothing
+    are left out where the matching leaves out parts of sides, unless all are."""
+    refusal, found = None, []
+    for side, mean in faces:
+        try:
+            matched = _match(side, mean, two, matching, size)
+        except InputError as error:
+            if not getattr(matching, "partial", False):
+                raise
+            refusal = refusal or error
+        else:
+            found.append((side.nodes.pick(matched.rows), matched))
+    if refusal is not None and not found:
+        raise refusal
+    nodes = joined_nodes([nodes for nodes, _ in found])
+    order = np.argsort(nodes.numbers, kind="stable") if len(found) > 1 else np.arange(len(nodes.numbers))
+    P = sp.csr_matrix(sp.vstack([matched.P for _, matched in found]))
+    weights, overlap = (
+        np.concatenate([getattr(matched, name) for _, matched in found]) for name in ("weights", "overlap")
+    )
+    whole = Matched(np.arange(len(order)), P, weights, overlap)
+    return replace(nodes, weights=weights).pick(order), whole.pick(order)
+
+
+def _match(side: Side, mean: Array, two: Side, matching: Matching, size: float) -> Matched:
+    """What a face of side 1 faces: along its own normals or, since across a gap the partner of a corner lies on the
+    bisector, along the ``mean`` normals of its nodes."""
+    try:
+        return matching.match(side, two, size)
+    except InputError:
+        if np.array_equal(mean, side.nodes.normals):
+            raise
+        try:
+            return matching.match(replace(side, nodes=replace(side.nodes, normals=mean)), two, size)
+        except InputError:
+            pass
+        raise
+
+
+def _unclamped(space: FemSpace, name: str, nodes: Nodes, two: Side, matched: Matched) -> Mask:
+    """Those not clamped; InputError when one that is faces a free node, or when none is left."""
+    clamped = nodes.held.all(axis=1)
     facing = np.asarray(matched.P.argmax(axis=1)).ravel()
-    lost = np.flatnonzero(clamped[matched.rows] & ~two.nodes.held[facing].all(axis=1))
+    lost = np.flatnonzero(clamped & ~two.nodes.held[facing].all(axis=1))
     if len(lost):
         raise InputError(
-            f"contact node {at(one.nodes.points[matched.rows[lost[0]]])} of '{one.name}' is clamped but faces a free "
+            f"contact node {at(nodes.points[lost[0]])} of '{name}' is clamped but faces a free "
             f"node of '{two.name}': make '{two.name}' the first side, or clamp less"
         )
-    if clamped[matched.rows].all():
+    if clamped.all():
         raise InputError(
-            f"no contact nodes: every node of '{one.name}' that faces '{two.name}' is also clamped; clamp less"
+            f"no contact nodes: every node of '{name}' that faces '{two.name}' is also clamped; clamp less"
         )
-    if clamped[matched.rows].any() and space.comm.rank == 0:
-        log.info("%d clamped nodes of '%s' are left out of the contact", clamped[matched.rows].sum(), one.name)
-    return matched.pick(~clamped[matched.rows])
+    if clamped.any() and space.comm.rank == 0:
+        log.info("%d clamped nodes of '%s' are left out of the contact", clamped.sum(), name)
+    return np.asarray(~clamped)
 
 
 def _gap(space: FemSpace, name: str, two: Side, nodes: Nodes, directions: Array, matched: Matched) -> Array:
@@ -132,7 +207,7 @@ def _prescribed_motion(space: FemSpace, conditions: Conditions) -> dict[str, Cal
         return {}
     numbers, P = facing.nodes.numbers, facing.P
     held = conditions.nodes.held
-    free = np.array([np.delete(~own, c) for own, c in zip(held, frames.column, strict=True)])
+    free = np.array([np.delete(~own, c) for own, c in zip(held, frames.column, strict=True)]) & frames.rubs
     tangents, nothing = frames.tangents, np.zeros(len(space.ids))
 
     def displacement(t: float) -> Array:

@@ -70,4 +70,4 @@ def _contact_force(problem: ContactProblem, state: State) -> Array:
     force = surface.reaction_load(state.r_n, problem.system.rows, state.r_t)
     if surface.coupling is not None:  # the load of relative unknowns is Rᵀ f, and R⁻¹ = 2 - R
         force = 2.0 * force - surface.coupling.transpose_apply(force)
-    return force if surface.basis is None else surface.basis @ force
+    return surface.along_axes(force)

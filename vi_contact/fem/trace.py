@@ -7,19 +7,18 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-import ufl
 
-from ..algebra import Array, Mask
+from ..algebra import Array
+from ..corners import PARALLEL
 from ..errors import InputError
 from ..surfaces import ContactSurface, Obstacle, Touching, admissible_gap
 from ..system import SemiDiscreteSystem
-from . import compat
+from .faces import FEATURE_ANGLE, boundary, checked_angle, in_symmetry_planes, integrals, split, tell_corners
 from .frames import Conditions, Nodes, at, surface_of
 from .mesh import Facets
 from .space import FemSpace
 
 log = logging.getLogger(__name__)
-LEANING = 0.9  # cosine of the angle (26°) up to which a normal counts as lying in a symmetry plane
 
 
 def contact_surface(
@@ -28,6 +27,7 @@ def contact_surface(
     *,
     obstacle: Obstacle | None = None,
     points: Sequence[Sequence[float]] | None = None,
+    feature_angle: float = FEATURE_ANGLE,
 ) -> ContactSurface:
     """The contact conditions of a boundary part, or only of the listed points of it (seed 000's case a).
 
@@ -35,38 +35,68 @@ def contact_surface(
     direction of ∫ phi_i n over the facets, on rollers (a symmetry plane) without the component held there. Nodes of
     the facets that are clamped in every component (where the boundary meets a clamped part) are left out.
 
+    Where the facets turn by more than the feature angle the boundary has faces, and a node on several of them has one
+    condition for each, with the normal and the weight of this face, at any angle between them (``fem.faces``). Where
+    the obstacle gives all faces of a node one direction, as a HalfSpace does, the node has one condition.
+
     Args:
-        obstacle: Touching() by default, HalfSpace, AnalyticGap or the user's own.
+        obstacle: Touching() by default, HalfSpace, AnalyticGap or the user's own, asked for every face of a node.
         points: (k, d) coordinates; each stands for the nearest node of the facets. The order is kept.
+        feature_angle: in radians; facets round a node that turn by less from one another are one smooth face.
     Raises:
         InputError: no contact nodes, a listed point that is clamped or not on the facets, a contact direction that is
-            partly prescribed, initial penetration.
+            partly prescribed, initial penetration, a node with more faces than the body has dimensions.
     """
     space = system.space
     if not isinstance(space, FemSpace):
         raise InputError("contact_surface needs a system made by fem.assemble")
-    nodes = nodes_on(space, facets)
-    nodes = free_nodes(space, nodes, facets.name) if points is None else listed(space, nodes, points, facets.name)
+    angle = checked_angle("contact_surface", feature_angle)
+    whole = nodes_on(space, facets)
+    whole = free_nodes(space, whole, facets.name) if points is None else listed(space, whole, points, facets.name)
+    nodes, _ = split(space, boundary(space, facets), whole, angle)
     obstacle = obstacle or Touching()
     directions = snapped(np.asarray(obstacle.directions(nodes.points, nodes.normals), dtype=float))
     gap = admissible_gap(np.asarray(obstacle.gap(nodes.points, nodes.normals), dtype=float), nodes.points, space.size)
+    nodes, directions, gap = one_per_direction(whole, nodes, directions, gap)
     weights = nodes.weights * space.forms.section.thickness
     _refuse_tied(space, nodes, facets.name)
+    tell_corners(space, facets.name, nodes, angle)
     return surface_of(space, [Conditions(nodes, directions)], gap0=gap, weights=weights)
+
+
+def one_per_direction(whole: Nodes, nodes: Nodes, directions: Array, gap: Array) -> tuple[Nodes, Array, Array]:
+    """(nodes, directions, gaps), faces of a node with one direction as one condition: weights added, the smaller gap.
+
+    ``whole``: the nodes with the weights of all their faces.
+    """
+    if len(nodes.numbers) == len(whole.numbers):
+        return nodes, directions, gap
+    home: dict[int, list[int]] = {}
+    weights, gap = nodes.weights.copy(), gap.copy()
+    for row, node in enumerate(nodes.numbers):
+        before = home.setdefault(int(node), [])
+        alike = [other for other in before if directions[row] @ directions[other] > 1.0 - PARALLEL]
+        if alike:
+            weights[alike[0]] += weights[row]
+            gap[alike[0]] = min(gap[alike[0]], gap[row])
+        else:
+            before.append(row)
+    total = dict(zip(whole.numbers.tolist(), whole.weights, strict=True))
+    for node, rows in home.items():
+        if len(rows) == 1:
+            weights[rows[0]] = total[node]  # to the last digit
+    kept = [row for rows in home.values() for row in rows]
+    return replace(nodes, weights=weights).pick(kept), directions[kept], gap[kept]
 
 
 def nodes_on(space: FemSpace, facets: Facets) -> Nodes:
     """All nodes of the facets, ordered by original node number."""
-    mesh, d = space.mesh, space.dimension
-    ds = compat.measure(mesh, mesh.topology.dim - 1, facets.indices)
-    v = ufl.TestFunction(space.V)
-    n = ufl.FacetNormal(mesh)
-    one = compat.assemble_vector(compat.compile_form(sum(v[c] for c in range(d)) * ds)).array_r.reshape(-1, d)
-    normal = compat.assemble_vector(compat.compile_form(ufl.inner(n, v) * ds)).array_r.reshape(-1, d)
+    d = space.dimension
+    values = integrals(space, facets.indices)
     blocks = space.facet_blocks(facets.indices)
-    first = int(mesh.comm.exscan(len(space.ids)) or 0)
+    first = int(space.mesh.comm.exscan(len(space.ids)) or 0)
     unknowns = np.where(space.free, first + space.free_index, -1).reshape(-1, d)
-    local = (space.nodes, space.points, normal, one[:, 0], space.held, unknowns)
+    local = (space.nodes, space.points, values[:, 1:], values[:, 0], space.held, unknowns)
     parts = space.comm.bcast(space.comm.gather(tuple(values[blocks] for values in local)))
     nodes = Nodes(*(np.concatenate([part[i] for part in parts]) for i in range(6)))
     if len(nodes.numbers) == 0:
@@ -76,18 +106,9 @@ def nodes_on(space: FemSpace, facets: Facets) -> Nodes:
             f"boundary group '{facets.name}' lies inside the body, where cells on both sides share its nodes: cut the "
             "mesh open there (meshes.cut.CutOpen), or choose an outer boundary"
         )
-    normals = in_symmetry_planes(nodes.normals / np.linalg.norm(nodes.normals, axis=1)[:, None], nodes.held)
+    length = np.linalg.norm(nodes.normals, axis=1)[:, None]
+    normals = in_symmetry_planes(nodes.normals / np.maximum(length, np.finfo(float).tiny), nodes.held)
     return replace(nodes, normals=normals).pick(np.argsort(nodes.numbers))
-
-
-def in_symmetry_planes(normals: Array, held: Mask) -> Array:
-    """Normals (k, d) without the prescribed components of their nodes, where that turns them by little.
-
-    On a symmetry plane the true normal lies in the plane; that of the facets on one side of it leans to that side.
-    """
-    inside = np.where(held, 0.0, normals)
-    length = np.linalg.norm(inside, axis=1)[:, None]
-    return np.asarray(np.where(length > LEANING, inside / np.maximum(length, LEANING), normals))
 
 
 def free_nodes(space: FemSpace, nodes: Nodes, name: str) -> Nodes:

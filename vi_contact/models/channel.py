@@ -186,7 +186,7 @@ def build(
     )
     system = weighted(system, weighing)
     pairs = [contact_pair(system, tags[f"channel_{side}"], tags[f"soil_{side}"]) for side in SIDES]
-    return ChannelModel(channel, mesh, tags, system, together(*pairs))
+    return ChannelModel(channel, mesh, tags, system, together(*pairs).with_frictionless_corners())
 
 
 def weighted(system: SemiDiscreteSystem, weighing: Sequence[str]) -> SemiDiscreteSystem:

@@ -107,4 +107,4 @@ def build(embedded: Embedded, comm: Any, *, mesh: Callable[[], Any] | None = Non
         clamped=[tags[f"{name}_bottom"] for name in GROUND],
     )  # fmt: skip
     pairs = [contact_pair(system, tags[one], tags[two]) for one, two in CONTACT]
-    return EmbeddedModel(embedded, system, together(*pairs))
+    return EmbeddedModel(embedded, system, together(*pairs).with_frictionless_corners())

@@ -8,6 +8,7 @@ from typing import Any
 
 from .. import friction, materials, surfaces
 from ..fem.dashpots import CompliantBase
+from ..fem.faces import FEATURE_ANGLE
 from ..fem.free_field import FreeField
 from ..fem.matching import Matching
 from ..fem.mesh import Facets
@@ -37,20 +38,25 @@ def record(
 
 def surface(
     system: SemiDiscreteSystem, facets: Facets, *, obstacle: surfaces.Obstacle | None = None,
-    points: Sequence[tuple[float, ...]] | None = None, held: bool = False, springs: float | None = None,
+    points: Sequence[tuple[float, ...]] | None = None, feature_angle: float = FEATURE_ANGLE, held: bool = False,
+    springs: float | None = None, frictionless_corners: bool = False,
 ) -> ContactSurface:
-    """``contact_surface``; held: ``.held()``; springs: ``.on_springs(stiffness)``."""
-    found = contact_surface(system, facets, obstacle=obstacle, points=points)
+    """``contact_surface``; held: ``.held()``; springs: ``.on_springs(stiffness)``; the last:
+    ``.with_frictionless_corners()``."""
+    found = contact_surface(system, facets, obstacle=obstacle, points=points, feature_angle=feature_angle)
     found = found if springs is None else found.on_springs(springs)
+    found = found.with_frictionless_corners() if frictionless_corners else found
     return found.held() if held else found
 
 
 def pair(
     system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *, matching: Matching | None = None,
-    points: Sequence[tuple[float, ...]] | None = None, held: bool = False,
+    points: Sequence[tuple[float, ...]] | None = None, feature_angle: float = FEATURE_ANGLE, held: bool = False,
+    frictionless_corners: bool = False,
 ) -> ContactSurface:
-    """``contact_pair``; held: ``.held()``."""
-    found = contact_pair(system, facets1, facets2, matching=matching, points=points)
+    """``contact_pair``; held: ``.held()``; the last: ``.with_frictionless_corners()``."""
+    found = contact_pair(system, facets1, facets2, matching=matching, points=points, feature_angle=feature_angle)
+    found = found.with_frictionless_corners() if frictionless_corners else found
     return found.held() if held else found
 
 

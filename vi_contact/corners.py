@@ -1,0 +1,74 @@
+"""Corners: nodes with a contact condition for each of several faces, what is special about them.
+
+With the directions n_i of a node its unknowns are û_i = n_i·u, and a force on them is Σ f̂_i n_i. Where the directions
+are oblique, with the cosines G_ij = n_i·n_j, a change of velocity along one normal changes the others' û too, Δû = G a,
+and a lumped mass m is m G⁻¹.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .algebra import Array, Indices
+from .errors import InputError
+from .surfaces import ContactSurface
+
+PARALLEL = 1e-9  # 1 - cosine of the angle between directions that count as one, cosine between those at right angles
+
+
+def at_right_angles(directions: Array) -> bool:
+    """Whether unit vectors (k, d) are orthogonal to one another, to round-off."""
+    return bool(np.all(np.abs(directions @ directions.T)[np.triu_indices(len(directions), 1)] <= PARALLEL))
+
+
+def oblique_corners(surface: ContactSurface) -> list[Indices]:
+    """The conditions of each node with directions that are not at right angles."""
+    if surface.dual is None:
+        return []
+    return [corner for corner in surface.corners if not at_right_angles(surface.normals[corner])]
+
+
+def refuse_rubbing(surface: ContactSurface) -> None:
+    """InputError for corners beside friction, unless they are allowed to slide freely."""
+    if surface.corners and not surface.frictionless_corners:
+        where = ", ".join(f"{x:g}" for x in surface.points[surface.corners[0][0]])
+        raise InputError(
+            f"{len(surface.corners)} contact nodes, the first at ({where}), have several contact directions, and how "
+            "they rub on two faces at once is not modelled: let them slide freely "
+            "(surface.with_frictionless_corners()), or take the corner for smooth (a larger feature_angle=)"
+        )
+
+
+def with_open_faces(surface: ContactSurface, v: Array, target: Array) -> Array:
+    """Target normal velocities (m,), NaN for open faces, with those that oblique open faces get from the closed faces
+    of their nodes, whose velocity changes along the normals of these. Collective."""
+    corners = oblique_corners(surface)
+    if not corners:
+        return target
+    v_n, target = surface.normal_values(v), target.copy()
+    for corner in corners:
+        closed = ~np.isnan(target[corner])
+        one, other = corner[closed], corner[~closed]
+        if len(one) and len(other):
+            cosines = surface.normals[corner] @ surface.normals[corner].T
+            jump = np.linalg.solve(cosines[np.ix_(closed, closed)], target[one] - v_n[one])
+            target[other] = v_n[other] + cosines[np.ix_(~closed, closed)] @ jump
+    return target
+
+
+def lumped_entries(surface: ContactSurface, nodal: Array) -> tuple[Indices, Indices, Array]:
+    """(rows, columns, values) of the lumped masses ``nodal`` of the owned unknowns: the diagonal, but m G⁻¹ at oblique
+    corners."""
+    rows = [np.arange(len(nodal))]
+    columns, values = [rows[0]], [nodal.copy()]
+    unknown = np.full(surface.count, -1, dtype=np.int64)
+    unknown[surface.slots] = surface.owned
+    for corner in oblique_corners(surface):
+        own = unknown[corner]
+        if np.all(own >= 0):  # one rank has all unknowns of a node
+            cosines = surface.normals[corner] @ surface.normals[corner].T
+            values[0][own] = 0.0
+            rows.append(np.repeat(own, len(own)))
+            columns.append(np.tile(own, len(own)))
+            values.append((np.sqrt(np.outer(nodal[own], nodal[own])) * np.linalg.inv(cosines)).ravel())
+    return np.concatenate(rows), np.concatenate(columns), np.concatenate(values)

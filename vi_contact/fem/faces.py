@@ -1,0 +1,201 @@
+"""Faces of a contact boundary: where it turns by more than a feature angle, its nodes have one normal for every face.
+
+Facets round a node are one face there as long as each turns by no more than the angle from another one of them. A
+smooth node has one face, a node at an edge two, at a corner in space three. Normal and weight of a face at a node are
+those of the facets of this face. Everything here is the same on every rank.
+"""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+import ufl
+from scipy.sparse.csgraph import connected_components
+
+from ..algebra import Array, Indices, Mask
+from ..checks import number
+from ..errors import InputError
+from ..meshes.rows import number_alike
+from . import compat
+from .frames import Nodes, at
+from .mesh import Facets, node_numbers
+from .space import FemSpace
+
+log = logging.getLogger(__name__)
+FEATURE_ANGLE = np.pi / 6  # CHOSEN: 30°, a usual feature angle; the coarsest circles of the models turn by less
+LEANING = 0.9  # cosine of the angle (26°) up to which a normal counts as lying in a symmetry plane
+NAMED = 4  # corners that the log names
+
+
+@dataclass(frozen=True, eq=False)
+class Boundary:
+    """The facets of a group, on every rank in the order of the numbers of their nodes.
+
+    Attributes:
+        vertices: (k, v) original numbers of their nodes, ascending; normals: (k, d) outward, of length one.
+        local: this rank's facets of the group; place: their numbers among the k.
+    """
+
+    vertices: Indices
+    normals: Array
+    local: Any
+    place: Indices
+
+    def corner_faces(self, angle: float) -> Indices:
+        """Number the faces (k, v) that each facet belongs to round each of its nodes, all nodes apart."""
+        node = self.vertices.ravel()
+        facet = np.repeat(np.arange(len(self.vertices)), self.vertices.shape[1])
+        order = np.argsort(node, kind="stable")
+        links = []
+        for apart in range(1, int(np.unique(node, return_counts=True)[1].max(initial=1))):
+            one, other = order[:-apart], order[apart:]
+            same = node[one] == node[other]
+            one, other = one[same], other[same]
+            turn = _turn(self.normals[facet[one]], self.normals[facet[other]])
+            close = turn <= angle * (1.0 + 1e-9)
+            links.append(np.stack([one[close], other[close]]))
+        return _components(len(node), links).reshape(self.vertices.shape)
+
+    def faces(self, angle: float) -> Indices:
+        """Number the face (k,) of each facet over the whole boundary."""
+        k, v = self.vertices.shape
+        of_facet = np.stack([np.repeat(np.arange(k), v), k + self.corner_faces(angle).ravel()])
+        return np.unique(_components(k + k * v, [of_facet])[:k], return_inverse=True)[1].ravel()
+
+
+def checked_angle(owner: str, value: Any) -> float:
+    """Return the feature angle as a float; InputError for what is no angle above 0 and up to pi."""
+    angle = number(owner, "feature_angle", value, positive=True, unit="radians")
+    if angle > np.pi:
+        raise InputError(f"{owner}: feature_angle is {value}; give radians: with pi no edge counts as a corner")
+    return angle
+
+
+def boundary(space: FemSpace, facets: Facets) -> Boundary:
+    """Gather the facets of a group. Collective."""
+    mesh = space.mesh
+    geometry = compat.entities_to_geometry(mesh, mesh.topology.dim - 1, facets.indices)
+    vertices = node_numbers(mesh)[geometry].astype(np.int64)
+    parts = space.comm.bcast(space.comm.gather((vertices, _outward(mesh, facets.indices, geometry))))
+    rows, normals = (np.concatenate([part[i] for part in parts]) for i in (0, 1))
+    unique, first = np.unique(np.sort(rows, axis=1), axis=0, return_index=True)
+    known, own = number_alike(unique, vertices)
+    order = np.argsort(known)
+    return Boundary(unique, normals[first], facets.indices, order[np.searchsorted(known[order], own)])
+
+
+def _outward(mesh: Any, facets: Any, geometry: Any) -> Array:
+    """Outward unit normals (k, d) of local facets with these nodes."""
+    d = mesh.geometry.dim
+    x = mesh.geometry.x[geometry][:, :, :d]
+    middle = x.mean(axis=1)
+    normals = np.linalg.svd(x - middle[:, None, :])[2][:, -1]  # along which the facet extends least
+    cell_of = mesh.topology.connectivity(mesh.topology.dim - 1, mesh.topology.dim)
+    cells = np.array([cell_of.links(facet)[0] for facet in facets], dtype=np.int64)
+    inside = mesh.geometry.x[compat.geometry_dofmap(mesh)[cells]][:, :, :d].mean(axis=1)
+    return np.asarray(np.where(np.sum((middle - inside) * normals, axis=1)[:, None] < 0.0, -normals, normals))
+
+
+def _turn(one: Array, other: Array) -> Array:
+    """Angles between unit vectors (k, d)."""
+    return np.asarray(2.0 * np.arctan2(np.linalg.norm(one - other, axis=1), np.linalg.norm(one + other, axis=1)))
+
+
+def _components(count: int, links: list[Indices]) -> Indices:
+    """Number of the connected part of each of ``count`` things."""
+    one, other = np.concatenate([np.zeros((2, 0), dtype=np.int64), *links], axis=1)
+    graph = sp.coo_matrix((np.ones(len(one)), (one, other)), shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+
+
+def integrals(space: FemSpace, indices: Any) -> Array:
+    """(owned nodes, 1 + d): ∫ phi_i and ∫ phi_i n over local facets. Collective."""
+    mesh, d = space.mesh, space.dimension
+    ds = compat.measure(mesh, mesh.topology.dim - 1, indices)
+    v = ufl.TestFunction(space.V)
+    one = compat.assemble_vector(compat.compile_form(sum(v[c] for c in range(d)) * ds)).array_r.reshape(-1, d)
+    normal = compat.assemble_vector(compat.compile_form(ufl.inner(ufl.FacetNormal(mesh), v) * ds)).array_r
+    return np.column_stack([one[:, 0], normal.reshape(-1, d)])
+
+
+def split(space: FemSpace, around: Boundary, nodes: Nodes, angle: float) -> tuple[Nodes, Indices]:
+    """(the nodes, those at corners once for each face with its normal and weight; a facet of the face, -1 elsewhere).
+
+    The order of the nodes is kept. Collective.
+    """
+    labels = around.corner_faces(angle)
+    known = np.isin(around.vertices, nodes.numbers)
+    pairs = np.unique(np.column_stack([around.vertices[known], labels[known]]), axis=0)
+    numbers, counts = np.unique(pairs[:, 0], return_counts=True)
+    pairs = pairs[np.isin(pairs[:, 0], numbers[counts > 1])]
+    if not len(pairs):
+        return nodes, np.full(len(nodes.numbers), -1)
+    starts, ends = (np.searchsorted(pairs[:, 0], nodes.numbers, side) for side in ("left", "right"))
+    of_rows = [np.arange(start, end) if end > start else [-1] for start, end in zip(starts, ends, strict=True)]
+    found = nodes.pick(np.repeat(np.arange(len(of_rows)), [len(own) for own in of_rows]))
+    pair = np.concatenate(of_rows).astype(np.int64)
+    double, values = pair >= 0, _of_faces(space, around, labels, pairs)[pair]
+    unit = values[:, 1:] / np.linalg.norm(values[:, 1:], axis=1)[:, None]
+    normals = np.where(double[:, None], in_symmetry_planes(unit, found.held), found.normals)
+    facet = np.unique(labels, return_index=True)[1] // labels.shape[1]
+    split_nodes = replace(found, normals=normals, weights=np.where(double, values[:, 0], found.weights))
+    return split_nodes, np.where(double, facet[pairs[pair, 1]], -1)
+
+
+def _of_faces(space: FemSpace, around: Boundary, labels: Indices, pairs: Indices) -> Array:
+    """``integrals`` (pairs, 1 + d) at corner nodes over one of their faces, for pairs of node and face.
+
+    Facets are sorted into classes, in which those at one node are all of one face, and each class is integrated.
+    """
+    corners = np.unique(pairs[:, 0])
+    classes, row_of = _classes(around.vertices, labels, corners), np.full(int(labels.max()) + 1, -1)
+    row_of[pairs[:, 1]] = np.arange(len(pairs))
+    total = np.zeros((len(pairs), 1 + space.dimension))
+    for number_ in range(int(classes.max()) + 1):
+        local = np.asarray(around.local)[classes[around.place] == number_]
+        values = space._of_nodes(corners, integrals(space, local))
+        inside = classes == number_
+        rows = np.unique(row_of[labels[inside]])
+        rows = rows[rows >= 0]
+        total[rows] += values[np.searchsorted(corners, pairs[rows, 0])]
+    return total
+
+
+def _classes(vertices: Indices, labels: Indices, corners: Indices) -> Indices:
+    """Class (k,) of every facet at a corner, -1 for others; facets of different faces at a node differ in class."""
+    classes = np.full(len(vertices), -1, dtype=np.int64)
+    at_corner = np.isin(vertices, corners)
+    around: dict[int, list[tuple[int, int]]] = {int(node): [] for node in corners}
+    for facet in np.flatnonzero(at_corner.any(axis=1)):
+        own = [(int(vertices[facet, i]), int(labels[facet, i])) for i in np.flatnonzero(at_corner[facet])]
+        taken = {int(classes[other]) for node, label in own for other, face in around[node] if face != label}
+        classes[facet] = next(c for c in range(len(taken) + 1) if c not in taken)
+        for node, label in own:
+            around[node].append((int(facet), label))
+    return classes
+
+
+def in_symmetry_planes(normals: Array, held: Mask) -> Array:
+    """Normals (k, d) without the prescribed components of their nodes, where that turns them by little.
+
+    On a symmetry plane the true normal lies in the plane; that of the facets on one side of it leans to that side.
+    """
+    inside = np.where(held, 0.0, normals)
+    length = np.linalg.norm(inside, axis=1)[:, None]
+    return np.asarray(np.where(length > LEANING, inside / np.maximum(length, LEANING), normals))
+
+
+def tell_corners(space: FemSpace, name: str, nodes: Nodes, angle: float) -> None:
+    """Log, on rank 0, how many nodes have several conditions, and where."""
+    _, first, counts = np.unique(nodes.numbers, return_index=True, return_counts=True)
+    rows = np.sort(first[counts > 1])
+    if space.comm.rank == 0 and len(rows):
+        places = ", ".join(at(point) for point in nodes.points[rows[:NAMED]]) + (", …" if len(rows) > NAMED else "")
+        log.info(
+            "'%s' turns by more than %.4g degrees at %d contact nodes, which have one condition for every face: %s",
+            name, np.degrees(angle), len(rows), places,
+        )
