@@ -78,7 +78,7 @@ def test_csmip_touching_values_are_cut_by_column(tmp_path):
 
 
 def test_csmip_in_tenths_of_g_and_without_a_format(tmp_path):
-    record = read_record(write(tmp_path, csmip(unit="in g/10.  (8f10.3)")))
+    record = read_record(write(tmp_path, csmip(unit="in g/10.  (8f10.3)")), largest=1e3)
     assert np.allclose(record.acceleration, 0.1 * G * VALUES, rtol=1e-14, atol=0.0) and record.units == "g/10"
     record = read_record(write(tmp_path, csmip(unit="in cm/sec/sec")))
     assert np.allclose(record.acceleration, 0.01 * VALUES, rtol=1e-14, atol=0.0)
@@ -268,7 +268,7 @@ def test_esm_record_and_its_licence(tmp_path):
 
 def test_esm_in_g_windows_line_ends_and_first_key_unlike_event_name(tmp_path):
     text = esm(units="g").replace("EVENT_NAME", "EARTHQUAKE_NAME").replace("\n", "\r\n")
-    record = read_record(write(tmp_path, text))
+    record = read_record(write(tmp_path, text), largest=1e4)
     assert record.format == "ESM" and np.allclose(record.acceleration, G * VALUES, rtol=1e-12)
 
 
@@ -430,12 +430,13 @@ def test_what_is_written_is_read_back(units, tmp_path):
     write_columns(RECORD, tmp_path / "a.txt", units)
     write_at2(RECORD, tmp_path / "a.at2", units)
     write_path_series(RECORD, tmp_path / "a.th", units)
-    for record in (read_record(tmp_path / "a.txt", units), read_record(tmp_path / "a.at2"),
-                   read_record(tmp_path / "a.th", units, dt=0.005)):
+    for record in (read_record(tmp_path / "a.txt", units, largest=200.0),
+                   read_record(tmp_path / "a.at2", largest=200.0),
+                   read_record(tmp_path / "a.th", units, dt=0.005, largest=200.0)):
         assert np.allclose(record.acceleration, RECORD.acceleration, rtol=6e-9, atol=0.0)
         assert np.isclose(record.dt, 0.005, rtol=1e-12) and record.units == units
-    assert read_record(tmp_path / "a.txt", units).notes[0] == "Some motion of mine"
-    assert read_record(tmp_path / "a.at2").title == "Some motion of mine"
+    assert read_record(tmp_path / "a.txt", units, largest=200.0).notes[0] == "Some motion of mine"
+    assert read_record(tmp_path / "a.at2", largest=200.0).title == "Some motion of mine"
 
 
 def test_writing_where_nothing_can_be_written(tmp_path):

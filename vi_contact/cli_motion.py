@@ -11,6 +11,7 @@ from typing import Any
 from .errors import InputError
 
 _FORMATS = {".at2": "at2", ".th": "path", ".g3": "path", ".acc": "path"}
+_QUANTITY = re.compile(r"([-+]?[\d.]++(?:[eE][-+]?\d++)?)(.*+)")
 _SHOWN = (0.1, 0.2, 0.5, 1.0, 2.0)  # periods of the printed table [s]
 _ACTIONS = {
     "info": "what a record file holds: units, peaks, intensities, duration, drift",
@@ -50,6 +51,8 @@ def _add_reading(one: argparse.ArgumentParser) -> None:
     group.add_argument("--units", help="m/s2, cm/s2, gal, g, ...: required where the file does not say")
     group.add_argument("--dt", type=float, help="time step [s], where the file does not say")
     group.add_argument("--channel", type=int, metavar="K", help="which one of a file that holds several, from 1")
+    group.add_argument("--largest", type=acceleration, metavar="A",
+                       help="accept peaks up to this (default 10g: beyond it the units are doubted)")
     group.add_argument("--even", type=float, metavar="DT", help="bring uneven times of a column file to this step [s]")
 
 
@@ -101,11 +104,11 @@ def acceleration(text: str) -> float:
     """Metres per second squared of "3.0", "0.3g", "0.3 g" or "300gal"."""
     from .ground_motion.record import UNITS, canonical_units
 
-    match = re.fullmatch(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(.*?)\s*", text)
+    match = _QUANTITY.fullmatch(text.strip())
     try:
         if match is None:
             raise ValueError(text)
-        return float(match[1]) * UNITS[canonical_units("option", match[2] or "m/s2")]
+        return float(match[1]) * UNITS[canonical_units("option", match[2].strip() or "m/s2")]
     except ValueError:  # InputError is one
         raise argparse.ArgumentTypeError(f"{text!r} is no acceleration such as 3.0 or 0.3g") from None
 
@@ -113,13 +116,15 @@ def acceleration(text: str) -> float:
 def _read(options: argparse.Namespace, path: str) -> Any:
     """The record of a file after the processing asked for."""
     from .ground_motion import Processing, read_record
+    from .ground_motion.reader import LARGEST_PEAK
 
     steps = Processing(
         trim=options.trim, pad=options.pad, mean=options.remove_mean, taper=options.taper, low=options.low,
         high=options.high, order=options.order, causal=options.causal, resample=options.resample,
         baseline=options.baseline, scale=options.scale, pga=options.pga, arias=options.arias, psa=_psa(options.psa),
     )
-    record = read_record(path, options.units, dt=options.dt, channel=options.channel, resample_dt=options.even)
+    record = read_record(path, options.units, dt=options.dt, channel=options.channel, resample_dt=options.even,
+                         largest=options.largest or LARGEST_PEAK)
     return steps(record)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..errors import InputError
 from .record import UNITS, Record, file_dt, file_units
-from .text import TextFile, to_float
+from .text import TextFile, filled, to_float
 
 COMPONENTS = ("N-S", "E-W", "U-D")
 
@@ -24,16 +24,17 @@ def read(text: TextFile, units: str | None = None, dt: float | None = None, chan
     """
     if channel not in (1, 2, 3):
         raise InputError(f"{text.path}: the file holds 3 channels (1: N-S, 2: E-W, 3: U-D); pass channel=")
-    start = next((k + 1 for k, line in enumerate(text.lines) if line.split() == list(COMPONENTS)), None)
+    start = next((k + 1 for k, line in enumerate(text.heads) if line.split() == list(COMPONENTS)), None)
     if start is None:
         raise InputError(f"{text.path}: no line 'N-S E-W U-D' announces the columns; get the complete file")
     header = {}
-    for index, line in enumerate(text.lines[:start - 1]):
+    for index, line in enumerate(text.heads[:start - 1]):
         key, colon, value = line.partition(":")
         if colon:
             header[" ".join(key.split()).upper()] = index, " ".join(value.split())
     count, step = _number(text, header, "NUMBER OF DATA"), _number(text, header, "SAMPLING INTERVAL (SEC)")
-    rows = [(k, text.numbers(k)) for k in range(start, len(text.lines)) if text.lines[k].strip()]
+    data = filled(text, start)
+    rows = list(zip(data, text.rows(data), strict=True))
     for index, row in rows:
         if len(row) != 3:
             raise InputError(f"{text.at(index)}: {len(row)} values instead of N-S, E-W and U-D; get the file again")
@@ -42,7 +43,7 @@ def read(text: TextFile, units: str | None = None, dt: float | None = None, chan
                          "follow; get the complete file")
     name = file_units(text.path, "gal", units)
     samples = np.array([row[channel - 1] for _, row in rows])
-    lines = tuple(" ".join(line.split()) for line in text.lines[:start - 1] if line.strip())
+    lines = tuple(" ".join(line.split()) for line in text.heads[:start - 1] if line.strip())
     station, date = (header.get(key, (0, ""))[1] for key in ("STATION ID", "EARTHQUAKE DATE"))
     return Record(acceleration=UNITS[name] * samples, dt=file_dt(text.path, step, dt), source=text.path, units=name,
                   title=f"{date} {station} {COMPONENTS[channel - 1]}".strip(),

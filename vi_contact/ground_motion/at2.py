@@ -14,30 +14,30 @@ import numpy as np
 
 from ..errors import InputError
 from .record import UNITS, Record, file_dt, file_units
-from .text import NUMBER, TextFile, to_float
+from .text import NUMBER, TextFile, filled, number, whole
 
 HEADER_LINES = 8
 """NPTS and DT are looked for in this many first lines."""
 
-_NPTS = re.compile(r"\bNPTS\s*[=:]\s*(\d+)", re.IGNORECASE)
-_DT = re.compile(rf"\bDT\s*[=:]\s*({NUMBER})", re.IGNORECASE)
-_VALUES_FIRST = re.compile(rf"^\s*(\d+)[\s,]+({NUMBER})\s*,?\s*NPTS\b", re.IGNORECASE)
-_BEGIN = re.compile(r"\*+\s*begin\s+data\s*\*+", re.IGNORECASE)
-_SECONDS = rf"({NUMBER})\s*-?s(?:ec(?:ond)?s?)?\b"
+_NPTS = re.compile(r"\bNPTS\s*+[=:]\s*+(\d++)", re.IGNORECASE)
+_DT = re.compile(rf"\bDT\s*+[=:]\s*+({NUMBER})", re.IGNORECASE)
+_VALUES_FIRST = re.compile(rf"^\s*+(\d++)[\s,]++({NUMBER})\s*+,?\s*+NPTS\b", re.IGNORECASE)
+_BEGIN = re.compile(r"(?<!\*)\*++\s*+begin\s++data\s*+\*", re.IGNORECASE)
+_SECONDS = rf"({NUMBER})\s*+-?s(?:ec(?:ond)?s?)?\b"
 _PROSE_DT = (re.compile(rf"\b(?:spacing|spaced|step|intervals?|every|sampled at)\b[^\d.+-]{{0,20}}{_SECONDS}",
                         re.IGNORECASE),
-             re.compile(rf"{_SECONDS}\.?\s+(?:time\s+)?(?:spacing|steps?|intervals?)\b", re.IGNORECASE))
-_UNITS = re.compile(r"\bunits?\s*(?:of|are|is|in|[=:])\s*(\([^)]*\)|[^\s,;]+)", re.IGNORECASE)
+             re.compile(rf"{_SECONDS}\.?\s++(?:time\s++)?(?:spacing|steps?|intervals?)\b", re.IGNORECASE))
+_UNITS = re.compile(r"\bunits?\s*+(?:of|are|is|in|[=:])\s*+(\([^()]*+\)|[^\s,;]++)", re.IGNORECASE)
 
 
 def begin_data(text: TextFile) -> int | None:
     """Index of the first line after `*** Begin data ***`, or None."""
-    return next((k + 1 for k, line in enumerate(text.lines) if _BEGIN.search(line)), None)
+    return next((k + 1 for k, line in enumerate(text.heads) if _BEGIN.search(line)), None)
 
 
 def recognises(text: TextFile) -> bool:
     """Whether the file says NPTS in its first lines, outside "#" comments, or has a `*** Begin data ***` line."""
-    header = [line for line in text.lines[:HEADER_LINES] if not line.startswith("#")]
+    header = [line for line in text.heads[:HEADER_LINES] if not line.startswith("#")]
     return any(_NPTS.search(line) or _VALUES_FIRST.search(line) for line in header) or begin_data(text) is not None
 
 
@@ -48,12 +48,9 @@ def read(text: TextFile, units: str | None = None, dt: float | None = None) -> R
     or units, a velocity or displacement file, a word that is not a number.
     """
     npts, stated_dt, npts_line, start = _header(text)
-    header = [" ".join(line.split()) for line in text.lines[:start] if line.strip()]
+    header = [" ".join(line.split()) for line in text.heads[:start] if line.strip()]
     name = file_units(text.path, _stated_units(header), units)
-    values: list[float] = []
-    for index in range(start, len(text.lines)):
-        if text.lines[index].strip():
-            values += text.numbers(index)
+    values = [value for row in text.rows(filled(text, start)) for value in row]
     if npts is not None and len(values) != npts:
         raise InputError(f"{text.at(npts_line)}: NPTS is {npts} but {len(values)} values follow; "
                          "get the complete file or correct NPTS")
@@ -66,22 +63,23 @@ def _header(text: TextFile) -> tuple[int | None, float | None, int, int]:
     """NPTS, DT, the index of the NPTS line and the index of the first data line."""
     npts, dt, npts_line, start = None, None, 0, begin_data(text)
     last = 0
-    for index, line in enumerate(text.lines[:HEADER_LINES if start is None else start]):
+    for index, line in enumerate(text.heads[:HEADER_LINES if start is None else start]):
         both, count, step = _VALUES_FIRST.search(line), _NPTS.search(line), _DT.search(line)
         if both:
-            npts, dt, npts_line, last = int(both[1]), to_float(both[2]), index, index
+            npts, dt, npts_line, last = whole(text, index, both[1]), number(text, index, both[2]), index, index
         if count:
-            npts, npts_line, last = int(count[1]), index, index
+            npts, npts_line, last = whole(text, index, count[1]), index, index
         if step:
-            dt, last = to_float(step[1]), index
+            dt, last = number(text, index, step[1]), index
     if start is None:
         start = last + 1
-    return npts, dt if dt is not None else _prose_dt(text.lines[:start]), npts_line, start
+    return npts, dt if dt is not None else _prose_dt(text, start), npts_line, start
 
 
-def _prose_dt(header: tuple[str, ...]) -> float | None:
+def _prose_dt(text: TextFile, start: int) -> float | None:
     """The time step of a sentence like "1559 points at equal spacing of 0.02 sec", if the header has exactly one."""
-    found = {to_float(match[1]) for line in header for pattern in _PROSE_DT for match in pattern.finditer(line)}
+    found = {number(text, index, match[1]) for index in range(start) for pattern in _PROSE_DT
+             for match in pattern.finditer(text.heads[index])}
     return found.pop() if len(found) == 1 else None
 
 

@@ -14,10 +14,11 @@ from itertools import pairwise
 import numpy as np
 
 from ..algebra import Array
+from ..checks import counted, number
 from ..errors import InputError
 from .at2 import begin_data
 from .record import UNITS, Record, file_dt, file_units
-from .text import TextFile
+from .text import TextFile, filled
 
 JITTER = 1e-6
 """Relative difference between time steps that still counts as rounding."""
@@ -47,7 +48,7 @@ def read(text: TextFile, units: str | None = None, dt: float | None = None, resa
             notes += (f"uneven times interpolated linearly to a step of {step:g} s",)
         if times[0] != 0.0:
             notes += (f"the first time in the file is {times[0]:g} s and is t = 0 here",)
-    comments = tuple(line.lstrip("# ").rstrip() for line in text.lines if line.startswith("#"))
+    comments = tuple(line.lstrip("# ").rstrip() for line in text.heads if line.startswith("#"))
     return Record(acceleration=UNITS[name] * samples, dt=step, title=comments[0] if comments else "", source=text.path,
                   format="columns", units=name, sha256=text.sha256, notes=comments + notes)
 
@@ -57,7 +58,7 @@ def follow_begin_data(text: TextFile) -> bool:
     start = begin_data(text)
     if start is None:
         return False
-    rows = [text.numbers(index) for index in range(start, len(text.lines)) if text.lines[index].strip()]
+    rows = list(text.rows(filled(text, start)))
     times = [row[0] for row in rows]
     return all(len(row) == 2 for row in rows) and all(after > before >= 0.0 for before, after in pairwise(times))
 
@@ -67,9 +68,8 @@ def _table(text: TextFile, *, series: bool) -> tuple[list[int], Array]:
 
     series: rows of more than two values, the last perhaps shorter, are one column written in rows.
     """
-    lines = [index for index in range(begin_data(text) or 0, len(text.lines))
-             if text.lines[index].strip() and not text.lines[index].lstrip().startswith("#")]
-    rows = [text.numbers(index) for index in lines]
+    lines = [index for index in filled(text, begin_data(text) or 0) if not text.lines[index].lstrip().startswith("#")]
+    rows = list(text.rows(lines))
     if series and rows and len(rows[0]) > 2:
         return lines, np.array([value for row in rows for value in row])[:, None]
     for index, row in zip(lines, rows, strict=True):
@@ -101,8 +101,8 @@ def _evened(sentence: str, times: Array, samples: Array, resample_dt: float | No
     """Step and samples on an equal grid; InputError with the sentence when no resampling was asked for."""
     if resample_dt is None:
         raise InputError(f"{sentence}; pass resample_dt= to interpolate, or correct the time")
-    if not resample_dt > 0.0 or not math.isfinite(resample_dt):
-        raise InputError(f"resample_dt is {resample_dt!r}; give a positive number of seconds")
+    number("read_record", "resample_dt", resample_dt, positive=True, unit="seconds")
     step = resample_dt / math.ceil(resample_dt / float(np.median(np.diff(times))) * (1.0 - JITTER))
-    count = int((times[-1] - times[0]) / step * (1.0 + 1e-12)) + 1
+    asked = (times[-1] - times[0]) / step * (1.0 + 1e-12) + 1.0
+    count = counted("read_record", f"resample_dt = {resample_dt!r} s", asked)
     return step, np.interp(times[0] + step * np.arange(count), times, samples)

@@ -17,23 +17,31 @@ import numpy as np
 from ..algebra import Array
 from ..errors import InputError
 from .record import UNITS, Record, file_dt, file_units
-from .text import NUMBER, TextFile, to_float
+from .text import NUMBER, TextFile, number, whole
 
 STEP = 33
 """Place of the time step among the real header values of COSMOS, from 0."""
 
-_FIRST = re.compile(r"^\s*(?:un)?corrected accelerogram|\(\s*format\s+v[\d.]+ with \d+ text lines", re.IGNORECASE)
-_BLOCK = re.compile(r"^\s*(\d+)\s+.*?\b(accel|veloc|displ)\w*\.?.*?(?:\bpts\b|\bspaced\b|\bdata\b)", re.IGNORECASE)
-_FORMAT = re.compile(r"\(\s*(\d*)\s*(?:1P)?[FEIDG](\d+)[^)]*\)", re.IGNORECASE)
-_UNITS = (re.compile(r"units?\s*(?:[=:]|\bof\b)\s*(g/10|[^,()\s]+)", re.IGNORECASE),
-          re.compile(r"\bin\s+(g/10|cm/s(?:ec)?[*^]*2|cm/s(?:ec)?/s(?:ec)?|g)\b", re.IGNORECASE))
-_SPACED = re.compile(rf"equally[- ]spaced\s+(?:at|intervals\s+of)\s+({NUMBER})\s*sec", re.IGNORECASE)
-_RATE = re.compile(rf"\bat\s+({NUMBER})\s*pts/sec", re.IGNORECASE)
-_REALS = re.compile(r"^\s*(\d+)\s+real-header values follow on\s+(\d+)\s+lines", re.IGNORECASE)
-_CHANNEL = re.compile(r"\bchan?:?\s+([\w?]+):\s*([^(]*?)\s*(?:\(|\bfrom\b|$)", re.IGNORECASE)
-_STATION = re.compile(r"\bstat(?:io)?n\s*(?:no|id)[.:]\s*(?:.*?\bcode:\s*)?(\S+)", re.IGNORECASE)
+_FIRST = re.compile(r"^\s*+(?:un)?corrected accelerogram|\(\s*+format\s++v[\d.]++ with \d++ text lines",
+                    re.IGNORECASE)
+_COUNT = re.compile(r"^\s*+(\d++)\s")
+_QUANTITY = re.compile(r"\b(accel|veloc|displ)\w*+", re.IGNORECASE)
+_SAMPLES = re.compile(r"\b(?:pts|spaced|data)\b", re.IGNORECASE)
+_FORMAT = re.compile(r"\(\s*+(\d*+)\s*+(?:1P)?[FEIDG](\d++)[^()]*+\)", re.IGNORECASE)
+_UNITS = (re.compile(r"units?\s*+(?:[=:]|\bof\b)\s*+(g/10|[^,()\s]++)", re.IGNORECASE),
+          re.compile(r"\bin\s++(g/10|cm/s(?:ec)?[*^]*+2|cm/s(?:ec)?/s(?:ec)?|g)\b", re.IGNORECASE))
+_SPACED = re.compile(rf"equally[- ]spaced\s++(?:at|intervals\s++of)\s++({NUMBER})\s*+sec", re.IGNORECASE)
+_UNEVEN = re.compile(r"unequally", re.IGNORECASE)
+_RATE = re.compile(rf"\bat\s++({NUMBER})\s*+pts/sec", re.IGNORECASE)
+_REALS = re.compile(r"^\s*+(\d++)\s++real-header values follow on\s++(\d++)\s++lines", re.IGNORECASE)
+_CHANNEL = re.compile(r"\bchan?:?\s++([\w?]++):([^(]*+)", re.IGNORECASE)
+_FROM = re.compile(r"\bfrom\b", re.IGNORECASE)
+_STATION = re.compile(r"\bstat(?:io)?n\s*+(?:no|id)[.:](.*+)", re.IGNORECASE)
+_CODE = re.compile(r"\bcode:(.*+)", re.IGNORECASE)
 _EVENT = re.compile(r"re?co?rd of", re.IGNORECASE)
-_UNKNOWN = re.compile(rf"unknown/unspecified:\s*{NUMBER}[,\s]+({NUMBER})", re.IGNORECASE)
+_END = re.compile(r"^\s*+(?:end-of-data|/&)", re.IGNORECASE)
+_NUMBERS = re.compile(r"[\s\d-]++")
+_UNKNOWN = re.compile(rf"unknown/unspecified:\s*+{NUMBER}[,\s]++({NUMBER})", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -54,7 +62,7 @@ class Block:
 
 def recognises(text: TextFile) -> bool:
     """Whether the first line is that of a COSMOS or CSMIP file of any volume."""
-    return _FIRST.search(text.lines[0]) is not None
+    return _FIRST.search(text.heads[0]) is not None
 
 
 def read(text: TextFile, units: str | None = None, dt: float | None = None, channel: int | None = None) -> Record:
@@ -67,13 +75,13 @@ def read(text: TextFile, units: str | None = None, dt: float | None = None, chan
     if not blocks:
         raise InputError(f"{text.at(0)}: no block of accelerations follows; get the corrected accelerations (V2)")
     block = _chosen(text, blocks, channel)
-    line = text.lines[block.line]
-    if re.search(r"unequally", line, re.IGNORECASE):
+    line = text.heads[block.line]
+    if _UNEVEN.search(line):
         raise InputError(f"{text.at(block.line)}: the samples are unequally spaced; get the corrected file (V2)")
     stated = next((match[1] for match in (pattern.search(line) for pattern in _UNITS) if match), None)
     name = file_units(text.at(block.line), stated, units)
     words, comments = _words(text, block)
-    cosmos = "format v" in text.lines[0].lower()
+    cosmos = "format v" in text.heads[0].lower()
     event = next(filter(_EVENT.match, words), " ".join(words[1:2] if cosmos else words[2:3]))
     return Record(acceleration=UNITS[name] * _samples(text, block), dt=file_dt(text.path, _step(text, block), dt),
                   title=event, source=text.path, units=name, sha256=text.sha256,
@@ -85,25 +93,36 @@ def _blocks(text: TextFile) -> list[Block]:
     """The blocks of accelerations; blocks of other quantities belong to the channel before them."""
     found, index, start = [], 0, 0
     while index < len(text.lines):
-        match = _BLOCK.match(text.lines[index])
-        form = _FORMAT.search(text.lines[index])
-        if match and (form or _SPACED.search(text.lines[index])):
-            per_line, width = (int(form[1] or 1), int(form[2])) if form else (8, 10)
-            block = Block(index, range(start, index), int(match[1]), max(per_line, 1), max(width, 1))
-            if match[2].lower() == "accel":
+        announced = _announced(text, index)
+        form = _FORMAT.search(text.heads[index]) if announced else None
+        if announced and (form or _SPACED.search(text.heads[index])):
+            count, quantity = announced
+            per_line, width = (whole(text, index, part or "1") for part in form.groups()) if form else (8, 10)
+            block = Block(index, range(start, index), count, max(per_line, 1), max(width, 1))
+            if quantity == "accel":
                 found.append(block)
             index = start = block.end
-        elif re.match(r"\s*(?:end-of-data|/&)", text.lines[index], re.IGNORECASE):
+        elif _END.match(text.heads[index]):
             index = start = index + 1
         else:
             index += 1
     return found
 
 
+def _announced(text: TextFile, index: int) -> tuple[int, str] | None:
+    """Number of points and quantity ("accel", "veloc", "displ") of the line that begins a block, None for another."""
+    line = text.heads[index]
+    count = _COUNT.match(line)
+    quantity = _QUANTITY.search(line, count.end()) if count else None
+    if count is None or quantity is None or not _SAMPLES.search(line, quantity.end()):
+        return None
+    return whole(text, index, count[1]), quantity[1].lower()
+
+
 def _words(text: TextFile, block: Block) -> tuple[list[str], list[str]]:
     """The text of a channel's header, which ends where its numbers begin, and its comments, blanks squeezed."""
-    header = [" ".join(text.lines[index].split()) for index in block.header]
-    numbers = (k for k, entry in enumerate(header) if re.fullmatch(r"[\s\d-]+", entry) or "header values" in entry)
+    header = [" ".join(text.heads[index].split()) for index in block.header]
+    numbers = (k for k, entry in enumerate(header) if _NUMBERS.fullmatch(entry) or "header values" in entry)
     comments = [entry.lstrip("| ") for entry in header if entry.startswith("|")]
     return [entry for entry in header[:next(numbers, len(header))] if entry], [entry for entry in comments if entry]
 
@@ -120,8 +139,8 @@ def _chosen(text: TextFile, blocks: list[Block], channel: int | None) -> Block:
 
 def _samples(text: TextFile, block: Block) -> Array:
     """The samples in the file's units, shape (count,)."""
-    marks = filter(None, (_UNKNOWN.search(text.lines[index]) for index in block.header))
-    unknown = next((to_float(mark[1]) for mark in marks), None)
+    marks = ((index, _UNKNOWN.search(text.heads[index])) for index in block.header)
+    unknown = next((number(text, index, mark[1]) for index, mark in marks if mark), None)
     values: list[float] = []
     for index in range(block.line + 1, block.end):
         row = text.fixed(index, block.width) if index < len(text.lines) else []
@@ -137,29 +156,33 @@ def _samples(text: TextFile, block: Block) -> Array:
 
 def _step(text: TextFile, block: Block) -> float | None:
     """The time step stated with the samples, in the text of the header or among its real numbers."""
-    rate = _RATE.search(text.lines[block.line])
-    if rate and to_float(rate[1]) > 0.0:
-        return 1.0 / to_float(rate[1])
+    rate = _RATE.search(text.heads[block.line])
+    if rate and number(text, block.line, rate[1]) > 0.0:
+        return 1.0 / number(text, block.line, rate[1])
     for index in (block.line, *block.header):
-        spaced = _SPACED.search(text.lines[index])
+        spaced = _SPACED.search(text.heads[index])
         if spaced:
-            return to_float(spaced[1])
+            return number(text, index, spaced[1])
     for index in block.header:
-        reals, form = _REALS.match(text.lines[index]), _FORMAT.search(text.lines[index])
+        reals, form = _REALS.match(text.heads[index]), _FORMAT.search(text.heads[index])
         if reals and form:
-            rows = range(index + 1, min(index + 1 + int(reals[2]), block.line))
-            values = [value for row in rows for value in text.fixed(row, int(form[2]))]
+            rows = range(index + 1, min(index + 1 + whole(text, index, reals[2]), block.line))
+            values = [value for row in rows for value in text.fixed(row, max(whole(text, index, form[2]), 1))]
             return values[STEP] if len(values) > STEP and values[STEP] > 0.0 else None
     return None
 
 
 def _component(text: TextFile, block: Block) -> str:
     """Direction of the channel, such as "90 Deg" or "UP", from the text of its header."""
-    found = (_CHANNEL.search(text.lines[index]) for index in block.header)
-    return next((" ".join(match[2].split()) for match in found if match and match[2]), "")
+    found = (_CHANNEL.search(text.heads[index]) for index in block.header)
+    named = (" ".join(_FROM.split(match[2], maxsplit=1)[0].split()) for match in found if match)
+    return next(filter(None, named), "")
 
 
 def _station(text: TextFile, block: Block) -> str:
     """Number or code of the station, from the text of the header."""
-    match = next(filter(None, (_STATION.search(text.lines[index]) for index in block.header)), None)
-    return match[1] if match else ""
+    match = next(filter(None, (_STATION.search(text.heads[index]) for index in block.header)), None)
+    if match is None:
+        return ""
+    code = _CODE.search(match[1])
+    return next(iter((code or match)[1].split()), "")

@@ -11,17 +11,17 @@ import numpy as np
 
 from ..errors import InputError
 from .record import UNITS, Record, file_dt, file_units
-from .text import TextFile, to_float
+from .text import TextFile, filled, to_float
 
 NEEDED = ("SAMPLING_INTERVAL_S", "NDATA", "UNITS")
-_ENTRY = re.compile(r"^\s*([A-Z][A-Z0-9_/^ ]*?)\s*:\s*(.*?)\s*$")
+_KEY = re.compile(r"[A-Z][A-Z0-9_/^ ]*+")
 
 
 def recognises(text: TextFile) -> bool:
     """Whether the first line is an entry "KEY: value" and one of the first hundred is NDATA or SAMPLING_INTERVAL_S."""
     keys = ("EVENT_NAME", "SAMPLING_INTERVAL_S", "NDATA")
-    entries = [_ENTRY.match(line) for line in text.lines[:100]]
-    return entries[0] is not None and any(entry is not None and entry[1] in keys for entry in entries)
+    entries = [_entry(line) for line in text.heads[:100]]
+    return entries[0] is not None and any(entry is not None and entry[0] in keys for entry in entries)
 
 
 def read(text: TextFile, units: str | None = None, dt: float | None = None) -> Record:
@@ -38,8 +38,7 @@ def read(text: TextFile, units: str | None = None, dt: float | None = None) -> R
     if kind and "ACCELERATION" not in kind.upper():
         raise InputError(f"{text.at(index)}: the file holds {kind.lower()}; get the file of accelerations (.ACC.ASC)")
     count, step = _number(text, header, "NDATA"), _number(text, header, "SAMPLING_INTERVAL_S")
-    values = [value for line in range(start, len(text.lines)) if text.lines[line].strip()
-              for value in text.numbers(line)]
+    values = [value for row in text.rows(filled(text, start)) for value in row]
     if len(values) != count:
         raise InputError(f"{text.at(header['NDATA'][0])}: NDATA is {count:g} but {len(values)} values follow; get the "
                          "complete file")
@@ -57,12 +56,18 @@ def read(text: TextFile, units: str | None = None, dt: float | None = None) -> R
 def _header(text: TextFile) -> tuple[dict[str, tuple[int, str]], int]:
     """Line index and value of each key, and the index of the first line that is no entry."""
     header: dict[str, tuple[int, str]] = {}
-    for index, line in enumerate(text.lines):
-        entry = _ENTRY.match(line)
+    for index, line in enumerate(text.heads):
+        entry = _entry(line)
         if entry is None:
             return header, index
-        header[entry[1]] = index, entry[2]
+        header[entry[0]] = index, entry[1]
     return header, len(text.lines)
+
+
+def _entry(line: str) -> tuple[str, str] | None:
+    """Key and value of a line "KEY: value", None for any other line."""
+    key, colon, value = (part.strip() for part in line.partition(":"))
+    return (key, value) if colon and _KEY.fullmatch(key) else None
 
 
 def _number(text: TextFile, header: dict[str, tuple[int, str]], key: str) -> float:

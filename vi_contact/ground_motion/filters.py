@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..checks import counted
 from ..errors import InputError
 from .record import Record
 
@@ -80,4 +81,6 @@ def filtered(record: Record, *, low: float | None = None, high: float | None = N
 
 def _ringing(record: Record, corner: float) -> int:
     """Samples in which the slowest filter has died away: six periods of its lowest corner."""
-    return math.ceil(6.0 / (corner * record.dt))
+    asked = 6.0 / (corner * record.dt)
+    counted("filtered", f"a corner of {corner:g} Hz", 3.0 * asked + record.acceleration.size)
+    return math.ceil(asked)

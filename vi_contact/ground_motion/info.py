@@ -7,16 +7,16 @@ import os
 from .chain import Processing
 from .intensity import arias, cav, d5_95, pga, pga_time, pgd, pgv, rms
 from .processing import integrated
-from .reader import read_record
+from .reader import LARGEST_PEAK, read_record
 from .record import STANDARD_GRAVITY, UNITS, Record
 from .spectral_intensity import housner_intensity, mean_period, predominant_period
 
 
 def motion_info(path: str | os.PathLike[str], units: str | None = None, *, dt: float | None = None,
                 resample_dt: float | None = None, channel: int | None = None,
-                processing: Processing | None = None) -> str:
+                largest: float = LARGEST_PEAK, processing: Processing | None = None) -> str:
     """A table of one quantity a line, after `processing`; other options and InputError: see `read_record`."""
-    record = read_record(path, units, dt=dt, resample_dt=resample_dt, channel=channel)
+    record = read_record(path, units, dt=dt, resample_dt=resample_dt, channel=channel, largest=largest)
     return record_info(record if processing is None else processing(record))
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..algebra import Array
+from ..checks import counted
 from ..errors import InputError
 from .record import Record
 
@@ -79,6 +80,7 @@ def synthetic(spectrum: KanaiTajimi, duration: float, dt: float, *, seed: int,
     """
     if not 0.0 < dt < duration < math.inf:
         raise InputError(f"synthetic: duration={duration!r}, dt={dt!r} s; give 0 < dt < duration")
+    counted("synthetic", f"duration={duration!r} and dt={dt!r} s", 4.0 * duration / dt)
     count = math.floor(duration / dt * (1.0 + 1e-12)) + 1
     size = 2 ** math.ceil(math.log2(2 * count))
     step = 2.0 * math.pi / (size * dt)

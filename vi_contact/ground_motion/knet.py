@@ -12,19 +12,19 @@ import numpy as np
 
 from ..errors import InputError
 from .record import UNITS, Record, file_dt, file_units
-from .text import NUMBER, TextFile, to_float
+from .text import NUMBER, TextFile, filled, number
 
 KEYS = ("Origin Time", "Station Code", "Record Time", "Sampling Freq(Hz)", "Duration Time(s)", "Dir.", "Scale Factor",
         "Max. Acc. (gal)", "Memo.")
 """Header entries used here; the last one ends the header."""
 
-_SCALE = re.compile(rf"({NUMBER})\s*\((.*?)\)\s*/\s*({NUMBER})\s*$")
-_FREQUENCY = re.compile(rf"({NUMBER})\s*(?:Hz)?\s*$", re.IGNORECASE)
+_SCALE = re.compile(rf"({NUMBER})\s*+\(([^()]*+)\)\s*+/\s*+({NUMBER})\s*+$")
+_FREQUENCY = re.compile(rf"({NUMBER})\s*+(?:Hz)?\s*+$", re.IGNORECASE)
 
 
 def recognises(text: TextFile) -> bool:
     """Whether the first line is the origin time and a scale factor follows."""
-    return text.lines[0].startswith("Origin Time") and any(line.startswith("Scale Factor") for line in text.lines[:20])
+    return text.lines[0].startswith("Origin Time") and any(line.startswith("Scale Factor") for line in text.heads[:20])
 
 
 def read(text: TextFile, units: str | None = None, dt: float | None = None) -> Record:
@@ -33,22 +33,21 @@ def read(text: TextFile, units: str | None = None, dt: float | None = None) -> R
     Raises InputError naming the file, mostly with a line: an entry of the header is missing or no number, words
     between the counts, fewer or more samples than "Duration Time(s)".
     """
-    header = {key: index for key in KEYS for index in range(len(text.lines)) if text.lines[index].startswith(key)}
+    header = {key: index for key in KEYS for index in range(len(text.lines)) if text.heads[index].startswith(key)}
     missing = [key for key in KEYS if key not in header]
     if missing:
         raise InputError(f"{text.path}: the header has no line {missing[0]!r}; get the complete file")
     scale, unit = _scale(text, header["Scale Factor"])
     frequency = _number(text, header["Sampling Freq(Hz)"], "Sampling Freq(Hz)")
-    counts = [value for index in range(header["Memo."] + 1, len(text.lines)) if text.lines[index].strip()
-              for value in text.numbers(index)]
+    counts = [value for row in text.rows(filled(text, header["Memo."] + 1)) for value in row]
     seconds = _number(text, header["Duration Time(s)"], "Duration Time(s)")
-    if len(counts) != round(seconds * frequency):
+    if not abs(len(counts) - seconds * frequency) <= 0.5:
         raise InputError(f"{text.at(header['Duration Time(s)'])}: {seconds:g} s at {frequency:g} Hz are announced but "
                          f"{len(counts)} samples follow; get the complete file")
     name = file_units(text.at(header["Scale Factor"]), unit, units)
     samples = UNITS[name] * scale * (np.array(counts) - np.mean(counts))
-    lines = tuple(" ".join(line.split()) for line in text.lines[:header["Memo."]])
-    value = {key: text.lines[index][len(key):].strip() for key, index in header.items()}
+    lines = tuple(" ".join(line.split()) for line in text.heads[:header["Memo."]])
+    value = {key: text.heads[index][len(key):].strip() for key, index in header.items()}
     return Record(acceleration=samples, dt=file_dt(text.path, 1.0 / frequency, dt), source=text.path,
                   title=f"{value['Origin Time']}, {value['Station Code']} {value['Dir.']}", format="K-NET", units=name,
                   sha256=text.sha256, notes=(*lines, f"mean of {scale * np.mean(counts):.6g} {name} removed"),
@@ -57,15 +56,15 @@ def read(text: TextFile, units: str | None = None, dt: float | None = None) -> R
 
 def _scale(text: TextFile, index: int) -> tuple[float, str]:
     """Size of a count, and its unit, of "Scale Factor      3920(gal)/6182761"."""
-    match = _SCALE.search(text.lines[index])
-    if match is None or to_float(match[3]) == 0.0:
+    match = _SCALE.search(text.heads[index])
+    if match is None or number(text, index, match[3]) == 0.0:
         raise InputError(f"{text.at(index)}: the scale factor is not like '3920(gal)/6182761'; get the file again")
-    return to_float(match[1]) / to_float(match[3]), match[2]
+    return number(text, index, match[1]) / number(text, index, match[3]), match[2]
 
 
 def _number(text: TextFile, index: int, key: str) -> float:
     """The positive number after a key, "Hz" allowed."""
-    match = _FREQUENCY.match(text.lines[index][len(key):].strip())
-    if match is None or to_float(match[1]) <= 0.0:
+    match = _FREQUENCY.match(text.heads[index][len(key):].strip())
+    if match is None or number(text, index, match[1]) <= 0.0:
         raise InputError(f"{text.at(index)}: {key!r} gives no positive number; get the file again")
-    return to_float(match[1])
+    return number(text, index, match[1])

@@ -12,6 +12,7 @@ from fractions import Fraction
 import numpy as np
 
 from ..algebra import Array
+from ..checks import counted, number
 from ..errors import InputError
 from .record import Record
 
@@ -50,8 +51,8 @@ def resampled(record: Record, dt: float) -> Record:
     Sample 0 stays at t = 0; the new record ends at the last multiple of dt inside the old one.
     Raises InputError when dt is not positive, not such a ratio, or longer than the record.
     """
-    if not math.isfinite(dt) or dt <= 0:
-        raise InputError(f"resampled: dt is {dt!r}; give a positive number of seconds")
+    dt = number("resampled", "dt", dt, positive=True, unit="seconds")
+    counted("resampled", f"dt={dt!r} s", record.duration / dt)
     from scipy.signal import resample_poly  # late: it takes longer to import than the rest of the package
 
     ratio = Fraction(record.dt / dt).limit_denominator(LARGEST_RATIO)

@@ -5,33 +5,59 @@ from __future__ import annotations
 import math
 import os
 
+import numpy as np
+
+from ..checks import number
 from ..errors import InputError
 from . import afad, at2, columns, cosmos, esm, knet, simcenter, smc
 from .processing import resampled
-from .record import Record
+from .record import STANDARD_GRAVITY, Record
 from .text import TextFile, load_text
 
 SEVERAL = (cosmos, afad, simcenter)
 """Formats whose files may hold several components."""
 
 
+LARGEST_PEAK = 10.0 * STANDARD_GRAVITY
+"""Peak acceleration [m/s²] beyond which units are doubted: the strongest ground motions on record reach half of it."""
+
+STEPS = 1e-6, 100.0
+"""Shortest and longest time step [s] of a file; that of seismographs is 0.001 to 0.05."""
+
+
 def read_record(path: str | os.PathLike[str], units: str | None = None, *, dt: float | None = None,
-                resample_dt: float | None = None, channel: int | None = None) -> Record:
+                resample_dt: float | None = None, channel: int | None = None,
+                largest: float = LARGEST_PEAK) -> Record:
     """One component of ground motion from a file of any format listed in docs/records.md.
 
     units: a key of UNITS ("m/s2", "cm/s2", "gal", "g", ...); required for column and SimCenter files, elsewhere only
     checked against what the file states. dt: time step [s], for files that do not state one. resample_dt: time step [s]
     the record is brought to by `resampled`; it also allows uneven times in a column file. channel: which one, from 1,
-    of a file that holds several (SEVERAL).
+    of a file that holds several (SEVERAL). largest: the greatest peak acceleration [m/s²] that is believed; give more
+    where the motion is that strong.
     Raises InputError with one sentence that names the file and, where there is one, the line.
     """
     text = load_text(path)
     if channel is not None and not any(several.recognises(text) for several in SEVERAL):
         raise InputError(f"{text.path}: channel={channel} was passed but the file holds one record; leave channel out")
+    number("read_record", "largest", largest, positive=True, unit="m/s²")
     record = _read(text, units, dt, resample_dt, channel)
+    _doubt(record, largest)
     if resample_dt is not None and not math.isclose(record.dt, resample_dt, rel_tol=1e-9):
         record = resampled(record, resample_dt)
     return record
+
+
+def _doubt(record: Record, largest: float) -> None:
+    """InputError for a peak or a time step that no ground motion has."""
+    peak = float(np.max(np.abs(record.acceleration)))
+    if peak > largest:
+        raise InputError(f"{record.source}: the peak acceleration is {peak / STANDARD_GRAVITY:.4g} g = {peak:.4g} m/s2 "
+                         f"if the unit is {record.units}; give the right units=, or largest= in m/s2 where the motion "
+                         "is that strong")
+    if not STEPS[0] <= record.dt <= STEPS[1]:
+        raise InputError(f"{record.source}: a time step of {record.dt:g} s is none of a ground motion; give seconds "
+                         f"from {STEPS[0]:g} to {STEPS[1]:g}, or make a Record of the samples")
 
 
 def _read(text: TextFile, units: str | None, dt: float | None, resample_dt: float | None,

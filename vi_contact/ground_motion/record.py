@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import dataclass
 from numbers import Real
 
@@ -73,7 +72,7 @@ class Record:
 def canonical_units(source: str, units: str) -> str:
     """The key of UNITS that `units` spells ("CM/SEC/SEC", "(g)", "cm/s^2"); InputError if it is no acceleration."""
     text = units.lower().strip(" ()[].,;").replace("²", "2").replace("^", "").replace("**", "")
-    text = re.sub(r"\s", "", text).replace("sec", "s").replace("/s/s", "/s2")
+    text = "".join(text.split()).replace("sec", "s").replace("/s/s", "/s2")
     if text not in UNITS:
         raise InputError(f"{source}: {units!r} is not a unit of acceleration known here; use a file of accelerations "
                          f"in one of {', '.join(UNITS)}")

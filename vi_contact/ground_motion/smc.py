@@ -22,14 +22,14 @@ VERTICAL, AZIMUTH, COMMENTS, SAMPLES, PROBLEM = 12, 13, 15, 16, 17  # places amo
 SAMPLING_RATE = 1  # place among the 50 reals
 UNDEFINED = 1e38  # any real at least this large is the mark of an undefined value
 
-_KIND = re.compile(r"^\s*\d\s+(?:(?:UN)?CORRECTED ACCELEROGRAM|UNKNOWN|VELOCITY|DISPLACEMENT|RESPONSE|FOURIER)",
+_KIND = re.compile(r"^\s*+\d\s++(?:(?:UN)?CORRECTED ACCELEROGRAM|UNKNOWN|VELOCITY|DISPLACEMENT|RESPONSE|FOURIER)",
                    re.IGNORECASE)
-_STATION = re.compile(r"station\s*=\s*(.*?)\s*(?:component|$)", re.IGNORECASE)
+_STATION = re.compile(r"station\s*+=\s*+(.*+)", re.IGNORECASE)
 
 
 def recognises(text: TextFile) -> bool:
     """Whether the first line is the type line of an SMC file, of any type."""
-    return _KIND.match(text.lines[0]) is not None
+    return _KIND.match(text.heads[0]) is not None
 
 
 def read(text: TextFile, units: str | None = None, dt: float | None = None) -> Record:
@@ -43,9 +43,9 @@ def read(text: TextFile, units: str | None = None, dt: float | None = None) -> R
     reals = _fields(text, TEXT_LINES + INTEGER_LINES, REAL_LINES, REAL_WIDTH, 5)
     comments_start = TEXT_LINES + INTEGER_LINES + REAL_LINES
     start = comments_start + int(integers[COMMENTS])
-    comments = text.lines[comments_start:start]
+    comments = text.heads[comments_start:start]
     if not 0 <= integers[COMMENTS] < len(text.lines) or any(not line.startswith("|") for line in comments):
-        raise InputError(f"{text.at(TEXT_LINES + 1)}: the header announces {int(integers[COMMENTS])} comment lines but "
+        raise InputError(f"{text.at(TEXT_LINES + 1)}: the header announces {integers[COMMENTS]:g} comment lines but "
                          "as many lines starting with '|' do not follow; get the file again")
     name = file_units(text.path, "cm/s2", units)
     rate = reals[SAMPLING_RATE]
@@ -59,7 +59,7 @@ def read(text: TextFile, units: str | None = None, dt: float | None = None) -> R
 
 
 def _refuse_other_kinds(text: TextFile) -> None:
-    kind = text.lines[0].strip()
+    kind = text.heads[0].strip()
     if kind.upper().startswith("1"):
         raise InputError(f"{text.at(0)}: {kind!r} holds unequally spaced (time, acceleration) pairs before instrument "
                          "correction; get the file of type '2 CORRECTED ACCELEROGRAM'")
@@ -95,7 +95,7 @@ def _samples(text: TextFile, start: int, count: int) -> Array:
 
 def _title(text: TextFile) -> str:
     """Event (text line 4) and station (text line 6), blanks squeezed."""
-    return "; ".join(" ".join(text.lines[index].split()) for index in (3, 5) if text.lines[index].strip(" *"))
+    return "; ".join(" ".join(text.heads[index].split()) for index in (3, 5) if text.heads[index].strip(" *"))
 
 
 def _direction(integers: list[float]) -> str:
@@ -113,5 +113,7 @@ def _problem(integers: list[float]) -> tuple[str, ...]:
 
 def _station(text: TextFile) -> str:
     """What follows "station =" on text line 6, up to "component"."""
-    match = _STATION.search(text.lines[5])
-    return " ".join(match[1].split()) if match else ""
+    match = _STATION.search(text.heads[5])
+    named = match[1] if match else ""
+    end = named.lower().find("component")
+    return " ".join((named if end < 0 else named[:end]).split())

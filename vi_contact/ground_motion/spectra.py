@@ -16,11 +16,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..algebra import Array
+from ..checks import counted
 from ..errors import InputError
 from .record import Record
 
 PER_PERIOD, PER_STEP = 64, 4
 """The response is looked at this often in a period of the oscillator, or in a step of the record, whatever is more."""
+
+SHORTEST, MOST = 1000, 10**10
+"""Steps of the record in the shortest period that is looked at, at most; and samples times periods, at most."""
 
 _SMALL, _TERMS = 0.3, 14  # below this omega t the closed forms lose digits; the series of so many terms does not
 
@@ -115,6 +119,10 @@ def response_spectrum(record: Record, periods: Array, *, damping: float = 0.05) 
         raise InputError(f"response_spectrum: periods are {periods!r}; give a row of positive numbers of seconds")
     if not 0.0 <= damping < 1.0:
         raise InputError(f"response_spectrum: damping is {damping!r}; give a ratio from 0 to below 1, 0.05 for 5 %")
+    if record.dt > SHORTEST * row.min():
+        raise InputError(f"response_spectrum: a period of {row.min():g} s is below a {SHORTEST}th of the step "
+                         f"{record.dt:g} s and feels the peak acceleration alone; begin with longer ones")
+    counted("response_spectrum", f"{row.size} periods", float(row.size) * record.acceleration.size, most=MOST)
     parts = np.maximum(PER_STEP, 2 ** np.ceil(np.log2(PER_PERIOD * record.dt / row))).astype(int)
     peaks = np.zeros((3, row.size))
     for count in np.unique(parts):  # oscillators that need the same number of looks a step go together

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..checks import counted
 from ..errors import InputError
 from .record import Record
 
@@ -35,6 +36,8 @@ def padded(record: Record, before: float = 0.0, after: float = 0.0) -> Record:
     """
     if not all(0.0 <= length < math.inf for length in (before, after)):
         raise InputError(f"padded: before={before!r} and after={after!r} s; give zero or positive lengths")
-    counts = [math.ceil(length / record.dt * (1.0 - 1e-9)) for length in (before, after)]
+    asked = [length / record.dt * (1.0 - 1e-9) for length in (before, after)]
+    counted("padded", f"before={before!r} and after={after!r} s", record.acceleration.size + sum(asked))
+    counts = [math.ceil(samples) for samples in asked]
     note = f"zeros added: {counts[0] * record.dt:g} s before, {counts[1] * record.dt:g} s after"
     return replace(record, acceleration=np.pad(record.acceleration, counts), notes=(*record.notes, note))

@@ -15,6 +15,7 @@ from ..fem.mesh import Facets
 from ..fem.pairs import contact_pair
 from ..fem.trace import contact_surface
 from ..ground_motion import Processing, Record, read_record
+from ..ground_motion.reader import LARGEST_PEAK
 from ..surfaces import ContactSurface
 from ..system import SemiDiscreteSystem
 from ..upgoing import UpgoingVelocity
@@ -29,10 +30,10 @@ class MeshFile:
 
 def record(
     path: Path, units: str | None = None, *, dt: float | None = None, resample_dt: float | None = None,
-    channel: int | None = None, processing: Processing | None = None,
+    channel: int | None = None, largest: float = LARGEST_PEAK, processing: Processing | None = None,
 ) -> Record:
     """``read_record``, then ``processing``."""
-    found = read_record(path, units, dt=dt, resample_dt=resample_dt, channel=channel)
+    found = read_record(path, units, dt=dt, resample_dt=resample_dt, channel=channel, largest=largest)
     return found if processing is None else processing(found)
 
 

@@ -10,6 +10,8 @@ from typing import Any
 
 from ..errors import InputError
 
+_REASON = re.compile(r"^(.*) \(at (?:line (\d+), column (\d+)|end of document)\)", re.DOTALL)
+
 
 def read_toml(path: str | Path) -> dict[str, Any]:
     """The tables of a file. InputError with file, line and reason when it cannot be read or is no TOML."""
@@ -30,7 +32,7 @@ def read_toml(path: str | Path) -> dict[str, Any]:
 
 def _reason(said: str, text: str) -> tuple[str, str]:
     """(what is wrong, "line 3, column 7") of tomllib's sentence."""
-    found = re.fullmatch(r"(.*) \(at (?:line (\d+), column (\d+)|end of document)\)", said, re.DOTALL)
+    found = _REASON.fullmatch(said)
     if found is None:
         return said, f"line {text.count(chr(10)) + 1}"
     if found[2] is None:
