@@ -25,7 +25,7 @@ from .radial_table import RadialTable
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-ORDERS = Orders(far=6, near=8, touching=32)  # |s| h/c_S reaches 100 with small steps; points cost nothing per frequency
+ORDERS = Orders(far=6, near=8, touching=32, close=16)  # |s| h/c_S reaches 100 with small steps; points cost nothing per frequency
 PANEL = 1.5  # width of the panels of the radial table, in c_S dt: functions there are exp(-s r/c_S), |s| dt up to 4
 
 

@@ -10,13 +10,15 @@ from .boundary_mesh import BoundaryMesh
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 NEAR = 3.0  # pairs closer than this many element lengths get the finer rule
+CLOSE = 0.9  # pairs whose elements are this share of the longer one's length apart are integrated with their feet
 
 
 class ElementPairs:
     """All pairs first <= second: x = point + a xi on the first, y on the second, x - y = offset + a xi - b eta.
 
     offset, a, b: (2, p) [m]; r_min, r_max: least and greatest distance [m]; h: the longer element [m];
-    same, corner, near: boolean masks; shares_end: the common corner is the end of the first element.
+    width: what is between them over h; of two elements with a common corner, the distance of a free end from the other.
+    same, corner, near, close: boolean masks; shares_end: the common corner is the end of the first element.
     """
 
     def __init__(self, mesh: BoundaryMesh) -> None:
@@ -38,6 +40,10 @@ class ElementPairs:
         to_second = [_distance(p[first], starts[second], ends[second]) for p in (starts, ends)]
         to_first = [_distance(p[second], starts[first], ends[first]) for p in (starts, ends)]
         self.r_min: Array = np.where(self.same | self.corner, 0.0, np.min(to_second + to_first, axis=0))
+        free = [np.where(self.shares_end, ends[0], ends[1]) for ends in (to_second, to_first[::-1])]
+        width = np.where(self.corner, np.minimum(*free), self.r_min) / self.h
+        self.width: Array = np.where(self.same, np.inf, width)
+        self.close = self.width < CLOSE
         self.near = self.r_min < NEAR * self.h
 
     def __len__(self) -> int:

@@ -13,7 +13,7 @@ from .boundary_mesh import BoundaryMesh
 from .boundary_operators import N_SINGLE, double_local, joined, stacked
 from .fundamental_solution import TimeKernels
 from .poincare_steklov import BoundaryMotion, PoincareSteklov
-from .quadrature import pieces, roots, smoothed
+from .rules import pieces, roots, smoothed
 
 Array = NDArray[np.float64]
 ORDER, CLOSEST = 8, 1e-3  # points a piece; least distance from the boundary in element lengths

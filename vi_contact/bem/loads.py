@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .boundary_mesh import BoundaryMesh
-from .quadrature import gauss
+from .rules import gauss
 
 Array = NDArray[np.float64]
 

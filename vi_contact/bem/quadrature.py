@@ -5,6 +5,10 @@ not touch are integrated with products of Gauss rules, or, where a front crosses
 front. Touching pairs use coordinates in which r is a product, so that the singularity and the fronts lie at ends of the
 inner integral: z = xi - eta on one element, Duffy's (u, u w) at a common corner.
 
+Elements that face each other at a fraction of their length have peaks of that width: the inner integral is split and
+stretched about the foot of x on the second element, the outer one about the feet of that element's ends, the integral
+over w about the foot of one end on the other element (rules.stretched).
+
 Every piece is mapped with w -> w²(3 - 2w), which makes square roots and logarithms at both ends harmless.
 """
 
@@ -12,28 +16,31 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_matrix
 
 from .element_pairs import ElementPairs
+from .rules import gauss, graded, linear, pieces, roots, smoothed, stretched
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+Rule = tuple[Array, Array]
 CHUNK = 40_000  # points evaluated at once: keeps the arrays in the cache
 
 
 @dataclass(frozen=True)
 class Orders:
-    """Gauss points: far and near pairs (each way); pieces of split pairs, outer and inner; touching pairs."""
+    """Gauss points: far and near pairs (each way); pieces of split pairs, outer and inner; touching pairs; pieces of
+    pairs that are close (each way)."""
 
     far: int = 4
     near: int = 8
     outer: int = 6
     inner: int = 8
     touching: int = 12
+    close: int = 10
 
 
 @dataclass(frozen=True)
@@ -65,44 +72,6 @@ class PointSet:
         return np.asarray(matrix @ values.T).T.reshape(len(values), len(self.pairs), 4)
 
 
-@lru_cache
-def gauss(n: int) -> tuple[Array, Array]:
-    """Gauss points and weights on [0, 1]."""
-    x, w = np.polynomial.legendre.leggauss(n)
-    return 0.5 * (x + 1.0), 0.5 * w
-
-
-@lru_cache
-def smoothed(n: int) -> tuple[Array, Array]:
-    """Gauss rule after the substitution w²(3 - 2w): exact ends for square roots and logarithms."""
-    x, w = gauss(n)
-    return x**2 * (3.0 - 2.0 * x), 6.0 * w * x * (1.0 - x)
-
-
-@lru_cache
-def graded(n: int) -> tuple[Array, Array]:
-    """Gauss rule after the substitution w³(10 - 15w + 6w²), for the logarithm at r = 0."""
-    x, w = gauss(n)
-    return x**3 * (10.0 - 15.0 * x + 6.0 * x**2), 30.0 * w * (x * (1.0 - x)) ** 2
-
-
-def pieces(breaks: Array) -> tuple[Index, Array, Array]:
-    """(row, start, length) of the parts into which each row of breaks cuts [0, 1]; NaN is no break."""
-    inner = np.clip(np.nan_to_num(breaks, nan=0.0), 0.0, 1.0)
-    ends = np.zeros((len(breaks), 1)), np.ones((len(breaks), 1))
-    sorted_ends = np.sort(np.concatenate([ends[0], inner, ends[1]], axis=1), axis=1)
-    lengths = np.diff(sorted_ends, axis=1)
-    rows, columns = np.nonzero(lengths > 1e-12)
-    return rows, sorted_ends[rows, columns], lengths[rows, columns]
-
-
-def roots(a: Array, b: Array, c: Array) -> Array:
-    """(..., 2) real roots of a x² + b x + c, NaN where there are none."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        q = -0.5 * (b + np.copysign(np.sqrt(b**2 - 4.0 * a * c), b))
-        return np.stack([q / a, c / q], axis=-1)
-
-
 def point_sets(pairs: ElementPairs, fronts: Sequence[float], orders: Orders = Orders()) -> Iterator[PointSet]:
     """All points needed for kernels with kinks at r in `fronts` [m], zero beyond the greatest of them; () is smooth."""
     reach = max(fronts, default=np.inf)
@@ -112,14 +81,18 @@ def point_sets(pairs: ElementPairs, fronts: Sequence[float], orders: Orders = Or
         crossed |= (pairs.r_min < front) & (front < pairs.r_max)
         behind_soon |= (pairs.r_max <= front) & (front < pairs.r_max + pairs.h)
     reached = pairs.r_min < reach
-    apart = reached & ~pairs.same & ~pairs.corner
+    apart = reached & ~pairs.same & ~pairs.corner & ~pairs.close
     plain = apart & ~crossed
     fine = pairs.near | behind_soon
     yield from _products(pairs, np.flatnonzero(plain & ~fine), orders.far)
     yield from _products(pairs, np.flatnonzero(plain & fine), orders.near)
-    yield from _split(pairs, np.flatnonzero(apart & crossed), fronts, orders)
+    yield from _split(pairs, np.flatnonzero(apart & crossed), fronts, smoothed(orders.outer), smoothed(orders.inner))
+    close = smoothed(orders.close)
+    yield from _split(pairs, np.flatnonzero(reached & pairs.close & ~pairs.corner), fronts, close, close, close=True)
     yield from _on_one_element(pairs, np.flatnonzero(pairs.same), fronts, orders.touching)
-    yield from _at_corners(pairs, np.flatnonzero(pairs.corner), fronts, orders.touching)
+    for sharp in (False, True):
+        corner = np.flatnonzero(pairs.corner & (pairs.close == sharp))
+        yield from _at_corners(pairs, corner, fronts, orders.touching, sharp=sharp)
 
 
 def _products(pairs: ElementPairs, chosen: Index, order: int) -> Iterator[PointSet]:
@@ -139,29 +112,63 @@ def _flat(pairs: ElementPairs, chosen: Index, owner: Index, xi: Array, eta: Arra
     return PointSet(chosen, owner, d, np.hypot(*d), xi, eta, weight)
 
 
-def _split(pairs: ElementPairs, chosen: Index, fronts: Sequence[float], orders: Orders) -> Iterator[PointSet]:
-    """Outer integral split where fronts reach the ends of the second element or graze it, inner one at the fronts."""
+def _split(
+    pairs: ElementPairs, chosen: Index, fronts: Sequence[float], outer: Rule, inner: Rule, *, close: bool = False
+) -> Iterator[PointSet]:
+    """Outer integral split where fronts reach the ends of the second element or graze it, inner one at the fronts.
+
+    Where elements are close, both are split and stretched about the feet as well.
+    """
     for start in range(0, len(chosen), 200):
         part = chosen[start : start + 200]
-        row, low, length = pieces(_outer_breaks(pairs, part, fronts))
-        x, w = smoothed(orders.outer)
-        outer = np.repeat(row, len(x))
-        xi = (low[:, None] + length[:, None] * x).ravel()
-        outer_weight = (length[:, None] * w).ravel()
-        pair = part[outer]
-        d = pairs.offset[:, pair] + pairs.a[:, pair] * xi
-        b = pairs.b[:, pair]
-        b2, projection, d2 = (b**2).sum(0), (d * b).sum(0), (d**2).sum(0)
-        breaks = np.concatenate([roots(b2, -2.0 * projection, d2 - front**2) for front in fronts], axis=1)
+        owner, xi, weight = _outer(pairs, part, fronts, outer, close)
+        row, eta, weight = _inner(pairs, part[owner], xi, weight, fronts, inner, close)
+        yield _flat(pairs, part, owner[row], xi[row], eta, weight)
+
+
+def _outer(
+    pairs: ElementPairs, part: Index, fronts: Sequence[float], rule: Rule, close: bool
+) -> tuple[Index, Array, Array]:
+    """(pair in ``part``, xi, weight) of the points on the first elements."""
+    breaks = _outer_breaks(pairs, part, fronts)
+    if close:
+        feet, heights = _feet(pairs, part)
+        row, low, length = pieces(np.concatenate([breaks, feet, feet.mean(axis=1, keepdims=True)], axis=1))
+        nearer = np.hypot(feet[row] - (low + 0.5 * length)[:, None], heights[row]).argmin(axis=1)
+        xi, weight = stretched(low, length, rule, feet[row, nearer], heights[row, nearer])
+    else:
         row, low, length = pieces(breaks)
-        middle = d[:, row] - b[:, row] * (low + 0.5 * length)
-        heard = (middle**2).sum(0) < max(fronts) ** 2
-        row, low, length = row[heard], low[heard], length[heard]
-        x, w = smoothed(orders.inner)
-        eta = (low[:, None] + length[:, None] * x).ravel()
-        weight = ((outer_weight[row] * length)[:, None] * w).ravel()
-        point = np.repeat(row, len(x))
-        yield _flat(pairs, part, outer[point], xi[point], eta, weight)
+        xi, weight = linear(low, length, rule)
+    return np.repeat(row, len(rule[0])), xi.ravel(), weight.ravel()
+
+
+def _inner(
+    pairs: ElementPairs, pair: Index, xi: Array, scale: Array, fronts: Sequence[float], rule: Rule, close: bool
+) -> tuple[Index, Array, Array]:
+    """(row of ``xi``, eta, weight) of the points on the second elements that the last front has reached."""
+    d, b = pairs.offset[:, pair] + pairs.a[:, pair] * xi, pairs.b[:, pair]
+    b2, projection, d2 = (b**2).sum(0), (d * b).sum(0), (d**2).sum(0)
+    breaks = [roots(b2, -2.0 * projection, d2 - front**2) for front in fronts]
+    foot, height = projection / b2, np.abs(d[0] * b[1] - d[1] * b[0]) / b2
+    row, low, length = pieces(np.concatenate([*breaks, foot[:, None]] if close else breaks, axis=1))
+    middle = d[:, row] - b[:, row] * (low + 0.5 * length)
+    heard = (middle**2).sum(0) < max(fronts, default=np.inf) ** 2
+    row, low, length = row[heard], low[heard], length[heard]
+    if close:
+        eta, weight = stretched(low, length, rule, foot[row], height[row], scale[row])
+    else:
+        eta, weight = linear(low, length, rule, scale[row])
+    return np.repeat(row, len(rule[0])), eta.ravel(), weight.ravel()
+
+
+def _feet(pairs: ElementPairs, part: Index) -> tuple[Array, Array]:
+    """(p, 2) xi of the feet of both ends of the second element on the line of the first, and their heights over it."""
+    offset, a, b = pairs.offset[:, part], pairs.a[:, part], pairs.b[:, part]
+    a2 = (a**2).sum(0)
+    ends = (-offset, b - offset)
+    feet = [(end * a).sum(0) / a2 for end in ends]
+    heights = [np.abs(end[0] * a[1] - end[1] * a[0]) / a2 for end in ends]
+    return np.stack(feet, axis=1), np.stack(heights, axis=1)
 
 
 def _outer_breaks(pairs: ElementPairs, part: Index, fronts: Sequence[float]) -> Array:
@@ -177,7 +184,7 @@ def _outer_breaks(pairs: ElementPairs, part: Index, fronts: Sequence[float]) -> 
             slope, height = (normal * a).sum(0), (normal * offset).sum(0)
             graze = np.stack([(front - height) / slope, (-front - height) / slope], axis=-1)
         breaks.append(np.where(np.isfinite(graze), graze, 0.0))
-    return np.concatenate(breaks, axis=1)
+    return np.concatenate(breaks, axis=1) if breaks else np.empty((len(part), 0))
 
 
 def _on_one_element(pairs: ElementPairs, chosen: Index, fronts: Sequence[float], order: int) -> Iterator[PointSet]:
@@ -198,31 +205,39 @@ def _on_one_element(pairs: ElementPairs, chosen: Index, fronts: Sequence[float],
                 np.concatenate([small.ravel(), large.ravel()]), np.tile(weight, 2))
 
 
-def _at_corners(pairs: ElementPairs, chosen: Index, fronts: Sequence[float], order: int) -> Iterator[PointSet]:
-    """Distances from the corner are (u, u w) and (u w, u): r = u R(w), inner integral in u split at fronts/R(w)."""
+def _at_corners(
+    pairs: ElementPairs, chosen: Index, fronts: Sequence[float], order: int, *, sharp: bool
+) -> Iterator[PointSet]:
+    """Distances from the corner are (u, u w) and (u w, u): r = u R(w), inner integral in u split at fronts/R(w).
+
+    sharp: R(w) falls to a small share of its greatest value at the foot of one end on the other element.
+    """
     if not len(chosen):
         return
     at_end = pairs.shares_end[chosen]  # the corner is the end of the first element and the start of the second
     from_corner = np.where(at_end, -1.0, 1.0)
     a, b = pairs.a[:, chosen] * from_corner, -pairs.b[:, chosen] * from_corner
     aa, ab, bb = (a**2).sum(0), (a * b).sum(0), (b**2).sum(0)
+    height = np.abs(a[0] * b[1] - a[1] * b[0])
     sets = []
     for first in (True, False):
         c0, c2 = (aa, bb) if first else (bb, aa)
         cuts = [roots(c2, -2.0 * ab, c0 - front**2) for front in fronts]
-        row, low, length = pieces(np.concatenate(cuts, axis=1) if cuts else np.empty((len(chosen), 0)))
-        x, w = smoothed(order)
-        owner, ratio = np.repeat(row, order), (low[:, None] + length[:, None] * x).ravel()
-        outer_weight = (length[:, None] * w).ravel()
+        foot = (ab / c2)[:, None]
+        row, low, length = pieces(np.concatenate([*cuts, foot] if sharp else [foot[:, :0], *cuts], axis=1))
+        if sharp:
+            ratios, weights = stretched(low, length, smoothed(order), foot[row, 0], (height / c2)[row])
+        else:
+            ratios, weights = linear(low, length, smoothed(order))
+        owner, ratio, outer_weight = np.repeat(row, order), ratios.ravel(), weights.ravel()
         distance = np.sqrt(c0[owner] - 2.0 * ratio * ab[owner] + ratio**2 * c2[owner])
         reached = np.stack([front / distance for front in fronts], axis=1) if cuts else np.empty((len(ratio), 0))
         row, low, length = pieces(reached)
         heard = (low + 0.5 * length) * distance[row] < max(fronts, default=np.inf)
         row, low, length = row[heard], low[heard], length[heard]
-        x, w = graded(order)
-        u = low[:, None] + length[:, None] * x
-        weight = ((outer_weight[row] * length)[:, None] * w * u).ravel()
-        long, short = u.ravel(), (u * ratio[row, None]).ravel()
+        along, weight = linear(low, length, graded(order), outer_weight[row])
+        weight, long = (weight * along).ravel(), along.ravel()
+        short = (along * ratio[row, None]).ravel()
         sets.append((np.repeat(owner[row], order), *((long, short) if first else (short, long)), weight))
     owner, xi, eta, weight = (np.concatenate(parts) for parts in zip(*sets, strict=True))
     end = at_end[owner]
