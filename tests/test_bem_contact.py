@@ -121,7 +121,7 @@ def test_uzawa_fails_in_words():
     rho = 2.2 / float(np.linalg.eigvalsh(contact.W[0])[-1])
     with pytest.raises(StepFailure, match="take a fifth of this rho"):
         SpaceTimeUzawa(rho=rho, max_iterations=300).solve(contact)
-    for wrong, words in (({"rho": 0.0}, "rho is 0"), ({"window": 0}, "window of 0 steps")):
+    for wrong, words in (({"rho": 0.0}, "rho is 0"), ({"window": 0}, "window is 0")):
         with pytest.raises(InputError, match=words):
             SpaceTimeUzawa(**wrong)
     rates = BoundaryContact(condensed(), friction=vc.SlipRateCoulomb(lambda v: 0.1 + 0.0 * v))

@@ -279,21 +279,21 @@ def test_errors(operators):
     with pytest.raises(InputError, match="above zero"):
         bdf2.frequencies(dt=-1.0, steps=3)
     for count in (0, 2.5):
-        with pytest.raises(InputError, match="at least one"):
+        with pytest.raises(InputError, match="at least 1"):
             bdf2.frequencies(dt=0.1, steps=count)
     for dt, remedy in ((1e-3, "enlarge"), (10.0, "reduce")):
         with pytest.raises(InputError, match=remedy):
             convolution_operator(operator.mesh, MATERIAL, quadrature=bdf2, dt=dt, steps=3)
     with pytest.raises(InputError, match=r"0.3, too small for Trapezoid.* needs 0.5"):
         convolution_operator(operator.mesh, MATERIAL, quadrature=ConvolutionQuadrature(Trapezoid()), dt=0.06, steps=3)
-    with pytest.raises(InputError, match="forces have shape"):
+    with pytest.raises(InputError, match="forces has shape"):
         ConvolutionProblem(operator, forces[1:])
     with pytest.raises(InputError, match="prescribed has shape"):
         ConvolutionProblem(operator, forces, prescribed=forces[1:])
     for wrong in ("clamped", np.zeros((2, n)), np.arange(n)):
-        with pytest.raises(InputError, match="fixed is no boolean mask"):
+        with pytest.raises(InputError, match="fixed .* give a boolean mask"):
             ConvolutionProblem(operator, forces, fixed=wrong)
-    with pytest.raises(InputError, match="contact is no boolean mask"):
+    with pytest.raises(InputError, match="contact .* give a boolean mask"):
         ConvolutionProblem(operator, forces, contact=np.array([1, 2]))
     with pytest.raises(InputError, match="no contact boundary"):
         ConvolutionProblem(operator, forces).condensed()

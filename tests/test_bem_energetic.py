@@ -249,7 +249,8 @@ def test_saved_blocks(blocks, tmp_path):
     ({"dt": 3.0, "steps": 2}, "reduce the time step"),
     ({"dt": 0.004, "steps": 2}, "enlarge the time step"),
     ({"dt": -1.0, "steps": 2}, "above zero"),
-    ({"dt": 0.2, "steps": 0}, "at least one"),
+    ({"dt": 0.2, "steps": 0}, "steps is 0; give a whole number of at least 1"),
+    ({"dt": 0.2, "steps": 2.5}, "steps is 2.5"),
 ])
 def test_time_steps_that_are_refused(options, message):
     with pytest.raises(InputError, match=message):

@@ -10,11 +10,12 @@ import math
 import re
 from collections.abc import Iterable, Sequence
 from numbers import Integral, Real
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from .algebra import Array, Comm
+from .algebra import Array, Comm, Indices, Mask
 from .errors import InputError
 
 SHOWN = 60  # characters of a value in a sentence
@@ -138,6 +139,33 @@ def array(owner: str, meaning: str, value: Any, shape: tuple[int | None, ...], *
     return found
 
 
+def integers(owner: str, meaning: str, value: Any, shape: tuple[int | None, ...]) -> Indices:
+    """Return whole numbers as an integer array of this shape; 3.0 counts as one."""
+    found = array(owner, meaning, value, shape)
+    if np.any(found != np.rint(found)) or np.any(np.abs(found) > 2.0**53):
+        raise InputError(f"{owner}: {meaning} is {shown(value)}; give whole numbers")
+    return found.astype(np.int64)
+
+
+def mask(owner: str, meaning: str, value: Any, shape: tuple[int, ...]) -> Mask:
+    """Return truth values of this shape; InputError for indices, numbers, texts and other shapes."""
+    try:
+        found = np.asarray(value)
+    except ValueError:
+        found = np.empty(0)
+    if found.dtype != bool or found.shape != shape:
+        is_what = f"has shape {found.shape}" if found.dtype == bool else f"is {shown(value)}"
+        raise InputError(f"{owner}: {meaning} {is_what}; give a boolean mask of shape {shape}")
+    return found
+
+
+def path(owner: str, meaning: str, value: Any) -> Path:
+    """Return a path; InputError for what is none, and for an empty one."""
+    if not isinstance(value, str | Path) or not str(value).strip() or "\0" in str(value):
+        raise InputError(f"{owner}: {meaning} is {shown(value)}; give the path of a file")
+    return Path(value)
+
+
 def shown(value: Any) -> str:
     """The value for a sentence: short, on one line, also where its own repr fails."""
     if isinstance(value, type):
@@ -155,6 +183,8 @@ def _called(value: Any) -> str:
 
 def real(value: Any) -> float:
     """The value as a float, NaN for what is no real number; integers too large for a float are infinite."""
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        value = value[()]
     if isinstance(value, bool | np.bool_) or not isinstance(value, Real | Integral):
         return math.nan
     try:

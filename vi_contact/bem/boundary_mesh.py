@@ -16,10 +16,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..checks import array, counted, function, instance, integers, mask, number, whole
 from ..errors import InputError
-from .loops import check_orientation, check_simple, ordered_loops
+from .loops import check_orientation, check_simple, check_size, ordered_loops
 
 Array = NDArray[np.float64]
+MOST = 3000  # elements: the matrices of one time step take 2 GB
 P1_MASS = np.array([[2.0, 1.0], [1.0, 2.0]]) / 6.0
 
 
@@ -30,7 +32,7 @@ class BoundaryMesh:
     points: (n, 2) nodes [m], loop after loop, in the direction that keeps the body on the left.
     loop_sizes: nodes of each loop. labels: (n,) integer of each element, to name parts of the boundary.
     exterior: the body is the unbounded outside. Raises InputError for fewer than three nodes in a loop, elements of no
-    length, a boundary that crosses itself or runs the wrong way round.
+    length, a boundary that crosses or touches itself or runs the wrong way round.
     """
 
     points: Array
@@ -39,19 +41,20 @@ class BoundaryMesh:
     exterior: bool = False
 
     def __post_init__(self) -> None:
-        points = np.array(self.points, float)
-        if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
-            raise InputError(f"BoundaryMesh: points have shape {points.shape}; give finite plane coordinates (n, 2)")
-        sizes = tuple(int(size) for size in self.loop_sizes) or (len(points),)
+        points = array("BoundaryMesh", "points", self.points, (None, 2), unit="m")
+        counted("BoundaryMesh", "points", len(points), "elements", most=MOST)
+        given = np.atleast_1d(np.asarray(self.loop_sizes, object))
+        sizes = tuple(whole("BoundaryMesh", "the size of a loop", size, least=1) for size in given) or (len(points),)
         if min(sizes) < 3 or sum(sizes) != len(points):
             raise InputError(f"BoundaryMesh: loops of {sizes} nodes, {len(points)} points; a loop has three or more")
-        labels = np.array(self.labels, np.int64) if len(self.labels) else np.zeros(len(points), np.int64)
-        if labels.shape != (len(points),):
-            raise InputError(f"BoundaryMesh: {len(labels)} labels for {len(points)} elements; give one per element")
+        instance("BoundaryMesh", "exterior", self.exterior, (bool, np.bool_), "give True or False")
+        labels = _labels("BoundaryMesh", self.labels, len(points), "element") if np.size(self.labels) else None
+        labels = np.zeros(len(points), np.int64) if labels is None else labels
         for name, value in (("points", points), ("loop_sizes", sizes), ("labels", labels)):
             object.__setattr__(self, name, value)
         if self.lengths.min() <= 1e-12 * self.size:
             raise InputError(f"BoundaryMesh: element {int(self.lengths.argmin())} has no length; remove doubled points")
+        check_size(points, sizes)
         check_simple(points, self.after)
         check_orientation(points, sizes, exterior=self.exterior)
 
@@ -119,27 +122,31 @@ class BoundaryMesh:
 
     def elements_where(self, chosen: Callable[[Array], ArrayLike]) -> NDArray[np.bool_]:
         """(n,) elements with both ends where `chosen`((m, 2) points) is true."""
-        inside = np.asarray(chosen(self.points), bool)
+        function("BoundaryMesh.elements_where", "chosen", chosen, "give a function of points (m, 2)")
+        inside = mask("BoundaryMesh.elements_where", "what chosen(points) returns", chosen(self.points), (len(self),))
         return inside & inside[self.after]
 
     def nodes_of(self, elements: ArrayLike) -> NDArray[np.bool_]:
         """(n,) nodes that touch one of the elements (n,) given as a boolean mask."""
-        mask = np.asarray(elements, bool)
-        nodes = mask.copy()
-        nodes[self.after[mask]] = True
+        chosen = self._mask(elements)
+        nodes = chosen.copy()
+        nodes[self.after[chosen]] = True
         return nodes
 
     def node_lengths(self, elements: ArrayLike) -> Array:
         """(n,) half the lengths of the masked elements that meet at each node [m]."""
-        half = 0.5 * self.lengths * np.asarray(elements, bool)
+        half = 0.5 * self.lengths * self._mask(elements)
         return half + np.bincount(self.after, half, len(self))
 
     def node_normals(self, elements: ArrayLike) -> Array:
         """(n, 2) unit normals at nodes, the mean over the masked elements weighted with their lengths; else zero."""
-        weighted = self.normals * (self.lengths * np.asarray(elements, bool))[:, None]
+        weighted = self.normals * (self.lengths * self._mask(elements))[:, None]
         sums = weighted + np.stack([np.bincount(self.after, w, len(self)) for w in weighted.T], axis=1)
         length = np.hypot(*sums.T)
         return sums / np.where(length > 0.0, length, 1.0)[:, None]
+
+    def _mask(self, elements: ArrayLike) -> NDArray[np.bool_]:
+        return mask("BoundaryMesh", "elements", elements, (len(self),))
 
 
 def polygon(corners: ArrayLike, h: float | Sequence[int], *, exterior: bool = False) -> BoundaryMesh:
@@ -148,16 +155,21 @@ def polygon(corners: ArrayLike, h: float | Sequence[int], *, exterior: bool = Fa
     corners: (m, 2) [m], counter-clockwise (clockwise for an exterior body). h: greatest element length [m], or the
     number of elements of every side.
     """
-    start = np.asarray(corners, float)
+    start = array("polygon", "corners", corners, (None, 2), unit="m")
+    if len(start) < 3:
+        raise InputError(f"polygon: {len(start)} corners; give three or more")
     sides = np.roll(start, -1, axis=0) - start
-    if isinstance(h, (int, float)):
-        if not 0.0 < h < np.inf:
-            raise InputError(f"polygon: the element length is {h!r}; give a length above zero")
-        counts = np.maximum(1, np.ceil(np.hypot(*sides.T) / h - 1e-9).astype(int))
+    if isinstance(h, Sequence | np.ndarray) and not isinstance(h, str) and np.ndim(h):
+        if len(h) != len(start):
+            raise InputError(f"polygon: {len(start)} sides need as many numbers of elements, {len(h)} were given")
+        counts = np.array([whole("polygon", "the number of elements of a side", one, least=1) for one in h])
     else:
-        counts = np.asarray(h, int)
-    if counts.shape != (len(start),) or counts.min() < 1:
-        raise InputError(f"polygon: {len(start)} sides need as many numbers of elements, at least 1 each")
+        length = number("polygon", "the element length h", h, positive=True, unit="m")
+        with np.errstate(over="ignore"):
+            wanted = np.maximum(1.0, np.ceil(np.hypot(*sides.T) / length - 1e-9))
+        counted("polygon", f"h = {length:g} m", float(wanted.sum()), "elements", most=MOST)
+        counts = wanted.astype(int)
+    counted("polygon", "h", int(counts.sum()), "elements", most=MOST)
     fractions = [np.arange(count)[:, None] / count for count in counts]
     points = np.concatenate([p + f * side for p, f, side in zip(start, fractions, sides, strict=True)])
     return BoundaryMesh(points, labels=np.repeat(np.arange(len(start)), counts), exterior=exterior)
@@ -165,16 +177,21 @@ def polygon(corners: ArrayLike, h: float | Sequence[int], *, exterior: bool = Fa
 
 def smooth_curve(curve: Callable[[Array], Array], count: int, *, exterior: bool = False) -> BoundaryMesh:
     """Mesh of a closed curve: `count` chords at equal steps of its parameter in [0, 1), curve(parameters) -> (m, 2)."""
-    return BoundaryMesh(np.asarray(curve(np.arange(count) / count), float), exterior=exterior)
+    function("smooth_curve", "curve", curve, "give a function of parameters (m,) that returns points (m, 2)")
+    counted("smooth_curve", "count", whole("smooth_curve", "count", count, least=3), "elements", most=MOST)
+    points = array("smooth_curve", "what curve(parameters) returns", curve(np.arange(count) / count), (count, 2))
+    return BoundaryMesh(points, exterior=exterior)
 
 
 def circle(radius: float, count: int, *, centre: ArrayLike = (0.0, 0.0), exterior: bool = False) -> BoundaryMesh:
     """A disk of `count` chords, starting at its lowest point; exterior: the space around a round hole."""
+    middle = array("circle", "centre", centre, (2,), unit="m")
+    number("circle", "radius", radius, positive=True, unit="m")
     turn = -2.0 * np.pi if exterior else 2.0 * np.pi
 
     def point(t: Array) -> Array:
         angle = turn * t - 0.5 * np.pi
-        return np.asarray(centre, float) + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        return middle + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
     return smooth_curve(point, count, exterior=exterior)
 
@@ -187,10 +204,18 @@ def from_segments(
     points: (p, 2) or (p, 3) coordinates [m]; segments: (n, 2) indices of points; labels: (n,) e.g. facet tags. Loops
     are joined and turned so that the body is on the left. Raises InputError when a curve is open or branches.
     """
-    coordinates = np.asarray(points, float)[:, :2]
-    pairs = np.asarray(segments, np.int64).reshape(-1, 2)
+    coordinates = array("from_segments", "points", points, (None, None), unit="m")[:, :2]
+    pairs = integers("from_segments", "segments", segments, (None, 2))
+    if len(pairs) and not 0 <= pairs.min() <= pairs.max() < len(coordinates):
+        raise InputError(f"from_segments: segments name the points {pairs.min()} to {pairs.max()}, there are "
+                         f"{len(coordinates)}; number points from 0 on")
     order, sizes = ordered_loops(coordinates, pairs, exterior=exterior)
-    tags = np.zeros(len(pairs), np.int64) if labels is None else np.asarray(labels, np.int64)
-    if tags.shape != (len(pairs),):
-        raise InputError(f"from_segments: {len(tags)} labels for {len(pairs)} segments; give one per segment")
+    tags = np.zeros(len(pairs), np.int64) if labels is None else _labels("from_segments", labels, len(pairs), "segment")
     return BoundaryMesh(coordinates[order[:, 0]], sizes, tags[order[:, 1]], exterior)
+
+
+def _labels(owner: str, labels: ArrayLike, count: int, things: str) -> NDArray[np.int64]:
+    found = integers(owner, "labels", labels, (None,))
+    if len(found) != count:
+        raise InputError(f"{owner}: {len(found)} labels for {count} {things}s; give one per {things}")
+    return found

@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks import instance, number
 from .boundary_mesh import BoundaryMesh
 from .element_pairs import ElementPairs
 from .fundamental_solution import KernelSet
@@ -54,6 +55,8 @@ class Galerkin:
     """
 
     def __init__(self, mesh: BoundaryMesh, c_s: float, orders: Orders = Orders()) -> None:
+        instance("Galerkin", "orders", orders, Orders, "give numbers of points, Orders()")
+        number("Galerkin", "the shear wave speed c_s", c_s, positive=True, unit="m/s")
         self.mesh, self.shear, self.orders = mesh, c_s**2, orders
         self.pairs = ElementPairs(mesh)
 

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..algebra import Array, Indices, Mask, SerialAlgebra, SerialComm, SerialMatrix
+from ..checks import array, function, instance, integers, provides
 from ..errors import InputError
 from ..friction import FrictionLaw, Frictionless
 from ..step import EffectiveMatrix, StepProblem
@@ -45,12 +46,24 @@ class Conditions:
     normals: Array
     lengths: Array
 
+    def __post_init__(self) -> None:
+        nodes = integers("Conditions", "nodes", self.nodes, (None,))
+        if len(nodes) and nodes.min() < 0:
+            raise InputError(f"Conditions: nodes has {nodes.min()}; give numbers of contact nodes from 0 on")
+        array("Conditions", "normals", self.normals, (len(nodes), 2))
+        array("Conditions", "lengths", self.lengths, (len(nodes),), unit="m")
+
 
 def conditions_on(mesh: BoundaryMesh, compliance: CondensedCompliance, *sides: ArrayLike) -> Conditions:
     """Conditions of several sides, each a mask of elements (n,): a node of two sides gets one for each of them.
 
     Raises InputError for a side with nodes that were not condensed, and for more than two sides at a node.
     """
+    owner = "conditions_on"
+    instance(owner, "mesh", mesh, BoundaryMesh, "give the BoundaryMesh of the body")
+    instance(owner, "compliance", compliance, CondensedCompliance, "give what condensed() returns")
+    if not sides:
+        raise InputError(f"{owner}: no side; give masks of elements, one for each side")
     place = np.full(len(mesh), -1)
     place[compliance.nodes] = np.arange(len(compliance.nodes))
     chosen = [np.flatnonzero(mesh.nodes_of(side)) for side in sides]
@@ -81,6 +94,21 @@ class BoundaryContact:
     along: Motion | None = None
     bilateral: bool = False
     conditions: Conditions | None = None
+
+    def __post_init__(self) -> None:
+        owner = "BoundaryContact"
+        instance(owner, "compliance", self.compliance, CondensedCompliance, "give what condensed() returns")
+        provides(owner, "obstacle", self.obstacle, ("gap", "directions"), "give an obstacle, for example Touching()")
+        provides(owner, "friction", self.friction, ("limit", "slope"), "give a friction law, for example Coulomb(mu)")
+        for name in ("towards", "along"):
+            if getattr(self, name) is not None:
+                function(owner, name, getattr(self, name), "give a function of the time, or None")
+        instance(owner, "bilateral", self.bilateral, bool, "give True or False")
+        if self.conditions is not None:
+            instance(owner, "conditions", self.conditions, Conditions, "give those of conditions_on(...), or None")
+            if self.conditions.nodes.max(initial=0) >= self.count:
+                raise InputError(f"{owner}: conditions name node {self.conditions.nodes.max()} of {self.count} contact "
+                                 "nodes; make them with conditions_on for this compliance")
 
     @property
     def count(self) -> int:

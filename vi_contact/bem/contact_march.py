@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..certified import TOLERANCE
+from ..checks import instance, number
 from ..errors import StepFailure
 from ..solvers.condensed import Condensed
 from ..step import StepProblem, StepResult
@@ -20,6 +21,10 @@ def march_contact(
 
     Raises StepFailure when a step's certificate exceeds ``tolerance``, with step, time and residuals.
     """
+    instance("march_contact", "contact", contact, BoundaryContact, "give a BoundaryContact")
+    if solver is not None:
+        instance("march_contact", "solver", solver, Condensed, "give Condensed() with any of its methods, or None")
+    number("march_contact", "tolerance", tolerance, positive=True)
     surface, matrix = contact.surface, contact.matrix
     prepared = (solver or Condensed()).prepare(matrix, surface, 1.0)
     v, active = np.zeros(int(contact.kept.sum())), surface.gap(0.0) <= 0.0

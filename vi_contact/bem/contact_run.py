@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..algebra import Array, Mask
+from ..checks import array, instance, mask
+from ..errors import InputError
 from ..step import Certificate, StepProblem, StepResult
 from ..verify import kkt_residual
 from .contact import BoundaryContact
@@ -114,6 +116,14 @@ def ledger(run: ContactRun, motion: BoundaryMotion, loads: Array, *, supported: 
 
     supported: (2, n), the ``fixed`` of the problem.
     """
+    instance("ledger", "run", run, ContactRun, "give the answer of march_contact")
+    instance("ledger", "motion", motion, BoundaryMotion, "give BoundaryProblem.solve(run.forces)")
+    loads = array("ledger", "loads", loads, motion.displacement.shape, unit="N/m")
+    if len(run.times) != len(motion.times):
+        raise InputError(f"ledger: the run has {len(run.times)} steps and the motion {len(motion.times)}; give the "
+                         "motion of this run, BoundaryProblem.solve(run.forces)")
+    if supported is not None:
+        mask("ledger", "supported", supported, motion.displacement.shape[1:])
     increments = np.diff(motion.displacement, axis=0, prepend=0.0)
     support = np.zeros(len(run.times))
     if supported is not None:

@@ -13,19 +13,22 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..checks import array, counted, instance, mask
 from ..errors import InputError
 from ..materials import LinearElastic
 from .boundary_mesh import BoundaryMesh
 from .convolution_quadrature import ConvolutionQuadrature, Frequencies
-from .energetic import check_time_step
+from .energetic import NUMBERS, check_time_step
 from .fundamental_solution import LaplaceKernels
+from .operators import check_body
 from .poincare_steklov import BoundaryMotion, CondensedCompliance
 from .quadrature import Orders
 from .radial_table import RadialTable
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-ORDERS = Orders(far=6, near=8, touching=32, close=16)  # |s| h/c_S reaches 100 with small steps; points cost nothing per frequency
+# |s| h/c_S reaches 100 with small steps; points cost nothing per frequency
+ORDERS = Orders(far=6, near=8, touching=32, close=16)
 PANEL = 1.5  # width of the panels of the radial table, in c_S dt: functions there are exp(-s r/c_S), |s| dt up to 4
 
 
@@ -41,6 +44,15 @@ class ConvolutionOperator:
     steklov: NDArray
     to_traction: NDArray
 
+    def __post_init__(self) -> None:
+        instance("ConvolutionOperator", "mesh", self.mesh, BoundaryMesh, "give a BoundaryMesh")
+        instance("ConvolutionOperator", "frequencies", self.frequencies, Frequencies, "give Frequencies(...)")
+        n, table = len(self.mesh), self.frequencies.s.shape
+        for name, rows in (("steklov", 2 * n), ("to_traction", 4 * n)):
+            if np.shape(getattr(self, name)) != (*table, rows, 2 * n):
+                raise InputError(f"ConvolutionOperator: {name} has shape {np.shape(getattr(self, name))}; this mesh "
+                                 f"and these frequencies need {(*table, rows, 2 * n)}: use convolution_operator(...)")
+
     @property
     def steps(self) -> int:
         """Number of time steps, that of every history."""
@@ -53,13 +65,14 @@ class ConvolutionOperator:
 
     def apply(self, displacement: ArrayLike) -> Array:
         """(steps, 2, n) mean nodal forces [N/m] of displacements (steps, 2, n) at t_1, t_2, ...; 0 at t_0."""
-        u = np.asarray(displacement, float)
+        shape = (self.steps, 2, len(self.mesh))
+        u = array("ConvolutionOperator.apply", "displacement", displacement, shape, unit="m")
         everywhere = np.ones((2, len(self.mesh)), bool)
         return ConvolutionProblem(self, np.zeros_like(u), everywhere, u).solve().forces
 
     def solve(self, forces: ArrayLike) -> Array:
         """(steps, 2, n) displacements under nodal forces (steps, 2, n): the inverse, no support anywhere."""
-        return ConvolutionProblem(self, np.asarray(forces, float)).solve().displacement
+        return ConvolutionProblem(self, np.asarray(forces)).solve().displacement
 
 
 def convolution_operator(
@@ -77,7 +90,12 @@ def convolution_operator(
     Raises InputError for a time step too small (c_P dt/h < 0.05, for the trapezoidal rule 0.5) or too large (> 8) for
     the mesh, or for less than one step.
     """
+    check_body(mesh, material, orders)
+    instance("convolution_operator", "quadrature", quadrature, ConvolutionQuadrature, "give a ConvolutionQuadrature()")
+    instance("convolution_operator", "symmetric", symmetric, bool, "give True or False")
     table = quadrature.frequencies(dt=dt, steps=steps)
+    counted("convolution_operator", f"{table.s.size} frequencies of {len(mesh)} elements",
+            24 * table.s.size * len(mesh) ** 2, "numbers", most=NUMBERS)
     check_time_step(mesh, material.c_p, dt)
     ratio = material.c_p * dt / float(mesh.lengths.max())
     if ratio < quadrature.method.smallest_ratio * (1.0 - 1e-9):
@@ -113,18 +131,16 @@ class ConvolutionProblem:
     contact: Mask | None = None
 
     def __post_init__(self) -> None:
+        owner, operator = "ConvolutionProblem", self.operator
+        instance(owner, "operator", operator, ConvolutionOperator, "give one of convolution_operator(...)")
         n, steps, stages = len(self.operator.mesh), self.operator.steps, self.operator.frequencies.s.shape[1]
-        if np.shape(self.forces) not in ((steps, 2, n), (steps, stages, 2, n)):
-            raise InputError(f"ConvolutionProblem: forces have shape {np.shape(self.forces)}; this operator needs "
-                             f"{(steps, 2, n)}, one mean for each of its steps")
-        if self.prescribed is not None and np.shape(self.prescribed) != (steps, 2, n):
-            raise InputError(f"ConvolutionProblem: prescribed has shape {np.shape(self.prescribed)}; this operator "
-                             f"needs {(steps, 2, n)}")
-        for name, mask, shape, what in (("fixed", self.fixed, (2, n), "(component, node)"),
-                                        ("contact", self.contact, (n,), "(element,)")):
-            if mask is not None and (np.shape(mask) != shape or np.asarray(mask).dtype != bool):
-                raise InputError(f"ConvolutionProblem: {name} is no boolean mask of shape {shape}; give one, {what}; "
-                                 "a boundary is fixed, in contact or free")
+        means = (steps, stages, 2, n) if np.ndim(self.forces) == 4 else (steps, 2, n)
+        object.__setattr__(self, "forces", array(owner, "forces", self.forces, means, unit="N/m"))
+        if self.prescribed is not None:
+            array(owner, "prescribed", self.prescribed, (steps, 2, n), unit="m")
+        for name, shape in (("fixed", (2, n)), ("contact", (n,))):
+            if getattr(self, name) is not None:
+                mask(owner, name, getattr(self, name), shape)
 
     @property
     def times(self) -> Array:
@@ -149,7 +165,9 @@ class ConvolutionProblem:
         forces = np.asarray(self.forces, float)
         forces = forces.reshape(steps, -1, 2, n).copy()
         if contact_forces is not None:
-            forces[..., self.contact_nodes] += np.asarray(contact_forces, float).reshape(steps, 1, 2, -1)
+            shape = (steps, 2 * len(self.contact_nodes))
+            given = array("ConvolutionProblem.solve", "contact_forces", contact_forces, shape, unit="N/m")
+            forces[..., self.contact_nodes] += given.reshape(steps, 1, 2, -1)
         u = self._displacement_modes(table.impulses(forces.reshape(steps, -1, 2 * n)))
         over_s = u[..., None] / table.s[..., None, None]
         traction = table.step_means((self.operator.to_traction @ over_s)[..., 0])

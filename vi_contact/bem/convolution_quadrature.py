@@ -19,6 +19,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..checks import attributes, function, instance, number, whole
 from ..errors import InputError
 from .time_methods import BDF2, Contour, RadauIIA, TimeMethod, Trapezoid
 
@@ -36,6 +37,11 @@ class Frequencies:
     method: TimeMethod
     dt: float
     steps: int
+
+    def __post_init__(self) -> None:
+        instance("Frequencies", "the method", self.method, METHODS, "give BDF2(), Trapezoid() or RadauIIA()")
+        attributes(self, positive=("dt",))
+        whole("Frequencies", "steps", self.steps, least=1)
 
     @cached_property
     def contour(self) -> Contour:
@@ -87,23 +93,20 @@ class ConvolutionQuadrature:
     method: TimeMethod = RadauIIA()
 
     def __post_init__(self) -> None:
-        if not isinstance(self.method, METHODS):
-            raise InputError(f"ConvolutionQuadrature: the method is {self.method!r}; give BDF2(), Trapezoid() or "
-                             "RadauIIA()")
+        instance("ConvolutionQuadrature", "the method", self.method, METHODS, "give BDF2(), Trapezoid() or RadauIIA()")
 
     def frequencies(self, *, dt: float, steps: int) -> Frequencies:
         """The frequencies for `steps` steps of dt [s]. Raises InputError unless dt > 0 and steps >= 1."""
-        if not (np.isfinite(dt) and dt > 0.0):
-            raise InputError(f"ConvolutionQuadrature: the time step is {dt!r}; give a number of seconds above zero")
-        if steps != int(steps) or steps < 1:
-            raise InputError(f"ConvolutionQuadrature: {steps!r} time steps; give a whole number, at least one")
-        return Frequencies(self.method, float(dt), int(steps))
+        owner = "ConvolutionQuadrature"
+        step = number(owner, "the time step dt", dt, positive=True, unit="s")
+        return Frequencies(self.method, step, whole(owner, "the number of time steps", steps, least=1))
 
     def weights(self, transfer: Callable[[complex], ArrayLike], *, dt: float, steps: int) -> Array:
         """(steps, ...) W with u(t_(k+1)) = sum_(l<=k) W[k-l] g[l], g the mean of the input over each step.
 
         transfer(s) is the transfer function C, a number or an array, analytic for Re s > 0 and real for real s.
         """
+        function("ConvolutionQuadrature.weights", "transfer", transfer, "give a function of the frequency s")
         table = self.frequencies(dt=dt, steps=steps)
         sums = [
             sum(a * np.asarray(transfer(complex(s))) for a, s in zip(*rows, strict=True))
@@ -117,9 +120,16 @@ class ConvolutionQuadrature:
         forces is, for example, `lambda dt, steps: traction_forces(mesh, traction, dt=dt, steps=steps)`. With these
         instead of means over whole steps Radau keeps its order 3 in time; the other methods have one stage.
         """
+        owner = "ConvolutionQuadrature.substep_means"
+        function(owner, "forces", forces, "give a function (dt, steps) that returns means over steps")
+        number(owner, "the time step dt", dt, positive=True, unit="s")
+        steps = whole(owner, "the number of time steps", steps, least=1)
         shares = np.diff(self.method.abscissae, prepend=0.0)
         parts = np.rint(shares / shares.min()).astype(int)
         fine = forces(dt / parts.sum(), steps * int(parts.sum()))
+        if len(np.shape(fine)) < 1 or len(fine) != steps * parts.sum():
+            raise InputError(f"{owner}: forces(dt, {steps * parts.sum()}) has shape {np.shape(fine)}; return one mean "
+                             "for each step")
         fine = fine.reshape(steps, int(parts.sum()), *fine.shape[1:])
         starts = np.concatenate([[0], np.cumsum(parts)[:-1]])
         return np.asarray(np.add.reduceat(fine, starts, axis=1) / parts.reshape(-1, *[1] * (fine.ndim - 2)))

@@ -5,12 +5,17 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks import instance
+from ..errors import InputError
 from .boundary_mesh import BoundaryMesh
+from .loops import place
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 NEAR = 3.0  # pairs closer than this many element lengths get the finer rule
 CLOSE = 0.9  # pairs whose elements are this share of the longer one's length apart are integrated with their feet
+
+LEAST = 0.05  # of the longer element: nearer ones are refused, for nothing is known of the answers
 
 
 class ElementPairs:
@@ -19,9 +24,13 @@ class ElementPairs:
     offset, a, b: (2, p) [m]; r_min, r_max: least and greatest distance [m]; h: the longer element [m];
     width: what is between them over h; of two elements with a common corner, the distance of a free end from the other.
     same, corner, near, close: boolean masks; shares_end: the common corner is the end of the first element.
+
+    Raises InputError for elements that are nearer than a twentieth of the longer one's length, and for corners of two
+    elements so sharp, or of lengths so different, that an end of one is as near to the other.
     """
 
     def __init__(self, mesh: BoundaryMesh) -> None:
+        instance("boundary elements", "the mesh", mesh, BoundaryMesh, "give a BoundaryMesh, for example polygon(...)")
         first, second = np.triu_indices(len(mesh))
         starts, ends = mesh.points, mesh.points[mesh.after]
         self.first: Index = first
@@ -45,6 +54,23 @@ class ElementPairs:
         self.width: Array = np.where(self.same, np.inf, width)
         self.close = self.width < CLOSE
         self.near = self.r_min < NEAR * self.h
+        self._check_width(mesh)
+
+    def _check_width(self, mesh: BoundaryMesh) -> None:
+        thin = self.width < LEAST * (1.0 - 1e-9)
+        if not thin.any():
+            return
+        facing = thin & ~self.corner
+        pair = int(np.where(facing if facing.any() else thin, self.width, np.inf).argmin())
+        first, second, h, apart = self.first[pair], self.second[pair], self.h[pair], self.width[pair] * self.h[pair]
+        near, remedy = "comes near itself", (f"take elements of at most {apart / LEAST:.3g} m there, or widen the "
+                                             "angle if two sides meet near by")
+        if self.corner[pair]:
+            near, remedy = "has a sharp or uneven corner", "widen its angle or make its two elements more equal"
+        raise InputError(
+            f"boundary elements: the boundary {near} at {place(mesh.points[second])}, where elements {first} and "
+            f"{second} are {apart:.3g} m apart, less than 1/20 of the {h:.3g} m of the longer one; {remedy}"
+        )
 
     def __len__(self) -> int:
         return len(self.first)

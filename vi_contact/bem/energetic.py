@@ -21,13 +21,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, lu_factor, lu_solve
 
+from ..checks import array, attributes, counted, instance, mask, number, whole
 from ..errors import InputError
 from ..materials import LinearElastic
 from .boundary_mesh import BoundaryMesh
-from .operators import Operators
+from .operators import Operators, check_body
 from .quadrature import Orders
 
 Array = NDArray[np.float64]
+NUMBERS = 4_000_000_000  # in the blocks of a body: 32 GB
 SMALLEST, GREATEST = 0.05, 8.0  # limits of c_P dt / h
 
 
@@ -46,6 +48,17 @@ class EnergeticBlocks:
     double: Array
     hyper: Array | None
 
+    def __post_init__(self) -> None:
+        instance("EnergeticBlocks", "mesh", self.mesh, BoundaryMesh, "give a BoundaryMesh")
+        attributes(self, positive=("c_p", "c_s", "dt"))
+        n, steps = len(self.mesh), np.shape(self.single)[:1]
+        shapes = {"single": (*steps, 4 * n, 4 * n), "double": (*steps, 4 * n, 2 * n), "hyper": (*steps, 2 * n, 2 * n)}
+        for name, shape in shapes.items():
+            found = np.shape(getattr(self, name))
+            if found != shape and not (name == "hyper" and self.hyper is None):
+                raise InputError(f"EnergeticBlocks: {name} has shape {found}; a mesh of {n} elements needs {shape}: "
+                                 "use energetic_blocks(...)")
+
     @property
     def steps(self) -> int:
         """Number of time steps."""
@@ -54,8 +67,7 @@ class EnergeticBlocks:
 
 def check_time_step(mesh: BoundaryMesh, c_p: float, dt: float) -> None:
     """Raise InputError unless 0.05 <= c_P dt / h <= 8, h the longest element."""
-    if not (np.isfinite(dt) and dt > 0.0):
-        raise InputError(f"boundary elements: the time step is {dt!r}; give a number of seconds above zero")
+    number("boundary elements", "the time step dt", dt, positive=True, unit="s")
     ratio = c_p * dt / float(mesh.lengths.max())
     advice = f"c_P dt / h is {ratio:.3g} (h = {mesh.lengths.max():.3g} m, dt = {dt:.3g} s), good is 0.5 to 2"
     if ratio < SMALLEST:
@@ -69,10 +81,13 @@ def energetic_blocks(
 ) -> EnergeticBlocks:
     """Assemble the blocks of `steps` time steps of dt [s]; memory 224 steps n² bytes (192 without `hyper`).
 
-    Raises InputError for a time step far too small or large for the mesh.
+    Raises InputError for a time step far too small or large for the mesh, and for a body too thin or sharp for it.
     """
-    if steps < 1:
-        raise InputError(f"boundary elements: {steps} time steps; give at least one")
+    check_body(mesh, material, orders)
+    instance("boundary elements", "hyper", hyper, bool, "give True or False")
+    steps = whole("boundary elements", "the number of time steps", steps, least=1)
+    counted("boundary elements", f"{steps} steps of {len(mesh)} elements", 28 * steps * len(mesh) ** 2, "numbers",
+            most=NUMBERS)
     check_time_step(mesh, material.c_p, dt)
     operators, n = Operators(mesh, material, orders), len(mesh)
     single, double = np.empty((steps, 4 * n, 4 * n)), np.empty((steps, 4 * n, 2 * n))
@@ -110,10 +125,12 @@ class Marching:
     """
 
     def __init__(self, blocks: EnergeticBlocks, fixed: NDArray[np.bool_], *, symmetric: bool = True) -> None:
+        instance("Marching", "blocks", blocks, EnergeticBlocks, "give those of energetic_blocks")
         if symmetric and blocks.hyper is None:
             raise InputError("these boundary element blocks have no hypersingular operator; assemble them with "
                              "hyper=True or use the unsymmetric form")
-        self.blocks, self.symmetric, self.free = blocks, symmetric, ~np.asarray(fixed, bool).ravel()
+        fixed = mask("Marching", "fixed", np.ravel(fixed), (2 * len(blocks.mesh),))
+        self.blocks, self.symmetric, self.free = blocks, symmetric, ~fixed
         self.mass = blocks.mesh.mass
         self.v0 = cho_factor(0.5 * (blocks.single[0] + blocks.single[0].T))
         self.right = blocks.double[0] + 0.5 * self.mass
@@ -127,7 +144,10 @@ class Marching:
 
     def run(self, forces: Array, prescribed: Array | None = None) -> Motion:
         """Motion under forces (steps, 2n, R); prescribed: (steps, 2n, R) displacements, read at fixed unknowns only."""
+        array("Marching", "forces", forces, (None, 2 * len(self.blocks.mesh), None), unit="N/m")
         steps, unknowns, count = forces.shape
+        if prescribed is not None:
+            array("Marching", "prescribed", prescribed, forces.shape, unit="m")
         if steps > self.blocks.steps:
             raise InputError(f"boundary elements: loads for {steps} steps, but the operator has {self.blocks.steps}; "
                              "assemble it with more steps")

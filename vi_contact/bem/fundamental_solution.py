@@ -16,11 +16,15 @@ Elastic Solids, section 3.10.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from numbers import Number
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import kv
+
+from ..checks import attributes, shown
+from ..errors import InputError
 
 Array = NDArray[np.float64]
 TWO_PI = 2.0 * np.pi
@@ -73,6 +77,14 @@ class LaplaceKernels:
     c_p: float
     c_s: float
 
+    def __post_init__(self) -> None:
+        _check_speeds(self)
+        if isinstance(self.s, bool) or not isinstance(self.s, Number) or not np.isfinite(complex(self.s)) or (
+            not complex(self.s).real > 0.0
+        ):
+            raise InputError(f"LaplaceKernels: the frequency s is {shown(self.s)}; give a complex number with a "
+                             "positive real part [1/s]")
+
     def __call__(self, r: Array) -> KernelSet:
         """All three operators share the same seven functions."""
         s, ratio2 = self.s, (self.c_s / self.c_p) ** 2
@@ -89,6 +101,13 @@ class LaplaceKernels:
             DoubleLayerKernels(phi, dphi, ddiff, g1, g2),
             HypersingularKernels(phi, dphi, ddiff, g1, g2, s**2 * k0_p / TWO_PI, s**2 * phi),
         )
+
+
+def _check_speeds(kernels: LaplaceKernels | TimeKernels) -> None:
+    attributes(kernels, positive=("c_p", "c_s"))
+    if kernels.c_p <= kernels.c_s:
+        raise InputError(f"{type(kernels).__name__}: c_p is {kernels.c_p:g} and c_s is {kernels.c_s:g} m/s; pressure "
+                         "waves are faster than shear waves")
 
 
 def kappa(z: NDArray) -> NDArray:
@@ -123,6 +142,10 @@ class TimeKernels:
     c_p: float
     c_s: float
     hyper: bool = True
+
+    def __post_init__(self) -> None:
+        _check_speeds(self)
+        attributes(self, positive=("t",))
 
     def __call__(self, r: Array) -> KernelSet:
         """Kernels at distances r [m] > 0; zero where r >= c_p t."""

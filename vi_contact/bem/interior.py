@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csc_matrix
 
+from ..checks import array, instance, integers
 from ..errors import InputError
 from .boundary_mesh import BoundaryMesh
 from .boundary_operators import N_SINGLE, double_local, joined, stacked
 from .fundamental_solution import TimeKernels
 from .poincare_steklov import BoundaryMotion, PoincareSteklov
-from .rules import pieces, roots, smoothed
+from .rules import pieces, roots, smoothed, stretched
 
 Array = NDArray[np.float64]
 ORDER, CLOSEST = 8, 1e-3  # points a piece; least distance from the boundary in element lengths
@@ -27,10 +28,16 @@ def interior_displacement(
     Without quadrature in time, with the elements split at the wave fronts. Raises InputError for points on the boundary
     or outside the body.
     """
+    owner = "interior_displacement"
+    instance(owner, "operator", operator, PoincareSteklov, "give PoincareSteklov(blocks, rho)")
+    instance(owner, "motion", motion, BoundaryMotion, "give the answer of BoundaryProblem.solve()")
     mesh, blocks = operator.mesh, operator.blocks
-    x = np.asarray(points, float).reshape(-1, 2)
+    x = array(owner, "points", np.atleast_2d(points), (None, 2), unit="m")
     _check_inside(mesh, x)
-    wanted = np.arange(len(motion.times)) if steps is None else np.asarray(steps, int)
+    wanted = np.arange(len(motion.times)) if steps is None else integers(owner, "steps", steps, (None,))
+    if len(wanted) and not 0 <= wanted.min() <= wanted.max() < len(motion.times):
+        raise InputError(f"{owner}: steps are from {wanted.min()} to {wanted.max()}; this motion has steps 0 to "
+                         f"{len(motion.times) - 1}")
     traction = motion.traction.reshape(len(motion.times), -1) / operator.rho
     increments = np.diff(motion.displacement, axis=0, prepend=0.0).reshape(len(motion.times), -1)
     total = np.zeros((len(wanted), 2 * len(x)))
@@ -65,17 +72,17 @@ def _moments(mesh: BoundaryMesh, x: Array, t: float, c_p: float, c_s: float) -> 
     n, along = len(mesh), mesh.points[mesh.after] - mesh.points
     group = max(1, 4000 // n)
     kernels = TimeKernels(t, c_p, c_s, hyper=False)
-    nodes, weights = smoothed(ORDER)
     for first in range(0, len(x), group):
         count = len(x[first : first + group])
         offset = (x[first : first + group, None] - mesh.points).reshape(-1, 2)
         b = np.tile(along, (count, 1))
         b2, projection, d2 = (b**2).sum(1), (b * offset).sum(1), (offset**2).sum(1)
         fronts = [roots(b2, -2.0 * projection, d2 - (c * t) ** 2) for c in (c_p, c_s)]
-        row, low, length = pieces(np.concatenate([*fronts, (projection / b2)[:, None]], axis=1))
-        eta = (low[:, None] + length[:, None] * nodes).ravel()
+        foot, height = projection / b2, np.abs(b[:, 0] * offset[:, 1] - b[:, 1] * offset[:, 0]) / b2
+        row, low, length = pieces(np.concatenate([*fronts, foot[:, None]], axis=1))
+        eta, weight = (part.ravel() for part in stretched(low, length, smoothed(ORDER), foot[row], height[row]))
         owner = np.repeat(row, ORDER)
-        weight = (length[:, None] * weights).ravel() * np.sqrt(b2)[owner]
+        weight = weight * np.sqrt(b2)[owner]
         d = (offset[owner] - eta[:, None] * b[owner]).T
         r = np.hypot(*d)
         heard = r < c_p * t

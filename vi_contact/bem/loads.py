@@ -7,7 +7,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..checks import array, counted, function, instance, mask, number, whole
 from .boundary_mesh import BoundaryMesh
+from .quadrature import MOST
 from .rules import gauss
 
 Array = NDArray[np.float64]
@@ -27,16 +29,26 @@ def traction_forces(
     points, normals: (m, 2); elements: mask (n,) of the loaded elements, all if None; order: Gauss points in time and
     along an element.
     """
-    chosen = np.arange(len(mesh)) if elements is None else np.flatnonzero(np.asarray(elements, bool))
-    x, w = gauss(order)
+    owner = "traction_forces"
+    instance(owner, "mesh", mesh, BoundaryMesh, "give a BoundaryMesh, for example polygon(...)")
+    function(owner, "traction", traction, "give a function (points, normals, t) -> (m, 2) in Pa")
+    dt, steps = number(owner, "dt", dt, positive=True, unit="s"), whole(owner, "steps", steps, least=1)
+    counted(owner, "steps", 2 * steps * len(mesh), "numbers")
+    everywhere = np.ones(len(mesh), bool)
+    chosen = np.flatnonzero(everywhere if elements is None else mask(owner, "elements", elements, (len(mesh),)))
+    x, w = gauss(whole(owner, "order", order, least=1, most=MOST))
     start, end = mesh.points[chosen, None], mesh.points[mesh.after[chosen], None]
     places = (start + x[:, None] * (end - start)).reshape(-1, 2)
     normals = np.repeat(mesh.normals[chosen], order, axis=0)
     weight = mesh.lengths[chosen, None] * w
     forces = np.zeros((steps, 2, len(mesh)))
     for k in range(steps):
-        at_times = [np.asarray(traction(places, normals, (k + xt) * dt), float) for xt in x]
+        at_times = [_values(traction(places, normals, (k + xt) * dt), (k + xt) * dt, places.shape) for xt in x]
         loads = np.tensordot(w, np.stack(at_times), 1).reshape(len(chosen), order, 2) * weight[:, :, None]
         for nodes, shape in ((chosen, 1.0 - x), (mesh.after[chosen], x)):
             forces[k][:, nodes] += np.einsum("eqc,q->ce", loads, shape)
     return forces
+
+
+def _values(values: ArrayLike, t: float, shape: tuple[int, ...]) -> Array:
+    return array("traction_forces", f"the traction at t = {t:.6g} s", values, shape, unit="Pa")

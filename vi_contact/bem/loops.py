@@ -9,6 +9,7 @@ from ..errors import InputError
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+TOUCHING = 1e-12  # of the size of the boundary: nearer is the same place
 
 
 def signed_area(points: Array) -> float:
@@ -43,9 +44,21 @@ def check_orientation(points: Array, sizes: tuple[int, ...], *, exterior: bool) 
             )
 
 
+def check_size(points: Array, sizes: tuple[int, ...]) -> None:
+    """Raise InputError when the area of a loop is no number above zero: points on a line, or too large for squares."""
+    for i, loop in enumerate(np.split(points, np.cumsum(sizes)[:-1])):
+        with np.errstate(all="ignore"):
+            extent = np.ptp(loop, axis=0)
+            smallest, largest = extent.min() ** 2, extent @ extent
+        if not (smallest > 0.0 and np.isfinite(largest)):
+            raise InputError(f"BoundaryMesh: loop {i} is {extent[0]:.3g} m wide and {extent[1]:.3g} m high, which "
+                             "leaves no area to compute with; give points of a plane body, in units of its size")
+
+
 def check_simple(points: Array, after: Index) -> None:
-    """Raise InputError when two elements that are not neighbours cross or touch."""
+    """Raise InputError when two elements cross, or a node lies on an element of which it is no end."""
     a, b = points, points[after]
+    _check_touching(points, after)
 
     def side(p: Array, q: Array, x: Array) -> Array:
         return (q[:, None, 0] - p[:, None, 0]) * (x[None, :, 1] - p[:, None, 1]) - (
@@ -58,7 +71,26 @@ def check_simple(points: Array, after: Index) -> None:
     crossing = splits & splits.T & ~neighbours
     if crossing.any():
         i, j = np.argwhere(crossing)[0]
-        raise InputError(f"BoundaryMesh: elements {i} and {j} cross; give a boundary that does not meet itself")
+        raise InputError(f"BoundaryMesh: the boundary crosses itself near {place(a[i])}, where elements {i} and {j} "
+                         "cross; give a boundary that does not meet itself")
+
+
+def _check_touching(points: Array, after: Index) -> None:
+    start, along = points, points[after] - points
+    offset = points[:, None] - start
+    share = np.clip((offset * along).sum(2) / (along**2).sum(1), 0.0, 1.0)
+    distance = np.hypot(*np.moveaxis(offset - share[..., None] * along, 2, 0))
+    index = np.arange(len(points))
+    distance[index, index] = distance[after, index] = np.inf
+    node, element = np.unravel_index(int(distance.argmin()), distance.shape)
+    if distance[node, element] <= TOUCHING * np.hypot(*np.ptp(points, axis=0)):
+        raise InputError(f"BoundaryMesh: the boundary crosses or touches itself at {place(points[node])}, where node "
+                         f"{node} lies on element {element}; give a boundary that does not meet itself")
+
+
+def place(point: Array) -> str:
+    """A point for a sentence."""
+    return f"({point[0]:.4g}, {point[1]:.4g})"
 
 
 def ordered_loops(points: Array, segments: Index, *, exterior: bool) -> tuple[Index, tuple[int, ...]]:

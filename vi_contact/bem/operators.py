@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+from ..checks import instance, number
 from ..materials import LinearElastic
 from .boundary_mesh import BoundaryMesh
 from .boundary_operators import Galerkin, OperatorMatrices
 from .fundamental_solution import LaplaceKernels, TimeKernels
 from .quadrature import Orders
+
+
+def check_body(mesh: BoundaryMesh, material: LinearElastic, orders: Orders) -> None:
+    """Raise InputError unless these are a boundary mesh, a material and numbers of points."""
+    owner = "boundary elements"
+    instance(owner, "the mesh", mesh, BoundaryMesh, "give a BoundaryMesh, for example polygon(...)")
+    instance(owner, "the material", material, LinearElastic, "give a LinearElastic")
+    instance(owner, "orders", orders, Orders, "give numbers of points, Orders()")
 
 
 class Operators:
@@ -17,6 +26,7 @@ class Operators:
     """
 
     def __init__(self, mesh: BoundaryMesh, material: LinearElastic, orders: Orders = Orders()) -> None:
+        check_body(mesh, material, orders)
         self.mesh, self.material = mesh, material
         self.c_p, self.c_s = material.c_p, material.c_s
         self.galerkin = Galerkin(mesh, self.c_s, orders)
@@ -31,6 +41,7 @@ class Operators:
 
     def unit_in_time(self, t: float, *, hyper: bool = True) -> OperatorMatrices:
         """The same for density 1."""
+        number("Operators", "the time t", t, positive=True, unit="s")
         kernels = TimeKernels(t, self.c_p, self.c_s, hyper)
         return self.galerkin.assemble(kernels, (self.c_s * t, self.c_p * t))
 

@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..checks import array, instance, mask, number
 from ..errors import InputError
 from .boundary_mesh import BoundaryMesh
 from .energetic import EnergeticBlocks, Marching, Motion, summed
@@ -29,8 +30,9 @@ class PoincareSteklov:
     symmetric: bool = True
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.rho) and self.rho > 0.0):
-            raise InputError(f"PoincareSteklov: the mass density is {self.rho!r}; give a number above zero [kg/m³]")
+        instance("PoincareSteklov", "blocks", self.blocks, EnergeticBlocks, "give those of energetic_blocks")
+        number("PoincareSteklov", "the mass density rho", self.rho, positive=True, unit="kg/m³")
+        instance("PoincareSteklov", "symmetric", self.symmetric, bool, "give True or False")
 
     @property
     def mesh(self) -> BoundaryMesh:
@@ -39,7 +41,7 @@ class PoincareSteklov:
 
     def apply(self, displacement: ArrayLike) -> Array:
         """(steps, 2, n) nodal forces [N/m] of displacements (steps, 2, n) at t_1, t_2, ...; 0 at t_0."""
-        u = np.asarray(displacement, float)
+        u = self._history("displacement", displacement)
         everything = np.ones(2 * len(self.mesh), bool)
         flat = u.reshape(len(u), -1, 1)
         motion = Marching(self.blocks, everything, symmetric=self.symmetric).run(np.zeros_like(flat), flat)
@@ -47,10 +49,13 @@ class PoincareSteklov:
 
     def solve(self, forces: ArrayLike) -> Array:
         """(steps, 2, n) displacements under nodal forces (steps, 2, n): the inverse, no support anywhere."""
-        f = np.asarray(forces, float)
+        f = self._history("forces", forces)
         free = np.zeros(2 * len(self.mesh), bool)
         motion = Marching(self.blocks, free, symmetric=self.symmetric).run(f.reshape(len(f), -1, 1) / self.rho)
         return motion.displacement.reshape(f.shape)
+
+    def _history(self, meaning: str, value: ArrayLike) -> Array:
+        return array("PoincareSteklov", meaning, value, (None, 2, len(self.mesh)))
 
 
 @dataclass(frozen=True)
@@ -75,7 +80,8 @@ class BoundaryMotion:
     def work_on(self, nodes: ArrayLike) -> Array:
         """(steps,) the part of the work done at masked nodes (n,) [J/m]."""
         increments = np.diff(self.displacement, axis=0, prepend=0.0)
-        return np.cumsum((self.forces * increments)[:, :, np.asarray(nodes, bool)].sum(axis=(1, 2)))
+        chosen = mask("BoundaryMotion.work_on", "nodes", nodes, self.displacement.shape[2:])
+        return np.cumsum((self.forces * increments)[:, :, chosen].sum(axis=(1, 2)))
 
 
 @dataclass(frozen=True)
@@ -95,6 +101,15 @@ class CondensedCompliance:
     normals: Array
     lengths: Array
     dt: float
+
+    def __post_init__(self) -> None:
+        owner, m = "CondensedCompliance", np.size(self.nodes)
+        steps = len(array(owner, "W", self.W, (None, 2 * m, 2 * m), unit="m²/N"))
+        array(owner, "u_free", self.u_free, (steps, 2 * m), unit="m")
+        for name in ("points", "normals"):
+            array(owner, name, getattr(self, name), (m, 2))
+        array(owner, "lengths", self.lengths, (m,), unit="m")
+        number(owner, "dt", self.dt, positive=True, unit="s")
 
     def displacement(self, forces: Array) -> Array:
         """(steps, 2m) displacements under nodal contact forces (steps, 2m)."""
@@ -118,12 +133,16 @@ class BoundaryProblem:
     contact: Mask | None = None
 
     def __post_init__(self) -> None:
-        n, steps = len(self.operator.mesh), len(self.forces)
-        shapes = {"forces": (steps, 2, n), "fixed": (2, n), "prescribed": (steps, 2, n), "contact": (n,)}
-        for name, shape in shapes.items():
-            value = getattr(self, name)
-            if value is not None and np.shape(value) != shape:
-                raise InputError(f"BoundaryProblem: {name} has shape {np.shape(value)}; this boundary needs {shape}")
+        owner = "BoundaryProblem"
+        instance(owner, "operator", self.operator, PoincareSteklov, "give PoincareSteklov(blocks, rho)")
+        n = len(self.operator.mesh)
+        forces = array(owner, "forces", self.forces, (None, 2, n), unit="N/m")
+        object.__setattr__(self, "forces", forces)
+        for name, shape in (("fixed", (2, n)), ("contact", (n,))):
+            if getattr(self, name) is not None:
+                mask(owner, name, getattr(self, name), shape)
+        if self.prescribed is not None:
+            array(owner, "prescribed", self.prescribed, forces.shape, unit="m")
 
     @cached_property
     def marching(self) -> Marching:
@@ -149,7 +168,9 @@ class BoundaryProblem:
         n, rho = len(self.operator.mesh), self.operator.rho
         forces = np.array(self.forces, float)
         if contact_forces is not None:
-            forces[:, :, self.contact_nodes] += np.asarray(contact_forces, float).reshape(len(forces), 2, -1)
+            shape = (len(forces), 2 * len(self.contact_nodes))
+            given = array("BoundaryProblem.solve", "contact_forces", contact_forces, shape, unit="N/m")
+            forces[:, :, self.contact_nodes] += given.reshape(len(forces), 2, -1)
         prescribed = None if self.prescribed is None else np.asarray(self.prescribed).reshape(len(forces), 2 * n, 1)
         motion: Motion = self.marching.run(forces.reshape(len(forces), 2 * n, 1) / rho, prescribed)
         return BoundaryMotion(

@@ -21,12 +21,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_matrix
 
+from ..checks import whole
 from .element_pairs import ElementPairs
 from .rules import gauss, graded, linear, pieces, roots, smoothed, stretched
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Rule = tuple[Array, Array]
+MOST = 200  # Gauss points a rule may have
 CHUNK = 40_000  # points evaluated at once: keeps the arrays in the cache
 
 
@@ -41,6 +43,10 @@ class Orders:
     inner: int = 8
     touching: int = 12
     close: int = 10
+
+    def __post_init__(self) -> None:
+        for name in ("far", "near", "outer", "inner", "touching", "close"):
+            whole("Orders", name, getattr(self, name), least=1, most=MOST)
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from numpy.polynomial.chebyshev import chebvander
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix, vstack
 
+from ..checks import counted, number
 from .boundary_mesh import BoundaryMesh
 from .boundary_operators import Galerkin
 from .fundamental_solution import TWO_PI, KernelSet
@@ -26,6 +27,7 @@ from .quadrature import Orders, PointSet, point_sets
 
 Array = NDArray[np.float64]
 POINTS = 16  # Chebyshev points of a panel
+PANELS = 100_000  # of equal width
 SMALLEST = 1e-9  # end of the dyadic panels, relative to the shortest element
 
 
@@ -37,7 +39,9 @@ class RadialTable(Galerkin):
 
     def __init__(self, mesh: BoundaryMesh, c_s: float, width: float, orders: Orders = Orders()) -> None:
         super().__init__(mesh, c_s, orders)
+        number("RadialTable", "the width of its panels", width, positive=True, unit="m")
         far = float(self.pairs.r_max.max())
+        counted("RadialTable", "the width of its panels", far / width, "panels", most=PANELS)
         dyadic = width * 0.5 ** np.arange(np.ceil(np.log2(width / (SMALLEST * mesh.lengths.min()))), 0.0, -1.0)
         self.edges: Array = np.concatenate([dyadic, width * np.arange(1.0, np.ceil(far / width * (1.0 + 1e-9)) + 1.0)])
         reference = np.cos(np.pi * (np.arange(POINTS) + 0.5) / POINTS)

@@ -51,7 +51,7 @@ def roots(a: Array, b: Array, c: Array) -> Array:
 
 
 def linear(low: Array, length: Array, rule: tuple[Array, Array], scale: Array | float = 1.0) -> tuple[Array, Array]:
-    """Points and weights (p, n) of a rule on pieces from ``low`` (p,) of these lengths; scale: factor of the weights."""
+    """Points and weights (p, n) of a rule on pieces from ``low`` (p,) of these lengths; scale: of the weights."""
     x, w = rule
     return low[:, None] + length[:, None] * x, (scale * length)[:, None] * w
 

@@ -7,12 +7,17 @@ from typing import Any
 
 import numpy as np
 
+from .. import checks
 from ..errors import InputError
 from ..materials import LinearElastic
 from .boundary_mesh import BoundaryMesh
+from .element_pairs import ElementPairs
 from .energetic import EnergeticBlocks, energetic_blocks
+from .operators import check_body
+from .quadrature import Orders
 
-FORMAT = "vi_contact boundary element blocks, 1"
+FORMAT = "vi_contact boundary element blocks, 2"
+EARLIER = "vi_contact boundary element blocks, 1"  # the same numbers but for thin and sharp bodies
 SAME = 1e-12  # relative difference up to which geometry, speeds and time step count as equal
 
 
@@ -20,7 +25,10 @@ def save_blocks(path: str | Path, blocks: EnergeticBlocks) -> None:
     """Write the blocks; an existing file is replaced once the new one is complete."""
     import h5py
 
-    target = Path(path)
+    checks.instance("save_blocks", "blocks", blocks, EnergeticBlocks, "give those of energetic_blocks")
+    target = checks.path("save_blocks", "path", path)
+    if not target.parent.is_dir():
+        raise InputError(f"save_blocks: there is no folder {checks.shown(str(target.parent))}; make it first")
     unfinished = target.with_name(target.name + ".part")
     with h5py.File(unfinished, "w") as file:
         file.attrs.update(format=FORMAT, c_p=blocks.c_p, c_s=blocks.c_s, dt=blocks.dt, exterior=blocks.mesh.exterior)
@@ -41,29 +49,54 @@ def load_blocks(
     """
     import h5py
 
+    checks.path("load_blocks", "path", path)
+    checks.instance("load_blocks", "hyper", hyper, bool, "give True or False")
+    check_body(mesh, material, Orders())
+    steps = checks.whole("load_blocks", "steps", steps, least=1)
+    dt = checks.number("load_blocks", "dt", dt, positive=True, unit="s")
     try:
         file = h5py.File(path, "r")
     except OSError as error:
         raise InputError(f"{Path(path).name}: no readable HDF5 file; assemble the operator and save it") from error
     with file:
-        if file.attrs.get("format") != FORMAT:
-            raise InputError(f"{Path(path).name}: no boundary element blocks; give a file written by save_blocks")
-        different = [*_differences(file, mesh, material, dt), *_missing(file, steps, hyper)]
-        if different:
-            raise InputError(f"{Path(path).name} holds the operator of another problem ({'; '.join(different)}); "
-                             "assemble the operator of this one")
-        return EnergeticBlocks(
-            mesh, material.c_p, material.c_s, dt, file["single"][:steps], file["double"][:steps],
-            file["hyper"][:steps] if hyper else None,
-        )
+        try:
+            return _read(Path(path).name, file, mesh, material, dt, steps, hyper)
+        except InputError:
+            raise
+        except (KeyError, ValueError, TypeError, OSError, AttributeError) as error:
+            raise InputError(f"{Path(path).name}: a damaged file of boundary element blocks "
+                             f"({checks.shown(str(error))}); assemble the operator and save it again") from error
+
+
+def _read(
+    name: str, file: Any, mesh: BoundaryMesh, material: LinearElastic, dt: float, steps: int, hyper: bool
+) -> EnergeticBlocks:
+    if file.attrs.get("format") not in (FORMAT, EARLIER):
+        raise InputError(f"{name}: no boundary element blocks of this version; give a file written by save_blocks")
+    if file.attrs["format"] == EARLIER and ElementPairs(mesh).close.any():
+        raise InputError(f"{name} was written by an earlier version, whose integrals were wrong for bodies as thin or "
+                         "sharp as this one; assemble the operator and save it again")
+    different = [*_differences(file, mesh, material, dt), *_missing(file, steps, hyper)]
+    if different:
+        raise InputError(f"{name} holds the operator of another problem ({'; '.join(different)}); "
+                         "assemble the operator of this one")
+    n = len(mesh)
+    shapes = {"single": (steps, 4 * n, 4 * n), "double": (steps, 4 * n, 2 * n), "hyper": (steps, 2 * n, 2 * n)}
+    wanted = ("single", "double", "hyper") if hyper else ("single", "double")
+    found = {key: checks.array(name, key, file[key][:steps], shapes[key]) for key in wanted}
+    return EnergeticBlocks(
+        mesh, material.c_p, material.c_s, dt, found["single"], found["double"], found.get("hyper")
+    )
 
 
 def stored_blocks(
     path: str | Path, mesh: BoundaryMesh, material: LinearElastic, *, dt: float, steps: int, hyper: bool = True
 ) -> EnergeticBlocks:
     """load_blocks if the file exists, else energetic_blocks and save_blocks."""
-    if Path(path).exists():
+    if checks.path("stored_blocks", "path", path).exists():
         return load_blocks(path, mesh, material, dt=dt, steps=steps, hyper=hyper)
+    if not Path(path).parent.is_dir():
+        raise InputError(f"stored_blocks: there is no folder {checks.shown(str(Path(path).parent))}; make it first")
     blocks = energetic_blocks(mesh, material, dt=dt, steps=steps, hyper=hyper)
     save_blocks(path, blocks)
     return blocks

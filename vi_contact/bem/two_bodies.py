@@ -18,6 +18,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from ..algebra import Array, Indices, Mask
+from ..checks import array, mask, provides
 from ..errors import InputError
 from .energetic import summed
 from .poincare_steklov import BoundaryMotion, BoundaryProblem, CondensedCompliance
@@ -37,6 +38,13 @@ class TwoBodies:
     one: BoundaryProblem
     two: BoundaryProblem
     welded: Mask | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("one", "two"):
+            provides("TwoBodies", name, getattr(self, name), ("operator", "contact", "condensed", "solve"),
+                     "give a BoundaryProblem")
+        if self.welded is not None:
+            mask("TwoBodies", "welded", self.welded, (len(self.one.operator.mesh),))
 
     @cached_property
     def relative(self) -> CondensedCompliance:
@@ -72,8 +80,8 @@ class TwoBodies:
     def solve(self, forces: Array | None = None) -> tuple[BoundaryMotion, BoundaryMotion]:
         """Motions of both bodies under their loads, contact forces (steps, 2m_c) on body 1, and the welds."""
         relative = self.relative
-        if forces is None:
-            forces = np.zeros((len(relative.W), self.condensed().W.shape[1]))
+        shape = (len(relative.W), self.condensed().W.shape[1])
+        forces = np.zeros(shape) if forces is None else array("TwoBodies.solve", "forces", forces, shape, unit="N/m")
         on_one = self.interface_forces(forces)
         two_nodes = self.two.operator.mesh.points[self.two.contact_nodes]
         back = matching(two_nodes, relative.points)

@@ -18,6 +18,7 @@ import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 
 from ..algebra import Array
+from ..checks import attributes, instance, whole
 from ..errors import InputError, StepFailure
 from ..friction import project
 from ..step import StepResult
@@ -43,17 +44,20 @@ class SpaceTimeUzawa:
     window: int | None = None
 
     def __post_init__(self) -> None:
-        if self.rho is not None and not 0.0 < self.rho < np.inf:
-            raise InputError(f"SpaceTimeUzawa: rho is {self.rho!r}; give a positive number, or None")
-        if self.window is not None and self.window < 1:
-            raise InputError(f"SpaceTimeUzawa: a window of {self.window!r} steps; give one step or more, or None")
+        attributes(self, positive=("tolerance",))
+        whole("SpaceTimeUzawa", "max_iterations", self.max_iterations, least=1)
+        if self.rho is not None:
+            attributes(self, positive=("rho",))
+        if self.window is not None:
+            whole("SpaceTimeUzawa", "window", self.window, least=1)
 
     def solve(self, contact: BoundaryContact) -> ContactRun:
         """The run; StepFailure when ``max_iterations`` do not reach the tolerance."""
+        instance("SpaceTimeUzawa", "contact", contact, BoundaryContact, "give a BoundaryContact")
         if contact.frictional and contact.friction.at(np.ones(contact.surface.count)) is not contact.friction:
             raise InputError(f"SpaceTimeUzawa: {contact.friction} depends on the slip rate; use march_contact")
         total = len(contact.v_free)
-        length = min(self.window or total, total)
+        length = min(int(self.window or total), total)
         problem = _SpaceTime(contact, length)
         r, history, counts = np.zeros((total, 2, contact.surface.count)), list[float](), list[int]()
         for first in range(0, total, length):
