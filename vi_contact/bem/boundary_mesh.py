@@ -16,7 +16,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..checks import array, counted, function, instance, integers, mask, number, whole
+from ..checks import array, counted, flag, function, integers, mask, number, whole
 from ..errors import InputError
 from .loops import check_orientation, check_simple, check_size, ordered_loops
 
@@ -47,7 +47,7 @@ class BoundaryMesh:
         sizes = tuple(whole("BoundaryMesh", "the size of a loop", size, least=1) for size in given) or (len(points),)
         if min(sizes) < 3 or sum(sizes) != len(points):
             raise InputError(f"BoundaryMesh: loops of {sizes} nodes, {len(points)} points; a loop has three or more")
-        instance("BoundaryMesh", "exterior", self.exterior, (bool, np.bool_), "give True or False")
+        flag("BoundaryMesh", "exterior", self.exterior)
         labels = _labels("BoundaryMesh", self.labels, len(points), "element") if np.size(self.labels) else None
         labels = np.zeros(len(points), np.int64) if labels is None else labels
         for name, value in (("points", points), ("loop_sizes", sizes), ("labels", labels)):

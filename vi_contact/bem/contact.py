@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..algebra import Array, Indices, Mask, SerialAlgebra, SerialComm, SerialMatrix
-from ..checks import array, function, instance, integers, provides
+from ..checks import array, flag, function, instance, integers, provides
 from ..errors import InputError
 from ..friction import FrictionLaw, Frictionless
 from ..step import EffectiveMatrix, StepProblem
@@ -103,7 +103,7 @@ class BoundaryContact:
         for name in ("towards", "along"):
             if getattr(self, name) is not None:
                 function(owner, name, getattr(self, name), "give a function of the time, or None")
-        instance(owner, "bilateral", self.bilateral, bool, "give True or False")
+        flag(owner, "bilateral", self.bilateral)
         if self.conditions is not None:
             instance(owner, "conditions", self.conditions, Conditions, "give those of conditions_on(...), or None")
             if self.conditions.nodes.max(initial=0) >= self.count:

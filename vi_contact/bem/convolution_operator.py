@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..checks import array, counted, instance, mask
+from ..checks import array, counted, flag, instance, mask
 from ..errors import InputError
 from ..materials import LinearElastic
 from .boundary_mesh import BoundaryMesh
@@ -92,7 +92,7 @@ def convolution_operator(
     """
     check_body(mesh, material, orders)
     instance("convolution_operator", "quadrature", quadrature, ConvolutionQuadrature, "give a ConvolutionQuadrature()")
-    instance("convolution_operator", "symmetric", symmetric, bool, "give True or False")
+    flag("convolution_operator", "symmetric", symmetric)
     table = quadrature.frequencies(dt=dt, steps=steps)
     counted("convolution_operator", f"{table.s.size} frequencies of {len(mesh)} elements",
             24 * table.s.size * len(mesh) ** 2, "numbers", most=NUMBERS)

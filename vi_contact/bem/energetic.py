@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, lu_factor, lu_solve
 
-from ..checks import array, attributes, counted, instance, mask, number, whole
+from ..checks import array, attributes, counted, flag, instance, mask, number, whole
 from ..errors import InputError
 from ..materials import LinearElastic
 from .boundary_mesh import BoundaryMesh
@@ -84,7 +84,7 @@ def energetic_blocks(
     Raises InputError for a time step far too small or large for the mesh, and for a body too thin or sharp for it.
     """
     check_body(mesh, material, orders)
-    instance("boundary elements", "hyper", hyper, bool, "give True or False")
+    flag("boundary elements", "hyper", hyper)
     steps = whole("boundary elements", "the number of time steps", steps, least=1)
     counted("boundary elements", f"{steps} steps of {len(mesh)} elements", 28 * steps * len(mesh) ** 2, "numbers",
             most=NUMBERS)

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..checks import array, instance, mask, number
+from ..checks import array, flag, instance, mask, number
 from ..errors import InputError
 from .boundary_mesh import BoundaryMesh
 from .energetic import EnergeticBlocks, Marching, Motion, summed
@@ -32,7 +32,7 @@ class PoincareSteklov:
     def __post_init__(self) -> None:
         instance("PoincareSteklov", "blocks", self.blocks, EnergeticBlocks, "give those of energetic_blocks")
         number("PoincareSteklov", "the mass density rho", self.rho, positive=True, unit="kg/m³")
-        instance("PoincareSteklov", "symmetric", self.symmetric, bool, "give True or False")
+        flag("PoincareSteklov", "symmetric", self.symmetric)
 
     @property
     def mesh(self) -> BoundaryMesh:

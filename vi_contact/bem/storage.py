@@ -50,7 +50,7 @@ def load_blocks(
     import h5py
 
     checks.path("load_blocks", "path", path)
-    checks.instance("load_blocks", "hyper", hyper, bool, "give True or False")
+    checks.flag("load_blocks", "hyper", hyper)
     check_body(mesh, material, Orders())
     steps = checks.whole("load_blocks", "steps", steps, least=1)
     dt = checks.number("load_blocks", "dt", dt, positive=True, unit="s")
