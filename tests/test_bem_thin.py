@@ -41,7 +41,7 @@ def wedge(height: float) -> BoundaryMesh:
 
 SHAPES = {
     "slab of h/20": slab(H / 20),
-    "nodes that do not face each other": polygon([(-0.01, -0.5), (0.01, -0.5), (0.01, 0.5), (-0.01, 0.5)], (1, 9, 1, 7)),
+    "no node faces another": polygon([(-0.01, -0.5), (0.01, -0.5), (0.01, 0.5), (-0.01, 0.5)], (1, 9, 1, 7)),
     "7 degrees": wedge(0.12),
     "3 degrees": wedge(0.06),
     "crack": polygon([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (0.03, 0.5), (0.0, 0.0), (-0.03, 0.5), (-0.5, 0.5)], H),
