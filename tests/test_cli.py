@@ -99,6 +99,39 @@ def test_errors_are_one_sentence(arguments, word):
         assert not done.stdout and done.stderr == said[0] + "\n"
 
 
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        (["motion", "convert", "r.at2", "r.at2"], "r.at2 is read by this command"),
+        (["motion", "convert", "r.at2", "./link.at2"], "link.at2 is read by this command"),
+        (["motion", "plot", "r.at2", "--out", "r.at2"], "a picture ends in .png, .pdf or .svg"),
+        (["motion", "plot", "r.at2", "--out", "x.nosuch"], "a picture ends in"),
+        (["motion", "plot", "r.at2", "--out", "x" * 300 + ".png"], "give the name of a file in a folder that exists"),
+        (["motion", "spectrum", "r.at2", "--csv", "r.at2"], "r.at2 is read by this command"),
+        (["motion", "spectrum", "r.at2", "--csv", "x.png", "--png", "x.png"], "overwritten by its picture"),
+        (["post", "spectrum", "run", "a_g_x", "--out", "run/history.csv"], "history.csv is read by this command"),
+        (["post", "peaks", "run", "--out", "run/../run/checkpoint.npz"], "checkpoint.npz is read by this command"),
+        (["post", "spectrum", "run", "a_g_x", "--out", "x.png"], "give a name such as x.csv"),
+        (["report", "run", "--out", "page.docx"], "a picture ends in"),
+        (["layer", "--out", "x.nosuch"], "a picture ends in"),
+    ],
+)
+def test_no_input_is_overwritten(tmp_path, monkeypatch, capsys, arguments, word):
+    """An output that the command reads, or that it would write twice, is refused; every file is what it was."""
+    monkeypatch.chdir(tmp_path)
+    Path("r.at2").write_text("A MOTION\nIN UNITS OF G\nNPTS= 4, DT= .01 SEC\n0.0 0.1 -0.1 0.0\n")
+    Path("link.at2").symlink_to("r.at2")
+    Path("run").mkdir()
+    Path("run/history.csv").write_text("k,t,a_g_x\n" + "".join(f"{k},{0.01 * k},0.{k}\n" for k in range(9)))
+    Path("run/columns.json").write_text("{}")
+    Path("run/checkpoint.npz").write_bytes(b"kept")
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    assert main(arguments) == 1
+    said = capsys.readouterr().err
+    assert word in said and said.count("\n") == 1
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
+
+
 def test_units_must_be_said(record, capsys):
     assert main(["motion", "info", str(record)]) == 1
     captured = capsys.readouterr()

@@ -8,6 +8,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+from .cli_options import output_file
 from .errors import InputError
 
 _FORMATS = {".at2": "at2", ".th": "path", ".g3": "path", ".acc": "path"}
@@ -147,6 +148,7 @@ def _info(options: argparse.Namespace) -> str:
 def _convert(options: argparse.Namespace) -> str:
     from .ground_motion import pga, write_at2, write_columns, write_path_series
 
+    output_file(options.out, reads=[options.file])
     record = _read(options, options.file)
     form = options.to or _FORMATS.get(Path(options.out).suffix.lower(), "columns")
     units = options.out_units or ("g" if form == "at2" else "m/s2")
@@ -163,10 +165,9 @@ def _plot(options: argparse.Namespace) -> str:
     from .ground_motion.record import canonical_units
     from .plotting_motion import plot_motion
 
+    out = output_file(options.out or Path(options.file).stem + ".png", reads=[options.file], picture=True)
     record = _read(options, options.file)
     units = canonical_units("--out-units", options.out_units)
-    out = Path(options.out or Path(options.file).stem + ".png")
-    _writable(out)
     return f"picture: {plot_motion(record, out, units=units)}"
 
 
@@ -195,9 +196,10 @@ def _spectrum(options: argparse.Namespace) -> str:
             at = response_spectrum(record, np.array(_SHOWN), damping=damping).psa / UNITS[units]
             rows.append(f"{label:<44}" + "".join(f"{value:>10.4g}" for value in at))
     stem = Path(options.file[0]).stem + "_spectrum"
-    table, picture = Path(options.csv or stem + ".csv"), Path(options.png or stem + ".png")
-    for out in (table, picture):
-        _writable(out)
+    table = output_file(options.csv or stem + ".csv", reads=options.file)
+    picture = output_file(options.png or stem + ".png", reads=options.file, picture=True)
+    if table == picture:
+        raise InputError(f"{table}: the table would be overwritten by its picture; give each a name of its own")
     _write_csv(table, spectra, target)
     plot_spectra(spectra, picture, target=target, steps=steps, units=units)
     if target is not None:
@@ -229,8 +231,3 @@ def _write_csv(path: Path, spectra: Any, target: Any) -> None:
             name = label.rpartition(",")[0]
             writer.writerows([name, spectrum.damping, *(f"{value:.8g}" for value in row)]
                              for row in zip(*columns, strict=True))
-
-
-def _writable(path: Path) -> None:
-    if path.is_dir() or not path.parent.is_dir():
-        raise InputError(f"{path}: cannot be written; give the name of a file in a folder that exists")

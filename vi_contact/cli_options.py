@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
+from .checks import shown
 from .errors import InputError
 
 SHAKING = ("motion", "vertical", "units", "scale", "pga", "resample")
 STEP = ("solver", "scheme", "dt", "steps", "cross_check")
 OUTPUT = ("fields_every", "restart")
+PICTURES = (".png", ".pdf", ".svg")
 
 
 def add_shaking(parser: argparse.ArgumentParser, *, harmonic: str) -> Any:
@@ -61,6 +65,35 @@ def add_output(parser: argparse.ArgumentParser, *, out: str) -> Any:
 def chosen(options: argparse.Namespace) -> dict[str, Any]:
     """The shared options by the names of the runs' own arguments, but for the impact law."""
     return {name: getattr(options, name) for name in (*SHAKING, *STEP, *OUTPUT)}
+
+
+def output_file(path: str | Path, *, reads: Iterable[str | Path] = (), picture: bool = False) -> Path:
+    """The file that a command is about to write, checked before any work is done.
+
+    reads: files of its input, which it must not overwrite; picture: whether its name says the format of a picture.
+    InputError for a folder, a file in no folder, one of ``reads``, or a name without the ending of a picture.
+    """
+    out = Path(path)
+    try:
+        fits = out.parent.is_dir() and not out.is_dir()
+    except OSError:  # a name that is too long, a folder that may not be looked into
+        fits = False
+    if not fits:
+        raise InputError(f"{shown(str(path))}: cannot be written; give the name of a file in a folder that exists")
+    if picture and out.suffix.lower() not in PICTURES:
+        raise InputError(f"{out}: a picture ends in {', '.join(PICTURES[:-1])} or {PICTURES[-1]}; give it such a name")
+    if out.exists() and any(Path(one).exists() and out.samefile(one) for one in reads):
+        raise InputError(f"{out} is read by this command, which would overwrite it: give another name for the output")
+    return out
+
+
+def table_beside_picture(path: str | Path, *, reads: Iterable[str | Path] = ()) -> Path:
+    """The table that a command is about to write, with a picture of the same name beside it. InputError as above."""
+    out = output_file(path, reads=reads)
+    if out.suffix.lower() in PICTURES:
+        raise InputError(f"{out}: the table would be overwritten by its picture; give a name such as {out.stem}.csv")
+    output_file(out.with_suffix(PICTURES[0]))
+    return out
 
 
 def impact_law(name: str | None, projection: bool) -> Any:

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+from .cli_options import output_file, table_beside_picture
 from .errors import InputError, ViContactError
 
 _ACTIONS = {
@@ -70,8 +71,7 @@ def _report(options: argparse.Namespace) -> str:
     from .run_folder import read_run
 
     run = read_run(options.folder)
-    out = Path(options.out or Path(options.folder) / "report.pdf")
-    _writable(out)
+    out = output_file(options.out or Path(options.folder) / "report.pdf", picture=True)
     shown = None if options.show is None else [one.split(",") for one in options.show]
     page = plot_report(run, out, title=options.title, columns=shown)
     table = write_peaks(out.with_name("peaks.csv"), peaks(run.history, run.columns))
@@ -158,14 +158,11 @@ def _loop(options: argparse.Namespace) -> str:
 
 
 def _table_path(options: argparse.Namespace) -> Path:
-    path = Path(options.out or Path(options.folder) / f"{options.action}.csv")
-    _writable(path)
-    return path
+    from .output import FILES
 
-
-def _writable(path: Path) -> None:
-    if path.is_dir() or not path.parent.is_dir():
-        raise InputError(f"{path}: cannot be written; give the name of a file in a folder that exists")
+    folder = Path(options.folder)
+    path = options.out or folder / f"{options.action}.csv"
+    return table_beside_picture(path, reads=[folder / name for name in FILES])
 
 
 def _write(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:

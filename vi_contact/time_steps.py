@@ -18,6 +18,7 @@ from .errors import InputError
 HALVINGS = 20  # at most: a millionth of the base step
 SLACK = 1e-6  # of a step: round-off of the times t + dt + … of a run does not add a step to a piece
 LARGEST = 10**9  # steps of a run: beyond, dt is a mistake
+LONGEST = 1e100  # [s] and its inverse: squares of dt, with masses and stiffnesses as factors, are numbers
 
 
 @dataclass(frozen=True)
@@ -146,7 +147,10 @@ def _wanted(steps: int | None, t_end: float | None, t0: float) -> float:
 
 def _positive(dt: Any) -> float:
     remedy = f"dt is {shown(dt)}: give a positive time step in seconds, a Schedule or HalvedAtImpact"
-    return float(_read(number, dt, remedy, positive=True))
+    found = float(_read(number, dt, remedy, positive=True))
+    if not 1.0 / LONGEST < found < LONGEST:
+        raise InputError(f"dt is {found:g} s: give a time step between {1.0 / LONGEST:g} and {LONGEST:g} s")
+    return found
 
 
 def _read(check: Callable[..., Any], value: Any, remedy: str, **limits: Any) -> Any:
