@@ -6,11 +6,13 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import vi_contact
+from vi_contact import cli_ranks
 from vi_contact.cli import main, parser, split_petsc
 from vi_contact.cli_options import impact_law
 from vi_contact.errors import InputError
@@ -130,6 +132,34 @@ def test_no_input_is_overwritten(tmp_path, monkeypatch, capsys, arguments, word)
     said = capsys.readouterr().err
     assert word in said and said.count("\n") == 1
     assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
+
+
+@pytest.mark.parametrize("error", [InputError("no such thing"), RuntimeError("a defect")])
+@pytest.mark.parametrize("others", ["come", "wait"])
+def test_a_rank_that_fails_alone_ends_the_others(monkeypatch, capsys, error, others):
+    """Rank 1 of 2 fails: when rank 0 does too it is the one that speaks; when not, rank 1 speaks and MPI ends both."""
+
+    class World:
+        rank, size = 1, 2
+        Ibarrier = staticmethod(lambda: SimpleNamespace(Test=lambda: others == "come"))
+        Abort = staticmethod(sys.exit)
+
+    def fails(options):
+        raise error
+
+    monkeypatch.setitem(sys.modules, "mpi4py.MPI", SimpleNamespace(COMM_WORLD=World))
+    monkeypatch.setattr(cli_ranks, "PATIENCE", 0.0)
+    monkeypatch.setattr("vi_contact.cli.parser", lambda: SimpleNamespace(
+        parse_args=lambda words: SimpleNamespace(run=fails)))
+    if others == "wait":
+        with pytest.raises(SystemExit, match="1"):
+            main(["run"])
+        assert "rank 1 of 2 stopped alone" in (said := capsys.readouterr().err) and str(error) in said
+    elif isinstance(error, InputError):
+        assert main(["run"]) == 1 and not capsys.readouterr().err
+    else:
+        with pytest.raises(RuntimeError, match="a defect"):
+            main(["run"])
 
 
 def test_units_must_be_said(record, capsys):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+import traceback
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from .cli_ida import add_ida_commands
 from .cli_layer import add_layer_command
 from .cli_motion import add_motion_commands
 from .cli_options import add_output, add_shaking, add_step, chosen, impact_law
+from .cli_ranks import fail_together, rank
 from .cli_report import add_report_commands
 from .errors import Interrupted, ViContactError
 
@@ -122,19 +124,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         text = options.run(options)
     except ViContactError as error:
-        if _rank() == 0:
+        fail_together(str(error))
+        if rank() == 0:
             print(f"vi-contact: {error}", file=sys.stderr, flush=True)
         return 1
     except KeyboardInterrupt as error:
         stopped = error if isinstance(error, Interrupted) else Interrupted()
-        if _rank() == 0:
+        if rank() == 0:
             print(f"vi-contact: {stopped}", file=sys.stderr, flush=True)
         return 128 + stopped.number
+    except Exception:
+        fail_together(traceback.format_exc())
+        raise
     if text:
         print(text)
     return 0
-
-
-def _rank() -> int:
-    """This process's rank, without importing MPI for commands that do not use it."""
-    return sys.modules["mpi4py.MPI"].COMM_WORLD.rank if "mpi4py.MPI" in sys.modules else 0
