@@ -191,3 +191,8 @@ def test_a_law_is_asked_about_solid_contacts_only():
     soft = replace(soft, surface=soft.surface.on_springs(1e3))
     reports = list(run(soft, ZienkiewiczWoodTaylor(), dt=0.01, steps=5))
     assert reports[-1].new.active.all()
+
+
+def test_names_of_laws_are_the_same_in_every_run():
+    """They stand in summaries and in names of tests: no address of an object."""
+    assert repr(Inelastic(MassProjection())) == "Inelastic(reading=MassProjection())"

@@ -96,6 +96,9 @@ class MassProjection:
         self._columns: Array | None = None
         self._delassus: Array = np.zeros((0, 0))
 
+    def __repr__(self) -> str:
+        return "MassProjection()"  # in logs, summaries and names of tests: without an address
+
     def _prepare(self, system: SemiDiscreteSystem, surface: ContactSurface) -> None:
         comm = system.algebra.comm
         self._factor = system.algebra.factor(system.M)
