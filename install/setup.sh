@@ -13,12 +13,15 @@ vi_clean_environment() {
   export PATH=/usr/sbin:/usr/bin:/sbin:/bin:$PATH
 }
 
-# One thread a rank; Open MPI 4 (Debian 12) and 5 (Debian 13) on one machine: as root, more ranks than cores, no noise.
+# One thread a rank; Open MPI 4 (Debian 12), 5 (Debian 13) and 6 (sid) on one machine: as root, more ranks than cores, no noise.
 vi_mpi_environment() {
   export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 BLIS_NUM_THREADS=1
   export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
-  export OMPI_MCA_rmaps_base_oversubscribe=1 PRTE_MCA_rmaps_default_mapping_policy=:oversubscribe
-  export OMPI_MCA_hwloc_base_binding_policy=none PRTE_MCA_hwloc_default_binding_policy=none
+  export OMPI_MCA_rmaps_base_oversubscribe=1 OMPI_MCA_hwloc_base_binding_policy=none
+  case $(mpirun --version 2>/dev/null) in  # 5 does not know the new names, 6 prints 16 lines about the old ones
+    *"(Open MPI) 5."*) export PRTE_MCA_rmaps_default_mapping_policy=:oversubscribe PRTE_MCA_hwloc_default_binding_policy=none ;;
+    *) export PRTE_MCA_mapby=:oversubscribe PRTE_MCA_bindto=none ;;
+  esac
   export OMPI_MCA_ess_singleton_isolated=1  # one rank without mpirun: no daemon to start, none to fail
   export OMPI_MCA_mpi_yield_when_idle=1 HWLOC_HIDE_ERRORS=2 UCX_LOG_LEVEL=fatal
   export OMPI_MCA_pml=ob1 OMPI_MCA_btl=^tcp,openib,ofi,uct,usnic OMPI_MCA_btl_vader_single_copy_mechanism=none
@@ -66,7 +69,7 @@ vi_install_packages() {
   local missing said
   missing=$(vi_missing_packages)
   [ -n "$missing" ] || return 0
-  command -v apt-get >/dev/null || vi_fail "needs Debian 12 or 13 (there is no apt-get here) with $missing"
+  command -v apt-get >/dev/null || vi_fail "needs Debian (there is no apt-get here) with $missing"
   [ "$(id -u)" -eq 0 ] || sudo -n true 2>/dev/null || { command -v sudo >/dev/null && [ -t 0 ]; } ||
     vi_fail "packages are missing and sudo cannot be used; as root: apt-get install --no-install-recommends $missing"
   echo "vi_contact: installing $(wc -w <<<"$missing") Debian packages (once)…" >&2

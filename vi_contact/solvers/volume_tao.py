@@ -104,7 +104,7 @@ class TaoDriver:
                 tao.solve(self._y)
             y, reason = np.array(self._y.array_r), tao.getConvergedReason()
             F, iterations = scaled.residual(y), iterations + tao.getIterationNumber()
-            if reason != PETSc.TAO.Reason.DIVERGED_LS_FAILURE or scaled.accepts(y, F) or scaled.worst > 0.5 * before:
+            if reason != PETSc.TAO.Reason.DIVERGED_LS_FAILURE or scaled.accepts(y, F) or scaled.worst > 0.9 * before:
                 return y, F, reason, iterations
             before = scaled.worst  # the values compared were round-off: measured from here they have all digits again
 
