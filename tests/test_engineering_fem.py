@@ -302,7 +302,7 @@ def test_friction_of_walls_in_all_directions(comm: Any, angle: float) -> None:
     problem = vc.ContactProblem(
         system, fem.contact_surface(system, tags["bottom"], obstacle=ground), friction=vc.Coulomb(0.3)
     )
-    state = vc.static_equilibrium(problem, solver=vc.Condensed(vc.FrictionNewton()))
+    state = vc.static_equilibrium(problem, solver=vc.Condensed(friction_method=vc.FrictionNewton()))
     whole = vc.Contact().start(problem, state)
     row = vc.Resultants("base", tuple(turn @ [1.0, 0.0])).start(problem, state)
     size = row["N_base"]
@@ -323,7 +323,7 @@ def test_friction_resultants_are_the_recorded_forces(comm: Any) -> None:
         system, tags["bottom"], obstacle=vc.HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))
     )
     problem = vc.ContactProblem(system, surface, friction=vc.Coulomb(0.3))
-    state = vc.static_equilibrium(problem, solver=vc.Condensed(vc.FrictionNewton()))
+    state = vc.static_equilibrium(problem, solver=vc.Condensed(friction_method=vc.FrictionNewton()))
     whole = vc.Contact().start(problem, state)
     row = vc.Resultants("base", (1.0, 0.0)).start(problem, state)
     held = fem.Reactions("left", tags["left"], (1.0, 0.0), push).start(problem, state)
@@ -349,7 +349,7 @@ def test_wall_of_the_channel_is_in_equilibrium(comm: Any) -> None:
     x, y = model.channel.shape.x, model.channel.shape.y
     left, inner, top_of_slab = x[1], x[2], y[2]
     problem = model.problem(friction=vc.Coulomb(0.5))
-    state = vc.static_equilibrium(problem, solver=vc.Condensed(vc.FrictionNewton()))
+    state = vc.static_equilibrium(problem, solver=vc.Condensed(friction_method=vc.FrictionNewton()))
     middle = (0.5 * (left + inner), top_of_slab)
     whole = vc.Resultants("all", middle, normal=(0.0, -1.0)).start(problem, state)
     above_cut = vc.Resultants(

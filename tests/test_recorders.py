@@ -183,6 +183,7 @@ def test_contact_open_and_absent() -> None:
     none = replace(
         surface, points=np.zeros((0, 1)), normals=np.zeros((0, 1)), weights=np.zeros(0), gap0=np.zeros(0),
         bilateral=np.zeros(0, bool), compliance=np.zeros(0), owned=np.zeros(0, int), slots=np.zeros(0, int),
+        tangents=np.zeros((0, 0), int),
     )
     nowhere = State(0.0, 0, np.zeros(3), np.zeros(3), np.zeros(0), np.zeros(0, bool))
     row = Contact().start(replace(problem, surface=none), nowhere)

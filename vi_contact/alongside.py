@@ -14,7 +14,15 @@ from .errors import InputError
 from .march import march
 from .mass import ConsistentMass
 from .step import ContactProblem, Scheme
-from .time_steps import LARGEST, HalvedAtImpact, Schedule
+from .time_steps import LARGEST, HalvedAtImpact, Schedule, course
+
+
+def given_steps(dt: float | Schedule) -> None:
+    """InputError for time steps that the run itself chooses, and for what are none."""
+    if isinstance(dt, HalvedAtImpact):
+        raise InputError(f"the time step {dt!r} is found while the run goes: a motion computed alongside needs dt "
+                         "as a number or a Schedule")
+    course(dt, 1, None)
 
 
 class Alongside:
@@ -26,9 +34,7 @@ class Alongside:
     """
 
     def __init__(self, problem: ContactProblem, *, scheme: Scheme, dt: float | Schedule) -> None:
-        if isinstance(dt, HalvedAtImpact):
-            raise InputError(f"the time step {dt!r} is found while the run goes: a motion computed alongside needs dt "
-                             "as a number or a Schedule")
+        given_steps(dt)
         self.scheme, self.dt = scheme, dt
         system = problem.system
         self._steps = march(

@@ -12,11 +12,16 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from .algebra import max_abs
+from .checks import number, provides, several
+from .errors import InputError
 from .march import march
+from .run_checks import check_solver
 from .step import ContactProblem, EffectiveMatrix, PreparedSolver, Scheme, Solver, State, StepProblem, StepResult
 from .surfaces import ContactSurface
 from .time_steps import TimeSteps
 from .whole_run import Opinion, Overall, WholeRun
+
+OPINION = ("name", "times", "impulse", "mean_towards")
 
 
 @dataclass
@@ -72,6 +77,9 @@ class CrossChecked:
     opinions: list[Overall] = field(default_factory=list)
 
     def __post_init__(self) -> None:
+        check_solver("CrossChecked", self.primary, "the first solver")
+        for one in several("CrossChecked", "others", self.others, "give a list of solvers"):
+            check_solver("CrossChecked", one, "a solver")
         self.found = [Disagreement() for _ in self.others]
         self._earlier, self._last = self.found, (-1, 0.0)
 
@@ -156,6 +164,12 @@ def cross_check(
     ``opinions``: answers of other methods to the same problem, a ``bem.ContactRun`` for a homogeneous body for example;
     impulses and mean displacements are compared over the whole run and should agree within ``bound``, relative.
     """
+    given = several("cross_check", "solvers", solvers, "give a list of two or more solvers")
+    if len(given) < (1 if opinions else 2):
+        raise InputError(f"cross_check: {len(given)} solvers; give two or more to compare")
+    for one in several("cross_check", "opinions", opinions, "give a list of answers of other methods"):
+        provides("cross_check", "an opinion", one, OPINION, "give a bem.ContactRun, for example")
+    number("cross_check", "bound", bound, positive=True)
     checked, whole = CrossChecked(solvers[0], tuple(solvers[1:])), WholeRun()
     for _, report in march(problem, scheme=scheme, solver=checked, dt=dt, steps=steps, state=state):
         if opinions:

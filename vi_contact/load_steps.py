@@ -18,7 +18,10 @@ from dataclasses import replace
 import numpy as np
 
 from .certified import TOLERANCE
+from .checks import real, shown
 from .errors import InputError
+from .run_checks import check_methods, check_problem_given, check_sizes
+from .solvers.condensed import Condensed
 from .static import Equilibria, initial_state
 from .step import ContactProblem, Solver, State
 
@@ -27,7 +30,7 @@ def quasi_static(
     problem: ContactProblem,
     times: Iterable[float],
     *,
-    solver: Solver,
+    solver: Solver | None = None,
     state: State | None = None,
     tolerance: float = TOLERANCE,
 ) -> Iterator[State]:
@@ -46,13 +49,19 @@ def quasi_static(
             which nothing stops.
         StepFailure: no answer below the certificate tolerance.
     """
+    check_problem_given("quasi_static", problem)
+    check_methods("quasi_static", solver, (), tolerance)
     if problem.friction.at(np.zeros(problem.surface.count)) is not problem.friction:
         raise InputError(
             f"load steps with {problem.friction}: slip between them has no rate; use Coulomb with the coefficient of "
             "slow sliding, or march through the history in time"
         )
-    state = initial_state(problem) if state is None else state
+    if state is None:
+        state = initial_state(problem)
+    else:
+        check_sizes("quasi_static", problem, state)
     order = _checked(times, state.t)
+    solver = Condensed() if solver is None else solver
     return _stages(Equilibria(problem, solver=solver, tolerance=tolerance), state, order)
 
 
@@ -64,7 +73,9 @@ def _stages(equilibria: Equilibria, state: State, times: list[float]) -> Iterato
 
 def _checked(times: Iterable[float], start: float) -> list[float]:
     """The times as a list."""
-    order = [float(t) for t in times]
+    if not isinstance(times, Iterable) or isinstance(times, str | bytes):
+        raise InputError(f"load steps at {shown(times)}: give times in seconds")
+    order = [real(t) for t in times]
     ways = np.diff([start, *order])
     if not (np.all(np.isfinite(ways)) and np.all(ways >= 0.0) and np.all(ways[1:] > 0.0)):
         raise InputError(f"load steps from t = {start:g} s at {order}: give times that increase, none before the start")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .checks import instance, whole
 from .errors import InputError
 from .system import SemiDiscreteSystem
 
@@ -15,6 +16,8 @@ def lowest_frequency(system: SemiDiscreteSystem, *, max_iterations: int = 2000) 
     orthogonal to the first mode of structures that a base motion can excite.
     Raises InputError for a floating body (K singular) and when the iteration does not settle.
     """
+    instance("lowest_frequency", "system", system, SemiDiscreteSystem, "give a system, such as fem.assemble returns")
+    whole("lowest_frequency", "max_iterations", max_iterations, least=1)
     if system.floating:
         raise InputError("the body floats: its lowest frequency is zero; clamp a part of it")
     dot = system.algebra.dot

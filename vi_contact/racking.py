@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from .algebra import Array
+from .checks import array, column_name, instance
 from .errors import InputError
 from .recorders import Columns, Row
 from .step import ContactProblem, Report, State
@@ -44,10 +44,10 @@ class Racking:
     frames: Mapping[str, Sequence[Sequence[float]]]
 
     def __post_init__(self) -> None:
+        instance("Racking", "frames", self.frames, Mapping, "give labels and four corners each, {'box': [(x, y), …]}")
         for label, corners in self.frames.items():
-            if not re.fullmatch(r"\w+", str(label), re.ASCII):
-                raise InputError(f"racking label {label!r}: use letters, digits and underscores, it names columns")
-            racking(np.asarray(corners, dtype=float), np.zeros((4, 2)))
+            column_name("racking label", label)
+            racking(array("Racking", f"the corners of '{label}'", corners, (None, None)), np.zeros((4, 2)))
 
     def columns(self) -> Columns:
         """racking_<label>, rotation_<label>."""

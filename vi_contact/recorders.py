@@ -6,7 +6,6 @@ Displacements and velocities are those of the equations: relative to the ground 
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -14,13 +13,25 @@ from typing import Any
 import numpy as np
 
 from .algebra import Array
-from .errors import InputError
+from .checks import array, attributes, column_name, instance
+from .errors import InputError, StepFailure
 from .step import ContactProblem, Report, State
 from .verify import Energies, energies, energy_balance
 
 Columns = Mapping[str, tuple[str, str]]
 Row = Mapping[str, Any]
 AXES = "xyz"
+
+
+def refuse_overflow(row: Row) -> None:
+    """StepFailure for a number beyond those of the machine: infinite, or NaN in the energy ledger."""
+    for name, value in row.items():
+        ledger = name.startswith(("energy_", "work_", "loss_"))
+        if isinstance(value, float) and (np.isinf(value) or (ledger and np.isnan(value))):
+            raise StepFailure(
+                f"step {row['k']} at t = {row['t']:.6g} s: {name} is {value}, beyond the numbers of the machine: check "
+                "the sizes and units of loads, motions and initial data"
+            )
 
 
 class Steps:
@@ -237,9 +248,11 @@ class Probe:
     acceleration: bool = False
 
     def __post_init__(self) -> None:
-        for label in self.points:
-            if not re.fullmatch(r"\w+", str(label), re.ASCII):
-                raise InputError(f"probe label {label!r}: use letters, digits and underscores, it names columns")
+        attributes(self, flags=("velocity", "acceleration"))
+        instance("Probe", "points", self.points, Mapping, "give labels and points, {'top': (x, y)}")
+        for label, point in self.points.items():
+            column_name("probe label", label)
+            array("Probe", f"the point '{label}'", point, (None,), unit="metres")
         if len({len(point) for point in self.points.values()}) > 1:
             raise InputError("the probe points have different numbers of coordinates: give one per dimension")
 

@@ -13,7 +13,6 @@ force, T points to the right, and N acts at the distance e to the right of the c
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -21,6 +20,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from .algebra import Array, Mask
+from .checks import array, column_name, function
 from .errors import InputError
 from .recorders import AXES, Columns, Row
 from .step import ContactProblem, Report, State
@@ -40,6 +40,15 @@ class Geometry(Protocol):
     def weights(self) -> Array: ...
 
 
+def check_part(name: str, centre: Any, where: Any, normal: Any) -> None:
+    """InputError for a centre or direction of other things than numbers, or a mask that is no function."""
+    array(f"part '{name}'", "the centre", centre, (None,), unit="metres")
+    if where is not None:
+        function(f"part '{name}'", "where", where, "give a function of points and normals, or None")
+    if normal is not None:
+        array(f"part '{name}'", "normal", normal, (None,))
+
+
 class Part:
     """The points of a contact surface that a mask picks, with the directions of its resultants.
 
@@ -51,6 +60,7 @@ class Part:
         self, name: str, geometry: Geometry, centre: Sequence[float], where: Where | None,
         normal: Sequence[float] | None,
     ) -> None:
+        check_part(name, centre, where, normal)
         points, normals = geometry.points, geometry.normals
         mask = np.ones(len(points), dtype=bool) if where is None else np.asarray(where(points, normals))
         if mask.dtype != bool or mask.shape != (len(points),):
@@ -69,6 +79,8 @@ class Part:
 
     def _direction(self, name: str, given: Sequence[float] | None) -> Array:
         direction = self.weights @ self.normals if given is None else np.asarray(given, dtype=float)
+        if direction.shape != self.centre.shape:
+            raise InputError(f"part '{name}': normal has {direction.size} components, give {self.centre.size}")
         size = float(np.linalg.norm(direction))
         if size <= 1e-6 * (self.weights.sum() if given is None else 1.0):
             raise InputError(f"part '{name}': its contact directions cancel, give normal= the direction of N")
@@ -193,8 +205,8 @@ class Resultants:
     normal: Sequence[float] | None = None
 
     def __post_init__(self) -> None:
-        if not re.fullmatch(r"\w+", self.name, re.ASCII):
-            raise InputError(f"part name {self.name!r}: use letters, digits and underscores, it names columns")
+        column_name("part name", self.name)
+        check_part(self.name, self.centre, self.where, self.normal)
 
     def columns(self) -> Columns:
         """Call ``start`` first."""

@@ -17,6 +17,7 @@ from .checkpoint import Place
 from .errors import Interrupted
 from .history import Table
 from .march import March
+from .recorders import refuse_overflow
 from .run_log import Progress, versions
 from .solution import Solution, energy_warning, history_facts
 from .step import ContactProblem, Recorder, Report, Scheme, Solver, State, StepResult
@@ -153,6 +154,7 @@ class Run:
         row: dict[str, Any] = {}
         for recorder in self.recorders:
             row |= recorder.row(report)
+        refuse_overflow(row)
         writer.append(row)
         self.table.rows.append(row)  # after the disk: a checkpoint never knows a step that history.csv does not
         self.last = report

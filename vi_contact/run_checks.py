@@ -60,13 +60,20 @@ def start_time(owner: str, state: Any) -> float:
     return number(owner, "t of the state", state.t, unit="s")
 
 
+def check_sizes(owner: str, problem: ContactProblem, state: Any) -> None:
+    """InputError, on all ranks, for a state of another problem. Collective."""
+    start_time(owner, state)
+    instance(owner, "state", state, State, "give a state, of static_equilibrium or of a run")
+    refuse((f"{owner}: {text}" for text in _of_state(problem, state)), problem.surface.comm)
+
+
 def check_state(owner: str, problem: ContactProblem, state: State, *, dt: float, tolerance: float, scheme: Any) -> None:
     """InputError, on all ranks, for a state of another problem, or one that penetrates the obstacle. Collective.
 
     A scheme that ``penetrates``, whose condition is one on velocities, may go on from states of its own runs (k > 0).
     """
+    check_sizes(owner, problem, state)
     surface, rigid = problem.surface, problem.surface.compliance == 0.0
-    refuse((f"{owner}: {text}" for text in _of_state(problem, state)), surface.comm)
     if not rigid.any() or (state.k > 0 and getattr(scheme, "penetrates", False)):
         return
     gap = np.where(rigid, surface.gap(state.t) - surface.normal_values(state.u), np.inf)

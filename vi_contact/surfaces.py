@@ -103,7 +103,7 @@ class AnalyticGap:
         gap = np.asarray(self.function(points))
         if gap.shape != (len(points),) or gap.dtype.kind not in "iuf":
             raise InputError(
-                f"AnalyticGap returned {gap.dtype} of shape {gap.shape} for {len(points)} points: return one gap per "
+                f"AnalyticGap returned shape {gap.shape} of {gap.dtype} for {len(points)} points: return one gap per "
                 "point, a real number"
             )
         return gap.astype(float)
@@ -266,6 +266,24 @@ def _spread(name: str, value: Any, shape: tuple[int, ...], t: float) -> Array:
 def _alike(points: Array) -> Indices:
     """A number (k,) for every point, equal where points coincide."""
     return np.asarray(np.unique(points, axis=0, return_inverse=True)[1], dtype=np.int64).ravel()
+
+
+def facing(obstacle: Obstacle, points: Array, normals: Array) -> tuple[Array, Array]:
+    """(contact directions (m, d), gaps (m,)) of an obstacle; InputError for other shapes, what are no real numbers, and
+    directions that point into the body: away from its outward normals (at right angles it may touch with an edge)."""
+    owner, m = type(obstacle).__name__, len(points)
+    directions = array(owner, "what directions returns", obstacle.directions(points, normals), points.shape)
+    length = np.linalg.norm(directions, axis=1)
+    wrong = np.flatnonzero((np.sum(directions * normals, axis=1) < -1e-9 * length) | ~(length > 0.0))
+    if len(wrong):
+        where = ", ".join(f"{x:g}" for x in points[wrong[0]])
+        raise InputError(f"{owner}: the contact direction at ({where}) points into the body or has no length; give "
+                         "unit vectors from the body to the obstacle")
+    gap = np.asarray(obstacle.gap(points, normals))
+    if gap.shape != (m,) or gap.dtype.kind not in "iuf":
+        raise InputError(f"{owner}: gap returned {gap.dtype} of shape {gap.shape} for {m} points; return one real gap "
+                         "per point")
+    return directions, gap.astype(float)
 
 
 def admissible_gap(gap: Array, points: Array, size: float) -> Array:

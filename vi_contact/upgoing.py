@@ -8,14 +8,15 @@ expects the *within* motion, a compliant base the *upgoing* one (Mejia and Dawso
 from __future__ import annotations
 
 import math
-from numbers import Real
 
 import numpy as np
 
 from .algebra import Array
+from .checks import flag, provides, real, shown
 from .errors import InputError
 from .excitation import Excitation, GroundMotion
 from .ground_motion import Record
+from .problem_checks import EXCITATION
 
 
 class UpgoingVelocity:
@@ -57,10 +58,14 @@ def upgoing(
     record when None. A record keeps its drift: correct its baseline first (``baseline_corrected``).
     InputError for an excitation other than a record without dt, or a dt that is not positive.
     """
+    flag("upgoing", "outcrop", outcrop)
+    if not isinstance(motion, Record):
+        provides("upgoing", "motion", motion, EXCITATION, "give a Record or an excitation")
     excitation = GroundMotion(motion, direction=direction) if isinstance(motion, Record) else motion
     if dt is None and isinstance(excitation, GroundMotion):
         dt = excitation.record.dt
-    if not isinstance(dt, Real) or not math.isfinite(dt) or dt <= 0.0:
-        raise InputError(f"upgoing: dt is {dt!r}; give the step in seconds with which {type(excitation).__name__} is "
-                         "to be integrated")
-    return UpgoingVelocity(excitation, float(dt), 0.5 if outcrop else 1.0)
+    step = real(dt)
+    if not 0.0 < step < math.inf:
+        raise InputError(f"upgoing: dt is {shown(dt)}; give the step in seconds with which {type(excitation).__name__} "
+                         "is to be integrated")
+    return UpgoingVelocity(excitation, step, 0.5 if outcrop else 1.0)

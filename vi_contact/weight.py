@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from .algebra import Array
+from .checks import array, instance, number
 from .errors import InputError
 from .ground_motion import STANDARD_GRAVITY
 from .system import SemiDiscreteSystem
@@ -20,7 +21,8 @@ def with_weight(
     acceleration: g [m/s²]; direction: where it acts, of length one, (0, -1) or (0, 0, -1) by default, in one dimension
     (-1,). It is the load of ``BodyForce`` with the density of every material. InputError as for ``own_weight``.
     """
-    load = replace(system.load, constant=system.load.constant + own_weight(system, acceleration, direction))
+    weight = own_weight(system, acceleration, direction)
+    load = replace(system.load, constant=system.load.constant + weight)
     return replace(system, load=load, _cache={})
 
 
@@ -32,8 +34,11 @@ def own_weight(
     InputError for a direction of another length or number of components, and for a system without ``base_inertia``,
     which has lost the mass at held nodes.
     """
+    instance("with_weight", "system", system, SemiDiscreteSystem, "give a system, such as fem.assemble returns")
+    number("with_weight", "acceleration", acceleration, unit="m/s²")
     d = system.influence.shape[1]
-    way = np.array([0.0] * (d - 1) + [-1.0]) if direction is None else np.array(direction, dtype=float)
+    down = (*(0.0,) * (d - 1), -1.0)
+    way = array("with_weight", "direction", down if direction is None else direction, (None,))
     if way.shape != (d,) or not np.isclose(np.linalg.norm(way), 1.0):
         raise InputError(f"the direction {tuple(way)} of gravity: give {d} components of a vector of length one")
     if system.base_mass is None:

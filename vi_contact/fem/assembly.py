@@ -11,15 +11,17 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
+from weakref import WeakSet
 
 import numpy as np
 import ufl
 
 from ..algebra import Array, Mask
 from ..errors import InputError
-from ..materials import Damping, LinearElastic, NoDamping, PlaneStrain, Section, Solid
+from ..materials import Damping, LinearElastic, Section
 from ..system import Load, SemiDiscreteSystem
 from . import compat
+from .assembly_checks import check_body, check_boundaries, check_initial
 from .dashpots import CompliantBase, DashpotMatrix, Dashpots, incoming, tell
 from .free_field import free_field_loads
 from .loads import BodyForce, Prescribed, TangentialTraction, Traction, as_tuple, evaluate, is_constant
@@ -64,15 +66,17 @@ def assemble(
         initial_displacement, initial_velocity: constant or points (k, d) -> (k, d) (eqs. 10, 10a), or (cells, value)
             pairs for several bodies; the later pair counts where cells meet, zero where there are none.
     Raises:
-        InputError: cells without material, NaN in data, components that do not exist, dashpots on what is held.
+        InputError: cells without material, NaN in data, components that do not exist, dashpots on what is held, groups
+            of another mesh or kind, other displacements prescribed on the same facets.
     """
-    section = section or (PlaneStrain() if mesh.geometry.dim == 2 else Solid())
-    conditions = tuple(Prescribed(facets) for facets in as_tuple(clamped)) + as_tuple(prescribed)
-    space = FemSpace(mesh, conditions, as_tuple(tied))
-    forms = ElasticForms(space, cell_materials(mesh, material), section, damping or NoDamping())
+    section, damping = check_body(mesh, material, section, damping, base_inertia)
+    held, moved, boundaries = as_tuple(clamped), as_tuple(prescribed), as_tuple(dashpots)
+    check_boundaries(mesh, held, moved, as_tuple(tied), boundaries, as_tuple(loads))
+    check_initial(mesh, displacement=initial_displacement, velocity=initial_velocity)
+    space = FemSpace(mesh, tuple(Prescribed(facets) for facets in held) + moved, as_tuple(tied))
+    forms = ElasticForms(space, cell_materials(mesh, material), section, damping)
     algebra = PetscAlgebra(mesh.comm)
     mass, stiffness, damper = forms.matrices()
-    boundaries = as_tuple(dashpots)
     absorbers = [DashpotMatrix(space, forms, one) for one in boundaries]
     dampers = [(1.0, PetscMatrix(one)) for one in (damper, *(one.mat for one in absorbers)) if one is not None]
     damper = as_petsc(algebra.combine(dampers)).mat if dampers else None
@@ -81,8 +85,7 @@ def assemble(
     def reduced(full: Any) -> PetscMatrix:
         return PetscMatrix(full.PtAP(space.selection))
 
-    rigid = np.column_stack([space.restrict(np.tile(e, (len(space.nodes), 1))) for e in np.eye(space.dimension)])
-    M = reduced(mass)
+    rigid, M = _rigid(space), reduced(mass)
     system = SemiDiscreteSystem(
         algebra=algebra,
         M=M,
@@ -98,9 +101,15 @@ def assemble(
         tied=space.tied_unknowns,
         notes=tell(boundaries, mesh.comm.rank),
         absolute=any(isinstance(one, CompliantBase) for one in boundaries),
+        paces=tuple(pace for one in (*moved, *boundaries) for pace in one.paces),
     )
-    space.forms = forms
+    forms.own(system)
     return system
+
+
+def _rigid(space: FemSpace) -> Array:
+    """(n, d) unit translations of the free unknowns."""
+    return np.column_stack([space.restrict(np.tile(e, (len(space.nodes), 1))) for e in np.eye(space.dimension)])
 
 
 def with_waves(load: Load, absorbers: Sequence[DashpotMatrix], forms: ElasticForms) -> Load:
@@ -132,6 +141,18 @@ class ElasticForms:
             for name, value in zip(names, values, strict=True):
                 self.fields[name].x.array[indices] = section.thickness * value if name != "beta" else value
         self.damped = any(any(damping.coefficients(material)) for _, material in materials)
+        self._matrices: dict[str, WeakSet[Any]] = {name: WeakSet() for name in ("M", "C", "K")}
+
+    def own(self, system: SemiDiscreteSystem) -> None:
+        """Remembers the matrices of a system as made of these materials; the forms are then those of its space."""
+        self.space.forms = self
+        for name, known in self._matrices.items():
+            if getattr(system, name) is not None:
+                known.add(getattr(system, name))
+
+    def foreign(self, system: SemiDiscreteSystem, names: str) -> str:
+        """Which of these matrices of a system were not made of these materials: letters of ``names``."""
+        return "".join(name for name in names if getattr(system, name) not in (None, *self._matrices[name]))
 
     def stress(self, u: Any) -> Any:
         """sigma(u) times the thickness."""

@@ -8,6 +8,7 @@ import numpy.typing as npt
 from vi_contact.bem.boundary_mesh import BoundaryMesh, from_segments
 from vi_contact.errors import InputError
 from vi_contact.fem import compat
+from vi_contact.fem.groups import facets_of
 from vi_contact.fem.mesh import Facets, node_numbers
 
 
@@ -17,6 +18,8 @@ def boundary_curve(*facets: Facets) -> tuple[BoundaryMesh, npt.NDArray[np.int64]
     Label of an element = position of its group among the arguments. Raises InputError when the mesh is not plane, the
     groups overlap or the curves are open. Collective.
     """
+    for group in facets:
+        facets_of("boundary_curve", "a group", group, getattr(facets[0], "mesh", None))
     if not facets or facets[0].mesh.geometry.dim != 2:
         raise InputError("boundary_curve: give boundary groups of a plane mesh; boundary elements are two-dimensional")
     mesh = facets[0].mesh

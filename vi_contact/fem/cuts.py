@@ -9,6 +9,7 @@ import numpy as np
 from ..algebra import Array, Mask
 from ..errors import InputError
 from . import compat
+from .groups import cells_of
 from .mesh import Cells
 from .space import FemSpace
 
@@ -41,7 +42,7 @@ def find_cut(space: FemSpace, name: str, ends: Array, group: Cells | None) -> Cu
     tol = ON_LINE * length
     x = space.mesh.geometry.x[compat.geometry_dofmap(space.mesh)][:, :, :2] - ends[0]
     inside = np.zeros(len(x), dtype=bool)
-    inside[slice(None) if group is None else group.indices] = True
+    inside[slice(None) if group is None else cells_of(f"section '{name}'", "cells", group, space.mesh).indices] = True
     sides = _Sides(x @ along, x @ across, length, tol)
     on = (np.abs(sides.d) <= tol) & (sides.s >= -tol) & (sides.s <= length + tol)
     _refuse(space, name, inside, sides)

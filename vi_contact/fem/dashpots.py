@@ -18,17 +18,19 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from math import isfinite
-from numbers import Real
+from math import inf
 from typing import Any
 
 import numpy as np
 import ufl
 
 from ..algebra import Array
+from ..checks import function, instance, real, shown
 from ..errors import InputError
 from ..materials import LinearElastic
+from ..system import Pace
 from . import compat
+from .groups import facets_of
 from .mesh import Facets
 from .petsc_algebra import PetscMatrix
 from .space import FemSpace
@@ -50,10 +52,19 @@ class Dashpots:
     tangential: float = 1.0
 
     def __post_init__(self) -> None:
+        owner = type(self).__name__
+        facets_of(owner, "facets", self.facets)
+        if self.material is not None:
+            instance(owner, "material", self.material, LinearElastic, "give a LinearElastic, or None")
         for name in ("normal", "tangential"):
             value = getattr(self, name)
-            if not isinstance(value, Real) or not isfinite(value) or value < 0.0:
-                raise InputError(f"{type(self).__name__} factor {name} is {value!r}: give zero or a positive number")
+            if not 0.0 <= real(value) < inf:
+                raise InputError(f"{owner} factor {name} is {shown(value)}: give zero or a positive number")
+
+    @property
+    def paces(self) -> tuple[Pace, ...]:
+        """Of motions that were computed with time steps of their own: none here."""
+        return ()
 
     @property
     def expects(self) -> str:
@@ -66,6 +77,10 @@ class CompliantBase(Dashpots):
     """Dashpots and the upgoing wave ``motion``: t [s] -> v_up (d,) [m/s], half the outcrop velocity (``upgoing``)."""
 
     motion: Callable[[float], Array] = field(repr=False)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        function("CompliantBase", "motion", self.motion, "give upgoing(record), or a function of the time [s]")
 
     @property
     def expects(self) -> str:
@@ -121,8 +136,8 @@ class DashpotMatrix:
         columns, name = factor * np.column_stack(rows), type(self.dashpots).__name__
 
         def load(t: float) -> Array:
-            v = np.asarray(motion(t), dtype=float)
-            if v.shape != (len(rows),) or not np.all(np.isfinite(v)):
+            v = np.asarray(motion(t))
+            if v.dtype.kind not in "iuf" or v.shape != (len(rows),) or not np.all(np.isfinite(v)):
                 raise InputError(f"{name}: motion({t:g}) is {v}: return {len(rows)} finite velocities")
             return np.asarray(columns @ v)
 

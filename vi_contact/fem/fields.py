@@ -25,12 +25,13 @@ import h5py
 import numpy as np
 
 from ..algebra import Array, Indices, Mask
+from ..checks import real, shown
 from ..errors import InputError
 from ..output import FIELDS, FIELDS_INDEX, hdf5_image, on_root, write_atomically
 from ..step import ContactProblem, Report, State
 from . import compat
 from .mesh import node_numbers
-from .space import FemSpace
+from .space import FemSpace, known_matrices, space_of
 from .stress import VonMises
 
 _VTK_ORDER = {"Quadrilateral": [0, 1, 3, 2], "Hexahedron": [0, 1, 3, 2, 4, 5, 7, 6]}
@@ -52,13 +53,13 @@ class XDMF:
     every: int = 10
 
     def __post_init__(self) -> None:
-        if self.every < 1:
-            raise InputError(f"XDMF every is {self.every}: give a number of steps >= 1")
+        if not 1.0 <= real(self.every) < np.inf or self.every != int(self.every):
+            raise InputError(f"XDMF every is {shown(self.every)}: give a number of steps >= 1")
 
     def open(self, problem: ContactProblem, folder: Path, kept: Mapping[int, float]) -> Frames:
         """Writes the mesh; goes on after the frames of ``kept`` (step -> time) that are in the folder. Collective."""
-        if not isinstance(problem.system.space, FemSpace) or problem.system.space.forms is None:
-            raise InputError("XDMF needs a system made by fem.assemble")
+        space_of("XDMF", problem.system)
+        known_matrices("XDMF, von_mises", problem.system, "K")
         return Frames(problem, folder, kept)
 
 

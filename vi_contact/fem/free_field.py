@@ -20,14 +20,18 @@ from typing import Any
 import numpy as np
 
 from ..algebra import Array
-from ..alongside import Alongside
+from ..alongside import Alongside, given_steps
 from ..base_motion import BaseMotion
+from ..checks import provides
 from ..errors import InputError
 from ..excitation import Excitation
 from ..materials import Section
+from ..problem_checks import EXCITATION
+from ..run_checks import check_scheme
 from ..schemes.trapezoidal import Trapezoidal
 from ..soil_column import SoilColumn
 from ..step import Scheme
+from ..system import Pace
 from ..time_steps import Schedule
 from . import compat
 from .dashpots import CompliantBase, DashpotMatrix, Dashpots
@@ -42,12 +46,34 @@ class FreeField(Dashpots):
     """One vertical side of a body in the plane, its lowest node at the base.
 
     ``base``: the run's excitations (rigid base, frame of the ground), its ``BaseMotion`` (prescribed base) or its
-    ``CompliantBase``. ``dt`` [s] and ``scheme`` (Trapezoidal() when None) must be those of the run, from t = 0.
+    ``CompliantBase``. ``dt`` [s] and ``scheme`` (Trapezoidal() when None) must be those of the run, from t = 0:
+    ``march`` refuses others.
     """
 
     base: Base = field(repr=False)
     dt: float | Schedule
     scheme: Scheme | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        given_steps(self.dt)
+        check_scheme("FreeField", self.scheme)
+        if isinstance(self.base, BaseMotion | CompliantBase):
+            return
+        for one in self.base if isinstance(self.base, Sequence) else (self.base,):
+            remedy = "give the excitations of the run, its BaseMotion or its CompliantBase"
+            provides("FreeField", "base", one, EXCITATION, remedy)
+
+    @property
+    def rule(self) -> Scheme:
+        """The scheme that marches the column."""
+        return Trapezoidal() if self.scheme is None else self.scheme
+
+    @property
+    def paces(self) -> tuple[Pace, ...]:
+        """Its own, and that of the motion of its base."""
+        mine = Pace(f"FreeField on '{self.facets.name}'", self.rule, self.dt)
+        return (mine, self.base.pace) if isinstance(self.base, BaseMotion) else (mine,)
 
     @property
     def expects(self) -> str:
@@ -98,7 +124,7 @@ class FreeFieldSide:
         else:
             shaken = tuple(base) if isinstance(base, Sequence) else (base,)
             problem = column.on_rigid_base(lambda t: np.sum([one(t) for one in shaken], axis=0))
-        return Alongside(problem, scheme=self.given.scheme or Trapezoidal(), dt=self.given.dt)
+        return Alongside(problem, scheme=self.given.rule, dt=self.given.dt)
 
     def motion(self, t: float) -> tuple[Array, Array]:
         """(u_ff, v_ff) at the heights of the column, (n+1, 2), in the frame of the run."""

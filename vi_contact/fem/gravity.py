@@ -20,12 +20,12 @@ from typing import Any
 import ufl
 
 from ..algebra import Array
-from ..errors import InputError
+from ..run_checks import check_problem_given, check_sizes
 from ..step import ContactProblem, State
 from ..system import Load, SemiDiscreteSystem
 from . import compat
 from .petsc_algebra import PetscMatrix
-from .space import FemSpace
+from .space import FemSpace, known_matrices, space_of
 
 
 def geometric_stiffness(problem: ContactProblem, state: State) -> SemiDiscreteSystem:
@@ -42,9 +42,10 @@ def geometric_stiffness(problem: ContactProblem, state: State) -> SemiDiscreteSy
     Raises:
         InputError: a system that fem.assemble did not make.
     """
-    system, space = problem.system, problem.system.space
-    if not isinstance(space, FemSpace):
-        raise InputError("geometric_stiffness needs a system made by fem.assemble")
+    check_problem_given("geometric_stiffness", problem)
+    system, space = problem.system, space_of("geometric_stiffness", problem.system)
+    check_sizes("geometric_stiffness", problem, state)
+    known_matrices("geometric_stiffness", system, "K")
     u0 = problem.cartesian(state.u)
     full = initial_stress_matrix(space, space.expand(u0, state.t))
     reduced = PetscMatrix(full.PtAP(space.selection))
@@ -52,7 +53,10 @@ def geometric_stiffness(problem: ContactProblem, state: State) -> SemiDiscreteSy
     if any(condition.moves for condition in space.prescribed):
         load = _with_prescribed(space, PetscMatrix(full), load, state.t)
     K = system.algebra.combine([(1.0, system.K), (1.0, reduced)])
-    return replace(system, K=K, load=load, _cache={})
+    stiffer = replace(system, K=K, load=load, _cache={})
+    if not space.forms.foreign(system, "K"):
+        space.forms.own(stiffer)
+    return stiffer
 
 
 def initial_stress_matrix(space: FemSpace, nodal: Array) -> Any:

@@ -6,14 +6,16 @@ interpolated at the nodes and then integrated exactly, so a load costs one spars
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ..algebra import Array, Comm
-from ..errors import InputError
+from ..checks import function, refuse, shown
+from ..system import Pace
+from .groups import components_given, facets_of, field_given
 from .mesh import Facets
 
 Field = Callable[[Array, float], Array]
@@ -31,10 +33,10 @@ def evaluate_here(name: str, value: Value, points: Array, t: float) -> tuple[Arr
     """(values at the points, what is wrong with them or an empty text); zeros where something is wrong."""
     if len(points) == 0:
         return np.zeros_like(points), ""  # users' functions need not cope with no points
-    if callable(value):
-        result = np.asarray(value(points, t), dtype=float)
-    else:
-        result = np.tile(np.asarray(value, dtype=float), (len(points), 1))
+    result = np.asarray(value(points, t)) if callable(value) else np.tile(np.asarray(value), (len(points), 1))
+    if result.dtype.kind not in "iuf":
+        return np.zeros_like(points), f"{name} returned {shown(result)}: return real numbers"
+    result = result.astype(float, copy=False)
     if result.shape != points.shape:
         shape = f"shape {result.shape} for {len(points)} points"
         return np.zeros_like(points), f"{name} returned {shape}: return {points.shape[1]} components per point"
@@ -42,13 +44,6 @@ def evaluate_here(name: str, value: Value, points: Array, t: float) -> tuple[Arr
         where = f"NaN or infinite values at t = {t:g} s"
         return np.zeros_like(points), f"{name} contains {where}: check its function or data"
     return result, ""
-
-
-def refuse(defects: Sequence[str], comm: Comm) -> None:
-    """InputError on all ranks with the first text that is not empty; collective."""
-    if comm.max(np.array([float(any(defects))]))[0]:
-        found = comm.bcast(comm.gather(list(defects)))
-        raise InputError(next(text for texts in found for text in texts if text))
 
 
 def _zero(points: Array, t: float) -> Array:
@@ -70,6 +65,12 @@ class Prescribed:
     acceleration: Value = _zero
     components: tuple[int, ...] | None = None
 
+    def __post_init__(self) -> None:
+        facets_of("Prescribed", "facets", self.facets)
+        for name in ("displacement", "velocity", "acceleration"):
+            field_given("Prescribed", name, getattr(self, name))
+        components_given("Prescribed", self.components)
+
     @property
     def motions(self) -> tuple[Value, Value, Value]:
         """(U, U', U'')."""
@@ -79,6 +80,27 @@ class Prescribed:
     def moves(self) -> bool:
         """False for a clamped part."""
         return any(value is not _zero for value in self.motions)
+
+    @property
+    def paces(self) -> tuple[Pace, ...]:
+        """Of motions that were computed with time steps of their own, such as those of ``BaseMotion``."""
+        owners = {id(owner): owner for owner in (getattr(value, "__self__", None) for value in self.motions)}
+        found = (getattr(owner, "pace", None) for owner in owners.values())
+        return tuple(pace for pace in found if isinstance(pace, Pace))
+
+    def same_motion(self, other: Prescribed) -> bool:
+        """Whether both say the same of the components that both prescribe."""
+        mine, theirs = self.components, other.components
+        apart = mine is not None and theirs is not None and not set(mine) & set(theirs)
+        return apart or all(_same(one, two) for one, two in zip(self.motions, other.motions, strict=True))
+
+
+def _same(one: Value, other: Value) -> bool:
+    """Whether two values are one, or equal constants; a function that is not given is zero."""
+    if callable(one) and callable(other):
+        return one == other
+    constants = [0.0 if value is _zero else value for value in (one, other)]
+    return not any(callable(value) for value in constants) and bool(np.all(constants[0] == np.asarray(constants[1])))
 
 
 @dataclass(frozen=True)
@@ -91,6 +113,10 @@ class Traction:
     facets: Facets
     value: Value
     history: Callable[[float], float] | None = None
+
+    def __post_init__(self) -> None:
+        facets_of(type(self).__name__, "facets", self.facets)
+        _check_load(self)
 
 
 @dataclass(frozen=True)
@@ -105,6 +131,17 @@ class BodyForce:
 
     value: Value
     history: Callable[[float], float] | None = None
+
+    def __post_init__(self) -> None:
+        _check_load(self)
+
+
+def _check_load(load: Traction | BodyForce) -> None:
+    """InputError for a value or a history of another kind."""
+    owner = type(load).__name__
+    field_given(owner, "value", load.value)
+    if load.history is not None:
+        function(owner, "history", load.history, "give a function of the time [s], or None")
 
 
 def is_constant(load: Traction | BodyForce) -> bool:

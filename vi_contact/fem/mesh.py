@@ -17,9 +17,11 @@ import numpy.typing as npt
 from dolfinx.mesh import Mesh
 from mpi4py import MPI
 
+from vi_contact.checks import instance, refuse, shown
 from vi_contact.errors import InputError
 from vi_contact.fem import compat
 from vi_contact.fem.compat import Indices
+from vi_contact.fem.petsc_algebra import MpiComm
 from vi_contact.meshes.extract import MeshArrays, arrays_from_file, arrays_from_script
 from vi_contact.meshes.gmsh_session import MeshScript
 from vi_contact.meshes.partition import destinations
@@ -34,20 +36,50 @@ _NOWHERE = (np.zeros(0, dtype=np.int32), np.zeros(1, dtype=np.int32))
 
 @dataclass(frozen=True, eq=False)
 class Facets:
-    """A named part of the boundary or of an inner surface: local facets, ghosts included, ascending."""
+    """A named part of the boundary or of an inner surface: local facets, ghosts included; kept ascending. Collective.
+
+    InputError, on all ranks, for numbers that are no facets of this mesh.
+    """
 
     name: str
     indices: Indices
     mesh: Mesh = field(repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "indices", _local_numbers(self, 1))
 
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """A named part of the body: local cells, ghosts included, ascending."""
+    """A named part of the body: local cells, ghosts included; kept ascending. Collective.
+
+    InputError, on all ranks, for numbers that are no cells of this mesh.
+    """
 
     name: str
     indices: Indices
     mesh: Mesh = field(repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "indices", _local_numbers(self, 0))
+
+
+def _local_numbers(group: Facets | Cells, codimension: int) -> Indices:
+    """The numbers of a group, each once, ascending."""
+    owner = type(group).__name__
+    instance(owner, "name", group.name, str, "give a text")
+    mesh = instance(owner, "mesh", group.mesh, Mesh, "give the DOLFINx mesh that the numbers belong to")
+    dim = mesh.topology.dim - codimension
+    mesh.topology.create_entities(dim)
+    local = mesh.topology.index_map(dim)
+    count, numbers, defect = local.size_local + local.num_ghosts, np.asarray(group.indices), ""
+    if numbers.ndim != 1 or (numbers.dtype.kind not in "iu" and numbers.size):
+        defect = f"{owner}: indices is {shown(group.indices)}; give local numbers, such as tags.find(value) returns"
+    elif numbers.size and not 0 <= numbers.min() <= numbers.max() < count:
+        defect = (f"{owner}: '{group.name}' has numbers from {numbers.min()} to {numbers.max()} but the mesh has "
+                  f"{count} {owner.lower()} here, counted from 0: give numbers of this mesh")
+    refuse([defect], MpiComm(mesh.comm))
+    return np.unique(numbers).astype(np.int32)
 
 
 class Tags(dict[str, Any]):

@@ -17,15 +17,25 @@ import scipy.sparse as sp
 import ufl
 
 from ..algebra import Array, Mask
+from ..checks import array, instance
 from ..errors import InputError
 from ..step import ContactProblem, Report, State
 from . import compat
+from .groups import facets_of
 from .loads import BodyForce, TangentialTraction, Traction, as_tuple, evaluate, is_constant
-from .space import FemSpace
+from .space import FemSpace, known_matrices, space_of
 
 log = logging.getLogger(__name__)
 
 Loads = Traction | BodyForce | Sequence[Traction | BodyForce]
+
+
+def check_actions(owner: str, loads: Any, gravity: Any) -> None:
+    """InputError unless these are loads, as for ``fem.assemble``, and an acceleration."""
+    for load in as_tuple(loads):
+        instance(owner, "loads", load, (Traction, BodyForce), "give the loads of fem.assemble")
+    if gravity is not None:
+        array(owner, "gravity", gravity, (None,), unit="m/s²")
 
 
 class NodalWork:
@@ -38,10 +48,13 @@ class NodalWork:
     """
 
     def __init__(self, problem: ContactProblem, loads: Loads = (), gravity: Sequence[float] | None = None) -> None:
-        space = problem.system.space
-        if not isinstance(space, FemSpace) or space.forms is None:
-            raise InputError("reactions and section forces need a system made by fem.assemble")
+        space = space_of("NodalWork", problem.system)
+        known_matrices("reactions and section forces", problem.system, "MCK")
         self._problem, self.space, self._loads = problem, space, as_tuple(loads)
+        check_actions("NodalWork", loads, gravity)
+        for load in self._loads:
+            if isinstance(load, Traction):
+                facets_of("NodalWork", "the facets of loads", load.facets, space.mesh)
         self._gravity = np.zeros(space.dimension) if gravity is None else np.asarray(gravity, dtype=float)
         if self._gravity.shape != (space.dimension,):
             raise InputError(f"gravity has {self._gravity.size} components: give {space.dimension}")

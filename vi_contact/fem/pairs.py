@@ -20,6 +20,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..algebra import Array, Mask
+from ..checks import provides
 from ..errors import InputError
 from ..surfaces import ContactSurface
 from ..system import SemiDiscreteSystem
@@ -29,7 +30,7 @@ from .frames import Conditions, Facing, Frames, Nodes, at, joined_nodes, surface
 from .matching import Matched, Matching, NodeToNode, Side
 from .mesh import Facets, node_numbers
 from .space import FemSpace
-from .trace import listed, nodes_on, snapped
+from .trace import contact_space, listed, nodes_on, snapped
 
 log = logging.getLogger(__name__)
 
@@ -61,9 +62,9 @@ def contact_pair(
         InputError: sides that do not pair or do not face each other, bodies that overlap, sides of one and the same
             boundary, contact directions that are partly prescribed, clamped nodes that face free ones.
     """
-    space = system.space
-    if not isinstance(space, FemSpace):
-        raise InputError("contact_pair needs a system made by fem.assemble")
+    space = contact_space("contact_pair", system, {"facets1": facets1, "facets2": facets2}, points)
+    if matching is not None:
+        provides("contact_pair", "matching", matching, ("match",), "give NodeToNode() or DualMortar(), or None")
     angle = checked_angle("contact_pair", feature_angle)
     one, two = side_of(space, facets1), side_of(space, facets2)
     shared = np.isin(one.nodes.numbers, two.nodes.numbers)
@@ -73,7 +74,7 @@ def contact_pair(
             "one, or cut the mesh open (meshes.cut.CutOpen)"
         )
     faces = _faces(space, one, boundary(space, facets1), angle)
-    nodes, matched = _by_face(faces, two, matching or NodeToNode(), space.size)
+    nodes, matched = _by_face(faces, two, NodeToNode() if matching is None else matching, space.size)
     kept = ~np.isin(nodes.numbers, two.nodes.numbers)
     nodes, matched = nodes.pick(kept), matched.pick(kept)
     free = _unclamped(space, one.name, nodes, two, matched)

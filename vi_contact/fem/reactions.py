@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from ..checks import array, column_name
 from ..errors import InputError
 from ..recorders import Columns, Row
 from ..step import ContactProblem, Report, State
+from .groups import facets_of
 from .mesh import Facets
-from .nodal_work import Loads, NodalWork, rigid_fields
+from .nodal_work import Loads, NodalWork, check_actions, rigid_fields
 from .space import FemSpace
 
 
@@ -50,8 +51,10 @@ class Reactions:
     gravity: Sequence[float] | None = None
 
     def __post_init__(self) -> None:
-        if not re.fullmatch(r"\w+", self.name, re.ASCII):
-            raise InputError(f"reaction name {self.name!r}: use letters, digits and underscores, it names columns")
+        column_name("reaction name", self.name)
+        facets_of("Reactions", "facets", self.facets)
+        array("Reactions", "the centre", self.centre, (None,), unit="metres")
+        check_actions("Reactions", self.loads, self.gravity)
 
     def columns(self) -> Columns:
         """Call ``start`` first."""
@@ -75,6 +78,7 @@ class Reactions:
             raise InputError(f"reactions '{self.name}': the centre has {len(self.centre)} coordinates, give "
                              f"{space.dimension}")
         held = np.zeros_like(space.held)
+        facets_of(f"reactions '{self.name}'", "facets", self.facets, space.mesh)
         blocks = space.facet_blocks(self.facets.indices)
         held[blocks] = space.held[blocks]
         if not space.comm.max(np.array([float(held.any())]))[0]:

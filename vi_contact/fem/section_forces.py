@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from ..checks import array, column_name, instance, several
 from ..errors import InputError
 from ..recorders import Columns, Row
 from ..step import ContactProblem, Report, State
 from .cuts import find_cut
+from .groups import cells_of
 from .mesh import Cells
-from .nodal_work import Loads, NodalWork, check_labels
+from .nodal_work import Loads, NodalWork, check_actions, check_labels
 
 _QUANTITIES = {
     "N": ("N", "normal force, tension positive,"),
@@ -50,9 +51,16 @@ class SectionForces:
     gravity: Sequence[float] | None = None
 
     def __post_init__(self) -> None:
-        for label in self.cuts:
-            if not re.fullmatch(r"\w+", str(label), re.ASCII):
-                raise InputError(f"section label {label!r}: use letters, digits and underscores, it names columns")
+        instance("SectionForces", "cuts", self.cuts, Mapping, "give labels and two ends each, {'base': (a, b)}")
+        for label, ends in self.cuts.items():
+            column_name("section label", label)
+            for end in several("SectionForces", f"the ends of '{label}'", ends, "give two points"):
+                array("SectionForces", f"an end of '{label}'", end, (None,), unit="metres")
+            if len(ends) != 2:
+                raise InputError(f"SectionForces: '{label}' has {len(ends)} ends; give two points")
+        if self.cells is not None:
+            cells_of("SectionForces", "cells", self.cells)
+        check_actions("SectionForces", self.loads, self.gravity)
 
     def columns(self) -> Columns:
         """N_<label>, V_<label>, M_<label>."""

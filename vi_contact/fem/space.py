@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
@@ -11,13 +12,36 @@ import scipy.sparse as sp
 from petsc4py import PETSc
 
 from ..algebra import Array, Indices, Mask
+from ..checks import instance, refuse
 from ..errors import InputError
+from ..system import SemiDiscreteSystem
 from . import compat
 from .bodies import body_numbers
-from .loads import Prescribed, evaluate_here, refuse
+from .loads import Prescribed, evaluate_here
 from .mesh import node_numbers
 from .petsc_algebra import MpiComm, PetscMatrix
 from .ties import Pairs, Tied, paired
+
+log = logging.getLogger(__name__)
+
+
+def space_of(owner: str, system: Any) -> FemSpace:
+    """The space of a system that fem.assemble made; InputError for anything else."""
+    instance(owner, "system", system, SemiDiscreteSystem, "give a system, such as fem.assemble returns")
+    if not isinstance(system.space, FemSpace) or system.space.forms is None:
+        raise InputError(f"{owner} needs a system made by fem.assemble")
+    return system.space
+
+
+def known_matrices(owner: str, system: SemiDiscreteSystem, names: str) -> None:
+    """Warns when M, C or K of a system is not what fem.assemble made, for outputs that go by the materials given there.
+
+    Springs added to K leave the stresses of the elements as they are; another material does not.
+    """
+    found = system.space.forms.foreign(system, names)  # type: ignore[attr-defined]
+    if found and system.algebra.comm.rank == 0:
+        log.warning("%s: %s of the system is not the one that fem.assemble made: this output goes by the materials, "
+                    "section and damping given there", owner, " and ".join(found))
 
 
 class FemSpace:

@@ -18,6 +18,7 @@ import numpy as np
 
 from ..algebra import Array, max_abs
 from ..errors import InputError
+from ..run_checks import check_problem_given, check_sizes
 from ..static import initial_state
 from ..step import ContactProblem, State
 from .space import FemSpace
@@ -33,6 +34,9 @@ def release(static: ContactProblem, state: State, problem: ContactProblem) -> tu
     and contact points, and a motion that starts from rest. t = 0.
     InputError for another mesh or other contact points, or when forces are missing where nothing was released.
     """
+    for one in (static, problem):
+        check_problem_given("release", one)
+    check_sizes("release", static, state)
     before, after = static.system.space, problem.system.space
     if not isinstance(before, FemSpace) or not isinstance(after, FemSpace) or before.mesh is not after.mesh:
         raise InputError("release needs two problems of fem.assemble on one mesh")

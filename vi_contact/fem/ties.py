@@ -18,6 +18,7 @@ import numpy as np
 
 from ..algebra import Array, Indices
 from ..errors import InputError
+from .groups import components_given, facets_of
 from .mesh import Facets
 
 if TYPE_CHECKING:
@@ -33,6 +34,11 @@ class Tied:
     first: Facets
     second: Facets
     components: tuple[int, ...] | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("first", "second"):
+            facets_of("Tied", name, getattr(self, name))
+        components_given("Tied", self.components)
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from ..algebra import Array
+from ..checks import array, provides, several
 from ..corners import PARALLEL
 from ..errors import InputError
-from ..surfaces import ContactSurface, Obstacle, Touching, admissible_gap
+from ..surfaces import ContactSurface, Obstacle, Touching, admissible_gap, facing
 from ..system import SemiDiscreteSystem
 from .faces import FEATURE_ANGLE, boundary, checked_angle, in_symmetry_planes, integrals, split, tell_corners
 from .frames import Conditions, Nodes, at, surface_of
+from .groups import facets_of
 from .mesh import Facets
-from .space import FemSpace
+from .space import FemSpace, space_of
 
 log = logging.getLogger(__name__)
 
@@ -47,16 +50,15 @@ def contact_surface(
         InputError: no contact nodes, a listed point that is clamped or not on the facets, a contact direction that is
             partly prescribed, initial penetration, a node with more faces than the body has dimensions.
     """
-    space = system.space
-    if not isinstance(space, FemSpace):
-        raise InputError("contact_surface needs a system made by fem.assemble")
+    space = contact_space("contact_surface", system, {"facets": facets}, points)
+    if obstacle is not None:
+        provides("contact_surface", "obstacle", obstacle, ("directions", "gap"), "give HalfSpace(…) or another")
     angle = checked_angle("contact_surface", feature_angle)
     whole = nodes_on(space, facets)
     whole = free_nodes(space, whole, facets.name) if points is None else listed(space, whole, points, facets.name)
     nodes, _ = split(space, boundary(space, facets), whole, angle)
-    obstacle = obstacle or Touching()
-    directions = snapped(np.asarray(obstacle.directions(nodes.points, nodes.normals), dtype=float))
-    gap = admissible_gap(np.asarray(obstacle.gap(nodes.points, nodes.normals), dtype=float), nodes.points, space.size)
+    directions, gap = facing(Touching() if obstacle is None else obstacle, nodes.points, nodes.normals)
+    directions, gap = snapped(directions), admissible_gap(gap, nodes.points, space.size)
     nodes, directions, gap = one_per_direction(whole, nodes, directions, gap)
     weights = nodes.weights * space.forms.section.thickness
     _refuse_tied(space, nodes, facets.name)
@@ -87,6 +89,19 @@ def one_per_direction(whole: Nodes, nodes: Nodes, directions: Array, gap: Array)
             weights[rows[0]] = total[node]  # to the last digit
     kept = [row for rows in home.values() for row in rows]
     return replace(nodes, weights=weights).pick(kept), directions[kept], gap[kept]
+
+
+def contact_space(
+    owner: str, system: SemiDiscreteSystem, groups: Mapping[str, Facets], points: Any
+) -> FemSpace:
+    """The space of a system; InputError for another kind, for groups of another mesh, and for a list of no points."""
+    space = space_of(owner, system)
+    for meaning, group in groups.items():
+        facets_of(owner, meaning, group, space.mesh)
+    for point in () if points is None else several(owner, "points", points, "give a list of points, or None"):
+        several(owner, "a point", point, f"give {space.dimension} coordinates")
+        array(owner, "a point", point, (None,))
+    return space
 
 
 def nodes_on(space: FemSpace, facets: Facets) -> Nodes:

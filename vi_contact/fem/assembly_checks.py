@@ -1,0 +1,98 @@
+"""Checks of what a body is assembled of: kinds of objects, groups of this mesh, conditions that do not contradict."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+from dolfinx.mesh import Mesh
+
+from ..checks import flag, instance, provides, refuse, several
+from ..errors import InputError
+from ..materials import Damping, LinearElastic, NoDamping, PlaneStrain, PlaneStress, Section, Solid
+from .dashpots import Dashpots
+from .groups import cells_of, facets_of, field_given
+from .loads import BodyForce, Prescribed, Traction
+from .petsc_algebra import MpiComm
+from .ties import Tied
+
+OWNER = "assemble"
+
+
+def check_body(mesh: Any, material: Any, section: Any, damping: Any, base_inertia: Any) -> tuple[Section, Damping]:
+    """(section, damping), the usual ones for None; InputError for a mesh, material, section or damping of another kind,
+    or cells of another mesh."""
+    instance(OWNER, "mesh", mesh, Mesh, "give a DOLFINx mesh, such as fem.read_mesh(path, comm)[0]")
+    if mesh.topology.dim != mesh.geometry.dim:
+        raise InputError(f"assemble: the mesh has cells of dimension {mesh.topology.dim} at points of "
+                         f"{mesh.geometry.dim} coordinates; read it with gdim={mesh.topology.dim}")
+    if not isinstance(material, LinearElastic):
+        remedy = "give a LinearElastic, or (cells, material) pairs"
+        for pair in several(OWNER, "material", material, remedy):
+            cells, one = _pair("material", pair, remedy)
+            cells_of(OWNER, "the cells of a material", cells, mesh)
+            instance(OWNER, "material", one, LinearElastic, remedy)
+    if section is None:
+        section = PlaneStrain() if mesh.geometry.dim == 2 else Solid()
+    damping = NoDamping() if damping is None else damping
+    provides(OWNER, "section", section, ("thickness", "elastic_constants"), "give PlaneStrain(), PlaneStress() or None")
+    if mesh.geometry.dim == 3 and isinstance(section, PlaneStrain | PlaneStress):
+        raise InputError(f"assemble: {section} is a section of a plane body and this one has three dimensions; give "
+                         "Solid(), or leave it out")
+    provides(OWNER, "damping", damping, ("coefficients",), "give Rayleigh(alpha, beta), MassProportional(c) or None")
+    flag(OWNER, "base_inertia", base_inertia)
+    return section, damping
+
+
+def check_boundaries(mesh: Mesh, clamped: Any, prescribed: Any, tied: Any, dashpots: Any, loads: Any) -> None:
+    """InputError, on all ranks, for conditions and loads of another kind or on groups of another mesh, and for
+    prescribed displacements that contradict each other on the same facets. Collective. All are tuples."""
+    for group in clamped:
+        facets_of(OWNER, "clamped", group, mesh)
+    for name, items, kinds in (
+        ("prescribed", prescribed, Prescribed), ("tied", tied, Tied), ("dashpots", dashpots, Dashpots),
+        ("loads", loads, (Traction, BodyForce)),
+    ):
+        called = kinds if isinstance(kinds, tuple) else (kinds,)
+        remedy = f"give {' or '.join(f'fem.{kind.__name__}(…)' for kind in called)}, or a list of them"
+        for item in items:
+            instance(OWNER, name, item, kinds, remedy)
+            for group in (getattr(item, one, None) for one in ("facets", "first", "second")):
+                if group is not None:
+                    facets_of(OWNER, f"the facets of {name}", group, mesh)
+    conditions = [Prescribed(group) for group in clamped] + list(prescribed)
+    refuse(_contradictions(conditions), MpiComm(mesh.comm))
+
+
+def _contradictions(conditions: Sequence[Prescribed]) -> Iterator[str]:
+    """Pairs that prescribe other values of one component on the same facets of this rank."""
+    for one, two in combinations(conditions, 2):
+        if not one.same_motion(two) and len(np.intersect1d(one.facets.indices, two.facets.indices)):
+            yield (f"assemble: boundary groups '{one.facets.name}' and '{two.facets.name}' share facets on which "
+                   "different displacements are prescribed: leave out the one or the other")
+
+
+def check_initial(mesh: Mesh, **values: Any) -> None:
+    """InputError unless each is None, a field, or (cells, field) pairs of this mesh."""
+    for name, value in values.items():
+        if value is not None:
+            _check_initial(mesh, f"initial_{name}", value)
+
+
+def _check_initial(mesh: Mesh, name: str, value: Any) -> None:
+    if isinstance(value, Sequence) and value and isinstance(value[0], tuple):
+        for pair in value:
+            cells, one = _pair(name, pair, "give (cells, value) pairs")
+            cells_of(OWNER, f"the cells of {name}", cells, mesh)
+            field_given(OWNER, name, one)
+        return
+    field_given(OWNER, name, value)
+
+
+def _pair(name: str, pair: Any, remedy: str) -> tuple[Any, Any]:
+    found = several(OWNER, f"a pair of {name}", pair, remedy)
+    if len(found) != 2:
+        raise InputError(f"{OWNER}: a pair of {name} has {len(found)} members; {remedy}")
+    return found[0], found[1]

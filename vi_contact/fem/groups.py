@@ -1,0 +1,60 @@
+"""Groups of facets and cells where they are given: the right kind, of the mesh they are used on.
+
+Their numbers are local ones of one mesh. On another mesh, or taken for those of cells, they would name other places.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from dolfinx.mesh import Mesh
+
+from ..checks import array, function, several, shown, whole
+from ..errors import InputError
+from .mesh import Cells, Facets
+
+Group = Facets | Cells
+
+
+def facets_of(owner: str, meaning: str, group: Any, mesh: Mesh | None = None) -> Facets:
+    """The boundary group, of this mesh if one is given; InputError, with the remedy, for anything else."""
+    found: Facets = _group(owner, meaning, group, mesh, Facets, Cells)
+    return found
+
+
+def cells_of(owner: str, meaning: str, group: Any, mesh: Mesh | None = None) -> Cells:
+    """The cell group, of this mesh if one is given; InputError, with the remedy, for anything else."""
+    found: Cells = _group(owner, meaning, group, mesh, Cells, Facets)
+    return found
+
+
+def _group(owner: str, meaning: str, group: Any, mesh: Mesh | None, wanted: type[Group], other: type[Group]) -> Any:
+    kinds = {Facets: "boundary group", Cells: "cell group"}
+    kind = kinds[wanted]
+    if isinstance(group, wanted):
+        if mesh is None or group.mesh is mesh:
+            return group
+        raise InputError(f"{owner}: {meaning} is the {kind} '{group.name}' of another mesh; give one of this mesh")
+    if isinstance(group, other):
+        raise InputError(f"{owner}: {meaning} is the {kinds[other]} '{group.name}'; give a {kind}")
+    if hasattr(group, "find") and hasattr(group, "indices"):
+        raise InputError(f"{owner}: {meaning} is a DOLFINx MeshTags, with several values; give "
+                         f"fem.{wanted.__name__}(name, tags.find(value), mesh) with the value that is meant")
+    raise InputError(f"{owner}: {meaning} is {shown(group)}; give a {kind}, such as tags['name'] of fem.read_mesh or "
+                     f"fem.{wanted.__name__}(name, numbers, mesh)")
+
+
+def field_given(owner: str, meaning: str, value: Any) -> None:
+    """InputError unless it is a function, or a vector of numbers (whose size and NaN are told where it is used)."""
+    if callable(value):
+        function(owner, meaning, value, "give numbers, one per dimension, or a function")
+        return
+    for one in several(owner, meaning, value, "give numbers, one per dimension, or a function of points and time"):
+        if not isinstance(one, float):  # NaN too
+            array(owner, f"a component of {meaning}", one, ())
+
+
+def components_given(owner: str, value: Any) -> None:
+    """InputError unless it is None or a tuple of whole numbers (whose range is told where they are used)."""
+    for one in () if value is None else several(owner, "components", value, "give a tuple, such as (0,), or None"):
+        whole(owner, "a component", one)
