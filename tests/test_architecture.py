@@ -17,8 +17,8 @@ pytestmark = pytest.mark.serial
 ROOT = Path(vi_contact.__file__).parent
 FILES = {path.relative_to(ROOT).with_suffix("").as_posix().replace("/", "."): path for path in ROOT.rglob("*.py")}
 RANKS = {  # by the first part of a module's name; what is not named is a worker
-    0: "algebra checks corners errors exact materials friction impact excitation ground_motion handing_over mass "
-       "meshes surfaces system",
+    0: "algebra checks corners errors exact materials friction impact excitation ground_motion handing_over "
+       "initial_gap mass meshes surfaces system",
     1: "step problem_checks",
     3: "models studies",
     4: "cli cli_case cli_channel cli_ida __main__ __init__",

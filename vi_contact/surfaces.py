@@ -72,7 +72,7 @@ class HalfSpace:
                 "give one per dimension"
             )
         away = normals @ self.unit_normal > 1e-9  # a side at right angles may touch with its edge
-        if np.any(away) and np.any(away & ~np.isin(_alike(points), _alike(points)[~away])):  # a corner has several
+        if np.any(away) and np.any(away & ~np.isin(alike(points), alike(points)[~away])):  # a corner has several
             raise InputError(
                 f"HalfSpace normal {self.normal} points away from the body: turn its sign, "
                 "it must point out of the obstacle towards the contact boundary"
@@ -263,41 +263,9 @@ def _spread(name: str, value: Any, shape: tuple[int, ...], t: float) -> Array:
     return np.broadcast_to(found.astype(float), shape)
 
 
-def _alike(points: Array) -> Indices:
+def alike(points: Array) -> Indices:
     """A number (k,) for every point, equal where points coincide."""
     return np.asarray(np.unique(points, axis=0, return_inverse=True)[1], dtype=np.int64).ravel()
-
-
-def facing(obstacle: Obstacle, points: Array, normals: Array) -> tuple[Array, Array]:
-    """(contact directions (m, d), gaps (m,)) of an obstacle; InputError for other shapes, what are no real numbers, and
-    directions that point into the body: away from its outward normals (at right angles it may touch with an edge)."""
-    owner, m = type(obstacle).__name__, len(points)
-    directions = array(owner, "what directions returns", obstacle.directions(points, normals), points.shape)
-    length = np.linalg.norm(directions, axis=1)
-    wrong = np.flatnonzero((np.sum(directions * normals, axis=1) < -1e-9 * length) | ~(length > 0.0))
-    if len(wrong):
-        where = ", ".join(f"{x:g}" for x in points[wrong[0]])
-        raise InputError(f"{owner}: the contact direction at ({where}) points into the body or has no length; give "
-                         "unit vectors from the body to the obstacle")
-    gap = np.asarray(obstacle.gap(points, normals))
-    if gap.shape != (m,) or gap.dtype.kind not in "iuf":
-        raise InputError(f"{owner}: gap returned {gap.dtype} of shape {gap.shape} for {m} points; return one real gap "
-                         "per point")
-    return directions, gap.astype(float)
-
-
-def admissible_gap(gap: Array, points: Array, size: float) -> Array:
-    """The initial gap with round-off (1e-12 of the body's size) removed; InputError where the body penetrates."""
-    if not np.all(np.isfinite(gap)):
-        raise InputError("the initial gap contains NaN or infinite values: check the obstacle's gap function")
-    if len(gap) and gap.min() < -1e-12 * size:
-        worst = int(np.argmin(gap))
-        where = ", ".join(f"{x:g}" for x in points[worst])
-        raise InputError(
-            f"the body penetrates its obstacle by {-gap[worst]:.3g} m at ({where}) before the first step: "
-            "move the obstacle or the mesh so that every initial gap is >= 0"
-        )
-    return np.maximum(gap, 0.0)
 
 
 def nodal_frames(directions: Array) -> Array:

@@ -24,8 +24,9 @@ from ..algebra import Array, Indices, Mask, SerialAlgebra, SerialComm, SerialMat
 from ..checks import array, flag, function, instance, integers, provides
 from ..errors import InputError
 from ..friction import FrictionLaw, Frictionless
+from ..initial_gap import admissible_gap
 from ..step import EffectiveMatrix, StepProblem
-from ..surfaces import ContactSurface, Obstacle, Touching, admissible_gap, nodal_frames
+from ..surfaces import ContactSurface, Obstacle, Touching, nodal_frames
 from .boundary_mesh import BoundaryMesh
 from .energetic import summed
 from .poincare_steklov import CondensedCompliance

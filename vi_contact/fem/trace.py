@@ -13,7 +13,8 @@ from ..algebra import Array
 from ..checks import array, provides, several
 from ..corners import PARALLEL
 from ..errors import InputError
-from ..surfaces import ContactSurface, Obstacle, Touching, admissible_gap, facing
+from ..initial_gap import admissible_gap, facing
+from ..surfaces import ContactSurface, Obstacle, Touching
 from ..system import SemiDiscreteSystem
 from .faces import FEATURE_ANGLE, boundary, checked_angle, in_symmetry_planes, integrals, split, tell_corners
 from .frames import Conditions, Nodes, at, surface_of
