@@ -1,11 +1,11 @@
-# Sourced by .ci/run, as root: a tree of the other Debian release, kept between runs, to run the suite in.
+# Sourced by .ci/run, as root: trees of the other Debian release and of sid, kept between runs, to run the suite in.
 # A function that cannot do its work returns non-zero and leaves one sentence in $why.
 
 other_release() {
   case $(. /etc/os-release && echo "${VERSION_CODENAME:-}") in
     bookworm) release=trixie ;;
-    trixie) release=bookworm ;;
-    *) why="this is neither Debian 12 nor 13"; return 1 ;;
+    trixie | sid) release=bookworm ;;
+    *) why="this is no Debian 12, 13 or sid"; return 1 ;;
   esac
 }
 
@@ -37,6 +37,9 @@ fill_tree() {
   tar -C "$root" --exclude=./.venv --exclude=__pycache__ -cf - . | tar -C "$tree/srv/vi_contact" --no-same-owner -xf -
   said=$(in_tree "$tree" bash -c '. /srv/vi_contact/install/setup.sh; vi_setup' 2>&1) || { why=$(tail -n 1 <<<"$said"); return 1; }
 }
+
+# in_tree FOLDER bash -c "$as_user" - COMMAND…: as an ordinary user, who does not own the clone.
+as_user='id vi >/dev/null 2>&1 || useradd -m vi; exec runuser -u vi -- env HOME=/home/vi "$@"'
 
 # in_tree FOLDER COMMAND…: in namespaces of its own, so that its mounts and its processes end with it, however it ends.
 # The time it may take is what is left of the budget.
