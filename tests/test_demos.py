@@ -15,6 +15,7 @@ import h5py
 import numpy as np
 import pytest
 
+from vi_contact.cli import main
 from vi_contact.ground_motion import Record, pga, read_record
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -138,19 +139,25 @@ BAD = {
 }
 
 
-@pytest.mark.slow
 @pytest.mark.serial
 @pytest.mark.parametrize("name", BAD)
-def test_bad_input_is_one_sentence(tmp_path: Path, name: str) -> None:
+def test_bad_input_is_one_sentence(
+    tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     """Exit status 1, one line on standard error that names the thing and the remedy; nothing computed or written."""
     arguments, words = BAD[name]
     (tmp_path / "file").write_text("in the way")
     (tmp_path / "binary.at2").write_bytes(b"\0\1\2")
     before = sorted(tmp_path.rglob("*"))
-    done = vi_contact(tmp_path, "wall", *arguments)
-    assert done.returncode == 1 and done.stdout == ""
-    assert done.stderr.startswith("vi-contact: ") and done.stderr.count("\n") == 1
-    assert [word for word in words if word not in done.stderr] == []
+    if name == "missing record":  # one as users do it; the others in this process, which is quicker
+        done = vi_contact(tmp_path, "wall", *arguments)
+        status, out, err = done.returncode, done.stdout, done.stderr
+    else:
+        monkeypatch.chdir(tmp_path)
+        status, (out, err) = main(["wall", *arguments]), capsys.readouterr()
+    assert status == 1 and out == ""
+    assert err.startswith("vi-contact: ") and err.count("\n") == 1
+    assert [word for word in words if word not in err] == []
     assert sorted(tmp_path.rglob("*")) == before and (tmp_path / "file").read_text() == "in the way"
 
 
