@@ -102,6 +102,13 @@ def only_there(x: Array, t: float) -> Array:
     return np.where((x > 1.9).all(axis=1)[:, None] if x.shape[1] > 1 else x > 1.9, np.nan, 1.0) * np.ones_like(x)
 
 
+def fails_there(x: Array, t: float) -> Array:
+    """A function of a user with a mistake that shows at one corner of the body only."""
+    if (x > 1.9).all(axis=1).any():
+        raise ZeroDivisionError("no such place")
+    return np.zeros_like(x)
+
+
 def test_nan_and_shapes_are_refused_on_all_ranks():
     """Every kind of data, constant and callable; a callable is wrong on one rank only."""
     mesh, tags = block(COMM, lengths=(2.0, 2.0), divisions=(4, 4))
@@ -113,6 +120,9 @@ def test_nan_and_shapes_are_refused_on_all_ranks():
         ("BodyForce contains NaN or infinite values at t = 0 s", {"loads": BodyForce((0.0, float("inf")))}),
         ("initial displacement contains NaN", {"initial_displacement": lambda x: only_there(x, 0.0)}),
         ("initial velocity contains NaN", {"initial_velocity": (nan, 0.0)}),
+        (r"Traction at t = 0 s ended in ZeroDivisionError: no such place \(test_fem_loads.py, line \d+\): correct",
+         {"loads": Traction(tags["top"], fails_there, history=sin)}),
+        ("initial velocity at t = 0 s ended in Zero", {"initial_velocity": lambda x: fails_there(x, 0.0)}),
         (r"BodyForce returned shape \(\d+, 3\) .* return 2 components", {"loads": BodyForce((0.0, 0.0, 1.0))}),
         (r"initial velocity returned shape \(\d+,\)", {"initial_velocity": lambda x: x[:, 0]}),
         ("prescribed component 2 does not exist: give numbers from 0 to 1",
@@ -134,6 +144,7 @@ def test_nan_that_comes_with_time():
         ("Traction contains NaN or infinite values at t = 0.0035 s", {"loads": Traction(tags["top"], late)}),
         ("BodyForce contains NaN or infinite values at t = 0.0035 s", {"loads": BodyForce(late)}),
         ("prescribed motion on 'top' contains NaN", {"prescribed": Prescribed(tags["top"], late)}),
+        ("prescribed motion on 'top' at t = .* ended in Zero", {"prescribed": Prescribed(tags["top"], fails_there)}),
     ):
         problem = linear(assemble(mesh, CONCRETE, clamped=tags["bottom"], **data))
         with pytest.raises(InputError, match=sentence):

@@ -6,8 +6,10 @@ interpolated at the nodes and then integrated exactly, so a load costs one spars
 
 from __future__ import annotations
 
+import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -33,7 +35,12 @@ def evaluate_here(name: str, value: Value, points: Array, t: float) -> tuple[Arr
     """(values at the points, what is wrong with them or an empty text); zeros where something is wrong."""
     if len(points) == 0:
         return np.zeros_like(points), ""  # users' functions need not cope with no points
-    result = np.asarray(value(points, t)) if callable(value) else np.tile(np.asarray(value), (len(points), 1))
+    try:
+        result = np.asarray(value(points, t)) if callable(value) else np.tile(np.asarray(value), (len(points), 1))
+    except Exception as error:  # of a user's function, at the points of one rank: the others must not wait for it
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        said = f"{type(error).__name__}: {error} ({Path(place.filename).name}, line {place.lineno})"
+        return np.zeros_like(points), f"{name} at t = {t:g} s ended in {said}: correct its function"
     if result.dtype.kind not in "iuf":
         return np.zeros_like(points), f"{name} returned {shown(result)}: return real numbers"
     result = result.astype(float, copy=False)
