@@ -97,7 +97,7 @@ def test_ball_script_runs_by_file(tmp_path):
     script = Path(__file__).resolve().parents[1] / "meshes" / "ball.py"
     options = ["--radius", "0.01", "--size", "2e-4", "--foot", "8e-4", "--eighth", "-o", "ball.msh"]
     done = subprocess.run(
-        [sys.executable, str(script), *options], cwd=tmp_path, capture_output=True, text=True, timeout=120,
+        [sys.executable, str(script), *options], cwd=tmp_path, capture_output=True, text=True, timeout=600,
         env=dict(os.environ), check=False,
     )
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")

@@ -87,7 +87,7 @@ def vi_contact(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str
     quiet = f'. "{ROOT}/install/setup.sh"; vi_clean_environment; vi_mpi_environment; exec "$0" "$@"'
     return subprocess.run(
         ["bash", "-c", quiet, sys.executable, "-m", "vi_contact", *arguments],
-        cwd=folder, capture_output=True, encoding="utf-8", timeout=300,
+        cwd=folder, capture_output=True, encoding="utf-8", timeout=600,
         env=dict(os.environ),  # see shell() in test_cli.py
     )
 

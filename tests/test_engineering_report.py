@@ -168,7 +168,7 @@ def test_example_of_the_documentation(tmp_path: Path) -> None:
     ready = "import numpy as np\n" + code[: code.index("solution = ")]
     (tmp_path / "example.py").write_text(ready + "\n".join(blocks), encoding="utf-8")
     done = subprocess.run(
-        [sys.executable, "example.py"], cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)}, timeout=300,
+        [sys.executable, "example.py"], cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)}, timeout=600,
         capture_output=True, encoding="utf-8",
     )
     assert done.returncode == 0, done.stderr

@@ -203,7 +203,7 @@ def test_a_written_mesh_reads_back_the_same_and_is_written_the_same_every_time(m
 
 def run(*arguments, cwd):
     command = [sys.executable, *map(str, arguments)]  # env: see shell() in test_cli.py
-    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=120, env=dict(os.environ))
+    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=600, env=dict(os.environ))
 
 
 def test_wall_script_runs_through_the_link_without_installation(tmp_path):

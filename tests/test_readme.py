@@ -31,7 +31,7 @@ def run(code: str, folder: Path) -> str:
     (folder / "example.py").write_text(code, encoding="utf-8")
     environment = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONIOENCODING": "utf-8"}
     done = subprocess.run(
-        [sys.executable, "example.py"], cwd=folder, env=environment, capture_output=True, encoding="utf-8", timeout=300
+        [sys.executable, "example.py"], cwd=folder, env=environment, capture_output=True, encoding="utf-8", timeout=600
     )
     assert done.returncode == 0, done.stderr
     return done.stdout
