@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import json
+import tracemalloc
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +17,24 @@ from vi_contact import history as history_module
 from vi_contact.algebra import SerialComm
 from vi_contact.errors import InputError, ViContactError
 from vi_contact.excitation import Harmonic
-from vi_contact.history import HistoryFiles, Table, read_rows
-from vi_contact.output import hdf5_image, on_root, run_folder, sentence, to_json, write_all, write_atomically
-from vi_contact.recorders import Contact, Energy, Probe
+from vi_contact.history import HistoryFiles
+from vi_contact.output import (
+    hdf5_atomically,
+    hdf5_image,
+    on_root,
+    run_folder,
+    sentence,
+    to_json,
+    write_all,
+    write_atomically,
+)
+from vi_contact.recorders import Contact, Energy, Probe, Row
+from vi_contact.run_folder import read_run
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.simulate import Solution, simulate
 from vi_contact.solvers.condensed import Condensed
+from vi_contact.stored_rows import StoredRows
+from vi_contact.table import Block, StoredHistory, Table
 
 
 def run(out: Path | None, steps: int = 30, **more: Any) -> Solution:
@@ -258,59 +271,151 @@ def test_run_folder_leaves_no_trace(tmp_path: Path) -> None:
 # Histories on disk ---------------------------------------------------------------------------------------------------
 
 
-def table(rows: int) -> Table:
-    """A table with a number and two arrays."""
-    columns = {"t": ("s", "time"), "k": ("-", "step"), "p": ("Pa", "two"), "on": ("-", "mask")}
-    made = [{"t": 0.1 * k, "k": k, "p": np.array([k, 1.0 / 3.0]), "on": np.array([k % 2 == 0])} for k in range(rows)]
-    return Table(columns, made)
+COLUMNS = {
+    name: ("-", name) for name in ("t", "k", "iterations", "certificate", "escalated", "p", "on")
+}
+
+
+def rows(count: int) -> list[Row]:
+    """Rows with the numbers of every run, and two arrays."""
+    return [
+        {"t": 0.1 * k, "k": k, "iterations": 2, "certificate": 1e-12, "escalated": 0,
+         "p": np.array([k, 1.0 / 3.0]), "on": np.array([k % 2 == 0])} for k in range(count)
+    ]
+
+
+def written(folder: Path, count: int, *, save_at: int | None = None) -> HistoryFiles:
+    """Files of so many rows, still open."""
+    made = rows(count)
+    files = HistoryFiles(folder, Table(COLUMNS, made[0]), chain_problem(2).surface)
+    for row in made[1:]:
+        files.append(row)
+        if row["k"] == save_at:
+            files.save()
+    return files
+
+
+def read(folder: Path, k: int) -> list[Block]:
+    """Rows up to a step."""
+    return list(StoredRows(folder, Table(COLUMNS, rows(1)[0]), k).blocks())
 
 
 @pytest.mark.serial
 @pytest.mark.parametrize("cut", [0, 5])
 def test_arrays_survive_in_the_journal(tmp_path: Path, cut: int) -> None:
     """Rows that history.h5 does not have yet come from the journal, but for a record the crash cut short."""
-    surface = chain_problem(2).surface
-    full = table(8)
-    growing = Table(full.columns, full.rows[:1])
-    files = HistoryFiles(tmp_path, growing, surface)
-    for row in full.rows[1:]:
-        files.append(row)
-        growing.rows.append(row)
-        if row["k"] == 3:
-            files.save()
+    files = written(tmp_path, 8, save_at=3)
     journal = tmp_path / "history.journal"
     journal.write_bytes(journal.read_bytes()[: journal.stat().st_size - cut])
-    template = Table(full.columns, full.rows[:1])
     if cut:
         with pytest.raises(InputError, match="does not hold p, on of step 7"):
-            read_rows(tmp_path, template, 7)
+            read(tmp_path, 7)
     last = 6 if cut else 7
-    rows = read_rows(tmp_path, template, last)
-    assert [row["k"] for row in rows] == list(range(last + 1)) and isinstance(rows[0]["k"], int)
-    for row, wanted in zip(rows, full.rows, strict=False):
-        assert row["t"] == wanted["t"] and row["on"].dtype == bool
-        assert np.array_equal(row["p"], wanted["p"]) and np.array_equal(row["on"], wanted["on"])
-    files.close()
-    assert not journal.exists()
+    (found,) = read(tmp_path, last)
+    assert found["k"].tolist() == list(range(last + 1)) and found["on"].dtype == bool
+    for k, wanted in enumerate(rows(last + 1)):
+        assert found["t"][k] == wanted["t"]
+        assert np.array_equal(found["p"][k], wanted["p"]) and np.array_equal(found["on"][k], wanted["on"])
+    if not cut:
+        files.close()
+        assert not journal.exists()
 
 
 @pytest.mark.serial
 def test_damaged_histories_are_told(tmp_path: Path) -> None:
-    """Missing, other columns, damaged line, too short: one sentence each."""
-    files = HistoryFiles(tmp_path, table(5), chain_problem(2).surface)
-    files.close()
-    template, path = Table(table(1).columns, table(1).rows), tmp_path / "history.csv"
+    """Missing, other columns, damaged line, lines out of order, too short: one sentence each."""
+    written(tmp_path, 5).close()
+    path = tmp_path / "history.csv"
     good = path.read_text()
     for text, words in (
         (None, "is missing"),
         (good.replace("t,k", "t,kk"), "holds other columns"),
         (good.replace("0.2,2", "0.2,two"), "line 4 of '.*' is damaged"),
+        (good.replace("0.2,2", "0.2,"), "line 4 of '.*' is damaged"),
+        (good.replace("0.2,2", "0.2,2,2"), "line 4 of '.*' is damaged"),
+        (good.replace("0.2,2", "0.2,7"), "do not follow each other"),
+        (good.replace("0.2,2", "0.2,nan"), "do not follow each other"),
         ("\n".join(good.splitlines()[:4]), "does not reach step 4"),
         ("", "holds other columns"),
     ):
         path.unlink() if text is None else path.write_text(text)
         with pytest.raises(InputError, match=words):
-            read_rows(tmp_path, template, 4)
+            read(tmp_path, 4)
+
+
+@pytest.mark.serial
+def test_long_histories_stay_on_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Beyond a number of bytes the memory lets go of rows; histories, facts and restart are the same."""
+    kept = run(tmp_path / "kept", 300)
+    monkeypatch.setattr("vi_contact.table.KEPT", 10_000)
+    long = run(tmp_path / "long", 280)
+    assert isinstance(long.history, StoredHistory) and len(long.history) == len(long.columns)
+    long = run(tmp_path / "long", 300, restart=True)
+    for name, values in kept.history.items():
+        assert np.array_equal(long.history[name], values, equal_nan=True), name
+    assert "nothing" not in long.history and set(long.history) == set(kept.history)
+    alone = run(None, 300)
+    assert isinstance(alone.history, dict)
+    for name in ("steps", "iterations_per_step", "worst_certificate", "energy", "steps_in_contact", "smallest_gap"):
+        assert long.facts[name] == kept.facts[name] == alone.facts[name], name
+    run(tmp_path / "long", 5)
+    with pytest.raises(ViContactError, match="has been replaced or is not on this machine: give every run a folder"):
+        long.history["t"]
+
+
+@pytest.mark.serial
+def test_memory_does_not_grow_with_steps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without a folder the bytes of the numbers, some hundred a step; with one nothing beyond what is kept at most."""
+    monkeypatch.setattr("vi_contact.table.KEPT", 0)
+    made: Any = {"iterations": 2, "certificate": 1e-12, "escalated": 0} | {f"c{i}": 1.0 for i in range(35)}
+    columns = {name: ("-", name) for name in ("t", "k", *made)}
+    peaks = {}
+    for on_disk in (False, True):
+        table = Table(columns, {"t": 0.0, "k": 0} | made, on_disk=on_disk)
+        tracemalloc.start()
+        for k in range(1, 6000):
+            table.append({"t": 0.1 * k, "k": k} | made)
+            if k == 1999:
+                begin = tracemalloc.get_traced_memory()[0]
+        peaks[on_disk] = (tracemalloc.get_traced_memory()[0] - begin) / 4000
+        tracemalloc.stop()
+    assert peaks[False] < 1.5 * 8 * len(columns) and peaks[True] < 100.0
+
+
+@pytest.mark.serial
+def test_hdf5_on_a_full_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """HDF5 goes through to its end, the old file is still there, and the error is the disk's."""
+    path = tmp_path / "a.h5"
+    hdf5_atomically(path, lambda file: file.create_dataset("x", data=np.arange(1000.0)))
+    before = path.read_bytes()
+    for room in (0, 100, 2000, 5000):
+        monkeypatch.setattr("vi_contact.output.write_all", Disk(room))
+        with pytest.raises(OSError, match="No space left") as caught:
+            hdf5_atomically(path, lambda file: file.create_dataset("x", data=np.arange(2000.0)))
+        assert caught.value.filename == str(path)
+        assert path.read_bytes() == before and list(tmp_path.iterdir()) == [path]
+    with h5py.File(path) as file:
+        assert np.array_equal(file["x"][()], np.arange(1000.0))
+
+
+@pytest.mark.serial
+def test_folders_of_another_format(tmp_path: Path) -> None:
+    """Folder and checkpoint carry a number; an unknown one is refused, none is that of the first version."""
+    run(tmp_path, 10)
+    about = tmp_path / "format.json"
+    assert json.loads(about.read_text())["format"] == 1
+    for text, words in (
+        ('{"format": 2}', r"has format 2 and this version of vi_contact reads 1: read it with the version that wrote"),
+        ('{"format": true}', "has format True"),
+        ("[]", "'.*format.json' is damaged"),
+    ):
+        about.write_text(text)
+        for action in (lambda: run(tmp_path, 20, restart=True), lambda: read_run(tmp_path)):
+            with pytest.raises(InputError, match=words):
+                action()
+    about.unlink()
+    assert len(read_run(tmp_path).history["t"]) == 11
+    assert len(run(tmp_path, 20, restart=True).history["t"]) == 21 and about.exists()
 
 
 @pytest.mark.serial

@@ -1,28 +1,36 @@
 """Checkpoints: the state of a run in numbers that do not depend on the ranks, so that any number of them can go on.
 
 ``checkpoint.npz`` holds t, k, u, v, the reactions, active and the scheme's memory, vectors in the order of
-``space.ids`` (the rotated basis has the same numbers as the system's own), the base steps done, and a description of
-the run that must not change. It is of the end of a base step, never from inside a halved one, so that a restart takes
-the steps of the straight run. The file is replaced as a whole: after a crash it is the last complete one.
+``space.ids`` (the rotated basis has the same numbers as the system's own), the base steps done, what problem it is of
+(``identity``), checksums of the histories and of itself, and the number of its format. It is of the end of a base step,
+never from inside a halved one, so that a restart takes the steps of the straight run. The file is replaced as a whole:
+after a crash it is the last complete one.
 """
 
 from __future__ import annotations
 
+import hashlib
 import io
 import json
+import logging
 import zipfile
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from .checks import array, number, shown, whole
 from .errors import InputError
-from .output import CHECKPOINT, on_root, write_atomically
+from .identity import FIXED, Identity, difference, identity
+from .output import CHECKPOINT, FORMAT, check_format, on_root, write_atomically
 from .step import ContactProblem, Scheme, State
-from .time_steps import TimeSteps, described
+from .time_steps import TimeSteps
 
+log = logging.getLogger(__name__)
 Arrays = dict[str, Any]
+MEMORY = "memory_"
 
 
 @dataclass(frozen=True)
@@ -50,36 +58,51 @@ class Place:
         return self.k_start + self.base
 
 
-def describe(problem: ContactProblem, scheme: Scheme, dt: TimeSteps) -> dict[str, Any]:
-    """What a restart must have in common with the run it continues."""
-    return {
-        "unknowns": problem.system.space.unknowns,
-        "contact points": problem.surface.count,
-        "dt": described(dt),
-        "scheme": repr(scheme),
-        "mass": repr(problem.mass),
-    }
+@dataclass(frozen=True)
+class Problem:
+    """What a checkpoint is of: ``facts`` that a restart must have in common with it, functions of time seen between
+    two times [s]."""
+
+    facts: Identity
+    span: tuple[float, float]
+
+    @classmethod
+    def of(cls, problem: ContactProblem, scheme: Scheme, dt: TimeSteps, start: float, end: float) -> Problem:
+        """Of a run from start to end. Collective."""
+        return cls(identity(problem, scheme, dt, start=start, end=end), (start, end))
 
 
-def write_checkpoint(folder: Path, problem: ContactProblem, place: Place, *, scheme: Scheme, dt: TimeSteps) -> None:
-    """Replaces the checkpoint in the folder. Collective; ViContactError on all ranks when the disk refuses it."""
+def write_checkpoint(folder: Path, problem: ContactProblem, place: Place, *, of: Problem, rows: str = "") -> None:
+    """Replaces the checkpoint in the folder. ``rows``: checksum of the histories up to here. Collective;
+    ViContactError on all ranks when the disk refuses it."""
     state = place.state
     vectors, same = _split(problem, state)
     gathered = problem.system.algebra.comm.gather((problem.system.space.ids, vectors))
     about = json.dumps(
-        {"run": describe(problem, scheme, dt), "vectors": sorted(vectors), "t": state.t, "k": state.k,
-         "t_start": place.t_start, "k_start": place.k_start, "base": place.base, "halved": place.halved}
+        {"format": FORMAT, "run": of.facts, "span": of.span, "rows": rows, "vectors": sorted(vectors), "t": state.t,
+         "k": state.k, "t_start": place.t_start, "k_start": place.k_start, "base": place.base, "halved": place.halved}
     )  # json keeps floats to the last bit
 
     def write() -> None:
         parts = gathered or []
         order = np.argsort(np.concatenate([ids for ids, _ in parts]))
-        whole = {name: np.concatenate([found[name] for _, found in parts])[order] for name in vectors}
+        arrays = {name: np.concatenate([found[name] for _, found in parts])[order] for name in vectors} | same
+        arrays["about"] = np.array(about)
         buffer = io.BytesIO()
-        np.savez(buffer, about=np.array(about), **whole, **same)
+        np.savez(buffer, checksum=np.array(checksum(arrays)), **arrays)
         write_atomically(folder / CHECKPOINT, buffer.getvalue())
 
     on_root(problem.system.algebra.comm, write)
+
+
+def checksum(arrays: Mapping[str, Any]) -> str:
+    """Of names, types, shapes and values."""
+    found = hashlib.sha256()
+    for name, values in sorted(arrays.items()):
+        array = np.asarray(values)
+        found.update(f"{name} {array.dtype.str} {array.shape}".encode())
+        found.update(np.ascontiguousarray(array).tobytes())
+    return found.hexdigest()
 
 
 def _split(problem: ContactProblem, state: State) -> tuple[Arrays, Arrays]:
@@ -91,27 +114,58 @@ def _split(problem: ContactProblem, state: State) -> tuple[Arrays, Arrays]:
         array = np.asarray(state.memory[name])
         foreign = float(array.shape != state.u.shape)
         kind = same if comm.max(np.array([foreign]))[0] else vectors
-        kind[f"memory_{name}"] = array
+        kind[f"{MEMORY}{name}"] = array
     return vectors, same
 
 
-def read_checkpoint(folder: Path, problem: ContactProblem, *, scheme: Scheme, dt: TimeSteps) -> Place:
-    """Where a run was left, with the state on the ranks of this one. Collective.
+def read_checkpoint(
+    folder: Path, problem: ContactProblem, *, scheme: Scheme, dt: TimeSteps, changed: bool = False
+) -> tuple[Place, str]:
+    """(where a run was left, with the state on the ranks of this one; checksum of its histories). Collective.
 
-    InputError when the checkpoint is missing, damaged, or of another problem, dt (or plan of them) or scheme.
+    InputError when the checkpoint is missing, damaged, of an unknown format, or of another problem, dt (or plan of
+    them) or scheme; unless ``changed`` allows the latter. After another dt the steps are counted anew from here;
+    another scheme begins without the memory of the old one.
     """
-    file = folder / CHECKPOINT
-    comm = problem.system.algebra.comm
-    wanted = describe(problem, scheme, dt)
-    about, arrays = comm.bcast(on_root(comm, lambda: _read(file, wanted)))
+    file, comm = folder / CHECKPOINT, problem.system.algebra.comm
+    about, arrays = comm.bcast(on_root(comm, lambda: _read(file, problem)))
+    other = _compare(file, problem, scheme, dt, about, changed)
     mine = _places(problem)
     for name in about["vectors"]:
         arrays[name] = arrays[name][mine]
-    prefix = "memory_"
-    memory = {name.removeprefix(prefix): array for name, array in arrays.items() if name.startswith(prefix)}
+    memory = {name.removeprefix(MEMORY): array for name, array in arrays.items() if name.startswith(MEMORY)}
     contact = {name: arrays.get(name) for name in ("r_n", "active", "r_t")}
     state = State(about["t"], about["k"], arrays["u"], arrays["v"], memory=memory, **contact)
-    return Place(state, about["t_start"], about["k_start"], about["base"], about["halved"])
+    if "format" not in about and memory:
+        _check_memory(file, problem, scheme, state, about)
+    place = Place(state, about["t_start"], about["k_start"], about["base"], about["halved"])
+    return _adapted(place, other), about.get("rows", "")
+
+
+def _compare(
+    file: Path, problem: ContactProblem, scheme: Scheme, dt: TimeSteps, about: Mapping[str, Any], changed: bool
+) -> list[str]:
+    """The names of what is another problem's; InputError unless that was allowed, or can be. Collective."""
+    start, end = about.get("span", (about["t_start"], about["t"]))
+    ours, theirs = identity(problem, scheme, dt, start=start, end=end), dict(about["run"])
+    names: list[str] = []
+    while found := difference(ours, theirs):
+        name, how = found
+        if name in FIXED or not changed:
+            remedy = "or start a new one" + ("" if name in FIXED else ", or allow it by name (changed=True)")
+            raise InputError(f"the checkpoint '{file}' is of a run with {how}: restart the same run, {remedy}")
+        names.append(name)
+        del theirs[name]
+    if names and problem.system.algebra.comm.rank == 0:
+        log.warning("the checkpoint '%s' is continued as another problem: %s", file, ", ".join(names))
+    return names
+
+
+def _adapted(place: Place, other: list[str]) -> Place:
+    """The place for a run that differs in these."""
+    if "scheme" in other or "mass" in other:
+        place = replace(place, state=replace(place.state, memory={}))
+    return place if "dt" not in other else replace(place, t_start=place.state.t, k_start=place.number, base=0)
 
 
 def _places(problem: ContactProblem) -> Any:
@@ -122,21 +176,73 @@ def _places(problem: ContactProblem) -> Any:
     return np.searchsorted(everyone, ids)
 
 
-def _read(file: Path, wanted: dict[str, Any]) -> tuple[dict[str, Any], Arrays]:
-    """Description and whole arrays of a checkpoint that fits the run."""
+def _check_memory(
+    file: Path, problem: ContactProblem, scheme: Scheme, state: State, about: Mapping[str, Any]
+) -> None:
+    """InputError when a checkpoint without checksum lacks what the scheme keeps in mind. Collective."""
+    dt = about["run"].get("dt")
+    wanted = scheme.start(problem, replace(state, memory={}), dt if isinstance(dt, float) else 1.0).memory
+    if about["run"].get("scheme") == repr(scheme) and not set(wanted) <= set(state.memory):
+        raise _damaged(file, f"{', '.join(sorted(set(wanted) - set(state.memory)))} of the scheme is missing")
+
+
+def _damaged(file: Path, why: Any) -> InputError:
+    return InputError(f"the checkpoint '{file}' is damaged ({' '.join(str(why).split())}): start a new run")
+
+
+def _read(file: Path, problem: ContactProblem) -> tuple[dict[str, Any], Arrays]:
+    """Description and whole arrays of a checkpoint that fits the problem in its sizes."""
     if not file.is_file():
         raise InputError(f"there is no checkpoint '{file}' to restart from: give the folder of a run")
     try:
-        with np.load(file, allow_pickle=False) as stored:
-            arrays = {name: stored[name] for name in stored.files}
-        about = json.loads(str(arrays.pop("about")))
-        run, _ = about["run"], about["base"]
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
-        raise InputError(f"the checkpoint '{file}' is damaged ({error}): start a new run") from error
-    for name, value in wanted.items():
-        if run.get(name) != value:
-            raise InputError(
-                f"the checkpoint '{file}' is of a run with {name} = {run.get(name)} but this one has {value}: "
-                "restart the same run, or start a new one"
-            )
+        about, arrays = _unpacked(file)
+    except Exception as error:  # whatever a damaged archive makes the readers of numpy and zip do
+        raise _damaged(file, error or type(error).__name__) from error
+    check_format(file, about.get("format", FORMAT))
+    try:
+        _check_sizes(problem, about, arrays)
+    except (InputError, KeyError, TypeError) as error:
+        raise _damaged(file, f"{error} is missing" if isinstance(error, KeyError) else error) from error
     return about, arrays
+
+
+def _unpacked(file: Path) -> tuple[dict[str, Any], Arrays]:
+    """ValueError and others when it is not what was written."""
+    size = file.stat().st_size
+    with zipfile.ZipFile(file) as archive:
+        for one in archive.infolist():
+            if one.compress_type != zipfile.ZIP_STORED or one.file_size > size:
+                raise ValueError(f"{one.filename} is compressed, or larger than the file")
+    with np.load(file, allow_pickle=False) as stored:
+        arrays = {name: stored[name] for name in stored.files}
+    wanted = arrays.pop("checksum", None)
+    about = json.loads(str(arrays["about"]))
+    if not isinstance(about, dict) or not isinstance(about.get("run"), dict):
+        raise ValueError("no description of the run")
+    if "format" in about and str(wanted) != checksum(arrays):
+        raise ValueError("its checksum is another one")
+    del arrays["about"]
+    return about, arrays
+
+
+def _check_sizes(problem: ContactProblem, about: dict[str, Any], arrays: Arrays) -> None:
+    """InputError or KeyError for missing, misshapen or senseless values. Unknowns and points come first: of another
+    problem nothing fits."""
+    n, m, d = problem.system.space.unknowns, problem.surface.count, problem.surface.tangents.shape[1]
+    about |= {name: number("it", name, about[name]) for name in ("t", "t_start")}
+    about |= {name: whole("it", name, about[name], most=2**53) for name in ("k", "k_start", "base", "halved")}
+    if "span" in about:
+        array("it", "span", about["span"], (2,))
+    if not isinstance(about.get("rows", ""), str) or not {"u", "v"} <= set(about["vectors"]):
+        raise InputError("its description is of nothing")
+    theirs = about["run"]
+    if theirs.get("unknowns") != n or theirs.get("contact points") != m:
+        return  # told as another problem's
+    shapes = dict.fromkeys(about["vectors"], (n,)) | {"r_n": (m,), "active": (m,)}
+    for name, values in arrays.items():
+        wanted = shapes.pop(name, values.shape) if name != "r_t" else (m, d)
+        kind = np.dtype(bool if name == "active" else float)
+        if values.dtype != kind or values.shape != wanted or not np.all(np.isfinite(values)):
+            raise InputError(f"{shown(name)} is no {wanted} array of finite {kind} numbers")
+    if shapes:
+        raise KeyError(next(iter(shapes)))

@@ -6,6 +6,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from .cli_options import add_restart
+
 
 def add_case_commands(commands: Any) -> None:
     """Adds ``run`` to the commands of the top parser."""
@@ -13,7 +15,7 @@ def add_case_commands(commands: Any) -> None:
     run = commands.add_parser("run", help=sentence, description=sentence[0].upper() + sentence[1:] + ".")
     run.add_argument("case", help="the case file (docs/studies.md)")
     run.add_argument("--out", metavar="DIR", help="output folder (default: out of [run], or results/NAME of the file)")
-    run.add_argument("--restart", action="store_true", help="continue the run in the output folder from its checkpoint")
+    add_restart(run, "the output folder")
     run.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
                      help="replace a value of the file, such as friction.mu=0.5 or excitation.1.scale=2; repeatable")
     run.add_argument("--check", action="store_true", help="read the file and stop: nothing is computed")
@@ -33,5 +35,7 @@ def _run(options: argparse.Namespace) -> str:
         case.check()
         return f"{options.case}: {name}: the file is in order" if comm.rank == 0 else ""
     out = options.out or case.out or Path("results") / Path(options.case).stem
-    solution = case.run(comm, out=out, restart=options.restart, progress=not options.quiet)
+    solution = case.run(
+        comm, out=out, restart=options.restart or options.changed, progress=not options.quiet, changed=options.changed
+    )
     return f"{name}\n{solution.summary()}\noutput: {out}" if comm.rank == 0 else ""

@@ -12,7 +12,7 @@ from .errors import InputError
 
 SHAKING = ("motion", "vertical", "units", "scale", "pga", "resample")
 STEP = ("solver", "scheme", "dt", "steps", "cross_check")
-OUTPUT = ("fields_every", "restart")
+OUTPUT = ("fields_every", "restart", "changed")
 PICTURES = (".png", ".pdf", ".svg")
 
 
@@ -57,14 +57,22 @@ def add_output(parser: argparse.ArgumentParser, *, out: str) -> Any:
     output = parser.add_argument_group("output")
     output.add_argument("--out", default=out, metavar="DIR", help=f"output folder (default {out})")
     output.add_argument("--fields-every", type=int, default=10, metavar="K", help="steps between frames, 0: none")
-    output.add_argument("--restart", action="store_true", help="continue the run in --out from its checkpoint")
+    add_restart(output, "--out")
     output.add_argument("--quiet", action="store_true", help="no progress line")
     return output
 
 
+def add_restart(options: Any, where: str) -> None:
+    """The options that continue a run."""
+    options.add_argument("--restart", action="store_true", help=f"continue the run in {where} from its checkpoint")
+    options.add_argument("--restart-changed", action="store_true", dest="changed",
+                         help="the same, also when the problem is another one than that of the checkpoint")
+
+
 def chosen(options: argparse.Namespace) -> dict[str, Any]:
     """The shared options by the names of the runs' own arguments, but for the impact law."""
-    return {name: getattr(options, name) for name in (*SHAKING, *STEP, *OUTPUT)}
+    found = {name: getattr(options, name) for name in (*SHAKING, *STEP, *OUTPUT)}
+    return found | {"restart": options.restart or options.changed}
 
 
 def output_file(path: str | Path, *, reads: Iterable[str | Path] = (), picture: bool = False) -> Path:

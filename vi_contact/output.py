@@ -18,10 +18,14 @@ import h5py
 import numpy as np
 
 from .algebra import Comm
+from .checks import shown
 from .errors import InputError, ViContactError
 
 T = TypeVar("T")
 
+FORMAT = 1  # of run folders and checkpoints; what was written before there were numbers counts as it
+
+ABOUT = "format.json"
 CHECKPOINT = "checkpoint.npz"
 COLUMNS = "columns.json"
 FIELDS = "fields"
@@ -92,9 +96,27 @@ def run_folder(comm: Comm, path: str | Path) -> Path:
     return folder
 
 
+def check_format(file: Path, found: Any) -> None:
+    """InputError for a file of a format that this version does not know."""
+    if found != FORMAT or isinstance(found, bool):
+        raise InputError(f"'{file}' has format {shown(found)} and this version of vi_contact reads {FORMAT}: read it "
+                         "with the version that wrote it")
+
+
+def check_folder_format(folder: Path) -> None:
+    """The same for a run folder; those of the first version have no number, which is well."""
+    try:
+        found = json.loads((folder / ABOUT).read_text(encoding="utf-8"))["format"]
+    except FileNotFoundError:
+        return
+    except (OSError, ValueError, TypeError, KeyError, RecursionError) as error:
+        raise InputError(f"'{folder / ABOUT}' is damaged ({error}): restore it, or remove it") from error
+    check_format(folder, found)
+
+
 def clear(folder: Path) -> None:
     """Removes what an earlier run left in the folder and a new one could be mistaken for; histories are overwritten."""
-    for name in (CHECKPOINT, JOURNAL, HISTORY_H5, SUMMARY, FIELDS_INDEX):
+    for name in (ABOUT, CHECKPOINT, JOURNAL, HISTORY_H5, SUMMARY, FIELDS_INDEX):
         (folder / name).unlink(missing_ok=True)
     for frame in (folder / FIELDS).glob("*.h5"):
         frame.unlink()
@@ -125,6 +147,43 @@ def write_all(file: Any, data: bytes) -> None:
     view = memoryview(data)
     while view:
         view = view[file.write(view) :]
+
+
+def hdf5_atomically(path: Path, fill: Callable[[h5py.File], None]) -> None:
+    """The same for an HDF5 file that need not fit the memory."""
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        with open(temporary, "w+b", buffering=0) as raw:
+            kept = _Kept(raw)
+            with h5py.File(kept, "w", driver="fileobj") as file:
+                fill(file)
+            if kept.error is not None:
+                raise kept.error
+            os.fsync(raw.fileno())
+        os.replace(temporary, path)
+    except OSError as error:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+        raise OSError(error.errno, error.strerror or str(error), str(path)) from error
+
+
+class _Kept:
+    """A file for HDF5, which does not survive a full disk: the error is kept, and what comes after it is dropped."""
+
+    def __init__(self, file: Any) -> None:
+        self._file = file
+        self.error: OSError | None = None
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._file, name)
+
+    def write(self, data: Any) -> int:
+        if self.error is None:
+            try:
+                write_all(self._file, data)
+            except OSError as error:
+                self.error = error
+        return len(data)
 
 
 def hdf5_image(fill: Callable[[h5py.File], None]) -> bytes:

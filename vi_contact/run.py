@@ -4,28 +4,30 @@ from __future__ import annotations
 
 import logging
 import time
+from collections import deque
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from signal import Signals
 from typing import Any, Protocol
 
 import numpy as np
 
-from .algebra import Array
-from .checkpoint import Place
+from .checkpoint import Place, Problem
 from .errors import Interrupted
-from .history import Table
 from .march import March
 from .recorders import refuse_overflow
 from .run_log import Progress, versions
-from .solution import Solution, energy_warning, history_facts
+from .solution import Solution, energy_warning
 from .step import ContactProblem, Recorder, Report, Scheme, Solver, State, StepResult
 from .stop_signals import StopSignals
+from .table import Table
 from .time_steps import Course, TimeSteps, described
 from .writer import Writer
 
 log = logging.getLogger(__name__)
+TIMED = 10_000  # the last steps, of which seconds_per_step is the median
 LINEAR_STEPS = 21  # repetitions of the plain linear step that the step is compared with
 
 
@@ -48,6 +50,7 @@ class Settings:
     checkpoint_every: int
     cross_check: Comparison | None
     progress: bool
+    changed: bool = False
 
     @property
     def root(self) -> bool:
@@ -83,7 +86,7 @@ class Run:
     last: Report | None = None
     dt: float = float("nan")
     halved: int = 0
-    seconds: list[float] = field(default_factory=list)
+    seconds: deque[float] = field(default_factory=lambda: deque(maxlen=TIMED))
 
     @property
     def left(self) -> int:
@@ -109,13 +112,12 @@ class Run:
             reason = str(error) or ("interrupted by the user" if interrupted else type(error).__name__)
             self._rescue(writer, "interrupted" if interrupted else "failed", reason, time.perf_counter() - begin)
             raise
-        history = self.table.history()
-        facts = self._facts(history, "finished", "", time.perf_counter() - begin) | {"seconds_per_linear_step": linear}
+        facts = self._facts("finished", "", time.perf_counter() - begin) | {"seconds_per_linear_step": linear}
         warning = energy_warning(facts)
         if warning and self.settings.root:
             log.warning("%s", warning)
         writer.close(facts)
-        return Solution(history, self.table.columns, self.place.state, facts)
+        return Solution(self.table.history(writer.history), self.table.columns, self.place.state, facts)
 
     def _march(self, writer: Writer, signals: StopSignals) -> None:
         s, place = self.settings, self.place
@@ -156,7 +158,7 @@ class Run:
             row |= recorder.row(report)
         refuse_overflow(row)
         writer.append(row)
-        self.table.rows.append(row)  # after the disk: a checkpoint never knows a step that history.csv does not
+        self.table.append(row)  # after the disk: a checkpoint never knows a step that history.csv does not
         self.last = report
 
     def _end_base_step(self, report: Report, writer: Writer) -> None:
@@ -166,7 +168,13 @@ class Run:
             self._checkpoint(writer)
 
     def _checkpoint(self, writer: Writer) -> None:
-        writer.checkpoint(self.place, scheme=self.settings.scheme, dt=self.settings.dt)
+        writer.checkpoint(self.place, lambda: self._problem)
+
+    @cached_property
+    def _problem(self) -> Problem:
+        """What the run is of, for its checkpoints. Collective."""
+        s, start = self.settings, self.place.t_start
+        return Problem.of(s.problem, s.scheme, s.dt, start, start + self.course.length)
 
     def _rescue(self, writer: Writer, status: str, reason: str, seconds: float) -> None:
         """Saves what there is. A checkpoint of the last base step only on one rank: others might not come."""
@@ -174,7 +182,7 @@ class Run:
             if self.settings.problem.system.algebra.comm.size == 1:
                 self._checkpoint(writer)
         with suppress(Exception):
-            writer.rescue(self._facts(self.table.history(), status, reason, seconds))
+            writer.rescue(self._facts(status, reason, seconds))
 
     def _tell_start(self) -> None:
         if not self.settings.root:
@@ -186,20 +194,20 @@ class Run:
             log.info("continues from the checkpoint of step %d", self.resumed_from)
         log.info("%d steps to do", self.left)
 
-    def _facts(self, history: Mapping[str, Array], status: str, reason: str, seconds: float) -> dict[str, Any]:
+    def _facts(self, status: str, reason: str, seconds: float) -> dict[str, Any]:
         """The content of summary.json."""
         cross_check = self.settings.cross_check
         return (
             {"status": status, "reason": reason, "versions": versions()}
             | self.settings.facts()
             | {"restarted_from_step": self.resumed_from}
-            | history_facts(history)
+            | self.table.facts()
             | {
                 "base_steps": self.place.base,
                 "halved_steps": self.halved,
                 "cross_check": None if cross_check is None else cross_check.report(),
                 "seconds": seconds,
-                "seconds_per_step": float(np.median(self.seconds)) if self.seconds else float("nan"),
+                "seconds_per_step": float(np.median(list(self.seconds))) if self.seconds else float("nan"),
                 "seconds_per_linear_step": float("nan"),
             }
         )

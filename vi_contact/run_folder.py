@@ -14,7 +14,7 @@ import numpy as np
 
 from .algebra import Array, Mask
 from .errors import InputError
-from .output import COLUMNS, HISTORY_CSV, HISTORY_H5, SUMMARY
+from .output import COLUMNS, HISTORY_CSV, HISTORY_H5, SUMMARY, check_folder_format
 
 
 @dataclass(frozen=True)
@@ -54,6 +54,7 @@ def read_run(folder: str | Path) -> RunFolder:
     folder = Path(folder)
     if not (folder / HISTORY_CSV).is_file():
         raise InputError(f"'{folder}' has no {HISTORY_CSV}: give the output folder of a run")
+    check_folder_format(folder)
     history = _numbers(folder / HISTORY_CSV)
     try:
         described = json.loads((folder / COLUMNS).read_text(encoding="utf-8"))

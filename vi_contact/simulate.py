@@ -7,14 +7,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from .algebra import Comm
 from .certified import TOLERANCE
 from .checkpoint import Place, read_checkpoint
 from .checks import flag, instance, provides, several, whole
 from .errors import InputError
 from .folder_lock import locked
-from .history import Table, read_rows
 from .output import on_root, run_folder
-from .recorders import Contact, Energy, Row, Steps
+from .recorders import Columns, Contact, Energy, Row, Steps
 from .run import Comparison, Run, Settings
 from .run_checks import check_methods, check_pace, check_state, start_time
 from .schemes.choice import completed
@@ -22,6 +22,8 @@ from .solution import Solution
 from .solvers.condensed import Condensed
 from .static import initial_state
 from .step import ContactProblem, Recorder, Scheme, Solver, State
+from .stored_rows import StoredRows
+from .table import Block, Table
 from .time_steps import TimeSteps, course
 from .writer import FieldWriter, Writer
 
@@ -43,6 +45,7 @@ def simulate(
     tolerance: float = TOLERANCE,
     checkpoint_every: int = 100,
     restart: bool | str | Path = False,
+    changed: bool = False,
     progress: bool = True,
     fields: FieldWriter | None = None,
     cross_check: Comparison | None = None,
@@ -62,7 +65,8 @@ def simulate(
         checkpoint_every: base steps between checkpoints.
         restart: True continues the run in ``out`` from its checkpoint; a path continues the run in that folder.
             ``steps`` and ``t_end`` are those of the whole run. The result is the uninterrupted run's: on one rank to
-            the last bit, on several to round-off.
+            the last bit, on several to round-off. Another problem, dt or scheme than that of the checkpoint is refused.
+        changed: True continues all the same; after another dt, ``steps`` count from the checkpoint.
         progress: a progress line on a terminal.
         fields: fem.XDMF(every=10) for ParaView.
         cross_check: whose report() goes into the summary.
@@ -72,7 +76,7 @@ def simulate(
         StepFailure: a step no solver could certify; ViContactError: the disk refused something. All that was computed
             is in the folder then, and summary.json says why the run ended.
     """
-    _check_outputs(record, out, restart, checkpoint_every, progress, fields, cross_check)
+    _check_outputs(record, out, restart, checkpoint_every, (progress, changed), fields, cross_check)
     check_methods("simulate", solver, escalation, tolerance)
     problem, scheme = completed(problem, scheme)
     solver = Condensed() if solver is None else solver
@@ -82,37 +86,42 @@ def simulate(
     solver.check(problem)
     if state is not None:
         check_state("simulate", problem, state, dt=first, tolerance=tolerance, scheme=scheme)
-    settings = Settings(problem, scheme, solver, dt, escalation, tolerance, checkpoint_every, cross_check, progress)
+    settings = Settings(
+        problem, scheme, solver, dt, escalation, tolerance, checkpoint_every, cross_check, progress, changed
+    )
     folder = None if out is None else run_folder(problem.system.algebra.comm, out)
     recorders: list[Any] = [Steps(problem.system.influence.shape[1])]
     recorders += (Energy(), Contact()) if record is None else record
     source = _source(restart, folder)
     with locked(problem.system.algebra.comm, folder):
-        run = _prepared(settings, recorders, source, state, steps, t_end)
-        continued = source is not None and folder is not None and source.resolve() == folder.resolve()
-        return run.go(Writer(problem, folder, fields, run.table, continued=continued))
+        run, stored = _prepared(settings, recorders, source, state, steps, t_end, on_disk=folder is not None)
+        return run.go(Writer(problem, folder, fields, run.table, stored))
 
 
 def _prepared(
     settings: Settings, recorders: Sequence[Recorder], source: Path | None, state: State | None, steps: int | None,
-    t_end: float | None,
-) -> Run:
-    """The run at its first step, or at the checkpoint in ``source``. Collective."""
+    t_end: float | None, *, on_disk: bool,
+) -> tuple[Run, StoredRows | None]:
+    """The run at its first step, or at the checkpoint in ``source`` with the rows before it. Collective."""
     problem, scheme, dt = settings.problem, settings.scheme, settings.dt
+    checksum = ""
     if source is None:
         place = Place.first(initial_state(problem) if state is None else state)
     else:
-        place = read_checkpoint(source, problem, scheme=scheme, dt=dt)
+        place, checksum = read_checkpoint(source, problem, scheme=scheme, dt=dt, changed=settings.changed)
     plan = course(dt, steps, t_end, place.t_start)
     place = replace(place, state=scheme.start(problem, place.state, plan.dt(place.base)))
-    table = _table(problem, recorders, place.state)
-    if source is not None:
-        _continue(table, problem, recorders, place.state, source)
-    return Run(settings, recorders, table, plan, place, None if source is None else place.state.k)
+    table = Table(*_started(problem, recorders, place.state), on_disk=on_disk)
+    run = Run(settings, recorders, table, plan, place, None if source is None else place.state.k)
+    if source is None:
+        return run, None
+    stored = StoredRows(source, table, place.state.k, checksum)
+    _started(problem, recorders, place.state, _restored(table, stored, problem.system.algebra.comm))
+    return run, stored
 
 
 def _check_outputs(
-    record: Any, out: Any, restart: Any, checkpoint_every: Any, progress: Any, fields: Any, cross_check: Any
+    record: Any, out: Any, restart: Any, checkpoint_every: Any, flags: tuple[Any, Any], fields: Any, cross_check: Any
 ) -> None:
     """InputError for what is no recorder, folder, number of steps, writer of fields or cross-check."""
     owner = "simulate"
@@ -122,7 +131,8 @@ def _check_outputs(
         instance(owner, "out", out, (str, Path), "give a path, or None")
     instance(owner, "restart", restart, (bool, str, Path), "give True, False or the path of a run folder")
     whole(owner, "checkpoint_every", checkpoint_every, least=1)
-    flag(owner, "progress", progress)
+    for meaning, value in zip(("progress", "changed"), flags, strict=True):
+        flag(owner, meaning, value)
     if fields is not None:
         if out is None:
             raise InputError("fields need an output folder: give out, or leave fields away")
@@ -141,10 +151,10 @@ def _source(restart: bool | str | Path, folder: Path | None) -> Path | None:
     return path.parent if path.suffix == ".npz" else path
 
 
-def _table(
+def _started(
     problem: ContactProblem, recorders: Sequence[Recorder], state: State, resumed: Mapping[str, Any] | None = None
-) -> Table:
-    """Starts the recorders; the table with the row of the state. InputError when two record the same column."""
+) -> tuple[Columns, Row]:
+    """Starts the recorders: their columns, and the row of the state. InputError when two record the same column."""
     row: dict[str, Any] = {}
     columns: dict[str, tuple[str, str]] = {}
     for recorder in recorders:
@@ -153,14 +163,16 @@ def _table(
         if twice:
             raise InputError(f"two recorders record '{twice[0]}': leave one of them out")
         columns |= recorder.columns()
-    return Table(columns, [row])
+    return columns, row
 
 
-def _continue(
-    table: Table, problem: ContactProblem, recorders: Sequence[Recorder], state: State, source: Path
-) -> None:
-    """Puts the rows of an earlier run into the table; the recorders go on from the last one."""
-    comm = problem.system.algebra.comm
-    rows: list[Row] = comm.bcast(on_root(comm, lambda: read_rows(source, table, state.k)))
-    _table(problem, recorders, state, rows[-1])
-    table.rows[:] = rows
+def _restored(table: Table, stored: StoredRows, comm: Comm) -> Row:
+    """Puts the rows of an earlier run into the table, on every rank; the last of them. Collective."""
+    blocks = stored.blocks()
+    last: Row = {}
+    while True:
+        block: Block | None = comm.bcast(on_root(comm, lambda: next(blocks, None)))
+        if block is None:
+            return last
+        table.restore(block)
+        last = {name: values[-1] for name, values in block.items()}

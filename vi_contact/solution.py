@@ -13,19 +13,7 @@ from .algebra import Array
 from .output import to_json
 from .recorders import Columns
 from .step import State
-
-_LEDGER = (
-    ("work_input", "input work"),
-    ("energy_kinetic", "kinetic energy"),
-    ("energy_strain", "strain energy"),
-    ("loss_damping", "damping"),
-    ("loss_contact", "contact work"),
-    ("loss_friction", "friction work"),
-    ("loss_impact", "impact loss"),
-    ("loss_algorithmic", "algorithmic loss"),
-    ("energy_defect", "defect"),
-)
-
+from .tally import LEDGER
 
 CREATED = 0.01  # of the largest energy: more than schemes without a fault gain at sensible time steps
 
@@ -63,46 +51,6 @@ class Solution:
     def summary(self) -> str:
         """The run in a few lines for people."""
         return "\n".join(_lines(self.facts))
-
-
-def history_facts(history: Mapping[str, Array]) -> dict[str, Any]:
-    """What the histories say about the run: steps, iterations, worst certificate, energy ledger."""
-    iterations = history["iterations"][1:]
-    facts = {
-        "steps": len(history["t"]) - 1,
-        "t_start": float(history["t"][0]),
-        "t_end": float(history["t"][-1]),
-        "iterations_per_step": {
-            "mean": float(iterations.mean()) if len(iterations) else 0.0,
-            "max": int(iterations.max(initial=0)),
-        },
-        "escalated_steps": int(history["escalated"].sum()),
-        "worst_certificate": float(history["certificate"].max()),
-    }
-    if "contact_uplift" in history:
-        facts["largest_uplift"] = float(history["contact_uplift"].max())
-        facts["smallest_gap"] = float(np.fmin.reduce(history["contact_min_gap"]))  # negative: gap drift of the scheme
-        facts["steps_in_contact"] = int((history["contact_active"][1:] > 0).sum())
-    return facts | energy_facts(history)
-
-
-def energy_facts(history: Mapping[str, Array]) -> dict[str, Any]:
-    """The ledger at the end [J], and its largest defect relative to the largest energy or input work of the run."""
-    if "energy_defect" not in history:
-        return {}
-    total = history["energy_kinetic"] + history["energy_strain"]
-    size = max(float(total.max()), float(np.abs(history["work_input"]).max()))
-    defect = float(np.abs(history["energy_defect"]).max())
-    ledger = {name: float(history[name][-1]) for name, _ in _LEDGER[:-1]}
-    relative = defect / size if size > 0.0 else defect
-    losses = np.asarray(sum(history[name] for name, _ in _LEDGER if name.startswith("loss_")))
-    created = max(0.0, -float(losses.min()))
-    return {
-        "energy": {"energy_start": float(total[0]), "energy_max": float(total.max())} | ledger
-        | {"energy_defect_joule": float(history["energy_defect"][-1]), "energy_defect": relative},
-        "energy_defect": relative,
-        "energy_created": created / size if size > 0.0 else created,
-    }
 
 
 def energy_warning(facts: Mapping[str, Any]) -> str | None:
@@ -144,7 +92,7 @@ def _lines(facts: Mapping[str, Any]) -> list[str]:
     if "energy" in facts:
         lines.append("  energy ledger [J]")
         lines.append(line("  energy at the start", f"{facts['energy']['energy_start']: .6e}"))
-        lines += [line(f"  {title}", f"{facts['energy'][name]: .6e}") for name, title in _LEDGER[:-1]]
+        lines += [line(f"  {title}", f"{facts['energy'][name]: .6e}") for name, title in LEDGER[:-1]]
         lines.append(line("  defect, relative", f"{facts['energy_defect']: .2e}"))
     lines += wrap(f"WARNING: {warning}", 110, initial_indent="  ", subsequent_indent="  ") if warning else []
     if np.isfinite(facts["seconds_per_step"]):

@@ -82,6 +82,11 @@ class Course:
         """The number of base steps."""
         return sum(steps for _, steps in self.parts)
 
+    @property
+    def length(self) -> float:
+        """Of all of them together [s]."""
+        return sum(dt * steps for dt, steps in self.parts)
+
     def dt(self, base: int) -> float:
         """Length of a base step, counted from 0; beyond the end, of the last one."""
         for dt, steps in self.parts:

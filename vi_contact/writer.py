@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -12,13 +12,26 @@ from typing import Any, Protocol
 import numpy as np
 
 from .algebra import Array
-from .checkpoint import Place, write_checkpoint
-from .history import HistoryFiles, Table
-from .output import LOG, SUMMARY, clear, on_root, remove_litter, to_json, write_atomically
+from .checkpoint import Place, Problem, write_checkpoint
+from .history import HistoryFiles
+from .output import (
+    ABOUT,
+    FIELDS,
+    FORMAT,
+    HISTORY_H5,
+    LOG,
+    SUMMARY,
+    clear,
+    on_root,
+    remove_litter,
+    to_json,
+    write_atomically,
+)
 from .recorders import Row
-from .run_log import RunLog
-from .step import ContactProblem, Report, Scheme, State
-from .time_steps import TimeSteps
+from .run_log import RunLog, versions
+from .step import ContactProblem, Report, State
+from .stored_rows import StoredRows, times_of
+from .table import Table
 
 log = logging.getLogger(__name__)
 
@@ -41,13 +54,16 @@ class FieldWriter(Protocol):
 class Writer:
     """The folder of a run, or none: then nothing is written. Every method but ``rescue`` is collective.
 
-    ``continued``: the folder holds an earlier part of the same run, which is kept; otherwise it is cleared by ``open``.
+    ``stored``: the rows of an earlier run that this one continues. When they are in this folder, all that is there is
+    kept; otherwise it is cleared by ``open``.
     """
 
     def __init__(
-        self, problem: ContactProblem, folder: Path | None, fields: FieldWriter | None, table: Table, *, continued: bool
+        self, problem: ContactProblem, folder: Path | None, fields: FieldWriter | None, table: Table,
+        stored: StoredRows | None = None,
     ) -> None:
-        self._problem, self._folder, self._table, self._continued = problem, folder, table, continued
+        self._problem, self._folder, self._table, self._stored = problem, folder, table, stored
+        self._continued = stored is not None and folder is not None and stored.folder.resolve() == folder.resolve()
         self._settings = fields
         self._comm = problem.system.algebra.comm
         self._fields: OpenFields | None = None
@@ -69,17 +85,24 @@ class Writer:
             return
         on_root(self._comm, partial(self._make, folder))
         if self._settings is not None:
-            kept = {int(row["k"]): float(row["t"]) for row in self._table.rows} if self._continued else {}
+            kept = on_root(self._comm, lambda: self._frames_of(folder)) or {}
             self._fields = self._settings.open(self._problem, folder, kept)
             if not self._continued:
                 self._fields.write(state, np.zeros_like(state.u))
+
+    def _frames_of(self, folder: Path) -> dict[int, float]:
+        """Step -> time of the frames that an earlier part of the run has left."""
+        numbers = [path.stem.rpartition("_")[2] for path in (folder / FIELDS).glob("*_*.h5")] if self._continued else []
+        return times_of(folder, {int(number) for number in numbers if number.isdecimal()})
 
     def _make(self, folder: Path) -> None:
         remove_litter(folder)
         if not self._continued:
             clear(folder)
         self._log = RunLog(folder / LOG, append=self._continued)
-        self._files = HistoryFiles(folder, self._table, self._problem.surface, continued=self._continued)
+        self._files = HistoryFiles(folder, self._table, self._problem.surface, self._stored)
+        about = {"format": FORMAT, "vi_contact": versions()["vi_contact"]}
+        write_atomically(folder / ABOUT, (to_json(about) + "\n").encode())
 
     def append(self, row: Row) -> None:
         """A row of the histories onto the disk."""
@@ -96,20 +119,27 @@ class Writer:
         if self._fields is not None and self._settings is not None and number % self._settings.every == 0:
             self._fields.write(report.new, report.balance.a, report)
 
-    def checkpoint(self, place: Place, *, scheme: Scheme, dt: TimeSteps) -> None:
-        """A checkpoint of this place, unless there is one already."""
+    def checkpoint(self, place: Place, of: Callable[[], Problem]) -> None:
+        """A checkpoint of this place, unless there is one already. ``of``: what problem it is."""
         k = place.state.k
         if self._folder is None or self._saved == k:
             return
-        on_root(self._comm, self._sync)
-        write_checkpoint(self._folder, self._problem, place, scheme=scheme, dt=dt)
+        checksum = on_root(self._comm, self._sync) or ""
+        write_checkpoint(self._folder, self._problem, place, of=of(), rows=checksum)
         self._saved = k
         if self._comm.rank == 0:
             log.info("checkpoint of step %d", k)
 
-    def _sync(self) -> None:
-        if self._files is not None:
-            self._files.sync()
+    def _sync(self) -> str:
+        if self._files is None:
+            return ""
+        self._files.sync()
+        return self._files.checksum
+
+    @property
+    def history(self) -> Path | None:
+        """Where the histories are."""
+        return None if self._folder is None else self._folder / HISTORY_H5
 
     def close(self, facts: Mapping[str, Any]) -> None:
         """The last version of every file."""

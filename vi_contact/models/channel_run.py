@@ -98,6 +98,7 @@ def run_channel(run: ChannelRun, comm: Any, out: str | Path, *, progress: bool =
         escalation=(REFERENCE, SOLVERS["hildreth"]),
         cross_check=checked,
         restart=run.restart,
+        changed=run.changed,
         progress=progress,
     )
     if comm.rank == 0:

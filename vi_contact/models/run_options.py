@@ -34,6 +34,7 @@ class RunOptions:
     cross_check: bool = False
     fields_every: int = 10
     restart: bool = False
+    changed: bool = False
 
 
 def check_options(run: RunOptions) -> None:

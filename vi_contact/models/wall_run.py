@@ -76,6 +76,7 @@ def run_wall(run: WallRun, comm: Any, out: str | Path, *, progress: bool = True)
         escalation=(SOLVERS["volume-reference"], SOLVERS["hildreth"]),
         cross_check=checked,
         restart=run.restart,
+        changed=run.changed,
         progress=progress,
     )
     if comm.rank == 0:

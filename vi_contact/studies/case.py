@@ -105,7 +105,8 @@ class Case:
         return self._problem(self._parts(comm))
 
     def run(
-        self, comm: Any, *, out: str | Path | None = None, restart: bool | str | Path = False, progress: bool = True
+        self, comm: Any, *, out: str | Path | None = None, restart: bool | str | Path = False, progress: bool = True,
+        changed: bool = False,
     ) -> Solution:
         """The whole run; collective. ``out``: the run folder, by default the one of [run], if any.
 
@@ -117,6 +118,7 @@ class Case:
         own = {name: value for name, value in self._made("run").items() if name != "out"}
         parts = self._parts(comm)
         problem = self._problem(parts)
+        own |= {"changed": True} if changed else {}
         if "steps" not in own and "t_end" not in own:
             own["t_end"] = self._duration(problem)
         solver = self._made("solver")

@@ -1,0 +1,185 @@
+"""What makes two runs runs of the same problem, in few numbers that any ranks, machine or release give alike.
+
+Matrices and loads are seen through vectors w made of the numbers of the unknowns: wᵀMw, wᵀKw, wᵀCw, w·f(t). Such
+numbers depend neither on the ranks nor on their order, and round-off changes them in the last digits only; they are
+kept as numbers, with their sizes, and compared relative to these. Laws and schemes are their texts, the numbers in
+which are compared likewise.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+import numpy as np
+
+from .algebra import Array
+from .step import ContactProblem, Scheme
+from .surfaces import ContactSurface
+from .system import SemiDiscreteSystem
+from .time_steps import HalvedAtImpact, Schedule, TimeSteps, described
+
+SAME = 1e-8  # relative difference of numbers that count as equal: above round-off, below what anybody means to change
+GOLDEN = 0.6180339887498949
+PROBES = 2  # vectors w
+SAMPLES = 256  # times of functions of time alone, all over the run
+EARLY = 5  # times of other loads, which may have to be marched to: in the first steps
+STEPS = 32  # how many steps are the first ones
+FIXED = ("unknowns", "contact points")  # what a restart can by no means change
+SPEEDS = (0.0, 1e-3, 1e-1, 10.0)  # slip rates [m/s] at which friction is looked at
+_NUMBER = re.compile(r"(\d[\d.]*(?:[eE][-+]?\d+)?)")
+_ADDRESS = re.compile(r" at 0x[0-9a-f]+")
+_NUMPY = re.compile(r"\bnp\.\w+\(([^()]*)\)")  # as numpy 2 writes its numbers
+
+Numbers = list[tuple[float, float]]  # values and their sizes
+Identity = dict[str, Any]
+
+
+def identity(problem: ContactProblem, scheme: Scheme, dt: TimeSteps, *, start: float, end: float) -> Identity:
+    """Name -> number, text or numbers with their sizes, the same on all ranks; functions of time are looked at between
+    ``start`` and ``end`` [s]. Collective."""
+    system, surface = problem.system, problem.surface
+    probes = [probe(np.asarray(system.space.ids), j) for j in range(PROBES)]
+    first = min(end - start, STEPS * _smallest(dt))
+    early = [start + first * i / EARLY for i in range(EARLY + 1)]
+    times = start + (end - start) * (np.arange(SAMPLES) + probe(np.arange(SAMPLES), 0) + 0.5) / SAMPLES
+    return {
+        "unknowns": system.space.unknowns,
+        "contact points": surface.count,
+        "dt": described(dt),
+        "scheme": text_of(scheme),
+        "mass": text_of(problem.mass),
+        "impact law": text_of(problem.impact),
+        "friction law": text_of(problem.friction),
+        "stiffness": [_product(system, system.K, w) for w in probes],
+        "mass matrix": [_product(system, system.M, w) for w in probes],
+        "damping": [] if system.C is None else [_product(system, system.C, w) for w in probes],
+        "geometry": [_dot(system, probes[0], x) for x in system.space.coordinates.T],
+        "load": _loads(system, probes, early, times),
+        "excitation": _excitation(problem, times),
+        "contact surface or obstacle": _contact(surface, early),
+        "friction": _friction(problem),
+    }
+
+
+def probe(numbers: Any, j: int) -> Array:
+    """Values between -1/2 and 1/2 at these whole numbers; each j gives others."""
+    return np.asarray((np.asarray(numbers, dtype=float) * (GOLDEN / (j + 1))) % 1.0 - 0.5)
+
+
+def text_of(value: Any) -> str:
+    """The repr of a law without addresses, and without what releases of numpy write differently."""
+    return _NUMPY.sub(r"\1", _ADDRESS.sub("", repr(value)))
+
+
+def difference(ours: Identity, theirs: Mapping[str, Any]) -> tuple[str, str] | None:
+    """(name, how) of the first fact of theirs that is another one in ours."""
+    for name, own in ours.items():
+        if name not in theirs:
+            continue  # checkpoints of the first version do not have all
+        other = theirs[name]
+        if isinstance(own, list):
+            if not _same_numbers(own, other):
+                return name, f"another {name}"
+        elif not _same_text(str(own), str(other)):
+            return name, f"{name} = {other} but this one has {own}"
+    return None
+
+
+def _same_numbers(own: Numbers, other: Any) -> bool:
+    try:
+        one, two = np.array(own, dtype=float).reshape(-1, 2), np.array(other, dtype=float).reshape(-1, 2)
+    except (TypeError, ValueError):
+        return False
+    if one.shape != two.shape:
+        return False
+    return bool(np.all(np.abs(one - two) <= SAME * np.maximum(np.abs(one[:, 1:]), np.abs(two[:, 1:]))))
+
+
+def _same_text(own: str, other: str) -> bool:
+    """The same words, and the same numbers between them to SAME."""
+    one, two = _NUMBER.split(own), _NUMBER.split(other)
+    if len(one) != len(two) or one[::2] != two[::2]:
+        return False
+    return all(a == b or _near(a, b) for a, b in zip(one[1::2], two[1::2], strict=True))
+
+
+def _near(a: str, b: str) -> bool:
+    try:
+        return abs(float(a) - float(b)) <= SAME * max(abs(float(a)), abs(float(b)))
+    except ValueError:
+        return False
+
+
+def _smallest(dt: TimeSteps) -> float:
+    """The shortest base step of a plan [s]."""
+    plan = dt.dt if isinstance(dt, HalvedAtImpact) else dt
+    return min(size for size, _ in plan.pieces) if isinstance(plan, Schedule) else plan
+
+
+def _dot(system: SemiDiscreteSystem, w: Array, x: Array) -> tuple[float, float]:
+    """w·x and the size of it."""
+    dot = system.algebra.dot
+    return dot(w, x), float(np.sqrt(dot(w, w) * dot(x, x)))
+
+
+def _product(system: SemiDiscreteSystem, A: Any, w: Array) -> tuple[float, float]:
+    return _dot(system, w, A @ w)
+
+
+def _loads(system: SemiDiscreteSystem, probes: Sequence[Array], early: Sequence[float], times: Array) -> Numbers:
+    """The load in the first steps, and the histories of its separable parts through the run."""
+    forces = [system.load(t) for t in early]
+    size = max(float(np.sqrt(system.algebra.dot(f, f))) for f in forces)
+    length = float(np.sqrt(system.algebra.dot(probes[0], probes[0])))
+    found = [(system.algebra.dot(w, f), size * length) for f in forces for w in probes]
+    for vector, history in system.load.separable:
+        found += [_dot(system, probes[0], vector), *_sampled(np.array([float(history(t)) for t in times]))]
+    return found
+
+
+def _sampled(values: Array) -> Numbers:
+    """Sums of a row of numbers, with weights that see each of them."""
+    size = float(np.abs(values).sum())
+    weights: list[Callable[[Any, int], Array]] = [lambda n, j: np.ones(len(n)), probe, probe]
+    return [(float(weight(np.arange(len(values)), j) @ values), size) for j, weight in enumerate(weights)]
+
+
+def _excitation(problem: ContactProblem, times: Array) -> Numbers:
+    if not problem.excitations:
+        return []
+    ground = np.array([problem.ground_acceleration(float(t)) for t in times])
+    columns = [*ground.T, *(np.array(list(_numbers_in(one))) for one in problem.excitations)]
+    return [pair for column in columns for pair in _sampled(column)]
+
+
+def _numbers_in(value: Any) -> Iterator[float]:
+    """All numbers of a value object: every sample of a record, also those between the times that are looked at."""
+    if is_dataclass(value):
+        for one in fields(value):
+            yield from _numbers_in(getattr(value, one.name))
+    elif isinstance(value, np.ndarray | tuple | list):
+        found = np.asarray(value)
+        yield from found.ravel().tolist() if found.dtype.kind in "if" else ()
+    elif isinstance(value, int | float):
+        yield float(value)
+
+
+def _contact(surface: ContactSurface, early: Sequence[float]) -> Numbers:
+    """Where the contact points are, and what they may touch, at rest and as it moves."""
+    arrays = [*surface.points.T, *surface.normals.T, surface.weights, surface.gap0, surface.compliance,
+              surface.bilateral.astype(float)]
+    arrays += [] if surface.motion is None else [surface.gap(t) for t in early]
+    arrays += [] if surface.slide is None else [column for t in early for column in surface.slide(t).T]
+    return [pair for values in arrays for pair in _sampled(np.asarray(values, dtype=float))]
+
+
+def _friction(problem: ContactProblem) -> Numbers:
+    """The largest tangential reactions under a pressure, and their slopes at several slip rates."""
+    law, weights = problem.friction, problem.surface.weights
+    found = _sampled(np.asarray(law.limit(weights, weights, 1.0), dtype=float))
+    for speed in SPEEDS:
+        found += _sampled(np.asarray(law.at(np.full(len(weights), speed)).slope(weights), dtype=float))
+    return found

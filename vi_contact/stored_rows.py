@@ -1,0 +1,189 @@
+"""The rows that an earlier run left in its folder, read block by block: what a restart goes on from.
+
+Numbers are in history.csv, arrays in history.h5 and, of later steps, in history.journal. What was read is known by a
+checksum over lines and arrays, which the checkpoint keeps.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from .algebra import Array
+from .errors import InputError
+from .output import HISTORY_CSV, HISTORY_H5, JOURNAL, check_folder_format
+from .recorders import Row
+from .table import BLOCK, Block, Table
+
+
+def line_of(table: Table, row: Row) -> bytes:
+    """A line of history.csv: whole numbers stay whole, all others are floats that read back to the last bit."""
+    values = [row[name] for name in table.numbers]
+    return (",".join([repr(v if type(v) is int else float(v)) for v in values]) + "\n").encode()
+
+
+def record_of(table: Table, row: Row) -> bytes:
+    """The arrays of a row as the journal has them: float64, k first."""
+    arrays = [np.asarray(row[name], dtype=float).ravel() for name in table.arrays]
+    return np.concatenate([[float(row["k"])], *arrays]).tobytes()
+
+
+class StoredRows:
+    """Rows up to step k in a folder. ``checksum``: what they must have, as of the checkpoint; "" for one without.
+
+    After ``blocks`` has come to its end: ``length`` in bytes of their part of history.csv, ``hash`` of what was read.
+    """
+
+    def __init__(self, folder: Path, table: Table, k: int, checksum: str = "") -> None:
+        self.folder, self.k, self._table, self._checksum = folder, k, table, checksum
+        self.length, self.hash = 0, hashlib.sha256()
+
+    def blocks(self) -> Iterator[Block]:
+        """The rows, in order. InputError, one sentence, for what is missing, damaged or of other columns."""
+        check_folder_format(self.folder)
+        path, names = self.folder / HISTORY_CSV, self._table.numbers
+        if not path.is_file():
+            raise InputError(f"'{path}' is missing, so the histories cannot be continued: start a new run")
+        self.hash = hashlib.sha256()
+        with open(path, "rb") as csv, StoredArrays(self.folder, self._table) as arrays:
+            header = csv.readline()
+            if header.decode(errors="replace").strip() != ",".join(names):
+                raise InputError(f"'{path}' holds other columns than this run records: restart with the same recorders")
+            self.length = len(header)
+            for block in read_blocks(csv, self._table, arrays, k=self.k):
+                self._note(*block)
+                yield block[1]
+            if self._checksum and self.hash.hexdigest() != self._checksum:
+                raise InputError(f"the histories in '{self.folder}' are not those of the checkpoint, a file of them is "
+                                 "damaged: restore it or start a new run")
+
+    def _note(self, lines: list[bytes], block: Block) -> None:
+        for i, line in enumerate(lines):
+            self.length += len(line)
+            self.hash.update(line)
+            if self._table.arrays:
+                self.hash.update(record_of(self._table, {name: values[i] for name, values in block.items()}))
+
+
+def read_blocks(
+    csv: Any, table: Table, arrays: StoredArrays, *, first: int = 0, k: int | None = None
+) -> Iterator[tuple[list[bytes], Block]]:
+    """(lines, rows) from where history.csv is open, row ``first``, to step k or its end. A line cut short is none."""
+    done = first
+    while True:
+        lines = [line for line in islice(csv, BLOCK) if line.endswith(b"\n")]
+        numbers = _numbers(csv.name, lines, len(table.numbers), done)
+        steps = numbers[:, table.numbers.index("k")]
+        if len(steps) and not np.array_equal(steps, steps[0] + np.arange(len(steps))):
+            raise InputError(f"the steps in '{csv.name}' after line {done + 1} do not follow each other: restore it or "
+                             "start a new run")
+        n = len(steps) if k is None else int(np.searchsorted(steps, k, side="right"))
+        if n:
+            found = dict(zip(table.numbers, numbers[:n].T, strict=True))
+            yield lines[:n], found | arrays.rows(done, steps[:n])
+        done += n
+        if k is not None and n and steps[n - 1] == k:
+            return
+        if n < BLOCK:
+            if k is None:
+                return
+            raise InputError(f"'{csv.name}' does not reach step {k} of the checkpoint: restore it or start a new run")
+
+
+def _numbers(path: str, lines: list[bytes], width: int, before: int) -> Array:
+    """The numbers of lines (rows, width); InputError names the first line that holds something else."""
+    values = np.empty((len(lines), width))
+    for i, line in enumerate(lines):
+        try:
+            values[i] = [float(text) for text in line.decode("ascii").split(",")]
+        except (ValueError, UnicodeDecodeError) as error:
+            raise InputError(f"line {before + i + 2} of '{path}' is damaged: restore it or start a new run") from error
+    return values
+
+
+class StoredArrays:
+    """The arrays of a table in history.h5 (the first rows) and in the journal (later ones)."""
+
+    def __init__(self, folder: Path, table: Table) -> None:
+        self._path, self._samples = folder / HISTORY_H5, table.arrays
+        self._file: Any = None
+        self._journal = _journal(folder / JOURNAL, table.arrays) if table.arrays else np.zeros((0, 1))
+        if table.arrays:
+            with suppress(OSError):  # missing or damaged: the journal may still have all
+                self._file = h5py.File(self._path, "r")
+
+    def __enter__(self) -> StoredArrays:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._file is not None:
+            self._file.close()
+
+    def rows(self, first: int, steps: Array) -> Block:
+        """The arrays of consecutive rows, of these steps; InputError where one is missing."""
+        if not self._samples:
+            return {}
+        n = self._in_hdf5(first, steps)
+        found = [self._from_hdf5(first, n)] if n else []
+        if n < len(steps):
+            found.append(self._from_journal(steps[n:]))
+        return {name: np.concatenate([part[name] for part in found]) for name in self._samples}
+
+    def _in_hdf5(self, first: int, steps: Array) -> int:
+        """How many of them history.h5 has, all of the right shape."""
+        try:
+            held = self._file["k"]
+            fit = all(self._file[name].shape == (*held.shape, *one.shape) for name, one in self._samples.items())
+            n = min(max(held.shape[0] - first, 0), len(steps))
+            return n if fit and np.array_equal(held[first : first + n], steps[:n]) else 0
+        except (TypeError, KeyError, AttributeError, ValueError, OSError, RuntimeError):
+            return 0
+
+    def _from_hdf5(self, first: int, n: int) -> Block:
+        try:
+            return {
+                name: np.asarray(self._file[name][first : first + n]).astype(one.dtype)
+                for name, one in self._samples.items()
+            }
+        except (TypeError, ValueError, OSError, RuntimeError) as error:
+            raise InputError(f"'{self._path}' is damaged ({error}): restore it or start a new run") from error
+
+    def _from_journal(self, steps: Array) -> Block:
+        held = self._journal
+        start = int(steps[0] - held[0, 0]) if len(held) and np.isfinite(held[0, 0]) else -1
+        part = held[start : start + len(steps)] if start >= 0 else held[:0]
+        if not np.array_equal(part[:, 0], steps):
+            missing = int(steps[len(part)] if len(part) < len(steps) else steps[0])
+            raise InputError(f"'{self._path}' does not hold {', '.join(self._samples)} of step {missing}: restore it "
+                             "or start a new run")
+        ends = np.cumsum([one.size for one in self._samples.values()])[:-1]
+        columns = np.split(np.array(part[:, 1:]), ends, axis=1)
+        return {
+            name: column.reshape(len(part), *one.shape).astype(one.dtype)
+            for (name, one), column in zip(self._samples.items(), columns, strict=True)
+        }
+
+
+def _journal(path: Path, samples: Mapping[str, Array]) -> Array:
+    """The whole records of the journal, on disk until they are used; a record cut short by a crash is left out."""
+    width = 1 + sum(one.size for one in samples.values())
+    rows = path.stat().st_size // (8 * width) if path.is_file() else 0
+    return np.memmap(path, dtype=float, mode="r", shape=(rows, width)) if rows else np.zeros((0, width))
+
+
+def times_of(folder: Path, steps: set[int]) -> dict[int, float]:
+    """Step -> time of some rows of history.csv, whose first columns these are."""
+    found: dict[int, float] = {}
+    with open(folder / HISTORY_CSV, "rb") as file:
+        for line in islice(file, 1, None):
+            t, k, *_ = line.split(b",", 2)
+            if int(k) in steps:
+                found[int(k)] = float(t)
+    return found

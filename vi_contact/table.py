@@ -1,0 +1,120 @@
+"""The histories of a run in memory: compact columns, and of a run with a folder only so much of them."""
+
+from __future__ import annotations
+
+import copy
+import os
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from .algebra import Array
+from .errors import ViContactError
+from .recorders import Columns, Row
+from .tally import Tally
+
+BLOCK = 256  # rows that are turned into columns together
+KEPT = 64 * 2**20  # bytes of histories that stay in memory of a run with a folder, on each rank
+
+Block = dict[str, Array]  # column -> values of some rows: (rows,) float64, or (rows, *shape) of the arrays
+
+
+class Table:
+    """Columns and rows of a run, the same on every rank.
+
+    Attributes:
+        columns: column -> (unit, meaning). first: the row it was made with. count: rows so far.
+        numbers: columns of history.csv, in order; arrays: the others, which only HDF5 holds, each with a sample.
+        on_disk: whether a folder holds the rows too: beyond KEPT bytes the memory lets go of them.
+    """
+
+    def __init__(self, columns: Columns, first: Row, *, on_disk: bool = False) -> None:
+        self.columns, self.first, self.on_disk, self.count = columns, first, on_disk, 0
+        self.numbers = [name for name in columns if not isinstance(first[name], np.ndarray)]
+        self.arrays = {name: np.array(first[name]) for name in columns if isinstance(first[name], np.ndarray)}
+        self._open: list[Row] = []
+        self._blocks: list[Block] = []
+        self._size, self._kept = 0, True
+        self._tally = Tally()
+        self.append(first)
+
+    def append(self, row: Row) -> None:
+        """One more row."""
+        self._open.append(row)
+        self.count += 1
+        if len(self._open) == BLOCK:
+            rows, self._open = self._open, []
+            self._store(self._columns(rows))
+
+    def restore(self, block: Block) -> None:
+        """More rows of an earlier run, which are those before the one that the table was made with."""
+        if self.count == 1 and self._open:
+            self._open, self.count = [], 0
+        self.count += len(block["k"])
+        self._store(block)
+
+    def _columns(self, rows: list[Row]) -> Block:
+        found: Block = {name: np.array([row[name] for row in rows], dtype=float) for name in self.numbers}
+        return found | {name: np.array([row[name] for row in rows]) for name in self.arrays}
+
+    def _store(self, block: Block) -> None:
+        self._tally.add(block)
+        self._size += sum(values.nbytes for values in block.values())
+        if self.on_disk and self._size > KEPT:
+            self._kept, self._blocks = False, []
+        if self._kept:
+            self._blocks.append(block)
+
+    def facts(self) -> dict[str, Any]:
+        """What the rows say about the run, for its summary."""
+        tally = copy.deepcopy(self._tally)
+        if self._open:
+            tally.add(self._columns(self._open))
+        return tally.facts()
+
+    def history(self, file: Path | None = None) -> Mapping[str, Array]:
+        """Column -> values of all rows: (rows,) float64, or (rows, *shape of the arrays); of too many rows for the
+        memory as they are in ``file``, the history.h5 of the run."""
+        if not self._kept and file is not None:
+            return StoredHistory(file, list(self.columns), self.count)
+        if self._open:
+            rows, self._open = self._open, []
+            self._store(self._columns(rows))
+        names = [*self.numbers, *self.arrays]
+        return {name: np.concatenate([block[name] for block in self._blocks]) for name in names}
+
+
+class StoredHistory(Mapping[str, Array]):
+    """Histories that are read column by column from history.h5 when somebody asks.
+
+    ViContactError when the file is not there any more, or no longer holds these rows.
+    """
+
+    def __init__(self, file: Path, names: list[str], rows: int) -> None:
+        self._file, self._names, self._rows = file, names, rows
+        self._stamp = self._now()
+
+    def _now(self) -> tuple[int, int] | None:
+        try:
+            status = os.stat(self._file)
+        except OSError:
+            return None
+        return status.st_mtime_ns, status.st_size
+
+    def __getitem__(self, name: str) -> Array:
+        if name not in self._names:
+            raise KeyError(name)
+        if self._stamp is None or self._now() != self._stamp:
+            raise ViContactError(f"'{self._file}', where the histories of this run are, has been replaced or is not on "
+                                 "this machine: give every run a folder of its own, on a shared disk")
+        with h5py.File(self._file, "r") as file:
+            return np.asarray(file[name][()])
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
