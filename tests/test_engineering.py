@@ -270,6 +270,11 @@ def test_arc_position_of_lines_and_channels() -> None:
     channel = np.array([[0.0, 2.0], [2.0, 2.0], [0.0, 1.0], [0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [2.0, 1.0]])
     place, name = arc_position(channel)
     assert place == pytest.approx([0.0, 6.0, 1.0, 2.0, 3.0, 4.0, 5.0]) and name == "arc length [m]"
+    sides = np.array([[-1.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, -1.0], [0.0, -1.0], [1.0, 0.0], [1.0, 0.0]])
+    corners, other = np.vstack([channel, channel[[3, 5]]]), np.vstack([sides, [[-1.0, 0.0], [0.0, -1.0]]])
+    place, _ = arc_position(corners, other)  # each corner's condition on the side that comes first
+    assert place == pytest.approx([0.0, 6.0, 1.0, 2.0, 3.0, 4.0, 5.0, 2.0, 4.0], abs=1e-4)
+    assert place[7] < place[3] < place[4] < place[8] < place[5]
 
 
 def test_thinned_maps_keep_peaks() -> None:

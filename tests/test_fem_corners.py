@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from math import pi, radians
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 
@@ -395,6 +396,33 @@ def test_a_wall_moved_with_its_ground():
         answers.append(np.array([report.new.r_n for _, report in vc.march(problem, dt=2e-3, steps=40)]))
     assert answers[0][:, surface.corners[0]].max() > 0.0
     assert np.abs(answers[0] - answers[1]).max() < 1e-9 * answers[0].max()
+
+
+@pytest.mark.serial
+def test_supports_released_beside_an_oblique_notch(tmp_path):
+    """A static stage whose top is held goes on without that support, and nothing moves. The field file has the pressure
+    of the corner's face that is pressed most."""
+    mesh, tags = fem.build_mesh(BlockMesh(**BODIES["trapezoid"]), COMM)
+    weight = fem.BodyForce((-300.0, -2e3))
+    systems = [fem.assemble(mesh, SOFT, loads=weight, clamped=held) for held in (tags["top"], ())]
+    places = [(k / 3.0 / np.sqrt(3.0), k / 3.0) for k in (2, 1, 0)] + [(0.5 * k, 0.0) for k in range(1, 7)]
+    static, free = (
+        ContactProblem(one, fem.contact_surface(one, group(tags, "left", "bottom"), points=places)) for one in systems
+    )
+    state = vc.static_equilibrium(static, solver=vc.Condensed())
+    corner = static.surface.corners[0]
+    assert state.r_n[corner].min() > 0.0
+    problem, start = fem.release(static, state, free)
+    found = vc.simulate(
+        problem, dt=1e-3, steps=5, state=start, out=tmp_path / "run", fields=fem.XDMF(every=1), progress=False
+    )
+    u = systems[1].space.expand(problem.cartesian(found.state.u), 0.0)
+    before = systems[0].space.expand(static.cartesian(state.u), 0.0)
+    assert np.abs(u - before).max() < 1e-11 * np.abs(before).max()
+    assert np.abs(found.state.r_n - state.r_n).max() < 1e-9 * state.r_n.max()
+    with h5py.File(tmp_path / "run" / "fields" / "frame_000001.h5") as file:
+        pressure = file["contact_pressure"][static.surface.nodes[corner[0]]]
+    assert pressure == pytest.approx((state.r_n / static.surface.weights)[corner].max(), rel=1e-8)
 
 
 # The feature angle ----------------------------------------------------------------------------------------------------

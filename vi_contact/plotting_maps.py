@@ -13,8 +13,10 @@ STRAIGHT = 1e-6  # of its length: what a line of points may deviate
 ROWS = 1200  # of a map: more instants than a page has dots are gathered
 
 
-def arc_position(points: Array) -> tuple[Array, str]:
+def arc_position(points: Array, normals: Array | None = None) -> tuple[Array, str]:
     """(place (m,) along the line of points (m, 2) [m], name of the axis).
+
+    With ``normals`` (m, 2) the conditions of a corner follow each other as its sides do, by nothing that can be seen.
 
     Points on a straight line along an axis: their coordinate; on another one: the length along it; else the arc length
     of the chain that starts at the highest point (of those the leftmost) and goes on to the nearest one each time.
@@ -28,6 +30,8 @@ def arc_position(points: Array) -> tuple[Array, str]:
         along = axes[0] if axes[0, int(np.argmax(np.abs(axes[0])))] > 0.0 else -axes[0]
         place = arms @ along
         return np.asarray(place - place.min()), "length along the surface [m]"
+    if normals is not None:
+        points = np.column_stack([points, STRAIGHT * float(np.ptp(points, axis=0).max()) * normals])
     order = chain(points)
     lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points[order], axis=0), axis=1))])
     place = np.empty(len(points))

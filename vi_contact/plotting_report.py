@@ -192,7 +192,7 @@ def _spectrum(axis: Any, run: RunFolder, names: Sequence[str]) -> None:
 
 def _map(axis: Any, run: RunFolder, column: str, unit: str) -> None:
     assert run.contact is not None
-    position, label = arc_position(run.contact.points)
+    position, label = arc_position(run.contact.points, run.contact.normals)
     values = np.reshape(run.history[column], (len(run.history["t"]), -1))
     open_gap = column == "gap"
     t, shown = thinned(run.history["t"], np.maximum(values, 0.0) if open_gap else values)
