@@ -352,6 +352,42 @@ def test_mistakes_that_need_the_mesh(tmp_path: Path, old: str, new: str, said: s
         run_case(write(tmp_path, WALL.read_text("utf-8").replace(old, new, 1)), COMM)
 
 
+CORNER = """
+[mesh]
+type = "BlockMesh"
+divisions = [3, 3]
+
+[system]
+material = {E = 1e6, nu = 0.3, rho = 1000}
+clamped = "top"
+
+[[contact]]
+facets = "bottom"
+
+[[contact]]
+facets = "left"
+points = [[0, 0]]
+feature_angle = 0.4
+
+[friction]
+type = "Coulomb"
+mu = 0.3
+
+[run]
+dt = 0.005
+steps = 1
+"""
+
+
+@pytest.mark.serial
+def test_corners_beside_friction_are_said_to_slide_freely(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"1 contact nodes, the first at \(0, 0\), have several contact directions"):
+        read_case(write(tmp_path, CORNER)).problem(COMM)
+    allowed = CORNER.replace("\nfacets", "\nfrictionless_corners = true\nfacets")
+    surface = read_case(write(tmp_path, allowed)).problem(COMM).surface
+    assert surface.frictionless_corners and [len(corner) for corner in surface.corners] == [2]
+
+
 @pytest.mark.serial
 def test_files_that_are_none(tmp_path: Path) -> None:
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe")
