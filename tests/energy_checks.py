@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from bar import before_impact, energy, run
 
 from vi_contact.static import initial_state
@@ -48,3 +49,13 @@ def course(
         contact, algorithmic = min(contact, step.contact), min(algorithmic, step.algorithmic)
         friction = min(friction, step.friction)
     return Course(rise, first, last, defect, largest, min_gap, contact, algorithmic, friction)
+
+
+def rounded(problem: ContactProblem, way: float) -> float:
+    """[J] What round-off leaves in the ledger of a body that has moved by ``way`` [m] as a whole: eps Σ K_ii way².
+
+    The motion strains nothing, but K u is then a sum of products of this size that cancel, and each of them is rounded.
+    """
+    system = problem.equations
+    diagonal = np.abs(system.K.diagonal())
+    return float(np.finfo(float).eps * system.algebra.comm.sum(np.array([diagonal.sum()]))[0] * way**2)

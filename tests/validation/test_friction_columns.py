@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from column import UNIT, column, rubbing_mass
+from energy_checks import rounded
 
 from vi_contact.exact.columns import ObliqueImpact, ShearColumn
 from vi_contact.friction import Coulomb, Tresca
@@ -39,7 +40,8 @@ def history(problem: ContactProblem, scheme: Any, *, t_end: float, dt: float = D
     total = found["energy_kinetic"] + found["energy_strain"]
     losses = sum(value for name, value in found.items() if name.startswith("loss_"))
     defect = total + losses - found["work_input"] - total[0]
-    assert np.abs(defect).max() <= 1e-10 * total.max()
+    way = max(np.abs(found["slip"]).max(), np.abs(found["gap"]).max())
+    assert np.abs(defect).max() <= 1e-11 * total.max() + rounded(problem, way)  # measured: 0.18 of it
     assert found["certificate"].max() <= 1e-12
     assert np.diff(found["loss_friction"]).min() >= -1e-14 * total.max()
     return found
