@@ -295,7 +295,7 @@ MISTAKES = {  # what is replaced in demos/cases/wall.toml, by what, what the sen
     "no TOML": ("[mesh]", "[mesh", ", line 4, column 6: Expected ']'"),
     "end of file": ("every = 10", "every =", ", line "),
     "table twice": ("[impact]", "[solver]", ", line "),
-    "table": ("[impact]", "[impakt]", ": unknown table [impakt]: did you mean impact? Known: title, model, mesh"),
+    "table": ("[impact]", "[impakt]", ": unknown table [impakt]: did you mean impact or format? Known: format, title"),
     "key": ("amplitude", "amplitute", ": [excitation[1]] has the unknown key 'amplitute' for Harmonic: did you mean "
             "amplitude? Known: amplitude, frequency, phase, direction"),
     "type": ('"Condensed"', '"Condensd"', ": [solver] has the unknown type 'Condensd': did you mean Condensed?"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -124,8 +125,9 @@ def test_no_input_is_overwritten(tmp_path, monkeypatch, capsys, arguments, word)
     Path("r.at2").write_text("A MOTION\nIN UNITS OF G\nNPTS= 4, DT= .01 SEC\n0.0 0.1 -0.1 0.0\n")
     Path("link.at2").symlink_to("r.at2")
     Path("run").mkdir()
-    Path("run/history.csv").write_text("k,t,a_g_x\n" + "".join(f"{k},{0.01 * k},0.{k}\n" for k in range(9)))
-    Path("run/columns.json").write_text("{}")
+    names = "k,t,iterations,certificate,escalated,a_g_x"
+    Path("run/history.csv").write_text(names + "\n" + "".join(f"{k},{0.01 * k},1,0,0,0.{k}\n" for k in range(9)))
+    Path("run/columns.json").write_text(json.dumps({name: {"unit": "-", "meaning": name} for name in names.split(",")}))
     Path("run/checkpoint.npz").write_bytes(b"kept")
     before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
     assert main(arguments) == 1

@@ -12,6 +12,7 @@ from . import __version__
 from .cli_beam import add_beam_command
 from .cli_case import add_case_commands
 from .cli_channel import add_channel_commands
+from .cli_errors import check_words, printable, told
 from .cli_ida import add_ida_commands
 from .cli_layer import add_layer_command
 from .cli_motion import add_motion_commands
@@ -122,7 +123,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
         petsc4py.init(["vi-contact", *petsc])
     try:
-        text = options.run(options)
+        check_words(own)
+        text = told(lambda: options.run(options))
     except ViContactError as error:
         fail_together(str(error))
         if rank() == 0:
@@ -137,5 +139,5 @@ def main(arguments: Sequence[str] | None = None) -> int:
         fail_together(traceback.format_exc())
         raise
     if text:
-        print(text)
+        print(printable(text))
     return 0

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from .checks import counted
 from .errors import InputError
 
 
@@ -56,10 +57,12 @@ def _run(options: argparse.Namespace) -> str:
         options.length, options.rho, options.area, options.inertia, options.E, options.G, options.shear_factor,
         options.viscosity,
     )
+    counted("beam", f"--elements {options.elements}", options.elements, "elements", most=100_000)
     elements = Elements(options.elements) if options.free_end else published_elements(options.elements)
     law: TipFriction = ExactFriction() if options.exact else RegularisedFriction(options.eps)
     if not options.dt > 0.0 or not options.t_end >= options.dt:
         raise InputError(f"dt is {options.dt:g} s and t-end {options.t_end:g} s: give 0 < dt <= t-end")
+    counted("beam", f"--t-end {options.t_end:g} at --dt {options.dt:g}", options.t_end / options.dt, "steps")
     steps = round(options.t_end / options.dt)
     mu = published_mu if options.mu is None else lambda t, rate: options.mu
     stepper = BeamStepper(beam, elements, options.dt, _force(options, elements, steps), mu, law)

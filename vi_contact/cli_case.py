@@ -33,6 +33,7 @@ def _run(options: argparse.Namespace) -> str:
     name = case.tables.get("title") or Path(options.case).stem
     if options.check:
         case.check()
+        case.check_mesh(comm)
         return f"{options.case}: {name}: the file is in order" if comm.rank == 0 else ""
     out = options.out or case.out or Path("results") / Path(options.case).stem
     solution = case.run(

@@ -7,6 +7,7 @@ import shlex
 import signal
 from typing import Any
 
+from .checks import shown
 from .errors import InputError, ViContactError
 
 
@@ -52,6 +53,10 @@ def _ida(options: argparse.Namespace) -> str:
     from .studies.case import read_case
     from .studies.ida import IDA, run_ida
 
+    try:
+        launch = shlex.split(options.launch)
+    except ValueError as error:
+        raise InputError(f"--launch {shown(options.launch)}: {error}; close the quotation mark") from None
     study = IDA(
         read_case(options.case, options.settings), [_files(motion) for motion in options.motions], options.edp,
         scales=options.scales or (), levels=options.levels or (), intensity=options.im,
@@ -60,12 +65,15 @@ def _ida(options: argparse.Namespace) -> str:
         signal.signal(signum, signal.default_int_handler)
     try:
         rows = run_ida(
-            study, options.out, jobs=options.jobs, part=options.part, launch=shlex.split(options.launch),
+            study, options.out, jobs=options.jobs, part=options.part, launch=launch,
             say=lambda line: print(line, flush=True),
         )
     except KeyboardInterrupt:
         raise ViContactError("interrupted: give the same command again to go on") from None
     failed = sum(row["status"] != "finished" for row in rows)
+    if rows and failed == len(rows):
+        raise ViContactError(f"none of {failed} runs finished, the first because: {rows[0]['reason']}; the others are "
+                             f"in {options.out}/ida.csv")
     return f"{len(rows)} rows, {failed} of failed runs: {options.out}/ida.csv, ida.png"
 
 

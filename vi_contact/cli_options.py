@@ -23,7 +23,7 @@ def add_shaking(parser: argparse.ArgumentParser, *, harmonic: str) -> Any:
     shake.add_argument("--vertical", metavar="FILE", help="vertical record, beside --motion")
     shake.add_argument("--units", help="units of two-column files: m/s2, cm/s2, gal, g, ...")
     shake.add_argument(
-        "--scale", type=float, default=1.0, help=f"factor on the record, or on the harmonic's {harmonic}"
+        "--scale", type=float, help=f"factor on the record, or on the harmonic's {harmonic}; not beside --pga"
     )
     shake.add_argument("--pga", type=float, metavar="A", help="scale both to this peak [m/s2] of the first")
     shake.add_argument("--resample", type=float, metavar="DT", help="resample to this step [s], band-limited")
@@ -71,8 +71,13 @@ def add_restart(options: Any, where: str) -> None:
 
 def chosen(options: argparse.Namespace) -> dict[str, Any]:
     """The shared options by the names of the runs' own arguments, but for the impact law."""
+    if options.scale is not None and options.pga is not None:
+        raise InputError("--scale and --pga both scale the motion: give one of them")
+    if options.steps is not None and options.steps < 1:
+        raise InputError(f"--steps {options.steps}: give at least one step")
     found = {name: getattr(options, name) for name in (*SHAKING, *STEP, *OUTPUT)}
-    return found | {"restart": options.restart or options.changed}
+    scale = 1.0 if options.scale is None else options.scale
+    return found | {"scale": scale, "restart": options.restart or options.changed}
 
 
 def output_file(path: str | Path, *, reads: Iterable[str | Path] = (), picture: bool = False) -> Path:

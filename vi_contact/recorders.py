@@ -250,6 +250,8 @@ class Probe:
     def __post_init__(self) -> None:
         attributes(self, flags=("velocity", "acceleration"))
         instance("Probe", "points", self.points, Mapping, "give labels and points, {'top': (x, y)}")
+        if not self.points:
+            raise InputError("Probe: points is empty; give labels and points, {'top': (x, y)}, or leave it out")
         for label, point in self.points.items():
             column_name("probe label", label)
             array("Probe", f"the point '{label}'", point, (None,), unit="metres")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,8 +14,19 @@ import h5py
 import numpy as np
 
 from .algebra import Array, Mask
+from .checks import shown
 from .errors import InputError
 from .output import COLUMNS, HISTORY_CSV, HISTORY_H5, SUMMARY, check_folder_format
+
+BYTES = 100_000_000  # of a JSON file
+DENSEST = 1100  # bytes in memory for one on disk: zeros that are packed
+_NEEDED = ("t", "k", "iterations", "certificate", "escalated")  # columns of every run
+_NUMBER = (int, float)
+_KINDS: dict[str, type | tuple[type, ...]] = {  # of the entries of summary.json that are used
+    "scheme": str, "mass": str, "solver": str, "status": str, "reason": str, "dt": (int, float, str), "versions": dict,
+    "iterations_per_step": dict, "tolerance": _NUMBER, "ranks": int, "unknowns": int, "contact_points": int,
+    "energy_defect": _NUMBER, "worst_certificate": _NUMBER, "energy_created": _NUMBER, "steps": int,
+}
 
 
 @dataclass(frozen=True)
@@ -57,27 +69,72 @@ def read_run(folder: str | Path) -> RunFolder:
     check_folder_format(folder)
     history = _numbers(folder / HISTORY_CSV)
     try:
-        described = json.loads((folder / COLUMNS).read_text(encoding="utf-8"))
-        columns = {name: (one["unit"], one["meaning"]) for name, one in described.items()}
-        path = folder / SUMMARY
-        facts = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+        columns = _columns(read_object(folder / COLUMNS), history)
+        facts = _facts(read_object(folder / SUMMARY)) if (folder / SUMMARY).is_file() else {}
         arrays, contact = _arrays(folder / HISTORY_H5, len(history["t"]))
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise InputError(f"a file of the run in '{folder}' is missing or damaged ({error}): restore it") from error
+    except (OSError, ValueError, KeyError, TypeError, RuntimeError, AttributeError) as error:
+        reason = " ".join(str(error).split())
+        raise InputError(f"a file of the run in '{folder}' is missing or damaged ({reason}): restore it") from error
     return RunFolder(folder, history | arrays, columns, facts, contact)
+
+
+def read_object(path: Path) -> dict[str, Any]:
+    """The JSON object of a file of a run; ValueError for anything else, NaN, and texts that cannot be printed."""
+    if path.stat().st_size > BYTES:
+        raise ValueError(f"{path.name} is larger than {BYTES:.0e} bytes")
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"), parse_constant=lambda word: [])
+    except RecursionError:
+        raise ValueError(f"{path.name} is nested too deep") from None
+    if not isinstance(found, dict):
+        raise ValueError(f"{path.name} holds no object")
+    json.dumps(found, ensure_ascii=False).encode()  # lone surrogates
+    return found
+
+
+def _columns(described: dict[str, Any], history: Mapping[str, Array]) -> dict[str, tuple[str, str]]:
+    """Column -> (unit, meaning)."""
+    columns = {name: (one["unit"], one["meaning"]) for name, one in described.items()}
+    if not all(isinstance(text, str) for pair in columns.values() for text in pair):
+        raise ValueError(f"{COLUMNS}: units and meanings are texts")
+    for name in history:
+        if name not in columns:
+            raise ValueError(f"{COLUMNS} does not know the column {shown(name)}")
+    return columns
+
+
+def _facts(facts: dict[str, Any]) -> dict[str, Any]:
+    """The summary, its entries of the kinds that ``Solution`` writes."""
+    for name, kinds in _KINDS.items():
+        value = facts.get(name)
+        if value is not None and (not isinstance(value, kinds) or isinstance(value, bool)):
+            raise ValueError(f"{SUMMARY}: {name} is {shown(value)}")
+    mean = (facts.get("iterations_per_step") or {}).get("mean")
+    if mean is not None and not isinstance(mean, float | int):
+        raise ValueError(f"{SUMMARY}: iterations_per_step is {shown(mean)}")
+    return facts
 
 
 def _numbers(path: Path) -> dict[str, Array]:
     """Columns of history.csv; a last line that a crash cut short is left out."""
-    lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
-    rows = list(csv.reader(line for line in lines if line.endswith("\n")))
     try:
+        lines = path.read_bytes().decode("utf-8").splitlines(keepends=True)
+        rows = list(csv.reader(line for line in lines if line.endswith("\n")))
+        if any("_" in text for row in rows[1:] for text in row):  # float() would read 1_0 as ten
+            raise ValueError("no number")
         values = np.array([[float(text) for text in row] for row in rows[1:]]).reshape(len(rows) - 1, len(rows[0]))
-        if not len(values) or "t" not in rows[0]:
-            raise ValueError("no rows")
-    except (ValueError, IndexError) as error:
-        raise InputError(f"'{path}' is damaged ({error}): restore it or run again") from error
-    return {name: values[:, i] for i, name in enumerate(rows[0])}
+        history = {name: values[:, i] for i, name in enumerate(rows[0])}
+        if not len(values) or len(history) != len(rows[0]):
+            raise ValueError("no rows, or two columns of one name")
+        if missing := [name for name in _NEEDED if name not in history]:
+            raise ValueError(f"no column {missing[0]}")
+        if not np.all(np.isfinite(history["t"])) or np.any(np.diff(history["t"]) <= 0.0):
+            raise ValueError("times that do not increase")
+    except OSError as error:
+        raise InputError(f"'{path}' cannot be read ({error.strerror}): check its permissions") from error
+    except (ValueError, IndexError, csv.Error) as error:
+        raise InputError(f"'{path}' is damaged ({' '.join(str(error).split())}): restore it or run again") from error
+    return history
 
 
 def _arrays(path: Path, rows: int) -> tuple[dict[str, Array], ContactGeometry | None]:
@@ -86,9 +143,27 @@ def _arrays(path: Path, rows: int) -> tuple[dict[str, Array], ContactGeometry | 
         return {}, None
     with h5py.File(path, "r") as file:
         group = file["contact"]
-        geometry = ContactGeometry(*(group[name][()] for name in ("points", "normals", "weights", "gap0", "bilateral")))
+        geometry = ContactGeometry(*(_values(group, name) for name in ContactGeometry.__dataclass_fields__))
+        count = len(geometry.weights)
+        shapes = {np.shape(getattr(geometry, name)) for name in ("weights", "gap0", "bilateral")}
+        points = np.shape(geometry.points)
+        if shapes != {(count,)} or len(points) != 2 or points[0] != count or np.shape(geometry.normals) != points:
+            raise ValueError(f"{HISTORY_H5}: the contact points do not fit each other")
         arrays = {
-            name: item[()] for name, item in file.items()
-            if isinstance(item, h5py.Dataset) and item.ndim > 1 and item.shape[0] == rows
+            name: _values(file, name) for name in file
+            if name != "contact" and file[name].ndim > 1 and file[name].shape[0] == rows
         }
-    return arrays, geometry if len(geometry.weights) else None
+        if any(values.shape[1] != count for values in arrays.values()):
+            raise ValueError(f"{HISTORY_H5}: arrays are not those of {count} contact points")
+    return arrays, geometry if count else None
+
+
+def _values(group: Any, name: str) -> Any:
+    """Numbers of a data set that lies in this very file, in memory no more than it can hold."""
+    item = group[name]
+    link = group.get(name, getlink=True)
+    if not isinstance(link, h5py.HardLink) or item.external is not None or item.is_virtual:
+        raise ValueError(f"{HISTORY_H5}: {name} lies in another file")
+    if item.dtype.kind not in "fiub" or item.nbytes > DENSEST * os.path.getsize(item.file.filename):
+        raise ValueError(f"{HISTORY_H5}: {name} is no array of numbers of this file")
+    return item[()]

@@ -94,6 +94,11 @@ class Tags(dict[str, Any]):
         )
 
 
+def alone() -> MPI.Comm:
+    """The communicator of this process by itself."""
+    return MPI.COMM_SELF
+
+
 def read_mesh(path: str | Path, comm: MPI.Comm) -> tuple[Mesh, Tags]:
     """Read a first-order mesh of intervals, triangles, quadrilaterals, tetrahedra or hexahedra and its physical groups.
 

@@ -12,7 +12,7 @@ file is ever evaluated as code.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, is_dataclass
 from inspect import Parameter, signature
 from typing import Any, Protocol, get_type_hints
@@ -163,10 +163,21 @@ class Call:
             raise self.spot.inside(f"{error}") from error
 
 
+def groups(node: Node) -> Iterator[Group]:
+    """The groups of the mesh that are named in it."""
+    if isinstance(node, Group):
+        yield node
+    inside: Iterable[Node] = ()
+    if isinstance(node, Call):
+        inside = node.arguments.values()
+    elif isinstance(node, Items):
+        inside = node.items
+    elif isinstance(node, Named):
+        inside = node.items.values()
+    for one in inside:
+        yield from groups(one)
+
+
 def needs_mesh(node: Node) -> bool:
     """Whether groups of the mesh are named in it."""
-    if isinstance(node, Call):
-        return any(needs_mesh(one) for one in node.arguments.values())
-    if isinstance(node, Items):
-        return any(needs_mesh(one) for one in node.items)
-    return isinstance(node, Group) or (isinstance(node, Named) and any(needs_mesh(one) for one in node.items.values()))
+    return any(True for _ in groups(node))

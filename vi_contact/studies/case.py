@@ -15,12 +15,15 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from ..checks import shown
 from ..cross_check import CrossChecked
 from ..errors import InputError
 from ..excitation import Excitation
 from ..fem.assembly import assemble
 from ..fem.joined import together
-from ..fem.mesh import build_mesh, read_mesh
+from ..fem.mesh import Tags, build_mesh, read_mesh
 from ..folder_lock import locked
 from ..friction import FrictionLaw, Frictionless
 from ..impact import ImpactLaw
@@ -28,14 +31,16 @@ from ..mass import MassLaw
 from ..materials import LinearElastic
 from ..meshes.gmsh_session import MeshScript
 from ..output import on_root, run_folder, write_atomically
+from ..recorders import Contact, Energy, Steps
+from ..schemes.choice import completed
 from ..simulate import Solution, simulate
 from ..solvers.condensed import Condensed
-from ..static import static_equilibrium
+from ..static import initial_state, static_equilibrium
 from ..step import ContactProblem, Recorder, Scheme, Solver
 from ..surfaces import ContactSurface, empty_surface
 from ..weight import with_weight
 from ..writer import FieldWriter
-from .calls import Callee, Named, Node, Spot, callee, needs_mesh
+from .calls import Callee, Named, Node, Spot, callee, groups, needs_mesh
 from .models import Parts
 from .plain import MeshFile
 from .reading import Words, arguments, nearest, read
@@ -67,7 +72,8 @@ _CALLED: dict[str, Callee] = {  # tables that always call the same function
         function=dict,
     ),
 }
-TABLES = ("title", "model", "mesh", "material", "system", "contact", "gravity", "friction", "impact", "mass",
+FORMAT = 1  # of case files
+TABLES = ("format", "title", "model", "mesh", "material", "system", "contact", "gravity", "friction", "impact", "mass",
            "excitation", "scheme", "solver", "escalation", "run", "record", "fields")
 
 
@@ -100,9 +106,30 @@ class Case:
             if table in self.nodes and not needs_mesh(self.nodes[table]):
                 self._made(table)
 
+    def check_mesh(self, comm: Any) -> None:
+        """Makes or reads the mesh and looks up every group that the tables name; InputError. Collective."""
+        if "mesh" in self.nodes:
+            self._mesh(comm)
+
     def problem(self, comm: Any) -> ContactProblem:
         """The contact problem; collective."""
         return self._problem(self._parts(comm))
+
+    def columns(self, comm: Any) -> frozenset[str]:
+        """Names of the columns that a run writes into history.csv; assembles, and computes no step. Collective."""
+        parts = self._parts(comm)
+        problem = self._problem(parts)
+        own = self._recorders(parts)
+        recorders = [Steps(problem.system.influence.shape[1]), *((Energy(), Contact()) if own is None else own)]
+        problem, _ = completed(problem, self._made("scheme"))
+        state = initial_state(problem)
+        return frozenset(
+            name for one in recorders for name, value in one.start(problem, state).items() if np.ndim(value) == 0
+        )
+
+    def _recorders(self, parts: Parts) -> tuple[Recorder, ...] | None:
+        """Those of [[record]], else the model's own; None for those of ``simulate``."""
+        return self._several("record", tags=parts.tags) if "record" in self.nodes else parts.recorders
 
     def run(
         self, comm: Any, *, out: str | Path | None = None, restart: bool | str | Path = False, progress: bool = True,
@@ -129,7 +156,7 @@ class Case:
                 self._keep(folder, ranks)
             return simulate(
                 problem, scheme=self._made("scheme"), solver=solver, state=state, out=folder, restart=restart,
-                record=self._several("record", tags=parts.tags) if "record" in self.nodes else parts.recorders,
+                record=self._recorders(parts),
                 escalation=self._several("escalation"), fields=self._made("fields"), progress=progress,
                 cross_check=solver if isinstance(solver, CrossChecked) else None, **own,
             )
@@ -147,9 +174,7 @@ class Case:
         if "model" in self.nodes:
             parts: Parts = self._made("model", comm=comm)
             return parts
-        script = self._made("mesh")
-        given = read_mesh(script.path, comm) if isinstance(script, MeshFile) else build_mesh(script, comm)
-        mesh, tags = given
+        mesh, tags = self._mesh(comm)
         system = self._made(
             "system", mesh=mesh, tags=tags, excitations=self.excitations(), time_step=self._made("run")["dt"],
             time_scheme=self._made("scheme"),
@@ -160,6 +185,15 @@ class Case:
         if surface is None:
             surface = empty_surface(system.algebra.comm, system.space.dimension)
         return Parts(system, surface, tags, "gravity" in self.nodes)
+
+    def _mesh(self, comm: Any) -> tuple[Any, Tags]:
+        """The mesh and its groups, all those that the tables name among them."""
+        script = self._made("mesh")
+        mesh, tags = read_mesh(script.path, comm) if isinstance(script, MeshFile) else build_mesh(script, comm)
+        for node in self.nodes.values():
+            for group in groups(node):
+                group.build({"tags": tags})
+        return mesh, tags
 
     def _problem(self, parts: Parts) -> ContactProblem:
         return ContactProblem(
@@ -197,6 +231,10 @@ def read_case(path: str | Path, settings: Sequence[str] = ()) -> Case:
     tables = with_settings(read_toml(path), settings)
     known = words(path.parent)
     file = str(path)
+    found = tables.get("format", FORMAT)
+    if found != FORMAT or isinstance(found, bool):
+        raise InputError(f"{file}: format is {shown(found)}, and this version of vi_contact reads format {FORMAT}: "
+                         "take the version it was written for, or correct the number")
     for name in tables:
         if name not in TABLES:
             raise InputError(f"{file}: unknown table [{name}]: {nearest(name, dict.fromkeys(TABLES))}")
@@ -207,7 +245,7 @@ def read_case(path: str | Path, settings: Sequence[str] = ()) -> Case:
             raise InputError(f"{file}: [{name}] is part of the model: leave it out, or replace [model] by [mesh]")
     given = tables if "model" in tables else {"system": {}} | tables
     given = {"run": {}} | given
-    order = sorted(given, key=TABLES.index)  # materials are known before the system names them
+    order = sorted(given.keys() - {"format"}, key=TABLES.index)  # materials are known before the system names them
     nodes = {name: _node(name, given, Spot(file, "", name), known) for name in order}
     return Case(path, tables, tuple(settings), nodes)
 

@@ -23,12 +23,14 @@ import numpy as np
 
 from ..algebra import Array
 from ..errors import InputError
+from ..fem.mesh import alone
 from ..output import to_json, write_atomically
 from ..plotting_ida import Panel, plot_ida
 from .case import Case
 from .ida_runs import OneRun, Shaking, executed, read_json, refuse_mpirun, shakings
 from .ida_table import Row, tabulated
 from .measures import Demand, Intensity, demand, fractiles, intensity
+from .reading import nearest
 
 SHARES = (0.16, 0.50, 0.84)
 TABLE, COLUMNS, FIGURE, STUDY, RUNS = "ida.csv", "columns.json", "ida.png", "ida.json", "runs"
@@ -118,12 +120,25 @@ def run_ida(
     every = study.runs(out)
     mine = every[part[0] - 1 :: part[1]]
     left = [run for run in mine if run.done() is None]
+    if left:
+        _check_demands(study)
     say(f"{len(every)} runs, {len(mine)} of them here, {len(mine) - len(left)} finished before")
     for number, row in enumerate(executed(left, jobs, launch), start=1):
         _tell(study, out)
         say(f"[{number}/{len(left)}] {row['record']} x {_shown(row['scale'])}: {row['status']}"
             + (f": {row['reason']}" if row["reason"] else ""))
     return _tell(study, out, draw=True)
+
+
+def _check_demands(study: IDA) -> None:
+    """InputError before the first run for a demand on a column that no run will write; it assembles the case once."""
+    try:
+        written = study.case.columns(alone())
+    except InputError:
+        return  # every run will say it, in its row
+    for one in study.wanted:
+        if one.column not in written:
+            raise InputError(f"demand '{one.column}': the runs record no such column: {nearest(one.column, written)}")
 
 
 def _shown(value: float | None) -> str:
@@ -138,11 +153,14 @@ def _claim(study: IDA, out: Path) -> None:
     }
     old = read_json(out / STUDY)
     if old is not None:
-        changed = [name for name, digests in records.items() if old["records"].get(name, digests) != digests]
+        kept = old.get("records")
+        if not isinstance(kept, dict) or "case" not in old:
+            raise InputError(f"'{out / STUDY}' is damaged: restore it, choose another folder, or delete this one")
+        changed = [name for name, digests in records.items() if kept.get(name, digests) != digests]
         if old["case"] != case or changed:
             what = f"the record '{changed[0]}'" if changed else "the case"
             raise InputError(f"'{out}' holds runs from before {what} was changed: choose another folder, or delete it")
-        records = old["records"] | records
+        records = kept | records
     try:
         out.mkdir(parents=True, exist_ok=True)
         write_atomically(out / STUDY, to_json({"case": case, "records": records}).encode())

@@ -119,7 +119,7 @@ class OneRun:
 
     def done(self) -> dict[str, Any] | None:
         """The row of a run that has finished, or None."""
-        row = read_json(self.folder / ROW)
+        row = read_row(self.folder / ROW)
         if row is None and (read_json(self.folder / SUMMARY) or {}).get("status") == "finished":
             row = self.keep("", 0)  # it outlived the process that had started it
         return row if row is not None and row["status"] == "finished" else None
@@ -226,9 +226,18 @@ def read_json(path: Path) -> dict[str, Any] | None:
     """A whole JSON object, or None when there is none."""
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         return None
     return found if isinstance(found, dict) else None
+
+
+def read_row(path: Path) -> dict[str, Any] | None:
+    """The row of a run; None when there is none, or the file is not as ``OneRun.keep`` leaves it."""
+    row = read_json(path) or {}
+    files, scale = row.get("files"), row.get("scale")
+    whole = all(isinstance(row.get(name), str) for name in ("record", "status", "reason"))
+    numbers = scale is None or (isinstance(scale, int | float) and not isinstance(scale, bool))
+    return row if whole and numbers and isinstance(files, list) and all(isinstance(f, str) for f in files) else None
 
 
 def _sentence(said: str, code: int) -> str:

@@ -15,7 +15,7 @@ from ..errors import InputError
 from ..ground_motion import scaled
 from ..run_folder import read_run
 from .case import Case
-from .ida_runs import ROW, Shaking, read_json
+from .ida_runs import ROW, Shaking, read_row
 from .measures import Demand, Intensity
 
 Row = dict[str, Any]
@@ -28,7 +28,7 @@ def tabulated(case: Case, out: Path, measure: Intensity, demands: Sequence[Deman
     What a run has not measured is None: its demands when it failed, its intensity when its record cannot be read.
     InputError when a finished run has no such column.
     """
-    found = [(path.parent, row) for path in out.glob(f"*/{ROW}") if (row := read_json(path)) is not None]
+    found = [(path.parent, row) for path in out.glob(f"*/{ROW}") if (row := read_row(path)) is not None]
     found.sort(key=lambda one: (one[1]["record"], math.inf if one[1]["scale"] is None else one[1]["scale"]))
     units: Units = {
         "record": ("-", "name of the record"),

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import os
 import types
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, is_dataclass
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Union, get_args, get_origin
 
+from ..checks import SHOWN, shown
 from ..errors import InputError
 from .calls import GROUP, Call, Callee, Group, Items, Named, Node, Spot, Value, callee
 
@@ -69,9 +70,9 @@ def arguments(table: Mapping[str, Any], target: Callee, spot: Spot, words: Words
     return Call(target, nodes, spot)
 
 
-def nearest(word: Any, known: Mapping[str, Any]) -> str:
+def nearest(word: Any, known: Iterable[str]) -> str:
     """The rest of a sentence about a word nobody knows."""
-    names = list(known)
+    names = sorted(known) if isinstance(known, frozenset) else list(known)
     if not names:
         return "leave it out, there are none"
     near = get_close_matches(str(word), names, n=3, cutoff=0.5)
@@ -108,6 +109,8 @@ def _scalar(value: Any, member: Any, spot: Spot, words: Words) -> Node | None:
     if member in words.short:
         return _table({words.short[member]: value}, [member], spot, words)
     if _is_path(member):
+        if not value.strip():
+            raise spot.wrong("is empty: give the path of a file or folder")
         return Value(words.folder / value)
     return Value(value) if member is str else None
 
@@ -174,7 +177,7 @@ def _shown(value: Any) -> str:
     """A value as in the file."""
     if isinstance(value, bool):
         return str(value).lower()
-    return f"'{value}'" if isinstance(value, str) else str(value)
+    return f"'{value[:SHOWN]}'" if isinstance(value, str) else shown(value)
 
 
 _EXPECTED = {float: "a number", int: "a whole number", bool: "true or false", str: "text"}

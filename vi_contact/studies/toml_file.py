@@ -2,32 +2,75 @@
 
 from __future__ import annotations
 
+import math
 import re
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from ..checks import shown
 from ..errors import InputError
 
+BYTES, DEPTH = 10_000_000, 20  # of a case file; of tables and lists in each other
+_TOO_DEEP = "is nested too deep: give tables and lists as docs/studies.md has them"
+_TOO_LONG = "holds a whole number beyond 64 bits: write it with a point, as 1.0e30"
 _REASON = re.compile(r"^(.*) \(at (?:line (\d+), column (\d+)|end of document)\)", re.DOTALL)
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:
     """The tables of a file. InputError with file, line and reason when it cannot be read or is no TOML."""
     try:
-        text = Path(path).read_bytes().decode("utf-8")
+        with open(path, "rb") as file:
+            data = file.read(BYTES + 1)
+        text = data.decode("utf-8")
     except FileNotFoundError:
         raise InputError(f"{path}: there is no such file; give the path of a case file") from None
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); give the path of a case file") from None
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: byte {error.start} is no UTF-8 text; save the case file as UTF-8") from None
+    if len(data) > BYTES:
+        raise InputError(f"{path}: the file is larger than {BYTES:.0e} bytes; give a case file")
     try:
-        return tomllib.loads(text)
+        return checked(tomllib.loads(text), str(path))
     except tomllib.TOMLDecodeError as error:
         reason, place = _reason(str(error), text)
         raise InputError(f"{path}, {place}: {reason}; correct the TOML there") from None
+    except RecursionError:
+        raise InputError(f"{path}: {_TOO_DEEP}") from None
+    except InputError:
+        raise
+    except ValueError:  # a number of more digits than Python reads
+        raise InputError(f"{path}: {_TOO_LONG}") from None
+
+
+def checked(tables: dict[str, Any], source: str) -> dict[str, Any]:
+    """The tables; InputError naming the key for what no table of a case can hold.
+
+    These are NaN, whole numbers beyond 64 bits, the character NUL, and tables in tables in tables without end.
+    """
+    left: list[tuple[str, Any, int]] = [("", tables, 0)]
+    while left:
+        key, value, depth = left.pop()
+        wrong = _defect(value, depth)
+        if wrong:
+            raise InputError(f"{source}: {key} {wrong}")
+        inside = value.items() if isinstance(value, dict) else enumerate(value, 1) if isinstance(value, list) else ()
+        left += [(f"{key}.{name}".lstrip("."), one, depth + 1) for name, one in inside]
+        if any("\0" in str(name) for name, _ in inside):
+            raise InputError(f"{source}: a key below {key or 'the top'} holds the character NUL: correct it")
+    return tables
+
+
+def _defect(value: Any, depth: int) -> str:
+    if depth > DEPTH:
+        return _TOO_DEEP
+    if isinstance(value, float) and math.isnan(value):
+        return "is nan: give a number"
+    if isinstance(value, int) and not -(2**63) <= value < 2**63:
+        return _TOO_LONG
+    return "holds the character NUL: leave it out" if isinstance(value, str) and "\0" in value else ""
 
 
 def _reason(said: str, text: str) -> tuple[str, str]:
@@ -49,10 +92,12 @@ def with_settings(tables: dict[str, Any], settings: Sequence[str]) -> dict[str, 
     result = _copied(tables)
     for setting in settings:
         key, equals, value = setting.partition("=")
+        if key.count(".") > DEPTH:
+            raise InputError(f"setting {shown(setting)} {_TOO_DEEP}")
         if not equals or not key.strip():
             raise InputError(f"setting '{setting}': give KEY=VALUE, such as friction.mu=0.5")
         _set(result, key.strip().split("."), _value(value.strip()), setting)
-    return result
+    return checked(result, "settings")
 
 
 def _copied(value: Any) -> Any:
@@ -66,6 +111,8 @@ def _value(text: str) -> Any:
         found = tomllib.loads(f"value = {text}")
     except tomllib.TOMLDecodeError:
         return text
+    except (RecursionError, ValueError):
+        raise InputError(f"setting {shown(text)} is nested too deep, or {_TOO_LONG}") from None
     return found["value"] if set(found) == {"value"} else text
 
 
