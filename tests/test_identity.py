@@ -1,237 +1,196 @@
-"""What a restart compares: other matrices, loads, laws and plans are refused by name; ranks and round-off are not."""
+"""What was made for what: groups and their mesh, surfaces and their system, states and their problem, motions and the
+steps they were computed with, outputs and the matrices they go by. Refused on every rank, with one sentence."""
 
 from __future__ import annotations
 
-import io
 import json
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+import logging
+from dataclasses import replace
+from math import inf
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from test_checkpoint import chain, equal_files, rubbing_box, run, run_wall, wall
+import scipy.sparse as sp
+from chain import chain_problem
+from fem_problems import block
+from mpi4py import MPI
 
-from vi_contact.checkpoint import checksum
-from vi_contact.errors import InputError
-from vi_contact.excitation import Harmonic, Tabulated
-from vi_contact.friction import Coulomb, SlipRateCoulomb
-from vi_contact.identity import difference, identity, text_of
-from vi_contact.impact import Elastic
-from vi_contact.schemes.ss22 import SS22
-from vi_contact.schemes.trapezoidal import Trapezoidal
-from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
-from vi_contact.simulate import simulate
-from vi_contact.solvers.condensed import Condensed
-from vi_contact.solvers.hildreth import Hildreth
-from vi_contact.step import ContactProblem
+import vi_contact as vc
+from vi_contact import fem
+from vi_contact.algebra import Array, SerialMatrix
+from vi_contact.errors import InputError, StepFailure
+from vi_contact.run_checks import check_pace
 
-serial = pytest.mark.serial
+COMM = MPI.COMM_WORLD
+STEEL = vc.LinearElastic(E=2.0e9, nu=0.3, rho=2000.0)
+SHAKE = vc.Ricker(1.0, 5.0)
+DT = 2e-3
 
 
-def tabulated(peak: float) -> Tabulated:
-    """A record of 5000 samples, one of which can be another."""
-    values = np.sin(np.arange(5000.0))
-    values[2345] = peak
-    return Tabulated(np.linspace(0.0, 20.0, 5000).tolist(), values.tolist(), direction=(1.0,))
+def body(divisions: tuple[int, int] = (4, 4)) -> tuple[Any, Any]:
+    return block(COMM, lengths=(1.0, 1.0), divisions=divisions)
 
 
-OTHERS: dict[str, tuple[dict[str, Any], str]] = {
-    "stiffness": ({"problem": chain(stiffness=1.0001e3)}, "another stiffness"),
-    "mass": ({"problem": chain(mass=2.0001)}, "another mass matrix"),
-    "damping": ({"problem": chain(damping=1.01e-4)}, "another damping"),
-    "undamped": ({"problem": chain(damping=0.0)}, "another damping"),
-    "load": ({"problem": chain(constant=1e-3)}, "another load"),
-    "excitation": ({"problem": chain(excitation=Harmonic(3.0, 2.001, direction=(1.0,)))}, "another excitation"),
-    "none": ({"problem": chain(excitation=())}, "another excitation"),
-    "gap": ({"problem": chain(gap=1.001e-3)}, "another contact surface or obstacle"),
-    "impact": ({"problem": chain(impact=Elastic())}, r"impact law = Inelastic\(.*\) but this one has Newton"),
-    "dt": ({"dt": 5.001e-3}, "dt = 0.005 but this one has 0.005001"),
-    "scheme": ({"scheme": ZienkiewiczWoodTaylor(phi=0.51)}, r"scheme = Z.*phi=0.5\) but this one has .*phi=0.51"),
-}
+def test_numbers_of_no_facet_are_refused_on_all_ranks() -> None:
+    """One rank only has them; the others hear of it too. PETSc would end the process."""
+    mesh, _ = body()
+    for wrong in (10**6, -1):
+        mine = np.array([wrong if COMM.rank == COMM.size - 1 else 0])
+        for kind in (fem.Facets, fem.Cells):
+            with pytest.raises(InputError, match=f"{kind.__name__}: 'a' has numbers from .* give numbers of this mesh"):
+                kind("a", mine, mesh)
+    here = np.array([0]) if COMM.rank == 0 else np.zeros(0)  # a rank may have none, whatever their type
+    assert fem.Facets("a", np.tile(here, 2), mesh).indices.dtype == np.int32
 
 
-@pytest.fixture(scope="module")
-def left(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A run that was left after 60 steps."""
-    folder = tmp_path_factory.mktemp("left")
-    run(folder, 60)
-    return folder
+def test_other_displacements_on_the_same_facets() -> None:
+    """Also where they meet on the facets of one rank only; at edges the later condition counts, as it always did."""
+    mesh, tags = body()
+    bottom, left = tags["bottom"], tags["left"]
+    moved = fem.Prescribed(bottom, (1.0, 0.0))
+    shared = fem.Facets("shared", bottom.indices if COMM.rank == 0 else bottom.indices[:0], mesh)
+    for conditions in ({"clamped": bottom, "prescribed": moved}, {"prescribed": [moved, fem.Prescribed(bottom)]}):
+        with pytest.raises(InputError, match="'bottom' and 'bottom' share facets on which different displacements"):
+            fem.assemble(mesh, STEEL, **conditions)
+    if COMM.allreduce(len(shared.indices)):
+        with pytest.raises(InputError, match="'shared' and 'bottom' share facets"):
+            fem.assemble(mesh, STEEL, clamped=shared, prescribed=moved)
+    across = [fem.Prescribed(bottom, (1.0, 0.0), components=(0,)), fem.Prescribed(bottom, (0.0, 2.0), components=(1,))]
+    for right in (across, [moved, replace(moved)], [fem.Prescribed(left), moved], fem.Prescribed(bottom, (0.0, 0.0))):
+        fem.assemble(mesh, STEEL, clamped=bottom if isinstance(right, fem.Prescribed) else (), prescribed=right)
 
 
-@serial
-@pytest.mark.parametrize("name", OTHERS)
-def test_another_problem_is_refused_by_name(left: Path, name: str) -> None:
-    """One sentence that says what differs; asked for by name, the run goes on as the other one."""
-    arguments, words = OTHERS[name]
-    with pytest.raises(InputError, match=rf"is of a run with {words}.*: restart the same run, .*\(changed=True\)"):
-        run(None, 80, restart=left, **arguments)
-    goes_on = run(None, 80, restart=left, changed=True, **arguments)
-    assert len(goes_on.history["t"]) == (81 if name != "dt" else 141)  # after another dt steps are counted anew
+def test_a_surface_belongs_to_the_systems_of_its_space() -> None:
+    """It follows loads, weight, stiffness and initial values, and no other clamp: there its unknowns are others."""
+    mesh, tags = body()
+    system, other = (fem.assemble(mesh, STEEL, clamped=tags[name]) for name in ("bottom", "left"))
+    surface = fem.contact_surface(system, tags["right"])
+    for same in (vc.with_weight(system), system.with_load((system.u0, np.sin)), replace(system, v0=system.v0 + 1.0)):
+        vc.ContactProblem(same, surface.held().on_springs(1e9))
+    with pytest.raises(InputError, match="contact surface was made for another system"):
+        vc.ContactProblem(other, surface)
 
 
-@serial
-def test_another_size_is_never_allowed(left: Path) -> None:
-    """Another number of unknowns or contact points fits nothing."""
-    with pytest.raises(InputError, match="contact points = 2 but this one has 1: restart the same run, or start a new"):
-        run(None, 80, restart=left, changed=True, problem=chain(left_gap=None))
+def test_a_state_belongs_to_its_problem() -> None:
+    """Sizes differ on one rank only; all ranks refuse."""
+    mesh, tags = body()
+    system = fem.assemble(mesh, STEEL, clamped=tags["bottom"])
+    problem = vc.ContactProblem(system, fem.contact_surface(system, tags["right"]))
+    state = next(vc.march(problem, dt=DT, steps=1))[0]
+    short = replace(state, v=state.v[:-1]) if COMM.rank == COMM.size - 1 else state
+    for wrong, words in ((short, "has v of shape"), (replace(state, active=state.active[:-1]), "has active of shape")):
+        with pytest.raises(InputError, match=words):
+            vc.march(problem, dt=DT, steps=1, state=wrong)
+        with pytest.raises(InputError, match=words):
+            vc.simulate(problem, dt=DT, steps=1, state=wrong, progress=False)
 
 
-@serial
-def test_what_may_differ(left: Path, tmp_path: Path) -> None:
-    """Round-off of matrices, loads and dt, and the solver."""
-    tiny = 1.0 + 1e-13
-    problem = chain(stiffness=1e3 * tiny, mass=2.0 * tiny, damping=1e-4 / tiny, gap=1e-3 * tiny)
-    again = run(None, 80, restart=left, problem=problem, dt=5e-3 * tiny, solver=Condensed(Hildreth()))
-    assert np.allclose(again.history["u_x_12"], run(None, 80).history["u_x_12"], rtol=1e-6, atol=1e-12)
+@pytest.mark.serial
+def test_a_start_inside_the_obstacle() -> None:
+    """Refused, but for what a scheme leaves there that stops velocities: it may go on from states of its own runs."""
+    problem = chain_problem(3, gap=0.1, v0=[1.0, 1.0, 1.0])
+    scheme = vc.MoreauJean()
+    for state, report in vc.march(problem, scheme=scheme, dt=1e-2, steps=30):
+        gap = 0.1 - state.u[2]
+        if report.new.active.any():
+            break
+    assert gap < 0.0
+    vc.march(problem, scheme=scheme, dt=1e-2, steps=1, state=state)
+    metre = replace(state, k=0, u=state.u + 1.0)
+    for wrong, other in ((state, vc.ZienkiewiczWoodTaylor()), (metre, scheme), (metre, None)):
+        with pytest.raises(InputError, match=r"the state lies .* m inside the obstacle at \(3\)"):
+            vc.march(problem, scheme=other, dt=1e-2, steps=1, state=wrong)
+    sprung = replace(problem, surface=problem.surface.on_springs(1e6))
+    vc.march(sprung, dt=1e-2, steps=1, state=metre, scheme=vc.Midpoint())
 
 
-@serial
-def test_one_sample_of_a_record() -> None:
-    """One of 5000 samples is another."""
-    one, two = (identity(chain(excitation=tabulated(peak)), SS22(), 5e-3, start=0.0, end=20.0) for peak in (0.3, 0.4))
-    assert difference(one, two) == ("excitation", "another excitation") and difference(one, one) is None
+def test_motions_belong_to_runs_with_their_scheme_and_steps() -> None:
+    """base_motion, as prescribed motion and as an obstacle that goes along, and FreeField, also behind other loads."""
+    mesh, tags = body()
+    ground = vc.base_motion(SHAKE, DT, vc.HHT())
+    moved = fem.Prescribed(tags["bottom"], ground.displacement, ground.velocity, ground.acceleration)
+    sides = [fem.FreeField(tags[side], base=ground, dt=DT, scheme=vc.HHT()) for side in ("left", "right")]
+    system = fem.assemble(mesh, STEEL, prescribed=moved, dashpots=sides)
+    system = vc.with_weight(system).with_load((np.zeros_like(system.u0), np.sin))
+    problem = vc.ContactProblem(system, fem.contact_surface(system, tags["top"]))
+    alone = fem.assemble(mesh, STEEL, clamped=tags["bottom"])
+    carried = ground.carrying(fem.contact_surface(alone, tags["top"]), alone)
+    for one in (problem, vc.ContactProblem(alone, fem.together(carried))):
+        for wrong in (2 * DT, vc.HalvedAtImpact(DT), vc.Schedule(((DT, 1.0), (2 * DT, inf)))):
+            with pytest.raises(InputError, match=r"base_motion was computed with dt = 0.002 s and the run has dt = "):
+                vc.march(one, scheme=vc.HHT(), dt=wrong, steps=1)
+        with pytest.raises(InputError, match=r"computed with HHT\(alpha=-0.1\) and the run has HHT\(alpha=-0.2\)"):
+            vc.simulate(one, scheme=vc.HHT(-0.2), dt=DT, steps=1, progress=False)
+        for right in (DT, vc.Schedule(((DT, inf),)), DT * (1.0 + 1e-15)):
+            check_pace(one, vc.HHT(), right)
+    quiet = fem.assemble(mesh, STEEL, clamped=tags["bottom"], dashpots=fem.FreeField(tags["left"], base=SHAKE, dt=DT))
+    rest = vc.ContactProblem(quiet, fem.contact_surface(quiet, tags["top"]), excitation=SHAKE)
+    with pytest.raises(InputError, match="FreeField on 'left' was computed with Trapezoidal"):
+        vc.march(rest, scheme=vc.HHT(), dt=DT, steps=1)
+    check_pace(rest, vc.Trapezoidal(vc.ConsistentMass()), DT)  # the mass is not of the rule
 
 
-@serial
-def test_texts_of_laws() -> None:
-    """No addresses, no types of numpy 2; numbers are compared with room for round-off, words are not."""
-
-    class Own:
-        """Has the repr that Python gives it."""
-
-    assert "0x" not in text_of(Own()) and text_of(Own()) == text_of(Own())
-
-    @dataclass
-    class Law:
-        """Stands for a law."""
-
-        text: str
-
-        def __repr__(self) -> str:
-            return self.text
-
-    ours: dict[str, Any] = {"law": text_of(Law("Law(mu=np.float64(0.30000000000000004), many=(1e-3, inf))"))}
-    assert difference(ours, {"law": "Law(mu=0.3, many=(0.001, inf))"}) is None
-    for other in ("Law(mu=0.31, many=(0.001, inf))", "Law(mu=0.3, many=(0.001, nan))", "Law(mu=0.3, many=(0.001,))"):
-        assert difference(ours, {"law": other}) is not None
-    assert difference({"numbers": [(1.0, 2.0)]}, {"numbers": "none"}) is not None
-
-
-@serial
-def test_checkpoints_of_the_first_version(left: Path, tmp_path: Path) -> None:
-    """Without format, checksums and the facts that are newer they are read and compared as far as they go."""
-    for path in left.iterdir():
-        (tmp_path / path.name).write_bytes(path.read_bytes())
-    (tmp_path / "format.json").unlink()
-    first_version(tmp_path)
-    with pytest.raises(InputError, match="scheme = ZienkiewiczWoodTaylor.phi=0.5. but"):
-        run(tmp_path, 250, restart=True, scheme=SS22())
-    run(tmp_path, 250, restart=True)
-    run(tmp_path / "straight", 250)
-    assert equal_files(tmp_path, tmp_path / "straight")
+def test_outputs_say_when_the_matrices_are_not_of_their_materials(
+    caplog: pytest.LogCaptureFixture, shared_tmp: Path
+) -> None:
+    """Twice the stiffness: stresses and reactions go by the material of fem.assemble, and say so on rank 0."""
+    mesh, tags = body()
+    system = fem.assemble(mesh, STEEL, clamped=tags["bottom"], loads=fem.BodyForce((0.0, -1.0)))
+    surface = fem.contact_surface(system, tags["right"])
+    problem = vc.ContactProblem(system, surface)
+    stiffer = replace(system, K=system.algebra.combine([(2.0, system.K)]))
+    state = next(vc.march(problem, dt=DT, steps=1))[0]
+    record = [fem.Reactions("base", tags["bottom"], (0.0, 0.0), gravity=(0.0, 1.0))]
+    leaning = fem.geometric_stiffness(problem, state)
+    words = "K of the system is not the one that fem.assemble made"
+    for one, told in ((system, 0), (leaning, 0), (vc.with_weight(system), 0), (stiffer, 1)):
+        caplog.clear()
+        with caplog.at_level(logging.WARNING):
+            vc.simulate(
+                vc.ContactProblem(one, surface), dt=DT, steps=1, record=record, out=shared_tmp / "run", progress=False,
+                fields=fem.XDMF(),
+            )
+        found = [text for text in caplog.messages if "reactions" in text and words in text]
+        assert len(found) == (told if COMM.rank == 0 else 0)
+        assert (shared_tmp / "run" / "run.log").read_text().count(f"XDMF, von_mises: {words}") == told
 
 
-def first_version(folder: Path, change: Callable[[dict[str, Any]], None] | None = None) -> None:
-    """Writes the checkpoint as version 0.1 did, its arrays changed if one likes."""
-    path = folder / "checkpoint.npz"
-    with np.load(path) as stored:
-        arrays = {name: stored[name] for name in stored.files if name != "checksum"}
-    about = json.loads(str(arrays["about"]))
-    for name in ("format", "span", "rows"):
-        about.pop(name, None)
-    about["run"] = {name: about["run"][name] for name in ("unknowns", "contact points", "dt", "scheme", "mass")}
-    arrays["about"] = np.array(json.dumps(about))
-    if change is not None:
-        change(arrays)
-    buffer = io.BytesIO()
-    np.savez(buffer, **arrays)
-    path.write_bytes(buffer.getvalue())
+@pytest.mark.serial
+def test_row_sums_that_are_no_masses() -> None:
+    """A consistent mass of elements of order two has row sums of zero or less: moved about, it would explode."""
+    problem = chain_problem(4)
+    for off in (0.5, 0.75):
+        M = sp.diags([-off, 1.0, -off], [-1, 0, 1], shape=(4, 4))
+        wrong = replace(problem, system=replace(problem.system, M=SerialMatrix(M)), mass=vc.Redistributed())
+        with pytest.raises(InputError, match="needs positive row sums of M and [24] unknowns have none"):
+            vc.march(wrong, dt=1e-2, steps=1)
 
 
-CRAFTED: dict[str, Callable[[dict[str, Any]], Any]] = {
-    "short": lambda arrays: arrays.update(u=arrays["u"][:-1]),
-    "long": lambda arrays: arrays.update(r_n=np.zeros(7)),
-    "flat": lambda arrays: arrays.update(u=arrays["u"][:, None]),
-    "missing": lambda arrays: arrays.pop("v"),
-    "without reactions": lambda arrays: arrays.pop("r_n"),
-    "without memory": lambda arrays: [arrays.pop(name) for name in list(arrays) if name.startswith("memory_")],
-    "nan": lambda arrays: arrays["u"].__setitem__(2, np.nan),
-    "integers": lambda arrays: arrays.update(u=arrays["u"].astype(int)),
-    "texts": lambda arrays: arrays.update(u=arrays["u"].astype(str)),
-    "complex": lambda arrays: arrays.update(v=arrays["v"] * 1j),
-    "turned": lambda arrays: arrays.update(v=arrays["v"].astype(">f8")),
-    "objects": lambda arrays: arrays.update(u=np.array([None] * 5)),
-    "numbers for masks": lambda arrays: arrays.update(active=np.array([0.0, 1.0])),
-    "no about": lambda arrays: arrays.pop("about"),
-    "a list": lambda arrays: arrays.update(about=np.array("[]")),
-    "no vectors": lambda arrays: _about(arrays, vectors=["v"]),
-    "unhashable": lambda arrays: _about(arrays, vectors=[["u"]]),
-    "negative": lambda arrays: _about(arrays, base=-3),
-    "no time": lambda arrays: _about(arrays, t=None),
-    "huge": lambda arrays: _about(arrays, k=1e300),
-}
+@pytest.mark.serial
+def test_numbers_beyond_those_of_the_machine(tmp_path: Path) -> None:
+    """A run that overflows fails: its ledger would be NaN with the status of a run that went well."""
+    problem = chain_problem(3, gap=inf, excitation=vc.Harmonic(1e300, 1.0, phase=1.0, direction=(1.0,)))
+    with pytest.raises(StepFailure, match="step 1 at t = 0.01 s: energy_kinetic is inf, beyond the numbers"):
+        vc.simulate(problem, dt=1e-2, steps=3, out=tmp_path, progress=False)
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["status"] == "failed" and "check the sizes and units" in summary["reason"]
 
 
-def _about(arrays: dict[str, Any], **changes: Any) -> None:
-    arrays["about"] = np.array(json.dumps(json.loads(str(arrays["about"])) | changes))
+@pytest.mark.serial
+def test_what_a_users_function_returns_is_looked_at() -> None:
+    """Loads, motions and obstacles of one's own: real numbers of the right shape."""
+    mesh, tags = body()
+
+    def texts(x: Array, t: float) -> Any:
+        return np.full(x.shape, "a")
+
+    for field in (texts, lambda x, t: 1j * x, lambda x, t: None):
+        with pytest.raises(InputError, match=r"BodyForce returned .*return real numbers"):
+            next(vc.march(vc.ContactProblem(*_touching(mesh, tags, fem.BodyForce(field))), dt=DT, steps=1))
 
 
-@serial
-@pytest.mark.parametrize("name", CRAFTED)
-def test_crafted_checkpoints_are_told(tmp_path: Path, name: str) -> None:
-    """What no version has written: one sentence, also where no checksum gives it away."""
-    settings: dict[str, Any] = {"scheme": Trapezoidal(), "problem": chain(impact=None)}
-    run(tmp_path, 20, **settings)
-    first_version(tmp_path)
-    assert run(tmp_path, 21, restart=True, **settings).state.k == 21
-    first_version(tmp_path, CRAFTED[name])
-    with pytest.raises(InputError, match=r"the checkpoint '.*' is damaged \(.*\): start a new run$"):
-        run(tmp_path, 25, restart=True, **settings)
-
-
-@serial
-def test_checksum_sees_everything() -> None:
-    """Names, types, shapes and values."""
-    one = {"a": np.arange(4.0), "b": np.array("text")}
-    others = [{"c": one["a"], "b": one["b"]}, one | {"a": one["a"].astype(int)}, one | {"a": one["a"].reshape(2, 2)},
-              one | {"a": np.array([0.0, 1.0, 2.0, np.nextafter(3.0, 4.0)])}]
-    assert len({checksum(found) for found in (one, *others)}) == 5 and checksum(one) == checksum(dict(one))
-
-
-# Any number of ranks --------------------------------------------------------------------------------------------------
-
-
-def test_other_ranks_are_the_same_problem(comm: Any) -> None:
-    """All numbers agree with those of one rank, far below what counts as a difference."""
-    pytest.importorskip("dolfinx")
-    from mpi4py import MPI
-
-    def numbers(problem: ContactProblem) -> dict[str, Any]:
-        return identity(problem, ZienkiewiczWoodTaylor(), 1e-3, start=0.0, end=0.5)
-
-    for make in (wall, lambda ranks: replace(rubbing_box(ranks, None), friction=Coulomb(0.3))):
-        spread, alone = numbers(make(comm)), numbers(make(MPI.COMM_SELF))
-        assert difference(spread, alone) is None and spread.keys() == alone.keys()
-        for name, own in alone.items():
-            for (a, size), (b, _) in zip(own, spread[name], strict=True) if isinstance(own, list) else ():
-                assert abs(a - b) <= 1e-11 * size, name
-
-
-def test_another_material_is_refused_on_all_ranks(comm: Any, shared_tmp: Path) -> None:
-    """Other Young's modulus, other friction, and a law of one's own whose text says nothing."""
-    pytest.importorskip("dolfinx")
-    from fem_problems import shaken_wall
-
-    run_wall(comm, shared_tmp, 6)
-    with pytest.raises(InputError, match="is of a run with another stiffness"):
-        run_wall(comm, shared_tmp, 9, problem=shaken_wall(comm, angle=0.3, gap=1e-7, nu=0.2001), restart=True)
-    box = rubbing_box(comm, None)
-    laws = [SlipRateCoulomb(lambda speed, mu=mu: mu + 0.0 * speed) for mu in (0.3, 0.31)]
-    settings: dict[str, Any] = {"scheme": Trapezoidal(), "dt": 1e-3, "steps": 2, "out": shared_tmp / "box"}
-    simulate(replace(box, friction=laws[0]), **settings)
-    with pytest.raises(InputError, match="is of a run with another friction: restart"):
-        simulate(replace(box, friction=laws[1]), restart=True, **settings)
-    with pytest.raises(InputError, match=r"friction law = SlipRateCoulomb.* but this one has Coulomb\(mu=0.3\)"):
-        simulate(replace(box, friction=Coulomb(0.3)), restart=True, **settings)
+def _touching(mesh: Any, tags: Any, load: Any) -> tuple[Any, Any]:
+    system = fem.assemble(mesh, STEEL, clamped=tags["bottom"], loads=load)
+    return system, fem.contact_surface(system, tags["right"])

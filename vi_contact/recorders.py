@@ -112,6 +112,7 @@ class Energy:
     def _row(self) -> Row:
         return {"energy_kinetic": self._now.kinetic, "energy_strain": self._now.strain} | self._sums
 
+    @np.errstate(over="ignore", invalid="ignore")  # what overflows is told by refuse_overflow
     def row(self, report: Report) -> Row:
         system, new = self._problem.equations, report.new
         free = energies(system, new.u, report.v_minus)
