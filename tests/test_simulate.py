@@ -243,3 +243,49 @@ def test_bad_arguments_change_nothing(tmp_path: Path) -> None:
         run(restart=True)
     with pytest.raises(InputError, match="fields need an output folder"):
         run(fields=object())
+
+
+@dataclass
+class Own:
+    """A recorder of one's own that announces a column "a" and fills what it is told."""
+
+    first: dict[str, Any]
+    later: dict[str, Any]
+
+    def columns(self) -> dict[str, tuple[str, str]]:
+        return {"a": ("m", "mine")}
+
+    def start(self, problem: ContactProblem, state: State, resumed: Any = None) -> dict[str, Any]:
+        return self.first
+
+    def row(self, report: Report) -> dict[str, Any]:
+        return self.later
+
+
+@pytest.mark.parametrize(
+    ("first", "later", "words"),
+    [
+        ({}, {"a": 1.0}, "announces the column 'a' without filling it"),
+        ({"a": 1.0}, {"b": 1.0}, "announces the column 'a' without filling it"),
+        ({"a": 1.0}, {"a": 1.0, "b": 1.0}, "column 'b' without filling it, or the other way round"),
+        ({"a": 1.0}, {"a": "one"}, "column 'a' is 'one': let its recorder return a number or an array"),
+        ({"a": None}, {"a": 1.0}, "column 'a' is None"),
+    ],
+)
+def test_recorders_of_ones_own_fill_what_they_announce(first: Any, later: Any, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        run(3, record=[Own(first, later)])
+    assert run(3, record=[Own({"a": 1}, {"a": np.float32(2.0)})]).history["a"].tolist() == [1.0, 2.0, 2.0, 2.0]
+
+
+@pytest.mark.parametrize("value", ["1.0", None, np.ones(2), 1j], ids=repr)
+def test_histories_return_one_number(value: Any) -> None:
+    """Of an excitation of one's own, from the start or later; numpy's numbers are numbers."""
+
+    class Late(Harmonic):
+        def acceleration(self, t: float) -> Any:
+            return value if t > 0.01 else np.float64(t)
+
+    shaken = chain_problem(5, excitation=Late(1.0, 1.0, direction=(1.0,)), consistent=True)
+    with pytest.raises(InputError, match=r"the history of a load or excitation is .* at t = 0.01.* return one real"):
+        simulate(shaken, dt=DT, steps=9, progress=False)

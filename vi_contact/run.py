@@ -156,6 +156,7 @@ class Run:
         row: dict[str, Any] = {}
         for recorder in self.recorders:
             row |= recorder.row(report)
+        self.table.check(row)
         refuse_overflow(row)
         writer.append(row)
         self.table.append(row)  # after the disk: a checkpoint never knows a step that history.csv does not

@@ -64,7 +64,7 @@ class Load:
         """The load of a static stage at time t: what moves in a given way stands still where it then is."""
         total = self.constant.copy()
         for vector, history in self.separable:
-            total += history(t) * vector
+            total += _factor(history, t) * vector
         for function in self.general:
             total += function(t)
         return total
@@ -82,6 +82,15 @@ class Load:
     def handed_over(self, P: Matrix) -> Load:
         """The load beside C* = PᵀCP: Pᵀ on its viscous parts."""
         return replace(self, viscous=tuple(_turned(P, function) for function in self.viscous))
+
+
+def _factor(history: Callable[[float], float], t: float) -> float:
+    """The value of a history; NaN and infinity are told of the load as a whole."""
+    value = history(t)
+    if np.ndim(value) or np.asarray(value).dtype.kind not in "iuf":
+        what = f"the history of a load or excitation is {shown(value)} at t = {t:g} s"
+        raise InputError(f"{what}: return one real number")
+    return value
 
 
 def _turned(T: Matrix, function: Callable[[float], Array]) -> Callable[[float], Array]:

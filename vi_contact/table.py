@@ -12,7 +12,8 @@ import h5py
 import numpy as np
 
 from .algebra import Array
-from .errors import ViContactError
+from .checks import shown
+from .errors import InputError, ViContactError
 from .recorders import Columns, Row
 from .tally import Tally
 
@@ -33,6 +34,7 @@ class Table:
 
     def __init__(self, columns: Columns, first: Row, *, on_disk: bool = False) -> None:
         self.columns, self.first, self.on_disk, self.count = columns, first, on_disk, 0
+        self.check(first)
         self.numbers = [name for name in columns if not isinstance(first[name], np.ndarray)]
         self.arrays = {name: np.array(first[name]) for name in columns if isinstance(first[name], np.ndarray)}
         self._open: list[Row] = []
@@ -40,6 +42,16 @@ class Table:
         self._size, self._kept = 0, True
         self._tally = Tally()
         self.append(first)
+
+    def check(self, row: Row) -> None:
+        """InputError for a row whose recorder, one of your own, fills other columns than it announced, or not with
+        numbers."""
+        for name in sorted(row.keys() ^ self.columns.keys()):
+            raise InputError(f"a recorder announces the column '{name}' without filling it, or the other way round: "
+                             "let columns(), start() and row() name the same")
+        for name, value in row.items():
+            if not isinstance(value, int | float | np.generic | np.ndarray) or isinstance(value, np.str_):
+                raise InputError(f"column '{name}' is {shown(value)}: let its recorder return a number or an array")
 
     def append(self, row: Row) -> None:
         """One more row."""
