@@ -31,6 +31,7 @@ from .time_steps import TimeSteps
 log = logging.getLogger(__name__)
 Arrays = dict[str, Any]
 MEMORY = "memory_"
+SAID = 200  # characters of a foreign reason
 
 
 @dataclass(frozen=True)
@@ -187,7 +188,8 @@ def _check_memory(
 
 
 def _damaged(file: Path, why: Any) -> InputError:
-    return InputError(f"the checkpoint '{file}' is damaged ({' '.join(str(why).split())}): start a new run")
+    reason = " ".join(str(why).split())[:SAID]  # zipfile puts half the file into its words
+    return InputError(f"the checkpoint '{file}' is damaged ({reason}): start a new run")
 
 
 def _read(file: Path, problem: ContactProblem) -> tuple[dict[str, Any], Arrays]:

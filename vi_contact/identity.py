@@ -28,6 +28,7 @@ SAMPLES = 256  # times of functions of time alone, all over the run
 EARLY = 5  # times of other loads, which may have to be marched to: in the first steps
 STEPS = 32  # how many steps are the first ones
 FIXED = ("unknowns", "contact points")  # what a restart can by no means change
+SHOWN = 300  # characters of a law in a sentence
 SPEEDS = (0.0, 1e-3, 1e-1, 10.0)  # slip rates [m/s] at which friction is looked at
 _NUMBER = re.compile(r"(\d[\d.]*(?:[eE][-+]?\d+)?)")
 _ADDRESS = re.compile(r" at 0x[0-9a-f]+")
@@ -84,7 +85,7 @@ def difference(ours: Identity, theirs: Mapping[str, Any]) -> tuple[str, str] | N
             if not _same_numbers(own, other):
                 return name, f"another {name}"
         elif not _same_text(str(own), str(other)):
-            return name, f"{name} = {other} but this one has {own}"
+            return name, f"{name} = {str(other)[:SHOWN]} but this one has {str(own)[:SHOWN]}"
     return None
 
 

@@ -102,7 +102,7 @@ def _numbers(path: str, lines: list[bytes], width: int, before: int) -> Array:
     values = np.empty((len(lines), width))
     for i, line in enumerate(lines):
         try:
-            values[i] = [float(text) for text in line.decode("ascii").split(",")]
+            values[i] = [float(text) for text in line.replace(b"_", b"?").decode("ascii").split(",")]  # not 1_0
         except (ValueError, UnicodeDecodeError) as error:
             raise InputError(f"line {before + i + 2} of '{path}' is damaged: restore it or start a new run") from error
     return values
