@@ -23,6 +23,7 @@ import pytest
 
 RANK = int(os.environ.get("OMPI_COMM_WORLD_RANK", os.environ.get("PMI_RANK", "0")))
 SIZE = int(os.environ.get("OMPI_COMM_WORLD_SIZE", os.environ.get("PMI_SIZE", "1")))
+LEFT_OUT = ("serial", "slow") if SIZE > 2 else ("serial",) if SIZE > 1 else ()
 TEST_SECONDS = 600  # a test that takes longer on an idle machine is taken to be stuck
 MEETING_SECONDS = 30  # patience of a rank that has failed: the others are probably waiting for it in a collective call
 SLOWEST_FILES = 10  # told at the end of a run
@@ -68,15 +69,16 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_ignore_collect(collection_path: Path) -> bool | None:
-    """On several ranks files of serial tests are not even imported: that takes longer than many of their tests."""
-    if SIZE > 1 and collection_path.suffix == ".py":
-        return True if "\npytestmark = pytest.mark.serial\n" in collection_path.read_text() else None
-    return None
+    """Files that are left out as a whole are not even imported: that takes longer than many of their tests."""
+    if SIZE == 1 or collection_path.suffix != ".py":
+        return None
+    text = collection_path.read_text()
+    return True if any(f"\npytestmark = pytest.mark.{marker}" in text for marker in LEFT_OUT) else None
 
 
 def _left_out(item: pytest.Item) -> bool:
     """Serial tests on several ranks; on three and more, which seldom have a core each, also those that are slow."""
-    return bool(item.get_closest_marker("serial") or (SIZE > 2 and item.get_closest_marker("slow")))
+    return any(item.get_closest_marker(marker) for marker in LEFT_OUT)
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

@@ -43,6 +43,8 @@ from vi_contact.static import static_equilibrium
 from vi_contact.step import ContactProblem
 from vi_contact.surfaces import AnalyticGap
 
+pytestmark = pytest.mark.slow
+
 COMM = MPI.COMM_WORLD
 MU, NU = 0.5, 0.3
 HERTZ = HertzLine(force=0.02, modulus=1.0, radius=1.0)
@@ -258,7 +260,6 @@ def test_v2_4_one_body_reversed():
     assert len(found[1].slips(-1.0)) > 0 and len(found[1].slips(1.0)) == 0
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("problem", [sheared, mirrored_pair])
 def test_v2_4_ranks_agree(problem):
     """All ranks together and each alone: nodal forces to 1e-9 P."""

@@ -25,6 +25,8 @@ from vi_contact.static import static_equilibrium
 from vi_contact.step import ContactProblem, State
 from vi_contact.surfaces import HalfSpace
 
+pytestmark = pytest.mark.slow
+
 COMM = MPI.COMM_WORLD
 E, P, MU = 2.0e10, 4.0e6, 0.3
 TAU = MU * P

@@ -31,6 +31,8 @@ from vi_contact.static import static_equilibrium
 from vi_contact.step import ContactProblem
 from vi_contact.surfaces import AnalyticGap, HalfSpace
 
+pytestmark = pytest.mark.slow
+
 COMM = MPI.COMM_WORLD
 SETS = {  # modulus E*, radius, force per length, and the published a and p0
     "NAFEMS": (contact_modulus((2.1e11, 0.3), (7.0e10, 0.3)), 0.05, 3.5e7, 6.2146e-3, 3.58536e9),

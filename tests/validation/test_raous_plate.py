@@ -30,6 +30,8 @@ from vi_contact.solvers.friction_newton import FrictionNewton
 from vi_contact.static import static_equilibrium
 from vi_contact.step import ContactProblem, Solver, State
 
+pytestmark = pytest.mark.slow
+
 COMM = MPI.COMM_WORLD
 CONDENSED = Condensed()
 SIDE = 0.04

@@ -18,6 +18,8 @@ from vi_contact.algebra import Array
 from vi_contact.models import rocking_block as rocking
 from vi_contact.time_steps import TimeSteps
 
+pytestmark = pytest.mark.slow
+
 COMM = MPI.COMM_WORLD
 SHAPE = vc.HousnerBlock(width=0.4, height=2.0)
 IMPACTS = (0.490304, 1.342807, 2.100685)  # V3.1, from half of alpha [s]
@@ -119,7 +121,6 @@ def test_time_step(model):
     assert errors[1] < 0.1 * errors[0]
 
 
-@pytest.mark.slow
 def test_ledger(model):
     """V9.7 for V3.1: the ledger closes to 1e-10 of the largest energy, or to round-off of ½ uᵀKu where that is more.
 

@@ -25,6 +25,8 @@ from vi_contact.solvers.condensed import Condensed, PreparedCondensed
 from vi_contact.solvers.hildreth import Hildreth
 from vi_contact.step import ContactProblem, EffectiveMatrix
 
+pytestmark = pytest.mark.slow
+
 ROWS = (10, 20, 40, 100, 200, 400)
 one_rank = pytest.mark.serial  # whole marches, slow on several ranks; the last test here shows that these do not matter
 

@@ -16,6 +16,8 @@ import vi_contact as vc
 from vi_contact.algebra import Array
 from vi_contact.models.square import Square, build, concrete
 
+pytestmark = pytest.mark.slow
+
 LAWS = {"smooth": vc.Frictionless(), "on steel": vc.Coulomb(0.3)}
 REFERENCE = {  # kg m/ms² at 5, 10, 15, 20 ms
     "smooth": (4.1329e-6, 5.8575e-5, 1.9498e-4, 2.9966e-4),
@@ -79,7 +81,6 @@ def test_space_time_boundary_elements(law, top, tolerance):
     assert -history["u_y_top"][-1] == pytest.approx(top, rel=tolerance)
 
 
-@pytest.mark.slow
 def test_the_concrete_demo(comm: Any, shared_tmp: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """V7.2 with steps of 0.25 ms: certified, ledgers closed, static at the end to 1 %; figures drawn."""
     numbers = demo("concrete_on_steel").main(quick=True, out=shared_tmp, progress=False)

@@ -34,6 +34,8 @@ from vi_contact.models.square import concrete
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.step import ContactProblem
 
+pytestmark = pytest.mark.slow
+
 COMM = MPI.COMM_WORLD
 EMBEDDED = Embedded(concrete(cells=8))
 T_END = 0.02
@@ -228,7 +230,6 @@ def test_refusals():
         Embedded(replace(concrete(cells=4), confined=True))
 
 
-@pytest.mark.slow
 def test_the_embedded_demo(comm: Any, shared_tmp: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """V7.3 in the demo, small: certified, ledgers closed, less energy with friction, figures drawn."""
     numbers = demo("concrete_in_concrete").main(quick=True, out=shared_tmp, progress=False)

@@ -17,6 +17,8 @@ from vi_contact.errors import InputError
 from vi_contact.models.square import Square, SquareModel, build
 from vi_contact.plotting_deformed import read_frames, read_tractions
 
+pytestmark = pytest.mark.slow
+
 LAWS = {
     "none": vc.Frictionless(), "tresca": vc.Tresca(0.05), "coulomb": vc.Coulomb(0.5),
     "weak tresca": vc.Tresca(0.005),
@@ -156,7 +158,6 @@ def test_a_square_needs_cells():
         Square(cells=0)
 
 
-@pytest.mark.slow
 def test_the_square_demo(comm: Any, shared_tmp: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """V7.1 on 10 cells: all runs certified with closed ledgers, figures drawn, table printed."""
     numbers = demo("square").main(quick=True, out=shared_tmp, progress=False)

@@ -15,6 +15,8 @@ from vi_contact.errors import InputError
 from vi_contact.excitation import Excitation
 from vi_contact.models import sliding_block as sliding
 
+pytestmark = pytest.mark.slow
+
 G = 9.81
 
 
