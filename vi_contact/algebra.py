@@ -80,6 +80,10 @@ class Algebra(Protocol):
         """A with the rows and columns of the masked unknowns replaced by those of the identity."""
         ...
 
+    def block(self, A: Matrix, mask: Mask) -> Matrix:
+        """The rows and columns of A of the masked unknowns, which their ranks own."""
+        ...
+
     def first(self, n: int) -> int:
         """The number, among those of all ranks, of the first of the n unknowns that this rank owns."""
         ...
@@ -170,6 +174,9 @@ class SerialAlgebra:
     def held(self, A: Matrix, mask: Mask) -> Matrix:
         free = sp.diags([(~mask).astype(float)], [0])
         return SerialMatrix(free @ serial(A).csr @ free + sp.diags([mask.astype(float)], [0]))
+
+    def block(self, A: Matrix, mask: Mask) -> Matrix:
+        return SerialMatrix(serial(A).csr[mask][:, mask])
 
     def first(self, n: int) -> int:
         return 0

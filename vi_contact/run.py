@@ -215,7 +215,7 @@ class Run:
 
     def _seconds_per_linear_step(self) -> float:
         """Median time of right-hand side, one back-substitution and update with the same A, from the last state [s]."""
-        if self.last is None:
+        if self.last is None or not self.last.step.A.factorised:  # none is made for this: it may not fit
             return float("nan")
         s, dt, old, A = self.settings, self.dt, self.last.old, self.last.step.A
         none = np.zeros(s.problem.surface.count)
@@ -226,4 +226,4 @@ class Run:
             x = A.factor.solve(step.b)
             s.scheme.finish(s.problem, old, step, StepResult(x, none, none.astype(bool), 0, "linear"), dt)
             found.append(time.perf_counter() - begin)
-        return float(np.median(found[1:]))  # the first may make the factor, when the solver needed none
+        return float(np.median(found[1:]))  # the first is slower

@@ -236,6 +236,12 @@ class PetscAlgebra:
         mat.zeroRowsColumns(rows, diag=1.0)
         return PetscMatrix(mat)
 
+    def block(self, A: Matrix, mask: Mask) -> Matrix:
+        mat = as_petsc(A).mat
+        rows = (mat.getOwnershipRange()[0] + np.flatnonzero(mask)).astype(PETSc.IntType)
+        chosen = PETSc.IS().createGeneral(rows, comm=mat.comm)
+        return PetscMatrix(mat.createSubMatrix(chosen, chosen))
+
     def factor(self, A: Matrix) -> Factor:
         return PetscFactor(as_petsc(A))
 

@@ -13,33 +13,48 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..algebra import Mask
 from ..certified import TOLERANCE, CertifiedSolver
 from ..solvers.condensed import Condensed
 from ..step import ContactProblem, EffectiveMatrix, State, StepProblem
+from ..surfaces import ContactSurface
 
 
 def relaxed(problem: ContactProblem, state: State) -> State:
-    """The state with its massless unknowns in equilibrium, and the reactions that belong to it."""
-    system, surface = problem.equations, problem.surface
-    inner = np.ones(system.rows, dtype=bool) if system.massless is None else ~system.massless
-    load = system.load(state.t) - system.K @ (inner * state.u)
-    A = system.kept("contact layer", lambda: EffectiveMatrix(system.algebra.held(system.K, inner), system.algebra))
+    """The state with its massless unknowns, if there are any, in equilibrium, and the reactions that belong to it.
+
+    Only their own block of K is factorised, however large the body is.
+    """
+    system, layer = problem.equations, problem.equations.massless
+    if layer is None:
+        return state
+    load = system.load(state.t) - system.K @ np.where(layer, 0.0, state.u)
+    A = system.kept("contact layer", lambda: EffectiveMatrix(system.algebra.block(system.K, layer), system.algebra))
+    surface = _within(problem.surface, layer)
     step = StepProblem(
         A=A,
-        b=np.where(inner, state.u, load),
+        b=load[layer],
         bound=surface.gap(state.t),
         surface=surface,
         scale=1.0,
-        guess=state.u,
+        guess=state.u[layer],
         active=state.active,
         t=state.t,
         k=state.k,
         friction=problem.friction,
         slip0=problem.slip_origin(state.u, state.t, state.t),
     )
-    result, _, _ = CertifiedSolver(problem, A, 1.0, [Condensed()], TOLERANCE).solve(step)
-    u = np.where(inner, state.u, result.x)
+    result, _, _ = CertifiedSolver(problem, A, 1.0, [Condensed()], TOLERANCE, surface=surface).solve(step)
+    u = state.u.copy()
+    u[layer] = result.x
     return replace(state, u=u, r_n=result.r_n, r_t=result.r_t, active=result.active)
+
+
+def _within(surface: ContactSurface, layer: Mask) -> ContactSurface:
+    """The surface on the unknowns of the layer alone, in which all normal ones are."""
+    place = np.where(layer, np.cumsum(layer) - 1, -1)
+    tangents = np.where(surface.tangents >= 0, place[surface.tangents], -1)
+    return replace(surface, owned=place[surface.owned], tangents=tangents, basis=None, coupling=None, dual=None)
 
 
 def at_rest_between(problem: ContactProblem, old: State, u: np.ndarray, v: np.ndarray, dt: float) -> np.ndarray:

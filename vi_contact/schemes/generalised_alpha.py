@@ -81,7 +81,7 @@ class AlphaStep(BalanceStep, ABC):
         """The contact layer in equilibrium and the acceleration; once, not on restarts and changes of dt."""
         if np.array_equal(state.memory.get("of", ()), self._mark(state.t)):
             return state
-        state = state if problem.equations.massless is None else relaxed(problem, state)
+        state = relaxed(problem, state)
         return self._restarted(problem, state, dt)
 
     def jump(self, problem: ContactProblem, state: State, v: Array, dt: float) -> State:

@@ -105,7 +105,7 @@ class LinearMultistep(BalanceStep):
         """The past, unless the state brings one for this dt; the contact layer in equilibrium, once."""
         memory = state.memory
         if not np.array_equal(memory.get("t", ()), [state.t]):
-            state = state if problem.equations.massless is None else relaxed(problem, state)
+            state = relaxed(problem, state)
             return self._restarted(problem, state, dt)
         if np.array_equal(memory["dt"], [dt]) and f"a_{len(self.a) - 2}" in memory:
             return state

@@ -43,7 +43,7 @@ class Trapezoidal:
         """The contact layer in equilibrium; once, not on restarts and changes of dt."""
         if "force" in state.memory:
             return state
-        state = state if problem.equations.massless is None else relaxed(problem, state)
+        state = relaxed(problem, state)
         return self._with_force(problem, state)
 
     def _with_force(self, problem: ContactProblem, state: State) -> State:
