@@ -41,6 +41,7 @@ def quasi_static(
     K is factorised once. Prescribed motions should have no velocity and acceleration: their C U' + M U'' are loads.
 
     Args:
+        solver: Condensed() when None.
         times: increasing, none before ``state.t``; the loads are taken there, excitations are not.
         state: where the history starts, from ``static_equilibrium`` or an earlier history; u0 at t = 0 without
             reactions when None. A body pressed without friction first: the state of that problem.

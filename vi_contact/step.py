@@ -57,7 +57,7 @@ class ContactProblem:
     @cached_property
     def equations(self) -> SemiDiscreteSystem:
         """The system in the rotated basis, with the inertia loads -M r a_g(t) of the excitations; schemes see this."""
-        system = self._turned
+        system = self.turned
         if self.mass is not None:
             system = self.mass.apply(system, self.surface, tangential=self.frictional)
         system = self._relative(system)
@@ -69,10 +69,11 @@ class ContactProblem:
     @cached_property
     def static_load(self) -> SemiDiscreteSystem:
         """The system in the basis of the equations, without excitation: the gravity stage."""
-        return self._relative(self._turned)
+        return self._relative(self.turned)
 
     @cached_property
-    def _turned(self) -> SemiDiscreteSystem:
+    def turned(self) -> SemiDiscreteSystem:
+        """The system in the nodal frames, every body in its own unknowns."""
         surface = self.surface
         return self.system if surface.basis is None else self.system.in_basis(surface.basis, surface.dual)
 
@@ -133,6 +134,11 @@ class EffectiveMatrix:
     def factor(self) -> Factor:
         """The one factorisation of A."""
         return self.algebra.factor(self.matrix)
+
+    @property
+    def factorised(self) -> bool:
+        """Whether a factor has been made."""
+        return "factor" in self.__dict__
 
     @cached_property
     def largest(self) -> float:
@@ -274,6 +280,8 @@ class Certificate:
     along the slip on the edge of the cone. t_ref = max(limit, |r_t|, 1e-10 r_ref), s_ref = max(|slip|, 1e-5 x_ref): a
     step slides a small part of the way and rubs with a small part of the inertia. Both are 0 without friction.
     x_ref = max(|x|, |guess|), r_ref = max(|b|, |r_n|), maxima over all unknowns: a wide gap blunts no residual.
+    resultant: of static stages, the largest |w·(b - B_nᵀ r_n - B_tᵀ r_t)| over max |w| times the sum of |b| and |Bᵀr|
+    on a body, for its rigid motions w that no prescribed displacement holds: nodal residuals may be small and add up.
     """
 
     equilibrium: float
@@ -282,13 +290,15 @@ class Certificate:
     complementarity: float
     cone: float = 0.0
     dissipation: float = 0.0
+    resultant: float = 0.0
 
     @property
     def worst(self) -> float:
         """The largest residual; NaN counts as infinite."""
         values = (
-            self.equilibrium, self.penetration, self.tension, self.complementarity, self.cone, self.dissipation
-        )
+            self.equilibrium, self.penetration, self.tension, self.complementarity, self.cone, self.dissipation,
+            self.resultant,
+        )  # fmt: skip
         return float("inf") if any(np.isnan(values)) else max(values)
 
 

@@ -123,7 +123,7 @@ class PreparedActiveSet:
                 self.method,
                 iterations=len(history),
                 residual=self._scaled.complementarity(r, w) / self._scaled.violation(gap),
-                advice="reduce the time step, or raise max_iterations",
+                advice="take a smaller step of time or load, or raise max_iterations",
             )
         history.append(float(rows))
 

@@ -155,8 +155,8 @@ class Step:
         rounding = self.rounding(r)
         if not residual <= max(tolerance * unit, rounding):
             raise StepFailure(
-                f"{method} stopped after {iterations} iterations with residual {residual / unit:.1e}: reduce the time "
-                "step, or try another friction method (FrictionNewton, NSGS, FixedPoint)."
+                f"{method} stopped after {iterations} iterations with residual {residual / unit:.1e}: try another "
+                "friction method (FrictionNewton, NSGS, FixedPoint), or a smaller step of time or load"
             )
         still = np.linalg.norm(w[:, 1:], axis=1) <= 4.0 * max(residual, rounding)
         active = (r[:, 0] > 0.0) | self.blocks.bilateral

@@ -62,5 +62,5 @@ class RateIteration:
             mu = np.maximum(sequence.next(mu, new), 0.0)
         raise StepFailure(
             f"{self} stopped with a change of {history[-1] if history else np.inf:.1e} of the friction coefficients: "
-            "reduce the time step, or let mu(v) vary less with the slip rate"
+            "take a smaller time step, or let mu(v) vary less with the slip rate"
         )

@@ -96,7 +96,7 @@ class VolumeFriction:
             start = self._scaled.moved(found.state, found.slip, limit)
         raise StepFailure(
             f"{self._name} stopped after {PROBLEMS} Tresca problems with a change of {history[-1]:.1e} of the friction "
-            "thresholds: reduce the time step, or use Condensed()"
+            "thresholds: take a smaller step of time or load, or use Condensed()"
         )
 
     def _first(self, step: StepProblem, limit: Array) -> tuple[Rubbing, int]:

@@ -34,7 +34,7 @@ ADVICE = {
     "DIVERGED_LINEAR_SOLVE": "check that the body is held or that mass enters A, and that A is positive definite",
     **dict.fromkeys((name for name, words in WORDS.items() if words.endswith("not a number")), CHECK_NUMBERS),
 }
-GENERAL_ADVICE = "check that the body is held, try a smaller dt, another method, or a larger iteration limit"
+GENERAL_ADVICE = "check that the body is held, try a smaller step, another method, or a larger iteration limit"
 
 
 def name_of(reasons: type, reason: int) -> str:

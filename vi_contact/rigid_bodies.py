@@ -1,0 +1,131 @@
+"""The bodies of a system as rigid ones: what of their motion nothing but contact holds, and whether forces balance it.
+
+Every body is asked by itself, in its own unknowns (``problem.turned``): with w a rigid motion of it and K w = 0, a
+static stage asks for w·(f - B_nᵀ r_n - B_tᵀ r_t) = 0, the sums of forces and moments. No stiffness enters it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from .algebra import Array, Comm, Indices, Matrix
+from .handing_over import rigid_motions
+from .step import ContactProblem
+from .system import SemiDiscreteSystem
+
+FREE = 1e-10  # wᵀKw over the body's largest K_ii, for motions w of size one, that is round-off
+WEAK, STRONG = 4e-6, 1e-4  # of a stiffness: see body_springs
+
+
+@dataclass(frozen=True)
+class FreeMotions:
+    """Those of one body: its owned unknowns, the motions w (rows, k) of size one, and the same orthonormal in its mass,
+    with M w."""
+
+    rows: Indices
+    unit: Array
+    motions: Array
+    momenta: Array
+
+
+class RigidBodies:
+    """The bodies of a problem, and how forces balance on them. Collective."""
+
+    def __init__(self, problem: ContactProblem) -> None:
+        self._coupling, self._comm = problem.surface.coupling, problem.surface.comm
+        self._free = list(_free(problem.turned))
+
+    def imbalance(self, load: Array, reaction: Array) -> float:
+        """The largest |w·(load - reaction)| over max |w| times the sum of |load| and |reaction| on the body, forces [N]
+        on the unknowns of ``problem.static_load``. 0 when prescribed displacements hold every body."""
+        f, r = self._own(load), self._own(reaction)
+        worst = 0.0
+        for body in self._free:
+            own_f, own_r = f[body.rows], r[body.rows]
+            total = np.abs(own_f).sum() + np.abs(own_r).sum()
+            *missing, size = self._comm.sum(np.append(body.unit.T @ (own_f - own_r), total))
+            worst = float(np.max(np.abs(missing) / (size or 1.0), initial=worst))  # NaN stays NaN
+        return worst
+
+    def resultants(self, force: Array) -> Array:
+        """The part M w (w·force) of a force on the unknowns of ``problem.static_load``, which has its resultants."""
+        own, part = self._own(force), np.zeros_like(force)
+        for body in self._free:
+            part[body.rows] += body.momenta @ self._comm.sum(body.motions.T @ own[body.rows])
+        return part if self._coupling is None else self._coupling.transpose_apply(part)
+
+    def _own(self, force: Array) -> Array:
+        """Forces on the bodies themselves: û = R ǔ, R⁻¹ = 2 - R."""
+        return force if self._coupling is None else 2.0 * force - self._coupling.transpose_apply(force)
+
+
+def _free(system: SemiDiscreteSystem) -> Iterator[FreeMotions]:
+    comm, points = system.algebra.comm, system.space.coordinates
+    numbers = np.asarray(system.space.bodies)
+    stiffness = np.abs(system.K.diagonal())
+    for number in range(_count(comm, numbers)):
+        rows = np.flatnonzero(numbers == number)
+        high = comm.max(np.max(points[rows], axis=0, initial=-np.inf))
+        low = -comm.max(np.max(-points[rows], axis=0, initial=-np.inf))
+        x = (points[rows] - 0.5 * (low + high)) / max(float(np.max(high - low)), 1e-300)
+        w = rigid_motions(system.influence[rows], x)
+        bending = _form(system, system.K, rows, w)[1]
+        largest = float(comm.max(np.array([np.max(stiffness[rows], initial=0.0)]))[0])
+        w = w @ _kernel(bending, FREE * largest)
+        momenta, inertia = _form(system, system.M, rows, w)
+        scale = np.linalg.inv(np.linalg.cholesky(inertia)).T
+        yield FreeMotions(rows, w / comm.max(np.max(np.abs(w), axis=0, initial=0.0)), w @ scale, momenta @ scale)
+
+
+def _kernel(form: Array, zero: float) -> Array:
+    """Columns whose form is zero: the axes themselves where they are of that kind, so that no round-off of one sum of
+    forces gets into another; and others between the axes that are left."""
+    free = np.abs(form.diagonal()) <= zero
+    values, vectors = np.linalg.eigh(form[np.ix_(~free, ~free)])
+    others = np.zeros((len(form), len(values)))
+    others[~free] = vectors
+    return np.column_stack([np.eye(len(form))[:, free], others[:, np.abs(values) <= zero]])
+
+
+def _form(system: SemiDiscreteSystem, A: Matrix, rows: Indices, w: Array) -> tuple[Array, Array]:
+    """(A w, wᵀA w) of motions of a body, on the body."""
+    columns = []
+    for values in w.T:
+        x = np.zeros(system.rows)
+        x[rows] = values
+        columns.append((A @ x)[rows])
+    moved = np.column_stack(columns) if columns else np.zeros_like(w)
+    form = system.algebra.comm.sum(w.T @ moved)
+    return moved, 0.5 * (form + form.T)
+
+
+def body_springs(problem: ContactProblem) -> Matrix:
+    """P: the mass matrix of every body, times a number [1/s²] that makes the sum of its entries along a direction
+    STRONG of the stiffness of what is softest here, a body or the springs it stands on, and at least WEAK of the body's
+    own largest K_ii; in the unknowns of ``problem.static_load``. Collective.
+
+    It does not grow as meshes are refined, as it would with the largest K_ii / M_ii. Weaker springs take fewer steps to
+    push a stiff body into a soft one, and cost digits: round-off of the first step is 1e-16 / WEAK² at worst.
+    """
+    system, surface = problem.turned, problem.surface
+    algebra, numbers = system.algebra, np.asarray(system.space.bodies)
+    count, d = _count(algebra.comm, numbers), system.influence.shape[1]
+    row_sums = np.sum(system.influence * np.column_stack([system.M @ r for r in system.influence.T]), axis=1)
+    mass = algebra.comm.sum(np.bincount(numbers, row_sums, minlength=count).astype(float)) / d
+    stiffness = np.zeros(count)
+    np.maximum.at(stiffness, numbers, np.abs(system.K.diagonal()))
+    stiffness = algebra.comm.max(stiffness)
+    soft = surface.compliance > 0.0
+    bed = float(np.sum(1.0 / surface.compliance[soft])) if soft.any() else np.inf
+    wanted = np.clip(STRONG * min(bed, float(np.min(stiffness))), WEAK * stiffness, STRONG * stiffness)
+    root = np.sqrt(np.divide(wanted, mass, out=np.zeros(count), where=mass > 0.0))
+    every = np.arange(system.rows)
+    springs = algebra.congruence(algebra.local(every, every, root[numbers], system.rows), system.M)
+    return springs if surface.coupling is None else algebra.congruence(surface.coupling, springs)
+
+
+def _count(comm: Comm, numbers: Indices) -> int:
+    return 1 + int(comm.max(np.array([float(np.max(numbers, initial=0))]))[0])
