@@ -21,6 +21,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from .algebra import Algebra, Array, Factor, Mask, Matrix
+from .errors import InputError
 from .excitation import Excitation
 from .friction import FrictionLaw, Frictionless
 from .impact import ImpactLaw
@@ -171,6 +172,14 @@ class StepProblem:
     slip0: Array | None = None
     rate_factor: float = 0.0
 
+    def __post_init__(self) -> None:
+        rows, conditions = len(self.guess), self.surface.count
+        if len(self.b) != rows or len(self.bound) != conditions or len(self.active) != conditions:
+            raise InputError(
+                f"StepProblem has {len(self.b)} loads for {rows} unknowns, {len(self.bound)} bounds and a contact set "
+                f"of {len(self.active)} for {conditions} conditions: give one of each"
+            )
+
     def friction_at(self, slip: Array) -> FrictionLaw:
         """The friction law at the rates [m/s] of this slip, B_t x - slip0 (m, d - 1)."""
         return self.friction.at(self.rate_factor * np.linalg.norm(slip, axis=1))
@@ -212,7 +221,8 @@ class Balance:
 class Scheme(Protocol):
     """A time scheme: turns a state into a StepProblem and its solution into the next state.
 
-    ``mass``: the mass matrix it takes when the problem does not say which.
+    ``mass``: the mass matrix it takes when the problem does not say which. One whose contact condition is on velocities
+    says ``penetrates = True``: states of its own runs may lie inside the obstacle, and it goes on from them.
     """
 
     @property
