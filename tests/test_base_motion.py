@@ -54,6 +54,15 @@ def test_the_base_is_integrated_as_the_schemes_do():
 
 
 @pytest.mark.serial
+def test_a_schedule_may_end_with_the_run():
+    """Its last piece is that of the run: no more than its times are asked for."""
+    plans = [vc.Schedule(((DT, 0.01), (2.0 * DT, end))) for end in (0.05, math.inf)]
+    one, other = (base_motion(WAVES, plan).at(0.05) for plan in plans)
+    for mine, theirs in zip(one, other, strict=True):
+        np.testing.assert_array_equal(mine, theirs)
+
+
+@pytest.mark.serial
 def test_time_steps_of_the_run_are_refused():
     with pytest.raises(InputError, match="found while the run goes"):
         base_motion(WAVES, vc.HalvedAtImpact(DT), vc.Trapezoidal())  # type: ignore[arg-type]

@@ -8,6 +8,7 @@ motion with the same weights as the run's own u and v.
 from __future__ import annotations
 
 from bisect import bisect_right
+from math import inf
 
 from .algebra import Array
 from .errors import InputError
@@ -25,6 +26,11 @@ def given_steps(dt: float | Schedule) -> None:
     course(dt, 1, None)
 
 
+def _endless(dt: float | Schedule) -> float | Schedule:
+    """A plan whose last piece does not end: only the times of a run are asked for."""
+    return Schedule((*dt.pieces[:-1], (dt.pieces[-1][0], inf))) if isinstance(dt, Schedule) else dt
+
+
 class Alongside:
     """u(t) and v(t) of a system without contact, marched as far as somebody asks.
 
@@ -39,7 +45,7 @@ class Alongside:
         system = problem.system
         self._steps = march(
             ContactProblem(system, problem.surface, excitation=problem.excitation, mass=ConsistentMass()),
-            scheme=scheme, dt=dt, steps=LARGEST,
+            scheme=scheme, dt=_endless(dt), steps=LARGEST,
         )
         self._t, self._u, self._v = [0.0], [system.u0.copy()], [system.v0.copy()]
 

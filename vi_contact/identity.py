@@ -163,8 +163,8 @@ def _numbers_in(value: Any) -> Iterator[float]:
             yield from _numbers_in(getattr(value, one.name))
     elif isinstance(value, np.ndarray | tuple | list):
         found = np.asarray(value)
-        yield from found.ravel().tolist() if found.dtype.kind in "if" else ()
-    elif isinstance(value, int | float):
+        yield from found[np.isfinite(found)].tolist() if found.dtype.kind in "if" else ()
+    elif isinstance(value, int | float) and np.isfinite(value):
         yield float(value)
 
 
