@@ -122,18 +122,20 @@ def test_time_step(model):
 
 
 def test_ledger(model):
-    """V9.7 for V3.1: the ledger closes to 1e-10 of the largest energy, or to round-off of ½ uᵀKu where that is more.
+    """V9.7 for V3.1: the ledger closes to 1e-11 of the largest energy and the round-off of uᵀKu.
 
-    K u of a rotation is zero by cancellation only: at the stiffness V3.1 asks for its round-off is near 1e-10 already.
+    K u of a rotation is zero by cancellation only: that leaves 5e-11 of the energy in a soft block and 1e-9 in one as stiff
+    as V3.1 asks for, on every kind of processor a sixth of what is allowed here.
     """
     soft = rocking.build(block(3.0e9), COMM)
-    history, facts = released(soft, 0.25 * SHAPE.alpha, 1.2)
-    assert 0.0 < facts["energy_defect"] <= 1e-10
-    assert history["loss_damping"][-1] > 0.0 and history["loss_contact"][-1] > 0.0
-    history, facts = released(model, 0.5 * SHAPE.alpha, 0.6)
-    system, u = model.problem.equations, model.tilted(0.5 * SHAPE.alpha).u
-    terms = float(system.algebra.dot(u, system.K.diagonal() * u))
-    assert np.max(np.abs(history["energy_defect"])) <= 4.0 * np.finfo(float).eps * terms
+    for built, tilt, t_end in ((soft, 0.25 * SHAPE.alpha, 1.2), (model, 0.5 * SHAPE.alpha, 0.6)):
+        history, facts = released(built, tilt, t_end)
+        system, u = built.problem.equations, built.tilted(tilt).u
+        terms = float(system.algebra.dot(u, system.K.diagonal() * u))
+        bound = 1e-11 * facts["energy"]["energy_max"] + np.finfo(float).eps * terms
+        assert 0.0 < np.max(np.abs(history["energy_defect"])) <= bound
+        if built is soft:
+            assert history["loss_damping"][-1] > 0.0 and history["loss_contact"][-1] > 0.0
 
 
 def lifted(model: rocking.RockingModel, peak: float) -> tuple[float, float, float]:
