@@ -124,8 +124,8 @@ def test_time_step(model):
 def test_ledger(model):
     """V9.7 for V3.1: the ledger closes to 1e-11 of the largest energy and the round-off of uᵀKu.
 
-    K u of a rotation is zero by cancellation only: that leaves 5e-11 of the energy in a soft block and 1e-9 in one as stiff
-    as V3.1 asks for, on every kind of processor a sixth of what is allowed here.
+    K u of a rotation is zero by cancellation only. It leaves 5e-11 of the energy in a soft block, 1e-9 in one as stiff
+    as V3.1 asks for: on every kind of processor a sixth of what is allowed here.
     """
     soft = rocking.build(block(3.0e9), COMM)
     for built, tilt, t_end in ((soft, 0.25 * SHAPE.alpha, 1.2), (model, 0.5 * SHAPE.alpha, 0.6)):
