@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .algebra import Array
+from .checks import counted
 from .errors import InputError
 from .ground_motion import Record, ResponseSpectrum, response_spectrum
 from .peak_values import column_of
@@ -48,7 +49,9 @@ def recorded_motion(history: Mapping[str, Array], column: str, *, relative: bool
     steps = np.diff(t)
     dt = float(np.median(steps))
     if np.ptp(steps) > 1e-6 * dt:
-        even = t[0] + dt * np.arange(int(np.floor((t[-1] - t[0]) / dt * (1.0 + 1e-12))) + 1)
+        asked = (t[-1] - t[0]) / dt * (1.0 + 1e-12)
+        counted(f"column '{column}'", f"the step of {dt:g} s in {t[-1] - t[0]:g} s", asked)
+        even = t[0] + dt * np.arange(int(np.floor(asked)) + 1)
         values = np.interp(even, t, values)
     frame = "relative" if relative else "absolute"
     return Record(values, dt, title=f"{column}, {frame}", source=column, notes=(f"{frame} acceleration of a run",))

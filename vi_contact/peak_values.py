@@ -16,6 +16,7 @@ from .output import sentence, write_atomically
 from .recorders import Columns
 
 HEADER = ("name", "quantity", "unit", "max", "t_max", "min", "t_min")
+GROWS = "; at impacts its peak depends on dt"
 _NOT_PEAKS = ("t", "k", "iterations", "escalated")
 
 
@@ -35,14 +36,15 @@ class Peak:
 def peaks(history: Mapping[str, Array], columns: Columns, names: Sequence[str] | None = None) -> list[Peak]:
     """The peaks of these columns, of all columns of numbers but the counters when None. nan values are left out.
 
-    InputError for a column that the history does not have, or one of arrays.
+    The peak of an acceleration is that of the time step where contact closes, and is marked so: it grows as dt falls,
+    while displacements and forces converge. InputError for a column that the history does not have, or one of arrays.
     """
     if names is None:
         names = [name for name in columns if name not in _NOT_PEAKS and name in history and history[name].ndim == 1]
     found = []
     for name in names:
         values = column_of(history, name)
-        unit, quantity = columns[name]
+        unit, quantity = columns[name][0], columns[name][1] + (GROWS if _depends_on_dt(name) else "")
         if np.isnan(values).all():
             found.append(Peak(name, quantity, unit, *[float("nan")] * 4))
             continue
@@ -50,6 +52,11 @@ def peaks(history: Mapping[str, Array], columns: Columns, names: Sequence[str] |
         t = history["t"]
         found.append(Peak(name, quantity, unit, *(float(x) for x in (values[high], t[high], values[low], t[low]))))
     return found
+
+
+def _depends_on_dt(name: str) -> bool:
+    """Whether the peaks of a column grow without bound as the time step falls: accelerations of a body that strikes."""
+    return name.startswith(("a_x_", "a_y_", "a_z_"))
 
 
 def write_peaks(path: str | Path, rows: Sequence[Peak]) -> Path:

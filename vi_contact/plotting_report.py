@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from .algebra import Array
 from .errors import InputError
 from .floor_spectra import recorded_motion
-from .ground_motion import STANDARD_GRAVITY, response_spectrum
+from .ground_motion import STANDARD_GRAVITY, Record, response_spectrum
 from .peak_values import Peak, peaks
 from .plotting import _LEDGER, _STYLE, _log, _scaled
 from .plotting_maps import arc_position, draw_map, thinned
@@ -36,6 +37,7 @@ _GROUPS = (  # (title, prefixes of columns); the first four that move are drawn
     ("absolute acceleration", ("a_x_", "a_y_", "a_z_")),
     ("contact pressure", ("contact_max_pressure",)),
 )
+SAMPLES_A_PERIOD = 10  # fewer: a spectrum is drawn pale
 _LINES = 4  # of a panel: those that move most
 _PEAKS = (
     "a_g_", "u_", "a_x_", "contact_uplift", "contact_resultant", "contact_max_pressure", "reaction_x_", "reaction_M",
@@ -72,7 +74,8 @@ def plot_report(
     lines = (len(panels) + 1) // 2
     table = 0.15 * (len(rows) + 1) / PAGE[1]  # of the page's height
     height = (TOP - table - 0.06) * PAGE[1] / lines - GAP
-    with matplotlib.rc_context(_STYLE | {"font.size": 7, "axes.titlesize": 8, "axes.labelsize": 7}):
+    fonts = {"font.size": 7, "axes.titlesize": 8, "axes.labelsize": 7}
+    with matplotlib.rc_context(_STYLE | fonts | {"text.parse_math": False}):  # a dollar of a title is no formula
         figure = Figure(figsize=PAGE)
         grid = figure.add_gridspec(
             lines, 2, left=SIDES[0], right=SIDES[1], top=TOP, bottom=table + 0.06 + GAP / PAGE[1] - 0.05,
@@ -173,21 +176,31 @@ def _label(axis: Any, title: str, rows: int = 1) -> None:
 
 
 def _spectrum(axis: Any, run: RunFolder, names: Sequence[str]) -> None:
-    """Pseudo-acceleration of the ground's motion, 5 % damping, over periods that its steps resolve."""
+    """Pseudo-acceleration of the ground's motion, 5 % damping; pale at periods that its steps do not resolve."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     for name in names:
         record = recorded_motion(run.history, name)
-        periods = np.geomspace(max(10.0 * record.dt, 0.01 * record.duration), max(2.0 * record.duration, 1.0), 100)
-        periods = periods[periods <= 10.0] if record.duration > 1.0 else periods
-        spectrum = response_spectrum(record, periods)
-        axis.semilogx(periods, spectrum.psa / STANDARD_GRAVITY, lw=0.9, label=name)
+        periods = shown_periods(record)
+        psa = response_spectrum(record, periods).psa / STANDARD_GRAVITY
+        (line,) = axis.semilogx(periods, psa, lw=0.8, alpha=0.35)
+        trusted = periods >= SAMPLES_A_PERIOD * record.dt
+        axis.semilogx(periods[trusted], psa[trusted], lw=0.9, color=line.get_color(), label=name)
     _label(axis, "response spectrum of the ground, 5 %")
     axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axis.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.xaxis.set_minor_formatter(NullFormatter())
     axis.set_ylim(bottom=0.0)
     axis.set(xlabel="period [s]", ylabel="pseudo-acceleration [g]")
+
+
+def shown_periods(record: Record) -> Array:
+    """Periods [s] of the page's spectrum: from four steps of the run to twice its duration, at most 10 s in long runs.
+
+    What is short is what structures with contact feel, so the first period follows from the step, not the duration.
+    """
+    last = max(2.0 * record.duration, 1.0)
+    return np.geomspace(4.0 * record.dt, min(last, 10.0) if record.duration > 1.0 else last, 150)
 
 
 def _map(axis: Any, run: RunFolder, column: str, unit: str) -> None:

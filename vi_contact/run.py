@@ -19,11 +19,11 @@ from .errors import Interrupted
 from .march import March
 from .recorders import refuse_overflow
 from .run_log import Progress, versions
-from .solution import Solution, energy_warning
+from .solution import Solution, energy_warning, sampling_warning
 from .step import ContactProblem, Recorder, Report, Scheme, Solver, State, StepResult
 from .stop_signals import StopSignals
 from .table import Table
-from .time_steps import Course, TimeSteps, described
+from .time_steps import Course, TimeSteps, described, longest
 from .writer import Writer
 
 log = logging.getLogger(__name__)
@@ -70,6 +70,7 @@ class Settings:
             "unknowns": self.problem.system.space.unknowns,
             "contact_points": self.problem.surface.count,
             "boundaries": list(self.problem.system.notes),
+            "sampling": sampling_warning(self.problem.excitations, longest(self.dt)) or "",
         }
 
 
@@ -190,7 +191,10 @@ class Run:
             return
         log.info("versions: %s", ", ".join(f"{name} {version}" for name, version in versions().items()))
         for name, value in self.settings.facts().items():
-            log.info("%s: %s", name, value)
+            if name != "sampling":
+                log.info("%s: %s", name, value)
+            elif value:
+                log.warning("%s", value)
         if self.resumed_from is not None:
             log.info("continues from the checkpoint of step %d", self.resumed_from)
         log.info("%d steps to do", self.left)

@@ -8,13 +8,14 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from textwrap import shorten
 from typing import Any
 
 import h5py
 import numpy as np
 
 from .algebra import Array, Mask
-from .checks import shown
+from .checks import SHOWN, shown
 from .errors import InputError
 from .output import COLUMNS, HISTORY_CSV, HISTORY_H5, SUMMARY, check_folder_format
 
@@ -73,9 +74,14 @@ def read_run(folder: str | Path) -> RunFolder:
         facts = _facts(read_object(folder / SUMMARY)) if (folder / SUMMARY).is_file() else {}
         arrays, contact = _arrays(folder / HISTORY_H5, len(history["t"]))
     except (OSError, ValueError, KeyError, TypeError, RuntimeError, AttributeError) as error:
-        reason = " ".join(str(error).split())
+        reason = _short(error)
         raise InputError(f"a file of the run in '{folder}' is missing or damaged ({reason}): restore it") from error
     return RunFolder(folder, history | arrays, columns, facts, contact)
+
+
+def _short(error: Exception) -> str:
+    """The reason on one line; that of a damaged table may be as long as the table."""
+    return shorten(" ".join(part[:SHOWN] for part in str(error).split()), 200, placeholder=" …")
 
 
 def read_object(path: Path) -> dict[str, Any]:
@@ -107,12 +113,19 @@ def _facts(facts: dict[str, Any]) -> dict[str, Any]:
     """The summary, its entries of the kinds that ``Solution`` writes."""
     for name, kinds in _KINDS.items():
         value = facts.get(name)
-        if value is not None and (not isinstance(value, kinds) or isinstance(value, bool)):
+        if value is not None and not _fits(value, kinds):
             raise ValueError(f"{SUMMARY}: {name} is {shown(value)}")
     mean = (facts.get("iterations_per_step") or {}).get("mean")
-    if mean is not None and not isinstance(mean, float | int):
+    if mean is not None and not _fits(mean, _NUMBER):
         raise ValueError(f"{SUMMARY}: iterations_per_step is {shown(mean)}")
     return facts
+
+
+def _fits(value: Any, kinds: type | tuple[type, ...]) -> bool:
+    """Whether a value is of one of these kinds, a number no larger than those of the machine."""
+    if not isinstance(value, kinds) or isinstance(value, bool):
+        return False
+    return not isinstance(value, int | float) or abs(value) < 1e300
 
 
 def _numbers(path: Path) -> dict[str, Array]:
@@ -133,7 +146,7 @@ def _numbers(path: Path) -> dict[str, Array]:
     except OSError as error:
         raise InputError(f"'{path}' cannot be read ({error.strerror}): check its permissions") from error
     except (ValueError, IndexError, csv.Error) as error:
-        raise InputError(f"'{path}' is damaged ({' '.join(str(error).split())}): restore it or run again") from error
+        raise InputError(f"'{path}' is damaged ({_short(error)}): restore it or run again") from error
     return history
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from textwrap import shorten, wrap
 from typing import Any
@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from .algebra import Array
+from .excitation import Excitation, GroundMotion
 from .output import to_json
 from .recorders import Columns
 from .step import State
@@ -64,6 +65,17 @@ def energy_warning(facts: Mapping[str, Any]) -> str | None:
     )
 
 
+def sampling_warning(excitations: Sequence[Excitation], dt: float) -> str | None:
+    """A sentence when a time step [s] is longer than that of a record, whose peaks then fall between the steps."""
+    finest = min((one.record.dt for one in excitations if isinstance(one, GroundMotion)), default=dt)
+    if dt <= finest * (1.0 + 1e-6):
+        return None
+    return (
+        f"the time step of {dt:g} s is longer than the {finest:g} s of the record, whose peaks fall between the steps: "
+        "take a shorter dt, or bring the record to it by resampled(record, dt), which takes out what dt cannot carry"
+    )
+
+
 def _lines(facts: Mapping[str, Any]) -> list[str]:
     def line(name: str, value: str) -> str:
         return f"  {name:<26} {value}"
@@ -94,7 +106,8 @@ def _lines(facts: Mapping[str, Any]) -> list[str]:
         lines.append(line("  energy at the start", f"{facts['energy']['energy_start']: .6e}"))
         lines += [line(f"  {title}", f"{facts['energy'][name]: .6e}") for name, title in LEDGER[:-1]]
         lines.append(line("  defect, relative", f"{facts['energy_defect']: .2e}"))
-    lines += wrap(f"WARNING: {warning}", 110, initial_indent="  ", subsequent_indent="  ") if warning else []
+    for one in filter(None, (warning, facts.get("sampling"))):
+        lines += wrap(f"WARNING: {one}", 110, initial_indent="  ", subsequent_indent="  ")
     if np.isfinite(facts["seconds_per_step"]):
         mean, plain = facts["seconds_per_step"], facts["seconds_per_linear_step"]
         ratio = f", plain linear step {plain:.3e} s, ratio {mean / plain:.2f}" if np.isfinite(plain) else ""

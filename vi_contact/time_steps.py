@@ -70,6 +70,12 @@ def described(plan: TimeSteps) -> float | str:
     return repr(plan) if isinstance(plan, Schedule | HalvedAtImpact) else plan
 
 
+def longest(plan: TimeSteps) -> float:
+    """The longest base step of a plan [s]."""
+    dt = plan.dt if isinstance(plan, HalvedAtImpact) else plan
+    return max(size for size, _ in dt.pieces) if isinstance(dt, Schedule) else float(dt)
+
+
 @dataclass(frozen=True)
 class Course:
     """The base steps of one run: parts (dt, number of steps), and how often each may be halved."""
