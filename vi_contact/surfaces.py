@@ -237,8 +237,8 @@ class ContactSurface:
         """Beside friction, let nodes with several conditions slide freely over their faces; else they are refused.
 
         What such a node could rub on one face is a force across the other, which the conditions, each a bound on one
-        unknown, do not hold. In space it still rubs along its edge, with the normal force of its first condition; within
-        one group that of the face with the lowest node numbers.
+        unknown, do not hold. In space it still rubs along its edge, with the normal force of its first condition (of
+        one group: that of the face with the lowest node numbers).
         """
         if self.corners and self.comm.rank == 0:
             log.info("%d contact nodes with several directions slide freely over their faces", len(self.corners))
