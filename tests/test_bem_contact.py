@@ -225,6 +225,13 @@ def test_bad_input():
     mesh = problem.operator.mesh
     with pytest.raises(InputError, match="belong to the contact boundary"):
         conditions_on(mesh, condensed(), mesh.labels == 1)
+    coarse = square_problem(2, MATERIAL, dt=0.5, steps=2)
+    sides = [coarse.operator.mesh.labels == k for k in (0, 1)]
+    bent = replace(coarse, contact=sides[0] | sides[1]).condensed()
+    with pytest.raises(InputError, match=r"turns by 90 degrees at \(0.5, -0.5\): give conditions=conditions_on"):
+        BoundaryContact(bent)
+    BoundaryContact(bent, conditions=conditions_on(coarse.operator.mesh, bent, *sides))
+    BoundaryContact(bent, obstacle=vc.HalfSpace(point=(0.0, -0.5), normal=(0.0, 1.0)))
     moved = polygon(mesh.points[[0, 5, 10, 15]] - [0.05, 1.0], 0.2)
     below = unloaded(PoincareSteklov(replace(problem.operator.blocks, mesh=moved), 1.0), contact=moved.labels == 2)
     with pytest.raises(InputError, match="no partner on the other body"):

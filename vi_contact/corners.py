@@ -13,6 +13,7 @@ from .algebra import Array, Indices
 from .errors import InputError
 from .surfaces import ContactSurface
 
+FEATURE_ANGLE = np.pi / 6  # CHOSEN: 30°, a usual feature angle; the coarsest circles of the models turn by less
 PARALLEL = 1e-9  # 1 - cosine of the angle between directions that count as one, cosine between those at right angles
 
 

@@ -145,6 +145,14 @@ class BoundaryMesh:
         length = np.hypot(*sums.T)
         return sums / np.where(length > 0.0, length, 1.0)[:, None]
 
+    def node_turns(self, elements: ArrayLike) -> Array:
+        """(n,) angle [rad] by which the boundary turns at each node between two masked elements; else zero."""
+        chosen, before = self._mask(elements), np.empty(len(self), dtype=np.int64)
+        before[self.after] = np.arange(len(self))
+        one, other = self.normals[before], self.normals
+        turns = 2.0 * np.arctan2(np.hypot(*(one - other).T), np.hypot(*(one + other).T))
+        return np.where(chosen & chosen[before], turns, 0.0)
+
     def _mask(self, elements: ArrayLike) -> NDArray[np.bool_]:
         return mask("BoundaryMesh", "elements", elements, (len(self),))
 

@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike
 
 from ..algebra import Array, Indices, Mask, SerialAlgebra, SerialComm, SerialMatrix
 from ..checks import array, flag, function, instance, integers, provides
+from ..corners import FEATURE_ANGLE
 from ..errors import InputError
 from ..friction import FrictionLaw, Frictionless
 from ..initial_gap import admissible_gap
@@ -84,7 +85,8 @@ class BoundaryContact:
     the obstacle has moved towards the body and along its tangents at time t [m]; bilateral: every point is held on the
     obstacle; conditions: None for one per contact node. Points with two conditions do not rub.
 
-    Raises InputError for a compliance W[0] that is not symmetric and positive definite (the unsymmetric form is not),
+    Raises InputError for a contact boundary that turns by more than 30° where the obstacle follows it and no conditions
+    are given, for a compliance W[0] that is not symmetric and positive definite (the unsymmetric form is not),
     supports that hold a contact direction, and bodies that penetrate their obstacle.
     """
 
@@ -110,6 +112,21 @@ class BoundaryContact:
             if self.conditions.nodes.max(initial=0) >= self.count:
                 raise InputError(f"{owner}: conditions name node {self.conditions.nodes.max()} of {self.count} contact "
                                  "nodes; make them with conditions_on for this compliance")
+
+        self._refuse_corners()
+
+    def _refuse_corners(self) -> None:
+        """One condition along a mean normal is none of a node at which the contact boundary turns."""
+        turns, points = self.compliance.turns, self.compliance.points
+        if self.conditions is not None or turns is None or turns.max(initial=0.0) <= FEATURE_ANGLE * (1.0 + 1e-9):
+            return
+        corner, normals = int(np.argmax(turns)), self.compliance.normals
+        if np.array_equal(np.asarray(self.obstacle.directions(points, normals))[corner], normals[corner]):
+            where = ", ".join(f"{x:g}" for x in points[corner])
+            raise InputError(
+                f"BoundaryContact: the contact boundary turns by {np.degrees(turns[corner]):.3g} degrees at ({where}): "
+                "give conditions=conditions_on(mesh, compliance, one side, other side), a condition on each"
+            )
 
     @property
     def count(self) -> int:

@@ -193,6 +193,7 @@ class ConvolutionProblem:
         return CondensedCompliance(
             table.contour.backward(transform), u_free, nodes, mesh.points[nodes],
             mesh.node_normals(elements)[nodes], mesh.node_lengths(elements)[nodes], self.operator.dt,
+            mesh.node_turns(elements)[nodes],
         )
 
     def _displacement_modes(self, impulses: NDArray) -> NDArray:

@@ -91,7 +91,8 @@ class CondensedCompliance:
     W: (steps, 2m, 2m) [m²/N], displacement of the contact unknowns (x of all nodes, then y) at the end of step j after
     a unit nodal force [N/m] during step 0; u_free: (steps, 2m) [m] without contact forces; nodes: (m,) numbers in the
     mesh; points, normals: (m, 2) places [m] and outward unit normals; lengths: (m,) [m] of contact boundary that
-    belongs to a node, traction = force / length; dt [s]. Rows and columns of supported unknowns are zero.
+    belongs to a node, traction = force / length; dt [s]; turns: (m,) angle [rad] by which the contact boundary turns at
+    a node, None where nobody knows. Rows and columns of supported unknowns are zero.
     """
 
     W: Array
@@ -101,6 +102,7 @@ class CondensedCompliance:
     normals: Array
     lengths: Array
     dt: float
+    turns: Array | None = None
 
     def __post_init__(self) -> None:
         owner, m = "CondensedCompliance", np.size(self.nodes)
@@ -194,4 +196,5 @@ class BoundaryProblem:
         return CondensedCompliance(
             np.ascontiguousarray(u[:, :, :-1]), np.ascontiguousarray(u[:, :, -1]), nodes, mesh.points[nodes],
             mesh.node_normals(elements)[nodes], mesh.node_lengths(elements)[nodes], self.operator.blocks.dt,
+            mesh.node_turns(elements)[nodes],
         )

@@ -26,7 +26,6 @@ from .mesh import Facets, node_numbers
 from .space import FemSpace
 
 log = logging.getLogger(__name__)
-FEATURE_ANGLE = np.pi / 6  # CHOSEN: 30°, a usual feature angle; the coarsest circles of the models turn by less
 LEANING = 0.9  # cosine of the angle (26°) up to which a normal counts as lying in a symmetry plane
 NAMED = 4  # corners that the log names
 

@@ -21,11 +21,12 @@ import scipy.sparse as sp
 
 from ..algebra import Array, Mask
 from ..checks import provides
+from ..corners import FEATURE_ANGLE
 from ..errors import InputError
 from ..surfaces import ContactSurface
 from ..system import SemiDiscreteSystem
 from . import compat
-from .faces import FEATURE_ANGLE, Boundary, boundary, checked_angle, split, tell_corners
+from .faces import Boundary, boundary, checked_angle, split, tell_corners
 from .frames import Conditions, Facing, Frames, Nodes, at, joined_nodes, surface_of
 from .matching import Matched, Matching, NodeToNode, Side
 from .mesh import Facets, node_numbers

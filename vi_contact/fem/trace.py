@@ -11,12 +11,12 @@ import numpy as np
 
 from ..algebra import Array
 from ..checks import array, provides, several
-from ..corners import PARALLEL
+from ..corners import FEATURE_ANGLE, PARALLEL
 from ..errors import InputError
 from ..initial_gap import admissible_gap, facing
 from ..surfaces import ContactSurface, Obstacle, Touching
 from ..system import SemiDiscreteSystem
-from .faces import FEATURE_ANGLE, boundary, checked_angle, in_symmetry_planes, integrals, split, tell_corners
+from .faces import boundary, checked_angle, in_symmetry_planes, integrals, split, tell_corners
 from .frames import Conditions, Nodes, at, surface_of
 from .groups import facets_of
 from .mesh import Facets

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from .. import friction, materials, surfaces
+from ..corners import FEATURE_ANGLE
 from ..fem.dashpots import CompliantBase
-from ..fem.faces import FEATURE_ANGLE
 from ..fem.free_field import FreeField
 from ..fem.matching import Matching
 from ..fem.mesh import Facets
