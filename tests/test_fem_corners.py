@@ -1,4 +1,4 @@
-"""Contact boundaries that turn: one condition for every face of a node, at any angle between the faces."""
+"""Contact boundaries that turn: one condition for every face of a node, at any angle between the faces (V2.8)."""
 
 from __future__ import annotations
 

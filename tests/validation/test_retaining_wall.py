@@ -1,4 +1,4 @@
-"""An L-shaped retaining wall whose contact boundary goes round three corners: one group or one for each side."""
+"""An L-shaped retaining wall whose contact boundary goes round three corners: one group or one for each side (V2.8)."""
 
 from __future__ import annotations
 
