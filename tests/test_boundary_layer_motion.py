@@ -7,10 +7,11 @@ import pytest
 from scipy.special import ellipk
 from test_boundary_layer import DEEPEST, DURATION, RESTITUTION, C, K
 
+from vi_contact.boundary_layer import trajectory
 from vi_contact.boundary_layer.bilateral import bilateral_motion
 from vi_contact.boundary_layer.layer import Layer
 from vi_contact.boundary_layer.metric import Metric, b_affinities, b_metric, normal_mass
-from vi_contact.boundary_layer.motion import ConstrainedSystem
+from vi_contact.boundary_layer.motion import ConstrainedSystem, Evaluations
 from vi_contact.boundary_layer.particle import ParticleImpact, damping_ratio, layer_for, restitution
 from vi_contact.boundary_layer.rigid_body import Ellipsoid, RigidBody, rotation
 from vi_contact.boundary_layer.trajectory import Contact, Trajectory, layer_motion
@@ -262,3 +263,47 @@ def test_a_motion_that_cannot_be_integrated_names_its_time():
     )
     with pytest.raises(StepFailure, match=r"beyond t = 0\.2"):
         layer_motion(wild, Layer(0.1, k=1.0), q0=[1.0, 0.0], v0=[0.0, 0.0], t_end=1.0)
+
+
+NAN, INF = np.nan, np.inf
+ENDLESS = {
+    "speed": (lambda: pushed(v0=[NAN, 0.0]), InputError, "v0 is nan"),
+    "place": (lambda: pushed(q0=[INF, 0.0]), InputError, "q0 is inf"),
+    "time": (lambda: pushed(t_end=INF), InputError, "t_end is inf"),
+    "force": (lambda: pushed(lambda t: NAN), InputError, "force.* at the start is nan"),
+    "force on the way": (lambda: pushed(lambda t: INF if t > 0.25 else 0.0), StepFailure, r"beyond t = 0\.25"),
+    "force in the layer": (lambda: pushed(lambda t: -INF if t > 0.95 else 0.0), StepFailure, r"beyond t = 0\.9"),
+    "distance": (lambda: pushed(rho=lambda q: NAN), InputError, r"rho\(q\) at the start is nan"),
+    "distance on the way": (lambda: pushed(rho=lambda q: q[0] if q[0] > 0.5 else NAN), StepFailure, "rho.* nan"),
+    "great numbers": (lambda: pushed(v0=[-1e300, 0.0]), StepFailure, "beyond t = 0 s"),
+    "held": (lambda: bilateral_motion([system()], q0=[0.0, 0.0], v0=[0.0, NAN], times=[0.0, 1.0]), InputError, "v0"),
+    "held, force": (lambda: bilateral_motion([system(lambda t: INF if t > 0.5 else 1.0)], q0=[0.0, 0.0], v0=[0.0, 1.0],
+                                             times=[0.0, 1.0]), StepFailure, r"t = 0\.5"),
+    "held twice": (lambda: bilateral_motion([system(), system()], q0=[0.0, 0.0], v0=[0.0, 1.0], times=[0.0, 1.0]),
+                   StepFailure, "Singular matrix"),
+}
+
+
+def system(force=lambda t: 0.0, rho=lambda q: float(q[0])):
+    return ConstrainedSystem(np.eye(2), rho, lambda q: np.array([1.0, 0.0]),
+                             force=lambda t, q, v: np.array([force(t), 0.0]))
+
+
+def pushed(force=lambda t: 0.0, *, rho=lambda q: float(q[0]), q0=(1.0, 0.0), v0=(-1.0, 0.0), t_end=3.0):
+    return layer_motion(system(force, rho), Layer(0.1, k=1.0), q0=q0, v0=v0, t_end=t_end)
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@pytest.mark.parametrize("name", ENDLESS)
+def test_no_motion_goes_on_for_ever(name):
+    """NaN and infinity given at the start or returned on the way end in one sentence."""
+    act, kind, words = ENDLESS[name]
+    with pytest.raises(kind, match=words):
+        act()
+
+
+def test_evaluations_are_counted(monkeypatch):
+    """A force that varies without end stops at the bound, with the time it has come to."""
+    monkeypatch.setattr(trajectory, "Evaluations", lambda: Evaluations(2000))
+    with pytest.raises(StepFailure, match="did not get beyond t = .* in 2000 evaluations"):
+        pushed(lambda t: 1e9 * np.sin(1e9 * t))

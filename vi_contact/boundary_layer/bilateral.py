@@ -21,8 +21,9 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from ..algebra import Array
+from ..checks import array, instance, number, several, shown
 from ..errors import InputError, StepFailure
-from .motion import ConstrainedSystem
+from .motion import ConstrainedSystem, Evaluations, one_sentence
 
 
 @dataclass(frozen=True)
@@ -47,21 +48,36 @@ def bilateral_motion(
 
     Raises InputError for quasi-velocities or no constraint; StepFailure, naming the time, when the integrator stops.
     """
+    owner, k = "bilateral_motion", len(several("bilateral_motion", "systems", systems, "give a list of them"))
+    for system in systems:
+        instance(owner, "a system", system, ConstrainedSystem, "give ConstrainedSystem(...)")
     if not systems or any(system.rates is not None for system in systems):
-        raise InputError("bilateral constraints need at least one system, whose velocities are the rates of q")
-    q, v, k = np.array(q0, dtype=float), np.array(v0, dtype=float), len(systems)
-    n = len(q)
+        raise InputError(f"{owner}: bilateral constraints need at least one system, whose velocities are the rates of "
+                         "q; give one for each constraint")
+    q, v, times = (array(owner, name, value, (None,)) for name, value in (("q0", q0), ("v0", v0), ("times", times)))
+    if len(times) < 2 or np.any(np.diff(times) <= 0.0):
+        raise InputError(f"{owner}: times are {shown(times)}; give two or more that increase, the first the start")
+    if number(owner, "rtol", rtol, positive=True) >= 1.0:
+        raise InputError(f"{owner}: rtol is {rtol}; give a relative tolerance below 1")
+    for system in systems:
+        system.check(q, v, float(times[0]))
+    n, evaluations = len(q), Evaluations()
 
     def rates(t: float, y: Array) -> Array:
+        evaluations.spend(t)
         place, speed, multiplier, momentum = np.split(y, [n, 2 * n, 2 * n + k])
         acceleration, _, multiplier_rate, force = _solved(systems, t, place, speed, multiplier, momentum)
         return np.concatenate([speed, acceleration, multiplier_rate, force])
 
     y0 = np.concatenate([q, v, np.zeros(2 * k)])
     atol = rtol * max(float(np.max(np.abs(y0))), 1e-300)
-    found = solve_ivp(rates, (times[0], times[-1]), y0, t_eval=times, rtol=rtol, atol=atol, method="DOP853")
+    with one_sentence():
+        if not np.all(np.isfinite(rates(float(times[0]), y0))):
+            raise StepFailure(f"the accelerations at t = {times[0]:.6g} s are not finite: check what the systems' "
+                              "functions return there, and that the constraints are independent")
+        found = solve_ivp(rates, (times[0], times[-1]), y0, t_eval=times, rtol=rtol, atol=atol, method="DOP853")
     if found.status < 0:
-        raise StepFailure(f"the motion could not be integrated beyond t = {found.t[-1]:.6g} s: {found.message}")
+        raise StepFailure(f"the motion could not be integrated beyond t = {evaluations.t:.6g} s: {found.message}")
     places, speeds, multipliers, momenta = np.split(found.y.T, [n, 2 * n, 2 * n + k], axis=1)
     phi = np.array([[system.rho(row) for system in systems] for row in places])
     rows = zip(found.t, places, speeds, multipliers, momenta, strict=True)

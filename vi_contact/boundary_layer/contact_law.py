@@ -29,14 +29,17 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
 
 from ..algebra import Array
+from ..checks import instance, number, shown
 from ..errors import InputError
 from ..surfaces import ContactSurface
-from .layer import Layer, positive
+from .layer import Layer, sized
 from .metric import Metric
 from .motion import ConstrainedSystem
 from .particle import damping_ratio
 from .trajectory import layer_motion
 
+LEAST = 1e-3  # least restitution: below it the search takes minutes
+DOUBLINGS = 60  # of the damping ratio in search of a rebound
 NEAR = 1e-5  # |rho_1 - rho_0| over rho below which the quotient is the derivative in the middle
 
 
@@ -55,8 +58,9 @@ class ContactLayer:
     mass: float = 0.0
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.mass < np.inf:
-            raise InputError(f"the law's mass per area is {self.mass}: give zero or a positive finite number in kg/m²")
+        instance("ContactLayer", "layer", self.layer, Layer, "give a Layer")
+        if number("ContactLayer", "the law's mass per area", self.mass, not_negative=True, unit="kg/m²"):
+            sized("ContactLayer", "the law's mass per area", self.mass, "kg/m²")
         if self.layer.speed is None:
             raise InputError("a contact law needs the layer's speed V: give Layer(speed=...), the speed of approach")
         if self.layer.a >= self.layer.width:
@@ -74,6 +78,7 @@ class ContactLayer:
 
     def set_back(self, surface: ContactSurface) -> ContactSurface:
         """The surface with its obstacle moved back by b: a body that touched its face now touches the layer's edge."""
+        instance("ContactLayer.set_back", "surface", surface, ContactSurface, "give a contact surface")
         return replace(surface, gap0=surface.gap0 + self.layer.width)
 
     def potential(self, rho: Array) -> Array:
@@ -104,6 +109,8 @@ class ContactLayer:
     def rebound(self, mass: float, speed: float) -> float:
         """e of a rigid body that enters with this speed: one equation in time. mass: of the body [kg/m²]; a law with
         metric knows one, its own, and InputError for another."""
+        sized("ContactLayer.rebound", "mass", mass, "kg/m²")
+        sized("ContactLayer.rebound", "speed", speed, "m/s")
         if self.mass not in (0.0, mass):
             raise InputError(f"the law's metric is that of {self.mass} kg/m²: ask for the rebound of that mass")
         return _rebound(self.layer, mass, speed, Metric.BLENDED if self.mass else Metric.FLAT)
@@ -119,17 +126,19 @@ def contact_layer(
     strength: float = 1.0,
     metric: Metric = Metric.BLENDED,
 ) -> ContactLayer:
-    """The law from which a rigid body of ``mass`` [kg/m²] returns with e times its ``speed`` [m/s], 0 < e <= 1.
+    """The law from which a rigid body of ``mass`` [kg/m²] returns with e times its ``speed`` [m/s], 0.001 <= e <= 1.
 
     strength: k b²/(mass V²), how soon the body is turned back. start: a [m], half the width when None. metric: BLENDED,
     gamma = mass, or FLAT, gamma = 0. InputError for another and for values outside their range.
     """
     for name, value, unit in (("mass per area", mass, "kg/m²"), ("speed", speed, "m/s"), ("layer width", width, "m"),
                               ("strength k b²/(mass V²)", strength, "units of one")):
-        positive(f"the {name}", value, unit)
+        sized("contact_layer", f"the {name}", value, unit)
+    if not LEAST <= number("contact_layer", "the restitution coefficient e", e) <= 1.0:
+        raise InputError(f"contact_layer: the restitution coefficient e is {e}; give a number from {LEAST:g} to 1")
     if metric not in (Metric.BLENDED, Metric.FLAT):
-        raise InputError(f"a contact law cannot have {metric}: give Metric.BLENDED or Metric.FLAT")
-    a = 0.5 * width if start is None else start
+        raise InputError(f"contact_layer: a law cannot have {shown(metric)}; give Metric.BLENDED or Metric.FLAT")
+    a = 0.5 * width if start is None else sized("contact_layer", "start", start, "m")
     k = strength * mass * speed**2 / width**2
 
     def layer(s: float) -> Layer:
@@ -140,8 +149,12 @@ def contact_layer(
 
     s, low = damping_ratio(e), 0.0
     if s > 0.0:
-        while excess(s) > 0.0:
+        for _ in range(DOUBLINGS):
+            if excess(s) <= 0.0:
+                break
             low, s = s, 2.0 * s
+        else:
+            raise InputError(f"contact_layer: no layer returns {e:g} of the speed; give a larger e")
         s = float(brentq(excess, low, s, xtol=1e-14, rtol=1e-8))
     return ContactLayer(layer(s), mass if metric is Metric.BLENDED else 0.0)
 

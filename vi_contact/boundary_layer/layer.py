@@ -10,12 +10,16 @@ is complete up to a and fades out smoothly between a and b.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.special import expit
 
 from ..algebra import Array
+from ..checks import number
 from ..errors import InputError
+
+LARGEST, LARGEST_FORCE = 1e60, 1e150  # of lengths, speeds and masses; of k and c: products of their squares are finite
 
 
 @dataclass(frozen=True)
@@ -39,16 +43,16 @@ class Layer:
     start: float | None = None
 
     def __post_init__(self) -> None:
-        positive("layer width b", self.width, "m")
-        for name, value in (("k", self.k), ("c", self.c)):
-            if not 0.0 <= value < np.inf:
-                raise InputError(f"layer parameter {name} is {value}: give zero or a positive finite number")
+        sized("Layer", "the layer width b", self.width, "m")
+        for name, unit in (("k", "N/m"), ("c", "N")):
+            if number("Layer", f"the layer parameter {name}", getattr(self, name), not_negative=True, unit=unit):
+                sized("Layer", f"the layer parameter {name}", getattr(self, name), unit, most=LARGEST_FORCE)
         if self.k == 0.0 and self.c == 0.0:
             raise InputError("layer parameters k and c are both zero: nothing would push the body back, give k > 0")
         if self.speed is not None:
-            positive("layer speed V", self.speed, "m/s")
-        if self.start is not None and not 0.0 < self.start <= self.width:
-            raise InputError(f"layer start a is {self.start}: give a length above 0 and up to the width {self.width} m")
+            sized("Layer", "the layer speed V", self.speed, "m/s")
+        if self.start is not None and sized("Layer", "the layer start a", self.start, "m") > self.width:
+            raise InputError(f"Layer: the layer start a is {self.start}; give a length up to the width {self.width} m")
 
     @property
     def a(self) -> float:
@@ -84,7 +88,9 @@ class Layer:
         return np.asarray(self.width**2 * (self.k - self.c / self.v * rate / x) / x * self.cut_off(x))
 
 
-def positive(name: str, value: float, unit: str) -> None:
-    """InputError unless the value is positive and finite."""
-    if not 0.0 < value < np.inf:
-        raise InputError(f"{name} is {value}: give a positive finite number in {unit}")
+def sized(owner: str, meaning: str, value: Any, unit: str, *, most: float = LARGEST) -> float:
+    """Return a positive number whose powers are finite; InputError for another."""
+    found = number(owner, meaning, value, positive=True, unit=unit)
+    if not 1.0 / most <= found <= most:
+        raise InputError(f"{owner}: {meaning} is {found:g}; give a number from {1.0 / most:g} to {most:g} in {unit}")
+    return found

@@ -12,15 +12,19 @@ caller's; where it is no length the law's parameters have its units.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from ..algebra import Array
-from ..errors import InputError
-from .layer import positive
+from ..checks import array, function, number
+from ..errors import InputError, StepFailure
+from .layer import sized
 
+EVALUATIONS = 200_000  # of the acceleration in one motion
 STEP = 6e-6  # of a central difference over the size of its argument: eps to the power 1/3
 
 
@@ -47,11 +51,32 @@ class ConstrainedSystem:
     scale: float = 1.0
 
     def __post_init__(self) -> None:
-        positive("the scale of the coordinates", self.scale, "their units")
+        owner = "ConstrainedSystem"
+        sized(owner, "the scale of the coordinates", self.scale, "their units")
         if not callable(self.mass):
-            M = np.asarray(self.mass, dtype=float)
-            if M.ndim != 2 or not np.allclose(M, M.T) or np.min(np.linalg.eigvalsh(M)) <= 0.0:
-                raise InputError("the mass matrix is not symmetric positive definite: check its entries")
+            _check_mass(self.mass)
+        for name in ("rho", "gradient", "force", "rates", "gradient_rate"):
+            if name in ("rho", "gradient") or getattr(self, name) is not None:
+                function(owner, name, getattr(self, name), "give a function, see its docstring")
+
+    def check(self, q: Array, v: Array, t: float = 0.0) -> None:
+        """InputError for functions that return, at this state, other shapes, texts, NaN or infinity."""
+        owner, n = "ConstrainedSystem", len(v)
+        number(owner, "rho(q) at the start", self.rho(q))
+        array(owner, "gradient(q) at the start", self.gradient(q), (n,))
+        if callable(self.mass):
+            _check_mass(self.mass(q))
+        if self.matrix(q).shape != (n, n):
+            raise InputError(f"{owner}: the mass matrix has shape {self.matrix(q).shape} and there are {n} velocities; "
+                             "give one row for each")
+        if self.rates is None and len(q) != n:
+            raise InputError(f"{owner}: {len(q)} coordinates and {n} velocities; give as many, or rates(q, v)")
+        if self.force is not None:
+            array(owner, "force(t, q, v) at the start", self.force(t, q, v), (n,))
+        if self.rates is not None:
+            array(owner, "rates(q, v) at the start", self.rates(q, v), (len(q),))
+        if self.gradient_rate is not None:
+            number(owner, "gradient_rate(q, v) at the start", self.gradient_rate(q, v))
 
     def matrix(self, q: Array) -> Array:
         """M(q)."""
@@ -92,6 +117,36 @@ class ConstrainedSystem:
         both = np.linalg.solve(self.matrix(q), np.column_stack([self.generalised_force(t, q, v), A]))
         free, along = both[:, 0], both[:, 1]
         return free, along, float(1.0 / (A @ along)), float(A @ free) + self.turning(q, v)
+
+
+class Evaluations:
+    """Counts what an integration in time spends, so that no motion goes on for ever; t: the time it has come to [s]."""
+
+    def __init__(self, most: int = EVALUATIONS) -> None:
+        self.most, self.spent, self.t = most, 0, 0.0
+
+    def spend(self, t: float) -> None:
+        """StepFailure, naming the time, when everything is spent."""
+        self.spent, self.t = self.spent + 1, t
+        if self.spent > self.most:
+            raise StepFailure(f"the motion did not get beyond t = {t:.6g} s in {self.most} evaluations of its "
+                              "acceleration: give a shorter time, a larger rtol, or forces that vary less")
+
+
+@contextmanager
+def one_sentence() -> Iterator[None]:
+    """StepFailure for numbers that leave their range and matrices that become singular on the way."""
+    try:
+        yield
+    except (ArithmeticError, np.linalg.LinAlgError) as error:
+        raise StepFailure(f"the motion could not be integrated, its numbers left their range ({error}): check forces, "
+                          "masses and the state at the start") from error
+
+
+def _check_mass(mass: Any) -> None:
+    M = array("ConstrainedSystem", "the mass matrix", mass, (None, None), unit="kg")
+    if M.shape[0] != M.shape[1] or not np.allclose(M, M.T) or np.min(np.linalg.eigvalsh(M), initial=np.inf) <= 0.0:
+        raise InputError("ConstrainedSystem: the mass matrix is not symmetric positive definite; check its entries")
 
 
 def _inertia(mass: Callable[[Array], Array], q: Array, v: Array, h: float) -> Array:

@@ -25,8 +25,11 @@ from scipy.optimize import brentq
 from scipy.special import exprel, lambertw
 
 from ..algebra import Array
+from ..checks import instance, number
 from ..errors import InputError
-from .layer import Layer, positive
+from .layer import Layer, sized
+
+LEAST = 1e-9  # least restitution that is asked for
 
 
 @dataclass(frozen=True)
@@ -41,8 +44,9 @@ class ParticleImpact:
     speed: float
 
     def __post_init__(self) -> None:
-        positive("the particle's mass", self.mass, "kg")
-        positive("the particle's speed", self.speed, "m/s")
+        instance("ParticleImpact", "layer", self.layer, Layer, "give a Layer")
+        sized("ParticleImpact", "the particle's mass", self.mass, "kg")
+        sized("ParticleImpact", "the particle's speed", self.speed, "m/s")
         if self.layer.k == 0.0:
             raise InputError("layer parameter k is zero: the particle would stay in the layer, give k > 0")
 
@@ -112,11 +116,9 @@ class ParticleImpact:
 
 def restitution(s: float) -> float:
     """e of s = c/(a k) >= 0."""
-    if not 0.0 <= s < np.inf:
-        raise InputError(f"the damping ratio s = c/(a k) is {s}: give zero or a positive finite number")
+    number("restitution", "the damping ratio s = c/(a k)", s, not_negative=True)
     if s > 1.0:
-        tau = 1.0 + s + float(lambertw(-(1.0 + s) * np.exp(-(1.0 + s))).real)
-        return tau / s - 1.0
+        return (1.0 + float(lambertw(-(1.0 + s) * np.exp(-(1.0 + s))).real)) / s
     e = 1.0 - 2.0 / 3.0 * s + 4.0 / 9.0 * s**2 - 44.0 / 135.0 * s**3 * (s < 0.3)
     for _ in range(8):  # Newton; e² h(-s e) has the derivative e/(1 - s e)
         e -= (e**2 * _h(-s * e) - _h(s)) * (1.0 - s * e) / e
@@ -125,8 +127,8 @@ def restitution(s: float) -> float:
 
 def damping_ratio(e: float) -> float:
     """s = c/(a k) that gives the restitution 0 < e <= 1: the inverse of ``restitution``."""
-    if not 0.0 < e <= 1.0:
-        raise InputError(f"restitution coefficient e is {e}: a layer gives any number above 0 and up to 1")
+    if not LEAST <= number("damping_ratio", "the restitution coefficient e", e) <= 1.0:
+        raise InputError(f"damping_ratio: the restitution coefficient e is {e}; give a number from {LEAST:g} to 1")
     if e == 1.0:
         return 0.0
     most = (1.0 + 1e-9) / e  # e(s) < 1/s
@@ -141,12 +143,13 @@ def layer_for(
     ``deepest``: x_min/a, the part of the distance a that is left at the greatest compression. InputError unless
     0 < e <= 1 and 0 < deepest < 1.
     """
-    if not 0.0 < deepest < 1.0:
-        raise InputError(f"deepest is {deepest}: give the part of the layer that is left, between 0 and 1")
-    positive("the mass", mass, "kg")
-    positive("the speed", speed, "m/s")
+    if not 0.0 < number("layer_for", "deepest", deepest) < 1.0:
+        raise InputError(f"layer_for: deepest is {deepest}; give the part of the layer that is left, between 0 and 1")
+    given = (("the mass", mass, "kg"), ("the speed", speed, "m/s"), ("the layer width b", width, "m"))
+    for name, value, unit in given:
+        sized("layer_for", name, value, unit)
     s = damping_ratio(e)
-    a = width if start is None else start
+    a = width if start is None else sized("layer_for", "start", start, "m")
     k = mass * speed**2 / a**2 * _h(s) / -np.log(deepest)
     return Layer(width, k=float(k), c=float(s * a * k), speed=speed, start=start)
 

@@ -20,8 +20,9 @@ from typing import Any
 import numpy as np
 
 from ..algebra import Array
+from ..checks import array, number
 from ..errors import InputError
-from .layer import positive
+from .layer import sized
 from .metric import normal_mass
 from .motion import ConstrainedSystem
 
@@ -34,8 +35,8 @@ class Ellipsoid:
     axes: tuple[float, float, float]
 
     def __post_init__(self) -> None:
-        for length in self.axes:
-            positive("a semi-axis of the ellipsoid", length, "m")
+        for length in array("Ellipsoid", "axes", self.axes, (3,), unit="m"):
+            sized("Ellipsoid", "a semi-axis of the ellipsoid", float(length), "m")
 
     def __call__(self, nu: Array) -> Array:
         squares = np.asarray(self.axes, dtype=float) ** 2
@@ -62,12 +63,20 @@ class RigidBody:
     gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        positive("the body's mass", self.mass, "kg")
+        owner = "RigidBody"
+        sized(owner, "the body's mass", self.mass, "kg")
+        array(owner, "inertia", self.inertia, (3, 3) if np.ndim(self.inertia) == 2 else (3,), unit="kg m²")
+        if not callable(self.point) or isinstance(self.point, type):
+            array(owner, "point", self.point, (3,), unit="m")
+        for name in ("normal", "gravity"):
+            array(owner, name, getattr(self, name), (3,))
+        number(owner, "offset", self.offset, unit="m")
         J = self.J
         if J.shape != (3, 3) or not np.allclose(J, J.T) or np.min(np.linalg.eigvalsh(J)) <= 0.0:
-            raise InputError("the body's inertia is not symmetric positive definite: give (3, 3) or a diagonal (3,)")
+            raise InputError("RigidBody: the body's inertia is not symmetric positive definite; give (3, 3) or a "
+                             "diagonal (3,)")
         if not np.linalg.norm(self.normal) > 0.0:
-            raise InputError("the plane's normal has length zero: give a direction")
+            raise InputError("RigidBody: the plane's normal has length zero; give a direction")
 
     @property
     def J(self) -> Array:
@@ -114,6 +123,9 @@ class RigidBody:
 
     def after_impact(self, q: Array, v: Array, e: float) -> Array:
         """The impact map: v⁺ (6,)."""
+        owner = "RigidBody.after_impact"
+        q, v = array(owner, "q", q, (7,)), array(owner, "v", v, (6,))
+        number(owner, "e", e, not_negative=True)
         A = self.gradient(q)
         along = np.linalg.solve(self.matrix, A)
         return np.asarray(v - along * (1.0 + e) * (A @ v) / (A @ along))

@@ -20,6 +20,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from ..algebra import Array
+from ..checks import instance
 from ..errors import InputError, StepFailure
 from ..impact import NoImpact
 from ..schemes.midpoint import Midpoint
@@ -48,6 +49,9 @@ class BoundaryLayer(Midpoint):
     """
 
     law: ContactLayer
+
+    def __post_init__(self) -> None:
+        instance("BoundaryLayer", "law", self.law, ContactLayer, "give contact_layer(...)")
 
     def check(self, problem: ContactProblem) -> None:
         """InputError for what the law does not cover."""

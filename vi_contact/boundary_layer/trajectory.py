@@ -10,10 +10,13 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from ..algebra import Array
+from ..checks import array, instance, number, shown, whole
 from ..errors import InputError, StepFailure
 from .layer import Layer
 from .metric import Metric
-from .motion import ConstrainedSystem
+from .motion import ConstrainedSystem, Evaluations, one_sentence
+
+METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")  # of scipy.integrate.solve_ivp
 
 
 @dataclass(frozen=True)
@@ -70,24 +73,42 @@ def layer_motion(
     trajectory for each of its steps, which are large, by its own interpolation.
 
     Raises:
-        InputError: the start is not inside the admissible set (rho > 0), or in the layer while V is not known.
-        StepFailure: the integrator stopped; the message names the time.
+        InputError: the start is not inside the admissible set (rho > 0), or in the layer while V is not known; a
+            function of the system returns no finite numbers there.
+        StepFailure: the integrator stopped, or did not come to an end; the message names the time.
     """
-    q, v = np.array(q0, dtype=float), np.array(v0, dtype=float)
+    owner = "layer_motion"
+    instance(owner, "system", system, ConstrainedSystem, "give one, for example RigidBody(...).system()")
+    instance(owner, "layer", layer, Layer, "give a Layer")
+    instance(owner, "metric", metric, Metric, "give Metric.DOMINANT, FULL, BLENDED or FLAT")
+    q, v = array(owner, "q0", q0, (None,)), array(owner, "v0", v0, (None,))
+    system.check(q, v)
+    _check_options(t_end, contacts, rtol, method, refine)
     rho = float(system.rho(q))
     if not rho > 0.0:
         raise InputError(f"the motion starts at distance rho = {rho:g}, outside the admissible set: start at rho > 0")
-    if not 0.0 < t_end < np.inf:
-        raise InputError(f"t_end is {t_end}: give a positive time in s")
     passages = _Passages(system, layer, metric, {"rtol": rtol, "method": method}, refine)
     inside = rho < layer.width or (rho == layer.width and system.normal_rate(q, v) < 0.0)
     t = 0.0
-    while t < t_end and (contacts is None or len(passages.contacts) < contacts):
-        t, q, v, crossed = passages.run(t, t_end, q, v, inside)
-        inside = not inside
-        if not crossed:
-            break
+    with one_sentence():
+        while t < t_end and (contacts is None or len(passages.contacts) < contacts):
+            t, q, v, crossed = passages.run(t, t_end, q, v, inside)
+            inside = not inside
+            if not crossed:
+                break
     return passages.trajectory()
+
+
+def _check_options(t_end: float, contacts: int | None, rtol: float, method: str, refine: int) -> None:
+    owner = "layer_motion"
+    number(owner, "t_end", t_end, positive=True, unit="s")
+    if contacts is not None:
+        whole(owner, "contacts", contacts, least=1)
+    if number(owner, "rtol", rtol, positive=True) >= 1.0:
+        raise InputError(f"{owner}: rtol is {rtol}; give a relative tolerance below 1")
+    if method not in METHODS:
+        raise InputError(f"{owner}: method is {shown(method)}; give {', '.join(METHODS)}")
+    whole(owner, "refine", refine, least=1, most=10_000)
 
 
 class _Passages:
@@ -103,6 +124,7 @@ class _Passages:
         self._system, self._layer, self._metric = system, layer, metric
         self._options, self._refine = options | {"dense_output": refine > 1}, refine
         self._parts: list[tuple[Array, Array, Array, Array, Array]] = []
+        self._evaluations = Evaluations()
         self.contacts: list[Contact] = []
 
     def run(
@@ -114,12 +136,16 @@ class _Passages:
         width, rtol = layer.width, self._options["rtol"]
 
         def rates(t: float, y: Array) -> Array:
+            self._evaluations.spend(start + t)
             place, speed = q + y[:n], y[n:]
             acceleration, _ = self._acceleration(start + t, place, speed, layer, inside)
             return np.concatenate([system.velocity(place, speed), acceleration])
 
         def edge(t: float, y: Array) -> float:
-            return float(system.rho(q + y[:n])) - width
+            rho = float(system.rho(q + y[:n]))
+            if not np.isfinite(rho):
+                raise StepFailure(f"the distance rho(q) is {rho:g} at t = {start + t:.6g} s: return a finite number")
+            return rho - width
 
         def turn(t: float, y: Array) -> float:
             return system.normal_rate(q + y[:n], y[n:])
@@ -127,6 +153,9 @@ class _Passages:
         edge.terminal, edge.direction = True, 1.0 if inside else -1.0  # type: ignore[attr-defined]
         turn.direction = 1.0  # type: ignore[attr-defined]
         way = width if inside else max(width, float(np.max(np.abs(q))))
+        if not np.all(np.isfinite(rates(0.0, np.r_[np.zeros(n), v]))):
+            raise StepFailure(f"the velocities or accelerations at t = {start:.6g} s are not finite: check what the "
+                              "system's functions return there")
         pace = max(float(np.max(np.abs(v))), layer.speed or 0.0, self._pace(start, q, v, layer, inside))
         atol = rtol * np.r_[np.full(n, way), np.full(len(v), pace)]
         found = solve_ivp(
