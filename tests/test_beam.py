@@ -161,13 +161,15 @@ BAD: dict[str, tuple[Callable[[], object], str]] = {
     "published": (lambda: Elements(10, published_end=True), "reduced_shear=False"),
     "eps": (lambda: RegularisedFriction(0.0), "eps is 0.0; give a finite number above zero"),
     "iterations": (lambda: RegularisedFriction(1e-3, max_iterations=0), "max_iterations is 0"),
-    "dt": (lambda: run(0.0, source.no_force, dt=-1.0, m=4), "dt is -1.0 s; give a positive"),
-    "reading": (lambda: source.reading_c(0.0), "dt is 0.0; give the time step"),
+    "dt": (lambda: run(0.0, source.no_force, dt=-1.0, m=4), "dt is -1.0; give a finite number above zero in s"),
+    "reading": (lambda: source.reading_c(0.0), "dt is 0.0; give a finite number above zero in s"),
     "steps": (lambda: run(0.0, source.no_force, steps=0, m=4), "steps is 0"),
-    "force": (lambda: run(0.0, lambda t: -1.0, m=4), r"normal_force\(0 s\) is -1 N; return"),
-    "mu": (lambda: run(0.0, lambda t: 1.0, m=4, mu=lambda t, rate: np.nan), r"mu\(0 s, 5 m/s\) is nan; return"),
-    "load": (lambda: run(0.0, source.no_force, m=4, load=lambda t: np.inf), r"load\(0 s\) is inf N/m; return"),
-    "start": (lambda: run(0.0, source.no_force, m=4, start=Start(u=lambda x: x[:2])), r"u\(x\) has shape \(2,\)"),
+    "force": (lambda: run(0.0, lambda t: -1.0, m=4), r"force\(0 s\) is -1\.0; give zero or a positive"),
+    "mu": (lambda: run(0.0, lambda t: 1.0, m=4, mu=lambda t, rate: np.nan), r"mu\(0 s, 5 m/s\) is nan; give"),
+    "load": (lambda: run(0.0, source.no_force, m=4, load=lambda t: np.inf), r"load\(0 s\) is inf; give a finite"),
+    "text": (lambda: run(0.0, lambda t: "10", m=4), r"force\(0 s\) is '10'; give zero"),
+    "later": (lambda: run(0.0, lambda t: np.nan if t > 0.1 else 1.0, m=4), r"force\(0\.10\d* s\) is nan"),
+    "start": (lambda: run(0.0, source.no_force, m=4, start=Start(u=lambda x: x[:2])), r"u\(x\).* has shape \(2,\)"),
 }
 
 

@@ -111,8 +111,8 @@ def test_the_command_with_a_rod(tmp_path: Path, capsys: pytest.CaptureFixture[st
 
 BAD = {
     "--reading X": "unknown reading 'X': choose one of none, A, B, C",
-    "--force -3": "normal_force(0 s) is -3 N; return",
-    "--mu -0.1": "mu(0 s, 5 m/s) is -0.1; return",
+    "--force -3": "normal_force(0 s) is -3.0; give",
+    "--mu -0.1": "mu(0 s, 5 m/s) is -0.1; give",
     "--eps 0": "eps is 0.0; give a finite number above zero",
     "--elements 1": "count is 1; give a whole number",
     "--dt 0": "dt is 0 s and t-end 2 s: give 0 < dt <= t-end",

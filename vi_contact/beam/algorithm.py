@@ -20,7 +20,6 @@ One back-substitution per step. Energy: E = ½ wᵀMw + ½ yᵀSy, and (6.5) hol
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -30,6 +29,7 @@ from pathlib import Path
 import numpy as np
 
 from ..algebra import Array, SerialFactor, SerialMatrix
+from ..checks import array, counted, function, instance, number, path, provides, shown, whole
 from ..errors import InputError, StepFailure
 from .elements import BeamMatrices, Elements, beam_matrices
 from .tip import ExactFriction, Slip, TipFriction
@@ -67,12 +67,15 @@ class BeamRun:
         """Newton updates per step."""
         return float(np.mean(self.history["newton"][1:]))
 
-    def save(self, path: str | Path) -> Path:
+    def save(self, target: str | Path) -> Path:
         """The history as CSV, a line per time."""
+        file = path("BeamRun.save", "the path", target)
+        if not file.parent.is_dir():
+            raise InputError(f"BeamRun.save: there is no folder {shown(str(file.parent))}; make it first")
         columns = list(self.history)
         table = np.column_stack([self.history[name] for name in columns])
-        np.savetxt(path, table, fmt="%.17g", delimiter=",", header=",".join(columns), comments="")
-        return Path(path)
+        np.savetxt(file, table, fmt="%.17g", delimiter=",", header=",".join(columns), comments="")
+        return file
 
     def summary(self) -> str:
         """Energies, losses, tip and iterations in a few lines."""
@@ -119,8 +122,16 @@ class BeamStepper:
     load: Callable[[float], float] | None = None
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.dt) and self.dt > 0.0):
-            raise InputError(f"the time step dt is {self.dt!r} s; give a positive number")
+        owner = "BeamStepper"
+        instance(owner, "beam", self.beam, TimoshenkoBeam, "give a TimoshenkoBeam")
+        instance(owner, "elements", self.elements, Elements, "give Elements(count)")
+        number(owner, "the time step dt", self.dt, positive=True, unit="s")
+        function(owner, "normal_force", self.normal_force, "give a function of t that returns |r_N| in N")
+        function(owner, "mu", self.mu, "give a function of (t, slip rate)")
+        provides(owner, "friction", self.friction, ("solve",), "give ExactFriction() or RegularisedFriction(eps)",
+                 lacks=("limit",))
+        if self.load is not None:
+            function(owner, "load", self.load, "give a function of t in N/m, or None")
 
     @cached_property
     def matrices(self) -> BeamMatrices:
@@ -130,6 +141,8 @@ class BeamStepper:
     def steps(self, y: Array, w: Array) -> Iterator[BeamStep]:
         """Endless, from y, w at t = 0. InputError for a bad force or coefficient; StepFailure with the number of the
         step and its time."""
+        unknowns = (2 * self.elements.count,)
+        y, w = array("BeamStepper", "y", y, unknowns), array("BeamStepper", "w", w, unknowns)
         M, S, dt = self.matrices.M, self.matrices.S, self.dt
         P = ((2.0 / dt**2) * M + (self.beam.viscosity / dt + 0.5) * S).tocsr()
         T = SerialFactor(SerialMatrix(P[:-1, :-1]))
@@ -148,19 +161,17 @@ class BeamStepper:
                 raise StepFailure(f"step {k + 1}, t = {t + dt:.6g} s: {failure}") from None
             increment = np.append(free - slip.s * column, slip.s)
             y, w = y + increment, (2.0 / dt) * increment - w
+            if not (np.all(np.isfinite(y)) and np.all(np.isfinite(w))):
+                raise StepFailure(f"step {k + 1}, t = {t + dt:.6g} s: the beam's motion is no finite number; check the "
+                                  "loads and the state at the start")
             yield BeamStep((k + 1) * dt, y, w, increment, slip, N, mu, f)
 
     def _given(self, t: float, rate: float) -> tuple[float, float, float]:
         """(|r_N|, mu, load) at a time, checked."""
-        N, mu = float(self.normal_force(t)), float(self.mu(t, rate))
-        f = 0.0 if self.load is None else float(self.load(t))
-        if not (math.isfinite(N) and N >= 0.0):
-            raise InputError(f"normal_force({t:.6g} s) is {N:g} N; return |r_N|, zero or a positive finite number")
-        if not (math.isfinite(mu) and mu >= 0.0):
-            raise InputError(f"mu({t:.6g} s, {rate:.6g} m/s) is {mu:g}; return zero or a positive finite number")
-        if not math.isfinite(f):
-            raise InputError(f"load({t:.6g} s) is {f:g} N/m; return a finite number")
-        return N, mu, f
+        owner, at = "BeamStepper", f"({t:.6g} s)"
+        N = number(owner, f"normal_force{at}", self.normal_force(t), not_negative=True, unit="N")
+        mu = number(owner, f"mu({t:.6g} s, {rate:.6g} m/s)", self.mu(t, rate), not_negative=True)
+        return N, mu, 0.0 if self.load is None else number(owner, f"load{at}", self.load(t), unit="N/m")
 
 
 def run_beam(stepper: BeamStepper, start: Start, *, steps: int, every: int = 0) -> BeamRun:
@@ -168,8 +179,11 @@ def run_beam(stepper: BeamStepper, start: Start, *, steps: int, every: int = 0) 
 
     Raises InputError for bad numbers and StepFailure, with step and time, where the tip's equation is not solved.
     """
-    if steps < 1 or every < 0:
-        raise InputError(f"run_beam: steps is {steps} and every {every}; give steps >= 1 and every >= 0")
+    instance("run_beam", "stepper", stepper, BeamStepper, "give BeamStepper(...)")
+    instance("run_beam", "start", start, Start, "give Start(...)")
+    steps, every = whole("run_beam", "steps", steps, least=1), whole("run_beam", "every", every)
+    kept = len(_Ledger.NAMES) * steps + (4 * stepper.elements.count * (steps // every) if every else 0)
+    counted("run_beam", f"a run of {steps} steps", kept, "numbers to keep")
     x = stepper.elements.nodes(stepper.beam.length)
     y = np.concatenate([start.at("theta", x), start.at("u", x)])
     w = np.concatenate([start.at("omega", x), start.at("v", x)])
@@ -214,6 +228,9 @@ class _Ledger:
         self._sums += step.load * float(matrices.load @ step.increment), damping, slip.force * slip.s
         kinetic, strain = self._energies(step.y, step.w)
         work, viscous, friction = self._sums
+        if not np.isfinite(kinetic + strain + work):
+            raise StepFailure(f"t = {step.t:.6g} s: the energy of the beam is no finite number; check the loads and "
+                              "the state at the start")
         defect = kinetic + strain - self._start - (work - viscous - friction)
         self._rows.append((
             step.t, step.y[-1], step.w[-1], slip.force, slip.s, step.normal_force, step.mu, slip.updates, kinetic,

@@ -24,6 +24,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..algebra import Array, SerialAlgebra, SerialComm, SerialMatrix
+from ..checks import function, instance, number, provides
 from ..errors import InputError
 from ..friction import FrictionLaw, Frictionless
 from ..mass import ConsistentMass
@@ -39,6 +40,7 @@ History = Callable[[float], float]
 
 def rod_problem(rod: Rod, elements: Elements, start: Start | None = None) -> ContactProblem:
     """The rod before its wall (2.1)-(2.5). ``start``: u and v along the axis; at rest when None."""
+    _check("rod_problem", elements, start, rod=rod)
     x = elements.nodes(rod.length)
     start = start or Start()
     return _problem(x, _Part.of_rod(rod, elements, start), None, rod.gap, Frictionless())
@@ -53,9 +55,12 @@ def beam_problem(
     ``friction``: Coulomb or SlipRateCoulomb. Schemes take the force where they take loads: ``Midpoint`` at t + dt/2,
     Algorithm 10 at t. ``load``: uniform, across [N/m].
     """
+    _check("beam_problem", elements, start, beam=beam, friction=friction)
+    function("beam_problem", "normal_force", normal_force, "give a function of t that returns |r_N| >= 0 in N")
+    _check_load("beam_problem", load)
     x = elements.nodes(beam.length)
     mass = sp.csr_matrix([[beam.rho * beam.area * beam.length]])
-    push, rest = ((np.ones(1), normal_force),), np.zeros(1)
+    push, rest = ((np.ones(1), _given("normal_force", normal_force, "N")),), np.zeros(1)
     point = _Part(mass, None, sp.csr_matrix((1, 1)), push, rest, rest, inertia=mass @ np.ones(1))
     return _problem(x, point, _Part.of_beam(beam, elements, start or Start(), load), 0.0, friction)
 
@@ -65,6 +70,9 @@ def rubbing_problem(
     start: Start | None = None, load: History | None = None,
 ) -> ContactProblem:
     """Rod and beam of the same length: the beam rubs with the rod's contact force. InputError for other lengths."""
+    for one in (start, rod_start):
+        _check("rubbing_problem", elements, one, rod=rod, beam=beam, friction=friction)
+    _check_load("rubbing_problem", load)
     if rod.length != beam.length:
         raise InputError(
             f"the rod is {rod.length:g} m long and the beam {beam.length:g} m: they are one body, give one length"
@@ -91,8 +99,8 @@ class _Part:
         M, K, uniform = rod_matrices(rod, elements.count)
         tip = np.zeros_like(x)
         tip[-1] = 1.0
-        given = ((uniform, rod.body_force), (tip, rod.end_force))
-        loads = tuple((vector, history) for vector, history in given if history is not None)
+        given = ((uniform, "body_force", rod.body_force, "N/m"), (tip, "end_force", rod.end_force, "N"))
+        loads = tuple((vector, _given(name, history, unit)) for vector, name, history, unit in given if history)
         inertia = rod.rho * rod.area * uniform
         damper = rod.viscosity * K if rod.viscosity else None
         return cls(M, damper, K, loads, start.at("u", x), start.at("v", x), inertia)
@@ -102,10 +110,33 @@ class _Part:
         x, found = elements.nodes(beam.length), beam_matrices(beam, elements)
         y = np.concatenate([start.at("theta", x), start.at("u", x)])
         w = np.concatenate([start.at("omega", x), start.at("v", x)])
-        loads = () if load is None else ((found.load, load),)
+        loads = () if load is None else ((found.load, _given("load", load, "N/m")),)
         inertia = beam.rho * beam.area * found.load
         damper = beam.viscosity * found.S if beam.viscosity else None
         return cls(found.M, damper, found.S, loads, y, w, inertia)
+
+
+def _given(name: str, history: History, unit: str) -> History:
+    """The function; InputError, naming the time, where it returns no finite number, or a negative normal force."""
+    pressing = name == "normal_force"
+    return lambda t: number("beam", f"{name}({t:.6g} s)", history(t), not_negative=pressing, unit=unit)
+
+
+def _check(owner: str, elements: Elements, start: Start | None, **given: Any) -> None:
+    """InputError for what is no element count, start, rod, beam or friction law."""
+    instance(owner, "elements", elements, Elements, "give Elements(count)")
+    if start is not None:
+        instance(owner, "start", start, Start, "give Start(...), or None")
+    for name, kind in (("rod", Rod), ("beam", TimoshenkoBeam)):
+        if name in given:
+            instance(owner, name, given[name], kind, f"give a {kind.__name__}")
+    if "friction" in given:
+        provides(owner, "friction", given["friction"], ("limit", "slope", "at"), "give a law, for example Coulomb(mu)")
+
+
+def _check_load(owner: str, load: History | None) -> None:
+    if load is not None:
+        function(owner, "load", load, "give a function of t in N/m, or None")
 
 
 def _problem(x: Array, along: _Part, across: _Part | None, gap: float, friction: FrictionLaw) -> ContactProblem:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from ..checks import array, number, whole
 from ..errors import InputError
 from ..march import march
 from ..schemes.midpoint import Midpoint
@@ -26,7 +27,12 @@ class StepForces:
     dt: float
     forces: tuple[float, ...]
 
+    def __post_init__(self) -> None:
+        number("StepForces", "dt", self.dt, positive=True, unit="s")
+        array("StepForces", "forces", self.forces, (None,), unit="N")
+
     def __call__(self, t: float) -> float:
+        number("StepForces", "t", t, unit="s")
         step = math.floor(t / self.dt + 1e-6)
         if not 0 <= step < len(self.forces):
             end = len(self.forces) * self.dt
@@ -38,6 +44,8 @@ def rod_forces(
     rod: Rod, elements: Elements, *, dt: float, steps: int, start: Start | None = None, scheme: Scheme | None = None
 ) -> StepForces:
     """|r_N| of every step of the rod [N]. ``scheme``: Midpoint(), the source's, when None."""
+    dt = number("rod_forces", "dt", dt, positive=True, unit="s")
+    steps = whole("rod_forces", "steps", steps, least=1)
     problem = rod_problem(rod, elements, start)
     run = march(problem, scheme=scheme or Midpoint(), dt=dt, steps=steps)
     return StepForces(dt, tuple(float(state.r_n[0]) for state, _ in run))

@@ -22,9 +22,11 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..algebra import Array
+from ..checks import counted, flag, number, whole
 from ..errors import InputError
 from .values import Rod, TimoshenkoBeam
 
+MOST = 5_000_000  # elements
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(4)  # exact to degree 7: squares of cubics
 S, W = 0.5 * (_POINTS + 1.0), 0.5 * _WEIGHTS
 
@@ -42,14 +44,15 @@ class Elements:
     published_end: bool = False
 
     def __post_init__(self) -> None:
-        if not isinstance(self.count, (int, np.integer)) or isinstance(self.count, bool) or self.count < 2:
-            raise InputError(f"Elements: count is {self.count!r}; give a whole number of elements from 2 on")
+        counted("Elements", "count", whole("Elements", "count", self.count, least=2), "elements", most=MOST)
+        for name in ("reduced_shear", "published_end"):
+            flag("Elements", name, getattr(self, name))
         if self.published_end and self.reduced_shear:
             raise InputError("Elements: the published end function goes with reduced_shear=False, as in the source")
 
     def nodes(self, length: float) -> Array:
         """Positions of the unknowns: all nodes but the clamped one, shape (count,) [m]."""
-        return np.linspace(0.0, length, self.count + 1)[1:]
+        return np.linspace(0.0, number("Elements.nodes", "length", length, positive=True, unit="m"), self.count + 1)[1:]
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ..errors import InputError
+from ..checks import number
 from .elements import Elements
 from .tip import RegularisedFriction
 from .values import Start, TimoshenkoBeam
@@ -34,8 +34,7 @@ def reading_b(t: float) -> float:
 
 def reading_c(dt: float = DT) -> Force:
     """The function 10⁵/100^(t/dt) [N]: a hundredth in every step of dt [s]. InputError unless dt > 0."""
-    if not dt > 0.0:
-        raise InputError(f"reading_c: dt is {dt!r}; give the time step in seconds, above zero")
+    number("reading_c", "dt", dt, positive=True, unit="s")
     return lambda t: float(FORCE * 100.0 ** -(t / dt))
 
 

@@ -15,8 +15,8 @@ import math
 from dataclasses import dataclass
 from typing import Protocol
 
-from ..checks import attributes
-from ..errors import InputError, StepFailure
+from ..checks import attributes, flag, whole
+from ..errors import StepFailure
 
 
 @dataclass(frozen=True)
@@ -66,8 +66,8 @@ class RegularisedFriction:
         attributes(self, positive=("eps", "tolerance"))
         if self.absolute is not None:
             attributes(self, positive=("absolute",))
-        if self.max_iterations < 1:
-            raise InputError(f"RegularisedFriction: max_iterations is {self.max_iterations}; give a number from 1 on")
+        whole("RegularisedFriction", "max_iterations", self.max_iterations, least=1)
+        flag("RegularisedFriction", "safeguard", self.safeguard)
 
     def solve(self, c: float, g: float, limit: float) -> Slip:
         """The zero of F. StepFailure when max_iterations updates do not reach the tolerance."""

@@ -8,8 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..algebra import Array
-from ..checks import attributes
-from ..errors import InputError
+from ..checks import array, attributes, function
 
 Profile = Callable[[Array], Array]
 
@@ -71,8 +70,8 @@ class Rod:
     def __post_init__(self) -> None:
         attributes(self, positive=("length", "rho", "area", "E"), not_negative=("viscosity", "gap"))
         for name in ("body_force", "end_force"):
-            if getattr(self, name) is not None and not callable(getattr(self, name)):
-                raise InputError(f"Rod: {name} is {getattr(self, name)!r}; give a function of the time, or None")
+            if getattr(self, name) is not None:
+                function("Rod", name, getattr(self, name), "give a function of the time, or None")
 
 
 def _zero(x: Array) -> Array:
@@ -88,9 +87,12 @@ class Start:
     theta: Profile = field(default=_zero)
     omega: Profile = field(default=_zero)
 
+    def __post_init__(self) -> None:
+        for name in ("u", "v", "theta", "omega"):
+            function("Start", name, getattr(self, name), "give a function of the positions x")
+
     def at(self, name: str, x: Array) -> Array:
         """One of the four at the nodes; InputError unless it gives finite numbers, one per node or one for all."""
-        values = np.asarray(getattr(self, name)(x), dtype=float)
-        if values.shape not in ((), x.shape) or not np.all(np.isfinite(values)):
-            raise InputError(f"Start: {name}(x) has shape {values.shape} or is not finite; return a number per node")
-        return np.broadcast_to(values, x.shape).copy()
+        values = getattr(self, name)(x)
+        shape = () if np.ndim(values) == 0 else x.shape
+        return np.broadcast_to(array("Start", f"what {name}(x) returns", values, shape), x.shape).copy()
