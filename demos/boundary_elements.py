@@ -28,7 +28,7 @@ import vi_contact as vc
 from vi_contact import bem
 from vi_contact.models import disk, embedded, square
 from vi_contact.models.boundary_elements import disk_contact, disk_problem, embedded_problem, square_problem
-from vi_contact.plotting_boundary import Curve, Panel, Shot, plot_boundary_snapshots, plot_panels
+from vi_contact.plotting_boundary import SHEAR, Curve, Panel, Shot, plot_boundary_snapshots, plot_panels
 
 # Parameters ----------------------------------------------------------------------------------------------------------
 ELEMENTS = {"square": 20, "steel": 10, "concrete": 10, "ball": 80}  # along a side, around the ball
@@ -224,18 +224,20 @@ def points_inside(mesh: bem.BoundaryMesh, spacing: float = 0.2) -> np.ndarray:
 
 
 def tractions(name: str, law: str, answer: Answer, times: Sequence[float]) -> tuple[Panel, Panel]:
-    """Pressure and shear of the support over x at some times."""
+    """Pressure, and shear of the support on the body along +x, over x at some times: reactions turned round."""
     run, order = answer.run, np.argsort(answer.x)
     here = np.argsort(run.contact.compliance.points[:, 0])
     x = run.contact.compliance.points[here, 0]
     panels = []
-    for quantity, mine, theirs in (("pressure", run.pressure, "pressure"), ("shear", run.shear, "traction_t")):
+    for quantity, sign, mine, theirs in (("pressure", 1.0, run.pressure, "pressure"),
+                                         (SHEAR, -1.0, run.shear, "traction_t")):
         curves = []
         for t, colour in zip(times, ("black", "tab:orange", "tab:green"), strict=True):
             k = int(np.argmin(np.abs(run.times - t)))
             moment = f"t = {1e3 * t:g} ms" if T_END[name] < 1.0 else f"t = {t:g} s"
-            curves.append(Curve(moment, x, mine[k, here], colour))
-            curves.append(Curve("", answer.x[order], answer.fem_mean(theirs, run.times[k])[order], colour, marked=True))
+            dots = answer.fem_mean(theirs, run.times[k])[order]
+            curves.append(Curve(moment, x, sign * mine[k, here], colour))
+            curves.append(Curve("", answer.x[order], sign * dots, colour, marked=True))
         panels.append(Panel(f"{TITLES[name]}, {law}", quantity, "Pa", tuple(curves), "x [m]"))
     return panels[0], panels[1]
 

@@ -39,6 +39,9 @@ class Curve:
     marked: bool = False
 
 
+SHEAR = "shear on the body, along +x"  # the sign of all pictures of contact tractions
+
+
 @dataclass(frozen=True)
 class Panel:
     """Curves of one quantity with its unit; x: label of the abscissa."""

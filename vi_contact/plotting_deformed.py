@@ -179,7 +179,10 @@ def _draw_support(axis: Any, height: float, size: float) -> None:
 def plot_tractions(
     folders: Mapping[str, str | Path], times: Sequence[float], path: str | Path, *, title: str
 ) -> Path:
-    """Contact pressure p_n and shear traction p_t on the body over x: a column per run, a curve per time [s]."""
+    """Contact pressure p_n and shear traction p_t over x: a column per run, a curve per time [s].
+
+    The shear is that of the support on the body and positive along +x, as in the pictures of boundary elements.
+    """
     import matplotlib
     from matplotlib.figure import Figure
 
@@ -194,12 +197,13 @@ def plot_tractions(
     for column, (name, tractions) in zip(axes.T, runs.items(), strict=True):
         x, order = tractions.points[:, 0], np.argsort(tractions.points[:, 0])
         for t, colour in zip(times, colours, strict=True):
-            for axis, values in zip(column, tractions.at(t), strict=True):
+            pressure, shear = tractions.at(t)
+            for axis, values in zip(column, (pressure, shear * np.sign(tractions.tangents[:, 0])), strict=True):
                 axis.plot(x[order], factor * values[order], ".-", ms=3, lw=0.9, color=colour, label=_moment(t))
         column[0].set_title(name, fontsize=10)
         column[1].set_xlabel("x [m]")
     axes[0, 0].set_ylabel(f"pressure $p_n$ [{unit}]")
-    axes[1, 0].set_ylabel(f"shear traction $p_t$ [{unit}]")
+    axes[1, 0].set_ylabel(f"shear $p_t$ on the body, along +x [{unit}]")
     axes[0, -1].legend(fontsize=8)
     figure.suptitle(title)
     return _save(figure, path)
