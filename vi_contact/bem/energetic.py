@@ -149,7 +149,7 @@ class Marching:
         if prescribed is not None:
             array("Marching", "prescribed", prescribed, forces.shape, unit="m")
         if steps > self.blocks.steps:
-            raise InputError(f"boundary elements: loads for {steps} steps, but the operator has {self.blocks.steps}; "
+            raise InputError(f"boundary elements: forces for {steps} steps, but the operator has {self.blocks.steps}; "
                              "assemble it with more steps")
         u, p = np.zeros((steps, unknowns, count)), np.empty((steps, 2 * unknowns, count))
         total, before = forces.copy(), np.zeros((unknowns, count))

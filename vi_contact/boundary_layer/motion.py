@@ -62,6 +62,8 @@ class ConstrainedSystem:
     def check(self, q: Array, v: Array, t: float = 0.0) -> None:
         """InputError for functions that return, at this state, other shapes, texts, NaN or infinity."""
         owner, n = "ConstrainedSystem", len(v)
+        if self.rates is None and len(q) != n:
+            raise InputError(f"{owner}: {len(q)} coordinates and {n} velocities; give as many, or rates(q, v)")
         number(owner, "rho(q) at the start", self.rho(q))
         array(owner, "gradient(q) at the start", self.gradient(q), (n,))
         if callable(self.mass):
@@ -69,8 +71,6 @@ class ConstrainedSystem:
         if self.matrix(q).shape != (n, n):
             raise InputError(f"{owner}: the mass matrix has shape {self.matrix(q).shape} and there are {n} velocities; "
                              "give one row for each")
-        if self.rates is None and len(q) != n:
-            raise InputError(f"{owner}: {len(q)} coordinates and {n} velocities; give as many, or rates(q, v)")
         if self.force is not None:
             array(owner, "force(t, q, v) at the start", self.force(t, q, v), (n,))
         if self.rates is not None:

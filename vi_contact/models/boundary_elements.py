@@ -17,6 +17,8 @@ from ..bem.energetic import energetic_blocks
 from ..bem.loads import traction_forces
 from ..bem.poincare_steklov import BoundaryProblem, PoincareSteklov
 from ..bem.two_bodies import TwoBodies
+from ..checks import function, instance, number, whole
+from ..errors import InputError
 from ..friction import FrictionLaw, Frictionless
 from ..materials import LinearElastic
 from ..surfaces import HalfSpace
@@ -32,6 +34,8 @@ def steklov(mesh: BoundaryMesh, material: LinearElastic, *, dt: float, steps: in
 
 def pressed(operator: PoincareSteklov, *, pressure: Load, top: int, contact: Mask, **more: Any) -> BoundaryProblem:
     """Pressure [Pa] at time t on the elements labelled ``top``; contact: mask of elements; more: fixed, prescribed."""
+    instance("pressed", "operator", operator, PoincareSteklov, "give steklov(...)")
+    function("pressed", "pressure", pressure, "give a function of the time in Pa")
     blocks, mesh = operator.blocks, operator.mesh
 
     def traction(points: Array, normals: Array, t: float) -> Array:
@@ -43,6 +47,7 @@ def pressed(operator: PoincareSteklov, *, pressure: Load, top: int, contact: Mas
 
 def unloaded(operator: PoincareSteklov, *, contact: Mask, **more: Any) -> BoundaryProblem:
     """A body that is moved by contact or supports only."""
+    instance("unloaded", "operator", operator, PoincareSteklov, "give steklov(...)")
     loads = np.zeros((operator.blocks.steps, 2, len(operator.mesh)))
     return BoundaryProblem(operator, loads, contact=contact, **more)
 
@@ -57,14 +62,15 @@ def square_problem(
     side: float = 1.0,
 ) -> BoundaryProblem:
     """[-a/2, a/2]² of ``elements`` per side, pressed on its top; its bottom may come into contact (V7.1, V7.2)."""
-    a = 0.5 * side
-    mesh = polygon([(-a, -a), (a, -a), (a, a), (-a, a)], side / elements)
+    a, h = _halves("square_problem", side, elements)
+    mesh = polygon([(-a, -a), (a, -a), (a, a), (-a, a)], h)
     operator = steklov(mesh, material, dt=dt, steps=steps)
     return pressed(operator, pressure=pressure, top=TOP, contact=mesh.labels == BOTTOM)
 
 
 def disk_problem(elements: int, material: LinearElastic, *, dt: float, steps: int, radius: float) -> BoundaryProblem:
     """A disk around (0, radius) of ``elements`` chords; its foot, 60° to each side, may come into contact (V7.3)."""
+    number("disk_problem", "radius", radius, positive=True, unit="m")
     mesh = circle(radius, elements, centre=(0.0, radius))
     foot = mesh.elements_where(lambda points: points[:, 1] <= radius * (1.0 - 0.5) * (1.0 + 1e-9))
     return unloaded(steklov(mesh, material, dt=dt, steps=steps), contact=foot)
@@ -72,8 +78,18 @@ def disk_problem(elements: int, material: LinearElastic, *, dt: float, steps: in
 
 def disk_contact(problem: BoundaryProblem, push: Load, friction: FrictionLaw | None = None) -> BoundaryContact:
     """The disk on the plane y = push(t)."""
+    instance("disk_contact", "problem", problem, BoundaryProblem, "give disk_problem(...)")
+    function("disk_contact", "push", push, "give a function of the time in m")
     plane = HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))
     return BoundaryContact(problem.condensed(), obstacle=plane, friction=friction or Frictionless(), towards=push)
+
+
+def _halves(owner: str, side: float, elements: int, *, multiple: int = 1) -> tuple[float, float]:
+    """Half a side [m] and the length of an element; InputError unless its elements are such a multiple."""
+    length, count = number(owner, "side", side, positive=True, unit="m"), whole(owner, "elements", elements, least=1)
+    if count % multiple:
+        raise InputError(f"{owner}: elements is {count}; give an even number, half of them are in the notch")
+    return 0.5 * length, length / count
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +111,7 @@ def embedded_problem(
     elements: int, material: LinearElastic, *, dt: float, steps: int, pressure: Load, side: float = 1.0
 ) -> EmbeddedBox:
     """``elements``, an even number, along a side of the box."""
-    a, h = 0.5 * side, side / elements
+    a, h = _halves("embedded_problem", side, elements, multiple=2)
     box = polygon([(-a, -a), (a, -a), (a, a), (-a, a)], h)
     corners = [(-3, -4), (3, -4), (3, 0), (1, 0), (1, -1), (-1, -1), (-1, 0), (-3, 0)]
     block = polygon(a * np.array(corners, float), h)

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..errors import InputError
+from ..checks import attributes, function, instance
 from ..fem.assembly import assemble
 from ..fem.mesh import build_mesh
 from ..fem.trace import contact_surface
@@ -35,8 +35,7 @@ class Push:
     rise: float = 1.0
 
     def __post_init__(self) -> None:
-        if not (0.0 < self.height < math.inf and 0.0 < self.rise < math.inf):
-            raise InputError(f"{self}: give a positive height in metres and a positive rise in seconds")
+        attributes(self, positive=("height", "rise"))
 
     def __call__(self, t: float) -> float:
         """[m]"""
@@ -51,6 +50,11 @@ class Disk:
     size: float = 0.04
     material: LinearElastic = field(default_factory=lambda: LinearElastic.from_wave_speeds(2.0, 1.0, 1.0))
     push: Push = field(default_factory=Push)
+
+    def __post_init__(self) -> None:
+        attributes(self, positive=("radius", "size"))
+        instance("Disk", "material", self.material, LinearElastic, "give a LinearElastic")
+        function("Disk", "push", self.push, "give a Push(...), or a function of the time")
 
     @property
     def time_step(self) -> float:

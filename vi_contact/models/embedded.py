@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
+from ..checks import instance
 from ..errors import InputError
 from ..fem.assembly import assemble
 from ..fem.joined import together
@@ -48,10 +49,14 @@ class Embedded:
     block: LinearElastic | None = None
 
     def __post_init__(self) -> None:
+        instance("Embedded", "box", self.box, Square, "give a Square, for example concrete(cells=10)")
+        if self.block is not None:
+            instance("Embedded", "block", self.block, LinearElastic, "give a LinearElastic, or None")
         if self.box.cells % 2:
-            raise InputError(f"embedded box of {self.box.cells} cells per side: give an even number, half are in it")
+            raise InputError(f"Embedded: box of {self.box.cells} cells per side: give an even number, half are in it")
         if self.box.confined:
-            raise InputError("embedded box on rollers: give a box with confined=False, the notch is what confines it")
+            raise InputError("Embedded: the box is on rollers; give a box with confined=False, the notch is what "
+                             "confines it")
 
     def blocks(self) -> Blocks:
         """Sub-meshes: "foot" and "head" of the box, "left", "right", "under" (the notch), "left_wall" and

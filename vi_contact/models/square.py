@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..errors import InputError
+from ..checks import attributes, function, instance
 from ..fem.assembly import assemble
 from ..fem.loads import Prescribed, Traction
 from ..fem.mesh import build_mesh
@@ -39,8 +39,10 @@ class Square:
     confined: bool = False
 
     def __post_init__(self) -> None:
-        if self.cells < 1:
-            raise InputError(f"Square of {self.cells!r} cells per side: give a whole number, at least 1")
+        attributes(self, positive=("side",), finite=("pressure",), counts=("cells",), flags=("confined",))
+        instance("Square", "material", self.material, LinearElastic, "give a LinearElastic")
+        if self.history is not None:
+            function("Square", "history", self.history, "give a function of the time, or None")
 
     @property
     def time_step(self) -> float:
