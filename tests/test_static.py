@@ -107,7 +107,7 @@ def test_v2_1_standing_column_presses_uniformly(gap, solver):
     y = points[:, 1]
     sag = 2400.0 * G * (3.0 * y - y**2 / 2.0) / 2.0e10
     assert np.abs(u[:, 1] + gap + sag).max() < 1e-9 * (sag.max() + gap)
-    assert np.abs(u[:, 0] - 2.0e-4).max() < 1e-8 * (2.0e-4 + gap)  # round-off of a matrix that is almost singular
+    assert np.abs(u[:, 0] - 2.0e-4).max() < 1e-9 * (2.0e-4 + gap)
 
 
 @pytest.mark.parametrize(
@@ -138,7 +138,7 @@ def test_reactions_carry_the_weight(shape):
 
 def test_free_motions_keep_their_place():
     """On level ground nothing drives a block sideways: the M-weighted mean of u_x and, in 3D, of the spin stay zero
-    but for rounding, which a mode without stiffness sees magnified by K / eps M = 1e6 in every iteration."""
+    but for rounding, which a mode without stiffness sees magnified by that of the springs, 1e-4 of K."""
     for shape in ({}, {"lengths": (1.0, 1.5, 0.7), "divisions": (3, 4, 2)}):
         problem = standing(**shape)
         state = static_equilibrium(problem, solver=Condensed())
@@ -148,14 +148,12 @@ def test_free_motions_keep_their_place():
             motions.append(system.space.restrict(np.column_stack([points[:, 2], 0.0 * points[:, 0], -points[:, 0]])))
         size = system.algebra.dot(motions[0], system.M @ np.abs(state.u))
         for motion in motions:
-            assert abs(system.algebra.dot(motion, system.M @ state.u)) < 1e-8 * size
+            assert abs(system.algebra.dot(motion, system.M @ state.u)) < 1e-9 * size
 
 
 @pytest.mark.parametrize("push", [0.0, 5.0e3, -9.0e3])
 def test_two_corners_share_the_weight_like_a_beam(push):
-    """Only the base corners touch (u_x held at the base): r = W/2 ± T H / L, T = push · L on the top at height H.
-
-    Round-off of K u under the free rotation is 1e-10 of the weight on some machines' BLAS: 1e-9, as the certificate."""
+    """Only the base corners touch (u_x held at the base): r = W/2 ± T H / L, T = push · L on the top at height H."""
     problem = standing(points=[(0.0, 0.0), (1.0, 0.0)], held=True, push=push)
     state = static_equilibrium(problem, solver=Condensed())
     weight, moment = 2400.0 * G * 3.0, push * 3.0

@@ -161,12 +161,12 @@ def shear_error(found: Contact, share: float) -> float:
 
 
 def check_first_loading(found: Contact, share: float, h: float = H) -> None:
-    """c to h on both sides, slip along Q on both rings, Σ r_t = Q and Σ r_n = P to 5e-8 (asked: 1e-6)."""
+    """c to h on both sides, slip along Q on both rings, Σ r_t = Q and Σ r_n = P to 1e-9 (asked: 1e-6)."""
     stick, slip, c = found.sticking(), found.slips(1.0), A * np.sqrt(1.0 - share)
     assert abs(stick[0] + c) < h and abs(stick[-1] - c) < h
     assert len(stick) + len(slip) == np.sum(found.r_n > 0.0) and slip[0] < stick[0] and slip[-1] > stick[-1]
-    assert found.r_t.sum() == pytest.approx(share * MU * HERTZ.force, rel=5e-8)
-    assert found.r_n.sum() == pytest.approx(HERTZ.force, rel=5e-8)
+    assert found.r_t.sum() == pytest.approx(share * MU * HERTZ.force, rel=1e-9)
+    assert found.r_n.sum() == pytest.approx(HERTZ.force, rel=1e-9)
 
 
 SHARES = (0.25, 0.5, 0.75, 0.9)
