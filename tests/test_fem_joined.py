@@ -86,13 +86,19 @@ def test_two_pairs_and_an_obstacle(d):
     assert problem.equations.strain_energy(x) == pytest.approx(same.equations.strain_energy(u), rel=1e-11)
 
 
-@pytest.mark.parametrize("angle", [0.0, 0.4])
+def leaning(x: Array) -> Array:
+    """No two sides at right angles."""
+    lean = np.array([[1.0, 0.2, 0.1], [0.35, 1.0, -0.25], [-0.15, 0.3, 1.0]])
+    return np.asarray(x @ lean[: x.shape[1], : x.shape[1]])
+
+
+@pytest.mark.parametrize("shape", [0.0, 0.4, leaning], ids=["straight", "turned", "leaning"])
 @pytest.mark.parametrize("d", [2, 3])
-def test_corners(d, angle):
+def test_corners(d, shape):
     """A block in the corner between another block and a wall (in space: two walls): its corner nodes have two (three)
-    conditions, each exact; T stays orthogonal; they rub along the edge only. The walls also touch the lower block:
-    nodes of side 2 with a turned frame of their own."""
-    mesh = blocks(d, angle=angle)
+    conditions, each exact; T stays orthogonal, unless the sides lean; they rub along the edge only. The walls also
+    touch the lower block: nodes of side 2 with a turned frame of their own."""
+    mesh = blocks(d, deform=shape) if callable(shape) else blocks(d, angle=shape)
     system, tags = two_blocks(COMM, mesh)
     sides = ["left", "back"][: d - 1]
     walls = [contact_surface(system, tags[f"{body}_{side}"]) for side in sides for body in ("upper", "lower")]
@@ -108,7 +114,7 @@ def test_corners(d, angle):
     assert surface.normal_values(x) == pytest.approx(np.concatenate(expected), abs=1e-12)
     if surface.basis is not None:
         T = dense(COMM, system, surface.basis)
-        assert np.abs(T.T @ T - np.eye(len(T))).max() < 1e-14
+        assert (np.abs(T.T @ T - np.eye(len(T))).max() < 1e-14) == (shape is not leaning) == (surface.dual is None)
     places = np.round(surface.points, 9) + 0.0
     body = np.repeat([1, *[1, 0] * len(sides)], [pair.count, *(wall.count for wall in walls)])
     _, place, count = np.unique(np.column_stack([places, body]), axis=0, return_inverse=True, return_counts=True)
