@@ -23,6 +23,7 @@ from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.simulate import Solution, simulate
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.hildreth import Hildreth
+from vi_contact.static import static_equilibrium
 from vi_contact.step import ContactProblem, EffectiveMatrix, Report, State, StepProblem, StepResult
 from vi_contact.surfaces import ContactSurface
 
@@ -289,3 +290,19 @@ def test_histories_return_one_number(value: Any) -> None:
     shaken = chain_problem(5, excitation=Late(1.0, 1.0, direction=(1.0,)), consistent=True)
     with pytest.raises(InputError, match=r"the history of a load or excitation is .* at t = 0.01.* return one real"):
         simulate(shaken, dt=DT, steps=9, progress=False)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"problem": "chain"}, "static_equilibrium: problem is 'chain'; give a ContactProblem"),
+        ({"solver": "condensed"}, "static_equilibrium: solver is 'condensed'; give a solver, such as"),
+        ({"solver": Condensed}, "make an object of it"),
+        ({"tolerance": np.nan}, "static_equilibrium: tolerance is nan; give a relative residual"),
+        ({"t": np.nan}, "static_equilibrium: t is nan; give a finite number in s"),
+        ({"t": "0"}, "static_equilibrium: t is '0'"),
+    ],
+)
+def test_arguments_of_a_static_stage(arguments: dict[str, Any], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        static_equilibrium(**({"problem": problem()} | arguments))

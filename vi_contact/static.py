@@ -7,8 +7,10 @@ from collections.abc import Callable
 import numpy as np
 
 from .certified import TOLERANCE, CertifiedSolver, refuse_nan
+from .checks import number
 from .errors import InputError
 from .proximal import Proximal
+from .run_checks import check_methods, check_problem_given
 from .solvers.condensed import Condensed
 from .step import ContactProblem, EffectiveMatrix, Solver, State, StepProblem, StepResult
 
@@ -42,6 +44,10 @@ def static_equilibrium(
         InputError: the loads drive a rigid motion that nothing stops: there is no equilibrium.
         StepFailure: no answer below the certificate tolerance.
     """
+    owner = "static_equilibrium"
+    check_problem_given(owner, problem)
+    check_methods(owner, solver, (), tolerance)
+    t = number(owner, "t", t, unit="s")
     return Equilibria(problem, solver=solver, tolerance=tolerance).after(initial_state(problem, t), t)
 
 

@@ -62,10 +62,9 @@ class ContactProblem:
         if self.mass is not None:
             system = self.mass.apply(system, self.surface, tangential=self.frictional)
         system = self._relative(system)
-        inertia = []
-        for excitation in self.excitations:
-            inertia.append((-system.inertia(np.asarray(excitation.direction, dtype=float)), excitation.acceleration))
-        return system.with_load(*inertia)
+        return system.with_load(
+            *((-system.inertia(np.asarray(one.direction, dtype=float)), one.acceleration) for one in self.excitations)
+        )
 
     @cached_property
     def static_load(self) -> SemiDiscreteSystem:
@@ -100,10 +99,8 @@ class ContactProblem:
 
     def ground_acceleration(self, t: float) -> Array:
         """Vector a_g(t) [m/s²] summed over the excitations."""
-        total = np.zeros(self.system.influence.shape[1])
-        for excitation in self.excitations:
-            total += excitation.acceleration(t) * np.asarray(excitation.direction, dtype=float)
-        return total
+        parts = (one.acceleration(t) * np.asarray(one.direction, dtype=float) for one in self.excitations)
+        return np.asarray(sum(parts, np.zeros(self.system.influence.shape[1])))
 
 
 @dataclass(frozen=True)
@@ -174,11 +171,9 @@ class StepProblem:
 
     def __post_init__(self) -> None:
         rows, conditions = len(self.guess), self.surface.count
-        if len(self.b) != rows or len(self.bound) != conditions or len(self.active) != conditions:
-            raise InputError(
-                f"StepProblem has {len(self.b)} loads for {rows} unknowns, {len(self.bound)} bounds and a contact set "
-                f"of {len(self.active)} for {conditions} conditions: give one of each"
-            )
+        if (len(self.b), len(self.bound), len(self.active)) != (rows, conditions, conditions):
+            raise InputError(f"StepProblem has {len(self.b)} loads for {rows} unknowns, {len(self.bound)} bounds and a "
+                             f"contact set of {len(self.active)} for {conditions} conditions: give one of each")
 
     def friction_at(self, slip: Array) -> FrictionLaw:
         """The friction law at the rates [m/s] of this slip, B_t x - slip0 (m, d - 1)."""
@@ -305,11 +300,8 @@ class Certificate:
     @property
     def worst(self) -> float:
         """The largest residual; NaN counts as infinite."""
-        values = (
-            self.equilibrium, self.penetration, self.tension, self.complementarity, self.cone, self.dissipation,
-            self.resultant,
-        )  # fmt: skip
-        return float("inf") if any(np.isnan(values)) else max(values)
+        values = vars(self).values()
+        return float("inf") if any(np.isnan(value) for value in values) else max(values)
 
 
 class Recorder(Protocol):
