@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from energy_checks import rounded
 
 import vi_contact as vc
 from vi_contact.algebra import Array
@@ -107,7 +108,8 @@ def test_rod_ledger() -> None:
     history = solution.history
     assert np.all(np.diff(history["energy_kinetic"] + history["energy_strain"]) <= 1e-14)
     assert history["loss_contact"][-1] > 0.0 and history["loss_damping"][-1] > 0.0
-    assert solution.facts["energy_defect"] <= 1e-12
+    # round-off of K u at the start, when the tip is displaced by 0.5: a third of it
+    assert np.abs(history["energy_defect"]).max() <= 2.0 * rounded(problem, 0.5)
 
 
 def test_rod_comes_to_rest() -> None:
