@@ -453,6 +453,16 @@ def test_the_angle(turn, caplog: pytest.LogCaptureFixture):
 
 
 @dataclass(frozen=True)
+class Blade:
+    """A triangle whose edge at the origin is sharper than a node's directions may be: 0.3 degrees."""
+
+    def build(self, gmsh: Any) -> None:
+        points = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 0.005)])
+        cells, sides = np.array([(0, 1, 2)]), np.array([(0, 1), (0, 2)])
+        add_arrays(gmsh, MeshArrays("triangle", points, cells, {"body": np.ones(1, dtype=bool)}, {"sides": sides}))
+
+
+@dataclass(frozen=True)
 class Pyramid:
     """Four sides that meet in a point, (0, 0, 1), on a square base."""
 
@@ -470,6 +480,9 @@ def test_refusals():
     with pytest.raises(InputError, match=r"\(0, 0, 1\) has 4 contact directions, more than its 3 dimensions: take the"):
         fem.contact_surface(system, tags["sides"])
     assert fem.contact_surface(system, tags["sides"], feature_angle=pi).count == 5
+    mesh, tags = fem.build_mesh(Blade(), COMM)
+    with pytest.raises(InputError, match=r"\(0, 0\) has 2 contact directions, not independent in its 2 dimensions"):
+        fem.contact_surface(fem.assemble(mesh, SOFT), tags["sides"])
     system, tags = body("trapezoid")
     wall = group(tags, "left", "bottom")
     for angle in (0.0, 30.0, -1.0, float("nan"), "sharp"):

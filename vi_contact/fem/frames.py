@@ -132,7 +132,7 @@ class Frames:
         directions = self.directions[slots]
         k, d = directions.shape
         where = f"contact node {at(self.points[slots[0]])}"
-        cosines = np.abs(directions @ directions.T)[np.triu_indices(k, 1)]
+        cosines = (directions @ directions.T)[np.triu_indices(k, 1)]
         if np.any(cosines > 1.0 - PARALLEL):
             raise InputError(
                 f"{where} is on several contact surfaces with one contact direction: list every boundary and every "
