@@ -1,4 +1,4 @@
-"""Static stages of stiff bodies on soft ones: residuals at round-off, rigid bodies in equilibrium, few iterations."""
+"""V2.9: static stages of stiff bodies on soft ones: residuals of round-off, equilibrium of rigid bodies, few steps."""
 
 from __future__ import annotations
 
