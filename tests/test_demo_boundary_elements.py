@@ -5,17 +5,28 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import h5py
 import pytest
 from test_demos import demo
+
+from vi_contact import plotting_deformed
+from vi_contact.output import HISTORY_H5
+from vi_contact.plotting_boundary import SHEAR, plot_panels
 
 pytestmark = pytest.mark.serial
 
 
 @pytest.mark.slow
-def test_the_boundary_elements_demo(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_boundary_elements_demo(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """V7.1 to V7.3 on 4 to 24 elements: energies within 2 % (rms) of coarse finite elements, impulses within 8 % (ball)
     and 1 %; Uzawa's iteration and the march agree; every step certified."""
-    numbers: dict[str, Any] = demo("boundary_elements").main(quick=True, out=tmp_path, progress=False)
+    module, drawn = demo("boundary_elements"), list[Any]()
+    monkeypatch.setattr(module, "plot_panels", lambda rows, *a, **k: drawn.append(rows) or plot_panels(rows, *a, **k))
+    numbers: dict[str, Any] = module.main(quick=True, out=tmp_path, progress=False)
+    shear = drawn[0][1][2]  # concrete on steel: the support holds the corners together, by both methods
+    assert shear.quantity == SHEAR and all(curve.y[0] > 0.0 > curve.y[-1] for curve in shear.curves)
     of = {name.split(": ")[0] for name in numbers}
     assert len(of) == 9
     for name in of:
@@ -28,3 +39,19 @@ def test_the_boundary_elements_demo(tmp_path: Path, capsys: pytest.CaptureFixtur
     for figure in ("snapshots.png", "tractions.png", "energies.png"):
         assert (tmp_path / figure).stat().st_size > 20_000, figure
     assert "fem energy" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("normal", [(0.0, -1.0), (0.0, 1.0)])
+def test_the_shear_of_histories_is_drawn_on_the_body(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, normal: tuple[float, float]
+) -> None:
+    """Histories hold what the body does to its support along +x; drawn is the opposite, and the axis says so."""
+    shown: list[Any] = []
+    monkeypatch.setattr(plotting_deformed, "_save", lambda figure, path: shown.append(figure))
+    with h5py.File(tmp_path / HISTORY_H5, "w") as file:
+        file["t"], file["pressure"], file["traction_t"] = [1.0], [[1.0, 2.0]], [[[3.0], [-3.0]]]
+        file["contact/points"], file["contact/normals"] = [(0.0, 0.0), (1.0, 0.0)], [normal, normal]
+    plotting_deformed.plot_tractions({"box": tmp_path}, (1.0,), tmp_path / "none.png", title="")
+    axis = shown[0].axes[1]
+    assert axis.get_ylabel() == "shear $p_t$ on the body,\nalong +x [Pa]"
+    assert list(axis.lines[0].get_ydata()) == [-3.0, 3.0]

@@ -203,7 +203,7 @@ def plot_tractions(
         column[0].set_title(name, fontsize=10)
         column[1].set_xlabel("x [m]")
     axes[0, 0].set_ylabel(f"pressure $p_n$ [{unit}]")
-    axes[1, 0].set_ylabel(f"shear $p_t$ on the body, along +x [{unit}]")
+    axes[1, 0].set_ylabel(f"shear $p_t$ on the body,\nalong +x [{unit}]")
     axes[0, -1].legend(fontsize=8)
     figure.suptitle(title)
     return _save(figure, path)
