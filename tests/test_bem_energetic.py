@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import h5py
 import numpy as np
 import pytest
 from plane_waves import MATERIAL, SQUARE, pulse
@@ -220,6 +221,7 @@ def test_prescribed_motion(blocks):
 def test_saved_blocks(blocks, tmp_path):
     """Saved blocks come back to the last bit, for another density too; those of another problem are refused."""
     path, b = tmp_path / "square.h5", blocks[5]
+    points = b.mesh.points
     save_blocks(path, b)
     heavy = LinearElastic.from_wave_speeds(1.0, 0.5, 9.0)
     again = stored_blocks(path, polygon(SQUARE, 0.2), heavy, dt=0.2, steps=20)
@@ -234,6 +236,20 @@ def test_saved_blocks(blocks, tmp_path):
     ):
         with pytest.raises(InputError, match=f"another problem.*{message}"):
             load_blocks(path, mesh, material, **options)
+    for damage in (
+        lambda f: f.__delitem__("single"), lambda f: f.attrs.__delitem__("c_p"), lambda f: changed(f, "hyper"),
+        lambda f: f.attrs.__setitem__("dt", "fast"), lambda f: f.attrs.__setitem__("c_s", np.nan),
+        lambda f: f["double"].write_direct(b.double[:30] * np.nan), lambda f: f["points"].write_direct(np.nan * points),
+    ):
+        save_blocks(path, b)
+        with h5py.File(path, "r+") as file:
+            damage(file)
+        with pytest.raises(InputError, match=r"square\.h5"):
+            load_blocks(path, b.mesh, MATERIAL, dt=0.2, steps=20)
+    (tmp_path / "folder.h5").mkdir()
+    with pytest.raises(InputError, match="cannot be written"):
+        save_blocks(tmp_path / "folder.h5", b)
+    assert not list(tmp_path.glob("*.part"))
     path.write_text("nothing")
     with pytest.raises(InputError, match="HDF5"):
         load_blocks(path, b.mesh, MATERIAL, dt=0.2, steps=20)
@@ -243,6 +259,26 @@ def test_saved_blocks(blocks, tmp_path):
         load_blocks(tmp_path / "new.h5", b.mesh, MATERIAL, dt=0.2, steps=2)
     with pytest.raises(InputError, match="hyper=True"):
         PoincareSteklov(new, 1.0).solve(np.zeros((2, 2, 20)))
+
+
+def changed(file: h5py.File, name: str) -> None:
+    """A data set of another shape."""
+    del file[name]
+    file[name] = np.zeros((30, 3))
+
+
+def test_blocks_of_an_earlier_version(tmp_path):
+    """They hold the same numbers for ordinary bodies, and wrong ones for thin bodies."""
+    for mesh, wanted in ((polygon(SQUARE, 0.5), None), (polygon([(0, 0), (1, 0), (1, 0.2)], 0.5), "thin or")):
+        path = tmp_path / "old.h5"
+        save_blocks(path, energetic_blocks(mesh, MATERIAL, dt=0.5, steps=1))
+        with h5py.File(path, "r+") as file:
+            file.attrs["format"] = "vi_contact boundary element blocks, 1"
+        if wanted is None:
+            assert load_blocks(path, mesh, MATERIAL, dt=0.5, steps=1).steps == 1
+            continue
+        with pytest.raises(InputError, match=wanted):
+            load_blocks(path, mesh, MATERIAL, dt=0.5, steps=1)
 
 
 @pytest.mark.parametrize(("options", "message"), [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -29,14 +30,20 @@ def save_blocks(path: str | Path, blocks: EnergeticBlocks) -> None:
     target = checks.path("save_blocks", "path", path)
     if not target.parent.is_dir():
         raise InputError(f"save_blocks: there is no folder {checks.shown(str(target.parent))}; make it first")
-    unfinished = target.with_name(target.name + ".part")
-    with h5py.File(unfinished, "w") as file:
-        file.attrs.update(format=FORMAT, c_p=blocks.c_p, c_s=blocks.c_s, dt=blocks.dt, exterior=blocks.mesh.exterior)
-        file["points"], file["loop_sizes"] = blocks.mesh.points, np.array(blocks.mesh.loop_sizes)
-        file["single"], file["double"] = blocks.single, blocks.double
-        if blocks.hyper is not None:
-            file["hyper"] = blocks.hyper
-    unfinished.replace(target)
+    unfinished = target.with_name(f"{target.name}.{os.getpid()}.part")
+    mesh = blocks.mesh
+    try:
+        with h5py.File(unfinished, "w") as file:
+            file.attrs.update(format=FORMAT, c_p=blocks.c_p, c_s=blocks.c_s, dt=blocks.dt, exterior=mesh.exterior)
+            file["points"], file["loop_sizes"] = mesh.points, np.array(mesh.loop_sizes)
+            file["single"], file["double"] = blocks.single, blocks.double
+            if blocks.hyper is not None:
+                file["hyper"] = blocks.hyper
+        unfinished.replace(target)
+    except OSError as error:
+        unfinished.unlink(missing_ok=True)
+        raise InputError(f"save_blocks: {target.name} cannot be written ({checks.shown(str(error))}); give a file in a "
+                         "folder with room that may be written to") from error
 
 
 def load_blocks(
@@ -109,9 +116,9 @@ def _differences(file: Any, mesh: BoundaryMesh, material: LinearElastic, dt: flo
     different = []
     for name, here in (("c_p", material.c_p), ("c_s", material.c_s), ("dt", dt)):
         there = float(file.attrs[name])
-        if abs(there - here) > SAME * abs(here):
+        if not abs(there - here) <= SAME * abs(here):
             different.append(f"{name} = {there:.6g}, here {here:.6g}")
-    if np.abs(points - mesh.points).max() > SAME * mesh.size or tuple(file["loop_sizes"][:]) != mesh.loop_sizes:
+    if not np.abs(points - mesh.points).max() <= SAME * mesh.size or tuple(file["loop_sizes"][:]) != mesh.loop_sizes:
         different.append("other points of the boundary")
     if bool(file.attrs["exterior"]) != mesh.exterior:
         different.append("the other side of the boundary")
