@@ -50,7 +50,7 @@ class HistoryFiles:
         self, folder: Path, table: Table, surface: ContactSurface, stored: StoredRows | None = None
     ) -> None:
         self._folder, self._table, self._surface = folder, table, surface
-        self._rows = self._saved = self._tail = 0
+        self._rows = self._saved = self._tail = self._last = 0
         self._hash = hashlib.sha256()
         self._journal: Any = None
         write_atomically(folder / COLUMNS, (to_json(describe(table.columns)) + "\n").encode())
@@ -66,7 +66,7 @@ class HistoryFiles:
     def _continue(self, stored: StoredRows) -> None:
         self._rows = self._table.count
         self._replace(stored.blocks())
-        self._hash, source = stored.hash.copy(), stored.folder / HISTORY_CSV
+        self._hash, self._last, source = stored.hash.copy(), stored.k, stored.folder / HISTORY_CSV
         if source.resolve() == (self._folder / HISTORY_CSV).resolve():
             os.truncate(source, stored.length)
         else:
@@ -90,12 +90,16 @@ class HistoryFiles:
         self._write(self._csv, line)
         self._hash.update(line)
         self._hash.update(record)
-        self._rows += 1
+        self._rows, self._last = self._rows + 1, int(row["k"])
 
-    @property
-    def checksum(self) -> str:
-        """Of all rows so far, for the checkpoint."""
-        return self._hash.hexdigest()
+    def checksum(self, k: int) -> str:
+        """Of the rows up to step k, for its checkpoint; later ones are of a base step that is not at its end."""
+        if k == self._last:
+            return self._hash.hexdigest()
+        stored = StoredRows(self._folder, self._table, k)
+        for _ in stored.blocks():
+            pass
+        return stored.hash.hexdigest()
 
     def _write(self, file: Any, data: bytes) -> None:
         start = file.tell()

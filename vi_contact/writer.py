@@ -124,17 +124,17 @@ class Writer:
         k = place.state.k
         if self._folder is None or self._saved == k:
             return
-        checksum = on_root(self._comm, self._sync) or ""
+        checksum = on_root(self._comm, lambda: self._sync(k)) or ""
         write_checkpoint(self._folder, self._problem, place, of=of(), rows=checksum)
         self._saved = k
         if self._comm.rank == 0:
             log.info("checkpoint of step %d", k)
 
-    def _sync(self) -> str:
+    def _sync(self, k: int) -> str:
         if self._files is None:
             return ""
         self._files.sync()
-        return self._files.checksum
+        return self._files.checksum(k)
 
     @property
     def history(self) -> Path | None:
