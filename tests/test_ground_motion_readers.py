@@ -4,6 +4,7 @@ import hashlib
 
 import numpy as np
 import pytest
+import record_files
 
 from vi_contact.errors import InputError, ViContactError
 from vi_contact.ground_motion import UNITS, read_record
@@ -135,19 +136,8 @@ def test_bad_at2_is_refused_in_one_sentence(text, options, words, tmp_path):
         assert word in message
 
 
-def smc(kind="2 CORRECTED ACCELEROGRAM", *, rate="  0.2000000E+03", n=11, comments=2, vertical=90):
-    text = [kind, "*", "STA01", "     1989  10  18    0004 Loma Prieta, CA", "Moment Mag=      7.1",
-            "station = Somewhere     component=    360", "x", "y", "*", "*", "*"]
-    integers = [-32768] * 48
-    integers[12], integers[13], integers[15], integers[16] = vertical, 360, comments, n
-    text += ["".join(f"{i:10d}" for i in integers[k:k + 8]) for k in range(0, 48, 8)]
-    reals = ["  0.1700000E+39"] * 50
-    reals[1] = rate
-    text += ["".join(reals[k:k + 5]) for k in range(0, 50, 5)]
-    text += ["|"] + ["|reference of the record"] * (comments - 1)
-    fields = [f"{v:10.4E}".replace("E-0", "E-").replace("E+0", "E+").rjust(10) for v in VALUES]
-    text += ["".join(fields[k:k + 8]) for k in range(0, len(fields), 8)]
-    return "\n".join(line.ljust(80) for line in text)
+def smc(*given, **options):
+    return record_files.smc(*given, samples=VALUES, **options)
 
 
 def test_smc_is_cut_by_column_and_its_header_understood(tmp_path):

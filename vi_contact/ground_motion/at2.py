@@ -65,6 +65,8 @@ def _header(text: TextFile) -> tuple[int | None, float | None, int, int]:
     last = 0
     for index, line in enumerate(text.heads[:HEADER_LINES if start is None else start]):
         both, count, step = _VALUES_FIRST.search(line), _NPTS.search(line), _DT.search(line)
+        if npts is not None and (both or count):
+            raise InputError(f"{text.at(index)}: NPTS is stated a second time; give one record")
         if both:
             npts, dt, npts_line, last = whole(text, index, both[1]), number(text, index, both[2]), index, index
         if count:
