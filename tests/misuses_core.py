@@ -56,6 +56,8 @@ def but(kind: Wrong, *allowed: str) -> Wrong:
 
 # What the calls share -----------------------------------------------------------------------------------------------
 
+COLUMNS = {"t": ("s", "time"), "u": ("m", "displacement")}
+HISTORY = {"t": np.arange(64) * 0.01, "u": np.ones(64), "a_x_top": np.sin(np.arange(64.0))}
 STEEL = vc.LinearElastic(E=2.1e11, nu=0.3, rho=7850.0)
 
 
@@ -174,6 +176,27 @@ def values() -> Table:
           "normal": but(VECTOR, "none")}),
         (vc.Racking, {"frames": {"a": [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]}},
          {"frames": LABELS | {"line": {"a": [(0.0, 0.0)] * 4}, "three": {"a": [(0.0, 0.0)] * 3}}}),
+        (vc.CrossChecked, {"primary": vc.Condensed(), "others": [vc.Condensed()]},
+         {"primary": NEEDED, "others": {"one": vc.Condensed(), "texts": ["nsgs"], "none": None}}),
+        (vc.SoilColumn, {"heights": np.arange(3.0)} | dict.fromkeys(("lame", "shear", "rho", "alpha", "beta"),
+         np.ones(2)),
+         {"heights": VECTOR | {"down": np.array([1.0, 0.0]), "one": np.zeros(1)}, "rho": VECTOR, "lame": VECTOR}),
+        (vc.Load, {"constant": np.zeros(3)}, {
+            "constant": VECTOR, "separable": {"one": (np.zeros(3), np.sin), "function": np.sin, "none": None},
+            "general": {"function": np.sin, "texts": ("a",)}, "viscous": {"number": (1.0,)}}),
+        (vc.peaks, {"history": HISTORY, "columns": COLUMNS},
+         {"history": NEEDED, "columns": NEEDED, "names": {"text": "u", "unknown column": ["w"],
+          "number for a column": [1]}}),
+        (vc.hysteresis, {"history": HISTORY, "deformation": "u", "force": "u"},
+         {"history": NEEDED, "deformation": {"none": None, "unknown column": "w"},
+          "force": {"no name of a column": 1}, "sign": NUMBER}),
+        (vc.floor_spectrum, {"history": HISTORY, "column": "a_x_top", "periods": np.ones(1)},
+         {"history": NEEDED, "column": {"none": None, "displacement": "u", "unknown": "a_x_b"}, "relative": FLAG}),
+        (vc.transfer_function, {"history": HISTORY, "surface": "a_x_top", "base": "a_x_top"},
+         {"history": NEEDED, "surface": {"none": None, "displacement column": "u"}, "frequencies": but(VECTOR,
+          "number", "none"),
+          "bandwidth": but(POSITIVE, "none"), "floor": POSITIVE}),
+        (fem.NodeToNode, {}, {"tolerance": POSITIVE}),
         (vc.upgoing, {"motion": vc.Ricker(1.0, 1.0), "dt": 0.1},
          {"motion": NEEDED, "dt": POSITIVE, "outcrop": FLAG}),
         (vc.base_motion, {"excitation": vc.Ricker(1.0, 1.0), "dt": 0.1},
@@ -247,6 +270,10 @@ def of_the_mesh() -> Table:
         (fem.contact_pair, {"system": b.system, "facets1": left, "facets2": right},
          {"system": NEEDED, "facets1": groups(), "facets2": groups(), "matching": THING, "points": {"flat": (1.0,
           0.5)}}),
+        (fem.build_mesh, {"mesh": BlockMesh(lengths=(1.0,), divisions=(2,)), "comm": MPI.COMM_SELF},
+         {"mesh": NEEDED, "comm": NEEDED}),
+        (fem.read_mesh, {"path": "wall.msh", "comm": MPI.COMM_SELF}, {"path": {"none": None, "number": 3},
+         "comm": NEEDED}),
         (vc.with_weight, {"system": b.system}, {"system": NEEDED, "acceleration": NUMBER,
                                                 "direction": but(VECTOR, "none") | {"long": (2.0, 0.0)}}),
         (vc.lowest_frequency, {"system": b.system}, {"system": NEEDED, "max_iterations": COUNT}),
@@ -372,9 +399,9 @@ def calls(table: Table) -> Iterator[tuple[str, Callable[[], object]]]:
 
 
 def rights(table: Table) -> Iterator[tuple[str, Callable[[], object]]]:
-    """(name, call with the right arguments) of a table; the block has no two sides that could touch."""
+    """(name, call with the right arguments) of a table; the block has no two sides that could touch, and no file."""
     for rank, (make, right, _) in enumerate(table):
-        if make is not fem.contact_pair:
+        if make not in (fem.contact_pair, fem.read_mesh):
             yield f"{rank} {getattr(make, '__qualname__', make)}", partial(make, **right)
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .algebra import Array
-from .checks import counted
+from .checks import array, counted, flag, instance, number
 from .errors import InputError
 from .ground_motion import Record, ResponseSpectrum, response_spectrum
 from .peak_values import column_of
@@ -32,6 +32,8 @@ def recorded_motion(history: Mapping[str, Array], column: str, *, relative: bool
     jumps that an impact law makes: they are not in a_<axis>_<label>, whose integral drifts off.
     ``relative``: minus the ground acceleration a_g_<axis> of the run. InputError for columns that are no accelerations.
     """
+    flag("recorded_motion", "relative", relative)
+    instance("recorded_motion", "column", column, str, "give the name of a column, such as 'a_x_top'")
     kind, _, rest = column.partition("_")
     axis = rest.partition("_")[2 if rest.startswith("g_") else 0]
     if kind not in ("a", "v") or "_" not in rest:
@@ -95,13 +97,16 @@ def transfer_function(
     samples in a period; raw all of the transform. nan where the base has less than ``floor`` of its largest amplitude.
     InputError for a base without motion.
     """
+    number("transfer_function", "floor", floor, positive=True)
+    if bandwidth is not None:
+        number("transfer_function", "bandwidth", bandwidth, positive=True)
     top, below = recorded_motion(history, surface), recorded_motion(history, base)
     raw = np.fft.rfftfreq(len(top.acceleration), top.dt)[1:]
     spectra = [np.abs(np.fft.rfft(one.acceleration))[1:] for one in (top, below)]
     if frequencies is None:
         wanted = raw if bandwidth is None else np.geomspace(4.0 * raw[0], 0.5 * raw[-1], 200)
     else:
-        wanted = np.atleast_1d(np.asarray(frequencies, dtype=float))
+        wanted = array("transfer_function", "frequencies", np.atleast_1d(np.asarray(frequencies)), (None,), unit="Hz")
     if np.any(wanted <= 0.0) or np.any(wanted > raw[-1] * (1.0 + 1e-9)):
         raise InputError(f"transfer_function: give frequencies above 0 and up to {raw[-1]:.4g} Hz, half the sampling")
     if bandwidth is None:

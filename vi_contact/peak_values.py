@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from .algebra import Array
+from .checks import instance, number, several
 from .errors import InputError, ViContactError
 from .output import sentence, write_atomically
 from .recorders import Columns
@@ -39,10 +40,12 @@ def peaks(history: Mapping[str, Array], columns: Columns, names: Sequence[str] |
     The peak of an acceleration is that of the time step where contact closes, and is marked so: it grows as dt falls,
     while displacements and forces converge. InputError for a column that the history does not have, or one of arrays.
     """
+    for kind, one in (("history", history), ("columns", columns)):
+        instance("peaks", kind, one, Mapping, f"give the {kind} of a solution")
     if names is None:
         names = [name for name in columns if name not in _NOT_PEAKS and name in history and history[name].ndim == 1]
     found = []
-    for name in names:
+    for name in several("peaks", "names", names, "give a list of columns, or None"):
         values = column_of(history, name)
         unit, quantity = columns[name][0], columns[name][1] + (GROWS if _depends_on_dt(name) else "")
         if np.isnan(values).all():
@@ -96,6 +99,7 @@ def hysteresis(history: Mapping[str, Array], deformation: str, force: str, *, si
 
     ``sign`` = -1 turns the force: reactions on the body push against its deformation. InputError for missing columns.
     """
+    number("hysteresis", "sign", sign)
     x, y = column_of(history, deformation), sign * column_of(history, force)
     work = np.concatenate([[0.0], np.cumsum(0.5 * (y[1:] + y[:-1]) * np.diff(x))])
     return Loop(x, y, work)
@@ -103,6 +107,8 @@ def hysteresis(history: Mapping[str, Array], deformation: str, force: str, *, si
 
 def column_of(history: Mapping[str, Array], name: str) -> Array:
     """A column of numbers; InputError that names what there is."""
+    instance("history", "the name of a column", name, str, "give a text, such as 'u_x_top'")
+    instance("history", "it", history, Mapping, "give the history of a solution")
     if name not in history:
         known = [one for one in history if np.ndim(history[one]) == 1]
         raise InputError(f"the history has no column '{name}': it has {', '.join(known)}")

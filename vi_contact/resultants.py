@@ -20,7 +20,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from .algebra import Array, Mask
-from .checks import array, column_name, function
+from .checks import array, column_name, function, instance, provides
 from .errors import InputError
 from .recorders import AXES, Columns, Row
 from .step import ContactProblem, Report, State
@@ -245,6 +245,9 @@ def contact_summary(
     ``geometry``: the surface of the problem, or ``read_run(folder).contact``. Slip and friction count where they were
     recorded, with friction. InputError without arrays of the contact points.
     """
+    instance("contact_summary", "history", history, Mapping, "give the history of a solution")
+    provides("contact_summary", "geometry", geometry, ("points", "normals", "weights"), "give a contact surface")
+    column_name("part name", name)
     missing = [column for column in ("pressure", "gap", "active") if column not in history]
     if missing:
         raise InputError(f"the history has no column {missing[0]}: record Contact() and read history.h5")

@@ -18,6 +18,8 @@ import scipy.sparse as sp
 
 from .algebra import Array, SerialAlgebra, SerialComm, SerialMatrix
 from .base_motion import PointSpace
+from .checks import array, shown
+from .errors import InputError
 from .step import ContactProblem
 from .surfaces import empty_surface
 from .system import Load, SemiDiscreteSystem
@@ -33,6 +35,13 @@ class SoilColumn:
     rho: Array
     alpha: Array
     beta: Array
+
+    def __post_init__(self) -> None:
+        n = len(array("SoilColumn", "heights", self.heights, (None,), unit="m")) - 1
+        if n < 1 or np.any(np.diff(self.heights) <= 0.0):
+            raise InputError(f"SoilColumn: heights is {shown(self.heights)}; give two or more, upwards")
+        for name in ("lame", "shear", "rho", "alpha", "beta"):
+            array("SoilColumn", name, getattr(self, name), (n,))
 
     def matrices(self) -> tuple[sp.csr_matrix, sp.csr_matrix, sp.csr_matrix]:
         """(M, C, K) of all nodes; unknown 2 i + c is component c of node i."""

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from .algebra import Algebra, Array, Mask, Matrix
-from .checks import instance, provides, shown
+from .checks import array, function, instance, provides, several, shown
 from .errors import InputError
 
 
@@ -39,6 +39,9 @@ class Space(Protocol):
         ...
 
 
+PAIR = "give pairs of a vector [N] and a function of the time"
+
+
 @dataclass(frozen=True)
 class Load:
     """f(t) = constant + sum vector * history(t) + sum general(t) + sum viscous(t) + sum inertial(t), in newtons.
@@ -54,10 +57,19 @@ class Load:
     viscous: tuple[Callable[[float], Array], ...] = ()
     inertial: tuple[Callable[[float], Array], ...] = ()
 
+    def __post_init__(self) -> None:
+        array("Load", "constant", self.constant, (None,), unit="N")
+        for name in ("separable", "general", "viscous", "inertial"):
+            for part in several("Load", name, getattr(self, name), "give a tuple of functions of the time"):
+                if name != "separable":
+                    function("Load", f"a part of {name}", part, "give a function of the time [s]")
+                elif len(several("Load", "a part of separable", part, PAIR)) != 2:
+                    raise InputError(f"Load: a part of separable has {len(part)} members; {PAIR}")
+
     def __call__(self, t: float) -> Array:
         total = self.at_rest(t)
-        for function in self.viscous + self.inertial:
-            total += function(t)
+        for moving in self.viscous + self.inertial:
+            total += moving(t)
         return total
 
     def at_rest(self, t: float) -> Array:
@@ -65,8 +77,8 @@ class Load:
         total = self.constant.copy()
         for vector, history in self.separable:
             total += _factor(history, t) * vector
-        for function in self.general:
-            total += function(t)
+        for part in self.general:
+            total += part(t)
         return total
 
     def in_basis(self, T: Matrix) -> Load:

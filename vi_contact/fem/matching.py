@@ -13,6 +13,7 @@ import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 from ..algebra import Array, Indices
+from ..checks import attributes
 from ..errors import InputError
 from .frames import Nodes, at
 
@@ -62,6 +63,9 @@ class NodeToNode:
     """
 
     tolerance: float = 0.01
+
+    def __post_init__(self) -> None:
+        attributes(self, positive=("tolerance",))
 
     def match(self, one: Side, two: Side, size: float) -> Matched:
         partner = self._partners(one, two, size)

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from dolfinx.mesh import Mesh
 from mpi4py import MPI
 
-from vi_contact.checks import instance, refuse, shown
+from vi_contact.checks import instance, provides, refuse, shown
 from vi_contact.errors import InputError
 from vi_contact.fem import compat
 from vi_contact.fem.compat import Indices
@@ -106,6 +106,7 @@ def read_mesh(path: str | Path, comm: MPI.Comm) -> tuple[Mesh, Tags]:
     rank, if the file is missing, a script, or holds no usable mesh
     (all reasons: `vi_contact.meshes.extract.extract`). Collective.
     """
+    instance("read_mesh", "path", path, (str, Path), "give the path of a mesh file")
     return _distribute(comm, lambda: arrays_from_file(path))
 
 
@@ -114,6 +115,7 @@ def build_mesh(mesh: MeshScript, comm: MPI.Comm) -> tuple[Mesh, Tags]:
 
     Raises like `read_mesh`. Collective.
     """
+    provides("build_mesh", "mesh", mesh, ("build",), "give a script of vi_contact.meshes, BlockMesh(…) for example")
     return _distribute(comm, lambda: arrays_from_script(mesh))
 
 
@@ -123,6 +125,7 @@ def node_numbers(mesh: Mesh) -> npt.NDArray[np.int64]:
 
 
 def _distribute(comm: MPI.Comm, produce: Callable[[], MeshArrays]) -> tuple[Mesh, Tags]:
+    instance("mesh", "comm", comm, MPI.Comm, "give a communicator, such as MPI.COMM_WORLD")
     arrays = _on_root(comm, produce)
     vertices = arrays.cells[:, _TENSOR_ORDER.get(arrays.cell, slice(None))]
     where = destinations(arrays.points, arrays.cells, arrays.cell, comm.size) if comm.rank == 0 else _NOWHERE
