@@ -156,7 +156,8 @@ def test_records_shake_the_whole_mass(shared_tmp, monkeypatch, recorded):
     assert told in (shared_tmp / "run" / "run.log").read_text(encoding="utf-8")
     problem = build(Wall(), COMM, base_inertia="whole" if recorded else "catalogue").problem("face", excitation=shaking)
     expected = simulate(problem, scheme=ZienkiewiczWoodTaylor(), dt=1e-3, steps=3, progress=False)
-    assert np.array_equal(found.state.u, expected.state.u)
+    off, size = (max_over_ranks(COMM, u) for u in (found.state.u - expected.state.u, expected.state.u))
+    assert off < 1e-10 * size  # the other mass makes 1e-2
 
 
 def test_gravity_stage_with_contact_then_shaking():
