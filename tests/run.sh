@@ -39,7 +39,7 @@ run() {  # on $1 ranks, with pytest's arguments
   wait "$child" || code=$?
   case $code in 124 | 137) echo "vi_contact: stopped, the $seconds s of VI_CONTACT_TIMEOUT are over" >&2 ;; esac
   read -r p f s <"$tally"
-  [ "$code" -eq 0 ] || [ "${f:-0}" -gt 0 ] || f=1  # killed or aborted before it could count
+  [ "$code" -eq 0 ] || [ "${f:-0}" -gt 0 ] || { f=1; echo; }  # killed or aborted before it could count, maybe within a line
   [ "$code" -eq 0 ] || status=1
   passed=$((passed + p)) failed=$((failed + f)) skipped=$((skipped + s))
 }
