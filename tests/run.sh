@@ -37,7 +37,8 @@ run() {  # on $1 ranks, with pytest's arguments
   VI_CONTACT_TALLY=$tally "${limit[@]}" "${launch[@]}" "$vi_python" -m pytest --color="$colour" "$@" </dev/null &
   child=$!
   wait "$child" || code=$?
-  case $code in 124 | 137) echo "vi_contact: stopped, the $seconds s of VI_CONTACT_TIMEOUT are over" >&2 ;; esac
+  [ -z "$seconds" ] || [ "$SECONDS" -lt "$seconds" ] || [ "$code" -eq 0 ] ||
+    echo "vi_contact: stopped, the $seconds s of VI_CONTACT_TIMEOUT are over" >&2
   read -r p f s <"$tally"
   [ "$code" -eq 0 ] || [ "${f:-0}" -gt 0 ] || { f=1; echo; }  # killed or aborted before it could count, maybe within a line
   [ "$code" -eq 0 ] || status=1
