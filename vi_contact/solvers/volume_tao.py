@@ -104,7 +104,8 @@ class TaoDriver:
                 tao.solve(self._y)
             y, reason = np.array(self._y.array_r), tao.getConvergedReason()
             F, iterations = scaled.residual(y), iterations + tao.getIterationNumber()
-            if reason != PETSc.TAO.Reason.DIVERGED_LS_FAILURE or scaled.accepts(y, F) or scaled.worst > 0.9 * before:
+            failed = reason == PETSc.TAO.Reason.DIVERGED_LS_FAILURE and not scaled.accepts(y, F)
+            if not (failed and scaled.worst <= 0.9 * before):  # NaN ends it too
                 return y, F, reason, iterations
             before = scaled.worst  # the values compared were round-off: measured from here they have all digits again
 
