@@ -127,6 +127,23 @@ def test_nodal_residuals_add_up_on_a_body() -> None:
     assert Certificate(0.0, 0.0, 0.0, 0.0, resultant=wrong).worst == wrong
 
 
+def test_held_bodies_and_components_are_no_free_motions() -> None:
+    """A block on one whose nodes are all prescribed, and the same if it moves up and down only: what is left to be free
+    carries the weight."""
+    grid = {"lengths": (1.0, 1.0), "divisions": (1, 1)}
+    bodies = {"lower": BlockMesh(corner=(0.0, -1.0), **grid), "upper": BlockMesh(**grid)}
+    mesh, tags = build_mesh(Blocks(bodies), COMM)
+    whole = [Prescribed(tags[f"lower_{side}"]) for side in ("bottom", "top")]
+    along = [Prescribed(tags[f"upper_{side}"], components=(0,)) for side in ("bottom", "top")]
+    for held, free in ((whole, 3), ([*whole, *along], 1)):
+        system = assemble(mesh, CONCRETE, prescribed=held, loads=Traction(tags["upper_top"], (0.0, -1.0e3)))
+        pair = contact_pair(system, tags["upper_bottom"], tags["lower_top"])
+        problem = ContactProblem(system, pair)
+        motions = [motion for body in RigidBodies(problem)._free for motion in body.motions.T]
+        assert len(motions) == free and system.floating
+        assert static_equilibrium(problem).r_n.sum() == pytest.approx(1.0e3, rel=1e-12)
+
+
 @pytest.mark.parametrize("angle", [0.0, 0.4])
 def test_resultants_are_those_of_motions_that_nothing_holds(angle: float) -> None:
     """A free body has all, one on rollers those along them, a clamped one none; the part of a force that has its

@@ -68,16 +68,19 @@ def _free(system: SemiDiscreteSystem) -> Iterator[FreeMotions]:
     stiffness = np.abs(system.K.diagonal())
     for number in range(_count(comm, numbers)):
         rows = np.flatnonzero(numbers == number)
+        largest = float(comm.max(np.array([np.max(stiffness[rows], initial=0.0)]))[0])
+        if largest == 0.0:
+            continue  # every node of it is held
         high = comm.max(np.max(points[rows], axis=0, initial=-np.inf))
         low = -comm.max(np.max(-points[rows], axis=0, initial=-np.inf))
         x = (points[rows] - 0.5 * (low + high)) / max(float(np.max(high - low)), 1e-300)
         w = rigid_motions(system.influence[rows], x)
         bending = _form(system, system.K, rows, w)[1]
-        largest = float(comm.max(np.array([np.max(stiffness[rows], initial=0.0)]))[0])
         w = w @ _kernel(bending, FREE * largest)
         momenta, inertia = _form(system, system.M, rows, w)
-        scale = np.linalg.inv(np.linalg.cholesky(inertia)).T
-        yield FreeMotions(rows, w / comm.max(np.max(np.abs(w), axis=0, initial=0.0)), w @ scale, momenta @ scale)
+        basis = _orthonormal(inertia)
+        size = comm.max(np.max(np.abs(w @ basis), axis=0, initial=0.0))
+        yield FreeMotions(rows, w @ basis / size, w @ basis, momenta @ basis)
 
 
 def _kernel(form: Array, zero: float) -> Array:
@@ -88,6 +91,19 @@ def _kernel(form: Array, zero: float) -> Array:
     others = np.zeros((len(form), len(values)))
     others[~free] = vectors
     return np.column_stack([np.eye(len(form))[:, free], others[:, np.abs(values) <= zero]])
+
+
+def _orthonormal(form: Array) -> Array:
+    """Columns c with cᵀ form c = 1, by Gram and Schmidt, but for motions of which nothing is left: those along a
+    component that is held everywhere."""
+    columns: list[Array] = []
+    for column in np.eye(len(form)):
+        for c in columns:
+            column = column - c * (c @ form @ column)
+        size = float(column @ form @ column)
+        if size > 1e-10 * np.max(form):
+            columns.append(column / np.sqrt(size))
+    return np.column_stack(columns) if columns else np.zeros((len(form), 0))
 
 
 def _form(system: SemiDiscreteSystem, A: Matrix, rows: Indices, w: Array) -> tuple[Array, Array]:
@@ -120,7 +136,8 @@ def body_springs(problem: ContactProblem) -> Matrix:
     stiffness = algebra.comm.max(stiffness)
     soft = surface.compliance > 0.0
     bed = float(np.sum(1.0 / surface.compliance[soft])) if soft.any() else np.inf
-    wanted = np.clip(STRONG * min(bed, float(np.min(stiffness))), WEAK * stiffness, STRONG * stiffness)
+    softest = min(bed, float(np.min(stiffness, where=stiffness > 0.0, initial=np.inf)))
+    wanted = np.clip(STRONG * softest, WEAK * stiffness, STRONG * stiffness)
     root = np.sqrt(np.divide(wanted, mass, out=np.zeros(count), where=mass > 0.0))
     every = np.arange(system.rows)
     springs = algebra.congruence(algebra.local(every, every, root[numbers], system.rows), system.M)
