@@ -126,7 +126,7 @@ def read_checkpoint(
 
     InputError when the checkpoint is missing, damaged, of an unknown format, or of another problem, dt (or plan of
     them) or scheme; unless ``changed`` allows the latter. After another dt the steps are counted anew from here;
-    another scheme begins without the memory of the old one.
+    the scheme begins without memory.
     """
     file, comm = folder / CHECKPOINT, problem.system.algebra.comm
     about, arrays = comm.bcast(on_root(comm, lambda: _read(file, problem)))
@@ -164,7 +164,7 @@ def _compare(
 
 def _adapted(place: Place, other: list[str]) -> Place:
     """The place for a run that differs in these."""
-    if "scheme" in other or "mass" in other:
+    if other:  # what the scheme keeps in mind was made of the old problem's matrices and loads
         place = replace(place, state=replace(place.state, memory={}))
     return place if "dt" not in other else replace(place, t_start=place.state.t, k_start=place.number, base=0)
 
@@ -182,9 +182,13 @@ def _check_memory(
 ) -> None:
     """InputError when a checkpoint without checksum lacks what the scheme keeps in mind. Collective."""
     dt = about["run"].get("dt")
+    if about["run"].get("scheme") != repr(scheme):
+        return
     wanted = scheme.start(problem, replace(state, memory={}), dt if isinstance(dt, float) else 1.0).memory
-    if about["run"].get("scheme") == repr(scheme) and not set(wanted) <= set(state.memory):
-        raise _damaged(file, f"{', '.join(sorted(set(wanted) - set(state.memory)))} of the scheme is missing")
+    shapes = {name: np.shape(state.memory.get(name, ())) for name in sorted(wanted)}
+    wrong = [name not in state.memory or shape != np.shape(wanted[name]) for name, shape in shapes.items()]
+    if np.any(problem.system.algebra.comm.max(np.array(wrong, dtype=float))):
+        raise _damaged(file, f"{', '.join(shapes)} of the scheme is missing or of another shape")
 
 
 def _damaged(file: Path, why: Any) -> InputError:

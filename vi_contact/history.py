@@ -34,8 +34,9 @@ from .output import (
 from .recorders import Columns, Row
 from .stored_rows import StoredArrays, StoredRows, line_of, read_blocks, record_of
 from .surfaces import ContactSurface
-from .table import BLOCK, Block, Table
+from .table import Block, Table
 
+STRIDE = 2**20  # bytes that are copied at once
 GROWTH = 1.25  # history.h5 is rewritten when it has grown by this factor: what is written stays in proportion
 
 
@@ -120,40 +121,40 @@ class HistoryFiles:
 
     def save(self) -> None:
         """history.h5 with all rows; the journal starts anew."""
-        self._replace(self._so_far())
+        self._replace(self._since(), self._saved)
         self._tail = self._csv.tell()
         self._open_journal()
 
-    def _so_far(self) -> Iterator[Block]:
-        """The rows of the last history.h5, then those of the other files."""
-        if self._saved:
-            with h5py.File(self._folder / HISTORY_H5, "r") as file:
-                for i in range(0, self._saved, BLOCK):
-                    part = slice(i, min(i + BLOCK, self._saved))
-                    yield {name: file[name][part] for name in self._table.columns}
+    def _since(self) -> Iterator[Block]:
+        """The rows after those of the last history.h5."""
         with open(self._folder / HISTORY_CSV, "rb") as csv, StoredArrays(self._folder, self._table) as arrays:
             csv.seek(self._tail)
             for _, block in read_blocks(csv, self._table, arrays, first=self._saved):
                 yield block
 
-    def _replace(self, blocks: Iterator[Block]) -> None:
-        hdf5_atomically(self._folder / HISTORY_H5, lambda file: self._fill(file, blocks))
+    def _replace(self, blocks: Iterator[Block], kept: int = 0) -> None:
+        """history.h5 with so many rows of the old one, and these."""
+        hdf5_atomically(self._folder / HISTORY_H5, lambda file: self._fill(file, blocks, kept))
         self._saved = self._rows
 
-    def _fill(self, file: h5py.File, blocks: Iterator[Block]) -> None:
+    def _fill(self, file: h5py.File, blocks: Iterator[Block], kept: int) -> None:
         file.attrs["format"] = FORMAT
-        samples = {name: self._table.arrays.get(name, np.zeros(())) for name in self._table.columns}
+        found = {}
         for name, (unit, meaning) in self._table.columns.items():
-            shape = (self._rows, *samples[name].shape)
-            dataset = file.create_dataset(name, shape, samples[name].dtype)
+            sample = self._table.arrays.get(name, np.zeros(()))
+            dataset = file.create_dataset(name, (self._rows, *sample.shape), sample.dtype)
             dataset.attrs["unit"], dataset.attrs["meaning"] = unit, meaning
-        done = 0
+            if sample.size:
+                found[name] = dataset
+        if kept:
+            with h5py.File(self._folder / HISTORY_H5, "r") as old:
+                for name, dataset in found.items():
+                    _copy(old[name], dataset, kept)
         for block in blocks:
             n = len(block["k"])
-            for name, sample in samples.items():
-                if sample.size:
-                    file[name][done : done + n] = block[name]
-            done += n
+            for name, dataset in found.items():
+                dataset[kept : kept + n] = block[name]
+            kept += n
         self._fill_geometry(file.create_group("contact"))
 
     def _fill_geometry(self, geometry: h5py.Group) -> None:
@@ -182,6 +183,14 @@ class HistoryFiles:
             if file is not None:
                 with suppress(OSError):
                     file.close()
+
+
+def _copy(old: h5py.Dataset, new: h5py.Dataset, rows: int) -> None:
+    """The first rows, a part of at most STRIDE bytes at a time."""
+    step = max(1, STRIDE * rows // max(new.nbytes, 1))
+    for i in range(0, rows, step):
+        part = slice(i, min(i + step, rows))
+        new[part] = old[part]
 
 
 def describe(columns: Columns) -> dict[str, dict[str, str]]:

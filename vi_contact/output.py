@@ -35,7 +35,7 @@ HISTORY_H5 = "history.h5"
 JOURNAL = "history.journal"
 LOG = "run.log"
 SUMMARY = "summary.json"
-FILES = (CHECKPOINT, COLUMNS, FIELDS_INDEX, HISTORY_CSV, HISTORY_H5, JOURNAL, LOG, SUMMARY)  # of a run, in its folder
+FILES = (ABOUT, CHECKPOINT, COLUMNS, FIELDS_INDEX, HISTORY_CSV, HISTORY_H5, JOURNAL, LOG, SUMMARY)  # of a run
 
 _FULL = (errno.ENOSPC, errno.EDQUOT)
 _REFUSED = (errno.EACCES, errno.EPERM, errno.EROFS)

@@ -90,11 +90,11 @@ class Table:
     def history(self, file: Path | None = None) -> Mapping[str, Array]:
         """Column -> values of all rows: (rows,) float64, or (rows, *shape of the arrays); of too many rows for the
         memory as they are in ``file``, the history.h5 of the run."""
-        if not self._kept and file is not None:
-            return StoredHistory(file, list(self.columns), self.count)
         if self._open:
             rows, self._open = self._open, []
             self._store(self._columns(rows))
+        if not self._kept and file is not None:
+            return StoredHistory(file, list(self.columns), self.count)
         names = [*self.numbers, *self.arrays]
         return {name: np.concatenate([block[name] for block in self._blocks]) for name in names}
 

@@ -1,0 +1,255 @@
+"""What a restart compares: other matrices, loads, laws and plans are refused by name; ranks and round-off are not."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from test_checkpoint import chain, equal_files, rubbing_box, run, run_wall, wall
+
+from vi_contact.checkpoint import checksum
+from vi_contact.errors import InputError
+from vi_contact.excitation import Harmonic, Tabulated
+from vi_contact.friction import Coulomb, SlipRateCoulomb
+from vi_contact.identity import difference, identity, text_of
+from vi_contact.impact import Elastic
+from vi_contact.schemes.ss22 import SS22
+from vi_contact.schemes.trapezoidal import Trapezoidal
+from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
+from vi_contact.simulate import simulate
+from vi_contact.solvers.condensed import Condensed
+from vi_contact.solvers.hildreth import Hildreth
+from vi_contact.step import ContactProblem
+
+serial = pytest.mark.serial
+
+
+def tabulated(peak: float) -> Tabulated:
+    """A record of 5000 samples, one of which can be another."""
+    values = np.sin(np.arange(5000.0))
+    values[2345] = peak
+    return Tabulated(np.linspace(0.0, 20.0, 5000).tolist(), values.tolist(), direction=(1.0,))
+
+
+OTHERS: dict[str, tuple[dict[str, Any], str]] = {
+    "stiffness": ({"problem": chain(stiffness=1.0001e3)}, "another stiffness"),
+    "mass": ({"problem": chain(mass=2.0001)}, "another mass matrix"),
+    "damping": ({"problem": chain(damping=1.01e-4)}, "another damping"),
+    "undamped": ({"problem": chain(damping=0.0)}, "another damping"),
+    "load": ({"problem": chain(constant=1e-3)}, "another load"),
+    "excitation": ({"problem": chain(excitation=Harmonic(3.0, 2.001, direction=(1.0,)))}, "another excitation"),
+    "none": ({"problem": chain(excitation=())}, "another excitation"),
+    "gap": ({"problem": chain(gap=1.001e-3)}, "another contact surface or obstacle"),
+    "impact": ({"problem": chain(impact=Elastic())}, r"impact law = Inelastic\(.*\) but this one has Newton"),
+    "dt": ({"dt": 5.001e-3}, "dt = 0.005 but this one has 0.005001"),
+    "scheme": ({"scheme": ZienkiewiczWoodTaylor(phi=0.51)}, r"scheme = Z.*phi=0.5\) but this one has .*phi=0.51"),
+}
+
+
+@pytest.fixture(scope="module")
+def left(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run that was left after 60 steps."""
+    folder = tmp_path_factory.mktemp("left")
+    run(folder, 60)
+    return folder
+
+
+@serial
+@pytest.mark.parametrize("name", OTHERS)
+def test_another_problem_is_refused_by_name(left: Path, name: str) -> None:
+    """One sentence that says what differs; asked for by name, the run goes on as the other one."""
+    arguments, words = OTHERS[name]
+    with pytest.raises(InputError, match=rf"is of a run with {words}.*: restart the same run, .*\(changed=True\)"):
+        run(None, 80, restart=left, **arguments)
+    goes_on = run(None, 80, restart=left, changed=True, **arguments)
+    assert len(goes_on.history["t"]) == (81 if name != "dt" else 141)  # after another dt steps are counted anew
+
+
+@serial
+def test_another_size_is_never_allowed(left: Path) -> None:
+    """Another number of unknowns or contact points fits nothing."""
+    with pytest.raises(InputError, match="contact points = 2 but this one has 1: restart the same run, or start a new"):
+        run(None, 80, restart=left, changed=True, problem=chain(left_gap=None))
+
+
+@serial
+def test_what_may_differ(left: Path, tmp_path: Path) -> None:
+    """Round-off of matrices, loads and dt, and the solver."""
+    tiny = 1.0 + 1e-13
+    problem = chain(stiffness=1e3 * tiny, mass=2.0 * tiny, damping=1e-4 / tiny, gap=1e-3 * tiny)
+    again = run(None, 80, restart=left, problem=problem, dt=5e-3 * tiny, solver=Condensed(Hildreth()))
+    assert np.allclose(again.history["u_x_12"], run(None, 80).history["u_x_12"], rtol=1e-6, atol=1e-12)
+
+
+@serial
+def test_one_sample_of_a_record() -> None:
+    """One of 5000 samples is another."""
+    one, two = (identity(chain(excitation=tabulated(peak)), SS22(), 5e-3, start=0.0, end=20.0) for peak in (0.3, 0.4))
+    assert difference(one, two) == ("excitation", "another excitation") and difference(one, one) is None
+
+
+@serial
+def test_texts_of_laws() -> None:
+    """No addresses, no types of numpy 2; numbers are compared with room for round-off, words are not."""
+
+    class Own:
+        """Has the repr that Python gives it."""
+
+    assert "0x" not in text_of(Own()) and text_of(Own()) == text_of(Own())
+
+    @dataclass
+    class Law:
+        """Stands for a law."""
+
+        text: str
+
+        def __repr__(self) -> str:
+            return self.text
+
+    ours: dict[str, Any] = {"law": text_of(Law("Law(mu=np.float64(0.30000000000000004), many=(1e-3, inf))"))}
+    assert difference(ours, {"law": "Law(mu=0.3, many=(0.001, inf))"}) is None
+    for other in ("Law(mu=0.31, many=(0.001, inf))", "Law(mu=0.3, many=(0.001, nan))", "Law(mu=0.3, many=(0.001,))"):
+        assert difference(ours, {"law": other}) is not None
+    assert difference({"numbers": [(1.0, 2.0)]}, {"numbers": "none"}) is not None
+
+
+@serial
+def test_checkpoints_of_the_first_version(left: Path, tmp_path: Path) -> None:
+    """Without format, checksums and the facts that are newer they are read and compared as far as they go."""
+    for path in left.iterdir():
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    (tmp_path / "format.json").unlink()
+    first_version(tmp_path)
+    with pytest.raises(InputError, match="scheme = ZienkiewiczWoodTaylor.phi=0.5. but"):
+        run(tmp_path, 250, restart=True, scheme=SS22())
+    run(tmp_path, 250, restart=True)
+    run(tmp_path / "straight", 250)
+    assert equal_files(tmp_path, tmp_path / "straight")
+
+
+def first_version(folder: Path, change: Callable[[dict[str, Any]], None] | None = None) -> None:
+    """Writes the checkpoint as version 0.1 did, its arrays changed if one likes."""
+    path = folder / "checkpoint.npz"
+    with np.load(path) as stored:
+        arrays = {name: stored[name] for name in stored.files if name != "checksum"}
+    about = json.loads(str(arrays["about"]))
+    for name in ("format", "span", "rows"):
+        about.pop(name, None)
+    about["run"] = {name: about["run"][name] for name in ("unknowns", "contact points", "dt", "scheme", "mass")}
+    arrays["about"] = np.array(json.dumps(about))
+    if change is not None:
+        change(arrays)
+    buffer = io.BytesIO()
+    np.savez(buffer, **arrays)
+    path.write_bytes(buffer.getvalue())
+
+
+CRAFTED: dict[str, Callable[[dict[str, Any]], Any]] = {
+    "short": lambda arrays: arrays.update(u=arrays["u"][:-1]),
+    "long": lambda arrays: arrays.update(r_n=np.zeros(7)),
+    "flat": lambda arrays: arrays.update(u=arrays["u"][:, None]),
+    "missing": lambda arrays: arrays.pop("v"),
+    "without reactions": lambda arrays: arrays.pop("r_n"),
+    "without memory": lambda arrays: [arrays.pop(name) for name in list(arrays) if name.startswith("memory_")],
+    "short memory": lambda arrays: _shorten(arrays),
+    "nan": lambda arrays: arrays["u"].__setitem__(2, np.nan),
+    "integers": lambda arrays: arrays.update(u=arrays["u"].astype(int)),
+    "texts": lambda arrays: arrays.update(u=arrays["u"].astype(str)),
+    "complex": lambda arrays: arrays.update(v=arrays["v"] * 1j),
+    "turned": lambda arrays: arrays.update(v=arrays["v"].astype(">f8")),
+    "objects": lambda arrays: arrays.update(u=np.array([None] * 5)),
+    "numbers for masks": lambda arrays: arrays.update(active=np.array([0.0, 1.0])),
+    "no about": lambda arrays: arrays.pop("about"),
+    "a list": lambda arrays: arrays.update(about=np.array("[]")),
+    "no vectors": lambda arrays: _about(arrays, vectors=["v"]),
+    "unhashable": lambda arrays: _about(arrays, vectors=[["u"]]),
+    "negative": lambda arrays: _about(arrays, base=-3),
+    "no time": lambda arrays: _about(arrays, t=None),
+    "huge": lambda arrays: _about(arrays, k=1e300),
+}
+
+
+def _shorten(arrays: dict[str, Any]) -> None:
+    """The memory of the scheme is no vector any more."""
+    names = [name for name in arrays if name.startswith("memory_")]
+    arrays.update({name: arrays[name][:-1] for name in names})
+    _about(arrays, vectors=["u", "v"])
+
+
+def _about(arrays: dict[str, Any], **changes: Any) -> None:
+    arrays["about"] = np.array(json.dumps(json.loads(str(arrays["about"])) | changes))
+
+
+PLAIN: dict[str, Any] = {"scheme": Trapezoidal(), "problem": chain(impact=None)}
+
+
+@pytest.fixture(scope="module")
+def old(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run of the first version, with a scheme that keeps something in mind."""
+    folder = tmp_path_factory.mktemp("old")
+    run(folder, 20, **PLAIN)
+    first_version(folder)
+    assert run(None, 21, restart=folder, **PLAIN).state.k == 21
+    return folder
+
+
+@serial
+@pytest.mark.parametrize("name", CRAFTED)
+def test_crafted_checkpoints_are_told(old: Path, tmp_path: Path, name: str) -> None:
+    """What no version has written: one sentence, also where no checksum gives it away."""
+    (tmp_path / "checkpoint.npz").write_bytes((old / "checkpoint.npz").read_bytes())
+    first_version(tmp_path, CRAFTED[name])
+    with pytest.raises(InputError, match=r"the checkpoint '.*' is damaged \(.*\): start a new run$"):
+        run(None, 25, restart=tmp_path, **PLAIN)
+
+
+@serial
+def test_checksum_sees_everything() -> None:
+    """Names, types, shapes and values."""
+    one = {"a": np.arange(4.0), "b": np.array("text")}
+    others = [{"c": one["a"], "b": one["b"]}, one | {"a": one["a"].astype(int)}, one | {"a": one["a"].reshape(2, 2)},
+              one | {"a": np.array([0.0, 1.0, 2.0, np.nextafter(3.0, 4.0)])}]
+    assert len({checksum(found) for found in (one, *others)}) == 5 and checksum(one) == checksum(dict(one))
+
+
+# Any number of ranks --------------------------------------------------------------------------------------------------
+
+
+def test_other_ranks_are_the_same_problem(comm: Any) -> None:
+    """All numbers agree with those of one rank, far below what counts as a difference."""
+    pytest.importorskip("dolfinx")
+    from mpi4py import MPI
+
+    def numbers(problem: ContactProblem) -> dict[str, Any]:
+        return identity(problem, ZienkiewiczWoodTaylor(), 1e-3, start=0.0, end=0.5)
+
+    for make in (wall, lambda ranks: replace(rubbing_box(ranks, None), friction=Coulomb(0.3))):
+        spread, alone = numbers(make(comm)), numbers(make(MPI.COMM_SELF))
+        assert difference(spread, alone) is None and spread.keys() == alone.keys()
+        for name, own in alone.items():
+            for (a, size), (b, _) in zip(own, spread[name], strict=True) if isinstance(own, list) else ():
+                assert abs(a - b) <= 1e-11 * size, name
+
+
+def test_another_material_is_refused_on_all_ranks(comm: Any, shared_tmp: Path) -> None:
+    """Other Young's modulus, other friction, and a law of one's own whose text says nothing."""
+    pytest.importorskip("dolfinx")
+    from fem_problems import shaken_wall
+
+    run_wall(comm, shared_tmp, 6)
+    with pytest.raises(InputError, match="is of a run with another stiffness"):
+        run_wall(comm, shared_tmp, 9, problem=shaken_wall(comm, angle=0.3, gap=1e-7, nu=0.2001), restart=True)
+    box = rubbing_box(comm, None)
+    laws = [SlipRateCoulomb(lambda speed, mu=mu: mu + 0.0 * speed) for mu in (0.3, 0.31)]
+    settings: dict[str, Any] = {"scheme": Trapezoidal(), "dt": 1e-3, "steps": 2, "out": shared_tmp / "box"}
+    simulate(replace(box, friction=laws[0]), **settings)
+    with pytest.raises(InputError, match="is of a run with another friction: restart"):
+        simulate(replace(box, friction=laws[1]), restart=True, **settings)
+    with pytest.raises(InputError, match=r"friction law = SlipRateCoulomb.* but this one has Coulomb\(mu=0.3\)"):
+        simulate(replace(box, friction=Coulomb(0.3)), restart=True, **settings)
