@@ -30,10 +30,10 @@ VERSION: tuple[int, ...] = tuple(int(part) for part in dolfinx.__version__.split
 _BASIX_ELEMENTS = VERSION >= (0, 7)
 _DOFMAP_PER_CELL_TYPE = VERSION >= (0, 11)
 
-# A process waits for the form that another one compiles: longer than 10 s, which a busy machine takes for a large one.
+# Seconds to wait for a form that another process compiles: a busy machine may take more than the 10 of the default.
 _jit: Any = dolfinx.jit
 _defaults = _jit.DOLFINX_DEFAULT_JIT_OPTIONS if VERSION >= (0, 6) else _jit.DOLFINX_DEFAULT_JIT_PARAMETERS
-_defaults["timeout"] = (600, "Timeout for JIT compilation [s]")
+_defaults["timeout"] = (120, "Timeout for JIT compilation [s]")
 
 
 # Meshes ---------------------------------------------------------------------------------------------------------------
