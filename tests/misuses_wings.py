@@ -31,7 +31,8 @@ from vi_contact.models.square import Square
 SQUARE = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
 EIGHT = [(0.0, 0.0), (1.0, 1.0), (1.0, 0.0), (0.0, 1.0)]
 MATERIAL = vc.LinearElastic.from_wave_speeds(1.0, 0.5, 1.0)
-MASK = {"text": "bottom", "numbers": [0, 1], "short": np.ones(3, bool), "reals": np.ones(8), "class": list}
+RAGGED = {"ragged": [[1.0], [1.0, 2.0]]}
+MASK = RAGGED | {"text": "bottom", "numbers": [0, 1], "short": np.ones(3, bool), "reals": np.ones(8), "class": list}
 OTHER = but(NEEDED, "list")
 BODY = {"mesh": OTHER | {"corners": SQUARE}, "material": OTHER}
 STEPS = COUNT | {"none": None}
@@ -45,24 +46,27 @@ def function(wrong: dict[str, Any]) -> dict[str, Any]:
 def meshes() -> Table:
     """Boundaries and their methods."""
     mesh = bem.polygon(SQUARE, 0.5)
-    points = {"text": "abc", "number": 1.0, "nan": [(nan, 0.0), (1, 0), (0, 1)], "line": [(0, 0), (1, 0), (2, 0)],
+    points = RAGGED | {"text": "abc", "number": 1.0, "nan": [(nan, 0.0), (1, 0), (0, 1)],
+              "line": [(0, 0), (1, 0), (2, 0)],
               "space": np.eye(3), "eight": EIGHT, "two": [(0, 0), (1, 1)], "none": None, "class": list}
     return [
         (bem.polygon, {"corners": SQUARE, "h": 0.5}, {
             "corners": points | {"backwards": SQUARE[::-1]}, "exterior": FLAG | {"other": True},
-            "h": but(POSITIVE, "list", "huge") | {"one": [1], "texts": ["a"] * 4, "endless": 1e-12, "none": None}}),
+            "h": but(POSITIVE, "list", "huge") | RAGGED | {
+                "one": [1], "texts": ["a"] * 4, "endless": 1e-12, "none": None}}),
         (bem.BoundaryMesh, {"points": SQUARE}, {
-            "points": points, "loop_sizes": {"text": "4", "half": (2.5, 1.5), "other": (3,)}, "exterior": FLAG,
-            "labels": {"text": "abcd", "short": [1, 2], "half": [0.5, 1, 2, 3]}}),
+            "points": points, "loop_sizes": RAGGED | {"text": "4", "half": (2.5, 1.5), "other": (3,)}, "exterior": FLAG,
+            "labels": RAGGED | {"text": "abcd", "short": [1, 2], "half": [0.5, 1, 2, 3]}}),
         (bem.circle, {"radius": 1.0, "count": 8}, {
             "radius": but(POSITIVE, "list", "complex") | {"endless": 1e200}, "exterior": FLAG,
-            "count": COUNT | {"two": 2, "endless": 10**9}, "centre": {"text": "ab", "number": 1.0, "nan": (nan, 0.0)}}),
+            "count": COUNT | {"two": 2, "endless": 10**9},
+            "centre": {"text": "ab", "number": 1.0, "nan": (nan, 0.0)} | RAGGED}),
         (bem.smooth_curve, {"curve": lambda t: np.stack([np.cos(6.283 * t), np.sin(6.283 * t)], 1), "count": 8}, {
             "curve": function({"numbers": np.zeros(8), "nan": np.full((8, 2), nan), "a text": "round"}),
             "count": COUNT | {"two": 2}}),
         (bem.from_segments, {"points": SQUARE, "segments": [(0, 1), (1, 2), (2, 3), (3, 0)]}, {
             "points": {"text": "ab", "flat": [1.0, 2.0], "nan": [(nan, 0.0)] * 4}, "labels": {"text": "ab", "one": [1]},
-            "segments": {"text": "ab", "far": [(0, 9), (9, 0)], "negative": [(0, -1)], "half": [(0, 0.5)]}}),
+            "segments": RAGGED | {"text": "ab", "far": [(0, 9), (9, 0)], "negative": [(0, -1)], "half": [(0, 0.5)]}}),
         (mesh.nodes_of, {"elements": np.ones(8, bool)}, {"elements": MASK}),
         (mesh.node_normals, {"elements": np.ones(8, bool)}, {"elements": {"numbers": [0, 1]}}),
         (mesh.elements_where, {"chosen": lambda x: x[:, 0] > 0.5}, {"chosen": function({"numbers": np.ones(8)})}),
@@ -79,7 +83,8 @@ def operators() -> Table:
     problem = bem.BoundaryProblem(steklov, still, contact=mesh.labels == 0)
     motion, quadrature = problem.solve(), bem.ConvolutionQuadrature()
     wave = bem.convolution_operator(mesh, MATERIAL, quadrature=quadrature, dt=0.5, steps=2)
-    histories = {"text": "up", "nan": np.full((2, 2, 8), nan), "flat": np.zeros(16), "short": np.zeros((2, 2, 7)),
+    histories = RAGGED | {"text": "up", "nan": np.full((2, 2, 8), nan), "flat": np.zeros(16),
+                 "short": np.zeros((2, 2, 7)),
                  "texts": np.full((2, 2, 8), "a"), "none": None, "complex": 1j * np.ones((2, 2, 8))}
     speed = {"c_p": POSITIVE | {"slow": 0.1}, "c_s": POSITIVE}
     fields = {"fixed": MASK, "contact": MASK, "prescribed": but(histories, "none")}
@@ -109,7 +114,7 @@ def operators() -> Table:
         (quadrature.frequencies, {"dt": 0.1, "steps": 2}, {"dt": POSITIVE, "steps": STEPS}),
         (bem.interior_displacement, {"operator": steklov, "motion": motion, "points": [(0.5, 0.4)]}, {
             "operator": OTHER, "motion": OTHER, "steps": {"text": "ab", "far": [7], "half": [0.5]},
-            "points": {"text": "middle", "nan": [(nan, 0.0)], "space": np.eye(3), "outside": [(2.0, 2.0)]}}),
+            "points": RAGGED | {"text": "middle", "nan": [(nan, 0.0)], "space": np.eye(3), "outside": [(2.0, 2.0)]}}),
         (bem.save_blocks, {"path": "none/blocks.h5", "blocks": blocks}, {
             "path": {"missing folder": Path("/nowhere/at/all.h5"), "number": 3, "empty": "", "class": Path},
             "blocks": OTHER}),
@@ -136,7 +141,8 @@ def contacts() -> Table:
             "compliance": OTHER | {"problem": problem}, "obstacle": NEEDED, "friction": NEEDED, "towards": FUNCTION,
             "along": FUNCTION, "bilateral": FLAG, "conditions": THING}),
         (bem.Conditions, {"nodes": [0], "normals": [(0.0, -1.0)], "lengths": [1.0]}, {
-            "nodes": {"text": "a", "negative": [-1], "half": [0.5]}, "normals": {"text": "down", "flat": [0.0, -1.0]},
+            "nodes": RAGGED | {"text": "a", "negative": [-1], "half": [0.5]},
+            "normals": {"text": "down", "flat": [0.0, -1.0]},
             "lengths": {"nan": [nan], "two": [1.0, 1.0]}}),
         (conditions_on, {"compliance": compliance}, {"compliance": OTHER}),
         (bem.march_contact, {"contact": contact},
@@ -200,7 +206,7 @@ def beams() -> Table:
         (beam.rod_forces, {"rod": rod, "elements": few, "dt": 0.01, "steps": 2},
          runs | {"dt": POSITIVE, "steps": STEPS, "scheme": but(THING, "list")}),
         (beam.StepForces, {"dt": 0.1, "forces": (1.0, 2.0)},
-         {"dt": POSITIVE, "forces": {"text": "ab", "nan": (nan,), "number": 1.0}}),
+         {"dt": POSITIVE, "forces": RAGGED | {"text": "ab", "nan": (nan,), "number": 1.0}}),
         (beam.reading_c, {"dt": 0.1}, {"dt": POSITIVE}),
     ]
 
@@ -211,13 +217,13 @@ def layers() -> Table:
     system = {"mass": one, "rho": lambda q: float(q[0]), "gradient": lambda q: np.ones(1)}
     ready, body = ConstrainedSystem(**system), {"mass": 1.0, "inertia": (1.0, 1.0, 1.0), "point": (0.0, 0.0, -0.1)}
     law = contact_layer(1.0, mass=1.0, speed=1.0, width=0.1)
-    values = {"text": "ab", "nan": [nan], "number": 1.0, "none": None}
+    values = RAGGED | {"text": "ab", "nan": [nan], "number": 1.0, "none": None}
     two = {"two coordinates or velocities": [1.0, 2.0]}
     motion = {"q0": [1.0], "v0": [0.5]}
     size = {"mass": POSITIVE | {"endless": 1e300}, "speed": POSITIVE | {"endless": 1e300}}
     made = {"e": 0.5, "mass": 1.0, "speed": 1.0, "width": 0.1}
     rest = {"e": POSITIVE | {"more": 1.1, "least": 1e-12}, "width": POSITIVE}
-    three = {"text": "abc", "number": 1.0, "nan": (nan, 0.0, 1.0), "two": (1.0, 1.0)}
+    three = RAGGED | {"text": "abc", "number": 1.0, "nan": (nan, 0.0, 1.0), "two": (1.0, 1.0)}
     return [
         (Layer, {"width": 0.1, "k": 1.0}, {
             "width": POSITIVE, "k": NOT_NEGATIVE | {"nothing": 0.0}, "c": NOT_NEGATIVE, "speed": but(POSITIVE, "none"),

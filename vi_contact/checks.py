@@ -139,6 +139,14 @@ def array(owner: str, meaning: str, value: Any, shape: tuple[int | None, ...], *
     return found
 
 
+def shape_of(value: Any) -> tuple[int, ...]:
+    """The shape of numbers in lists or arrays; (-1,) for lists of different lengths, which have none."""
+    try:
+        return np.shape(value)
+    except ValueError:
+        return (-1,)
+
+
 def integers(owner: str, meaning: str, value: Any, shape: tuple[int | None, ...]) -> Indices:
     """Return whole numbers as an integer array of this shape; 3.0 counts as one."""
     found = array(owner, meaning, value, shape)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..algebra import Array
-from ..checks import array, attributes, function
+from ..checks import array, attributes, function, shape_of
 
 Profile = Callable[[Array], Array]
 
@@ -94,5 +94,5 @@ class Start:
     def at(self, name: str, x: Array) -> Array:
         """One of the four at the nodes; InputError unless it gives finite numbers, one per node or one for all."""
         values = getattr(self, name)(x)
-        shape = () if np.ndim(values) == 0 else x.shape
+        shape = () if shape_of(values) == () else x.shape
         return np.broadcast_to(array("Start", f"what {name}(x) returns", values, shape), x.shape).copy()

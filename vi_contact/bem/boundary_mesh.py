@@ -16,7 +16,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..checks import array, counted, flag, function, integers, mask, number, whole
+from ..checks import array, counted, flag, function, integers, mask, number, shape_of, whole
 from ..errors import InputError
 from .loops import check_orientation, check_simple, check_size, ordered_loops
 
@@ -48,7 +48,7 @@ class BoundaryMesh:
         if min(sizes) < 3 or sum(sizes) != len(points):
             raise InputError(f"BoundaryMesh: loops of {sizes} nodes, {len(points)} points; a loop has three or more")
         flag("BoundaryMesh", "exterior", self.exterior)
-        labels = _labels("BoundaryMesh", self.labels, len(points), "element") if np.size(self.labels) else None
+        labels = _labels("BoundaryMesh", self.labels, len(points), "element") if shape_of(self.labels) != (0,) else None
         labels = np.zeros(len(points), np.int64) if labels is None else labels
         for name, value in (("points", points), ("loop_sizes", sizes), ("labels", labels)):
             object.__setattr__(self, name, value)
@@ -167,7 +167,7 @@ def polygon(corners: ArrayLike, h: float | Sequence[int], *, exterior: bool = Fa
     if len(start) < 3:
         raise InputError(f"polygon: {len(start)} corners; give three or more")
     sides = np.roll(start, -1, axis=0) - start
-    if isinstance(h, Sequence | np.ndarray) and not isinstance(h, str) and np.ndim(h):
+    if isinstance(h, Sequence | np.ndarray) and not isinstance(h, str) and shape_of(h) != ():
         if len(h) != len(start):
             raise InputError(f"polygon: {len(start)} sides need as many numbers of elements, {len(h)} were given")
         counts = np.array([whole("polygon", "the number of elements of a side", one, least=1) for one in h])

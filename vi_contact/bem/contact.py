@@ -52,8 +52,10 @@ class Conditions:
         nodes = integers("Conditions", "nodes", self.nodes, (None,))
         if len(nodes) and nodes.min() < 0:
             raise InputError(f"Conditions: nodes has {nodes.min()}; give numbers of contact nodes from 0 on")
-        array("Conditions", "normals", self.normals, (len(nodes), 2))
-        array("Conditions", "lengths", self.lengths, (len(nodes),), unit="m")
+        normals = array("Conditions", "normals", self.normals, (len(nodes), 2))
+        lengths = array("Conditions", "lengths", self.lengths, (len(nodes),), unit="m")
+        for name, value in (("nodes", nodes), ("normals", normals), ("lengths", lengths)):
+            object.__setattr__(self, name, value)
 
 
 def conditions_on(mesh: BoundaryMesh, compliance: CondensedCompliance, *sides: ArrayLike) -> Conditions:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..checks import array, counted, flag, instance, mask
+from ..checks import array, counted, flag, instance, mask, shape_of
 from ..errors import InputError
 from ..materials import LinearElastic
 from .boundary_mesh import BoundaryMesh
@@ -49,7 +49,7 @@ class ConvolutionOperator:
         instance("ConvolutionOperator", "frequencies", self.frequencies, Frequencies, "give Frequencies(...)")
         n, table = len(self.mesh), self.frequencies.s.shape
         for name, rows in (("steklov", 2 * n), ("to_traction", 4 * n)):
-            if np.shape(getattr(self, name)) != (*table, rows, 2 * n):
+            if shape_of(getattr(self, name)) != (*table, rows, 2 * n):
                 raise InputError(f"ConvolutionOperator: {name} has shape {np.shape(getattr(self, name))}; this mesh "
                                  f"and these frequencies need {(*table, rows, 2 * n)}: use convolution_operator(...)")
 
@@ -72,7 +72,8 @@ class ConvolutionOperator:
 
     def solve(self, forces: ArrayLike) -> Array:
         """(steps, 2, n) displacements under nodal forces (steps, 2, n): the inverse, no support anywhere."""
-        return ConvolutionProblem(self, np.asarray(forces)).solve().displacement
+        given = array("ConvolutionOperator.solve", "forces", forces, (None, 2, len(self.mesh)), unit="N/m")
+        return ConvolutionProblem(self, given).solve().displacement
 
 
 def convolution_operator(
@@ -134,7 +135,7 @@ class ConvolutionProblem:
         owner, operator = "ConvolutionProblem", self.operator
         instance(owner, "operator", operator, ConvolutionOperator, "give one of convolution_operator(...)")
         n, steps, stages = len(self.operator.mesh), self.operator.steps, self.operator.frequencies.s.shape[1]
-        means = (steps, stages, 2, n) if np.ndim(self.forces) == 4 else (steps, 2, n)
+        means = (steps, stages, 2, n) if len(shape_of(self.forces)) == 4 else (steps, 2, n)
         object.__setattr__(self, "forces", array(owner, "forces", self.forces, means, unit="N/m"))
         if self.prescribed is not None:
             array(owner, "prescribed", self.prescribed, (steps, 2, n), unit="m")

@@ -19,7 +19,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..checks import attributes, function, instance, number, whole
+from ..checks import attributes, function, instance, number, shape_of, whole
 from ..errors import InputError
 from .time_methods import BDF2, Contour, RadauIIA, TimeMethod, Trapezoid
 
@@ -127,8 +127,8 @@ class ConvolutionQuadrature:
         shares = np.diff(self.method.abscissae, prepend=0.0)
         parts = np.rint(shares / shares.min()).astype(int)
         fine = forces(dt / parts.sum(), steps * int(parts.sum()))
-        if len(np.shape(fine)) < 1 or len(fine) != steps * parts.sum():
-            raise InputError(f"{owner}: forces(dt, {steps * parts.sum()}) has shape {np.shape(fine)}; return one mean "
+        if not shape_of(fine) or len(fine) != steps * parts.sum():
+            raise InputError(f"{owner}: forces(dt, {steps * parts.sum()}) has shape {shape_of(fine)}; return one mean "
                              "for each step")
         fine = fine.reshape(steps, int(parts.sum()), *fine.shape[1:])
         starts = np.concatenate([[0], np.cumsum(parts)[:-1]])

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, lu_factor, lu_solve
 
-from ..checks import array, attributes, counted, flag, instance, mask, number, whole
+from ..checks import array, attributes, counted, flag, instance, mask, number, shape_of, whole
 from ..errors import InputError
 from ..materials import LinearElastic
 from .boundary_mesh import BoundaryMesh
@@ -51,10 +51,10 @@ class EnergeticBlocks:
     def __post_init__(self) -> None:
         instance("EnergeticBlocks", "mesh", self.mesh, BoundaryMesh, "give a BoundaryMesh")
         attributes(self, positive=("c_p", "c_s", "dt"))
-        n, steps = len(self.mesh), np.shape(self.single)[:1]
+        n, steps = len(self.mesh), shape_of(self.single)[:1]
         shapes = {"single": (*steps, 4 * n, 4 * n), "double": (*steps, 4 * n, 2 * n), "hyper": (*steps, 2 * n, 2 * n)}
         for name, shape in shapes.items():
-            found = np.shape(getattr(self, name))
+            found = shape_of(getattr(self, name))
             if found != shape and not (name == "hyper" and self.hyper is None):
                 raise InputError(f"EnergeticBlocks: {name} has shape {found}; a mesh of {n} elements needs {shape}: "
                                  "use energetic_blocks(...)")
@@ -129,7 +129,7 @@ class Marching:
         if symmetric and blocks.hyper is None:
             raise InputError("these boundary element blocks have no hypersingular operator; assemble them with "
                              "hyper=True or use the unsymmetric form")
-        fixed = mask("Marching", "fixed", np.ravel(fixed), (2 * len(blocks.mesh),))
+        fixed = mask("Marching", "fixed", fixed, (2 * len(blocks.mesh),))
         self.blocks, self.symmetric, self.free = blocks, symmetric, ~fixed
         self.mass = blocks.mesh.mass
         self.v0 = cho_factor(0.5 * (blocks.single[0] + blocks.single[0].T))

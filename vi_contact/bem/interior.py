@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csc_matrix
 
-from ..checks import array, instance, integers
+from ..checks import array, instance, integers, shape_of
 from ..errors import InputError
 from .boundary_mesh import BoundaryMesh
 from .boundary_operators import N_SINGLE, double_local, joined, stacked
@@ -32,7 +32,7 @@ def interior_displacement(
     instance(owner, "operator", operator, PoincareSteklov, "give PoincareSteklov(blocks, rho)")
     instance(owner, "motion", motion, BoundaryMotion, "give the answer of BoundaryProblem.solve()")
     mesh, blocks = operator.mesh, operator.blocks
-    x = array(owner, "points", np.atleast_2d(points), (None, 2), unit="m")
+    x = array(owner, "points", points, (2,) if shape_of(points) == (2,) else (None, 2), unit="m").reshape(-1, 2)
     _check_inside(mesh, x)
     wanted = np.arange(len(motion.times)) if steps is None else integers(owner, "steps", steps, (None,))
     if len(wanted) and not 0 <= wanted.min() <= wanted.max() < len(motion.times):

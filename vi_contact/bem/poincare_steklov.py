@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..checks import array, flag, instance, mask, number
+from ..checks import array, flag, instance, integers, mask, number
 from ..errors import InputError
 from .boundary_mesh import BoundaryMesh
 from .energetic import EnergeticBlocks, Marching, Motion, summed
@@ -105,7 +105,8 @@ class CondensedCompliance:
     turns: Array | None = None
 
     def __post_init__(self) -> None:
-        owner, m = "CondensedCompliance", np.size(self.nodes)
+        owner = "CondensedCompliance"
+        m = len(integers(owner, "nodes", self.nodes, (None,)))
         steps = len(array(owner, "W", self.W, (None, 2 * m, 2 * m), unit="m²/N"))
         array(owner, "u_free", self.u_free, (steps, 2 * m), unit="m")
         for name in ("points", "normals"):

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from ..algebra import Array
-from ..checks import array, number
+from ..checks import array, number, shape_of
 from ..errors import InputError
 from .layer import sized
 from .metric import normal_mass
@@ -65,7 +65,7 @@ class RigidBody:
     def __post_init__(self) -> None:
         owner = "RigidBody"
         sized(owner, "the body's mass", self.mass, "kg")
-        array(owner, "inertia", self.inertia, (3, 3) if np.ndim(self.inertia) == 2 else (3,), unit="kg m²")
+        array(owner, "inertia", self.inertia, (3, 3) if len(shape_of(self.inertia)) == 2 else (3,), unit="kg m²")
         if not callable(self.point) or isinstance(self.point, type):
             array(owner, "point", self.point, (3,), unit="m")
         for name in ("normal", "gravity"):
