@@ -350,7 +350,9 @@ def runs() -> Table:
         }),
         (vc.ContactProblem, {"system": chain.system, "surface": chain.surface}, {"surface": {
             "unknowns of others": far, "slots": replace(far, owned=np.array([0]), slots=np.array([5])),
-            "weights": replace(chain.surface, weights=np.ones(3)), "points": replace(chain.surface,
+            "weights": replace(chain.surface, weights=np.ones(3)), "weights below zero": replace(
+                chain.surface, weights=-chain.surface.weights), "compliance": replace(
+                chain.surface, compliance=chain.surface.compliance - 1.0), "points": replace(chain.surface,
             points=np.zeros((1, 2))),
             "gaps": replace(chain.surface, gap0=np.array([nan]))}, "system": {
             "velocities": replace(chain.system, v0=np.zeros(2)), "influence": replace(chain.system,
@@ -375,6 +377,8 @@ def runs() -> Table:
             "texts for a solver": ["a", "b"], "none": None},
             "scheme": THING, "dt": STEP, "steps": {"text": "3", "half": 2.5}, "state": states(), "bound": POSITIVE,
             "opinions": {"number": 3.0, "texts": ["bem"], "none": None}}),
+        (vc.static_equilibrium, {"problem": b.problem},
+         {"problem": NEEDED, "solver": but(THING, "none"), "t": NUMBER, "tolerance": POSITIVE}),
         (vc.quasi_static, {"problem": b.problem, "times": [0.0, 1.0]}, {
             "problem": NEEDED, "times": {"number": 1.0, "text": "01", "back": [1.0, 0.5], "texts": ["a"], "none": None},
             "solver": but(THING, "none"), "state": states(), "tolerance": POSITIVE}),

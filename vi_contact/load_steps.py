@@ -21,7 +21,6 @@ from .certified import TOLERANCE
 from .checks import real, shown
 from .errors import InputError
 from .run_checks import check_methods, check_problem_given, check_sizes
-from .solvers.condensed import Condensed
 from .static import Equilibria, initial_state
 from .step import ContactProblem, Solver, State
 
@@ -62,7 +61,6 @@ def quasi_static(
     else:
         check_sizes("quasi_static", problem, state)
     order = _checked(times, state.t)
-    solver = Condensed() if solver is None else solver
     return _stages(Equilibria(problem, solver=solver, tolerance=tolerance), state, order)
 
 

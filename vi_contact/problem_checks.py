@@ -91,7 +91,7 @@ def _of_surface(surface: ContactSurface, system: SemiDiscreteSystem) -> Iterator
     """What is wrong with a surface on this rank, and with its places in the unknowns of the system."""
     m, d, n, k = surface.count, system.influence.shape[1], system.rows, len(surface.owned)
     shapes: dict[str, tuple[int, ...]] = {"points": (m, d), "normals": (m, d), "slots": (k,), "tangents": (k, d - 1)}
-    shapes |= dict.fromkeys(("weights", "bilateral", "compliance"), (m,))
+    shapes |= dict.fromkeys(("gap0", "weights", "bilateral", "compliance"), (m,))
     yield from _sizes("the contact surface", {name: getattr(surface, name) for name in shapes}, shapes)
     for name, least, most in (("owned", 0, n), ("tangents", -1, n), ("slots", 0, m)):
         values = getattr(surface, name)
@@ -100,3 +100,5 @@ def _of_surface(surface: ContactSurface, system: SemiDiscreteSystem) -> Iterator
                    f"{most - 1}: it was made for a system of another size")
     if np.isnan(np.sum(surface.gap0)):
         yield "the contact surface has NaN in gap0: check the obstacle's gap function"
+    if not (np.all(surface.weights > 0.0) and np.all(surface.compliance >= 0.0)):
+        yield "the contact surface has weights that are not above zero, or a compliance below: give lengths or areas"

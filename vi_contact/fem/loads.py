@@ -104,10 +104,13 @@ class Prescribed:
 
 def _same(one: Value, other: Value) -> bool:
     """Whether two values are one, or equal constants; a function that is not given is zero."""
-    if callable(one) and callable(other):
-        return one == other
-    constants = [0.0 if value is _zero else value for value in (one, other)]
-    return not any(callable(value) for value in constants) and bool(np.all(constants[0] == np.asarray(constants[1])))
+    if callable(one) or callable(other):
+        return bool(one == other) or (_at_rest(one) and _at_rest(other))
+    return np.array_equal(one, other)
+
+
+def _at_rest(value: Value) -> bool:
+    return value is _zero or (not callable(value) and not np.any(value))
 
 
 @dataclass(frozen=True)
