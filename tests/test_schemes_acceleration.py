@@ -18,7 +18,7 @@ from oscillator import SHAKEN
 from shaken import changes, shaken
 
 from vi_contact.algebra import Array
-from vi_contact.checkpoint import Place, read_checkpoint, write_checkpoint
+from vi_contact.checkpoint import Place, Problem, read_checkpoint, write_checkpoint
 from vi_contact.errors import InputError
 from vi_contact.exact.columns import ObliqueImpact
 from vi_contact.friction import Coulomb
@@ -213,8 +213,9 @@ def test_restart_from_a_checkpoint(tmp_path: Path, mass: Any, scheme: Any) -> No
     states = [report.new for report in run(problem, scheme, dt=1 / 60, steps=120)]
     assert any(state.active.any() for state in states[70:90])
     assert all(isinstance(array, np.ndarray) for array in states[80].memory.values())
-    write_checkpoint(tmp_path, problem, Place.first(states[80]), scheme=scheme, dt=1 / 60)
-    state = read_checkpoint(tmp_path, problem, scheme=scheme, dt=1 / 60).state
+    of = Problem.of(problem, scheme, 1 / 60, start=states[0].t, end=states[-1].t)
+    write_checkpoint(tmp_path, problem, Place.first(states[80]), of=of)
+    state = read_checkpoint(tmp_path, problem, scheme=scheme, dt=1 / 60)[0].state
     again = [report.new for report in run(problem, scheme, dt=1 / 60, steps=39, state=state)]
     assert all(np.array_equal(a, b) for a, b in zip(_numbers(again[-1]), _numbers(states[-1]), strict=True))
 
