@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 """Boundary elements: accuracy and cost against the numbers of elements and steps; boundedness over long times.
 
-    python3 benchmarks/bem.py [--sides 5 10 20 40] [--steps 60 120 240] [--long]
+    python3 benchmarks/bem.py [--sides 5 10 20 40] [--steps 60 120 240] [--long] [--thin]
 
 Unit square, c_P = 1, c_S = 1/2, rho = 1, k elements a side, c_P dt = h, symmetric form; one thread; a row is a process
 of its own, seconds are processor time. Errors are relative L2 norms over all nodes and steps: oblique plane pulses of
 duration 2 up to T = 4 without supports; top of a rod between rollers under a step and a sin² load up to T = 6. --steps
-adds rows with k = 10 and other numbers of steps; --long the rod up to T = 60 for c_P dt / h from 0.1 to 4.
+adds rows with k = 10 and other numbers of steps; --long the rod up to T = 60 for c_P dt / h from 0.1 to 4;
+--thin a rod of widths down to h/20, the sin² load, with c_P dt = h and h/2 and by Radau IIA, c_P dt = h.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
 import numpy as np  # noqa: E402
 from plane_waves import MATERIAL, SQUARE, pulse  # noqa: E402
+from test_bem_convolution import rod as convolution_rod  # noqa: E402
 from test_bem_energetic import echoes, rod, smooth_integral, smooth_load  # noqa: E402
 
 from vi_contact import bem  # noqa: E402
@@ -92,11 +94,28 @@ def long_run(ratio: float, *, k: int = 5, end: float = 60.0) -> str:
             f"{motion.work[early].max():.4f} {motion.work[late].max():.4f}")
 
 
+def thin(share: float, *, h: float = 0.1, end: float = 6.0) -> str:
+    """Error of the top of a rod of the width h/share, by both methods."""
+    half = 0.5 * h / share
+    mesh, errors = bem.polygon([(-half, -0.5), (half, -0.5), (half, 0.5), (-half, 0.5)], h), []
+    for dt in (h, 0.5 * h):
+        blocks = bem.energetic_blocks(mesh, MATERIAL, dt=dt, steps=round(end / dt))
+        errors.append(rod_errors(blocks)["sin²"])
+    operator = bem.convolution_operator(mesh, MATERIAL, quadrature=bem.ConvolutionQuadrature(), dt=h,
+                                        steps=round(end / h))
+    motion = convolution_rod(operator, smooth_load).solve()
+    exact = echoes(motion.times, smooth_integral)[:, None]
+    top = motion.displacement[:, 1][:, mesh.nodes_of(mesh.labels == 2)]
+    errors.append(float(np.linalg.norm(top - exact) / np.linalg.norm(np.broadcast_to(exact, top.shape))))
+    return " ".join(f"{value:9.3g}" for value in (1.0 / share, *errors))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sides", type=int, nargs="*", default=[5, 10, 20])
     parser.add_argument("--steps", type=int, nargs="*", default=[60, 120, 240])
     parser.add_argument("--long", action="store_true")
+    parser.add_argument("--thin", action="store_true")
     parser.add_argument("--one", type=int, nargs=3, help=argparse.SUPPRESS)
     chosen = parser.parse_args()
     if chosen.one:
@@ -112,6 +131,10 @@ def main() -> None:
         print("\nc_P dt/h, steps, greatest displacement early and late, work early and late")
         for ratio in (0.1, 0.25, 1.0, 4.0):
             print(long_run(ratio), flush=True)
+    if chosen.thin:
+        print("\nwidth/h, error of the energetic method with c_P dt = h and h/2, of Radau IIA")
+        for share in (1.0, 2.0, 5.0, 10.0, 20.0):
+            print(thin(share), flush=True)
 
 
 if __name__ == "__main__":
