@@ -23,8 +23,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the sou
 from mpi4py import MPI
 
 import vi_contact as vc
+from demos.pictures.bars import plot_bounces
 from vi_contact.models.bar import Bar, build
-from vi_contact.plotting_bars import plot_bounces
 
 # Parameters ----------------------------------------------------------------------------------------------------------
 BAR = Bar(vc.PeriodicBar(), elements=100, dimension=1)  # dimension=2: a strip of 3 elements across

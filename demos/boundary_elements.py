@@ -25,10 +25,10 @@ from matplotlib.path import Path as Outline
 from mpi4py import MPI
 
 import vi_contact as vc
+from demos.pictures.boundary import SHEAR, Curve, Panel, Shot, plot_boundary_snapshots, plot_panels
 from vi_contact import bem
 from vi_contact.models import disk, embedded, square
 from vi_contact.models.boundary_elements import disk_contact, disk_problem, embedded_problem, square_problem
-from vi_contact.plotting_boundary import SHEAR, Curve, Panel, Shot, plot_boundary_snapshots, plot_panels
 
 # Parameters ----------------------------------------------------------------------------------------------------------
 ELEMENTS = {"square": 20, "steel": 10, "concrete": 10, "ball": 80}  # along a side, around the ball

@@ -23,9 +23,9 @@ import numpy as np
 from mpi4py import MPI
 
 import vi_contact as vc
+from demos.pictures.layer import plot_layered_bar, plot_thin_limit
 from vi_contact.models import wall
 from vi_contact.models.bar import Bar, build
-from vi_contact.plotting_layer import plot_layered_bar, plot_thin_limit
 
 # Parameters ----------------------------------------------------------------------------------------------------------
 BARS = (Bar(vc.ThrownBar(), elements=100), Bar(vc.BouncingBar(), elements=100))

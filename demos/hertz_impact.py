@@ -20,8 +20,8 @@ import numpy as np
 from mpi4py import MPI
 
 import vi_contact as vc
+from demos.pictures.impact import ImpactCurves, plot_impact
 from vi_contact.models.ball import SHARE, Ball, BallModel, build, quasi_static
-from vi_contact.plotting_impact import ImpactCurves, plot_impact
 
 # Parameters ----------------------------------------------------------------------------------------------------------
 BALL = Ball(radius=0.01, speed=0.1, material=vc.LinearElastic(E=2.1e11, nu=0.3, rho=7800.0))

@@ -20,7 +20,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the sou
 import numpy as np
 
 import vi_contact as vc
-from vi_contact.plotting_layer import plot_cut_off, plot_parameters, plot_particle
+from demos.pictures.layer import plot_cut_off, plot_parameters
+from vi_contact.plotting_layer import plot_particle
 
 # Parameters ----------------------------------------------------------------------------------------------------------
 STIFFNESSES = (0.5, 1.0, 2.0, 5.0, 10.0)  # k [N/m]

@@ -20,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the sou
 import numpy as np
 
 import vi_contact as vc
-from vi_contact.plotting_layer import plot_bounces_of_body, plot_thin_limit
+from demos.pictures.layer import plot_bounces_of_body, plot_thin_limit
 
 # Parameters ----------------------------------------------------------------------------------------------------------
 BODY = vc.RigidBody(mass=2.0, inertia=(0.2, 0.3, 0.4), point=(0.3, -0.2, -0.5))  # V5.2

@@ -52,13 +52,13 @@ def test_every_axis_has_a_label(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     from vi_contact import plotting_beam
 
     seen: list[Any] = []
-    save = plotting._save
+    save = plotting.save
 
     def keep(figure: Any, path: Any) -> Path:
         seen.append(figure)
         return save(figure, path)
 
-    monkeypatch.setattr(plotting_beam, "_save", keep)
+    monkeypatch.setattr(plotting_beam, "save", keep)
     stepper = beam.BeamStepper(beam.TimoshenkoBeam(), beam.Elements(10), 0.01, lambda t: 5.0, lambda t, rate: 0.2)
     run = beam.run_beam(stepper, beam.published_start(), steps=40, every=4)
     plotting_beam.plot_beam_energies({"one": run}, tmp_path / "energy.png", title="Energy")

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from test_demos import demo
 
+from demos.pictures.layer import plot_thin_limit
 from vi_contact.cli import main
-from vi_contact.plotting_layer import plot_thin_limit
 
 serial = pytest.mark.serial
 

@@ -42,13 +42,13 @@ def history(n: int = 401, m: int = 11) -> dict[str, Any]:
 def figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """The figures that were saved, kept open to be looked into."""
     seen: list[Any] = []
-    save = plotting._save
+    save = plotting.save
 
     def keep(figure: Any, path: Any) -> Path:
         seen.append(figure)
         return save(figure, path)
 
-    monkeypatch.setattr(plotting, "_save", keep)
+    monkeypatch.setattr(plotting, "save", keep)
     return seen
 
 

@@ -58,10 +58,10 @@ def figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
 
     def keep(figure: Any, path: Any) -> Path:
         seen.append(figure)
-        return plotting._save(figure, path)
+        return plotting.save(figure, path)
 
     for module in ("plotting_channel", "plotting_channel_mesh"):
-        monkeypatch.setattr(f"vi_contact.{module}._save", keep)
+        monkeypatch.setattr(f"vi_contact.{module}.save", keep)
     return seen
 
 

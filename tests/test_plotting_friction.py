@@ -42,13 +42,13 @@ def cycles(n: int = 401, m: int = 6) -> dict[str, Any]:
 def figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """The figures that were saved, kept open to be looked into."""
     seen: list[Any] = []
-    save = plotting_friction._save
+    save = plotting_friction.save
 
     def keep(figure: Any, path: Any) -> Path:
         seen.append(figure)
         return save(figure, path)
 
-    monkeypatch.setattr(plotting_friction, "_save", keep)
+    monkeypatch.setattr(plotting_friction, "save", keep)
     return seen
 
 

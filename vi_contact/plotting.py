@@ -15,15 +15,15 @@ from .algebra import Array
 
 History = Mapping[str, Array]
 _UNITS = ((1.0, "m"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm"))
-_STYLE = {"axes.grid": True, "grid.alpha": 0.3, "axes.spines.top": False, "axes.spines.right": False}
+STYLE = {"axes.grid": True, "grid.alpha": 0.3, "axes.spines.top": False, "axes.spines.right": False}
 
 
-def _panels(rows: int, size: tuple[float, float], **more: Any) -> tuple[Any, Any]:
+def panels(rows: int, size: tuple[float, float], **more: Any) -> tuple[Any, Any]:
     """(figure, array of axes above each other with one time axis)."""
     import matplotlib
     from matplotlib.figure import Figure
 
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=size, layout="constrained")
         axes = figure.subplots(rows, 1, sharex=True, squeeze=False, **more)[:, 0]
     axes[-1].set_xlabel("time [s]")
@@ -38,7 +38,7 @@ def length_unit(size: float) -> tuple[float, str]:
     return _UNITS[-1] if size > 0.0 else _UNITS[0]
 
 
-def _scaled(values: Array, unit: str) -> tuple[Array, str]:
+def scaled(values: Array, unit: str) -> tuple[Array, str]:
     """Values over the power of 1000 that fits their size, and the unit with its prefix."""
     size = float(np.nanmax(np.abs(values), initial=0.0))
     for factor, prefix in ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n")):
@@ -47,7 +47,7 @@ def _scaled(values: Array, unit: str) -> tuple[Array, str]:
     return values, unit
 
 
-def _save(figure: Any, path: str | Path) -> Path:
+def save(figure: Any, path: str | Path) -> Path:
     figure.align_ylabels()
     figure.savefig(path, dpi=130)
     return Path(path)
@@ -71,7 +71,7 @@ def plot_points(
     names = [f"u_{component}_{label}" for label in labels]
     size = max(float(np.max(np.abs(history[name]), initial=0.0)) for name in names)
     metres, unit = length_unit(size)
-    figure, axes = _panels(len(names), (9.0, 1.5 * len(names) + 1.2), sharey=True)
+    figure, axes = panels(len(names), (9.0, 1.5 * len(names) + 1.2), sharey=True)
     for axis, name, label in zip(axes, names, labels, strict=True):
         if reference is not None:
             axis.plot(reference["t"], reference[name] / metres, color="0.65", lw=0.8, label="no contact")
@@ -85,12 +85,12 @@ def plot_points(
     if reference is not None:
         axes[0].legend(fontsize=8, ncol=2, loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
     figure.suptitle(title)
-    return _save(figure, path)
+    return save(figure, path)
 
 
 def plot_excitation(history: History, path: str | Path, *, title: str = "Ground acceleration") -> Path:
     """The ground acceleration components that the run used (Fig. 3)."""
-    figure, (axis,) = _panels(1, (9.0, 3.0))
+    figure, (axis,) = panels(1, (9.0, 3.0))
     for component in "xyz":
         values = history.get(f"a_g_{component}")
         if values is not None and np.any(values):
@@ -98,7 +98,7 @@ def plot_excitation(history: History, path: str | Path, *, title: str = "Ground 
     if axis.lines:
         axis.legend()
     axis.set(ylabel="acceleration [m/s²]", title=title)
-    return _save(figure, path)
+    return save(figure, path)
 
 
 _LEDGER = (
@@ -115,10 +115,10 @@ _LEDGER = (
 
 def plot_energy(history: History, path: str | Path, *, title: str = "Energy ledger") -> Path:
     """The ledger's terms, and its defect relative to the largest of them."""
-    figure, (top, bottom) = _panels(2, (9.0, 6.0), height_ratios=(3, 1))
+    figure, (top, bottom) = panels(2, (9.0, 6.0), height_ratios=(3, 1))
     present = [entry for entry in _LEDGER if entry[0] in history and np.any(history[entry[0]])]
     size = np.array([max((float(np.max(np.abs(history[name]))) for name, *_ in present), default=0.0)])
-    shown, unit = _scaled(size, "J")
+    shown, unit = scaled(size, "J")
     factor = shown[0] / size[0] if size[0] else 1.0
     for name, label, colour, style in present:
         top.plot(history["t"], history[name] * factor, color=colour, ls=style, lw=1.0, label=label)
@@ -128,12 +128,12 @@ def plot_energy(history: History, path: str | Path, *, title: str = "Energy ledg
     _log(bottom, history["t"], np.abs(history["energy_defect"]) / (size[0] or 1.0))
     bottom.axhline(1e-10, color="tab:red", ls="--", lw=0.8)
     bottom.set(ylabel="relative defect [-]")
-    return _save(figure, path)
+    return save(figure, path)
 
 
 def plot_certificate(history: History, path: str | Path, *, tolerance: float = 1e-9) -> Path:
     """Certificate of every step, and iterations of the solver."""
-    figure, (top, bottom) = _panels(2, (9.0, 5.0))
+    figure, (top, bottom) = panels(2, (9.0, 5.0))
     t = history["t"][1:]
     _log(top, t, history["certificate"][1:])
     top.axhline(tolerance, color="tab:red", ls="--", lw=0.8, label=f"tolerance {tolerance:g}")
@@ -142,7 +142,7 @@ def plot_certificate(history: History, path: str | Path, *, tolerance: float = 1
     bottom.step(t, history["iterations"][1:], where="mid", lw=0.8, color="black")
     bottom.yaxis.get_major_locator().set_params(integer=True)
     bottom.set(ylabel="iterations [-]")
-    return _save(figure, path)
+    return save(figure, path)
 
 
 def _log(axis: Any, t: Array, values: Array) -> None:
@@ -154,10 +154,10 @@ def plot_runs(
     runs: Mapping[str, History], quantities: Sequence[tuple[str, str, str]], path: str | Path, *, title: str
 ) -> Path:
     """The same quantities of several runs, a panel per quantity. quantities: (column, label, SI unit)."""
-    figure, axes = _panels(len(quantities), (9.0, 2.1 * len(quantities) + 1.2))
+    figure, axes = panels(len(quantities), (9.0, 2.1 * len(quantities) + 1.2))
     for axis, (column, label, unit) in zip(axes, quantities, strict=True):
         size = np.array([max(float(np.max(np.abs(run[column]), initial=0.0)) for run in runs.values())])
-        shown, prefixed = _scaled(size, unit)
+        shown, prefixed = scaled(size, unit)
         factor = shown[0] / size[0] if size[0] else 1.0
         for name, run in runs.items():
             axis.plot(run["t"], run[column] * factor, lw=0.9, label=name)
@@ -165,7 +165,7 @@ def plot_runs(
     axes[0].margins(y=0.25)  # room for the legend
     axes[0].legend(fontsize=8, ncol=len(runs), loc="lower right")
     axes[0].set_title(title)
-    return _save(figure, path)
+    return save(figure, path)
 
 
 def plot_contact(history: History, path: str | Path, *, position: Array, axis_label: str = "position [m]") -> Path:
@@ -173,9 +173,9 @@ def plot_contact(history: History, path: str | Path, *, position: Array, axis_la
 
     Open points are white; held points that pull are blue.
     """
-    figure, (top, bottom) = _panels(2, (9.0, 6.0), height_ratios=(3, 1))
+    figure, (top, bottom) = panels(2, (9.0, 6.0), height_ratios=(3, 1))
     t, order = history["t"], np.argsort(position)
-    pressure, unit = _scaled(np.reshape(history["pressure"], (len(t), -1))[:, order], "Pa")
+    pressure, unit = scaled(np.reshape(history["pressure"], (len(t), -1))[:, order], "Pa")
     colours, low, high = _pressure_scale(pressure)
     top.grid(False)
     image = top.pcolormesh(
@@ -186,7 +186,7 @@ def plot_contact(history: History, path: str | Path, *, position: Array, axis_la
     top.set(ylabel=axis_label, title="Contact pressure")
     bottom.plot(t, history["contact_uplift"], color="black", lw=0.9)
     bottom.set(ylabel="uplift ratio [-]", ylim=(-0.05, 1.05))
-    return _save(figure, path)
+    return save(figure, path)
 
 
 def _pressure_scale(pressure: Array) -> tuple[Any, float, float]:

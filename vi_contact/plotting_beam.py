@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from .algebra import Array
 from .beam.algorithm import BeamRun
-from .plotting import _STYLE, History, _panels, _save
+from .plotting import STYLE, panels, save
 
 _QUANTITIES = ("(A) rotation [-]", "(B) angular speed [1/s]", "(C) displacement [m]", "(D) velocity [m/s]")
 
 
 def plot_beam_energies(runs: Mapping[str, BeamRun], path: str | Path, *, title: str) -> Path:
     """Energy of several runs against time, above; losses by friction, below (Fig. 8.1). Dashed: no losses at all."""
-    figure, (top, bottom) = _panels(2, (9.0, 7.0), height_ratios=(3, 2))
+    figure, (top, bottom) = panels(2, (9.0, 7.0), height_ratios=(3, 2))
     for label, run in runs.items():
         (line,) = top.plot(run.history["t"], run.energy, lw=1.1, label=label)
         bottom.plot(run.history["t"], run.history["loss_friction"], lw=1.1, color=line.get_color(), label=label)
@@ -26,18 +24,18 @@ def plot_beam_energies(runs: Mapping[str, BeamRun], path: str | Path, *, title: 
     top.set(ylabel="energy [J]", ylim=(0.0, 1.15 * start), title=title)
     bottom.set(ylabel="lost to friction [J]")
     top.legend(fontsize=8, loc="center right")
-    return _save(figure, path)
+    return save(figure, path)
 
 
 def plot_tips(runs: Mapping[str, BeamRun], path: str | Path, *, title: str) -> Path:
     """Displacement of the tip against time, a panel per run (Figs. 8.2, 8.3)."""
-    figure, axes = _panels(len(runs), (9.0, 2.4 * len(runs) + 1.0))
+    figure, axes = panels(len(runs), (9.0, 2.4 * len(runs) + 1.0))
     for axis, (label, run) in zip(axes, runs.items(), strict=True):
         axis.plot(run.history["t"], run.history["u_tip"], color="black", lw=1.1)
         axis.set_ylabel("tip [m]")
         axis.set_title(label, fontsize=9, loc="left")
     figure.suptitle(title)
-    return _save(figure, path)
+    return save(figure, path)
 
 
 def plot_shapes(
@@ -48,7 +46,7 @@ def plot_shapes(
     import matplotlib
     from matplotlib.figure import Figure
 
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(13.0, 6.5), layout="constrained")
         axes = figure.subplots(2, 4)
     inside = [snapshot for snapshot in run.snapshots if span[0] - 1e-9 <= snapshot.t <= span[1] + 1e-9]
@@ -67,58 +65,4 @@ def plot_shapes(
     axes[1, 0].set_ylabel("whole beam")
     axes[0, 3].legend(*axes[1, 3].get_legend_handles_labels(), bbox_to_anchor=(1.02, 1.0), loc="upper left", fontsize=8)
     figure.suptitle(title)
-    return _save(figure, path)
-
-
-def plot_rubbing(history: History, path: str | Path, *, mu: float, gap: float, title: str) -> Path:
-    """Gap, contact force with the friction it allows, and motion of the tip across, from a run of ``rubbing_problem``.
-
-    history: with the columns of ``Contact`` and of a ``Probe`` labelled "tip". gap: of the rod at rest [m].
-    """
-    figure, (top, middle, bottom) = _panels(3, (9.0, 8.0))
-    t, force = history["t"], history["contact_resultant"]
-    top.plot(t, gap - history["u_x_tip"], color="black", lw=1.1)
-    top.set(ylabel="gap [m]", title=title)
-    middle.fill_between(t, -mu * force, mu * force, color="0.85", lw=0.0, label="friction allowed, ± mu r_n")
-    middle.plot(t, -history["friction_force_y"], color="tab:red", lw=1.0, label="friction on the wall")
-    middle.plot(t, mu * force, color="0.5", lw=0.6)
-    middle.plot(t, -mu * force, color="0.5", lw=0.6)
-    middle.set(ylabel="friction force [N]")
-    middle.legend(fontsize=8, loc="lower right")
-    bottom.plot(t, history["u_y_tip"], color="black", lw=1.1, label="tip")
-    slip = np.append(0.0, np.diff(history["u_y_tip"]))
-    _shade(bottom, t, (force > 0.0) & (np.abs(slip) <= 1e-12 * np.max(np.abs(slip))), "sticking")
-    bottom.set(ylabel="displacement across [m]")
-    bottom.legend(fontsize=8, loc="lower left")
-    return _save(figure, path)
-
-
-def _shade(axis: Any, t: Array, where: Array, label: str) -> None:
-    """Marks the times at which something holds."""
-    low, high = axis.get_ylim()
-    axis.fill_between(t, low, high, where=where, color="tab:orange", alpha=0.25, lw=0.0, label=label)
-    axis.set_ylim(low, high)
-
-
-def plot_regularisation(
-    eps: Sequence[float], errors: Mapping[str, Array], tips: Mapping[str, tuple[Array, Array]], path: str | Path
-) -> Path:
-    """Largest difference of the tip from the exact law over eps, left; tips (t, u) of some runs, right."""
-    import matplotlib
-    from matplotlib.figure import Figure
-
-    with matplotlib.rc_context(_STYLE):
-        figure = Figure(figsize=(11.0, 4.5), layout="constrained")
-        left, right = figure.subplots(1, 2)
-    for label, values in errors.items():
-        left.loglog(eps, values, "o-", ms=4, lw=1.1, label=label)
-    last = min(values[-1] for values in errors.values())
-    left.loglog(eps, last * np.asarray(eps) / eps[-1], color="0.6", ls=":", label="order 1")
-    left.set(xlabel="eps [m]", ylabel="largest difference of the tip [m]", title="Regularised against exact friction")
-    left.legend(fontsize=8)
-    for label, (t, u) in tips.items():
-        right.plot(t, u, lw=1.1, label=label)
-    right.set(xlabel="time [s]", ylabel="tip [m]", title="Motion of the tip")
-    right.legend(fontsize=8)
-    figure.savefig(path, dpi=130)
-    return Path(path)
+    return save(figure, path)

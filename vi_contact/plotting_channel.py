@@ -11,7 +11,7 @@ import numpy as np
 
 from .algebra import Array, Mask
 from .errors import InputError
-from .plotting import _STYLE, History, _edges, _panels, _save, _scaled
+from .plotting import STYLE, History, _edges, panels, save, scaled
 from .plotting_maps import thinned
 
 SHOWN = {  # panels of plot_openings: point -> outward normal of the channel there
@@ -89,7 +89,7 @@ def plot_openings(history: History, path: str | Path, *, title: str) -> Path:
         for name, points in SHOWN.items()
     }
     metres, unit = _unit(max(float(np.abs(one).max()) for rows in found.values() for _, one, _ in rows))
-    figure, axes = _panels(len(found) + 1, (9.0, 9.6))
+    figure, axes = panels(len(found) + 1, (9.0, 9.6))
     for component, colour in (("x", "black"), ("y", "0.6")):
         values = history.get(f"a_g_{component}")
         if values is not None and np.any(values):
@@ -108,7 +108,7 @@ def plot_openings(history: History, path: str | Path, *, title: str) -> Path:
         if len(axis.lines) > 1:
             axis.legend(ncol=3, **_LEGEND)
     figure.suptitle(title)
-    return _save(figure, path)
+    return save(figure, path)
 
 
 def plot_rocking(history: History, path: str | Path, *, title: str, corners: Sequence[str] = ("1", "7")) -> Path:
@@ -116,7 +116,7 @@ def plot_rocking(history: History, path: str | Path, *, title: str, corners: Seq
     left, right = (np.asarray(history[f"u_y_{label}"]) for label in corners)
     t = history["t"]
     metres, unit = _unit(float(max(np.abs(left).max(), np.abs(right).max())))
-    figure, (top, bottom) = _panels(2, (9.0, 5.6), height_ratios=(3, 2))
+    figure, (top, bottom) = panels(2, (9.0, 5.6), height_ratios=(3, 2))
     for label, values, colour in zip(corners, (left, right), ("tab:blue", "tab:red"), strict=True):
         top.plot(t, values / metres, color=colour, lw=0.9, label=f"point {label}")
     top.axhline(left[0] / metres, color="black", ls="--", lw=0.8, label="static, before the shaking")
@@ -129,7 +129,7 @@ def plot_rocking(history: History, path: str | Path, *, title: str, corners: Seq
     for axis in (top, bottom):
         axis.legend(ncol=3, **_LEGEND)
     figure.suptitle(title)
-    return _save(figure, path)
+    return save(figure, path)
 
 
 def plot_beside(
@@ -137,7 +137,7 @@ def plot_beside(
 ) -> Path:
     """Fig. 9: u_x and u_y of the channel's points in several runs, the one named ``reference`` grey and thick."""
     columns = [(f"u_{axis}_{label}", f"$u_{axis}$, point {label}") for label in points for axis in "xy"]
-    figure, axes = _panels(len(columns), (9.0, 2.1 * len(columns) + 1.0))
+    figure, axes = panels(len(columns), (9.0, 2.1 * len(columns) + 1.0))
     for axis, (column, label) in zip(axes, columns, strict=True):
         metres, unit = _unit(max(float(np.abs(run[column]).max()) for run in runs.values()))
         bare = runs[reference]
@@ -148,7 +148,7 @@ def plot_beside(
     axes[0].set_xlim(bare["t"][0], bare["t"][-1])
     axes[0].legend(ncol=len(runs), **_LEGEND)
     figure.suptitle(title)
-    return _save(figure, path)
+    return save(figure, path)
 
 
 def plot_interface(runs: Mapping[str, History], outline: Outline, path: str | Path, *, title: str) -> Path:
@@ -161,14 +161,14 @@ def plot_interface(runs: Mapping[str, History], outline: Outline, path: str | Pa
     maps = {name: _reduced(run, parts) for name, run in runs.items()}
     closed = np.concatenate([pressure[pressure > 0.0] for _, pressure, _ in maps.values()])
     most = np.array([np.percentile(closed, CLIPPED) if len(closed) else 1.0])
-    kilo, unit = _scaled(most, "Pa")
+    kilo, unit = scaled(most, "Pa")
     widest = max(float(gap.max()) for *_, gap in maps.values())
     metres, length = _unit(widest)
     drawn = {
         f"opening [{length}], where open": ("Blues", Normalize(0.0, widest / metres or 1.0), "neither"),
         f"pressure [{unit}], where closed": ("YlOrRd", PowerNorm(0.5, 0.0, float(kilo[0])), "max"),
     }
-    figure, axes = _panels(len(maps), (10.0, 2.9 * len(maps) + 1.0))
+    figure, axes = panels(len(maps), (10.0, 2.9 * len(maps) + 1.0))
     for axis, (name, (t, pressure, gap)) in zip(axes, maps.items(), strict=True):
         axis.grid(False)
         edges = _edges(t), np.clip(_edges(arc), arc.min(), arc.max())
@@ -183,7 +183,7 @@ def plot_interface(runs: Mapping[str, History], outline: Outline, path: str | Pa
     for image, (label, (*_, extend)) in zip(images, drawn.items(), strict=True):
         figure.colorbar(image, ax=axes, label=label, pad=0.01, fraction=0.04, aspect=35, extend=extend)
     figure.suptitle(title)
-    return _save(figure, path)
+    return save(figure, path)
 
 
 def _reduced(run: History, parts: Any) -> tuple[Array, Array, Array]:
@@ -212,10 +212,10 @@ def plot_envelope(runs: Mapping[str, History], outline: Outline, path: str | Pat
     keys = ("pressure", "gap", "active")
     rows = {name: [np.reshape(run[key], (len(run["t"]), -1)) for key in keys] for name, run in runs.items()}
     size = np.array([max(float(pressure.max()) for pressure, *_ in rows.values())])
-    shown, unit = _scaled(size, "Pa")
+    shown, unit = scaled(size, "Pa")
     factor = shown[0] / size[0] if size[0] else 1.0
     metres, length = _unit(max(float(gap.max()) for _, gap, _ in rows.values()))
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(9.0, 8.0), layout="constrained")
         axes = figure.subplots(3, 1, sharex=True)
     for colour, (name, (pressure, gap, active)) in zip(_RUNS, rows.items(), strict=False):
@@ -239,4 +239,4 @@ def plot_envelope(runs: Mapping[str, History], outline: Outline, path: str | Pat
         axes[0].text(float(np.mean(outline.arc[one])), 1.01, name, ha="center", va="bottom", fontsize=9,
                      transform=axes[0].get_xaxis_transform())
     figure.suptitle(title)
-    return _save(figure, path)
+    return save(figure, path)

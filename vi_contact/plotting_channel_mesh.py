@@ -11,7 +11,7 @@ import numpy as np
 
 from .algebra import Array, Indices, Mask
 from .errors import InputError
-from .plotting import _STYLE, History, _save, _scaled
+from .plotting import STYLE, History, save, scaled
 from .plotting_deformed import Frames, Tractions, read_frames, read_tractions
 
 SOIL, CONCRETE, CONTACT = "#efe3c8", "#9aa3ab", "tab:red"
@@ -89,7 +89,7 @@ def plot_layout(
     axis.annotate("", *ends_of_arrow, arrowprops={"arrowstyle": "<->", "lw": 1.5})
     axis.legend(fontsize=8, loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
     axis.set(xlim=(-0.7, width + 0.7), ylim=(-0.2 * depth, 1.04 * depth), title=title, xlabel="x [m]", ylabel="y [m]")
-    return _save(figure, path)
+    return save(figure, path)
 
 
 def _number(axis: Any, bodies: Bodies, points: Mapping[str, Sequence[float]]) -> None:
@@ -113,7 +113,7 @@ def plot_moments(
 
     runs = {name: read_bodies(folder) for name, folder in folders.items()}
     colours = Colours.of(np.concatenate([run.tractions.at(t)[0] for run in runs.values() for t in times]))
-    with matplotlib.rc_context(_STYLE | {"axes.grid": False}):
+    with matplotlib.rc_context(STYLE | {"axes.grid": False}):
         figure = Figure(figsize=(3.7 * len(times) + 1.3, 2.75 * len(runs) + 0.7), layout="constrained")
         axes = figure.subplots(len(runs), len(times), sharex=True, sharey=True, squeeze=False)
     for row, (name, run) in zip(axes, runs.items(), strict=True):
@@ -126,7 +126,7 @@ def plot_moments(
     figure.supxlabel("x [m]", fontsize=10)
     figure.supylabel("y [m]", fontsize=10)
     figure.suptitle(f"{title} (displacements x {magnified:g})")
-    return _save(figure, path)
+    return save(figure, path)
 
 
 @dataclass(frozen=True)
@@ -143,7 +143,7 @@ class Colours:
         from matplotlib.colors import PowerNorm
 
         most = np.array([float(pressures.max(initial=0.0)) or 1.0])
-        shown, unit = _scaled(most, "Pa")
+        shown, unit = scaled(most, "Pa")
         return cls(float(shown[0] / most[0]), unit, PowerNorm(0.5, 0.0, float(shown[0])))
 
     def bar(self, figure: Any, axes: Any, shrink: float = 1.0) -> None:
@@ -228,7 +228,7 @@ def _plane(size: tuple[float, float], heights: Sequence[float] = (1.0,)) -> tupl
     import matplotlib
     from matplotlib.figure import Figure
 
-    with matplotlib.rc_context(_STYLE | {"axes.grid": False}):
+    with matplotlib.rc_context(STYLE | {"axes.grid": False}):
         figure = Figure(figsize=size, layout="constrained")
         axes = figure.subplots(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
     axes[0].set_aspect("equal")

@@ -16,7 +16,7 @@ import numpy as np
 from .algebra import Array, Indices
 from .errors import InputError
 from .output import FIELDS, HISTORY_H5
-from .plotting import _STYLE, _save, _scaled
+from .plotting import STYLE, save, scaled
 
 ARROW = 0.3  # length of the longest arrow over the size of the body
 
@@ -109,13 +109,13 @@ def plot_snapshots(
     runs = {name: (read_frames(folder), read_tractions(folder)) for name, folder in folders.items()}
     shots = [[frames.at(t) for t in times] for frames, _ in runs.values()]
     stresses = np.array([stress.max() for row in shots for *_, stress in row])
-    shown, unit = _scaled(stresses, "Pa")
+    shown, unit = scaled(stresses, "Pa")
     longest = max(float(np.hypot(*tractions.at(t)).max(initial=0.0)) for _, tractions in runs.values() for t in times)
     points = next(iter(runs.values()))[0].points
     size = float(np.ptp(points, axis=0).max())
     low, high = _limits([points + magnified * u for row in shots for _, u, _ in row], size)
     height = 2.4 * (high[1] - low[1]) / (high[0] - low[0]) + 0.4
-    with matplotlib.rc_context(_STYLE | {"axes.grid": False}):
+    with matplotlib.rc_context(STYLE | {"axes.grid": False}):
         figure = Figure(figsize=(2.5 * len(times) + 1.6, height * len(runs) + 0.8), layout="constrained")
         axes = figure.subplots(len(runs), len(times), sharex=True, sharey=True, squeeze=False)
     axes[0, 0].set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
@@ -131,7 +131,7 @@ def plot_snapshots(
     figure.supylabel("y [m]", fontsize=10)
     figure.colorbar(cells, ax=axes, label=f"von Mises stress [{unit}]", shrink=0.7)
     figure.suptitle(title + (f" (displacements x {magnified:g})" if magnified != 1.0 else ""))
-    return _save(figure, path)
+    return save(figure, path)
 
 
 def _moment(t: float) -> str:
@@ -186,12 +186,12 @@ def plot_tractions(
     import matplotlib
     from matplotlib.figure import Figure
 
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(3.8 * len(folders) + 0.5, 5.4), layout="constrained")
         axes = figure.subplots(2, len(folders), sharex=True, sharey="row", squeeze=False)
     runs = {name: read_tractions(folder) for name, folder in folders.items()}
     size = np.array([max(float(np.abs(run.at(t)).max(initial=0.0)) for run in runs.values() for t in times)])
-    shown, unit = _scaled(size, "Pa")
+    shown, unit = scaled(size, "Pa")
     factor = shown[0] / size[0] if size[0] else 1.0
     colours = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.85, len(times)))
     for column, (name, tractions) in zip(axes.T, runs.items(), strict=True):
@@ -206,4 +206,4 @@ def plot_tractions(
     axes[1, 0].set_ylabel(f"shear $p_t$ on the body,\nalong +x [{unit}]")
     axes[0, -1].legend(fontsize=8)
     figure.suptitle(title)
-    return _save(figure, path)
+    return save(figure, path)

@@ -9,14 +9,14 @@ import numpy as np
 
 from .floor_spectra import TransferFunction
 from .peak_values import Loop
-from .plotting import _STYLE, _save, _scaled
+from .plotting import STYLE, save, scaled
 
 
 def _panel(size: tuple[float, float]) -> tuple[Any, Any]:
     import matplotlib
     from matplotlib.figure import Figure
 
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=size, layout="constrained")
         return figure, figure.subplots()
 
@@ -26,17 +26,17 @@ def plot_loop(
 ) -> Path:
     """Force over deformation; ``x``, ``y``: (name, SI unit) of the two. The title says the work at the end."""
     figure, axis = _panel((6.4, 4.8))
-    across, x_unit = _scaled(loop.deformation, x[1])
-    up, y_unit = _scaled(loop.force, y[1])
+    across, x_unit = scaled(loop.deformation, x[1])
+    up, y_unit = scaled(loop.force, y[1])
     axis.axhline(0.0, color="0.6", lw=0.6)
     axis.axvline(0.0, color="0.6", lw=0.6)
     axis.plot(across, up, color="black", lw=0.8)
     axis.plot(across[:1], up[:1], "o", color="tab:green", ms=5, label="start")
     axis.plot(across[-1:], up[-1:], "s", color="tab:red", ms=5, label="end")
     axis.legend(fontsize=8)
-    work, unit = _scaled(loop.work[-1:], "J")
+    work, unit = scaled(loop.work[-1:], "J")
     axis.set(xlabel=f"{x[0]} [{x_unit}]", ylabel=f"{y[0]} [{y_unit}]", title=title or f"work {work[0]:.3g} {unit}")
-    return _save(figure, path)
+    return save(figure, path)
 
 
 def plot_transfer(
@@ -61,4 +61,4 @@ def plot_transfer(
     finite = found.amplitude[np.isfinite(found.amplitude) & (found.amplitude > 0.0)]
     axis.set_ylim(0.5 * float(finite.min()), 2.0 * float(finite.max()))
     axis.set(xlabel="frequency [Hz]", ylabel="|surface / base| [-]", title=title)
-    return _save(figure, path)
+    return save(figure, path)

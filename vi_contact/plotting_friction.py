@@ -8,7 +8,7 @@ import numpy as np
 
 from .algebra import Array
 from .errors import InputError
-from .plotting import _STYLE, History, _edges, _panels, _save, _scaled, length_unit
+from .plotting import STYLE, History, _edges, length_unit, panels, save, scaled
 
 OPEN, STICK, SLIP = 1, 2, 3  # as contact_status in fields.xdmf
 _COLOURS = {OPEN: ("open", "white"), STICK: ("stick", "tab:blue"), SLIP: ("slip", "tab:orange")}
@@ -32,8 +32,8 @@ def plot_hysteresis(
     work = float(np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(slip)))
     slip = slip if work >= 0.0 else -slip
     metres, unit = length_unit(float(np.max(np.abs(slip), initial=0.0)))
-    newtons, force_unit = _scaled(force, "N")
-    with matplotlib.rc_context(_STYLE):
+    newtons, force_unit = scaled(force, "N")
+    with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(6.4, 4.8), layout="constrained")
         plot = figure.subplots()
     plot.axhline(0.0, color="0.6", lw=0.6)
@@ -44,7 +44,7 @@ def plot_hysteresis(
     plot.legend(fontsize=8, ncol=2, loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
     plot.set(xlabel=f"mean slip [{unit}]", ylabel=f"friction force on the support, {name} [{force_unit}]")
     plot.set_title(title, loc="left")
-    return _save(figure, path)
+    return save(figure, path)
 
 
 def plot_states(
@@ -60,7 +60,7 @@ def plot_states(
 
     t, order = history["t"], np.argsort(position)
     states = contact_states(history)[:, order]
-    figure, (panel,) = _panels(1, (9.0, 4.0))
+    figure, (panel,) = panels(1, (9.0, 4.0))
     panel.grid(False)
     colours = ListedColormap([colour for _, colour in _COLOURS.values()])
     panel.pcolormesh(
@@ -71,7 +71,7 @@ def plot_states(
     panel.legend(handles=patches, fontsize=8, ncol=3, loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
     panel.set_ylabel(axis_label)
     panel.set_title(title, loc="left")
-    return _save(figure, path)
+    return save(figure, path)
 
 
 def contact_states(history: History) -> Array:

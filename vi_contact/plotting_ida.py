@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from .algebra import Array
-from .plotting import _STYLE, _scaled
+from .plotting import STYLE, scaled
 
 _FRACTILES = (("16 %", "tab:blue", "--"), ("50 %", "black", "-"), ("84 %", "tab:red", "--"))
 
@@ -33,7 +33,7 @@ def plot_ida(panels: Sequence[Panel], path: str | Path, *, intensity: str) -> Pa
     import matplotlib
     from matplotlib.figure import Figure
 
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(1.0 + 4.4 * len(panels), 4.6), layout="constrained")
         axes = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
     for axis, panel in zip(axes, panels, strict=True):
@@ -50,7 +50,7 @@ def plot_ida(panels: Sequence[Panel], path: str | Path, *, intensity: str) -> Pa
 
 def _draw(axis: Any, panel: Panel) -> None:
     size = np.array([max(float(np.max(np.abs(demand), initial=0.0)) for _, demand in panel.curves.values())])
-    shown, unit = _scaled(size, panel.unit) if panel.unit != "-" else (size, "-")
+    shown, unit = scaled(size, panel.unit) if panel.unit != "-" else (size, "-")
     factor = shown[0] / size[0] if size[0] else 1.0
     axis.set_xlabel(f"{panel.label} [{unit}]")
     few = len(panel.curves) <= 5

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from .algebra import Array, Indices
-from .plotting import _edges, _scaled
+from .plotting import _edges, scaled
 
 STRAIGHT = 1e-6  # of its length: what a line of points may deviate
 ROWS = 1200  # of a map: more instants than a page has dots are gathered
@@ -71,7 +71,7 @@ def draw_map(
     import matplotlib
 
     order = np.argsort(position, kind="stable")
-    shown, prefixed = _scaled(values[:, order], unit)
+    shown, prefixed = scaled(values[:, order], unit)
     size = float(np.nanmax(np.abs(shown), initial=0.0)) or 1.0
     pulling = bool(np.any(shown < 0.0))
     palette = matplotlib.colormaps["RdBu_r" if pulling else colours].with_extremes(under="white")

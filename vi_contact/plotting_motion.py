@@ -21,7 +21,7 @@ from .ground_motion import (
     integrated,
     pga,
 )
-from .plotting import _STYLE, _panels, _save, length_unit
+from .plotting import STYLE, length_unit, panels, save
 
 SAMPLES_A_PERIOD = 10
 """A spectrum is drawn pale at periods with fewer samples of the record than this."""
@@ -32,7 +32,7 @@ def plot_motion(record: Record, path: str | Path, *, title: str | None = None, u
 
     title: default the record's. Nothing is corrected: a drift of the record shows.
     """
-    figure, axes = _panels(4, (9.0, 8.0))
+    figure, axes = panels(4, (9.0, 8.0))
     velocity, displacement = integrated(record)
     _line(axes[0], record.times, record.acceleration / UNITS[units], f"acceleration [{_pretty(units)}]")
     for axis, values, quantity, per_second in (
@@ -43,7 +43,7 @@ def plot_motion(record: Record, path: str | Path, *, title: str | None = None, u
     _husid(axes[3], record)
     axes[0].set_title(title if title is not None else record.title or record.source, fontsize=10)
     axes[-1].set_xlim(0.0, record.duration)
-    return _save(figure, path)
+    return save(figure, path)
 
 
 def plot_spectra(
@@ -83,7 +83,7 @@ def plot_spectra(
         axis.set_ylim(bottom=0.0)
     top.set(ylabel=f"pseudo-acceleration [{_pretty(units)}]", title=title)
     bottom.set(ylabel=f"displacement [{unit}]", xlabel="period [s]", xlim=(shown.min(), shown.max()))
-    return _save(figure, path)
+    return save(figure, path)
 
 
 def _logarithmic_panels() -> tuple[Any, Any]:
@@ -92,7 +92,7 @@ def _logarithmic_panels() -> tuple[Any, Any]:
     from matplotlib.figure import Figure
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(8.0, 7.5), layout="constrained")
         axes = figure.subplots(2, 1, sharex=True)
     axes[1].set_xscale("log")

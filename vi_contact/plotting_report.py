@@ -15,7 +15,7 @@ from .errors import InputError
 from .floor_spectra import recorded_motion
 from .ground_motion import STANDARD_GRAVITY, Record, response_spectrum
 from .peak_values import Peak, peaks
-from .plotting import _LEDGER, _STYLE, _log, _scaled
+from .plotting import _LEDGER, STYLE, _log, scaled
 from .plotting_maps import arc_position, draw_map, thinned
 from .run_folder import RunFolder
 
@@ -75,7 +75,7 @@ def plot_report(
     table = 0.15 * (len(rows) + 1) / PAGE[1]  # of the page's height
     height = (TOP - table - 0.06) * PAGE[1] / lines - GAP
     fonts = {"font.size": 7, "axes.titlesize": 8, "axes.labelsize": 7}
-    with matplotlib.rc_context(_STYLE | fonts | {"text.parse_math": False}):  # a dollar of a title is no formula
+    with matplotlib.rc_context(STYLE | fonts | {"text.parse_math": False}):  # a dollar of a title is no formula
         figure = Figure(figsize=PAGE)
         grid = figure.add_gridspec(
             lines, 2, left=SIDES[0], right=SIDES[1], top=TOP, bottom=table + 0.06 + GAP / PAGE[1] - 0.05,
@@ -159,7 +159,7 @@ def _lines(axis: Any, run: RunFolder, names: Sequence[str], title: str) -> None:
     """Histories in one unit, with a prefix that fits."""
     values, unit = np.array([run.history[name] for name in names]), run.columns[names[0]][0]
     if unit != "-":
-        values, unit = _scaled(values, unit)
+        values, unit = scaled(values, unit)
     for one, name in zip(values, names, strict=True):
         axis.plot(run.history["t"], one, lw=0.7, label=name)
     _label(axis, title)
@@ -216,7 +216,7 @@ def _map(axis: Any, run: RunFolder, column: str, unit: str) -> None:
 def _energies(axis: Any, run: RunFolder) -> None:
     sizes = {name: float(np.max(np.abs(run.history[name]))) for name, *_ in _LEDGER if name in run.history}
     present = [entry for entry in _LEDGER if sizes.get(entry[0], 0.0) > NOTHING * max(sizes.values())]
-    values, unit = _scaled(np.array([run.history[name] for name, *_ in present]), "J")
+    values, unit = scaled(np.array([run.history[name] for name, *_ in present]), "J")
     for one, (_, label, colour, style) in zip(values, present, strict=True):
         axis.plot(run.history["t"], one, color=colour, ls=style, lw=0.8, label=label)
     _label(axis, "energy", rows=1 if len(present) < 6 else 2)

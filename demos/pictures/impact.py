@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from .algebra import Array
-from .exact.hertz import HertzImpact
-from .plotting import _STYLE, _save
+from vi_contact.algebra import Array
+from vi_contact.exact.hertz import HertzImpact
+from vi_contact.plotting import STYLE, save
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ def plot_impact(
     import matplotlib
     from matplotlib.figure import Figure
 
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(13.0, 4.2), layout="constrained")
         force, approach, pressure = figure.subplots(1, 3)
     a = exact.deepest.contact_radius
@@ -57,4 +57,4 @@ def plot_impact(
     pressure.set(xlabel="distance from the axis [mm]", ylabel="pressure at the largest force [GPa]",
                  xlim=(0.0, 1.3e3 * a))
     pressure.legend(fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 0.1))
-    return _save(figure, path)
+    return save(figure, path)

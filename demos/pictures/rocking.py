@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from .algebra import Array
-from .plotting import History, _panels, _save
+from vi_contact.algebra import Array
+from vi_contact.plotting import History, panels, save
 
 
 def plot_rocking(
@@ -21,7 +21,7 @@ def plot_rocking(
     after each impact [J], shape (n + 1,), the weight's potential included; impacts: their times [s], shape (n,).
     """
     t = history["t"]
-    figure, (top, middle, bottom) = _panels(3, (9.0, 8.0))
+    figure, (top, middle, bottom) = panels(3, (9.0, 8.0))
     top.plot(t, history["theta"] / angle, color="black", lw=1.2, label="finite elements")
     top.plot(t, exact / angle, color="tab:red", lw=1.2, ls="--", label="rigid block")
     top.set(ylabel="rotation / overturning angle [-]", title=title)
@@ -38,7 +38,7 @@ def plot_rocking(
                 lw=1.2, ls="--", label="rigid block: energy times e² at every impact")
     bottom.set(ylabel="energy above rest [J]", ylim=(0.0, None))
     bottom.legend(fontsize=8, loc="upper right")
-    return _save(figure, path)
+    return save(figure, path)
 
 
 def plot_pulses(
@@ -48,7 +48,7 @@ def plot_pulses(
 
     Each pair: base acceleration over ``unit``, g b/h [m/s²]; what the block does. angle: of overturning [rad].
     """
-    figure, axes = _panels(4, (9.0, 9.0), height_ratios=(1, 2, 1, 2))
+    figure, axes = panels(4, (9.0, 9.0), height_ratios=(1, 2, 1, 2))
     for axis, runs in ((axes[0], onset), (axes[2], overturning)):
         for label, history in runs.items():
             axis.plot(history["t"], history["a_g_x"] / unit, lw=1.2, label=label)
@@ -65,4 +65,4 @@ def plot_pulses(
     axes[3].set(ylabel="|rotation| / overturning angle [-]", ylim=(-0.05, 1.5))
     for axis in (axes[1], axes[3]):
         axis.legend(fontsize=8, loc="upper left")
-    return _save(figure, path)
+    return save(figure, path)

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from .algebra import Array
-from .plotting import _STYLE, History, _save
+from vi_contact.algebra import Array
+from vi_contact.plotting import STYLE, History, save
 
 COLUMNS = ("displacement of the foot [m]", "contact force / section [Pa]", "energy / exact energy [-]")
 
@@ -26,7 +26,7 @@ def plot_bounces(histories: Mapping[str, History], exact: Any, section: float, p
     t = next(iter(histories.values()))["t"]
     fine = np.linspace(t[0], t[-1], 4000)
     curves = (exact.displacement(0.0, fine), exact.force(fine), np.ones_like(fine))
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(13.0, 1.55 * len(histories) + 1.0), layout="constrained")
         axes = figure.subplots(len(histories), 3, sharex=True, squeeze=False)
     for row, (name, history) in zip(axes, histories.items(), strict=True):
@@ -41,7 +41,7 @@ def plot_bounces(histories: Mapping[str, History], exact: Any, section: float, p
     for axis in axes[-1]:
         axis.set_xlabel("time [s]")
     axes[0, 2].legend(fontsize=8, loc="lower right")
-    return _save(figure, path)
+    return save(figure, path)
 
 
 def _values(history: History, energy: float, section: float) -> tuple[Array, Array, Array]:

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from .algebra import Array
-from .plotting import _STYLE, _save, _scaled
+from vi_contact.algebra import Array
+from vi_contact.plotting import STYLE, save, scaled
 
 ARROW = 0.3  # length of the longest arrow of a row over the size of its bodies
 
@@ -59,7 +59,7 @@ def plot_boundary_snapshots(rows: Mapping[str, Sequence[Shot]], path: str | Path
     from matplotlib.figure import Figure
 
     columns = max(len(shots) for shots in rows.values())
-    with matplotlib.rc_context(_STYLE | {"axes.grid": False}):
+    with matplotlib.rc_context(STYLE | {"axes.grid": False}):
         figure = Figure(figsize=(2.6 * columns + 0.6, 2.5 * len(rows) + 0.6), layout="constrained")
         axes = figure.subplots(len(rows), columns, squeeze=False)
     for row, (name, shots) in zip(axes, rows.items(), strict=True):
@@ -76,7 +76,7 @@ def plot_boundary_snapshots(rows: Mapping[str, Sequence[Shot]], path: str | Path
     figure.supxlabel("x [m]", fontsize=10)
     figure.supylabel("y [m]", fontsize=10)
     figure.suptitle(title)
-    return _save(figure, path)
+    return save(figure, path)
 
 
 def _draw(axis: Any, shot: Shot, scale: float, size: float) -> None:
@@ -98,19 +98,19 @@ def plot_panels(rows: Sequence[Sequence[Panel]], path: str | Path, *, title: str
     from matplotlib.figure import Figure
 
     columns = max(len(row) for row in rows)
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(3.7 * columns + 0.4, 2.7 * len(rows) + 0.6), layout="constrained")
         axes = figure.subplots(len(rows), columns, squeeze=False)
     for line, panels in zip(axes, rows, strict=True):
         for axis, panel in zip(line, panels, strict=True):
             _panel(axis, panel)
     figure.suptitle(title)
-    return _save(figure, path)
+    return save(figure, path)
 
 
 def _panel(axis: Any, panel: Panel) -> None:
     size = np.array([max(float(np.abs(curve.y).max(initial=0.0)) for curve in panel.curves)])
-    shown, unit = _scaled(size, panel.unit)
+    shown, unit = scaled(size, panel.unit)
     factor = shown[0] / size[0] if size[0] else 1.0
     for curve in panel.curves:
         style = {"ls": "", "marker": ".", "ms": 3.5} if curve.marked else {"lw": 1.1}
