@@ -23,6 +23,7 @@ from test_checkpoint import chain, difference, run
 
 from vi_contact.checkpoint import checksum, read_checkpoint
 from vi_contact.errors import InputError
+from vi_contact.run_folder import read_run
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.simulate import Solution
 from vi_contact.step import State
@@ -255,8 +256,8 @@ def damage(folder: Path, dice: Dice) -> str:
 
 
 def test_folders(sound: Path, tmp_path: Path) -> None:
-    """100 of them: a restart gives the straight run, or one sentence, and no file is changed."""
-    wanted = restarted(sound)
+    """100 of them: a restart gives the straight run, or one sentence, and no file is changed; so does reading."""
+    wanted, whole = restarted(sound), read_run(sound).history["u_x_12"]
     kept = 0
     for seed in range(FOLDERS):
         folder = tmp_path / str(seed)
@@ -273,6 +274,12 @@ def test_folders(sound: Path, tmp_path: Path) -> None:
             for column, values in wanted.history.items():
                 assert np.array_equal(found.history[column], values, equal_nan=True), (seed, name, column)
         assert {path.name: path.read_bytes() for path in folder.iterdir()} == before, (seed, name)
+        try:
+            again = read_run(folder).history["u_x_12"]
+        except InputError as error:
+            assert "\n" not in str(error), (seed, name)
+        else:
+            assert name == "history.csv" or np.array_equal(again, whole), (seed, name)
         assert time.monotonic() - begin < SECONDS, (seed, name)
         shutil.rmtree(folder)
     assert 10 < kept < 90
