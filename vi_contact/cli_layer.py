@@ -41,7 +41,7 @@ def _run(options: argparse.Namespace) -> str:
     if options.metric not in _METRICS:
         raise InputError(f"unknown metric '{options.metric}': give {', '.join(_METRICS)}")
     if options.out:
-        output_file(options.out, picture=True)
+        output_file(options.out, picture=True, made=True)
     closed = options.metric == "dominant" and options.start in (None, options.width)
     if not closed and (options.restitution is not None or options.out):
         raise InputError("--restitution and --out are for the closed form: leave --metric and --start away")

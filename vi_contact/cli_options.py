@@ -80,15 +80,18 @@ def chosen(options: argparse.Namespace) -> dict[str, Any]:
     return found | {"scale": scale, "restart": options.restart or options.changed}
 
 
-def output_file(path: str | Path, *, reads: Iterable[str | Path] = (), picture: bool = False) -> Path:
+def output_file(
+    path: str | Path, *, reads: Iterable[str | Path] = (), picture: bool = False, made: bool = False
+) -> Path:
     """The file that a command is about to write, checked before any work is done.
 
-    reads: files of its input, which it must not overwrite; picture: whether its name says the format of a picture.
+    reads: files of its input, which it must not overwrite; picture: whether its name says the format of a picture;
+    made: whether the command makes a folder that does not exist.
     InputError for a folder, a file in no folder, one of ``reads``, or a name without the ending of a picture.
     """
     out = Path(path)
     try:
-        fits = out.parent.is_dir() and not out.is_dir()
+        fits = (out.parent.is_dir() or (made and not out.parent.exists())) and not out.is_dir()
     except OSError:  # a name that is too long, a folder that may not be looked into
         fits = False
     if not fits:
