@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import Any
 
 from .cli_options import output_file
@@ -59,7 +60,7 @@ def _run(options: argparse.Namespace) -> str:
         lines.append(f"{impact.layer.k:12.6g} {impact.layer.c:12.6g} {values[0]:9.6f} {values[1]:9.6f}{shown}")
     lines.append("e: Newton's; e_p: Poisson's with the boundary force; t_c, t_f: end of compression, of contact")
     if options.out:
-        lines.append(f"figure: {_draw(impacts, options.out)}")
+        lines.append(f"figure: {_draw(impacts, Path(options.out))}")
     return "\n".join(lines)
 
 
@@ -92,9 +93,10 @@ def _integrated(impact: Any, metric: str) -> tuple[float, ...]:
     return contact.restitution, poisson, contact.turned - contact.start, contact.duration, contact.deepest
 
 
-def _draw(impacts: list[Any], path: str) -> Any:
+def _draw(impacts: list[Any], path: Path) -> Path:
     from .plotting_layer import plot_particle
 
+    path.parent.mkdir(parents=True, exist_ok=True)
     groups: dict[str, list[tuple[str, Any]]] = {}
     for impact in impacts:
         groups.setdefault(f"k = {impact.layer.k:.4g} N/m", []).append((f"c = {impact.layer.c:.4g} N", impact))
