@@ -201,3 +201,10 @@ def test_ground_accelerates_the_mass_shared_with_the_clamp(published: bool) -> N
     load = replace(problem, excitation=vc.FullSine(2.0, 1.0, direction=(1.0, -0.5))).equations.load(0.25)
     expected = -2.0 * np.concatenate([mass, np.zeros(4), -0.5 * mass])
     assert load == pytest.approx(expected, rel=1e-14, abs=1e-14)
+
+
+def test_loads_that_stop_being_numbers() -> None:
+    """The function and the time are named."""
+    rod = Rod(end_force=lambda t: 1.0 if t < 0.05 else np.nan)
+    with pytest.raises(InputError, match=r"end_force\(0\.05\d* s\) is nan; give a finite number in N"):
+        rod_forces(rod, Elements(4), dt=0.01, steps=20)
