@@ -24,7 +24,7 @@ from ..checks import array, function, number
 from ..errors import InputError, StepFailure
 from .layer import sized
 
-EVALUATIONS = 200_000  # of the acceleration in one motion
+EVALUATIONS = 100_000  # of the acceleration in one motion
 STEP = 6e-6  # of a central difference over the size of its argument: eps to the power 1/3
 
 
