@@ -12,7 +12,7 @@ from . import __version__
 from .cli_beam import add_beam_command
 from .cli_case import add_case_commands
 from .cli_channel import add_channel_commands
-from .cli_errors import check_words, printable, told
+from .cli_errors import Parser, check_words, printable, told
 from .cli_ida import add_ida_commands
 from .cli_layer import add_layer_command
 from .cli_motion import add_motion_commands
@@ -28,7 +28,7 @@ PETSc (for example -vi_contact_volume_snes_monitor)."""
 
 def parser() -> argparse.ArgumentParser:
     """All commands and options."""
-    top = argparse.ArgumentParser(prog="vi-contact", description=_DESCRIPTION)
+    top = Parser(prog="vi-contact", description=_DESCRIPTION)
     top.add_argument("--version", action="version", version=f"vi-contact {__version__}")
     commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
     wall = commands.add_parser(
@@ -72,7 +72,8 @@ def add_wall_arguments(wall: argparse.ArgumentParser) -> None:
 def _wall(options: argparse.Namespace) -> str:
     from mpi4py import MPI
 
-    cases = {options.case: Path(options.out)} if options.case else {case: Path(options.out) / case for case in "ab"}
+    out = Path(options.out)
+    cases = {case: out / case for case in "ab"} if options.case is None else {options.case: out}
     texts = [_wall_case(options, case, out) for case, out in cases.items()]
     return "\n\n".join(texts) if MPI.COMM_WORLD.rank == 0 else ""
 
@@ -124,7 +125,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         petsc4py.init(["vi-contact", *petsc])
     try:
         check_words(own)
-        text = told(lambda: options.run(options))
+        text = told(lambda: options.run(options), getattr(options, "spelling", {}))
     except ViContactError as error:
         fail_together(str(error))
         if rank() == 0:

@@ -85,7 +85,7 @@ def _force(options: argparse.Namespace, elements: Any, steps: int) -> Any:
         rod = Rod(options.length, options.rho, options.area, options.E, viscosity=options.viscosity, gap=options.gap,
                   body_force=lambda t: options.rod)
         return rod_forces(rod, elements, dt=options.dt, steps=steps)
-    known, name = readings(options.dt), options.reading or "C"
+    known, name = readings(options.dt), "C" if options.reading is None else options.reading
     if name not in known:
         raise InputError(f"unknown reading '{name}': choose one of {', '.join(known)}")
     return known[name]

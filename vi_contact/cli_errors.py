@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import argparse
 import errno
+import re
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from textwrap import shorten
+from typing import Any, NoReturn
 
-from .checks import shown
+from .checks import SHOWN, shown
 from .errors import InputError, ViContactError
 from .output import sentence
 
 PETSC_ERR_MEM = 55  # of petscsystypes.h
+_ARGUMENT = re.compile(r"(?<= )(\w++)= ?")
 _MEMORY = ("out of memory", "cannot allocate memory", "unable to allocate", "memory allocation failed", "bad_alloc")
 OUT_OF_MEMORY = (
     "out of memory: take a coarser mesh, fewer steps or samples, or more ranks on more machines; what a run has "
@@ -24,18 +28,32 @@ def check_words(arguments: Sequence[str]) -> None:
     for word in arguments:
         if "\0" in word:
             raise InputError(f"{shown(word)} holds the character NUL: leave it out")
+        if word.startswith("--") and word.endswith("=--"):
+            raise InputError(f"{shown(word)}: the value is missing, give one")
     for option, value in zip(arguments, [*arguments[1:], None], strict=True):
         if (option in ("--out", "--csv", "--png") and value == "") or option in ("--out=", "--csv=", "--png="):
             raise InputError(f"{option.rstrip('=')} is empty: give the name of a file or folder, or leave it away")
 
 
-def told(run: Callable[[], Any]) -> Any:
-    """What the call returns; ViContactError of one sentence for errors of memory, files and sizes of numbers."""
+class Parser(argparse.ArgumentParser):
+    """argparse's parser, whose sentences stay short where a word is long."""
+
+    def error(self, message: str) -> NoReturn:
+        super().error(shorten(" ".join(part[:SHOWN] for part in message.split()), 400, placeholder=" …"))
+
+
+def told(run: Callable[[], Any], spelling: Mapping[str, str]) -> Any:
+    """What the call returns; ViContactError of one sentence for errors of memory, files and sizes of numbers.
+
+    spelling: argument -> option: what sentences call units= is --units here.
+    """
     try:
         return run()
     except ViContactError as error:
         if _of_memory(error):
             raise ViContactError(OUT_OF_MEMORY) from error
+        if spelling and isinstance(error, InputError):
+            raise InputError(_respelt(str(error), spelling)) from error
         raise
     except Exception as error:
         text = _sentence(error)
@@ -48,6 +66,13 @@ def printable(text: str) -> str:
     """The text without what standard output cannot write, as names of files that are no UTF-8."""
     encoding = sys.stdout.encoding or "utf-8"
     return text.encode(encoding, "backslashreplace").decode(encoding)
+
+
+def _respelt(sentence: str, spelling: Mapping[str, str]) -> str:
+    def option(found: re.Match[str]) -> str:
+        return f"{spelling[found[1]]} " if found[1] in spelling else found[0]
+
+    return _ARGUMENT.sub(option, sentence).rstrip()
 
 
 def _sentence(error: Exception) -> str | None:

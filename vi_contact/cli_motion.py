@@ -8,12 +8,13 @@ import re
 from pathlib import Path
 from typing import Any
 
-from .cli_options import output_file
+from .cli_options import output_file, spaced
 from .errors import InputError
 
 _FORMATS = {".at2": "at2", ".th": "path", ".g3": "path", ".acc": "path"}
 _QUANTITY = re.compile(r"([-+]?[\d.]++(?:[eE][-+]?\d++)?)(.*+)")
 _SHOWN = (0.1, 0.2, 0.5, 1.0, 2.0)  # periods of the printed table [s]
+_SPELLING = {"units": "--units", "dt": "--dt", "channel": "--channel", "largest": "--largest", "resample_dt": "--even"}
 _ACTIONS = {
     "info": "what a record file holds: units, peaks, intensities, duration, drift",
     "convert": "process a record and write it as columns, PEER AT2 or OpenSees path series",
@@ -44,7 +45,7 @@ def add_motion_commands(commands: Any) -> None:
     plot.add_argument("--out-units", default="m/s2", metavar="UNITS", help="of the accelerations drawn (default m/s2)")
     _add_spectrum(parsers["spectrum"])
     for name, run in (("info", _info), ("convert", _convert), ("plot", _plot), ("spectrum", _spectrum)):
-        parsers[name].set_defaults(run=run)
+        parsers[name].set_defaults(run=run, spelling=_SPELLING)
 
 
 def _add_reading(one: argparse.ArgumentParser) -> None:
@@ -125,7 +126,7 @@ def _read(options: argparse.Namespace, path: str) -> Any:
         baseline=options.baseline, scale=options.scale, pga=options.pga, arias=options.arias, psa=_psa(options.psa),
     )
     record = read_record(path, options.units, dt=options.dt, channel=options.channel, resample_dt=options.even,
-                         largest=options.largest or LARGEST_PEAK)
+                         largest=LARGEST_PEAK if options.largest is None else options.largest)
     return steps(record)
 
 
@@ -180,10 +181,7 @@ def _spectrum(options: argparse.Namespace) -> str:
 
     units = canonical_units("--out-units", options.out_units)
     target = _target(options)
-    first, last, count = options.periods
-    if not (0.0 < first < last and count >= 2 and count == int(count)):
-        raise InputError(f"--periods {first:g} {last:g} {count:g}: give FROM below TO and a whole number N from 2 on")
-    periods = np.geomspace(first, last, int(count))
+    periods = spaced("--periods", options.periods)
     spectra, steps, rows = {}, {}, []
     for path in options.file:
         record = _read(options, path)

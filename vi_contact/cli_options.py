@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from .checks import shown
+from .checks import counted, shown
 from .errors import InputError
 
 SHAKING = ("motion", "vertical", "units", "scale", "pga", "resample")
 STEP = ("solver", "scheme", "dt", "steps", "cross_check")
+MOST_SPACED = 100_000  # periods or frequencies of a spectrum
 OUTPUT = ("fields_every", "restart", "changed")
 PICTURES = (".png", ".pdf", ".svg")
 
 
 def add_shaking(parser: argparse.ArgumentParser, *, harmonic: str) -> Any:
     """The group of options for the ground motion; ``harmonic``: amplitude of the motion without a record."""
+    parser.set_defaults(spelling={"units": "--units"})
     shake = parser.add_argument_group("ground motion")
     shake.add_argument("--motion", metavar="FILE", help="horizontal record: PEER AT2, USGS SMC or two columns")
     shake.add_argument("--vertical", metavar="FILE", help="vertical record, beside --motion")
@@ -78,6 +81,16 @@ def chosen(options: argparse.Namespace) -> dict[str, Any]:
     found = {name: getattr(options, name) for name in (*SHAKING, *STEP, *OUTPUT)}
     scale = 1.0 if options.scale is None else options.scale
     return found | {"scale": scale, "restart": options.restart or options.changed}
+
+
+def spaced(option: str, values: Sequence[float]) -> Any:
+    """FROM, TO, N of an option as N logarithmically spaced numbers; InputError for others, before memory is taken."""
+    import numpy as np
+
+    first, last, count = values
+    if not (0.0 < first < last < math.inf and 2 <= count < math.inf and count == int(count)):
+        raise InputError(f"{option} {first:g} {last:g} {count:g}: give FROM below TO and a whole number N from 2 on")
+    return np.geomspace(first, last, counted(option, f"N = {count:g}", count, "numbers", most=MOST_SPACED))
 
 
 def output_file(

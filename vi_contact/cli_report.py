@@ -9,8 +9,8 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from .cli_options import output_file, table_beside_picture
-from .errors import InputError, ViContactError
+from .cli_options import output_file, spaced, table_beside_picture
+from .errors import ViContactError
 
 _ACTIONS = {
     "peaks": "largest and smallest value of every column, as a table",
@@ -91,21 +91,12 @@ def _peaks(options: argparse.Namespace) -> str:
     return "\n".join([head, *lines, f"table: {table}"])
 
 
-def _spaced(option: str, values: Sequence[float]) -> Any:
-    import numpy as np
-
-    first, last, count = values
-    if not (0.0 < first < last and count >= 2 and count == int(count)):
-        raise InputError(f"{option} {first:g} {last:g} {count:g}: give FROM below TO and a whole number N from 2 on")
-    return np.geomspace(first, last, int(count))
-
-
 def _spectrum(options: argparse.Namespace) -> str:
     from .floor_spectra import floor_spectrum, recorded_motion
     from .plotting_motion import plot_spectra
     from .run_folder import read_run
 
-    run, periods = read_run(options.folder), _spaced("--periods", options.periods)
+    run, periods = read_run(options.folder), spaced("--periods", options.periods)
     table = _table_path(options)
     spectra = {
         name: floor_spectrum(run.history, name, periods, damping=options.damping, relative=options.relative)
@@ -130,7 +121,7 @@ def _transfer(options: argparse.Namespace) -> str:
     from .run_folder import read_run
 
     run, table = read_run(options.folder), _table_path(options)
-    given = None if options.frequencies is None else _spaced("--frequencies", options.frequencies)
+    given = None if options.frequencies is None else spaced("--frequencies", options.frequencies)
     found = transfer_function(
         run.history, options.surface, options.base, bandwidth=options.bandwidth or None, frequencies=given
     )

@@ -38,6 +38,7 @@ from ..solvers.condensed import Condensed
 from ..static import initial_state, static_equilibrium
 from ..step import ContactProblem, Recorder, Scheme, Solver
 from ..surfaces import ContactSurface, empty_surface
+from ..time_steps import course
 from ..weight import with_weight
 from ..writer import FieldWriter
 from .calls import Callee, Named, Node, Spot, callee, groups, needs_mesh
@@ -105,6 +106,15 @@ class Case:
         for table in ("material", *TABLES[TABLES.index("friction") :]):
             if table in self.nodes and not needs_mesh(self.nodes[table]):
                 self._made(table)
+        self._check_steps()
+
+    def _check_steps(self) -> None:
+        own = self._made("run")
+        steps = own.get("steps") if "steps" in own or "t_end" in own else 1  # else as long as the excitation
+        try:
+            course(own["dt"], steps, own.get("t_end"))
+        except InputError as error:
+            raise InputError(f"{self.path}: [run] {error}") from None
 
     def check_mesh(self, comm: Any) -> None:
         """Makes or reads the mesh and looks up every group that the tables name; InputError. Collective."""

@@ -1,0 +1,173 @@
+"""Command lines that are wrong by construction end with a status and one sentence: no traceback, no hang, no work done.
+
+All in one process. A sentence is that of ``main`` or, for words that the parser refuses, its last line.
+"""
+
+from __future__ import annotations
+
+import re
+import warnings
+from pathlib import Path
+from random import Random
+
+import pytest
+from chain import chain_problem
+
+pytest.importorskip("dolfinx")
+pytest.importorskip("matplotlib")
+
+import vi_contact as vc
+from vi_contact.cli import main
+from vi_contact.cli_errors import printable
+
+pytestmark = pytest.mark.serial
+COUNT = 300
+NUMBER = ["nan", "x", "", "1e400e", "1_0x", "--", "\0"]  # no number at all
+POSITIVE = ["0", "-1", "inf", "1e400", *NUMBER]
+COUNTED = ["0", "-3", "2.5", "1e3", "1" * 5000, "nan", "x", ""]
+PLACES = ["nowhere/x", "x\0y", "", "."]
+READING = {
+    "--units": ["furlong", "m/s2", ""], "--dt": [*POSITIVE, "0.5"], "--channel": [*COUNTED, "1"],
+    "--largest": ["x", "0", "-1g", "nan", "1e-9g", "g"], "--trim": ["2 1", "-1 1", "nan 1", "0 99", "x 1", "0 0"],
+    "--pad": ["1e12 0", "0 1e300", "-1 0", "nan 0", "0 inf"], "--taper": ["0", "0.9", "-1", "nan", "inf"],
+    "--low": [*POSITIVE, "1e9", "1e-300"], "--high": [*POSITIVE, "1e9"], "--resample": [*POSITIVE, "1e-12", "1e12"],
+    "--order": [], "--baseline": ["99", "-1", "x", "2.5"], "--scale": ["inf", "1e400", *NUMBER],
+    "--pga": ["0", "-1", "x", "1e999", "1furlong"], "--arias": POSITIVE, "--psa": ["0.5g 0", "x 1", "1 nan", "0 1"],
+}
+PERIODS = ["0.1 1 1e12", "1 0.1 5", "0.1 1 2.5", "nan 1 5", "0.1 inf 5", "1e-300 1 5", "0.1 1 1", "0.1 1 nan", "0 1 5"]
+STEP = {
+    "--steps": ["0", "-1", "x", "1" * 5000], "--dt": [*POSITIVE, "1e-300"], "--solver": ["foo", ""],
+    "--scheme": ["foo"], "--impact": ["foo", "2", "-1", "nan"],
+    "--motion": PLACES, "--vertical": ["x"], "--scale": ["inf", "nan", "x"],
+    "--fields-every": ["-1", "x"], "--scale=2 --pga": ["3"], "--out": [""],
+}
+WRONG: dict[str, dict[str, list[str]]] = {  # command -> option -> values; an option "" stands for more words
+    "motion info FILE": READING | {"": ["x.at2", "--nosuch", "FOLDER"]},
+    "motion plot FILE": {"--out": ["x.nosuch", "nowhere/x.png", "", "FILE"], "--out-units": ["furlong", ""]},
+    "motion convert FILE out.txt": {"--to": ["x"], "--out-units": ["furlong"], "--low": ["nan"]},
+    "motion convert FILE": {"": ["nowhere/x", "FILE", ".", "a\0b"]},
+    "motion spectrum FILE": {
+        "--periods": PERIODS, "--damping": ["1", "-1", "nan", "2", "0.05 0.05"], "--ec8": ["B", "Z --ag 1"],
+        "--ag": ["1", "x"],
+        "--csv": ["", "nowhere/x", "x.png --png x.png", "FILE"], "--out-units": ["furlong"],
+    },
+    "run CASE --check --set": {"": [
+        "run.dt=-1", "run.dt=nan", "run.dt=x", "run.steps=-1", "run.steps=1.5", "friction.mu=-1", "friction.type=X",
+        "scheme.phi=x", "mesh.divisions=[0,1]", "mesh.divisions=[1000000,1000000]", "mesh.height=inf", "x.y=1", "x",
+        "=1", "material.concrete.nu=0.7", "material.concrete.E=1" + "0" * 400, "excitation.1.frequency=nan",
+        "system.clamped='x'",
+        "excitation.9.scale=1", "mesh.path='x'", "format=2", "run=1", "mesh=[]", "record.1.points={}", "contact=3",
+    ]},
+    "run": {"": ["x.toml", "FOLDER", "FILE", "CASE --out \0", "CASE --check --out=", ""]},
+    "ida CASE --motions FILE --edp u_x_top --out study --scales": {"": ["nan", "", "-1", "x", "1,1", "0", "inf"]},
+    "ida CASE --motions FILE --edp u_x_top --out study --levels": {"": ["nan", "0", "-1", "1,x"]},
+    "ida CASE --motions FILE --out study --scales 1 --edp": {"": [":max", "a:b", "a:max:b"]},
+    "ida CASE --motions FILE --edp u_x_top --out study --scales 1": {
+        "--im": ["foo", "sa", "sa:0", "sa:nan", "sa:x", "pga:1"], "--jobs": ["0", "-1", "x"],
+        "--part": ["0/1", "5/2", "x", "1"], "--launch": ["'"], "--motions": ["FILE FILE", "FILE,FILE", ",", ""],
+        "--levels": ["1"], "--set": ["x"],
+    },
+    "beam --elements 4 --t-end 0.01 --out beam": {
+        "--length": POSITIVE, "--rho": POSITIVE, "--E": POSITIVE,
+        "--elements": ["0", "-1", "x", "1000000000", "1" * 5000],
+        "--dt": POSITIVE, "--t-end": [*POSITIVE, "1e300"], "--reading": ["Z", ""], "--eps": POSITIVE,
+        "--mu": ["nan", "-1", "inf"], "--out": ["", "FILE"],
+    },
+    "layer": {
+        "--mass": POSITIVE, "--speed": [*POSITIVE, "1e300"], "--width": POSITIVE, "--k": POSITIVE[1:],
+        "--c": POSITIVE[1:], "--restitution": ["2", "-1", "nan"],
+        "--metric": ["foo"], "--out": ["x.nosuch", ""],
+    },
+    "wall": STEP | {"--case": ["foo", ""], "--divisions": ["0 1", "x 1", "1000000 1000000"],
+                    "--size": [*POSITIVE, "1e-9"]},
+    "channel": STEP | {
+        "--contact": ["foo"], "--sides": ["foo"], "--base": ["foo"], "--gravity": ["foo"], "--size": POSITIVE,
+        "--rock": ["nan 0 1", "1 0.6 1"], "--damping": ["-1 1 2", "nan 1 2", "0.1 0 1"], "--mu": ["0.3"],
+    },
+    "report": {"": ["nowhere", "FILE", "FOLDER", "RUN --out x.docx", "RUN --show nosuch", "RUN --show t,u_x_end"]},
+    "post peaks RUN": {"": ["nosuch", "--out nowhere/x", "--out RUN/history.csv"]},
+    "post spectrum RUN": {"a_x_end --periods": PERIODS, "a_x_end --damping": ["1", "nan", "-1"],
+                          "": ["u_x_end", "nosuch"]},
+    "post transfer RUN a_x_end": {"": ["nosuch", "u_x_end"], "--frequencies": ["0 1 5", "1 99999 5", "1 2 1e12"],
+                                  "--bandwidth": ["nan", "-1", "x"]},
+    "post loop RUN": {"": ["nosuch u_x_end", "u_x_end", "u_x_end nosuch"]},
+    "": {"": ["", "nosuch", "--nosuch", "motion", "post nosuch", "\0", "run"]},
+}
+
+
+@pytest.fixture(scope="module")
+def places(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """A record, a case, a run folder and an empty folder."""
+    folder = tmp_path_factory.mktemp("cli")
+    motion = vc.scaled_to_pga(vc.synthetic(vc.KanaiTajimi(s0=0.01), 2.0, 0.01, seed=1), 1.0)
+    vc.write_at2(motion, folder / "motion.at2", "g")
+    case = Path(__file__).resolve().parents[1] / "demos" / "cases" / "wall.toml"
+    text = '[friction]\ntype = "Coulomb"\nmu = 0.3\n[[excitation]]'
+    (folder / "case.toml").write_text(case.read_text("utf-8").replace("[[excitation]]", text, 1), "utf-8")
+    problem = chain_problem(3, gap=1e-3, excitation=vc.Ricker(3.0, 6.0, direction=(1.0,)), consistent=True)
+    vc.simulate(problem, scheme=vc.ZienkiewiczWoodTaylor(), dt=5e-3, steps=20, out=folder / "run", progress=False,
+                record=[vc.Probe({"end": (3.0,)}, acceleration=True)])
+    (folder / "empty").mkdir()
+    return {"FILE": str(folder / "motion.at2"), "CASE": str(folder / "case.toml"), "RUN": str(folder / "run"),
+            "FOLDER": str(folder / "empty")}
+
+
+def lines() -> list[list[str]]:
+    """Wrong values by chance, each at most once."""
+    every = [words(command, option, value) for command, options in WRONG.items() for option, values in options.items()
+             for value in values]
+    assert len(every) > COUNT
+    return Random(7).sample(every, COUNT)
+
+
+def words(command: str, option: str, value: str) -> list[str]:
+    given = value.split(" ") if value else [""]
+    if option and len(given) == 1 and " " not in option:
+        return [*command.split(), f"{option}={value}"]  # a value that begins with a dash is one, too
+    return [*command.split(), *option.split(), *given]
+
+
+def placed(word: str, places: dict[str, str]) -> str:
+    """The word with the names of places in it replaced."""
+    for name, path in places.items():
+        word = re.sub(rf"(?<![A-Z]){name}(?![A-Z])", path.replace("\\", "/"), word)
+    return word
+
+
+def test_wrong_command_lines(places: dict[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                             capsys: pytest.CaptureFixture[str]) -> None:
+    """An exception that is no SystemExit would be a traceback, and ends this test; so does a warning of numpy."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("signal.signal", lambda *_: None)  # ida makes Ctrl-C of SIGTERM for good
+    warnings.simplefilter("error", RuntimeWarning)
+    for line in lines():
+        line = [placed(word, places) for word in line]
+        try:
+            code = main(line)
+        except SystemExit as end:
+            code = end.code if isinstance(end.code, int) else 1
+        said = capsys.readouterr().err
+        assert code in (1, 2), (line, said)
+        assert code == 2 or said.startswith("vi-contact: ") and said.count("\n") == 1, (line, said)
+        assert 0 < len(said.splitlines()[-1]) < 900, (line, said)
+    assert not [path for path in tmp_path.rglob("*") if path.is_file()]
+
+
+@pytest.mark.parametrize(("command", "words"), [
+    ("motion info", "pass --units as one of m/s2"), ("wall --motion", "pass --units as one of m/s2"),
+    ("motion info --units g --channel 1", "--channel 1 was passed"),
+    ("motion info --units g --dt 0.5", "--dt 0.5 was passed"),
+    ("motion info --units cm/s2 --trim 0.5 9", "start=0.5 and end=9.0"),
+])
+def test_sentences_name_options_and_not_arguments(command: str, words: str, tmp_path: Path,
+                                                  capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "motion.txt").write_text("0 0\n0.1 0.5\n0.2 0\n")
+    given = command.split()
+    place = given.index("--motion") + 1 if "--motion" in given else 2
+    assert main([*given[:place], str(tmp_path / "motion.txt"), *given[place:]]) == 1
+    said = capsys.readouterr().err
+    assert words in said and "units=" not in said and "dt=" not in said
+
+
+def test_names_that_are_no_text_are_printed() -> None:
+    assert printable("a\udcff.at2") == "a\\udcff.at2" and printable("é") in ("é", "\\xe9")
