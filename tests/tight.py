@@ -48,11 +48,19 @@ def shares(explanation: str) -> Iterator[float]:
         return
     for node in ast.walk(tree):
         if isinstance(node, ast.Compare):
-            sides = [number(side) for side in (node.left, *node.comparators)]
+            sides = [node.left, *node.comparators]
             for left, sign, right in zip(sides, node.ops, sides[1:], strict=False):
-                value, bound = (left, right) if isinstance(sign, (ast.Lt, ast.LtE)) else (right, left)
-                if 0.0 < value <= bound and (bound < SMALL or "e-" in explanation.split("\n")[0]):
-                    yield value / bound
+                yield share(left, right) if isinstance(sign, (ast.Lt, ast.LtE)) else share(right, left)
+
+
+def share(value: ast.expr, bound: ast.expr) -> float:
+    """How much of the bound is used up, or of what is added to something else: now <= before + 1e-12 * first."""
+    before = 0.0
+    if isinstance(bound, ast.BinOp) and isinstance(bound.op, ast.Add):
+        before, bound = number(bound.left), bound.right
+    factors = [bound, *((bound.left, bound.right) if isinstance(bound, ast.BinOp) else ())]
+    small = any(0.0 < number(factor) < SMALL for factor in factors)
+    return (number(value) - before) / number(bound) if small else 0.0
 
 
 def pytest_assertion_pass(item: pytest.Item, lineno: int, orig: str, expl: str) -> None:
@@ -60,7 +68,7 @@ def pytest_assertion_pass(item: pytest.Item, lineno: int, orig: str, expl: str) 
     seen[item.nodeid] += 1
     if seen[item.nodeid] == ENOUGH:
         util._assertion_pass = None
-    share = max(shares(expl), default=0.0)
-    if share * FACTOR > 1.0:
+    used = max(shares(expl), default=0.0)
+    if used * FACTOR > 1.0:
         with open(os.environ["VI_CONTACT_TIGHT"], "a") as file:
-            file.write(f"{share:.2f} {item.nodeid} line {lineno}: {orig}\n")
+            file.write(f"{used:.2f} {item.nodeid} line {lineno}: {orig}\n")
