@@ -28,8 +28,9 @@ from pathlib import Path
 
 import numpy as np
 
+from .. import checks
 from ..algebra import Array, SerialFactor, SerialMatrix
-from ..checks import array, counted, function, instance, number, path, provides, shown, whole
+from ..checks import array, counted, function, instance, number, provides, shown, whole
 from ..errors import InputError, StepFailure
 from .elements import BeamMatrices, Elements, beam_matrices
 from .tip import ExactFriction, Slip, TipFriction
@@ -67,9 +68,9 @@ class BeamRun:
         """Newton updates per step."""
         return float(np.mean(self.history["newton"][1:]))
 
-    def save(self, target: str | Path) -> Path:
+    def save(self, path: str | Path) -> Path:
         """The history as CSV, a line per time."""
-        file = path("BeamRun.save", "the path", target)
+        file = checks.path("BeamRun.save", "the path", path)
         if not file.parent.is_dir():
             raise InputError(f"BeamRun.save: there is no folder {shown(str(file.parent))}; make it first")
         columns = list(self.history)
