@@ -169,5 +169,14 @@ def test_sentences_name_options_and_not_arguments(command: str, words: str, tmp_
     assert words in said and "units=" not in said and "dt=" not in said
 
 
+def test_a_dollar_in_a_title_is_no_formula(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Titles come from files, and matplotlib would read a formula between two dollars, or fail."""
+    monkeypatch.chdir(tmp_path)
+    Path("a$\\frac$.txt").write_text("# $\\frac$ of $x\n0 0\n0.1 0.5\n0.2 0\n0.3 0.1\n")
+    for command in ("plot", "spectrum"):
+        more = ["--periods", "1", "2", "5"] if command == "spectrum" else []
+        assert main(["motion", command, "a$\\frac$.txt", "--units", "m/s2", *more]) == 0
+
+
 def test_names_that_are_no_text_are_printed() -> None:
     assert printable("a\udcff.at2") == "a\\udcff.at2" and printable("é") in ("é", "\\xe9")

@@ -30,6 +30,11 @@ def panels(rows: int, size: tuple[float, float], **more: Any) -> tuple[Any, Any]
     return figure, axes
 
 
+def plain(text: str) -> str:
+    """A text of a file or a user as it is drawn: a dollar begins no formula."""
+    return text.replace("$", r"\$")
+
+
 def length_unit(size: float) -> tuple[float, str]:
     """(metres per unit, name) so that a length of this size has one to three digits before the point."""
     for metres, name in _UNITS:

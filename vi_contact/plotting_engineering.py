@@ -9,7 +9,7 @@ import numpy as np
 
 from .floor_spectra import TransferFunction
 from .peak_values import Loop
-from .plotting import STYLE, save, scaled
+from .plotting import STYLE, plain, save, scaled
 
 
 def _panel(size: tuple[float, float]) -> tuple[Any, Any]:
@@ -35,7 +35,8 @@ def plot_loop(
     axis.plot(across[-1:], up[-1:], "s", color="tab:red", ms=5, label="end")
     axis.legend(fontsize=8)
     work, unit = scaled(loop.work[-1:], "J")
-    axis.set(xlabel=f"{x[0]} [{x_unit}]", ylabel=f"{y[0]} [{y_unit}]", title=title or f"work {work[0]:.3g} {unit}")
+    title = title or f"work {work[0]:.3g} {unit}"
+    axis.set(xlabel=plain(f"{x[0]} [{x_unit}]"), ylabel=plain(f"{y[0]} [{y_unit}]"), title=plain(title))
     return save(figure, path)
 
 
@@ -60,5 +61,5 @@ def plot_transfer(
                   textcoords="offset points", fontsize=8)
     finite = found.amplitude[np.isfinite(found.amplitude) & (found.amplitude > 0.0)]
     axis.set_ylim(0.5 * float(finite.min()), 2.0 * float(finite.max()))
-    axis.set(xlabel="frequency [Hz]", ylabel="|surface / base| [-]", title=title)
+    axis.set(xlabel="frequency [Hz]", ylabel="|surface / base| [-]", title=plain(title))
     return save(figure, path)

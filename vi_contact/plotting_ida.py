@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from .algebra import Array
-from .plotting import STYLE, scaled
+from .plotting import STYLE, plain, scaled
 
 _FRACTILES = (("16 %", "tab:blue", "--"), ("50 %", "black", "-"), ("84 %", "tab:red", "--"))
 
@@ -56,7 +56,7 @@ def _draw(axis: Any, panel: Panel) -> None:
     few = len(panel.curves) <= 5
     marks = "osv^D"
     for number, (record, (intensity, demand)) in enumerate(panel.curves.items()):
-        label = record if few else "a record" if number == 0 else None
+        label = plain(record) if few else "a record" if number == 0 else None
         mark = marks[number] if few else None
         axis.plot(factor * demand, intensity, marker=mark, color="0.65", lw=0.9, ms=4, label=label)
     if len(panel.levels) > 1:

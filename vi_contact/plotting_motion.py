@@ -21,7 +21,7 @@ from .ground_motion import (
     integrated,
     pga,
 )
-from .plotting import STYLE, length_unit, panels, save
+from .plotting import STYLE, length_unit, panels, plain, save
 
 SAMPLES_A_PERIOD = 10
 """A spectrum is drawn pale at periods with fewer samples of the record than this."""
@@ -41,7 +41,7 @@ def plot_motion(record: Record, path: str | Path, *, title: str | None = None, u
         metres, unit = _size(values)
         _line(axis, record.times, values / metres, f"{quantity} [{unit}{per_second}]")
     _husid(axes[3], record)
-    axes[0].set_title(title if title is not None else record.title or record.source, fontsize=10)
+    axes[0].set_title(plain(title if title is not None else record.title or record.source), fontsize=10)
     axes[-1].set_xlim(0.0, record.duration)
     return save(figure, path)
 
@@ -66,7 +66,8 @@ def plot_spectra(
         trusted = spectrum.periods >= SAMPLES_A_PERIOD * (steps or {}).get(label, 0.0)
         colour = None
         for axis, values in ((top, spectrum.psa / UNITS[units]), (bottom, spectrum.displacement / metres)):
-            (line,) = axis.plot(spectrum.periods, np.where(trusted, values, np.nan), lw=1.2, color=colour, label=label)
+            known = np.where(trusted, values, np.nan)
+            (line,) = axis.plot(spectrum.periods, known, lw=1.2, color=colour, label=plain(label))
             colour = line.get_color()
             axis.plot(spectrum.periods, values, lw=0.8, color=colour, alpha=0.35)
     if target is not None:
@@ -81,7 +82,7 @@ def plot_spectra(
     top.legend(fontsize=8)
     for axis in (top, bottom):
         axis.set_ylim(bottom=0.0)
-    top.set(ylabel=f"pseudo-acceleration [{_pretty(units)}]", title=title)
+    top.set(ylabel=f"pseudo-acceleration [{_pretty(units)}]", title=plain(title))
     bottom.set(ylabel=f"displacement [{unit}]", xlabel="period [s]", xlim=(shown.min(), shown.max()))
     return save(figure, path)
 
