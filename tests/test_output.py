@@ -20,7 +20,6 @@ from vi_contact.excitation import Harmonic
 from vi_contact.history import HistoryFiles
 from vi_contact.output import (
     hdf5_atomically,
-    hdf5_image,
     on_root,
     run_folder,
     sentence,
@@ -416,11 +415,3 @@ def test_folders_of_another_format(tmp_path: Path) -> None:
     about.unlink()
     assert len(read_run(tmp_path).history["t"]) == 11
     assert len(run(tmp_path, 20, restart=True).history["t"]) == 21 and about.exists()
-
-
-@pytest.mark.serial
-def test_hdf5_in_memory(tmp_path: Path) -> None:
-    """The image is a file like any other."""
-    (tmp_path / "a.h5").write_bytes(hdf5_image(lambda file: file.create_dataset("x", data=np.arange(1000.0))))
-    with h5py.File(tmp_path / "a.h5") as file:
-        assert np.array_equal(file["x"][()], np.arange(1000.0))

@@ -150,7 +150,7 @@ def write_all(file: Any, data: bytes) -> None:
 
 
 def hdf5_atomically(path: Path, fill: Callable[[h5py.File], None]) -> None:
-    """The same for an HDF5 file that need not fit the memory."""
+    """The same for an HDF5 file, which need not fit the memory."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
         with open(temporary, "w+b", buffering=0) as raw:
@@ -184,14 +184,6 @@ class _Kept:
             except OSError as error:
                 self.error = error
         return len(data)
-
-
-def hdf5_image(fill: Callable[[h5py.File], None]) -> bytes:
-    """The bytes of an HDF5 file made in memory: HDF5 itself does not survive a full disk."""
-    with h5py.File("image", "w", driver="core", backing_store=False) as file:
-        fill(file)
-        file.flush()
-        return bytes(file.id.get_file_image())
 
 
 def to_json(facts: Mapping[str, Any]) -> str:

@@ -27,7 +27,7 @@ import numpy as np
 from ..algebra import Array, Indices, Mask
 from ..checks import real, shown
 from ..errors import InputError
-from ..output import FIELDS, FIELDS_INDEX, hdf5_image, on_root, write_atomically
+from ..output import FIELDS, FIELDS_INDEX, hdf5_atomically, on_root, write_atomically
 from ..step import ContactProblem, Report, State
 from . import compat
 from .mesh import node_numbers
@@ -104,7 +104,7 @@ class Frames:
         def fill(file: h5py.File) -> None:
             file["points"], file["cells"] = points, cells
 
-        write_atomically(folder / "mesh.h5", hdf5_image(fill))
+        hdf5_atomically(folder / "mesh.h5", fill)
         self._frames = [(k, t) for k, t in sorted(kept.items()) if (self._folder / _name(k)).is_file()]
         if self._frames:
             self._write_index()
@@ -153,7 +153,7 @@ class Frames:
                 file[name] = vectors[:, 3 * i : 3 * i + 3]
             file["von_mises"], file["contact_pressure"], file["contact_status"] = stress, pressure, status
 
-        write_atomically(self._folder / _name(state.k), hdf5_image(fill))
+        hdf5_atomically(self._folder / _name(state.k), fill)
         self._frames.append((state.k, state.t))
         self._write_index()
 
