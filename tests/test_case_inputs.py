@@ -110,7 +110,8 @@ def test_every_path_is_relative_to_the_case_file(folder: Path, tmp_path: Path, m
     ("dt = 0.01", f"dt = {'[' * 3000}", "nested too deep"),
     ("dt = 0.01", f"dt = {'[' * 30}{']' * 30}", "nested too deep"),
     ("dt = 0.01", f"{'a.' * 3000}b = 1\ndt = 0.01", "nested too deep"),
-], ids=range(20))
+    ("dt = 0.01", f"{'a.' * 1_000_000}b = 1\ndt = 0.01", "nested too deep"),
+], ids=range(21))
 def test_check_tells_every_mistake(folder: Path, capsys: pytest.CaptureFixture[str], old: str, new: str,
                                    words: str) -> None:
     assert words in said(capsys, ["run", case(folder, (old, new)), "--check"])

@@ -22,7 +22,7 @@ PIECES = (
     "begin data ", "*begin data", "1 accel pts ", "1 accel ", "in g ", "(1F1", "(8F10.3) ", "format v1.",
     "format v1 with ", "chan 1: ", "chan x from ", "station = ", "station component", "station no: ", "code: ",
     "unknown/unspecified: 1, ", "equally spaced at 1 ", "at 1 ", "1 real-header values follow on 1 ",
-    "x (at line 1, ", "2 corrected ", "\n$Nodes ",
+    "a.", "\"a\".", "'", "x (at line 1, ", "2 corrected ", "\n$Nodes ",
 )
 SHORT, LONG = 400, 3200
 SLOWER = 24.0  # of LONG over SHORT: 8 where time grows as the text, 64 where as its square

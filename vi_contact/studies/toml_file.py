@@ -15,6 +15,8 @@ from ..errors import InputError
 BYTES, DEPTH = 10_000_000, 20  # of a case file; of tables and lists in each other
 _TOO_DEEP = "is nested too deep: give tables and lists as docs/studies.md has them"
 _TOO_LONG = "holds a whole number beyond 64 bits: write it with a point, as 1.0e30"
+_PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+"""
+_CHAIN = re.compile(rf"(?<![\w-])(?:{_PART}){{{DEPTH}}}")  # a key of many parts
 _REASON = re.compile(r"^(.*) \(at (?:line (\d+), column (\d+)|end of document)\)", re.DOTALL)
 
 
@@ -32,6 +34,8 @@ def read_toml(path: str | Path) -> dict[str, Any]:
         raise InputError(f"{path}: byte {error.start} is no UTF-8 text; save the case file as UTF-8") from None
     if len(data) > BYTES:
         raise InputError(f"{path}: the file is larger than {BYTES:.0e} bytes; give a case file")
+    if _CHAIN.search(text):  # before tomllib, whose time grows as the square of the parts of a key
+        raise InputError(f"{path}: {_TOO_DEEP}")
     try:
         return checked(tomllib.loads(text), str(path))
     except tomllib.TOMLDecodeError as error:
@@ -55,7 +59,7 @@ def checked(tables: dict[str, Any], source: str) -> dict[str, Any]:
         key, value, depth = left.pop()
         wrong = _defect(value, depth)
         if wrong:
-            raise InputError(f"{source}: {key} {wrong}")
+            raise InputError(f"{source}: {key[:200]} {wrong}")
         inside = value.items() if isinstance(value, dict) else enumerate(value, 1) if isinstance(value, list) else ()
         left += [(f"{key}.{name}".lstrip("."), one, depth + 1) for name, one in inside]
         if any("\0" in str(name) for name, _ in inside):
