@@ -22,7 +22,7 @@ from mpi4py import MPI
 import vi_contact as vc
 from vi_contact import fem
 from vi_contact.meshes.block import BlockMesh
-from vi_contact.solvers.volume import OneFactorisation, ReducedNewton, Selected, Volume
+from vi_contact.solvers.volume import OneFactorisation, Volume
 
 Wrong = Mapping[str, Any]
 HUGE = 10**5000  # more digits than Python prints
@@ -161,8 +161,6 @@ def values() -> Table:
         (Volume, {}, {"method": METHOD | {"of the other route": vc.ActiveSet()}, "tolerance": SHARE,
                       "petsc_options": {"text": "snes_monitor", "list": ["snes_monitor"]}, "prefix": {"none": None}}),
         (OneFactorisation, {}, {"exchanges": but(COUNT, "zero"), "limit": but(COUNT, "zero")}),
-        (Selected, {"petsc_type": "vinewtonrsls"}, {"petsc_type": {"none": None, "class": ReducedNewton,
-         "other": "x"}}),
         (vc.Schedule, {"pieces": ((0.1, 1.0),)},
          {"pieces": {"number": 0.1, "text": "0.1", "none": None, "nan": ((nan, 1.0),), "texts": (("0.1", 1.0),),
                      "back": ((0.1, 1.0), (0.1, 0.5)), "empty": ()}}),

@@ -17,9 +17,7 @@ from volume_cases import Case, block, case, pushed_block
 from vi_contact.solvers.volume import (
     OneFactorisation,
     ReducedNewton,
-    Selected,
     SemismoothNewton,
-    TaoBnls,
     TaoTron,
     Volume,
 )
@@ -32,8 +30,6 @@ METHODS = {
     "improved-prediction": OneFactorisation(),
     "semismooth": SemismoothNewton(),
     "tron": TaoTron(),
-    "bnls": TaoBnls(),
-    "bntr": Selected("bntr"),
 }
 M = 8  # contact points of pushed_block
 OPTIONS: dict[str, dict[str, Any]] = {
@@ -196,9 +192,6 @@ def test_units_do_not_matter(parallel: bool, method: Any, length: float, force: 
     assert np.max(np.abs(result.r_n / force - exact.r_n)) <= 1e-9 * np.max(exact.r_n)
 
 
-SELECTED = ("bntl", "bqnls", "bqnkls", "bqnktr", "bqnktl", "blmvm", "bncg", "vinewtonrsls", "vinewtonssls")
-
-
 @pytest.mark.parametrize("unit", [1e-6, 1e6])
 def test_units_do_not_matter_when_nothing_gives_the_scale(parallel: bool, method: Any, unit: float) -> None:
     """P18: from rest and in touch, only A and b tell how large the displacements are."""
@@ -206,14 +199,6 @@ def test_units_do_not_matter_when_nothing_gives_the_scale(parallel: bool, method
     one, other = (solve(replace(c, step=replace(c.step, bound=np.zeros(M))), method) for c in cases)
     assert np.max(np.abs(other.x / unit - one.x)) <= 1e-9 * np.max(np.abs(one.x))
     assert other.iterations == pytest.approx(one.iterations, abs=2)
-
-
-@pytest.mark.parametrize("options", [OPTIONS["rigid"], OPTIONS["springs"]], ids=["rigid", "springs"])
-@pytest.mark.parametrize("petsc_type", SELECTED)
-def test_selected_types_reach_the_certificate(parallel: bool, petsc_type: str, options: dict[str, Any]) -> None:
-    """Slow or not, what is offered ends below the tolerance of the loop."""
-    c = pushed_block(parallel=parallel, **options)
-    assert kkt_residual(c.step, solve(c, Selected(petsc_type))).worst <= 1e-9
 
 
 def test_a_start_below_the_tolerance_is_still_improved(parallel: bool, method: Any) -> None:

@@ -22,7 +22,7 @@ from vi_contact.errors import InputError, StepFailure
 from vi_contact.friction import Coulomb, ExponentialDecay, SlipRateCoulomb, Tresca
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.nsgs import NSGS
-from vi_contact.solvers.volume import ReducedNewton, Selected, Volume
+from vi_contact.solvers.volume import ReducedNewton, Volume
 from vi_contact.step import StepResult
 from vi_contact.verify import kkt_residual
 
@@ -235,11 +235,6 @@ def test_a_limit_of_iterations_is_told(parallel: bool) -> None:
     with pytest.raises(StepFailure, match="iteration limit"):
         solve(random_case(Coulomb(0.4), parallel=parallel), Volume(method=ReducedNewton(),
                                                                    petsc_options={"snes_max_it": 1}))
-
-
-def test_selected_by_petscs_name(parallel: bool) -> None:
-    c = random_case(Coulomb(0.4), parallel=parallel)
-    agree(c, solve(c, Volume(method=Selected("vinewtonrsls"))), solve(c))
 
 
 def test_solvers_are_freed(parallel: bool) -> None:

@@ -38,7 +38,7 @@ def add_step(parser: argparse.ArgumentParser, *, dt: str) -> Any:
     step = parser.add_argument_group("step")
     step.add_argument(
         "--solver", default="condensed",
-        help="condensed (default), hildreth, projected-cg, volume, volume-reference, semismooth, tron, bnls"
+        help="condensed (default), hildreth, projected-cg, volume, volume-reference, semismooth, tron"
     )
     step.add_argument(
         "--scheme", default="zwt",

@@ -24,7 +24,7 @@ from vi_contact.solvers.active_set import ActiveSet
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.hildreth import Hildreth
 from vi_contact.solvers.mprgp import ProjectedCG
-from vi_contact.solvers.volume import OneFactorisation, ReducedNewton, SemismoothNewton, TaoBnls, TaoTron, Volume
+from vi_contact.solvers.volume import OneFactorisation, ReducedNewton, SemismoothNewton, TaoTron, Volume
 from vi_contact.step import ContactProblem, StepProblem
 
 COMM = MPI.COMM_WORLD
@@ -40,7 +40,6 @@ VOLUME = {
     "reduced Newton": Volume(method=ReducedNewton()),
     "semismooth Newton": Volume(method=SemismoothNewton()),
     "TAO TRON": Volume(method=TaoTron()),
-    "TAO BNLS": Volume(method=TaoBnls()),
 }
 PROBLEMS: dict[str, Callable[[Any], ContactProblem]] = {
     "quadrilaterals": shaken_wall,

@@ -22,7 +22,7 @@ from ..solvers.mprgp import ProjectedCG
 from ..solvers.volume import Volume
 from ..solvers.volume_factorised import OneFactorisation
 from ..solvers.volume_snes import ReducedNewton, SemismoothNewton
-from ..solvers.volume_tao import TaoBnls, TaoTron
+from ..solvers.volume_tao import TaoTron
 from ..step import Scheme, Solver
 
 
@@ -68,5 +68,4 @@ SOLVERS: dict[str, Solver] = {
     "volume-reference": Volume(method=ReducedNewton()),  # factorises every reduced matrix anew: shares only A and b
     "semismooth": Volume(method=SemismoothNewton()),
     "tron": Volume(method=TaoTron()),
-    "bnls": Volume(method=TaoBnls()),
 }

@@ -29,9 +29,9 @@ from .volume_reasons import raised, stopped
 from .volume_snes import ReducedNewton, SemismoothNewton
 from .volume_step import ScaledStep
 from .volume_system import BoundedSystem
-from .volume_tao import Selected, TaoBnls, TaoTron
+from .volume_tao import TaoTron
 
-__all__ = ["OneFactorisation", "ReducedNewton", "Selected", "SemismoothNewton", "TaoBnls", "TaoTron", "Volume"]
+__all__ = ["OneFactorisation", "ReducedNewton", "SemismoothNewton", "TaoTron", "Volume"]
 
 
 class Driver(Protocol):
@@ -73,7 +73,7 @@ class Volume:
     """Settings of the volume route.
 
     Attributes:
-        method: OneFactorisation (fast), ReducedNewton (the reference), SemismoothNewton, TaoTron, TaoBnls or Selected.
+        method: OneFactorisation (fast), ReducedNewton (the reference), SemismoothNewton or TaoTron.
         petsc_options: PETSc options without prefix, e.g. {"snes_monitor": None}; command-line options go before them.
         prefix: what these options are called on the command line and in PETSC_OPTIONS.
         tolerance: largest relative error accepted when a solver stops improving above round-off.

@@ -6,7 +6,6 @@ are replaced by ``ScaledStep.verdict``.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -14,59 +13,34 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..algebra import Array
-from ..checks import instance
-from ..errors import InputError
 from ..step import StepProblem
-from .volume_friction_step import ScaledRubbing
 from .volume_options import REDUCED_PC, OptionLayers, Options, refuse
-from .volume_snes import AssembledJacobian, ReducedNewton, SemismoothNewton, SnesDriver, weakly, write_bounds
+from .volume_snes import AssembledJacobian, weakly, write_bounds
 from .volume_step import ScaledStep
 from .volume_system import BoundedSystem
 
-UNCONSTRAINED = "it ignores bounds, so the body would penetrate"
-OTHER = "it solves another class of problem (it wants constraint functions or a least-squares structure)"
-REFUSED = {
-    "bqpip": "it needs two finite bounds on every unknown and otherwise reports garbage as converged",
-    "gpcg": "on elasticity it needs thousands of iterations and stops short of the solution",
-    **dict.fromkeys(("lmvm", "nls", "ntr", "ntl", "cg", "nm", "owlqn", "bmrm"), UNCONSTRAINED),
-    **dict.fromkeys(("pounders", "brgn", "lcl", "admm", "almm", "ipm", "pdipm", "shell", "python"), OTHER),
-    **dict.fromkeys(("ssils", "ssfls", "asils", "asfls"), f"{OTHER}; SemismoothNewton() is its like in SNES"),
-}
-SOUND = ("tron", "bnls", "bntr", "bntl", "bqnls", "bqnkls", "bqnktr", "bqnktl", "blmvm", "bncg")
-FULL_NEWTON = ("bnls", "bntr", "bntl")
-FIRST_ORDER = ("bqnls", "bqnkls", "bqnktr", "bqnktl", "blmvm", "bncg")
 
-
-def tao_options(ranks: int, kind: str) -> Options:
-    """Defaults: TRON reads plain pc_type, the Newton-Krylov types tao_bnk_pc_type (P18), where the quasi-Newton types
-    want their own. PETSc has no incomplete Cholesky for several ranks."""
-    prefix = "tao_bnk_" if kind in FULL_NEWTON else ""
+def tao_options(ranks: int) -> Options:
+    """Give TRON's defaults; PETSc has no incomplete Cholesky for several ranks."""
     return {
         "tao_gatol": 0.0,
         "tao_grtol": 0.0,
         "tao_gttol": 0.0,
         "tao_steptol": 0.0,
-        "tao_max_it": 5000 if kind in FIRST_ORDER else 200,
-        f"{prefix}pc_type": "icc" if ranks == 1 else "bjacobi",
-        f"{prefix}sub_pc_type": "icc",
+        "tao_max_it": 200,
+        "pc_type": "icc" if ranks == 1 else "bjacobi",
+        "sub_pc_type": "icc",
     }
 
 
 def check_tao(tao: Any, layers: OptionLayers) -> None:
-    """Refuse types and preconditioners that give wrong answers, also when they come from options."""
-    refuse_type(tao.getType())
-    for key in ("pc_type", "tao_bnk_pc_type"):
-        pc = layers.chosen(key)
-        if pc in REDUCED_PC:
-            refuse(f"{key} {pc} with TAO {tao.getType()}", REDUCED_PC[pc], "use icc, bjacobi or hypre")
-
-
-def refuse_type(kind: str) -> None:
-    """InputError for TAO types that cannot solve the contact problem."""
-    if kind in REFUSED:
-        refuse(f"TAO type {kind}", REFUSED[kind], "use TaoTron(), TaoBnls() or ReducedNewton()")
-    if kind not in SOUND:
-        raise InputError(f"TAO type {kind!r} is not known to solve contact problems: choose one of {', '.join(SOUND)}")
+    """Refuse other types and preconditioners that give wrong answers, also when they come from options (docs/petsc.md:
+    many types ignore bounds, and bqpip reports garbage as converged)."""
+    if tao.getType() != "tron":
+        refuse(f"TAO type {tao.getType()}", "other types ignore bounds, or stop short or wrong", "leave it out")
+    pc = layers.chosen("pc_type")
+    if pc in REDUCED_PC:
+        refuse(f"pc_type {pc} with TAO tron", REDUCED_PC[pc], "use icc, bjacobi or hypre")
 
 
 class TaoDriver:
@@ -74,14 +48,14 @@ class TaoDriver:
 
     reasons = PETSc.TAO.Reason
 
-    def __init__(self, scaled: ScaledStep, layers: OptionLayers, tao_type: str) -> None:
+    def __init__(self, scaled: ScaledStep, layers: OptionLayers) -> None:
         self._scaled, self._layers = scaled, layers
         self._hessian = AssembledJacobian(scaled.system)
         self._y, G = self._hessian.mat.createVecs()
         self._vectors = [self._y, G, self._y.duplicate(), self._y.duplicate()]
         self.solver = PETSc.TAO().create(scaled.system.comm)
         self.solver.setOptionsPrefix(layers.prefix)
-        self.solver.setType(tao_type)
+        self.solver.setType("tron")
         self._test = Test(scaled)
         self.solver.setObjectiveGradient(weakly(scaled.objective), G)
         self.solver.setHessian(weakly(self._hessian.evaluate), self._hessian.mat)
@@ -140,74 +114,15 @@ class TaoTron:
     """
 
     carries_friction: ClassVar[bool] = False
-    tao_type: ClassVar[str] = "tron"
 
     def defaults(self, ranks: int) -> Options:
         """Options before the user's."""
-        return tao_options(ranks, self.tao_type)
+        return tao_options(ranks)
 
     def driver(self, scaled: ScaledStep, layers: OptionLayers) -> TaoDriver:
         """The TAO object."""
-        return TaoDriver(scaled, layers, self.tao_type)
+        return TaoDriver(scaled, layers)
 
     def start(self, driver: TaoDriver, system: BoundedSystem, step: StepProblem) -> Array:
         """The guess with the predicted contacts on their bounds."""
         return system.start(step)
-
-
-@dataclass(frozen=True)
-class TaoBnls(TaoTron):
-    """TAO BNLS: bound-constrained Newton with a line search; conjugate gradients with incomplete Cholesky inside."""
-
-    tao_type: ClassVar[str] = "bnls"
-
-
-@dataclass(frozen=True)
-class Selected:
-    """Any sound solver by PETSc's own name: vinewtonrsls, vinewtonssls or a TAO type.
-
-    bntr, bntl, the quasi-Newton types, blmvm and bncg are experimental and slow for elasticity. InputError, with the
-    reason, for types that ignore bounds, need another structure or are known to report wrong answers as converged.
-    """
-
-    petsc_type: str
-
-    def __post_init__(self) -> None:
-        instance("Selected", "petsc_type", self.petsc_type, str, "give a PETSc type, such as 'vinewtonrsls'")
-        if self.petsc_type not in SNES_TYPES:
-            refuse_type(self.petsc_type)
-
-    @property
-    def carries_friction(self) -> bool:
-        """Whether it is vinewtonrsls."""
-        return isinstance(SNES_TYPES.get(self.petsc_type), ReducedNewton)
-
-    def defaults(self, ranks: int) -> Options:
-        """Options before the user's."""
-        if self.petsc_type in SNES_TYPES:
-            return SNES_TYPES[self.petsc_type].defaults(ranks)
-        return tao_options(ranks, self.petsc_type)
-
-    def driver(self, scaled: ScaledStep, layers: OptionLayers) -> SnesDriver | TaoDriver:
-        """The SNES or TAO object."""
-        if self.petsc_type in SNES_TYPES:
-            return SNES_TYPES[self.petsc_type].driver(scaled, layers)
-        return TaoDriver(scaled, layers, self.petsc_type)
-
-    def start(self, driver: Any, system: BoundedSystem, step: StepProblem) -> Array:
-        """The guess with the predicted contacts on their bounds."""
-        return system.start(step)
-
-    def friction_defaults(self) -> Options:
-        """Options before the user's, with friction."""
-        return ReducedNewton().friction_defaults()
-
-    def friction_driver(self, scaled: ScaledRubbing, layers: OptionLayers) -> SnesDriver:
-        """The SNES object of a step with friction."""
-        return ReducedNewton().friction_driver(scaled, layers)
-
-
-SNES_TYPES: Mapping[str, ReducedNewton | SemismoothNewton] = {
-    "vinewtonrsls": ReducedNewton(),
-    "vinewtonssls": SemismoothNewton(),
-}

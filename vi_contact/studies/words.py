@@ -51,7 +51,7 @@ from ..solvers.nsgs import NSGS
 from ..solvers.uzawa import Uzawa
 from ..solvers.volume_factorised import OneFactorisation
 from ..solvers.volume_snes import ReducedNewton, SemismoothNewton
-from ..solvers.volume_tao import TaoBnls, TaoTron
+from ..solvers.volume_tao import TaoTron
 from ..step import Recorder, Scheme, Solver
 from ..surfaces import ContactSurface
 from ..upgoing import UpgoingVelocity, upgoing
@@ -113,7 +113,7 @@ def _choices() -> dict[Any, Mapping[str, Callee]]:
         SmallMethod: _named(ActiveSet, Hildreth, ProjectedCG),
         friction_small.FrictionMethod: frictional,
         extrapolation.Extrapolation: _named(extrapolation.Plain, extrapolation.Aitken, extrapolation.Anderson),
-        volume.Method: _named(OneFactorisation, ReducedNewton, SemismoothNewton, TaoTron, TaoBnls),
+        volume.Method: _named(OneFactorisation, ReducedNewton, SemismoothNewton, TaoTron),
         time_steps.Schedule: _named(time_steps.Schedule),
         time_steps.HalvedAtImpact: _named(time_steps.HalvedAtImpact),
         Recorder: _named(
