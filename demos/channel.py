@@ -24,13 +24,14 @@ import numpy as np
 from mpi4py import MPI
 
 import vi_contact as vc
+from demos.pictures.channel import plot_beside, plot_layout, plot_moments
 from vi_contact import fem
 from vi_contact import plotting_channel as pictures
 from vi_contact.meshes.channel import ChannelMesh
 from vi_contact.models.channel import Channel, ChannelModel, build
 from vi_contact.models.channel_run import REFERENCE
 from vi_contact.plotting import History, plot_energy, plot_excitation
-from vi_contact.plotting_channel_mesh import animate, plot_layout, plot_moments
+from vi_contact.plotting_channel_mesh import animate
 from vi_contact.plotting_friction import plot_states
 from vi_contact.static import static_equilibrium
 
@@ -112,7 +113,7 @@ def draw(model: ChannelModel, runs: Mapping[str, History], out: Path, quick: boo
     plot_excitation(runs[sliding], out / "excitation.png", title="Acceleration of the bedrock")
     pictures.plot_openings(runs[sliding], out / "openings.png", title="Openings of the interface (compare Fig. 7)")
     pictures.plot_rocking(runs[sliding], out / "rocking.png", title="Bottom corners (compare Fig. 8)")
-    pictures.plot_beside(runs, bilateral, out / "beside.png", title="Unilateral and bilateral contact (compare Fig. 9)")
+    plot_beside(runs, bilateral, out / "beside.png", title="Unilateral and bilateral contact (compare Fig. 9)")
     pictures.plot_interface(unilateral, outline, out / "interface.png", title="Interface between channel and soil")
     pictures.plot_envelope(unilateral, outline, out / "envelope.png", title="Envelopes along the outline")
     plot_states(runs[coulomb], out / "states.png", position=outline.places(), axis_label="arc length [m]",

@@ -10,7 +10,7 @@ from test_boundary_layer import DEEPEST, DURATION, RESTITUTION, C, K
 from vi_contact.boundary_layer import trajectory
 from vi_contact.boundary_layer.bilateral import bilateral_motion
 from vi_contact.boundary_layer.layer import Layer
-from vi_contact.boundary_layer.metric import Metric, b_affinities, b_metric, normal_mass
+from vi_contact.boundary_layer.metric import Metric, b_affinities, normal_mass
 from vi_contact.boundary_layer.motion import ConstrainedSystem, Evaluations
 from vi_contact.boundary_layer.particle import ParticleImpact, damping_ratio, layer_for, restitution
 from vi_contact.boundary_layer.rigid_body import Ellipsoid, RigidBody, rotation
@@ -19,6 +19,11 @@ from vi_contact.errors import InputError, StepFailure
 
 pytestmark = pytest.mark.serial
 PLANE = ConstrainedSystem(np.eye(2), lambda q: q[0], lambda q: np.array([1.0, 0.0]))  # a unit mass before x = 0
+
+
+def b_metric(M: np.ndarray, A: np.ndarray, rho: float, width: float) -> np.ndarray:
+    """g_IJ + ĝ_IJ of (15), (n, n)."""
+    return np.asarray(M + normal_mass(M, A) * (width / rho) ** 2 * np.outer(A, A))
 
 
 def collide(layer: Layer, **more) -> Contact:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import vi_contact as vc
+from demos.pictures.channel import plot_beside, plot_layout, plot_moments
 from vi_contact import fem, plotting
 from vi_contact.errors import InputError
 from vi_contact.meshes.channel import ChannelMesh
@@ -18,13 +19,12 @@ from vi_contact.plotting_channel import (
     SHOWN,
     Outline,
     opening,
-    plot_beside,
     plot_envelope,
     plot_interface,
     plot_openings,
     plot_rocking,
 )
-from vi_contact.plotting_channel_mesh import animate, plot_layout, plot_moments, read_bodies
+from vi_contact.plotting_channel_mesh import animate, read_bodies
 from vi_contact.plotting_channel_run import film, illustrate
 from vi_contact.static import static_equilibrium
 
@@ -60,8 +60,8 @@ def figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
         seen.append(figure)
         return plotting.save(figure, path)
 
-    for module in ("plotting_channel", "plotting_channel_mesh"):
-        monkeypatch.setattr(f"vi_contact.{module}.save", keep)
+    for module in ("vi_contact.plotting_channel", "demos.pictures.channel"):
+        monkeypatch.setattr(f"{module}.save", keep)
     return seen
 
 

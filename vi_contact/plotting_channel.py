@@ -22,9 +22,9 @@ SHOWN = {  # panels of plot_openings: point -> outward normal of the channel the
 }
 _COLOURS = {(-1.0, 0.0): "tab:blue", (1.0, 0.0): "tab:red"}
 _BELOW = ("tab:blue", "black", "tab:red")
-_RUNS = ("black", "tab:red", "tab:green", "tab:purple")
+RUNS = ("black", "tab:red", "tab:green", "tab:purple")
 CLIPPED = 98.0  # per cent of the closed points whose pressure the colours of a map tell apart
-_LEGEND: dict[str, Any] = {"fontsize": 8, "loc": "lower right", "bbox_to_anchor": (1.0, 0.98), "frameon": False}
+LEGEND: dict[str, Any] = {"fontsize": 8, "loc": "lower right", "bbox_to_anchor": (1.0, 0.98), "frameon": False}
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class Outline:
         return [float(self.arc[one].max()) for _, one in self.along()[:-1]]
 
 
-def _unit(size: float) -> tuple[float, str]:
+def unit_of(size: float) -> tuple[float, str]:
     """(metres per unit, name): millimetres from 0.1 mm on, as engineers draw soil and concrete."""
     if size >= 1.0:
         return 1.0, "m"
@@ -88,7 +88,7 @@ def plot_openings(history: History, path: str | Path, *, title: str) -> Path:
         name: [(label, opening(history, label, normal), normal) for label, normal in points.items()]
         for name, points in SHOWN.items()
     }
-    metres, unit = _unit(max(float(np.abs(one).max()) for rows in found.values() for _, one, _ in rows))
+    metres, unit = unit_of(max(float(np.abs(one).max()) for rows in found.values() for _, one, _ in rows))
     figure, axes = panels(len(found) + 1, (9.0, 9.6))
     for component, colour in (("x", "black"), ("y", "0.6")):
         values = history.get(f"a_g_{component}")
@@ -106,7 +106,7 @@ def plot_openings(history: History, path: str | Path, *, title: str) -> Path:
     for axis in axes:
         axis.axhline(0.0, color="0.3", lw=0.6)
         if len(axis.lines) > 1:
-            axis.legend(ncol=3, **_LEGEND)
+            axis.legend(ncol=3, **LEGEND)
     figure.suptitle(title)
     return save(figure, path)
 
@@ -115,7 +115,7 @@ def plot_rocking(history: History, path: str | Path, *, title: str, corners: Seq
     """Fig. 8: u_y of the bottom corners with their static settlement; what of it is rocking and what is common."""
     left, right = (np.asarray(history[f"u_y_{label}"]) for label in corners)
     t = history["t"]
-    metres, unit = _unit(float(max(np.abs(left).max(), np.abs(right).max())))
+    metres, unit = unit_of(float(max(np.abs(left).max(), np.abs(right).max())))
     figure, (top, bottom) = panels(2, (9.0, 5.6), height_ratios=(3, 2))
     for label, values, colour in zip(corners, (left, right), ("tab:blue", "tab:red"), strict=True):
         top.plot(t, values / metres, color=colour, lw=0.9, label=f"point {label}")
@@ -127,26 +127,7 @@ def plot_rocking(history: History, path: str | Path, *, title: str, corners: Seq
     bottom.set_ylabel(f"parts of $u_y$ [{unit}]")
     top.set_xlim(t[0], t[-1])
     for axis in (top, bottom):
-        axis.legend(ncol=3, **_LEGEND)
-    figure.suptitle(title)
-    return save(figure, path)
-
-
-def plot_beside(
-    runs: Mapping[str, History], reference: str, path: str | Path, *, title: str, points: Sequence[str] = ("1", "19")
-) -> Path:
-    """Fig. 9: u_x and u_y of the channel's points in several runs, the one named ``reference`` grey and thick."""
-    columns = [(f"u_{axis}_{label}", f"$u_{axis}$, point {label}") for label in points for axis in "xy"]
-    figure, axes = panels(len(columns), (9.0, 2.1 * len(columns) + 1.0))
-    for axis, (column, label) in zip(axes, columns, strict=True):
-        metres, unit = _unit(max(float(np.abs(run[column]).max()) for run in runs.values()))
-        bare = runs[reference]
-        axis.plot(bare["t"], bare[column] / metres, color="0.7", lw=2.2, label=reference)
-        for colour, name in zip(_RUNS, (name for name in runs if name != reference), strict=False):
-            axis.plot(runs[name]["t"], runs[name][column] / metres, color=colour, lw=0.9, label=name)
-        axis.set_ylabel(f"{label} [{unit}]")
-    axes[0].set_xlim(bare["t"][0], bare["t"][-1])
-    axes[0].legend(ncol=len(runs), **_LEGEND)
+        axis.legend(ncol=3, **LEGEND)
     figure.suptitle(title)
     return save(figure, path)
 
@@ -163,7 +144,7 @@ def plot_interface(runs: Mapping[str, History], outline: Outline, path: str | Pa
     most = np.array([np.percentile(closed, CLIPPED) if len(closed) else 1.0])
     kilo, unit = scaled(most, "Pa")
     widest = max(float(gap.max()) for *_, gap in maps.values())
-    metres, length = _unit(widest)
+    metres, length = unit_of(widest)
     drawn = {
         f"opening [{length}], where open": ("Blues", Normalize(0.0, widest / metres or 1.0), "neither"),
         f"pressure [{unit}], where closed": ("YlOrRd", PowerNorm(0.5, 0.0, float(kilo[0])), "max"),
@@ -214,11 +195,11 @@ def plot_envelope(runs: Mapping[str, History], outline: Outline, path: str | Pat
     size = np.array([max(float(pressure.max()) for pressure, *_ in rows.values())])
     shown, unit = scaled(size, "Pa")
     factor = shown[0] / size[0] if size[0] else 1.0
-    metres, length = _unit(max(float(gap.max()) for _, gap, _ in rows.values()))
+    metres, length = unit_of(max(float(gap.max()) for _, gap, _ in rows.values()))
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(9.0, 8.0), layout="constrained")
         axes = figure.subplots(3, 1, sharex=True)
-    for colour, (name, (pressure, gap, active)) in zip(_RUNS, rows.items(), strict=False):
+    for colour, (name, (pressure, gap, active)) in zip(RUNS, rows.items(), strict=False):
         shares = np.mean(active[1:] == 0.0, axis=0)
         for side, (_, one) in enumerate(outline.along()):
             label = name if side == 0 else None

@@ -11,7 +11,7 @@ import numpy as np
 
 from .algebra import Array, Indices, Mask
 from .errors import InputError
-from .plotting import STYLE, History, save, scaled
+from .plotting import STYLE, History, scaled
 from .plotting_deformed import Frames, Tractions, read_frames, read_tractions
 
 SOIL, CONCRETE, CONTACT = "#efe3c8", "#9aa3ab", "tab:red"
@@ -56,79 +56,6 @@ def read_bodies(folder: str | Path) -> Bodies:
     return Bodies(frames, tractions, cells, nodes, INWARDS * (high[1] - low[1]) * inwards, low, high)
 
 
-def plot_layout(
-    folder: str | Path, points: Mapping[str, Sequence[float]], path: str | Path, *,
-    title: str, soil: str, concrete: str, ends: str,
-) -> Path:
-    """Fig. 6: the mesh of a run with bodies, numbered points, bedrock and ends of the layer.
-
-    ``soil``, ``concrete``, ``ends``: what is written about the materials and the ends of the layer.
-    """
-    bodies = read_bodies(folder)
-    figure, axis = _plane((11.0, 4.9))
-    cells, low, high = bodies.frames.points[bodies.frames.cells], bodies.low, bodies.high
-    width, depth = bodies.frames.points.max(axis=0)
-    _fill(axis, cells[~bodies.cells], SOIL)
-    _fill(axis, cells[bodies.cells], CONCRETE)
-    axis.plot([low[0], low[0], high[0], high[0]], [high[1], low[1], low[1], high[1]], color=CONTACT, lw=2.0,
-              label="contact")
-    _bedrock(axis, bodies)
-    for end, outside in ((0.0, -0.18), (width, 0.18)):
-        up = np.unique(bodies.frames.points[np.isclose(bodies.frames.points[:, 0], end), 1])
-        axis.plot(np.full_like(up, end + outside), up, "o", ms=4, mfc="white", mec="black", mew=0.8)
-    _number(axis, bodies, points)
-    middle, box = 0.5 * (low[0] + high[0]), {"fc": "white", "ec": "0.5", "boxstyle": "round,pad=0.6"}
-    for across, up, text, more in (
-        (0.5 * low[0], 0.5 * depth, soil, {"fontsize": 9, "bbox": box}),
-        (0.5 * (high[0] + width), 0.5 * depth, ends, {"fontsize": 9, "bbox": box}),
-        (middle, low[1] + 0.6 * bodies.height, concrete, {"fontsize": 8}),
-        (middle, -0.11 * depth, "motion of the bedrock $a_g(t)$", {"fontsize": 9}),
-    ):
-        axis.text(across, up, text, ha="center", va="center", **more)
-    ends_of_arrow = [(middle + side * 0.8 * (high[0] - low[0]), -0.16 * depth) for side in (-1.0, 1.0)]
-    axis.annotate("", *ends_of_arrow, arrowprops={"arrowstyle": "<->", "lw": 1.5})
-    axis.legend(fontsize=8, loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
-    axis.set(xlim=(-0.7, width + 0.7), ylim=(-0.2 * depth, 1.04 * depth), title=title, xlabel="x [m]", ylabel="y [m]")
-    return save(figure, path)
-
-
-def _number(axis: Any, bodies: Bodies, points: Mapping[str, Sequence[float]]) -> None:
-    """Points of the outline with their labels outside of it."""
-    for label, (across, up) in points.items():
-        sideways = float(across >= bodies.high[0]) - float(across <= bodies.low[0])
-        outward = np.array([sideways, -1.0 if up <= bodies.low[1] else 0.0])
-        axis.plot(across, up, "o", ms=3.5, color="black", zorder=4)
-        axis.annotate(label, (across, up), xytext=9.0 * outward, textcoords="offset points", fontsize=9, zorder=4,
-                      weight="bold", ha="center", va="center",
-                      bbox={"fc": "white", "ec": "none", "pad": 0.6, "alpha": 0.8})
-
-
-def plot_moments(
-    folders: Mapping[str, str | Path], times: Sequence[float], path: str | Path, *, title: str, magnified: float
-) -> Path:
-    """A row per run (name -> folder), a column per time [s]: the bodies around the channel, their displacements less
-    the channel's mean drawn ``magnified`` times; contact points coloured by their pressure, open ones white."""
-    import matplotlib
-    from matplotlib.figure import Figure
-
-    runs = {name: read_bodies(folder) for name, folder in folders.items()}
-    colours = Colours.of(np.concatenate([run.tractions.at(t)[0] for run in runs.values() for t in times]))
-    with matplotlib.rc_context(STYLE | {"axes.grid": False}):
-        figure = Figure(figsize=(3.7 * len(times) + 1.3, 2.75 * len(runs) + 0.7), layout="constrained")
-        axes = figure.subplots(len(runs), len(times), sharex=True, sharey=True, squeeze=False)
-    for row, (name, run) in zip(axes, runs.items(), strict=True):
-        for axis, t in zip(row, times, strict=True):
-            shown = draw_bodies(axis, run, t, magnified=magnified, colours=colours, follow=True)
-            axis.set_title(f"{name}, t = {shown:.4g} s", fontsize=9)
-    reach = AROUND * run.height
-    axes[0, 0].set(xlim=(run.low[0] - reach, run.high[0] + reach), ylim=(run.low[1] - reach, run.high[1] + 0.2 * reach))
-    colours.bar(figure, axes)
-    figure.supxlabel("x [m]", fontsize=10)
-    figure.supylabel("y [m]", fontsize=10)
-    figure.suptitle(f"{title} (displacements x {magnified:g})")
-    return save(figure, path)
-
-
 @dataclass(frozen=True)
 class Colours:
     """Of contact pressures: pressure times ``factor`` is in ``unit``, and ``norm`` a root scale of it."""
@@ -163,8 +90,8 @@ def draw_bodies(
     shown, u, _ = frames.at(t)
     own = np.unique(frames.cells[bodies.cells])
     moved = frames.points + magnified * (u - u[own].mean(axis=0) if follow else u)
-    _fill(axis, moved[frames.cells[~bodies.cells]], SOIL, lw=0.3)
-    _fill(axis, moved[frames.cells[bodies.cells]], CONCRETE)
+    filled(axis, moved[frames.cells[~bodies.cells]], SOIL, lw=0.3)
+    filled(axis, moved[frames.cells[bodies.cells]], CONCRETE)
     pressure, _ = tractions.at(shown)
     places = moved[bodies.nodes] + bodies.inwards
     dots: dict[str, Any] = {"s": 26, "edgecolors": "black", "linewidths": 0.5, "norm": colours.norm, "cmap": MAP}
@@ -192,7 +119,7 @@ def animate(
     bodies = read_bodies(folder)
     colours = Colours.of(np.concatenate([bodies.tractions.at(t)[0] for t in times]))
     reach = 2.0 * AROUND * bodies.height
-    figure, (top, bottom) = _plane((6.6, 6.0), heights=(3.6, 1.0))
+    figure, (top, bottom) = plane((6.6, 6.0), heights=(3.6, 1.0))
     colours.bar(figure, top, shrink=0.85)
     marker = _traces(bottom, history, openings, (times[0], times[-1]))
     figure.draw_without_rendering()
@@ -202,7 +129,7 @@ def animate(
         for t in times:
             top.clear()
             shown = draw_bodies(top, bodies, t, magnified=magnified, colours=colours)
-            _bedrock(top, bodies)
+            bedrock(top, bodies)
             top.set(xlim=(bodies.low[0] - reach, bodies.high[0] + reach), xlabel="x [m]", ylabel="y [m]",
                     ylim=(-0.15 * reach, bodies.high[1] + 0.15 * reach))
             top.set_title(f"{title}, t = {shown:.3f} s (displacements x {magnified:g})", fontsize=10)
@@ -223,7 +150,7 @@ def _traces(axis: Any, history: History, openings: Mapping[str, Array], span: tu
     return axis.axvline(span[0], color="black", lw=1.2)
 
 
-def _plane(size: tuple[float, float], heights: Sequence[float] = (1.0,)) -> tuple[Any, Any]:
+def plane(size: tuple[float, float], heights: Sequence[float] = (1.0,)) -> tuple[Any, Any]:
     """(figure, axes above each other); the first one without distortion."""
     import matplotlib
     from matplotlib.figure import Figure
@@ -235,14 +162,14 @@ def _plane(size: tuple[float, float], heights: Sequence[float] = (1.0,)) -> tupl
     return figure, axes if len(heights) > 1 else axes[0]
 
 
-def _fill(axis: Any, cells: Array, colour: str, lw: float = 0.4) -> None:
+def filled(axis: Any, cells: Array, colour: str, lw: float = 0.4) -> None:
     from matplotlib.collections import PolyCollection
 
     axis.add_collection(PolyCollection(list(cells), facecolor=colour, edgecolor="0.45", linewidth=lw))
     axis.set_aspect("equal")
 
 
-def _bedrock(axis: Any, bodies: Bodies) -> None:
+def bedrock(axis: Any, bodies: Bodies) -> None:
     """The bedrock's line, hatched below."""
     width, depth = bodies.frames.points.max(axis=0)
     axis.axhline(0.0, color="black", lw=1.5, zorder=3)

@@ -185,21 +185,3 @@ def front_functions(r: Array, t: float, c: float) -> tuple[Array, Array]:
 def tensor(f_s: Array, f_p: Array, dq: Array) -> SingleLayerKernels:
     """(g1, g2) from F_n^S/c_S², F_n^P/c_P² and dQ_(n+2)."""
     return SingleLayerKernels((f_s - dq) / TWO_PI, (f_s - f_p - 2.0 * dq) / TWO_PI)
-
-
-def displacement_tensor(d: Array, t: float, c_p: float, c_s: float) -> Array:
-    """G(x - y, t) itself, density 1: (..., 2, 2) for d = x - y of shape (..., 2); the textbook form, not integrated.
-
-    Infinite at the fronts. It is here to check the integrated kernels, not to integrate with.
-    """
-    r2 = (d**2).sum(-1)
-    unit = d[..., :, None] * d[..., None, :] / r2[..., None, None]
-    total = np.zeros((*r2.shape, 2, 2))
-    for c, sign in ((c_p, 1.0), (c_s, -1.0)):
-        q2 = c**2 * t**2 - r2
-        q = np.sqrt(np.where(q2 > 0.0, q2, np.inf))
-        along = np.where(q2 > 0.0, (2.0 * c**2 * t**2 - r2) / (r2 * q), 0.0)
-        across = np.where(q2 > 0.0, q2 / (r2 * q) if sign > 0 else c**2 * t**2 / (r2 * q), 0.0)
-        term = along[..., None, None] * unit - across[..., None, None] * np.eye(2)
-        total += sign * term / (TWO_PI * c)
-    return total

@@ -53,11 +53,6 @@ def normal_mass(M: Array, A: Array) -> float:
     return float(1.0 / (A @ np.linalg.solve(M, A)))
 
 
-def b_metric(M: Array, A: Array, rho: float, width: float) -> Array:
-    """g_IJ + ĝ_IJ of (15), (n, n)."""
-    return np.asarray(M + normal_mass(M, A) * (width / rho) ** 2 * np.outer(A, A))
-
-
 def b_affinities(M: Array, A: Array, rho: float) -> Array:
     """Λ̂^K_IJ of (21), (n, n, n) in the order K, I, J."""
     B = normal_mass(M, A) * np.linalg.solve(M, A)
