@@ -21,11 +21,11 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the sou
 from mpi4py import MPI
 
 import vi_contact as vc
+from demos.pictures.deformed import plot_snapshots
 from vi_contact import fem
 from vi_contact.models.embedded import Embedded, build
 from vi_contact.models.square import concrete
 from vi_contact.plotting import History, plot_runs
-from vi_contact.plotting_deformed import plot_snapshots
 
 # Parameters ----------------------------------------------------------------------------------------------------------
 CELLS = 10  # along a side of the box

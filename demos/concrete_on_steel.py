@@ -21,10 +21,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the sou
 from mpi4py import MPI
 
 import vi_contact as vc
+from demos.pictures.deformed import plot_snapshots, plot_tractions
 from vi_contact import fem
 from vi_contact.models.square import Square, build, concrete
 from vi_contact.plotting import History, plot_runs
-from vi_contact.plotting_deformed import plot_snapshots, plot_tractions
 
 # Parameters ----------------------------------------------------------------------------------------------------------
 BOX = concrete(cells=20)

@@ -9,8 +9,8 @@ import h5py
 import pytest
 from test_demos import demo
 
+from demos.pictures import deformed
 from demos.pictures.boundary import SHEAR, plot_panels
-from vi_contact import plotting_deformed
 from vi_contact.output import HISTORY_H5
 
 pytestmark = pytest.mark.serial
@@ -47,11 +47,11 @@ def test_the_shear_of_histories_is_drawn_on_the_body(
 ) -> None:
     """Histories hold what the body does to its support along +x; drawn is the opposite, and the axis says so."""
     shown: list[Any] = []
-    monkeypatch.setattr(plotting_deformed, "save", lambda figure, path: shown.append(figure))
+    monkeypatch.setattr(deformed, "save", lambda figure, path: shown.append(figure))
     with h5py.File(tmp_path / HISTORY_H5, "w") as file:
         file["t"], file["pressure"], file["traction_t"] = [1.0], [[1.0, 2.0]], [[[3.0], [-3.0]]]
         file["contact/points"], file["contact/normals"] = [(0.0, 0.0), (1.0, 0.0)], [normal, normal]
-    plotting_deformed.plot_tractions({"box": tmp_path}, (1.0,), tmp_path / "none.png", title="")
+    deformed.plot_tractions({"box": tmp_path}, (1.0,), tmp_path / "none.png", title="")
     axis = shown[0].axes[1]
     assert axis.get_ylabel() == "shear $p_t$ on the body,\nalong +x [Pa]"
     assert list(axis.lines[0].get_ydata()) == [-3.0, 3.0]

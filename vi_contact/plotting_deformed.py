@@ -1,14 +1,12 @@
-"""Pictures of deformed bodies in the plane with their contact tractions, from the folder of a run.
+"""Deformed bodies in the plane with their contact tractions, read from the folder of a run for pictures of them.
 
 A run that writes fields (``fields=fem.XDMF(every=...)``) and records ``Contact()`` leaves all that is needed there.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import h5py
 import numpy as np
@@ -16,9 +14,6 @@ import numpy as np
 from .algebra import Array, Indices
 from .errors import InputError
 from .output import FIELDS, HISTORY_H5
-from .plotting import STYLE, save, scaled
-
-ARROW = 0.3  # length of the longest arrow over the size of the body
 
 
 @dataclass(frozen=True)
@@ -87,123 +82,3 @@ def read_frames(folder: str | Path) -> Frames:
     with h5py.File(fields / "mesh.h5") as file:
         t = np.array([times[int(path.stem.removeprefix("frame_"))] for path in paths])
         return Frames(file["points"][:, :2], file["cells"][:], t, tuple(paths))
-
-
-def plot_snapshots(
-    folders: Mapping[str, str | Path],
-    times: Sequence[float],
-    path: str | Path,
-    *,
-    title: str,
-    support: Callable[[float], float],
-    magnified: float = 1.0,
-) -> Path:
-    """A row per run (name -> folder), a column per time [s]: the deformed mesh and the contact tractions on it.
-
-    Cells are coloured by von Mises stress, tractions drawn as arrows with one scale for all. ``support``: height y [m]
-    of the rigid support at a time; displacements (not ``support``) are drawn ``magnified`` times.
-    """
-    import matplotlib
-    from matplotlib.figure import Figure
-
-    runs = {name: (read_frames(folder), read_tractions(folder)) for name, folder in folders.items()}
-    shots = [[frames.at(t) for t in times] for frames, _ in runs.values()]
-    stresses = np.array([stress.max() for row in shots for *_, stress in row])
-    shown, unit = scaled(stresses, "Pa")
-    longest = max(float(np.hypot(*tractions.at(t)).max(initial=0.0)) for _, tractions in runs.values() for t in times)
-    points = next(iter(runs.values()))[0].points
-    size = float(np.ptp(points, axis=0).max())
-    low, high = _limits([points + magnified * u for row in shots for _, u, _ in row], size)
-    height = 2.4 * (high[1] - low[1]) / (high[0] - low[0]) + 0.4
-    with matplotlib.rc_context(STYLE | {"axes.grid": False}):
-        figure = Figure(figsize=(2.5 * len(times) + 1.6, height * len(runs) + 0.8), layout="constrained")
-        axes = figure.subplots(len(runs), len(times), sharex=True, sharey=True, squeeze=False)
-    axes[0, 0].set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-    for row, row_shots, (name, (frames, tractions)) in zip(axes, shots, runs.items(), strict=True):
-        for axis, (t, u, stress) in zip(row, row_shots, strict=True):
-            _draw_support(axis, support(t), size)
-            moved = frames.points + magnified * u
-            cells = _draw_body(axis, moved[frames.cells], stress * (shown.max() / stresses.max()))
-            cells.set_clim(0.0, shown.max())
-            _draw_tractions(axis, frames, tractions, magnified * u, t, longest / (ARROW * size))
-            axis.set_title(f"{name}, {_moment(t)}", fontsize=9)
-    figure.supxlabel("x [m]", fontsize=10)
-    figure.supylabel("y [m]", fontsize=10)
-    figure.colorbar(cells, ax=axes, label=f"von Mises stress [{unit}]", shrink=0.7)
-    figure.suptitle(title + (f" (displacements x {magnified:g})" if magnified != 1.0 else ""))
-    return save(figure, path)
-
-
-def _moment(t: float) -> str:
-    """t with its unit."""
-    return f"t = {1e3 * t:.4g} ms" if 0.0 < t < 0.1 else f"t = {t:.4g} s"
-
-
-def _limits(moved: Sequence[Array], size: float) -> tuple[Array, Array]:
-    """Corners of what is drawn, with room for the arrows below."""
-    low = np.min([points.min(axis=0) for points in moved], axis=0)
-    high = np.max([points.max(axis=0) for points in moved], axis=0)
-    return low - size * np.array([0.2, 0.35]), high + size * np.array([0.2, 0.1])
-
-
-def _draw_body(axis: Any, cells: Array, stress: Array) -> Any:
-    """The cells where they are now, coloured."""
-    from matplotlib.collections import PolyCollection
-
-    drawn = PolyCollection(list(cells), cmap="YlOrRd", edgecolor="0.35", linewidth=0.3)
-    drawn.set_array(stress)
-    axis.add_collection(drawn)
-    axis.set_aspect("equal")
-    return drawn
-
-
-def _draw_tractions(axis: Any, frames: Frames, tractions: Tractions, u: Array, t: float, scale: float) -> None:
-    """Arrows that end at the contact points; nothing at open ones. scale: Pa per metre of arrow."""
-    pressure, shear = tractions.at(t)
-    acts = np.hypot(pressure, shear) > 0.0
-    if not acts.any():
-        return
-    points = tractions.points[acts]
-    nodes = [int(np.argmin(np.sum((frames.points - point) ** 2, axis=1))) for point in points]
-    arrows = shear[acts, None] * tractions.tangents[acts] - pressure[acts, None] * tractions.normals[acts]
-    tips = points + u[nodes]
-    axis.quiver(*tips.T, *arrows.T, angles="xy", scale_units="xy", scale=scale, pivot="tip", width=0.004,
-                color="tab:blue", zorder=3)
-
-
-def _draw_support(axis: Any, height: float, size: float) -> None:
-    axis.axhline(height, color="black", lw=1.0, zorder=2)
-    axis.axhspan(height - 0.05 * size, height, color="0.8", lw=0.0, zorder=0)
-
-
-def plot_tractions(
-    folders: Mapping[str, str | Path], times: Sequence[float], path: str | Path, *, title: str
-) -> Path:
-    """Contact pressure p_n and shear traction p_t over x: a column per run, a curve per time [s].
-
-    The shear is that of the support on the body and positive along +x, as in the pictures of boundary elements.
-    """
-    import matplotlib
-    from matplotlib.figure import Figure
-
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(3.8 * len(folders) + 0.5, 5.4), layout="constrained")
-        axes = figure.subplots(2, len(folders), sharex=True, sharey="row", squeeze=False)
-    runs = {name: read_tractions(folder) for name, folder in folders.items()}
-    size = np.array([max(float(np.abs(run.at(t)).max(initial=0.0)) for run in runs.values() for t in times)])
-    shown, unit = scaled(size, "Pa")
-    factor = shown[0] / size[0] if size[0] else 1.0
-    colours = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.85, len(times)))
-    for column, (name, tractions) in zip(axes.T, runs.items(), strict=True):
-        x, order = tractions.points[:, 0], np.argsort(tractions.points[:, 0])
-        for t, colour in zip(times, colours, strict=True):
-            pressure, shear = tractions.at(t)
-            for axis, values in zip(column, (pressure, shear * np.sign(tractions.tangents[:, 0])), strict=True):
-                axis.plot(x[order], factor * values[order], ".-", ms=3, lw=0.9, color=colour, label=_moment(t))
-        column[0].set_title(name, fontsize=10)
-        column[1].set_xlabel("x [m]")
-    axes[0, 0].set_ylabel(f"pressure $p_n$ [{unit}]")
-    axes[1, 0].set_ylabel(f"shear $p_t$ on the body,\nalong +x [{unit}]")
-    axes[0, -1].legend(fontsize=8)
-    figure.suptitle(title)
-    return save(figure, path)
