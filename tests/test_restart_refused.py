@@ -94,6 +94,30 @@ def test_one_sample_of_a_record() -> None:
     assert difference(one, two) == ("excitation", "another excitation") and difference(one, one) is None
 
 
+@dataclass(frozen=True)
+class Push:
+    """An excitation of one's own that has no end."""
+
+    size: float = 1.0
+    until: float = np.inf
+    direction: tuple[float, ...] = (1.0,)
+    duration = np.inf
+
+    def acceleration(self, t: float) -> float:
+        return self.size if t < self.until else 0.0
+
+    def __call__(self, t: float) -> np.ndarray:
+        return self.acceleration(t) * np.array(self.direction)
+
+
+@serial
+def test_infinite_numbers_of_an_excitation_are_no_difference(tmp_path: Path) -> None:
+    run(tmp_path, 20, problem=chain(excitation=Push()))
+    run(tmp_path, 30, problem=chain(excitation=Push()), restart=True)
+    with pytest.raises(InputError, match="another excitation"):
+        run(tmp_path, 40, problem=chain(excitation=Push(1.01)), restart=True)
+
+
 @serial
 def test_texts_of_laws() -> None:
     """No addresses, no types of numpy 2; numbers are compared with room for round-off, words are not."""

@@ -164,7 +164,7 @@ def test_bad_input_is_refused():
     for wrong in ({"size": 0.0}, {"size": 0.4}, {"foot": 1.6}, {"foot": 0.01}, {"radius": float("nan")}):
         with pytest.raises(InputError, match="of a disk|disk of radius"):
             DiskMesh(**({"radius": 0.5, "size": 0.04} | wrong))
-    with pytest.raises(InputError, match="positive height"):
+    with pytest.raises(InputError, match="rise is 0.0"):
         Push(rise=0.0)
 
 
