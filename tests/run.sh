@@ -25,7 +25,7 @@ trap 'kill "$child"; wait; exit 130' INT TERM
 share() {
   local cores argument; cores=$(env -u OMP_NUM_THREADS nproc)
   for argument; do case $argument in -s | --capture=no | --pdb | --trace | -n*) return ;; esac; done
-  [ "$cores" -lt 2 ] || echo "-n $((cores < 4 ? cores : 4)) --dist loadfile --max-worker-restart 2"
+  [ "$cores" -lt 2 ] || echo "-n $((cores < 4 ? cores : 4)) --dist loadfile --max-worker-restart 0"
 }
 
 run() {  # on $1 ranks, with pytest's arguments
@@ -34,7 +34,8 @@ run() {  # on $1 ranks, with pytest's arguments
   if [ "$ranks" -eq 1 ]; then set -- $(share "$@") "$@"; else launch=(mpirun -n "$ranks"); set -- --capture=sys "$@"; fi
   [ -z "$seconds" ] || limit=(timeout -k 10 "$((SECONDS < seconds ? seconds - SECONDS : 1))")
   : >"$tally"
-  VI_CONTACT_TALLY=$tally "${limit[@]}" "${launch[@]}" "$vi_python" -m pytest --color="$colour" "$@" </dev/null &
+  # bash lets what it starts with & ignore Ctrl-C, which tests send themselves
+  VI_CONTACT_TALLY=$tally "${limit[@]}" env --default-signal=INT,QUIT "${launch[@]}" "$vi_python" -m pytest --color="$colour" "$@" </dev/null &
   child=$!
   wait "$child" || code=$?
   [ -z "$seconds" ] || [ "$SECONDS" -lt "$seconds" ] || [ "$code" -eq 0 ] ||
