@@ -283,3 +283,8 @@ def test_thinned_maps_keep_peaks() -> None:
     values[7004, 0] = -4.0
     t, shown = thinned(np.arange(10007.0), values)
     assert len(t) == len(shown) == 1200 and shown[:, 1].max() == 5.0 and shown[:, 0].min() == -4.0
+
+
+def test_racking_of_nothing_is_refused():
+    with pytest.raises(InputError, match="Racking: frames is empty; give labels and four corners each"):
+        vc.Racking({})

@@ -217,3 +217,14 @@ def test_assemble_stays_a_function() -> None:
     """``fem.assemble`` is the function also after its module was imported: they must not share a name."""
     assert callable(fem.assemble)
     assert all(callable(getattr(fem, name)) for name in fem.__all__)
+
+
+@pytest.mark.serial
+def test_nearly_incompressible_materials_are_told(comm: Any, caplog: pytest.LogCaptureFixture) -> None:
+    """They lock first-order cells but in plane stress."""
+    mesh, tags = block(comm)
+    nearly = LinearElastic(E=1.0, nu=0.4999, rho=1.0)
+    assemble(mesh, nearly, section=PlaneStress(), clamped=tags["bottom"])
+    assert not caplog.records
+    assemble(mesh, nearly, clamped=tags["bottom"])
+    assert "Poisson's ratio 0.4999 locks first-order cells" in caplog.text

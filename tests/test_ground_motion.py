@@ -187,3 +187,9 @@ def test_decimation_does_not_alias():
 def test_resampling_to_the_same_step_changes_nothing():
     record = wave_packet(3.0, 0.02)
     assert np.allclose(resampled(record, 0.02).acceleration, record.acceleration, rtol=1e-15, atol=0.0)
+
+
+@pytest.mark.parametrize("wrong", [np.ones(4) * 1j, ["1", "2"], [None, 1.0], [True, False]])
+def test_samples_are_real_numbers(wrong):
+    with pytest.raises(InputError, match="Record: acceleration is .*; give a row of real numbers"):
+        Record(acceleration=wrong, dt=0.01)

@@ -99,3 +99,8 @@ def test_cells_are_counted_before_they_are_made() -> None:
             mesh()
     with pytest.raises(InputError, match="does not exist"):
         write(BlockMesh(), "/nowhere/at/all.msh")
+
+
+def test_a_name_that_is_too_long():
+    with pytest.raises(InputError, match="cannot be read .*: check the path"):
+        arrays_from_file("a" * 300 + ".msh")

@@ -12,6 +12,8 @@ from typing import ClassVar, Protocol
 from .checks import number
 from .errors import InputError
 
+EXTREME = 1e100  # beyond it, and below its inverse, squares are no numbers any more
+
 
 @dataclass(frozen=True)
 class LinearElastic:
@@ -29,6 +31,9 @@ class LinearElastic:
         number("LinearElastic", "Young's modulus E [Pa]", self.E, positive=True)
         number("LinearElastic", "Poisson's ratio nu", self.nu)
         number("LinearElastic", "the mass density rho [kg/m³]", self.rho, positive=True)
+        if not (EXTREME**-1 <= self.E <= EXTREME and EXTREME**-1 <= self.rho <= EXTREME):
+            raise InputError(f"LinearElastic: E = {self.E:g} Pa and rho = {self.rho:g} kg/m³ are of no material; give "
+                             f"numbers between {1.0 / EXTREME:g} and {EXTREME:g}")
         if not -1.0 < self.nu < 0.5:
             raise InputError(f"LinearElastic: Poisson's ratio nu is {self.nu!r}; give a number between -1 and 0.5, "
                              "both excluded (nearly incompressible materials need a mixed method)")

@@ -45,6 +45,8 @@ class Racking:
 
     def __post_init__(self) -> None:
         instance("Racking", "frames", self.frames, Mapping, "give labels and four corners each, {'box': [(x, y), …]}")
+        if not self.frames:
+            raise InputError("Racking: frames is empty; give labels and four corners each, or leave it out")
         for label, corners in self.frames.items():
             column_name("racking label", label)
             racking(array("Racking", f"the corners of '{label}'", corners, (None, None)), np.zeros((4, 2)))

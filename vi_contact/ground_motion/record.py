@@ -9,6 +9,7 @@ from numbers import Real
 import numpy as np
 
 from ..algebra import Array
+from ..checks import shown
 from ..errors import InputError
 
 STANDARD_GRAVITY = 9.80665
@@ -43,6 +44,9 @@ class Record:
     component: str = ""
 
     def __post_init__(self) -> None:
+        kind = np.asarray(self.acceleration).dtype.kind
+        if kind not in "iuf":
+            raise InputError(f"{self._name}: acceleration is {shown(self.acceleration)}; give a row of real numbers")
         samples = np.array(self.acceleration, dtype=float)
         if samples.ndim != 1 or samples.size < 2:
             raise InputError(f"{self._name}: acceleration has shape {samples.shape}; give a row of two or more")

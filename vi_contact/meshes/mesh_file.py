@@ -28,7 +28,11 @@ def copied(file: Path, folder: Path) -> Path:
     InputError for a file that is missing, empty, no MSH file (a script most of all), cut short, or that announces more
     nodes or cells than it has bytes.
     """
-    if not file.is_file():
+    try:
+        there = file.is_file()
+    except OSError as error:  # a name that is too long, a folder that may not be looked into
+        raise InputError(f"mesh file {shown(str(file))} cannot be read ({error.strerror}): check the path") from None
+    if not there:
         what = str(file) if "\0" not in str(file) else shown(str(file))
         raise InputError(f"mesh file {what} does not exist: check the path or write it with a script of folder meshes")
     copy = folder / "mesh.msh"
