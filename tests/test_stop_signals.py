@@ -49,6 +49,18 @@ class AtStep:
         return {"one": 1.0}
 
 
+@pytest.fixture(autouse=True)
+def heard() -> Iterator[None]:
+    """Signals mean what they mean by default, also where a shell or nohup lets this process ignore them."""
+    before = {number: signal.getsignal(number) for number in SIGNALS}
+    for number, handler in before.items():
+        if handler is signal.SIG_IGN:
+            signal.signal(number, signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL)
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
 def kill(number: int) -> Callable[[], None]:
     """Sends itself a signal."""
     return lambda: os.kill(os.getpid(), number)

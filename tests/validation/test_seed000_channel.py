@@ -106,17 +106,18 @@ def test_fig_8_rocking():
 
 @pytest.mark.parametrize("contact", ["sliding", "rubbing"])
 def test_mirror_symmetry(contact):
-    """-a_g: u_y(1) <-> u_y(7) and u_x -> -u_x to 1e-12 of the largest displacement in the first 200 steps. Round-off
-    grows: in 400 steps to between 4e-13 and 1.005e-12, by the processor; at the slender walls to 1.7e-12."""
+    """-a_g: u_y(1) <-> u_y(7) and u_x -> -u_x to the run's round-off, that a change of the shaking by a last digit
+    shows: 1e-12 of the largest displacement. Mirrored runs differ by 0.4 to 2 times that, by processor and release."""
     one, two = shaken(contact).history, shaken(contact, amplitude=-2.0).history
+    last_digit = shaken(contact, amplitude=np.nextafter(2.0, 3.0)).history
+    round_off = max(float(np.abs(one[name] - last_digit[name]).max()) for name in displacements(one))
+    assert 0.0 < round_off < 1e-11 * largest(one)
     image = {"1": "7", "7": "1", "4": "4", "10": "16", "16": "10", "13": "19", "19": "13"}
     for label, other in image.items():
         for end in ("", "_soil"):
             off = np.abs(np.array([one[f"u_x_{label}{end}"] + two[f"u_x_{other}{end}"],
                                    one[f"u_y_{label}{end}"] - two[f"u_y_{other}{end}"]]))
-            if label in "17":
-                assert off[:, :201].max() < EXACT * largest(one)
-            assert off.max() < (3.0 if label in "17" else 10.0) * EXACT * largest(one)
+            assert off.max() < 8.0 * round_off
 
 
 def test_fig_9_unilateral_and_bilateral():
