@@ -27,6 +27,7 @@ from vi_contact.run_folder import read_run
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.simulate import Solution
 from vi_contact.step import State
+from vi_contact.writer import Writer
 
 pytestmark = pytest.mark.serial
 CHECKPOINTS, FOLDERS, SECONDS, SEED = 400, 100, 10.0, 0  # how many, and what one may take at most
@@ -43,7 +44,8 @@ def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
     class Killed(BaseException):
         """Nothing is saved any more."""
 
-    def kill(*_: Any) -> None:
+    def kill(writer: Writer, *_: Any) -> None:
+        writer._log.close()  # what the end of the process would do: other tests listen to the same logger
         raise Killed
 
     with pytest.MonkeyPatch.context() as patch:
