@@ -183,8 +183,10 @@ class Run:
         with suppress(Exception):
             if self.settings.problem.system.algebra.comm.size == 1:
                 self._checkpoint(writer)
+        facts: dict[str, Any] = {"status": status, "reason": reason, "steps": self.place.state.k}
         with suppress(Exception):
-            writer.rescue(self._facts(status, reason, seconds))
+            facts = self._facts(status, reason, seconds)
+        writer.rescue(facts)
 
     def _tell_start(self) -> None:
         if not self.settings.root:
