@@ -51,11 +51,13 @@ class AtStep:
 
 @pytest.fixture(autouse=True)
 def heard() -> Iterator[None]:
-    """Signals mean what they mean by default, also where a shell or nohup lets this process ignore them."""
+    """Signals mean what they mean to Python by default, also where a shell, nohup or a test runner has changed that."""
     before = {number: signal.getsignal(number) for number in SIGNALS}
     for number, handler in before.items():
-        if handler is signal.SIG_IGN:
-            signal.signal(number, signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL)
+        if number == signal.SIGINT:
+            signal.signal(number, signal.default_int_handler)
+        elif handler is signal.SIG_IGN:
+            signal.signal(number, signal.SIG_DFL)
     yield
     for number, handler in before.items():
         signal.signal(number, handler)
