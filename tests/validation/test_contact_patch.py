@@ -36,6 +36,8 @@ from vi_contact.static import static_equilibrium
 from vi_contact.step import ContactProblem, State
 from vi_contact.surfaces import HalfSpace
 
+pytestmark = pytest.mark.slow
+
 COMM = MPI.COMM_WORLD
 STEEL = LinearElastic(E=2.1e11, nu=0.3, rho=7850.0)
 P = 1.0e8

@@ -28,6 +28,8 @@ from vi_contact.schemes.moreau_jean import MoreauJean
 from vi_contact.schemes.newmark import Newmark
 from vi_contact.schemes.trapezoidal import Trapezoidal
 
+pytestmark = pytest.mark.slow
+
 BODIES = {"bar": {"dimension": 1}, "strip": {"dimension": 2}, "triangles": {"dimension": 2, "triangles": True}}
 COURANTS = (1.0, 0.5, 0.1)
 ON_RANKS = (1.0, *(pytest.param(courant, marks=pytest.mark.serial) for courant in COURANTS[1:]))

@@ -38,6 +38,8 @@ from vi_contact.solvers.volume import OneFactorisation, ReducedNewton, Volume
 from vi_contact.static import static_equilibrium
 from vi_contact.step import ContactProblem
 
+pytestmark = pytest.mark.slow
+
 COMM = MPI.COMM_WORLD
 ELEMENTS, ACROSS = 50, 3  # of the shorter bar, across a strip
 

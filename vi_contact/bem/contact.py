@@ -123,7 +123,8 @@ class BoundaryContact:
         if self.conditions is not None or turns is None or turns.max(initial=0.0) <= FEATURE_ANGLE * (1.0 + 1e-9):
             return
         corner, normals = int(np.argmax(turns)), self.compliance.normals
-        if np.array_equal(np.asarray(self.obstacle.directions(points, normals))[corner], normals[corner]):
+        directions = np.asarray(self.obstacle.directions(points, normals))
+        if np.max(np.abs(directions - normals)) <= 1e-9:  # the obstacle follows the boundary; a plane has one direction
             where = ", ".join(f"{x:g}" for x in points[corner])
             raise InputError(
                 f"BoundaryContact: the contact boundary turns by {np.degrees(turns[corner]):.3g} degrees at ({where}): "
