@@ -41,8 +41,9 @@ def started(folder: Path, steps: int, ranks: int) -> subprocess.Popen[bytes]:
 
 
 def ranks_of(launcher: int) -> list[int]:
-    """Processes that mpirun has started."""
-    return [int(pid) for pid in Path(f"/proc/{launcher}/task/{launcher}/children").read_text().split()]
+    """Processes that mpirun has started, whichever of its threads did."""
+    lists = Path(f"/proc/{launcher}/task").glob("*/children")
+    return sorted(int(pid) for one in lists for pid in one.read_text().split())
 
 
 def lines(folder: Path) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -104,8 +105,10 @@ def output_file(
     """
     out = Path(path)
     try:
+        with suppress(FileNotFoundError):
+            out.stat()  # is_dir alone hides from Python 3.14 on what OSError says
         fits = (out.parent.is_dir() or (made and not out.parent.exists())) and not out.is_dir()
-    except OSError:  # a name that is too long, a folder that may not be looked into
+    except (OSError, ValueError):  # a name that is too long or holds NUL, a folder that may not be looked into
         fits = False
     if not fits:
         raise InputError(f"{shown(str(path))}: cannot be written; give the name of a file in a folder that exists")
