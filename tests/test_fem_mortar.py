@@ -71,7 +71,7 @@ def matched(system: Any, one: Any, two: Any) -> Any:
 # The matrix P ---------------------------------------------------------------------------------------------------------
 
 @shapes
-@pytest.mark.parametrize("swapped", [False, True])
+@pytest.mark.parametrize("swapped", [False, pytest.param(True, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("angle", [0.0, 0.4])
 def test_linear_fields_and_uniform_pressure(angle, swapped, simplices):
     """Rows of P sum to 1 and reproduce positions: P x_2 = x_1; the nodal forces of a uniform pressure on side 1 arrive
@@ -97,7 +97,7 @@ def test_matching_sides_are_the_special_case():
 
 
 @pytest.mark.parametrize("offset", [0.0, 0.33, 0.5, -0.41])
-@pytest.mark.parametrize("swapped", [False, True])
+@pytest.mark.parametrize("swapped", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_partly_covered_sides(offset, swapped):
     """A short block on a long one, at any place, over either end, from either side: weights sum to what they share,
     linear fields are exact, the pressure on it arrives as the same force and moment."""
@@ -148,7 +148,7 @@ STEEL, BRASS = LinearElastic(E=2.1e11, nu=0.3, rho=7850.0), LinearElastic(E=1.0e
 
 
 @pytest.mark.parametrize("solver", [Condensed(), Volume(method=ReducedNewton())], ids=["condensed", "volume"])
-@pytest.mark.parametrize("swapped", [False, True])
+@pytest.mark.parametrize("swapped", [False, pytest.param(True, marks=pytest.mark.slow)])
 @shapes
 def test_v2_1_pressure_through_meshes_that_do_not_match(simplices, swapped, solver):
     """Steel on brass, turned by 0.4 rad: one uniform strain e_xx in both, as if glued, pressure p across the interface;

@@ -70,7 +70,9 @@ def test_default_scheme_takes_the_same_steps(dt: Any) -> None:
     assert 0.0 < checked.worst <= 1e-9
 
 
-@pytest.mark.parametrize("law", [{}, {"friction": Coulomb(0.4)}], ids=["frictionless", "Coulomb"])
+@pytest.mark.parametrize(
+    "law", [{}, pytest.param({"friction": Coulomb(0.4)}, marks=pytest.mark.slow)], ids=["frictionless", "Coulomb"]
+)
 def test_ranks_agree_and_contact_opens_and_closes(scheme: Any, law: dict[str, Any]) -> None:
     """Rank independence, certified steps, several points in contact at a time."""
     together, alone = (

@@ -60,7 +60,7 @@ def along(problem: ContactProblem, x: Array, angle: float = SLOPE) -> float:
     return float(-total @ turned((1.0, 0.0), angle) / mass[0])
 
 
-@pytest.mark.parametrize("scale", [1.0, 0.1, 0.01])
+@pytest.mark.parametrize("scale", [1.0, pytest.param(0.1, marks=pytest.mark.slow), 0.01])
 def test_incline_sticks(comm: Any, scale: float) -> None:
     """tan 30° = 0.577 < mu = 0.6: the static stage stands, and the block stays where it is, in every length unit."""
     problem = resting(comm, Coulomb(0.6), scale=scale)

@@ -53,7 +53,7 @@ def inertia(problem: ContactProblem) -> np.ndarray:
     return np.asarray(system.algebra.comm.sum(R.T @ MR))
 
 
-@pytest.mark.parametrize("friction", [None, Coulomb(0.3)])
+@pytest.mark.parametrize("friction", [None, pytest.param(Coulomb(0.3), marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", FINER)
 def test_mass_centre_and_inertia_are_kept(name: str, friction: Any) -> None:
     """Total mass, centre of mass and every moment of inertia to round-off, in 1D, 2D, 3D, straight and turned."""
@@ -64,7 +64,7 @@ def test_mass_centre_and_inertia_are_kept(name: str, friction: Any) -> None:
     assert np.abs(inertia(moved) - before).max() <= 1e-12 * np.abs(before).max()
 
 
-@pytest.mark.parametrize("friction", [None, Coulomb(0.3)])
+@pytest.mark.parametrize("friction", [None, pytest.param(Coulomb(0.3), marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", ["bar", "quadrilaterals", "triangles", "tetrahedra"])
 def test_only_the_contact_nodes_lose_their_mass(name: str, friction: Any) -> None:
     """Rows and columns of the normal unknowns (with friction of the tangential ones too) are zero; the rest of M* is
@@ -87,7 +87,7 @@ def test_only_the_contact_nodes_lose_their_mass(name: str, friction: Any) -> Non
     assert np.linalg.eigvalsh(M[np.ix_(~none, ~none)])[0] > 0.0
 
 
-@pytest.mark.parametrize("friction", [None, Coulomb(0.3)])
+@pytest.mark.parametrize("friction", [None, pytest.param(Coulomb(0.3), marks=pytest.mark.slow)])
 @pytest.mark.parametrize("simplices", [False, True])
 def test_the_axes_do_not_matter(simplices: bool, friction: Any) -> None:
     """A body and its velocities turned by 0.4 rad have the same kinetic energy, for velocities that deform it too."""

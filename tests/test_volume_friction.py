@@ -145,6 +145,7 @@ def test_large_friction(parallel: bool) -> None:
         agree(c, solve(c), solve(c, Condensed(friction_method=NSGS())))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("force", [1e-6, 1e6])
 @pytest.mark.parametrize("length", [1e-6, 1e6])
 def test_units_do_not_matter(parallel: bool, length: float, force: float) -> None:

@@ -40,7 +40,7 @@ def compared(problem: ContactProblem, scheme: Any, steps: int) -> tuple[CrossChe
     return checked, states
 
 
-@pytest.mark.parametrize("angle", [0.0, 0.3])
+@pytest.mark.parametrize("angle", [0.0, pytest.param(0.3, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("simplices", [False, True], ids=["quadrilaterals", "triangles"])
 @pytest.mark.parametrize("friction", ROUGH_ON_ONE_SIDE, ids=["coulomb", "tresca"])
 def test_routes_agree_in_the_plane(comm: Any, friction: FrictionLaw, simplices: bool, angle: float) -> None:
@@ -54,7 +54,7 @@ def test_routes_agree_in_the_plane(comm: Any, friction: FrictionLaw, simplices: 
     assert checked.report()["Volume(ReducedNewton)"]["r_t"] == found.relative_r_t
 
 
-@pytest.mark.parametrize("friction", [Coulomb(0.3), Tresca(2e3)], ids=repr)
+@pytest.mark.parametrize("friction", [Coulomb(0.3), pytest.param(Tresca(2e3), marks=pytest.mark.slow)], ids=repr)
 def test_routes_agree_in_space(comm: Any, friction: FrictionLaw) -> None:
     """The circular cone on an inclined plane, another scheme: to 1e-9."""
     box = thrown_box(comm, angle=0.3, simplices=True, divisions=(4, 3, 3))

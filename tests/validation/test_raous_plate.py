@@ -30,7 +30,7 @@ from vi_contact.solvers.friction_newton import FrictionNewton
 from vi_contact.static import static_equilibrium
 from vi_contact.step import ContactProblem, Solver, State
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.serial  # ranks change none of these numbers: cheaper tests show it
 
 COMM = MPI.COMM_WORLD
 CONDENSED = Condensed()

@@ -18,7 +18,7 @@ from vi_contact.algebra import Array
 from vi_contact.models import rocking_block as rocking
 from vi_contact.time_steps import TimeSteps
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.serial  # ranks change none of these numbers: cheaper tests show it
 
 COMM = MPI.COMM_WORLD
 SHAPE = vc.HousnerBlock(width=0.4, height=2.0)

@@ -34,7 +34,7 @@ from vi_contact.models.square import concrete
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.step import ContactProblem
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.serial  # ranks change none of these numbers: cheaper tests show it
 
 COMM = MPI.COMM_WORLD
 EMBEDDED = Embedded(concrete(cells=8))
