@@ -9,8 +9,8 @@ from __future__ import annotations
 import errno
 import json
 import os
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -128,18 +128,25 @@ def remove_litter(folder: Path) -> None:
         path.unlink(missing_ok=True)
 
 
-def write_atomically(path: Path, data: bytes) -> None:
-    """The file has its old content or all of the new one, whatever happens; OSError names it."""
+@contextmanager
+def _whole_or_not_at_all(path: Path) -> Iterator[Any]:
+    """Open an unbuffered file beside ``path`` that takes its place at the end; OSError names ``path``."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
-        with open(temporary, "wb", buffering=0) as file:
-            write_all(file, data)
+        with open(temporary, "w+b", buffering=0) as file:
+            yield file
             os.fsync(file.fileno())
         os.replace(temporary, path)
     except OSError as error:
         with suppress(OSError):
             temporary.unlink(missing_ok=True)
         raise OSError(error.errno, error.strerror or str(error), str(path)) from error
+
+
+def write_atomically(path: Path, data: bytes) -> None:
+    """The file has its old content or all of the new one, whatever happens; OSError names it."""
+    with _whole_or_not_at_all(path) as file:
+        write_all(file, data)
 
 
 def write_all(file: Any, data: bytes) -> None:
@@ -151,20 +158,12 @@ def write_all(file: Any, data: bytes) -> None:
 
 def hdf5_atomically(path: Path, fill: Callable[[h5py.File], None]) -> None:
     """The same for an HDF5 file, which need not fit the memory."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        with open(temporary, "w+b", buffering=0) as raw:
-            kept = _Kept(raw)
-            with h5py.File(kept, "w", driver="fileobj") as file:
-                fill(file)
-            if kept.error is not None:
-                raise kept.error
-            os.fsync(raw.fileno())
-        os.replace(temporary, path)
-    except OSError as error:
-        with suppress(OSError):
-            temporary.unlink(missing_ok=True)
-        raise OSError(error.errno, error.strerror or str(error), str(path)) from error
+    with _whole_or_not_at_all(path) as raw:
+        kept = _Kept(raw)
+        with h5py.File(kept, "w", driver="fileobj") as file:
+            fill(file)
+        if kept.error is not None:
+            raise kept.error
 
 
 class _Kept:
