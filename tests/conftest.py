@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import faulthandler
 import functools
+import gc
 import itertools
 import os
 import shutil
@@ -96,6 +97,7 @@ def pytest_collectreport(report: pytest.CollectReport) -> None:
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
+    gc.freeze()  # what was imported stays: the collector need not look at it again and again
     if SIZE == 1:
         return
     mine = "\n".join([*_collection_errors, *(item.nodeid for item in session.items)])
@@ -105,9 +107,13 @@ def pytest_collection_finish(session: pytest.Session) -> None:
 
 
 @pytest.hookimpl(hookwrapper=True)
-def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, Any, None]:
+def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> Generator[None, Any, None]:
     faulthandler.dump_traceback_later(_patience(TEST_SECONDS), exit=True, file=item.config.stash[_stderr])
+    if SIZE > 1:  # what all ranks own is freed by all at one place: one that frees alone lets the others wait
+        gc.disable()
     yield
+    if SIZE > 1 and (nextitem is None or nextitem.path != item.path):
+        gc.collect()
     faulthandler.cancel_dump_traceback_later()
 
 
