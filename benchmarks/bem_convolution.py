@@ -35,7 +35,7 @@ from vi_contact import Tresca, bem  # noqa: E402
 from vi_contact.bem.contact import BoundaryContact  # noqa: E402
 from vi_contact.bem.contact_march import march_contact  # noqa: E402
 from vi_contact.bem.uzawa_space_time import SpaceTimeUzawa  # noqa: E402
-from vi_contact.errors import StepFailure  # noqa: E402
+from vi_contact.core.errors import StepFailure  # noqa: E402
 
 METHODS = ("energetic", "BDF2", "Trapezoid", "RadauIIA")
 COLUMNS = ("k", "assembly", "solve", "condense", "peak MB", "pulse P", "pulse S", "sin²", "step", "base", "max base",

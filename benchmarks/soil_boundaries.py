@@ -28,10 +28,10 @@ from mpi4py import MPI  # noqa: E402
 
 import vi_contact as vc  # noqa: E402
 from vi_contact import fem  # noqa: E402
+from vi_contact.core.surfaces import empty_surface  # noqa: E402
 from vi_contact.exact.packet import WavePacket  # noqa: E402
 from vi_contact.fem.compat import geometry_dofmap  # noqa: E402
 from vi_contact.meshes.block import BlockMesh  # noqa: E402
-from vi_contact.surfaces import empty_surface  # noqa: E402
 
 NU = 0.25
 LENGTH = 2.5  # of the packet, in wavelengths

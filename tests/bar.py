@@ -14,13 +14,13 @@ import numpy as np
 import scipy.sparse as sp
 from chain import ChainSpace
 
-from vi_contact.algebra import Array, SerialAlgebra, SerialComm, SerialMatrix
+from vi_contact.core.algebra import Array, SerialAlgebra, SerialComm, SerialMatrix
+from vi_contact.core.step import ContactProblem, Report, State
+from vi_contact.core.surfaces import ContactSurface
+from vi_contact.core.system import Load, SemiDiscreteSystem
 from vi_contact.march import march
 from vi_contact.mass import ConsistentMass
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.step import ContactProblem, Report, State
-from vi_contact.surfaces import ContactSurface
-from vi_contact.system import Load, SemiDiscreteSystem
 
 
 def bar_matrices(n: int, *, length: float, E: float, rho: float, lumped: bool = False) -> tuple[Any, Any]:

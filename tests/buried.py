@@ -10,12 +10,12 @@ from mpi4py import MPI
 from scipy.optimize import brentq
 
 from vi_contact import Condensed, ContactProblem, LinearElastic, State, fem, static_equilibrium
+from vi_contact.core.surfaces import ContactSurface, empty_surface
+from vi_contact.core.system import SemiDiscreteSystem
 from vi_contact.exact.racking import BoxFrame
 from vi_contact.meshes.extract import MeshArrays
 from vi_contact.meshes.from_arrays import add_arrays
 from vi_contact.meshes.grid import add_grid
-from vi_contact.surfaces import ContactSurface, empty_surface
-from vi_contact.system import SemiDiscreteSystem
 
 GAMMA = 1e-3
 

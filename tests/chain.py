@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from vi_contact.algebra import Array, SerialAlgebra, SerialComm, SerialMatrix
-from vi_contact.errors import InputError
+from vi_contact.core.algebra import Array, SerialAlgebra, SerialComm, SerialMatrix
+from vi_contact.core.errors import InputError
+from vi_contact.core.step import ContactProblem
+from vi_contact.core.surfaces import ContactSurface
+from vi_contact.core.system import Load, SemiDiscreteSystem
 from vi_contact.mass import ConsistentMass
-from vi_contact.step import ContactProblem
-from vi_contact.surfaces import ContactSurface
-from vi_contact.system import Load, SemiDiscreteSystem
 
 
 @dataclass(frozen=True)

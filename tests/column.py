@@ -14,11 +14,11 @@ import numpy as np
 import scipy.sparse as sp
 from bar import bar_matrices
 
-from vi_contact.algebra import Array, SerialAlgebra, SerialComm, SerialMatrix
+from vi_contact.core.algebra import Array, SerialAlgebra, SerialComm, SerialMatrix
+from vi_contact.core.step import ContactProblem
+from vi_contact.core.surfaces import ContactSurface
+from vi_contact.core.system import Load, SemiDiscreteSystem
 from vi_contact.materials import LinearElastic
-from vi_contact.step import ContactProblem
-from vi_contact.surfaces import ContactSurface
-from vi_contact.system import Load, SemiDiscreteSystem
 
 UNIT = LinearElastic(E=2.0, nu=0.0, rho=1.0)  # c_S = 1, c_P = √2
 

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from bar import before_impact, energy, run
 
+from vi_contact.core.step import ContactProblem, State
+from vi_contact.core.verify import energies, energy_balance
 from vi_contact.static import initial_state
-from vi_contact.step import ContactProblem, State
-from vi_contact.verify import energies, energy_balance
 
 
 @dataclass(frozen=True)

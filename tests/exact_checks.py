@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from vi_contact.algebra import Array
+from vi_contact.core.algebra import Array
 
 Field = Callable[[Array, Array], Array]
 

@@ -14,7 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from vi_contact.algebra import Array, Mask
+from vi_contact.core.algebra import Array, Mask
+from vi_contact.core.step import ContactProblem, Scheme, Solver, State
+from vi_contact.core.surfaces import HalfSpace, empty_surface
+from vi_contact.core.system import SemiDiscreteSystem
 from vi_contact.excitation import Harmonic
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import BodyForce, Prescribed
@@ -28,9 +31,6 @@ from vi_contact.materials import LinearElastic, PlaneStress
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.step import ContactProblem, Scheme, Solver, State
-from vi_contact.surfaces import HalfSpace, empty_surface
-from vi_contact.system import SemiDiscreteSystem
 
 CONCRETE = LinearElastic(E=2.0e10, nu=0.2, rho=2400.0)
 BODIES = {

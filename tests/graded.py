@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 from fem_problems import block
 
-from vi_contact.algebra import Array
+from vi_contact.core.algebra import Array
+from vi_contact.core.step import ContactProblem
+from vi_contact.core.surfaces import Obstacle
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import Prescribed, Traction
 from vi_contact.fem.trace import contact_surface
 from vi_contact.materials import LinearElastic
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.static import static_equilibrium
-from vi_contact.step import ContactProblem
-from vi_contact.surfaces import Obstacle
 
 
 def growing(h: float, length: float, *, growth: float = 1.15) -> Array:

@@ -5,7 +5,7 @@ import pytest
 dolfinx = pytest.importorskip("dolfinx")
 
 from vi_contact import fem  # noqa: E402
-from vi_contact.errors import InputError  # noqa: E402
+from vi_contact.core.errors import InputError  # noqa: E402
 from vi_contact.fem import compat  # noqa: E402
 
 LINE, TRIANGLE, QUADRANGLE, PRISM = 1, 2, 3, 6

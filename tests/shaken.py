@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from chain import chain_problem
 
+from vi_contact.core.step import ContactProblem, Report
 from vi_contact.excitation import Harmonic
-from vi_contact.step import ContactProblem, Report
 
 SHAKE = Harmonic(-30.0, 3.0, phase=0.3, direction=(1.0,))
 

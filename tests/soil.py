@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from vi_contact import fem
-from vi_contact.algebra import Array
+from vi_contact.core.algebra import Array
 from vi_contact.march import march
 from vi_contact.materials import LinearElastic
 from vi_contact.meshes.block import BlockMesh

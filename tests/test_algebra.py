@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from vi_contact.algebra import SerialAlgebra, SerialComm, SerialMatrix
+from vi_contact.core.algebra import SerialAlgebra, SerialComm, SerialMatrix
 
 pytestmark = pytest.mark.serial
 rng = np.random.default_rng(1)

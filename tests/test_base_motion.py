@@ -11,7 +11,7 @@ import pytest
 import vi_contact as vc
 from vi_contact import fem
 from vi_contact.base_motion import base_motion
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 from vi_contact.march import march
 from vi_contact.meshes.block import BlockMesh
 

@@ -13,7 +13,7 @@ from vi_contact.beam.algorithm import BeamRun, BeamStepper, run_beam
 from vi_contact.beam.elements import Elements
 from vi_contact.beam.tip import ExactFriction, RegularisedFriction
 from vi_contact.beam.values import Rod, Start, TimoshenkoBeam
-from vi_contact.errors import InputError, StepFailure
+from vi_contact.core.errors import InputError, StepFailure
 
 pytestmark = pytest.mark.serial
 # (a2, reading): E at t = .02 .1 .5 1 1.5 2, tip at .1 .5 1 2, friction loss, viscous loss, Newton updates; as printed

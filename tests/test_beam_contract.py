@@ -10,7 +10,6 @@ import pytest
 from energy_checks import rounded
 
 import vi_contact as vc
-from vi_contact.algebra import Array
 from vi_contact.beam.algorithm import BeamRun, BeamStepper, run_beam
 from vi_contact.beam.contract import beam_problem, rod_problem, rubbing_problem
 from vi_contact.beam.coupling import rod_forces
@@ -18,7 +17,8 @@ from vi_contact.beam.elements import Elements
 from vi_contact.beam.source_data import published_beam, published_mu, published_start
 from vi_contact.beam.tip import ExactFriction, RegularisedFriction
 from vi_contact.beam.values import Rod, Start, TimoshenkoBeam
-from vi_contact.errors import InputError
+from vi_contact.core.algebra import Array
+from vi_contact.core.errors import InputError
 
 pytestmark = pytest.mark.serial
 MU, PUSH = 0.3, 100.0

@@ -9,10 +9,10 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 from scipy.sparse.linalg import eigsh, spsolve
 
-from vi_contact.algebra import Array
 from vi_contact.beam.elements import Elements, beam_matrices, rod_matrices
 from vi_contact.beam.source_data import published_elements
 from vi_contact.beam.values import Rod, TimoshenkoBeam
+from vi_contact.core.algebra import Array
 
 pytestmark = pytest.mark.serial
 SLENDER = (1.0, 10.0, 1e2, 1e3, 1e4)  # length over depth

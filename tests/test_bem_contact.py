@@ -23,7 +23,7 @@ from vi_contact.bem.contact_march import march_contact
 from vi_contact.bem.contact_run import ContactRun, ledger
 from vi_contact.bem.two_bodies import TwoBodies
 from vi_contact.bem.uzawa_space_time import SpaceTimeUzawa
-from vi_contact.errors import InputError, StepFailure
+from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.models.boundary_elements import pressed, square_problem, steklov, unloaded
 
 pytestmark = pytest.mark.serial

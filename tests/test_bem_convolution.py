@@ -31,7 +31,7 @@ from vi_contact.bem.contact_march import march_contact
 from vi_contact.bem.contact_run import ledger
 from vi_contact.bem.radial_table import RadialTable
 from vi_contact.bem.uzawa_space_time import SpaceTimeUzawa
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 
 pytestmark = pytest.mark.serial
 METHODS = {"BDF2": BDF2(), "trapezoid": Trapezoid(), "Radau": RadauIIA()}

@@ -25,7 +25,7 @@ from vi_contact.bem import (
     stored_blocks,
     traction_forces,
 )
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 
 pytestmark = pytest.mark.serial
 

@@ -9,7 +9,7 @@ from test_bem_energetic import rod, smooth_integral, smooth_load
 
 from vi_contact.bem import BoundaryProblem, PoincareSteklov, circle, energetic_blocks, polygon, traction_forces
 from vi_contact.bem.interior import interior_displacement
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 
 pytestmark = pytest.mark.serial
 POINTS = np.array([(0.0, 0.0), (0.3, -0.2), (-0.41, 0.43), (0.1, 0.49)])

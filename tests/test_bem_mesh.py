@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vi_contact.bem import BoundaryMesh, circle, from_segments, polygon
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 
 pytestmark = pytest.mark.serial
 SQUARE = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)]

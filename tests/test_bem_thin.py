@@ -24,7 +24,7 @@ from vi_contact.bem import (
 )
 from vi_contact.bem.element_pairs import ElementPairs
 from vi_contact.bem.quadrature import point_sets
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 
 pytestmark = pytest.mark.serial
 H = 0.125

@@ -8,7 +8,7 @@ from scipy.integrate import quad
 
 from vi_contact.boundary_layer.layer import Layer
 from vi_contact.boundary_layer.particle import ParticleImpact, damping_ratio, layer_for, restitution
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 
 pytestmark = pytest.mark.serial
 K, C = (0.5, 1.0, 2.0, 5.0, 10.0), (0.0, 0.5, 1.0, 2.0, 5.0)

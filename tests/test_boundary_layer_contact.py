@@ -16,7 +16,8 @@ from vi_contact.boundary_layer.contact_law import ContactLayer, contact_layer
 from vi_contact.boundary_layer.layer import Layer
 from vi_contact.boundary_layer.metric import Metric
 from vi_contact.boundary_layer.scheme import BoundaryLayer
-from vi_contact.errors import InputError, StepFailure
+from vi_contact.core.errors import InputError, StepFailure
+from vi_contact.core.step import ContactProblem
 from vi_contact.exact.bar import ThrownBar
 from vi_contact.excitation import Harmonic
 from vi_contact.friction import Coulomb
@@ -26,7 +27,6 @@ from vi_contact.mass import ConsistentMass
 from vi_contact.schemes.midpoint import Midpoint
 from vi_contact.simulate import simulate
 from vi_contact.static import initial_state
-from vi_contact.step import ContactProblem
 from vi_contact.time_steps import Schedule
 
 serial = pytest.mark.serial

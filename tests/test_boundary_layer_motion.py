@@ -15,7 +15,7 @@ from vi_contact.boundary_layer.motion import ConstrainedSystem, Evaluations
 from vi_contact.boundary_layer.particle import ParticleImpact, damping_ratio, layer_for, restitution
 from vi_contact.boundary_layer.rigid_body import Ellipsoid, RigidBody, rotation
 from vi_contact.boundary_layer.trajectory import Contact, Trajectory, layer_motion
-from vi_contact.errors import InputError, StepFailure
+from vi_contact.core.errors import InputError, StepFailure
 
 pytestmark = pytest.mark.serial
 PLANE = ConstrainedSystem(np.eye(2), lambda q: q[0], lambda q: np.array([1.0, 0.0]))  # a unit mass before x = 0

@@ -17,14 +17,14 @@ from mpi4py import MPI
 import vi_contact as vc
 from vi_contact import fem
 from vi_contact.cli import main
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
+from vi_contact.core.surfaces import empty_surface
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import TwoBlocks
 from vi_contact.models.wall import Wall, build
 from vi_contact.studies import Case, read_case, run_case
 from vi_contact.studies.toml_file import with_settings
 from vi_contact.studies.words import words
-from vi_contact.surfaces import empty_surface
 
 ROOT = Path(__file__).resolve().parents[1]
 WALL = ROOT / "demos" / "cases" / "wall.toml"

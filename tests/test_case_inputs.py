@@ -14,7 +14,7 @@ from mpi4py import MPI
 
 import vi_contact as vc
 from vi_contact.cli import main
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.gmsh_session import session, write
 from vi_contact.studies import IDA, read_case, run_ida

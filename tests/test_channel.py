@@ -12,7 +12,7 @@ from mpi4py import MPI
 
 import vi_contact as vc
 from vi_contact.cli import main
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 from vi_contact.meshes.channel import ChannelMesh
 from vi_contact.meshes.extract import arrays_from_script
 from vi_contact.models.channel import BODIES, Channel, build

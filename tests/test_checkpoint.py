@@ -16,7 +16,8 @@ import numpy as np
 import pytest
 from chain import chain_problem
 
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
+from vi_contact.core.step import ContactProblem, State
 from vi_contact.excitation import Harmonic
 from vi_contact.friction import Coulomb
 from vi_contact.impact import Inelastic, MassProjection
@@ -29,7 +30,6 @@ from vi_contact.schemes.trapezoidal import Trapezoidal
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.simulate import Solution, simulate
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.step import ContactProblem, State
 
 FILES = ("history.csv", "columns.json")
 NEWMARK = LinearMultistep.newmark(beta=0.3025, gamma=0.6)

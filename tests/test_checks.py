@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from vi_contact import checks
-from vi_contact.errors import InputError
+from vi_contact.core import checks
+from vi_contact.core.errors import InputError
 
 pytestmark = pytest.mark.serial
 HUGE = 10**5000  # more digits than a float holds and Python prints

@@ -11,8 +11,11 @@ from bar import bar, run, thrown
 from chain import chain_problem
 from shaken import SHAKE, shaken
 
-from vi_contact.algebra import SerialComm
-from vi_contact.errors import InputError
+from vi_contact.core.algebra import SerialComm
+from vi_contact.core.errors import InputError
+from vi_contact.core.step import ContactProblem, StepProblem
+from vi_contact.core.surfaces import ContactSurface, empty_surface
+from vi_contact.core.verify import kkt_residual
 from vi_contact.friction import Coulomb, Frictionless
 from vi_contact.schemes.linear_multistep import LinearMultistep
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
@@ -21,9 +24,6 @@ from vi_contact.solvers.active_set import ActiveSet
 from vi_contact.solvers.condensed import AppliedDelassus, Condensed
 from vi_contact.solvers.hildreth import Hildreth
 from vi_contact.solvers.mprgp import ProjectedCG
-from vi_contact.step import ContactProblem, StepProblem
-from vi_contact.surfaces import ContactSurface, empty_surface
-from vi_contact.verify import kkt_residual
 
 pytestmark = pytest.mark.serial
 HALF, DT = ZienkiewiczWoodTaylor(), 5e-3

@@ -11,8 +11,10 @@ from fem_problems import max_over_ranks, shaken_wall
 from mpi4py import MPI
 
 from vi_contact.certified import NEAR, TOLERANCE, CertifiedSolver
+from vi_contact.core.errors import StepFailure
+from vi_contact.core.step import ContactProblem, EffectiveMatrix, Scheme, StepProblem, StepResult
+from vi_contact.core.verify import kkt_residual
 from vi_contact.correction import Share, added, left_over, share_of
-from vi_contact.errors import StepFailure
 from vi_contact.friction import Coulomb, ExponentialDecay, SlipRateCoulomb, Tresca
 from vi_contact.schemes.moreau_jean import MoreauJean
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
@@ -20,8 +22,6 @@ from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.nsgs import NSGS
 from vi_contact.solvers.volume import OneFactorisation, ReducedNewton, Volume
 from vi_contact.static import initial_state
-from vi_contact.step import ContactProblem, EffectiveMatrix, Scheme, StepProblem, StepResult
-from vi_contact.verify import kkt_residual
 
 COMM = MPI.COMM_WORLD
 DECAY = SlipRateCoulomb(ExponentialDecay(0.6, 0.3, 0.05))

@@ -12,8 +12,8 @@ from chain import chain_problem
 from rubbing import rubbing_block
 from shaken import SHAKE, shaken
 
+from vi_contact.core.errors import InputError
 from vi_contact.cross_check import CrossChecked, cross_check
-from vi_contact.errors import InputError
 from vi_contact.friction import Coulomb, Tresca
 from vi_contact.impact import Inelastic
 from vi_contact.schemes.linear_multistep import LinearMultistep

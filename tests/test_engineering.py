@@ -12,8 +12,8 @@ import pytest
 from chain import chain_problem
 
 import vi_contact as vc
-from vi_contact.algebra import Array
-from vi_contact.errors import InputError
+from vi_contact.core.algebra import Array
+from vi_contact.core.errors import InputError
 from vi_contact.floor_spectra import konno_ohmachi
 from vi_contact.peak_values import HEADER
 from vi_contact.plotting_maps import arc_position, thinned

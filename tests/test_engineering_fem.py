@@ -10,15 +10,15 @@ from fem_problems import CONCRETE, block, linear
 
 import vi_contact as vc
 from vi_contact import fem
-from vi_contact.algebra import Array
 from vi_contact.base_motion import base_motion
-from vi_contact.errors import InputError
+from vi_contact.core.algebra import Array
+from vi_contact.core.errors import InputError
+from vi_contact.core.surfaces import nodal_frames
 from vi_contact.fem import compat
 from vi_contact.fem.frames import block_of
 from vi_contact.models.channel import Channel, build
 from vi_contact.resultants import tangent_vectors
 from vi_contact.static import initial_state
-from vi_contact.surfaces import nodal_frames
 
 WIDTH, HEIGHT = 0.5, 4.0
 TIP, WIND, WEIGHT = (2000.0, -5000.0), 700.0, (300.0, -24000.0)  # Pa, Pa, N/m³

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from exact_checks import derivative_defect, energies, wave_defect
 
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 from vi_contact.exact.bouncing_bar import BouncingBar
 
 pytestmark = pytest.mark.serial

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from exact_checks import derivative_defect, wave_defect
 
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 from vi_contact.exact.columns import ObliqueImpact, ShearColumn
 from vi_contact.exact.two_bars import TwoBars
 from vi_contact.materials import LinearElastic

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 from vi_contact.exact.hertz import HertzImpact, HertzLine, HertzPoint, contact_modulus, contact_radius
 from vi_contact.exact.punch import RoundPunch, StripPunch
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 from vi_contact.exact.housner import HousnerBlock
 
 pytestmark = pytest.mark.serial

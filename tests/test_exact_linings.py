@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vi_contact import LinearElastic
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 from vi_contact.exact.lining import ThickLining, ThinLining
 from vi_contact.exact.racking import BoxFrame, ChannelFrame, racking_ratio
 from vi_contact.exact.rigid_wall import RigidWall

@@ -9,7 +9,7 @@ import pytest
 from soil import SOIL, column_of
 
 import vi_contact as vc
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 from vi_contact.exact.site_response import viscous
 from vi_contact.ground_motion import Record
 

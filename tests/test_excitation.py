@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 from vi_contact.excitation import FullSine, GroundMotion, HalfSine, Harmonic, Rectangular, Ricker, Tabulated
 from vi_contact.ground_motion import Record
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vi_contact.algebra import Array
-from vi_contact.errors import InputError
+from vi_contact.core.algebra import Array
+from vi_contact.core.errors import InputError
 from vi_contact.solvers.extrapolation import Aitken, Anderson, Plain
 
 pytestmark = pytest.mark.serial

@@ -10,7 +10,8 @@ from fem_problems import BODIES, CONCRETE, block, dense, field, linear, max_over
 from mpi4py import MPI
 
 from vi_contact import fem
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
+from vi_contact.core.system import SemiDiscreteSystem
 from vi_contact.fem import compat
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import BodyForce, Prescribed, Traction
@@ -20,7 +21,6 @@ from vi_contact.materials import LinearElastic, MassProportional, PlaneStrain, P
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.static import static_equilibrium
-from vi_contact.system import SemiDiscreteSystem
 
 COMM = MPI.COMM_WORLD
 bodies = pytest.mark.parametrize("name", BODIES)

@@ -7,7 +7,7 @@ import pytest
 from fem_problems import block
 from mpi4py import MPI
 
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 from vi_contact.fem.boundary_elements import boundary_curve
 from vi_contact.fem.mesh import node_numbers
 

@@ -20,17 +20,17 @@ from two_bodies import SOFT, forces, relative
 
 import vi_contact as vc
 from vi_contact import fem
-from vi_contact.algebra import Array
 from vi_contact.base_motion import base_motion
-from vi_contact.errors import InputError
+from vi_contact.core.algebra import Array
+from vi_contact.core.errors import InputError
+from vi_contact.core.step import ContactProblem
+from vi_contact.core.surfaces import ContactSurface
 from vi_contact.fem.mesh import Facets
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.extract import MeshArrays
 from vi_contact.meshes.from_arrays import add_arrays
 from vi_contact.meshes.two_blocks import Blocks
 from vi_contact.solvers.volume import Volume
-from vi_contact.step import ContactProblem
-from vi_contact.surfaces import ContactSurface
 
 COMM = MPI.COMM_WORLD
 SIDES = ("left", "bottom", "right", "top", "back", "front")
@@ -239,7 +239,7 @@ def test_redistributed_mass_at_oblique_corners():
 @pytest.mark.serial
 def test_lumped_mass_does_not_depend_on_the_frames():
     """Lumped mass before the contact nodes give theirs away: the kinetic energy of any rigid motion."""
-    from vi_contact.corners import lumped_entries
+    from vi_contact.core.corners import lumped_entries
     from vi_contact.mass import _row_sums
 
     system, tags = body("trapezoid")

@@ -13,7 +13,7 @@ from soil import SOIL, burst, energies, history, strip
 
 import vi_contact as vc
 from vi_contact import fem
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 from vi_contact.exact.packet import WavePacket
 
 HEIGHT, CELLS = 20.0, 80  # of 0.25 m

@@ -12,6 +12,8 @@ pytest.importorskip("dolfinx")
 
 from fem_problems import CONCRETE, block
 
+from vi_contact.core.step import ContactProblem
+from vi_contact.core.surfaces import HalfSpace
 from vi_contact.excitation import Harmonic
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.fields import XDMF
@@ -23,8 +25,6 @@ from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.simulate import Solution, simulate
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.volume import Volume
-from vi_contact.step import ContactProblem
-from vi_contact.surfaces import HalfSpace
 
 FEW = {
     "bar": {"lengths": (2.0,), "divisions": (1,)},

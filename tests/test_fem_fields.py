@@ -17,7 +17,9 @@ import h5py
 from fem_problems import BOX_DT, CONCRETE, block, field, shaken_wall, thrown_box, turned
 from tipped import ROUGH_ON_ONE_SIDE, tipped
 
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
+from vi_contact.core.step import ContactProblem
+from vi_contact.core.surfaces import empty_surface
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.fields import XDMF
 from vi_contact.fem.loads import Prescribed
@@ -29,8 +31,6 @@ from vi_contact.materials import LinearElastic, PlaneStrain, PlaneStress, Sectio
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.simulate import Solution, simulate
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.step import ContactProblem
-from vi_contact.surfaces import empty_surface
 
 DT = 1.0 / 560.0
 RUBBER = LinearElastic(E=3.0e6, nu=0.3, rho=1000.0)

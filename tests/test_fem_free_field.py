@@ -12,7 +12,7 @@ from test_fem_ties import SHAKE, STIFF, middles
 
 import vi_contact as vc
 from vi_contact import fem
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 
 DT, STEPS = 2e-3, 150
 UP = vc.upgoing(vc.Ricker(2.0, 4.0, direction=(1.0, 0.5)), dt=DT)

@@ -13,8 +13,10 @@ from fem_problems import CONCRETE, block, dense, held_by, linear, max_over_ranks
 from mpi4py import MPI
 from test_static import COLUMN, G, standing
 
-from vi_contact.algebra import Array
-from vi_contact.errors import InputError
+from vi_contact.core.algebra import Array
+from vi_contact.core.errors import InputError
+from vi_contact.core.step import ContactProblem, State
+from vi_contact.core.surfaces import HalfSpace
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.gravity import geometric_stiffness, initial_stress_matrix
 from vi_contact.fem.loads import BodyForce, Prescribed, Traction
@@ -24,8 +26,6 @@ from vi_contact.march import march
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.static import static_equilibrium
-from vi_contact.step import ContactProblem, State
-from vi_contact.surfaces import HalfSpace
 
 COMM = MPI.COMM_WORLD
 

@@ -13,8 +13,10 @@ from fem_problems import dense, field, max_over_ranks, turned
 from mpi4py import MPI
 from two_bodies import SOFT, blocks, forces, momenta, per_body, relative, thrown, two_blocks
 
-from vi_contact.algebra import Array
-from vi_contact.errors import InputError
+from vi_contact.core.algebra import Array
+from vi_contact.core.errors import InputError
+from vi_contact.core.step import ContactProblem
+from vi_contact.core.surfaces import AnalyticGap, ContactSurface, HalfSpace, empty_surface
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.joined import together
 from vi_contact.fem.loads import BodyForce
@@ -27,8 +29,6 @@ from vi_contact.mass import Redistributed
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import Blocks
 from vi_contact.schemes.midpoint import Midpoint
-from vi_contact.step import ContactProblem
-from vi_contact.surfaces import AnalyticGap, ContactSurface, HalfSpace, empty_surface
 
 COMM = MPI.COMM_WORLD
 

@@ -10,14 +10,14 @@ import pytest
 from fem_problems import BODIES, CONCRETE, block, linear, max_over_ranks, nodal, resultant
 from mpi4py import MPI
 
-from vi_contact.algebra import Array
-from vi_contact.errors import InputError
+from vi_contact.core.algebra import Array
+from vi_contact.core.errors import InputError
+from vi_contact.core.system import Load
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import BodyForce, Prescribed, TangentialTraction, Traction
 from vi_contact.march import march
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.system import Load
 
 COMM = MPI.COMM_WORLD
 bodies = pytest.mark.parametrize("name", BODIES)

@@ -14,9 +14,10 @@ from fem_problems import field, held_by, run, turned
 from mpi4py import MPI
 from two_bodies import forces, momenta, per_body, relative, thrown, two_blocks
 
-from vi_contact.algebra import Array
+from vi_contact.core.algebra import Array
+from vi_contact.core.errors import InputError
+from vi_contact.core.step import ContactProblem
 from vi_contact.cross_check import cross_check
-from vi_contact.errors import InputError
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.mesh import build_mesh
 from vi_contact.fem.mortar import DualMortar
@@ -33,7 +34,6 @@ from vi_contact.schemes.trapezoidal import Trapezoidal
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.volume import OneFactorisation, ReducedNewton, Volume
 from vi_contact.static import static_equilibrium
-from vi_contact.step import ContactProblem
 
 COMM = MPI.COMM_WORLD
 shapes = pytest.mark.parametrize("simplices", [False, True], ids=["tensor", "simplices"])

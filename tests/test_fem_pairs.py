@@ -14,8 +14,10 @@ from fem_problems import field, held_by, max_over_ranks, run, turned
 from mpi4py import MPI
 from two_bodies import SOFT, blocks, forces, per_body, relative, thrown, two_blocks
 
-from vi_contact.algebra import Array
-from vi_contact.errors import InputError
+from vi_contact.core.algebra import Array
+from vi_contact.core.errors import InputError
+from vi_contact.core.step import ContactProblem
+from vi_contact.core.surfaces import HalfSpace
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import BodyForce, Prescribed
 from vi_contact.fem.matching import NodeToNode
@@ -28,8 +30,6 @@ from vi_contact.meshes.cut import CutOpen
 from vi_contact.meshes.two_blocks import Blocks
 from vi_contact.schemes.midpoint import Midpoint
 from vi_contact.schemes.trapezoidal import Trapezoidal
-from vi_contact.step import ContactProblem
-from vi_contact.surfaces import HalfSpace
 
 COMM = MPI.COMM_WORLD
 CASES: dict[str, dict[str, Any]] = {

@@ -14,6 +14,8 @@ from energy_checks import course
 from fem_problems import WALL_DT, run, shaken_wall
 from mpi4py import MPI
 
+from vi_contact.core.step import ContactProblem
+from vi_contact.core.surfaces import HalfSpace
 from vi_contact.cross_check import cross_check
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.mesh import build_mesh
@@ -27,8 +29,6 @@ from vi_contact.schemes.contact_stabilised import ContactStabilisedNewmark
 from vi_contact.schemes.moreau_jean import MoreauJean
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.volume import OneFactorisation, ReducedNewton, Volume
-from vi_contact.step import ContactProblem
-from vi_contact.surfaces import HalfSpace
 from vi_contact.time_steps import HalvedAtImpact
 
 STEPS = 80

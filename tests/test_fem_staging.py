@@ -11,8 +11,8 @@ from soil import SOIL, strip
 
 import vi_contact as vc
 from vi_contact import fem
-from vi_contact.errors import InputError
-from vi_contact.surfaces import empty_surface
+from vi_contact.core.errors import InputError
+from vi_contact.core.surfaces import empty_surface
 
 DT = 4e-3
 WEIGHT = fem.BodyForce((0.0, -2000.0 * 9.81))

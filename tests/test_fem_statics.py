@@ -9,7 +9,9 @@ import pytest
 from fem_problems import CONCRETE, block, field, held_by, max_over_ranks, turned
 from mpi4py import MPI
 
-from vi_contact.algebra import Array
+from vi_contact.core.algebra import Array
+from vi_contact.core.step import ContactProblem, State
+from vi_contact.core.surfaces import ContactSurface, HalfSpace
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import BodyForce, Prescribed, Traction
 from vi_contact.fem.trace import contact_surface
@@ -18,8 +20,6 @@ from vi_contact.materials import LinearElastic, PlaneStress
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.static import static_equilibrium
-from vi_contact.step import ContactProblem, State
-from vi_contact.surfaces import ContactSurface, HalfSpace
 
 COMM = MPI.COMM_WORLD
 GROUND = HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))

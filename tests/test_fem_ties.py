@@ -9,7 +9,7 @@ from soil import SOIL, history, strip
 
 import vi_contact as vc
 from vi_contact import fem
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.soil_column import SoilColumn
 

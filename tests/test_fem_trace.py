@@ -10,16 +10,16 @@ import pytest
 from fem_problems import BODIES, CONCRETE, block, dense, field, max_over_ranks, turned
 from mpi4py import MPI
 
-from vi_contact.algebra import Array
-from vi_contact.errors import InputError
+from vi_contact.core.algebra import Array
+from vi_contact.core.errors import InputError
+from vi_contact.core.step import ContactProblem
+from vi_contact.core.surfaces import AnalyticGap, HalfSpace, Touching
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import BodyForce, Prescribed
 from vi_contact.fem.mesh import Facets
 from vi_contact.fem.trace import contact_surface
 from vi_contact.materials import PlaneStress
 from vi_contact.static import initial_state
-from vi_contact.step import ContactProblem
-from vi_contact.surfaces import AnalyticGap, HalfSpace, Touching
 
 COMM = MPI.COMM_WORLD
 GROUND = HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))

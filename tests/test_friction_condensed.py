@@ -11,6 +11,8 @@ from column import column
 from test_friction_methods import small
 
 from vi_contact.certified import CertifiedSolver
+from vi_contact.core.step import ContactProblem, Report
+from vi_contact.core.surfaces import ContactSurface
 from vi_contact.friction import Coulomb, Frictionless, Tresca
 from vi_contact.march import march
 from vi_contact.mass import ConsistentMass, Redistributed
@@ -20,8 +22,6 @@ from vi_contact.solvers import condensed
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.friction_newton import FrictionNewton
 from vi_contact.solvers.mprgp import ProjectedCG
-from vi_contact.step import ContactProblem, Report
-from vi_contact.surfaces import ContactSurface
 
 pytestmark = pytest.mark.serial
 SCHEME, DT = ZienkiewiczWoodTaylor(), 1e-2

@@ -12,6 +12,8 @@ pytest.importorskip("dolfinx")
 
 from fem_problems import BOX_DT, block, run, thrown_box, turned
 
+from vi_contact.core.step import ContactProblem, Report
+from vi_contact.core.surfaces import HalfSpace
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import BodyForce, Prescribed
 from vi_contact.fem.trace import contact_surface
@@ -23,8 +25,6 @@ from vi_contact.schemes.trapezoidal import Trapezoidal
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.nsgs import NSGS
-from vi_contact.step import ContactProblem, Report
-from vi_contact.surfaces import HalfSpace
 
 SCHEMES = [(ZienkiewiczWoodTaylor(), ConsistentMass()), (Trapezoidal(), Redistributed())]
 NAMES = ["midpoint", "trapezoidal"]

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vi_contact.algebra import Array, Mask
-from vi_contact.errors import InputError, StepFailure
+from vi_contact.core.algebra import Array, Mask
+from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.solvers import friction_linear
 from vi_contact.solvers.active_set import ActiveSet
 from vi_contact.solvers.extrapolation import Aitken, Anderson, Plain

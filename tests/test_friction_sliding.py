@@ -14,8 +14,10 @@ pytest.importorskip("dolfinx")
 from fem_problems import block, thrown_box, turned
 
 import vi_contact as vc
-from vi_contact.algebra import Array
-from vi_contact.errors import InputError
+from vi_contact.core.algebra import Array
+from vi_contact.core.errors import InputError
+from vi_contact.core.step import ContactProblem
+from vi_contact.core.surfaces import HalfSpace
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import BodyForce
 from vi_contact.fem.trace import contact_surface
@@ -25,8 +27,6 @@ from vi_contact.mass import ConsistentMass
 from vi_contact.materials import LinearElastic, Rayleigh
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.static import static_equilibrium
-from vi_contact.step import ContactProblem
-from vi_contact.surfaces import HalfSpace
 
 G, SLOPE = 9.81, pi / 6.0
 MIDPOINT = vc.ZienkiewiczWoodTaylor()

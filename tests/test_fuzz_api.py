@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import pytest
 
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 
 pytestmark = pytest.mark.serial
 LONGEST = 400  # characters of a sentence

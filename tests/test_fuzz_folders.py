@@ -22,11 +22,11 @@ import pytest
 from test_checkpoint import chain, difference, run
 
 from vi_contact.checkpoint import checksum, read_checkpoint
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
+from vi_contact.core.step import State
 from vi_contact.run_folder import read_run
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.simulate import Solution
-from vi_contact.step import State
 from vi_contact.writer import Writer
 
 pytestmark = pytest.mark.serial

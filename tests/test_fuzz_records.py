@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from record_files import AFAD, EVENT, ONE, VALUES, cosmos, csmip, esm, knet, smc
 
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 from vi_contact.ground_motion import UNITS, Record, read_record
 
 pytestmark = pytest.mark.serial

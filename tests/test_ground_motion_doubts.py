@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 from vi_contact.ground_motion import (
     KanaiTajimi,
     Record,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from record_files import AFAD, COUNTS, EVENT, ONE, VALUES, cosmos, csmip, esm, knet, rows
 
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 from vi_contact.ground_motion import Record, read_record, write_at2, write_columns, write_path_series
 
 pytestmark = pytest.mark.serial

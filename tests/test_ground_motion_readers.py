@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import record_files
 
-from vi_contact.errors import InputError, ViContactError
+from vi_contact.core.errors import InputError, ViContactError
 from vi_contact.ground_motion import UNITS, read_record
 
 pytestmark = pytest.mark.serial

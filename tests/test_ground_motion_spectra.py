@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import expm
 from test_ground_motion import EL_CENTRO, shared
 
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 from vi_contact.ground_motion import (
     STANDARD_GRAVITY,
     Record,

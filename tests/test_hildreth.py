@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from reference_lcp import generic, mixed
 
-from vi_contact.errors import StepFailure
+from vi_contact.core.errors import StepFailure
 from vi_contact.solvers.active_set import ActiveSet
 from vi_contact.solvers.hildreth import Hildreth
 from vi_contact.solvers.lcp import LCP

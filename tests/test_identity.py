@@ -19,8 +19,8 @@ from mpi4py import MPI
 
 import vi_contact as vc
 from vi_contact import fem
-from vi_contact.algebra import Array, SerialMatrix
-from vi_contact.errors import InputError, StepFailure
+from vi_contact.core.algebra import Array, SerialMatrix
+from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.run_checks import check_pace
 
 COMM = MPI.COMM_WORLD

@@ -10,7 +10,7 @@ from bar import bar, energy, run, thrown
 from chain import chain_problem, chain_surface, chain_system
 from shaken import shaken
 
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 from vi_contact.impact import ComponentReset, Elastic, Impact, Inelastic, MassProjection, Newton, NoImpact
 from vi_contact.schemes.linear_multistep import LinearMultistep
 from vi_contact.schemes.ss22 import SS22

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from reference_lcp import spd
 
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 from vi_contact.solvers.lcp import LCP, energy_scale, largest_eigenvalue, scaled_dense
 
 pytestmark = pytest.mark.serial

@@ -12,15 +12,15 @@ import pytest
 import scipy.sparse as sp
 from column import column, rubbing_mass, two_component_system
 
-from vi_contact.algebra import Array, SerialComm
-from vi_contact.errors import InputError
+from vi_contact.core.algebra import Array, SerialComm
+from vi_contact.core.errors import InputError
+from vi_contact.core.step import ContactProblem, State
+from vi_contact.core.surfaces import ContactSurface
 from vi_contact.friction import Coulomb, ExponentialDecay, FrictionLaw, SlipRateCoulomb, StaticKinetic, Tresca
 from vi_contact.load_steps import quasi_static
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.nsgs import NSGS
 from vi_contact.static import static_equilibrium
-from vi_contact.step import ContactProblem, State
-from vi_contact.surfaces import ContactSurface
 
 pytestmark = pytest.mark.serial
 STIFFNESS, THRESHOLD, H = 4.0e6, 50.0, 0.1  # EA of the bar [N], friction per length [N/m], distance of its nodes [m]

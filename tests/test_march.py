@@ -12,8 +12,9 @@ from bar import bar, energy, run
 from chain import chain_problem
 from shaken import changes, shaken
 
-from vi_contact.algebra import SerialMatrix
-from vi_contact.errors import InputError, StepFailure
+from vi_contact.core.algebra import SerialMatrix
+from vi_contact.core.errors import InputError, StepFailure
+from vi_contact.core.step import ContactProblem, State, StepResult
 from vi_contact.friction import Coulomb
 from vi_contact.impact import Elastic, Inelastic
 from vi_contact.schemes.linear_multistep import LinearMultistep
@@ -21,7 +22,6 @@ from vi_contact.schemes.ss22 import SS22
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.static import static_equilibrium
-from vi_contact.step import ContactProblem, State, StepResult
 
 pytestmark = pytest.mark.serial
 HALF, NEWMARK = ZienkiewiczWoodTaylor(), LinearMultistep.newmark()

@@ -12,7 +12,9 @@ from chain import chain_problem
 from fem_problems import BODIES, CONCRETE, block, dense, spread, turned
 from mpi4py import MPI
 
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
+from vi_contact.core.step import ContactProblem
+from vi_contact.core.surfaces import Touching
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.trace import contact_surface
 from vi_contact.friction import Coulomb
@@ -22,8 +24,6 @@ from vi_contact.mass import ConsistentMass, Redistributed
 from vi_contact.materials import Rayleigh
 from vi_contact.schemes.trapezoidal import Trapezoidal
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.step import ContactProblem
-from vi_contact.surfaces import Touching
 
 FINER = BODIES | {
     "bar": {"lengths": (2.0,), "divisions": (12,)},

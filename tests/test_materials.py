@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 from vi_contact.materials import (
     LinearElastic,
     MassProportional,

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 from vi_contact.meshes.ball import BallMesh
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.channel import ChannelMesh

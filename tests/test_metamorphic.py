@@ -10,7 +10,7 @@ from bar import run
 from chain import chain_problem
 from shaken import SHAKE, changes, shaken
 
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 from vi_contact.impact import Elastic, Inelastic
 from vi_contact.schemes.linear_multistep import LinearMultistep
 from vi_contact.schemes.ss22 import SS22

@@ -10,7 +10,7 @@ from bar import bar
 from chain import chain_system
 from scipy.linalg import eigh
 
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 from vi_contact.modal import lowest_frequency
 
 pytestmark = pytest.mark.serial

@@ -13,7 +13,7 @@ import pytest
 from mpi4py import MPI
 
 import vi_contact as vc
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 from vi_contact.models import rocking_block as rocking
 
 COMM = MPI.COMM_WORLD

@@ -11,7 +11,10 @@ from bar import bar, before_impact, run
 from fem_problems import block
 from mpi4py import MPI
 
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
+from vi_contact.core.step import ContactProblem
+from vi_contact.core.surfaces import HalfSpace
+from vi_contact.core.verify import energy_balance
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import BodyForce
 from vi_contact.fem.trace import contact_surface
@@ -28,9 +31,6 @@ from vi_contact.schemes.newmark import Newmark
 from vi_contact.schemes.trapezoidal import Trapezoidal
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.static import static_equilibrium
-from vi_contact.step import ContactProblem
-from vi_contact.surfaces import HalfSpace
-from vi_contact.verify import energy_balance
 
 SCHEMES = [
     (Trapezoidal(), Redistributed()), (Newmark(), Redistributed()), (HHT(-0.1), Redistributed()),

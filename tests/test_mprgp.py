@@ -7,7 +7,7 @@ import pytest
 import scipy.sparse as sp
 from reference_lcp import generic, spd
 
-from vi_contact.errors import InputError, StepFailure
+from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.solvers.active_set import ActiveSet
 from vi_contact.solvers.lcp import LCP
 from vi_contact.solvers.mprgp import ProjectedCG

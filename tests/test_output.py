@@ -14,8 +14,8 @@ import pytest
 from chain import chain_problem
 
 from vi_contact import history as history_module
-from vi_contact.algebra import SerialComm
-from vi_contact.errors import InputError, ViContactError
+from vi_contact.core.algebra import SerialComm
+from vi_contact.core.errors import InputError, ViContactError
 from vi_contact.excitation import Harmonic
 from vi_contact.history import HistoryFiles
 from vi_contact.output import (

@@ -8,8 +8,8 @@ import scipy.sparse as sp
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from vi_contact.algebra import Array, SerialAlgebra, SerialMatrix
-from vi_contact.errors import InputError
+from vi_contact.core.algebra import Array, SerialAlgebra, SerialMatrix
+from vi_contact.core.errors import InputError
 from vi_contact.fem.petsc_algebra import CHUNK, MpiComm, PetscAlgebra, PetscMatrix
 
 COMM = MPI.COMM_WORLD

@@ -10,7 +10,7 @@ import pytest
 from rubbing import rubbing_block
 
 from vi_contact import plotting_friction
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 from vi_contact.friction import Coulomb
 from vi_contact.plotting_friction import contact_states, plot_hysteresis, plot_states
 from vi_contact.recorders import Contact

@@ -10,7 +10,10 @@ import pytest
 from fem_problems import CONCRETE, block, linear
 from mpi4py import MPI
 
-from vi_contact.errors import InputError, StepFailure
+from vi_contact.core.errors import InputError, StepFailure
+from vi_contact.core.step import Certificate, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
+from vi_contact.core.surfaces import HalfSpace
+from vi_contact.core.verify import kkt_residual
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import BodyForce, Prescribed, Traction
 from vi_contact.fem.mesh import build_mesh
@@ -26,9 +29,6 @@ from vi_contact.rigid_bodies import RigidBodies
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.nsgs import NSGS
 from vi_contact.static import initial_state, static_equilibrium
-from vi_contact.step import Certificate, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
-from vi_contact.surfaces import HalfSpace
-from vi_contact.verify import kkt_residual
 
 COMM = MPI.COMM_WORLD
 WIDTH, HEIGHT, WEIGHT, LEAN, MU = 80.0, 100.0, 23544.0, 0.05, 0.6  # m, m, N/m³, of the weight, -

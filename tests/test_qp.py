@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from reference_lcp import KINDS, enumerate_lcp, from_solution, generic, mixed, problems, spd
 
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 from vi_contact.solvers.active_set import ActiveSet
 from vi_contact.solvers.hildreth import Hildreth
 from vi_contact.solvers.lcp import LCP

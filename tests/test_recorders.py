@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from chain import chain_problem, chain_surface
 
-from vi_contact.algebra import Array
-from vi_contact.errors import InputError
+from vi_contact.core.algebra import Array
+from vi_contact.core.errors import InputError
+from vi_contact.core.step import ContactProblem, Report, State
 from vi_contact.excitation import Harmonic
 from vi_contact.impact import Inelastic, MassProjection, Newton
 from vi_contact.march import march
@@ -20,7 +21,6 @@ from vi_contact.schemes.ss22 import SS22
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.simulate import simulate
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.step import ContactProblem, Report, State
 
 pytestmark = pytest.mark.serial
 

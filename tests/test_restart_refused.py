@@ -14,7 +14,8 @@ import pytest
 from test_checkpoint import chain, equal_files, rubbing_box, run, run_wall, wall
 
 from vi_contact.checkpoint import checksum
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
+from vi_contact.core.step import ContactProblem
 from vi_contact.excitation import Harmonic, Tabulated
 from vi_contact.friction import Coulomb, SlipRateCoulomb
 from vi_contact.identity import difference, identity, text_of
@@ -25,7 +26,6 @@ from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.simulate import simulate
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.hildreth import Hildreth
-from vi_contact.step import ContactProblem
 
 serial = pytest.mark.serial
 

@@ -17,9 +17,11 @@ from column import column
 from oscillator import SHAKEN
 from shaken import changes, shaken
 
-from vi_contact.algebra import Array
 from vi_contact.checkpoint import Place, Problem, read_checkpoint, write_checkpoint
-from vi_contact.errors import InputError
+from vi_contact.core.algebra import Array
+from vi_contact.core.errors import InputError
+from vi_contact.core.step import ContactProblem, Report, State
+from vi_contact.core.verify import energies, energy_balance
 from vi_contact.exact.columns import ObliqueImpact
 from vi_contact.friction import Coulomb
 from vi_contact.impact import Inelastic, MassProjection
@@ -33,8 +35,6 @@ from vi_contact.schemes.newmark import Newmark
 from vi_contact.schemes.ss22 import SS22
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.static import initial_state, static_equilibrium
-from vi_contact.step import ContactProblem, Report, State
-from vi_contact.verify import energies, energy_balance
 
 pytestmark = pytest.mark.serial
 CONSISTENT, MASSLESS = ConsistentMass(), Redistributed()

@@ -12,7 +12,8 @@ from fem_problems import max_over_ranks, shaken_wall
 from mpi4py import MPI
 from two_bodies import two_blocks
 
-from vi_contact.algebra import Array, SerialAlgebra
+from vi_contact.core.algebra import Array, SerialAlgebra
+from vi_contact.core.step import ContactProblem, EffectiveMatrix, State, StepProblem
 from vi_contact.fem.loads import BodyForce, Traction
 from vi_contact.fem.pairs import contact_pair
 from vi_contact.fem.petsc_algebra import PetscAlgebra
@@ -24,7 +25,6 @@ from vi_contact.schemes.contact_layer import relaxed
 from vi_contact.simulate import simulate
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.volume import ReducedNewton, Volume
-from vi_contact.step import ContactProblem, EffectiveMatrix, State, StepProblem
 
 COMM = MPI.COMM_WORLD
 Rows = list[float]

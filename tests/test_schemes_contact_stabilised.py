@@ -12,7 +12,8 @@ from chain import chain_problem
 from energy_checks import course
 from oscillator import SHAKEN, amplification, observed_order
 
-from vi_contact.errors import InputError, StepFailure
+from vi_contact.core.errors import InputError, StepFailure
+from vi_contact.core.step import ContactProblem, State
 from vi_contact.excitation import Harmonic
 from vi_contact.mass import ConsistentMass, Redistributed
 from vi_contact.schemes import mass_projection
@@ -20,7 +21,6 @@ from vi_contact.schemes.contact_stabilised import ContactStabilisedNewmark
 from vi_contact.schemes.ss22 import SS22
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.static import initial_state
-from vi_contact.step import ContactProblem, State
 
 pytestmark = pytest.mark.serial
 STABILISED = ContactStabilisedNewmark()

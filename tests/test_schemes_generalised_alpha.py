@@ -9,7 +9,7 @@ import pytest
 from bar import energy, period_three, run
 from oscillator import SHAKEN, dense, observed_order, oscillators
 
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 from vi_contact.mass import ConsistentMass, Redistributed
 from vi_contact.schemes.generalised_alpha import AlphaStep, GeneralisedAlpha
 from vi_contact.schemes.hht import HHT

@@ -8,7 +8,7 @@ from bar import energy, period_three, run, thrown
 from oscillator import observed_order
 from test_schemes_generalised_alpha import amplification
 
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 from vi_contact.mass import ConsistentMass, Redistributed
 from vi_contact.schemes.hht import HHT
 from vi_contact.schemes.newmark import Newmark

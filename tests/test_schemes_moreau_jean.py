@@ -12,14 +12,14 @@ from chain import chain_problem
 from energy_checks import course
 from oscillator import FAR, amplification, observed_order
 
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
+from vi_contact.core.step import ContactProblem, State
 from vi_contact.excitation import Harmonic
 from vi_contact.impact import Inelastic, NoImpact
 from vi_contact.mass import ConsistentMass, Redistributed
 from vi_contact.recorders import Contact
 from vi_contact.schemes.moreau_jean import MoreauJean
 from vi_contact.static import initial_state
-from vi_contact.step import ContactProblem, State
 from vi_contact.time_steps import HalvedAtImpact
 
 pytestmark = pytest.mark.serial

@@ -12,7 +12,8 @@ from bar import bar, bouncing, energy, period_three, run, thrown
 from oscillator import observed_order
 from shaken import changes, shaken
 
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
+from vi_contact.core.verify import energy_balance
 from vi_contact.impact import Inelastic
 from vi_contact.mass import ConsistentMass, Redistributed
 from vi_contact.schemes.linear_multistep import LinearMultistep
@@ -20,7 +21,6 @@ from vi_contact.schemes.newmark import Newmark
 from vi_contact.schemes.trapezoidal import Trapezoidal
 from vi_contact.static import initial_state
 from vi_contact.time_steps import Schedule
-from vi_contact.verify import energy_balance
 
 pytestmark = pytest.mark.serial
 MEMBERS = pytest.mark.parametrize(("beta", "gamma"), [(0.25, 0.5), (0.3025, 0.6), (0.4, 0.5)])

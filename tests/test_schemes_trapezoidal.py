@@ -12,13 +12,13 @@ from bar import bar, before_impact, bouncing, energy, period_three, run, thrown
 from oscillator import last_state, observed_order, oscillators
 from shaken import shaken
 
+from vi_contact.core.step import ContactProblem
+from vi_contact.core.verify import energy_balance
 from vi_contact.mass import ConsistentMass, Redistributed
 from vi_contact.schemes.trapezoidal import Trapezoidal
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.static import initial_state, static_equilibrium
-from vi_contact.step import ContactProblem
-from vi_contact.verify import energy_balance
 
 pytestmark = pytest.mark.serial
 DEFAULT = Trapezoidal()

@@ -8,7 +8,7 @@ from bar import bar, before_impact, bouncing, energy, period_three, run, thrown
 from chain import chain_problem
 from oscillator import SHAKEN, amplification, dense, exact, last_state, observed_order, oscillators
 
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.static import initial_state
 

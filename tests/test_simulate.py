@@ -12,8 +12,10 @@ import numpy as np
 import pytest
 from chain import chain_problem
 
+from vi_contact.core.errors import InputError, StepFailure
+from vi_contact.core.step import ContactProblem, EffectiveMatrix, Report, State, StepProblem, StepResult
+from vi_contact.core.surfaces import ContactSurface
 from vi_contact.cross_check import CrossChecked
-from vi_contact.errors import InputError, StepFailure
 from vi_contact.excitation import Harmonic
 from vi_contact.impact import Inelastic
 from vi_contact.march import march
@@ -24,8 +26,6 @@ from vi_contact.simulate import Solution, simulate
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.hildreth import Hildreth
 from vi_contact.static import static_equilibrium
-from vi_contact.step import ContactProblem, EffectiveMatrix, Report, State, StepProblem, StepResult
-from vi_contact.surfaces import ContactSurface
 
 pytestmark = pytest.mark.serial
 

@@ -12,8 +12,9 @@ from rubbing import rubbing_block
 from scipy.integrate import solve_ivp
 
 import vi_contact as vc
-from vi_contact.algebra import Array
-from vi_contact.errors import InputError, StepFailure
+from vi_contact.core.algebra import Array
+from vi_contact.core.errors import InputError, StepFailure
+from vi_contact.core.step import ContactProblem, Report
 from vi_contact.friction import Coulomb, ExponentialDecay, SlipRateCoulomb, StaticKinetic
 from vi_contact.march import march
 from vi_contact.mass import ConsistentMass
@@ -21,7 +22,6 @@ from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.extrapolation import Plain
 from vi_contact.solvers.slip_rate import RateIteration
 from vi_contact.static import static_equilibrium
-from vi_contact.step import ContactProblem, Report
 
 pytestmark = pytest.mark.serial
 MIDPOINT, BACKWARD = vc.ZienkiewiczWoodTaylor(), vc.ZienkiewiczWoodTaylor(phi=1.0)

@@ -9,8 +9,10 @@ from chain import chain_problem
 from fem_problems import CONCRETE, block, field, held_by, linear, max_over_ranks, turned
 from mpi4py import MPI
 
-from vi_contact.algebra import Array
-from vi_contact.errors import InputError
+from vi_contact.core.algebra import Array
+from vi_contact.core.errors import InputError
+from vi_contact.core.step import ContactProblem, State
+from vi_contact.core.surfaces import HalfSpace
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import BodyForce, Prescribed, Traction
 from vi_contact.fem.trace import contact_surface
@@ -22,8 +24,6 @@ from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.mprgp import ProjectedCG
 from vi_contact.solvers.volume import ReducedNewton, Volume
 from vi_contact.static import static_equilibrium
-from vi_contact.step import ContactProblem, State
-from vi_contact.surfaces import HalfSpace
 
 COMM = MPI.COMM_WORLD
 G = 9.80665

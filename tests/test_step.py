@@ -7,11 +7,11 @@ import pytest
 from bar import bar
 from chain import chain_problem
 
-from vi_contact.algebra import SerialAlgebra, SerialMatrix
-from vi_contact.errors import InputError, StepFailure, ViContactError
+from vi_contact.core.algebra import SerialAlgebra, SerialMatrix
+from vi_contact.core.errors import InputError, StepFailure, ViContactError
+from vi_contact.core.step import Certificate, EffectiveMatrix
 from vi_contact.excitation import Harmonic
 from vi_contact.friction import Frictionless
-from vi_contact.step import Certificate, EffectiveMatrix
 
 pytestmark = pytest.mark.serial
 

@@ -19,12 +19,12 @@ from test_checkpoint import equal_files, run, run_wall
 from test_simulate import summary_of
 
 from vi_contact import folder_lock
-from vi_contact.algebra import SerialComm
 from vi_contact.cli import main
-from vi_contact.errors import InputError, Interrupted
+from vi_contact.core.algebra import SerialComm
+from vi_contact.core.errors import InputError, Interrupted
+from vi_contact.core.step import ContactProblem, Report, State
 from vi_contact.folder_lock import locked
 from vi_contact.recorders import Contact, Energy
-from vi_contact.step import ContactProblem, Report, State
 from vi_contact.stop_signals import SIGNALS, StopSignals
 
 serial = pytest.mark.serial

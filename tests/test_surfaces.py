@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from chain import chain_surface
 
-from vi_contact.algebra import SerialComm
-from vi_contact.errors import InputError
-from vi_contact.initial_gap import admissible_gap
-from vi_contact.surfaces import AnalyticGap, HalfSpace, Touching, empty_surface, nodal_frames
+from vi_contact.core.algebra import SerialComm
+from vi_contact.core.errors import InputError
+from vi_contact.core.initial_gap import admissible_gap
+from vi_contact.core.surfaces import AnalyticGap, HalfSpace, Touching, empty_surface, nodal_frames
 
 pytestmark = pytest.mark.serial
 POINTS = np.array([[0.0, 1.0], [2.0, 3.0], [-1.0, 0.5]])

@@ -8,8 +8,8 @@ import scipy.sparse as sp
 from bar import thrown
 from chain import chain_system
 
-from vi_contact.algebra import SerialMatrix
-from vi_contact.system import Load
+from vi_contact.core.algebra import SerialMatrix
+from vi_contact.core.system import Load
 
 pytestmark = pytest.mark.serial
 

@@ -17,7 +17,8 @@ from shaken import changes, shaken
 from test_checkpoint import chain, difference, equal_files, round_off, run_wall, wall
 from test_checkpoint import run as run_chain
 
-from vi_contact.errors import InputError, StepFailure
+from vi_contact.core.errors import InputError, StepFailure
+from vi_contact.core.step import ContactProblem, Report
 from vi_contact.impact import Inelastic, MassProjection
 from vi_contact.march import March
 from vi_contact.mass import ConsistentMass, Redistributed
@@ -29,7 +30,6 @@ from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.simulate import simulate
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.static import initial_state
-from vi_contact.step import ContactProblem, Report
 from vi_contact.time_steps import Course, HalvedAtImpact, Schedule, course
 
 serial = pytest.mark.serial

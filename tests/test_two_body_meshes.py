@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.cut import CutOpen, Welded, cut_open, welded
 from vi_contact.meshes.extract import arrays_from_file, arrays_from_script

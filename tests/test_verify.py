@@ -11,14 +11,14 @@ from bar import before_impact, bouncing, period_three, run, thrown
 from chain import chain_problem
 from shaken import changes, shaken
 
-from vi_contact.algebra import SerialMatrix
+from vi_contact.core.algebra import SerialMatrix
+from vi_contact.core.step import EffectiveMatrix, Report, StepProblem, StepResult
+from vi_contact.core.verify import energies, energy_balance, kkt_residual
 from vi_contact.impact import ComponentReset, Elastic, Inelastic, MassProjection, Newton
 from vi_contact.schemes.linear_multistep import LinearMultistep
 from vi_contact.schemes.ss22 import SS22
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.static import initial_state
-from vi_contact.step import EffectiveMatrix, Report, StepProblem, StepResult
-from vi_contact.verify import energies, energy_balance, kkt_residual
 
 pytestmark = pytest.mark.serial
 HALF, NEWMARK = ZienkiewiczWoodTaylor(), LinearMultistep.newmark()

@@ -14,6 +14,7 @@ pytest.importorskip("petsc4py")
 
 from volume_cases import Case, block, case, pushed_block
 
+from vi_contact.core.verify import kkt_residual
 from vi_contact.solvers.volume import (
     OneFactorisation,
     ReducedNewton,
@@ -21,7 +22,6 @@ from vi_contact.solvers.volume import (
     TaoTron,
     Volume,
 )
-from vi_contact.verify import kkt_residual
 
 METHODS = {
     "reduced": ReducedNewton(),

@@ -17,14 +17,14 @@ pytest.importorskip("petsc4py")
 
 from volume_cases import Case, case, pushed_block
 
-from vi_contact.algebra import Array
-from vi_contact.errors import InputError, StepFailure
+from vi_contact.core.algebra import Array
+from vi_contact.core.errors import InputError, StepFailure
+from vi_contact.core.step import StepResult
+from vi_contact.core.verify import kkt_residual
 from vi_contact.friction import Coulomb, ExponentialDecay, SlipRateCoulomb, Tresca
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.nsgs import NSGS
 from vi_contact.solvers.volume import ReducedNewton, Volume
-from vi_contact.step import StepResult
-from vi_contact.verify import kkt_residual
 
 M = 8  # contact points of pushed_block
 VOLUME = Volume(method=ReducedNewton())

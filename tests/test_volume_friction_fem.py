@@ -13,6 +13,8 @@ pytest.importorskip("dolfinx")
 from fem_problems import BOX_DT, block, thrown_box
 from tipped import ROUGH_ON_ONE_SIDE, RUBBER, tipped
 
+from vi_contact.core.step import ContactProblem
+from vi_contact.core.surfaces import HalfSpace
 from vi_contact.cross_check import CrossChecked
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import BodyForce, Prescribed
@@ -24,8 +26,6 @@ from vi_contact.schemes.trapezoidal import Trapezoidal
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.volume import ReducedNewton, Volume
-from vi_contact.step import ContactProblem
-from vi_contact.surfaces import HalfSpace
 
 
 def compared(problem: ContactProblem, scheme: Any, steps: int) -> tuple[CrossChecked, list[tuple[int, int, int]]]:

@@ -11,11 +11,11 @@ pytest.importorskip("petsc4py")
 
 from volume_cases import Case, pushed_block
 
+from vi_contact.core.verify import kkt_residual
 from vi_contact.solvers.volume import ReducedNewton, Volume
 from vi_contact.solvers.volume_held import HeldInverse
 from vi_contact.solvers.volume_step import ScaledStep
 from vi_contact.solvers.volume_system import BoundedSystem
-from vi_contact.verify import kkt_residual
 
 M = 8
 SPRINGS = {"compliance": np.array([0.3, 0.0] * 4), "scale": 2.0}

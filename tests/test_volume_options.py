@@ -17,7 +17,8 @@ pytest.importorskip("petsc4py")
 from petsc4py import PETSc
 from volume_cases import Case, case, pushed_block
 
-from vi_contact.errors import InputError, StepFailure
+from vi_contact.core.errors import InputError, StepFailure
+from vi_contact.core.verify import kkt_residual
 from vi_contact.friction import Coulomb, Frictionless
 from vi_contact.solvers.volume import (
     OneFactorisation,
@@ -27,7 +28,6 @@ from vi_contact.solvers.volume import (
     Volume,
 )
 from vi_contact.solvers.volume_reasons import NOT_A_NUMBER, raised, stopped
-from vi_contact.verify import kkt_residual
 
 METHODS = (ReducedNewton(), OneFactorisation(), SemismoothNewton(), TaoTron())
 PREFIX = "vi_contact_volume_"

@@ -7,7 +7,7 @@ import pytest
 from fem_problems import field, max_over_ranks
 from mpi4py import MPI
 
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 from vi_contact.excitation import GroundMotion, Harmonic
 from vi_contact.ground_motion import read_record
 from vi_contact.impact import Elastic, Inelastic

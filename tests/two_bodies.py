@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 from fem_problems import field
 
-from vi_contact.algebra import Array
+from vi_contact.core.algebra import Array
+from vi_contact.core.step import ContactProblem
+from vi_contact.core.system import SemiDiscreteSystem
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.mesh import build_mesh
 from vi_contact.materials import LinearElastic
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import TwoBlocks
-from vi_contact.step import ContactProblem
-from vi_contact.system import SemiDiscreteSystem
 
 SOFT = LinearElastic(E=1.0e6, nu=0.3, rho=1000.0)
 LENGTHS, UPPER, LOWER = (1.5, 1.0, 1.2), (4, 3, 3), (4, 2, 3)

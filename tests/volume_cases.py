@@ -13,9 +13,9 @@ import numpy as np
 import scipy.sparse as sp
 from reference_lcp import enumerate_lcp
 
-from vi_contact.algebra import Array, SerialAlgebra, SerialComm, SerialMatrix
-from vi_contact.step import EffectiveMatrix, StepProblem, StepResult
-from vi_contact.surfaces import ContactSurface
+from vi_contact.core.algebra import Array, SerialAlgebra, SerialComm, SerialMatrix
+from vi_contact.core.step import EffectiveMatrix, StepProblem, StepResult
+from vi_contact.core.surfaces import ContactSurface
 
 
 def q1_element(nu: float) -> tuple[Array, Array]:

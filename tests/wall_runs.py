@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from vi_contact.algebra import Array, Mask
+from vi_contact.core.algebra import Array, Mask
+from vi_contact.core.step import ContactProblem, State
+from vi_contact.core.verify import energy_balance
 from vi_contact.impact import Inelastic, MassProjection
 from vi_contact.march import march
 from vi_contact.models.wall import Wall, WallModel, build
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.step import ContactProblem, State
-from vi_contact.verify import energy_balance
 
 POINTS = (12, 6, 7, 26)  # columns of the reference table: top of the contact side, two of its points, the opposite side
 SCHEME = ZienkiewiczWoodTaylor(phi=0.5)

@@ -19,7 +19,7 @@ from .upgoing import upgoing  # noqa: F401
 __version__ = "0.1.0"
 
 _CONTENTS = {
-    "errors": ("InputError", "Interrupted", "StepFailure", "ViContactError"),
+    "core.errors": ("InputError", "Interrupted", "StepFailure", "ViContactError"),
     # values
     "materials": (
         "LinearElastic", "MassProportional", "NoDamping", "PlaneStrain", "PlaneStress", "Rayleigh", "Solid",
@@ -39,8 +39,8 @@ _CONTENTS = {
         "write_at2", "write_columns", "write_path_series",
     ),
     "mass": ("ConsistentMass", "Redistributed"),
-    "surfaces": ("AnalyticGap", "ContactSurface", "HalfSpace", "Touching"),
-    "system": ("Load", "SemiDiscreteSystem"),
+    "core.surfaces": ("AnalyticGap", "ContactSurface", "HalfSpace", "Touching"),
+    "core.system": ("Load", "SemiDiscreteSystem"),
     # exact solutions to compare with
     "exact.bar": ("PeriodicBar", "ThrownBar"),
     "exact.bouncing_bar": ("BouncingBar",),
@@ -56,7 +56,7 @@ _CONTENTS = {
     "exact.racking": ("BoxFrame", "ChannelFrame", "racking_ratio"),
     "exact.lining": ("ThickLining", "ThinLining"),
     # contract
-    "step": ("Certificate", "ContactProblem", "Report", "State", "StepProblem", "StepResult"),
+    "core.step": ("Certificate", "ContactProblem", "Report", "State", "StepProblem", "StepResult"),
     # schemes
     "schemes.choice": ("completed",),
     "schemes.trapezoidal": ("Trapezoidal",),
@@ -97,7 +97,7 @@ _CONTENTS = {
     "peak_values": ("Loop", "Peak", "hysteresis", "peaks", "write_peaks"),
     "run_folder": ("RunFolder", "read_run"),
     "cross_check": ("CrossChecked", "cross_check"),
-    "verify": ("energy_balance", "kkt_residual"),
+    "core.verify": ("energy_balance", "kkt_residual"),
     "modal": ("lowest_frequency",),
     # contact in a boundary layer (seed 001)
     "boundary_layer.layer": ("Layer",),

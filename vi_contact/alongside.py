@@ -10,11 +10,11 @@ from __future__ import annotations
 from bisect import bisect_right
 from math import inf
 
-from .algebra import Array
-from .errors import InputError
+from .core.algebra import Array
+from .core.errors import InputError
+from .core.step import ContactProblem, Scheme
 from .march import march
 from .mass import ConsistentMass
-from .step import ContactProblem, Scheme
 from .time_steps import LARGEST, HalvedAtImpact, Schedule, course
 
 

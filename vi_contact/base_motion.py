@@ -20,17 +20,17 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import scipy.sparse as sp
 
-from .algebra import Array, SerialAlgebra, SerialComm, SerialMatrix
 from .alongside import Alongside
-from .checks import provides
-from .errors import InputError
+from .core.algebra import Array, SerialAlgebra, SerialComm, SerialMatrix
+from .core.checks import provides
+from .core.errors import InputError
+from .core.problem_checks import EXCITATION
+from .core.step import ContactProblem, Scheme
+from .core.surfaces import ContactSurface, empty_surface
+from .core.system import Load, Pace, SemiDiscreteSystem
 from .excitation import Excitation
-from .problem_checks import EXCITATION
 from .run_checks import check_scheme
 from .schemes.trapezoidal import Trapezoidal
-from .step import ContactProblem, Scheme
-from .surfaces import ContactSurface, empty_surface
-from .system import Load, Pace, SemiDiscreteSystem
 from .time_steps import Schedule
 
 

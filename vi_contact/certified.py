@@ -10,11 +10,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from .core.errors import StepFailure
+from .core.step import Certificate, ContactProblem, EffectiveMatrix, PreparedSolver, Solver, StepProblem, StepResult
+from .core.surfaces import ContactSurface
+from .core.verify import kkt_residual
 from .correction import corrected
-from .errors import StepFailure
-from .step import Certificate, ContactProblem, EffectiveMatrix, PreparedSolver, Solver, StepProblem, StepResult
-from .surfaces import ContactSurface
-from .verify import kkt_residual
 
 TOLERANCE = 1e-9
 NEAR = 1e-2  # of the tolerance: round-off of ordinary steps stays a hundred times below, and is left as it is

@@ -21,11 +21,11 @@ from typing import Any
 
 import numpy as np
 
-from .checks import array, number, shown, whole
-from .errors import InputError
+from .core.checks import array, number, shown, whole
+from .core.errors import InputError
+from .core.step import ContactProblem, Scheme, State
 from .identity import FIXED, Identity, difference, identity
 from .output import CHECKPOINT, FORMAT, check_format, on_root, write_atomically
-from .step import ContactProblem, Scheme, State
 from .time_steps import TimeSteps
 
 log = logging.getLogger(__name__)

@@ -19,7 +19,7 @@ from .cli_motion import add_motion_commands
 from .cli_options import add_output, add_shaking, add_step, chosen, impact_law
 from .cli_ranks import fail_together, rank
 from .cli_report import add_report_commands
-from .errors import Interrupted, ViContactError
+from .core.errors import Interrupted, ViContactError
 
 _DESCRIPTION = """Dynamic unilateral contact of elastic structures: exact non-penetration, a closed energy ledger and a
 certificate for every time step. Run under "mpirun -n N" for any number of ranks. Options -vi_contact_volume_... go to

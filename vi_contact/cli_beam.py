@@ -6,8 +6,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from .checks import counted
-from .errors import InputError
+from .core.checks import counted
+from .core.errors import InputError
 
 
 def add_beam_command(commands: Any) -> None:
@@ -45,12 +45,12 @@ def add_beam_command(commands: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> str:
-    from .algebra import SerialComm
     from .beam.algorithm import BeamStepper, run_beam
     from .beam.elements import Elements
     from .beam.source_data import published_elements, published_mu, published_start
     from .beam.tip import ExactFriction, RegularisedFriction, TipFriction
     from .beam.values import TimoshenkoBeam
+    from .core.algebra import SerialComm
     from .output import run_folder
 
     beam = TimoshenkoBeam(

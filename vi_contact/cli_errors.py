@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from textwrap import shorten
 from typing import Any, NoReturn
 
-from .checks import SHOWN, shown
-from .errors import InputError, ViContactError
+from .core.checks import SHOWN, shown
+from .core.errors import InputError, ViContactError
 from .output import sentence
 
 PETSC_ERR_MEM = 55  # of petscsystypes.h

@@ -7,8 +7,8 @@ import shlex
 import signal
 from typing import Any
 
-from .checks import shown
-from .errors import InputError, ViContactError
+from .core.checks import shown
+from .core.errors import InputError, ViContactError
 
 
 def add_ida_commands(commands: Any) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from .cli_options import output_file
-from .errors import InputError
+from .core.errors import InputError
 
 _METRICS = ("dominant", "full", "blended", "flat")
 

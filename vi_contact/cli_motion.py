@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from .cli_options import output_file, spaced
-from .errors import InputError
+from .core.errors import InputError
 
 _FORMATS = {".at2": "at2", ".th": "path", ".g3": "path", ".acc": "path"}
 _QUANTITY = re.compile(r"([-+]?[\d.]++(?:[eE][-+]?\d++)?)(.*+)")

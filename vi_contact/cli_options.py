@@ -9,8 +9,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from .checks import counted, shown
-from .errors import InputError
+from .core.checks import counted, shown
+from .core.errors import InputError
 
 SHAKING = ("motion", "vertical", "units", "scale", "pga", "resample")
 STEP = ("solver", "scheme", "dt", "steps", "cross_check")

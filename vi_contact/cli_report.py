@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from .cli_options import output_file, spaced, table_beside_picture
-from .errors import ViContactError
+from .core.errors import ViContactError
 
 _ACTIONS = {
     "peaks": "largest and smallest value of every column, as a table",

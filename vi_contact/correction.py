@@ -18,11 +18,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .algebra import Array
-from .errors import StepFailure
+from .core.algebra import Array
+from .core.errors import StepFailure
+from .core.step import Certificate, StepProblem, StepResult
+from .core.verify import kkt_residual
 from .friction import FrictionLaw
-from .step import Certificate, StepProblem, StepResult
-from .verify import kkt_residual
 
 MARGIN = 2.0**10  # share over residual: reactions may be that much more wrong than the residual tells
 LEAST = 2.0**-30

@@ -11,13 +11,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .algebra import max_abs
-from .checks import number, provides, several
-from .errors import InputError
+from .core.algebra import max_abs
+from .core.checks import number, provides, several
+from .core.errors import InputError
+from .core.step import ContactProblem, EffectiveMatrix, PreparedSolver, Scheme, Solver, State, StepProblem, StepResult
+from .core.surfaces import ContactSurface
 from .march import march
 from .run_checks import check_solver
-from .step import ContactProblem, EffectiveMatrix, PreparedSolver, Scheme, Solver, State, StepProblem, StepResult
-from .surfaces import ContactSurface
 from .time_steps import TimeSteps
 from .whole_run import Opinion, Overall, WholeRun
 

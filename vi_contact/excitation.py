@@ -18,9 +18,9 @@ from typing import Protocol
 
 import numpy as np
 
-from .algebra import Array
-from .checks import attributes, instance, number, several
-from .errors import InputError
+from .core.algebra import Array
+from .core.checks import attributes, instance, number, several
+from .core.errors import InputError
 from .ground_motion import Record
 
 

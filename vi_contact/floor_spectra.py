@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .algebra import Array
-from .checks import array, counted, flag, instance, number
-from .errors import InputError
+from .core.algebra import Array
+from .core.checks import array, counted, flag, instance, number
+from .core.errors import InputError
 from .ground_motion import Record, ResponseSpectrum, response_spectrum
 from .peak_values import column_of
 

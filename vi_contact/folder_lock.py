@@ -12,8 +12,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from .algebra import Comm
-from .errors import InputError
+from .core.algebra import Comm
+from .core.errors import InputError
 from .output import on_root
 
 log = logging.getLogger(__name__)

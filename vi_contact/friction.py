@@ -18,9 +18,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from .algebra import Array
-from .checks import function, real, shown
-from .errors import InputError
+from .core.algebra import Array
+from .core.checks import function, real, shown
+from .core.errors import InputError
 
 
 class FrictionLaw(Protocol):

@@ -20,6 +20,7 @@ from typing import Any
 import h5py
 import numpy as np
 
+from .core.surfaces import ContactSurface
 from .output import (
     COLUMNS,
     FORMAT,
@@ -33,7 +34,6 @@ from .output import (
 )
 from .recorders import Columns, Row
 from .stored_rows import StoredArrays, StoredRows, line_of, read_blocks, record_of
-from .surfaces import ContactSurface
 from .table import Block, Table
 
 STRIDE = 2**20  # bytes that are copied at once

@@ -18,11 +18,11 @@ from dataclasses import replace
 import numpy as np
 
 from .certified import TOLERANCE
-from .checks import real, shown
-from .errors import InputError
+from .core.checks import real, shown
+from .core.errors import InputError
+from .core.step import ContactProblem, Solver, State
 from .run_checks import check_methods, check_problem_given, check_sizes
 from .static import Equilibria, initial_state
-from .step import ContactProblem, Solver, State
 
 
 def quasi_static(

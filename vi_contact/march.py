@@ -8,12 +8,12 @@ from functools import partial
 import numpy as np
 
 from .certified import TOLERANCE, CertifiedSolver
+from .core.step import ContactProblem, EffectiveMatrix, Report, Scheme, Solver, State
 from .impact import Impact
 from .run_checks import check_methods, check_pace, check_state, start_time
 from .schemes.choice import completed
 from .solvers.condensed import Condensed
 from .static import initial_state
-from .step import ContactProblem, EffectiveMatrix, Report, Scheme, Solver, State
 from .time_steps import Course, TimeSteps, course
 
 

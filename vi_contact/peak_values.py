@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from .algebra import Array
-from .checks import instance, number, several
-from .errors import InputError, ViContactError
+from .core.algebra import Array
+from .core.checks import instance, number, several
+from .core.errors import InputError, ViContactError
 from .output import sentence, write_atomically
 from .recorders import Columns
 

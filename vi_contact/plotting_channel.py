@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from .algebra import Array, Mask
-from .errors import InputError
+from .core.algebra import Array, Mask
+from .core.errors import InputError
 from .plotting import STYLE, History, _edges, panels, save, scaled
 from .plotting_maps import thinned
 

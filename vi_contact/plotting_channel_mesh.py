@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from .algebra import Array, Indices, Mask
-from .errors import InputError
+from .core.algebra import Array, Indices, Mask
+from .core.errors import InputError
 from .plotting import STYLE, History, scaled
 from .plotting_deformed import Frames, Tractions, read_frames, read_tractions
 

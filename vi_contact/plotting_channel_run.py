@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from .algebra import Array
-from .errors import InputError
+from .core.algebra import Array
+from .core.errors import InputError
 from .plotting_channel import Outline, opening, plot_envelope, plot_interface, plot_openings, plot_rocking
 from .plotting_channel_mesh import animate, read_bodies
 from .run_folder import read_run

@@ -11,8 +11,8 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from .algebra import Array, Indices
-from .errors import InputError
+from .core.algebra import Array, Indices
+from .core.errors import InputError
 from .output import FIELDS, HISTORY_H5
 
 

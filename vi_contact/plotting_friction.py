@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from .algebra import Array
-from .errors import InputError
+from .core.algebra import Array
+from .core.errors import InputError
 from .plotting import STYLE, History, _edges, length_unit, panels, save, scaled
 
 OPEN, STICK, SLIP = 1, 2, 3  # as contact_status in fields.xdmf

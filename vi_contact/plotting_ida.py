@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from .algebra import Array
+from .core.algebra import Array
 from .plotting import STYLE, plain, scaled
 
 _FRACTILES = (("16 %", "tab:blue", "--"), ("50 %", "black", "-"), ("84 %", "tab:red", "--"))

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from .algebra import Array, Indices
+from .core.algebra import Array, Indices
 from .plotting import _edges, scaled
 
 STRAIGHT = 1e-6  # of its length: what a line of points may deviate

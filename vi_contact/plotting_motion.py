@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .algebra import Array
+from .core.algebra import Array
 from .ground_motion import (
     STANDARD_GRAVITY,
     UNITS,

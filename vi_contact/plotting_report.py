@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from .algebra import Array
-from .errors import InputError
+from .core.algebra import Array
+from .core.errors import InputError
 from .floor_spectra import recorded_motion
 from .ground_motion import STANDARD_GRAVITY, Record, response_spectrum
 from .peak_values import Peak, peaks

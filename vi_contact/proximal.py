@@ -20,12 +20,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .algebra import Array, Mask, max_abs
+from .core.algebra import Array, Mask, max_abs
+from .core.errors import InputError, StepFailure
+from .core.step import Certificate, ContactProblem, EffectiveMatrix, Solver, StepProblem, StepResult
+from .core.verify import kkt_residual
 from .correction import MARGIN, added, kept, left_over, share_of
-from .errors import InputError, StepFailure
 from .rigid_bodies import RigidBodies, body_springs
-from .step import Certificate, ContactProblem, EffectiveMatrix, Solver, StepProblem, StepResult
-from .verify import kkt_residual
 
 ITERATIONS = 200
 STIFFER = 1e3  # springs for solvers that the weak ones defeat

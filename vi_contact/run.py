@@ -15,12 +15,12 @@ from typing import Any, Protocol
 import numpy as np
 
 from .checkpoint import Place, Problem
-from .errors import Interrupted
+from .core.errors import Interrupted
+from .core.step import ContactProblem, Recorder, Report, Scheme, Solver, State, StepResult
 from .march import March
 from .recorders import refuse_overflow
 from .run_log import Progress, versions
 from .solution import Solution, energy_warning, sampling_warning
-from .step import ContactProblem, Recorder, Report, Scheme, Solver, State, StepResult
 from .stop_signals import StopSignals
 from .table import Table
 from .time_steps import Course, TimeSteps, described, longest

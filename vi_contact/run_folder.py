@@ -14,9 +14,9 @@ from typing import Any
 import h5py
 import numpy as np
 
-from .algebra import Array, Mask
-from .checks import SHOWN, shown
-from .errors import InputError
+from .core.algebra import Array, Mask
+from .core.checks import SHOWN, shown
+from .core.errors import InputError
 from .output import COLUMNS, HISTORY_CSV, HISTORY_H5, SUMMARY, check_folder_format
 
 BYTES = 100_000_000  # of a JSON file

@@ -7,11 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from .algebra import Comm
 from .certified import TOLERANCE
 from .checkpoint import Place, read_checkpoint
-from .checks import flag, instance, provides, several, whole
-from .errors import InputError
+from .core.algebra import Comm
+from .core.checks import flag, instance, provides, several, whole
+from .core.errors import InputError
+from .core.step import ContactProblem, Recorder, Scheme, Solver, State
 from .folder_lock import locked
 from .output import on_root, run_folder
 from .recorders import Columns, Contact, Energy, Row, Steps
@@ -21,7 +22,6 @@ from .schemes.choice import completed
 from .solution import Solution
 from .solvers.condensed import Condensed
 from .static import initial_state
-from .step import ContactProblem, Recorder, Scheme, Solver, State
 from .stored_rows import StoredRows
 from .table import Block, Table
 from .time_steps import TimeSteps, course

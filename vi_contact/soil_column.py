@@ -16,13 +16,13 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from .algebra import Array, SerialAlgebra, SerialComm, SerialMatrix
 from .base_motion import PointSpace
-from .checks import array, shown
-from .errors import InputError
-from .step import ContactProblem
-from .surfaces import empty_surface
-from .system import Load, SemiDiscreteSystem
+from .core.algebra import Array, SerialAlgebra, SerialComm, SerialMatrix
+from .core.checks import array, shown
+from .core.errors import InputError
+from .core.step import ContactProblem
+from .core.surfaces import empty_surface
+from .core.system import Load, SemiDiscreteSystem
 
 
 @dataclass(frozen=True)

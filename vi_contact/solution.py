@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from .algebra import Array
+from .core.algebra import Array
+from .core.step import State
 from .excitation import Excitation, GroundMotion
 from .output import to_json
 from .recorders import Columns
-from .step import State
 from .tally import LEDGER
 
 CREATED = 0.01  # of the largest energy: more than schemes without a fault gain at sensible time steps

@@ -7,12 +7,12 @@ from collections.abc import Callable
 import numpy as np
 
 from .certified import TOLERANCE, CertifiedSolver, refuse_nan
-from .checks import number
-from .errors import InputError
+from .core.checks import number
+from .core.errors import InputError
+from .core.step import ContactProblem, EffectiveMatrix, Solver, State, StepProblem, StepResult
 from .proximal import Proximal
 from .run_checks import check_methods, check_problem_given
 from .solvers.condensed import Condensed
-from .step import ContactProblem, EffectiveMatrix, Solver, State, StepProblem, StepResult
 
 ADVICE = "try another solver, or smaller load steps, and check the data"
 

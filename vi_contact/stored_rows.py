@@ -16,8 +16,8 @@ from typing import Any
 import h5py
 import numpy as np
 
-from .algebra import Array
-from .errors import InputError
+from .core.algebra import Array
+from .core.errors import InputError
 from .output import HISTORY_CSV, HISTORY_H5, JOURNAL, check_folder_format
 from .recorders import Row
 from .table import BLOCK, Block, Table

@@ -11,9 +11,9 @@ from typing import Any
 import h5py
 import numpy as np
 
-from .algebra import Array
-from .checks import shown
-from .errors import InputError, ViContactError
+from .core.algebra import Array
+from .core.checks import shown
+from .core.errors import InputError, ViContactError
 from .recorders import Columns, Row
 from .tally import Tally
 

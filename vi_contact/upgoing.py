@@ -11,12 +11,12 @@ import math
 
 import numpy as np
 
-from .algebra import Array
-from .checks import flag, provides, real, shown
-from .errors import InputError
+from .core.algebra import Array
+from .core.checks import flag, provides, real, shown
+from .core.errors import InputError
+from .core.problem_checks import EXCITATION
 from .excitation import Excitation, GroundMotion
 from .ground_motion import Record
-from .problem_checks import EXCITATION
 
 
 class UpgoingVelocity:

@@ -11,8 +11,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from .algebra import Array
 from .checkpoint import Place, Problem, write_checkpoint
+from .core.algebra import Array
+from .core.step import ContactProblem, Report, State
 from .history import HistoryFiles
 from .output import (
     ABOUT,
@@ -29,7 +30,6 @@ from .output import (
 )
 from .recorders import Row
 from .run_log import RunLog, versions
-from .step import ContactProblem, Report, State
 from .stored_rows import StoredRows, times_of
 from .table import Table
 

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from vi_contact.algebra import Array
 from vi_contact.boundary_layer.layer import Layer
 from vi_contact.boundary_layer.particle import ParticleImpact
 from vi_contact.boundary_layer.trajectory import Trajectory
+from vi_contact.core.algebra import Array
 from vi_contact.plotting import save
 from vi_contact.plotting_layer import COLOURS, grid
 

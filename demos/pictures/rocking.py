@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vi_contact.algebra import Array
+from vi_contact.core.algebra import Array
 from vi_contact.plotting import History, panels, save
 
 

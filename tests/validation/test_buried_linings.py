@@ -13,10 +13,10 @@ from buried import GAMMA, LinedBox, Rings, displacement, racking
 from mpi4py import MPI
 
 from vi_contact import Condensed, ContactProblem, LinearElastic, State, fem, static_equilibrium
+from vi_contact.core.surfaces import empty_surface
 from vi_contact.exact.lining import ThickLining
 from vi_contact.exact.racking import racking_ratio
 from vi_contact.meshes.cut import Welded
-from vi_contact.surfaces import empty_surface
 
 pytestmark = pytest.mark.serial
 CONCRETE, SOIL = LinearElastic(E=25e9, nu=0.2, rho=2400.0), LinearElastic(E=100e6, nu=0.3, rho=1900.0)

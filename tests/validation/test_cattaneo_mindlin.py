@@ -26,7 +26,9 @@ import pytest
 from graded import even_then_growing, growing
 from mpi4py import MPI
 
-from vi_contact.algebra import Array
+from vi_contact.core.algebra import Array
+from vi_contact.core.step import ContactProblem
+from vi_contact.core.surfaces import AnalyticGap
 from vi_contact.exact.hertz import HertzLine
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import Traction
@@ -40,8 +42,6 @@ from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import Blocks
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.static import static_equilibrium
-from vi_contact.step import ContactProblem
-from vi_contact.surfaces import AnalyticGap
 
 pytestmark = pytest.mark.slow
 

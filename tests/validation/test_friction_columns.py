@@ -12,6 +12,7 @@ import pytest
 from column import UNIT, column, rubbing_mass
 from energy_checks import rounded
 
+from vi_contact.core.step import ContactProblem
 from vi_contact.exact.columns import ObliqueImpact, ShearColumn
 from vi_contact.friction import Coulomb, Tresca
 from vi_contact.mass import ConsistentMass, Redistributed
@@ -22,7 +23,6 @@ from vi_contact.simulate import simulate
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.fixed_point import FixedPoint
 from vi_contact.solvers.nsgs import NSGS
-from vi_contact.step import ContactProblem
 
 pytestmark = pytest.mark.serial
 PAIRS = [(ZienkiewiczWoodTaylor(), ConsistentMass()), (Trapezoidal(), Redistributed())]

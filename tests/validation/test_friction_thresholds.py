@@ -12,8 +12,10 @@ import pytest
 from fem_problems import block, field, turned
 from mpi4py import MPI
 
-from vi_contact.algebra import Array
-from vi_contact.errors import InputError
+from vi_contact.core.algebra import Array
+from vi_contact.core.errors import InputError
+from vi_contact.core.step import ContactProblem, State
+from vi_contact.core.surfaces import HalfSpace
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import Traction
 from vi_contact.fem.trace import contact_surface
@@ -22,8 +24,6 @@ from vi_contact.load_steps import quasi_static
 from vi_contact.materials import LinearElastic
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.static import static_equilibrium
-from vi_contact.step import ContactProblem, State
-from vi_contact.surfaces import HalfSpace
 
 pytestmark = pytest.mark.slow
 

@@ -19,6 +19,8 @@ from fem_problems import field, orders
 from graded import Pressed, even_then_growing, growing, pressed_half
 from mpi4py import MPI
 
+from vi_contact.core.step import ContactProblem
+from vi_contact.core.surfaces import AnalyticGap, HalfSpace
 from vi_contact.exact.hertz import HertzLine, HertzPoint, contact_modulus
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import Prescribed, Traction
@@ -28,8 +30,6 @@ from vi_contact.materials import LinearElastic
 from vi_contact.meshes.ball import BallMesh
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.static import static_equilibrium
-from vi_contact.step import ContactProblem
-from vi_contact.surfaces import AnalyticGap, HalfSpace
 
 pytestmark = pytest.mark.slow
 

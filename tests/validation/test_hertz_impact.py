@@ -15,8 +15,11 @@ import pytest
 from mpi4py import MPI
 from test_mass import inertia
 
-from vi_contact.algebra import Array
-from vi_contact.errors import InputError
+from vi_contact.core.algebra import Array
+from vi_contact.core.errors import InputError
+from vi_contact.core.step import ContactProblem
+from vi_contact.core.surfaces import HalfSpace, Touching
+from vi_contact.core.verify import energy_balance
 from vi_contact.exact.hertz import HertzPoint
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.mesh import build_mesh
@@ -26,9 +29,6 @@ from vi_contact.march import march
 from vi_contact.mass import Redistributed
 from vi_contact.meshes.ball import BallMesh
 from vi_contact.models.ball import SHARE, Ball, BallModel, build, quasi_static
-from vi_contact.step import ContactProblem
-from vi_contact.surfaces import HalfSpace, Touching
-from vi_contact.verify import energy_balance
 
 COMM = MPI.COMM_WORLD
 

@@ -16,7 +16,7 @@ from bar import bouncing, energy, period_three
 from bar import run as serial_run
 from mpi4py import MPI
 
-from vi_contact.algebra import Array
+from vi_contact.core.algebra import Array
 from vi_contact.exact.bar import PeriodicBar, ThrownBar
 from vi_contact.exact.bouncing_bar import BouncingBar
 from vi_contact.march import march

@@ -13,14 +13,14 @@ import pytest
 from fem_problems import Errors, block, field, field_errors, linear, max_over_ranks, orders, plane_strain
 from mpi4py import MPI
 
-from vi_contact.algebra import Array
+from vi_contact.core.algebra import Array
+from vi_contact.core.step import State
+from vi_contact.core.system import SemiDiscreteSystem
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import BodyForce, Prescribed
 from vi_contact.march import march
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.step import State
-from vi_contact.system import SemiDiscreteSystem
 
 KX, KY, W = 2.0, 3.0, 4.0
 MATERIAL = plane_strain(shear=1.0, nu=0.25, rho=1.5)

@@ -17,7 +17,8 @@ import pytest
 from fem_problems import block
 from mpi4py import MPI
 
-from vi_contact.algebra import Array
+from vi_contact.core.algebra import Array
+from vi_contact.core.step import ContactProblem, Solver, State
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import Prescribed, Traction
 from vi_contact.fem.trace import contact_surface
@@ -28,7 +29,6 @@ from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.fixed_point import FixedPoint
 from vi_contact.solvers.friction_newton import FrictionNewton
 from vi_contact.static import static_equilibrium
-from vi_contact.step import ContactProblem, Solver, State
 
 pytestmark = pytest.mark.serial  # ranks change none of these numbers: cheaper tests show it
 

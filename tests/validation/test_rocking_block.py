@@ -14,7 +14,7 @@ import pytest
 from mpi4py import MPI
 
 import vi_contact as vc
-from vi_contact.algebra import Array
+from vi_contact.core.algebra import Array
 from vi_contact.models import rocking_block as rocking
 from vi_contact.time_steps import TimeSteps
 

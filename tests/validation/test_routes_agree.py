@@ -17,6 +17,7 @@ import pytest
 from fem_problems import BOX_DT, WALL_DT, Run, max_over_ranks, run, shaken_wall, thrown_box, turned
 from mpi4py import MPI
 
+from vi_contact.core.step import ContactProblem, StepProblem
 from vi_contact.cross_check import cross_check
 from vi_contact.march import march
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
@@ -25,7 +26,6 @@ from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.hildreth import Hildreth
 from vi_contact.solvers.mprgp import ProjectedCG
 from vi_contact.solvers.volume import OneFactorisation, ReducedNewton, SemismoothNewton, TaoTron, Volume
-from vi_contact.step import ContactProblem, StepProblem
 
 COMM = MPI.COMM_WORLD
 SCHEME = ZienkiewiczWoodTaylor(phi=0.5)

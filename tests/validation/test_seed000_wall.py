@@ -14,7 +14,8 @@ from fem_problems import dense, spread
 from mpi4py import MPI
 from wall_runs import POINTS, SCHEME, follow, history, model, problem
 
-from vi_contact.algebra import Array
+from vi_contact.core.algebra import Array
+from vi_contact.core.step import ContactProblem, EffectiveMatrix
 from vi_contact.cross_check import cross_check
 from vi_contact.impact import MassProjection
 from vi_contact.march import march
@@ -23,7 +24,6 @@ from vi_contact.modal import lowest_frequency
 from vi_contact.models.wall import Wall
 from vi_contact.solvers.condensed import Condensed, PreparedCondensed
 from vi_contact.solvers.hildreth import Hildreth
-from vi_contact.step import ContactProblem, EffectiveMatrix
 
 pytestmark = pytest.mark.slow
 

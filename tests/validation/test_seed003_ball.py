@@ -13,8 +13,8 @@ from mpi4py import MPI
 from test_demos import demo
 
 import vi_contact as vc
-from vi_contact.algebra import Array
-from vi_contact.errors import InputError
+from vi_contact.core.algebra import Array
+from vi_contact.core.errors import InputError
 from vi_contact.meshes.disk import DiskMesh
 from vi_contact.meshes.extract import arrays_from_script
 from vi_contact.models.disk import Disk, DiskModel, Momentum, Push, build

@@ -13,7 +13,7 @@ from mpi4py import MPI
 from test_demos import demo
 
 import vi_contact as vc
-from vi_contact.algebra import Array
+from vi_contact.core.algebra import Array
 from vi_contact.models.square import Square, build, concrete
 
 pytestmark = pytest.mark.slow

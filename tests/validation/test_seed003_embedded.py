@@ -17,8 +17,9 @@ from test_demos import demo
 from two_bodies import relative
 
 import vi_contact as vc
-from vi_contact.algebra import Array
-from vi_contact.errors import InputError
+from vi_contact.core.algebra import Array
+from vi_contact.core.errors import InputError
+from vi_contact.core.step import ContactProblem
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import Traction
 from vi_contact.fem.mesh import build_mesh
@@ -32,7 +33,6 @@ from vi_contact.meshes.rows import cell_sides
 from vi_contact.models.embedded import CONTACT, Embedded, build
 from vi_contact.models.square import concrete
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.step import ContactProblem
 
 pytestmark = pytest.mark.serial  # ranks change none of these numbers: cheaper tests show it
 

@@ -12,8 +12,8 @@ from mpi4py import MPI
 from test_demos import demo
 
 import vi_contact as vc
-from vi_contact.algebra import Array
-from vi_contact.errors import InputError
+from vi_contact.core.algebra import Array
+from vi_contact.core.errors import InputError
 from vi_contact.models.square import Square, SquareModel, build
 from vi_contact.plotting_deformed import read_frames, read_tractions
 

@@ -16,6 +16,8 @@ import pytest
 from fem_problems import Errors, block, field, field_errors, orders, plane_strain, signorini_field, signorini_pressure
 from mpi4py import MPI
 
+from vi_contact.core.step import ContactProblem, State
+from vi_contact.core.surfaces import HalfSpace
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import BodyForce, Prescribed
 from vi_contact.fem.trace import contact_surface
@@ -23,8 +25,6 @@ from vi_contact.march import march
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.static import static_equilibrium
-from vi_contact.step import ContactProblem, State
-from vi_contact.surfaces import HalfSpace
 
 SHEAR, NU, X0 = 0.4, 0.3, 1.0 / 7.0
 one_rank = pytest.mark.serial  # finer meshes: the coarser rows of both tables are computed on any number of ranks

@@ -10,8 +10,8 @@ from energy_checks import rounded
 from mpi4py import MPI
 
 import vi_contact as vc
-from vi_contact.algebra import Array
-from vi_contact.errors import InputError
+from vi_contact.core.algebra import Array
+from vi_contact.core.errors import InputError
 from vi_contact.excitation import Excitation
 from vi_contact.models import sliding_block as sliding
 

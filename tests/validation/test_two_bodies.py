@@ -16,7 +16,8 @@ from fem_problems import linear as without_contact
 from mpi4py import MPI
 from two_bodies import SOFT, blocks, momenta, per_body, relative, thrown, two_blocks
 
-from vi_contact.algebra import Array
+from vi_contact.core.algebra import Array
+from vi_contact.core.step import ContactProblem
 from vi_contact.cross_check import cross_check
 from vi_contact.exact.two_bars import TwoBars
 from vi_contact.fem.assembly import assemble
@@ -36,7 +37,6 @@ from vi_contact.schemes.trapezoidal import Trapezoidal
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.volume import OneFactorisation, ReducedNewton, Volume
 from vi_contact.static import static_equilibrium
-from vi_contact.step import ContactProblem
 
 pytestmark = pytest.mark.slow
 

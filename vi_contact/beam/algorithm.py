@@ -28,10 +28,10 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import checks
-from ..algebra import Array, SerialFactor, SerialMatrix
-from ..checks import array, counted, function, instance, number, provides, shown, whole
-from ..errors import InputError, StepFailure
+from ..core import checks
+from ..core.algebra import Array, SerialFactor, SerialMatrix
+from ..core.checks import array, counted, function, instance, number, provides, shown, whole
+from ..core.errors import InputError, StepFailure
 from .elements import BeamMatrices, Elements, beam_matrices
 from .tip import ExactFriction, Slip, TipFriction
 from .values import Start, TimoshenkoBeam

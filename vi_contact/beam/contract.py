@@ -23,14 +23,14 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from ..algebra import Array, SerialAlgebra, SerialComm, SerialMatrix
-from ..checks import function, instance, number, provides
-from ..errors import InputError
+from ..core.algebra import Array, SerialAlgebra, SerialComm, SerialMatrix
+from ..core.checks import function, instance, number, provides
+from ..core.errors import InputError
+from ..core.step import ContactProblem
+from ..core.surfaces import ContactSurface
+from ..core.system import Load, SemiDiscreteSystem
 from ..friction import FrictionLaw, Frictionless
 from ..mass import ConsistentMass
-from ..step import ContactProblem
-from ..surfaces import ContactSurface
-from ..system import Load, SemiDiscreteSystem
 from .elements import Elements, beam_matrices, rod_matrices
 from .space import BeamSpace
 from .values import Rod, Start, TimoshenkoBeam

@@ -9,11 +9,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ..checks import array, number, whole
-from ..errors import InputError
+from ..core.checks import array, number, whole
+from ..core.errors import InputError
+from ..core.step import Scheme
 from ..march import march
 from ..schemes.midpoint import Midpoint
-from ..step import Scheme
 from .contract import rod_problem
 from .elements import Elements
 from .values import Rod, Start

@@ -21,9 +21,9 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from ..algebra import Array
-from ..checks import counted, flag, number, whole
-from ..errors import InputError
+from ..core.algebra import Array
+from ..core.checks import counted, flag, number, whole
+from ..core.errors import InputError
 from .values import Rod, TimoshenkoBeam
 
 MOST = 5_000_000  # elements

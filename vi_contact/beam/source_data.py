@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ..checks import number
+from ..core.checks import number
 from .elements import Elements
 from .tip import RegularisedFriction
 from .values import Start, TimoshenkoBeam

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..algebra import Array, Indices
-from ..errors import InputError
+from ..core.algebra import Array, Indices
+from ..core.errors import InputError
 
 
 class BeamSpace:

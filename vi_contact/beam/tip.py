@@ -15,8 +15,8 @@ import math
 from dataclasses import dataclass
 from typing import Protocol
 
-from ..checks import attributes, flag, whole
-from ..errors import StepFailure
+from ..core.checks import attributes, flag, whole
+from ..core.errors import StepFailure
 
 
 @dataclass(frozen=True)

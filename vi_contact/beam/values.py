@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..algebra import Array
-from ..checks import array, attributes, function, shape_of
+from ..core.algebra import Array
+from ..core.checks import array, attributes, function, shape_of
 
 Profile = Callable[[Array], Array]
 

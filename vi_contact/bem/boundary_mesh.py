@@ -16,8 +16,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..checks import array, counted, flag, function, integers, mask, number, shape_of, whole
-from ..errors import InputError
+from ..core.checks import array, counted, flag, function, integers, mask, number, shape_of, whole
+from ..core.errors import InputError
 from .loops import check_orientation, check_simple, check_size, ordered_loops
 
 Array = NDArray[np.float64]

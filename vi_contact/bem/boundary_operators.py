@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks import instance, number
+from ..core.checks import instance, number
 from .boundary_mesh import BoundaryMesh
 from .element_pairs import ElementPairs
 from .fundamental_solution import KernelSet

@@ -20,14 +20,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..algebra import Array, Indices, Mask, SerialAlgebra, SerialComm, SerialMatrix
-from ..checks import array, flag, function, instance, integers, provides
-from ..corners import FEATURE_ANGLE
-from ..errors import InputError
+from ..core.algebra import Array, Indices, Mask, SerialAlgebra, SerialComm, SerialMatrix
+from ..core.checks import array, flag, function, instance, integers, provides
+from ..core.corners import FEATURE_ANGLE
+from ..core.errors import InputError
+from ..core.initial_gap import admissible_gap
+from ..core.step import EffectiveMatrix, StepProblem
+from ..core.surfaces import ContactSurface, Obstacle, Touching, nodal_frames
 from ..friction import FrictionLaw, Frictionless
-from ..initial_gap import admissible_gap
-from ..step import EffectiveMatrix, StepProblem
-from ..surfaces import ContactSurface, Obstacle, Touching, nodal_frames
 from .boundary_mesh import BoundaryMesh
 from .energetic import summed
 from .poincare_steklov import CondensedCompliance

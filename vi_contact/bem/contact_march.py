@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from ..certified import TOLERANCE
-from ..checks import instance, number
-from ..errors import StepFailure
+from ..core.checks import instance, number
+from ..core.errors import StepFailure
+from ..core.step import StepProblem, StepResult
+from ..core.verify import kkt_residual
 from ..solvers.condensed import Condensed
-from ..step import StepProblem, StepResult
-from ..verify import kkt_residual
 from .contact import BoundaryContact
 from .contact_run import ContactRun, run_of
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..algebra import Array, Mask
-from ..checks import array, instance, mask
-from ..errors import InputError
-from ..step import Certificate, StepProblem, StepResult
-from ..verify import kkt_residual
+from ..core.algebra import Array, Mask
+from ..core.checks import array, instance, mask
+from ..core.errors import InputError
+from ..core.step import Certificate, StepProblem, StepResult
+from ..core.verify import kkt_residual
 from .contact import BoundaryContact
 from .poincare_steklov import BoundaryMotion
 

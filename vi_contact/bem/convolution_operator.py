@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..checks import array, counted, flag, instance, mask, shape_of
-from ..errors import InputError
+from ..core.checks import array, counted, flag, instance, mask, shape_of
+from ..core.errors import InputError
 from ..materials import LinearElastic
 from .boundary_mesh import BoundaryMesh
 from .convolution_quadrature import ConvolutionQuadrature, Frequencies

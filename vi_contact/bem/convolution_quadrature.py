@@ -19,8 +19,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..checks import attributes, function, instance, number, shape_of, whole
-from ..errors import InputError
+from ..core.checks import attributes, function, instance, number, shape_of, whole
+from ..core.errors import InputError
 from .time_methods import BDF2, Contour, RadauIIA, TimeMethod, Trapezoid
 
 Array = NDArray[np.float64]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks import instance
-from ..errors import InputError
+from ..core.checks import instance
+from ..core.errors import InputError
 from .boundary_mesh import BoundaryMesh
 from .loops import place
 

@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, lu_factor, lu_solve
 
-from ..checks import array, attributes, counted, flag, instance, mask, number, shape_of, whole
-from ..errors import InputError
+from ..core.checks import array, attributes, counted, flag, instance, mask, number, shape_of, whole
+from ..core.errors import InputError
 from ..materials import LinearElastic
 from .boundary_mesh import BoundaryMesh
 from .operators import Operators, check_body

@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import kv
 
-from ..checks import attributes, shown
-from ..errors import InputError
+from ..core.checks import attributes, shown
+from ..core.errors import InputError
 
 Array = NDArray[np.float64]
 TWO_PI = 2.0 * np.pi

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csc_matrix
 
-from ..checks import array, instance, integers, shape_of
-from ..errors import InputError
+from ..core.checks import array, instance, integers, shape_of
+from ..core.errors import InputError
 from .boundary_mesh import BoundaryMesh
 from .boundary_operators import N_SINGLE, double_local, joined, stacked
 from .fundamental_solution import TimeKernels

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..checks import array, counted, function, instance, mask, number, whole
+from ..core.checks import array, counted, function, instance, mask, number, whole
 from .boundary_mesh import BoundaryMesh
 from .quadrature import MOST
 from .rules import gauss

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..checks import instance, number
+from ..core.checks import instance, number
 from ..materials import LinearElastic
 from .boundary_mesh import BoundaryMesh
 from .boundary_operators import Galerkin, OperatorMatrices

@@ -12,8 +12,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..checks import array, flag, instance, integers, mask, number
-from ..errors import InputError
+from ..core.checks import array, flag, instance, integers, mask, number
+from ..core.errors import InputError
 from .boundary_mesh import BoundaryMesh
 from .energetic import EnergeticBlocks, Marching, Motion, summed
 

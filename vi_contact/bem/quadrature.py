@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_matrix
 
-from ..checks import whole
+from ..core.checks import whole
 from .element_pairs import ElementPairs
 from .rules import gauss, graded, linear, pieces, roots, smoothed, stretched
 

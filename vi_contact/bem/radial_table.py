@@ -19,7 +19,7 @@ from numpy.polynomial.chebyshev import chebvander
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix, vstack
 
-from ..checks import counted, number
+from ..core.checks import counted, number
 from .boundary_mesh import BoundaryMesh
 from .boundary_operators import Galerkin
 from .fundamental_solution import TWO_PI, KernelSet

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from .. import checks
-from ..errors import InputError
+from ..core import checks
+from ..core.errors import InputError
 from ..materials import LinearElastic
 from .boundary_mesh import BoundaryMesh
 from .element_pairs import ElementPairs

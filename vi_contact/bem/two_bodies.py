@@ -17,9 +17,9 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from ..algebra import Array, Indices, Mask
-from ..checks import array, mask, provides
-from ..errors import InputError
+from ..core.algebra import Array, Indices, Mask
+from ..core.checks import array, mask, provides
+from ..core.errors import InputError
 from .energetic import summed
 from .poincare_steklov import BoundaryMotion, BoundaryProblem, CondensedCompliance
 

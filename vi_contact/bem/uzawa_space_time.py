@@ -17,11 +17,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 
-from ..algebra import Array
-from ..checks import attributes, instance, whole
-from ..errors import InputError, StepFailure
+from ..core.algebra import Array
+from ..core.checks import attributes, instance, whole
+from ..core.errors import InputError, StepFailure
+from ..core.step import StepResult
 from ..friction import project
-from ..step import StepResult
 from .contact import BoundaryContact
 from .contact_run import ContactRun, run_of
 from .energetic import summed

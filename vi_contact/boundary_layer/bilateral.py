@@ -20,9 +20,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from ..algebra import Array
-from ..checks import array, instance, number, several, shown
-from ..errors import InputError, StepFailure
+from ..core.algebra import Array
+from ..core.checks import array, instance, number, several, shown
+from ..core.errors import InputError, StepFailure
 from .motion import ConstrainedSystem, Evaluations, one_sentence
 
 

@@ -28,10 +28,10 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
 
-from ..algebra import Array
-from ..checks import instance, number, shown
-from ..errors import InputError
-from ..surfaces import ContactSurface
+from ..core.algebra import Array
+from ..core.checks import instance, number, shown
+from ..core.errors import InputError
+from ..core.surfaces import ContactSurface
 from .layer import Layer, sized
 from .metric import Metric
 from .motion import ConstrainedSystem

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from scipy.special import expit
 
-from ..algebra import Array
-from ..checks import number
-from ..errors import InputError
+from ..core.algebra import Array
+from ..core.checks import number
+from ..core.errors import InputError
 
 LARGEST, LARGEST_FORCE = 1e60, 1e150  # of lengths, speeds and masses; of k and c: products of their squares are finite
 

@@ -18,7 +18,7 @@ from enum import Enum
 
 import numpy as np
 
-from ..algebra import Array
+from ..core.algebra import Array
 from .layer import Layer
 
 

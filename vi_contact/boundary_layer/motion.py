@@ -19,9 +19,9 @@ from typing import Any
 
 import numpy as np
 
-from ..algebra import Array
-from ..checks import array, function, number
-from ..errors import InputError, StepFailure
+from ..core.algebra import Array
+from ..core.checks import array, function, number
+from ..core.errors import InputError, StepFailure
 from .layer import sized
 
 EVALUATIONS = 100_000  # of the acceleration in one motion

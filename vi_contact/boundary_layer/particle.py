@@ -24,9 +24,9 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.special import exprel, lambertw
 
-from ..algebra import Array
-from ..checks import instance, number
-from ..errors import InputError
+from ..core.algebra import Array
+from ..core.checks import instance, number
+from ..core.errors import InputError
 from .layer import Layer, sized
 
 LEAST = 1e-9  # least restitution that is asked for

@@ -19,9 +19,9 @@ from typing import Any
 
 import numpy as np
 
-from ..algebra import Array
-from ..checks import array, number, shape_of
-from ..errors import InputError
+from ..core.algebra import Array
+from ..core.checks import array, number, shape_of
+from ..core.errors import InputError
 from .layer import sized
 from .metric import normal_mass
 from .motion import ConstrainedSystem

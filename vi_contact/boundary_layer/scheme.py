@@ -19,13 +19,13 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from ..algebra import Array
-from ..checks import instance
-from ..errors import InputError, StepFailure
+from ..core.algebra import Array
+from ..core.checks import instance
+from ..core.errors import InputError, StepFailure
+from ..core.step import ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
 from ..impact import NoImpact
 from ..schemes.midpoint import Midpoint
 from ..solvers.condensed import Condensed
-from ..step import ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
 from .contact_law import ContactLayer
 
 ITERATIONS, HALVINGS = 60, 30

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from ..algebra import Array
-from ..checks import array, instance, number, shown, whole
-from ..errors import InputError, StepFailure
+from ..core.algebra import Array
+from ..core.checks import array, instance, number, shown, whole
+from ..core.errors import InputError, StepFailure
 from .layer import Layer
 from .metric import Metric
 from .motion import ConstrainedSystem, Evaluations, one_sentence

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..algebra import Array
-from ..checks import attributes
+from ..core.algebra import Array
+from ..core.checks import attributes
 
 # of PeriodicBar: u = c0 + c1 x + c2 s in [phase][zone]
 _PERIOD_THREE = 0.5 * np.array([

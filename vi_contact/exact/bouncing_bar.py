@@ -22,9 +22,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..algebra import Array
-from ..checks import attributes
-from ..errors import InputError
+from ..core.algebra import Array
+from ..core.checks import attributes
+from ..core.errors import InputError
 
 SAME = 1e-12  # events and piece ends closer than this, relative to the problem's own scales, are the same
 

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..algebra import Array
-from ..checks import attributes
+from ..core.algebra import Array
+from ..core.checks import attributes
 from ..materials import LinearElastic
 from .waves import History, reflected
 

@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.integrate import quad
 
-from ..algebra import Array
-from ..checks import attributes
-from ..errors import InputError
+from ..core.algebra import Array
+from ..core.checks import attributes
+from ..core.errors import InputError
 
 REST = 1e-30  # phi below which the rest of the motion lasts less than round-off of what has passed
 

@@ -22,9 +22,9 @@ from functools import cached_property
 
 import numpy as np
 
-from ..algebra import Array
-from ..checks import attributes
-from ..errors import InputError
+from ..core.algebra import Array
+from ..core.checks import attributes
+from ..core.errors import InputError
 from ..materials import LinearElastic
 
 

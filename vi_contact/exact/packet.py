@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..algebra import Array
+from ..core.algebra import Array
 from ..materials import LinearElastic
 from .surface_waves import dashpot_energy
 

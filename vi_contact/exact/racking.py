@@ -12,8 +12,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..checks import attributes
-from ..errors import InputError
+from ..core.checks import attributes
+from ..core.errors import InputError
 
 
 @dataclass(frozen=True)

@@ -20,9 +20,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import zeta
 
-from ..algebra import Array
-from ..checks import attributes
-from ..errors import InputError
+from ..core.algebra import Array
+from ..core.checks import attributes
+from ..core.errors import InputError
 
 CATALAN = 0.915965594177219
 TERMS = 4000  # of the series of p: its tail is below 3e-5 of p

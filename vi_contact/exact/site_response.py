@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..algebra import Array
-from ..checks import attributes
+from ..core.algebra import Array
+from ..core.checks import attributes
 from ..materials import LinearElastic
 
 

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..algebra import Array
-from ..checks import attributes
-from ..errors import InputError
+from ..core.algebra import Array
+from ..core.checks import attributes
+from ..core.errors import InputError
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ import math
 import numpy as np
 from scipy.optimize import brentq
 
-from ..algebra import Array
-from ..errors import InputError
+from ..core.algebra import Array
+from ..core.errors import InputError
 from ..materials import LinearElastic
 
 

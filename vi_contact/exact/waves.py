@@ -15,7 +15,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..algebra import Array
+from ..core.algebra import Array
 
 History = Callable[[Array], Array]
 

@@ -16,10 +16,10 @@ from weakref import WeakSet
 import numpy as np
 import ufl
 
-from ..algebra import Array, Mask
-from ..errors import InputError
+from ..core.algebra import Array, Mask
+from ..core.errors import InputError
+from ..core.system import Load, SemiDiscreteSystem
 from ..materials import Damping, LinearElastic, Section
-from ..system import Load, SemiDiscreteSystem
 from . import compat
 from .assembly_checks import check_body, check_boundaries, check_initial
 from .dashpots import CompliantBase, DashpotMatrix, Dashpots, incoming, tell

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from dolfinx.mesh import Mesh
 
-from ..checks import flag, instance, provides, refuse, several
-from ..errors import InputError
+from ..core.checks import flag, instance, provides, refuse, several
+from ..core.errors import InputError
 from ..materials import Damping, LinearElastic, NoDamping, PlaneStrain, PlaneStress, Section, Solid
 from .dashpots import Dashpots
 from .groups import cells_of, facets_of, field_given

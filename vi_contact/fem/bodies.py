@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from ..algebra import Indices
+from ..core.algebra import Indices
 from . import compat
 
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..algebra import Array, Mask
-from ..errors import InputError
+from ..core.algebra import Array, Mask
+from ..core.errors import InputError
 from . import compat
 from .groups import cells_of
 from .mesh import Cells

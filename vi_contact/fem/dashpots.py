@@ -24,11 +24,11 @@ from typing import Any
 import numpy as np
 import ufl
 
-from ..algebra import Array
-from ..checks import function, instance, real, shown
-from ..errors import InputError
+from ..core.algebra import Array
+from ..core.checks import function, instance, real, shown
+from ..core.errors import InputError
+from ..core.system import Pace
 from ..materials import LinearElastic
-from ..system import Pace
 from . import compat
 from .groups import facets_of
 from .mesh import Facets

@@ -16,9 +16,9 @@ import scipy.sparse as sp
 import ufl
 from scipy.sparse.csgraph import connected_components
 
-from ..algebra import Array, Indices, Mask
-from ..checks import number
-from ..errors import InputError
+from ..core.algebra import Array, Indices, Mask
+from ..core.checks import number
+from ..core.errors import InputError
 from ..meshes.rows import number_alike
 from . import compat
 from .frames import Nodes, at

@@ -24,11 +24,11 @@ from xml.sax.saxutils import quoteattr
 import h5py
 import numpy as np
 
-from ..algebra import Array, Indices, Mask
-from ..checks import real, shown
-from ..errors import InputError
+from ..core.algebra import Array, Indices, Mask
+from ..core.checks import real, shown
+from ..core.errors import InputError
+from ..core.step import ContactProblem, Report, State
 from ..output import FIELDS, FIELDS_INDEX, hdf5_atomically, on_root, write_atomically
-from ..step import ContactProblem, Report, State
 from . import compat
 from .mesh import node_numbers
 from .space import FemSpace, known_matrices, space_of

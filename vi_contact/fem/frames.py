@@ -17,10 +17,10 @@ import numpy as np
 import scipy.sparse as sp
 from petsc4py import PETSc
 
-from ..algebra import Array, Indices, Mask
-from ..corners import PARALLEL, at_right_angles
-from ..errors import InputError
-from ..surfaces import ContactSurface, nodal_frames
+from ..core.algebra import Array, Indices, Mask
+from ..core.corners import PARALLEL, at_right_angles
+from ..core.errors import InputError
+from ..core.surfaces import ContactSurface, nodal_frames
 from .petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc
 from .space import FemSpace
 

@@ -19,19 +19,19 @@ from typing import Any
 
 import numpy as np
 
-from ..algebra import Array
 from ..alongside import Alongside, given_steps
 from ..base_motion import BaseMotion
-from ..checks import provides
-from ..errors import InputError
+from ..core.algebra import Array
+from ..core.checks import provides
+from ..core.errors import InputError
+from ..core.problem_checks import EXCITATION
+from ..core.step import Scheme
+from ..core.system import Pace
 from ..excitation import Excitation
 from ..materials import Section
-from ..problem_checks import EXCITATION
 from ..run_checks import check_scheme
 from ..schemes.trapezoidal import Trapezoidal
 from ..soil_column import SoilColumn
-from ..step import Scheme
-from ..system import Pace
 from ..time_steps import Schedule
 from . import compat
 from .dashpots import CompliantBase, DashpotMatrix, Dashpots

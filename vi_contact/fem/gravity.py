@@ -19,10 +19,10 @@ from typing import Any
 
 import ufl
 
-from ..algebra import Array
+from ..core.algebra import Array
+from ..core.step import ContactProblem, State
+from ..core.system import Load, SemiDiscreteSystem
 from ..run_checks import check_problem_given, check_sizes
-from ..step import ContactProblem, State
-from ..system import Load, SemiDiscreteSystem
 from . import compat
 from .petsc_algebra import PetscMatrix
 from .space import FemSpace, known_matrices, space_of

@@ -9,8 +9,8 @@ from typing import Any
 
 from dolfinx.mesh import Mesh
 
-from ..checks import array, function, several, shown, whole
-from ..errors import InputError
+from ..core.checks import array, function, several, shown, whole
+from ..core.errors import InputError
 from .mesh import Cells, Facets
 
 Group = Facets | Cells

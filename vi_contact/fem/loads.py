@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from ..algebra import Array, Comm
-from ..checks import function, refuse, shown
-from ..system import Pace
+from ..core.algebra import Array, Comm
+from ..core.checks import function, refuse, shown
+from ..core.system import Pace
 from .groups import components_given, facets_of, field_given
 from .mesh import Facets
 

@@ -17,8 +17,8 @@ import numpy.typing as npt
 from dolfinx.mesh import Mesh
 from mpi4py import MPI
 
-from vi_contact.checks import instance, provides, refuse, shown
-from vi_contact.errors import InputError
+from vi_contact.core.checks import instance, provides, refuse, shown
+from vi_contact.core.errors import InputError
 from vi_contact.fem import compat
 from vi_contact.fem.compat import Indices
 from vi_contact.fem.petsc_algebra import MpiComm

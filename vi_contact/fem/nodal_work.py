@@ -16,10 +16,10 @@ import numpy as np
 import scipy.sparse as sp
 import ufl
 
-from ..algebra import Array, Mask
-from ..checks import array, instance
-from ..errors import InputError
-from ..step import ContactProblem, Report, State
+from ..core.algebra import Array, Mask
+from ..core.checks import array, instance
+from ..core.errors import InputError
+from ..core.step import ContactProblem, Report, State
 from . import compat
 from .groups import facets_of
 from .loads import BodyForce, TangentialTraction, Traction, as_tuple, evaluate, is_constant

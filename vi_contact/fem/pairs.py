@@ -19,12 +19,12 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 
-from ..algebra import Array, Mask
-from ..checks import provides
-from ..corners import FEATURE_ANGLE
-from ..errors import InputError
-from ..surfaces import ContactSurface
-from ..system import SemiDiscreteSystem
+from ..core.algebra import Array, Mask
+from ..core.checks import provides
+from ..core.corners import FEATURE_ANGLE
+from ..core.errors import InputError
+from ..core.surfaces import ContactSurface
+from ..core.system import SemiDiscreteSystem
 from . import compat
 from .faces import Boundary, boundary, checked_angle, split, tell_corners
 from .frames import Conditions, Facing, Frames, Nodes, at, joined_nodes, surface_of

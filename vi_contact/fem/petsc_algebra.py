@@ -10,8 +10,8 @@ import scipy.sparse as sp
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from ..algebra import Array, Factor, Indices, Mask, Matrix, identity_with
-from ..errors import InputError
+from ..core.algebra import Array, Factor, Indices, Mask, Matrix, identity_with
+from ..core.errors import InputError
 
 PREFIX = "vi_contact_factor_"
 OWN_FACTOR = {

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..checks import array, column_name
-from ..errors import InputError
+from ..core.checks import array, column_name
+from ..core.errors import InputError
+from ..core.step import ContactProblem, Report, State
 from ..recorders import Columns, Row
-from ..step import ContactProblem, Report, State
 from .groups import facets_of
 from .mesh import Facets
 from .nodal_work import Loads, NodalWork, check_actions, rigid_fields

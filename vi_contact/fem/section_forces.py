@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..checks import array, column_name, instance, several
-from ..errors import InputError
+from ..core.checks import array, column_name, instance, several
+from ..core.errors import InputError
+from ..core.step import ContactProblem, Report, State
 from ..recorders import Columns, Row
-from ..step import ContactProblem, Report, State
 from .cuts import find_cut
 from .groups import cells_of
 from .mesh import Cells

@@ -11,10 +11,10 @@ import numpy as np
 import scipy.sparse as sp
 from petsc4py import PETSc
 
-from ..algebra import Array, Indices, Mask
-from ..checks import instance, refuse
-from ..errors import InputError
-from ..system import SemiDiscreteSystem
+from ..core.algebra import Array, Indices, Mask
+from ..core.checks import instance, refuse
+from ..core.errors import InputError
+from ..core.system import SemiDiscreteSystem
 from . import compat
 from .bodies import body_numbers
 from .loads import Prescribed, evaluate_here

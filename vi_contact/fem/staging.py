@@ -16,11 +16,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..algebra import Array, max_abs
-from ..errors import InputError
+from ..core.algebra import Array, max_abs
+from ..core.errors import InputError
+from ..core.step import ContactProblem, State
 from ..run_checks import check_problem_given, check_sizes
 from ..static import initial_state
-from ..step import ContactProblem, State
 from .space import FemSpace
 
 log = logging.getLogger(__name__)

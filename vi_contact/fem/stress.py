@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import ufl
 
-from ..algebra import Array
+from ..core.algebra import Array
 from . import compat
 
 

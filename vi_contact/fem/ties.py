@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..algebra import Array, Indices
-from ..errors import InputError
+from ..core.algebra import Array, Indices
+from ..core.errors import InputError
 from .groups import components_given, facets_of
 from .mesh import Facets
 

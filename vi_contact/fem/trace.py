@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from ..algebra import Array
-from ..checks import array, provides, several
-from ..corners import FEATURE_ANGLE, PARALLEL
-from ..errors import InputError
-from ..initial_gap import admissible_gap, facing
-from ..surfaces import ContactSurface, Obstacle, Touching
-from ..system import SemiDiscreteSystem
+from ..core.algebra import Array
+from ..core.checks import array, provides, several
+from ..core.corners import FEATURE_ANGLE, PARALLEL
+from ..core.errors import InputError
+from ..core.initial_gap import admissible_gap, facing
+from ..core.surfaces import ContactSurface, Obstacle, Touching
+from ..core.system import SemiDiscreteSystem
 from .faces import boundary, checked_angle, in_symmetry_planes, integrals, split, tell_corners
 from .frames import Conditions, Nodes, at, surface_of
 from .groups import facets_of

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..errors import InputError
+from ..core.errors import InputError
 from .record import UNITS, Record, file_dt, file_units
 from .text import TextFile, filled, to_float
 

@@ -12,7 +12,7 @@ import re
 
 import numpy as np
 
-from ..errors import InputError
+from ..core.errors import InputError
 from .record import UNITS, Record, file_dt, file_units
 from .text import NUMBER, TextFile, filled, number, whole
 

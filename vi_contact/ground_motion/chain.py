@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..errors import InputError
+from ..core.errors import InputError
 from .baseline import baseline_corrected
 from .filters import filtered, tapered, without_mean
 from .processing import resampled, scaled, scaled_to_pga

@@ -13,9 +13,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..algebra import Array
-from ..checks import counted, number
-from ..errors import InputError
+from ..core.algebra import Array
+from ..core.checks import counted, number
+from ..core.errors import InputError
 from .at2 import begin_data
 from .record import UNITS, Record, file_dt, file_units
 from .text import TextFile, filled

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..algebra import Array
-from ..errors import InputError
+from ..core.algebra import Array
+from ..core.errors import InputError
 from .record import UNITS, Record, file_dt, file_units
 from .text import NUMBER, TextFile, number, whole
 

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from ..algebra import Array
-from ..errors import InputError
+from ..core.algebra import Array
+from ..core.errors import InputError
 from .processing import integrated
 from .record import STANDARD_GRAVITY, Record
 

@@ -11,9 +11,9 @@ from fractions import Fraction
 
 import numpy as np
 
-from ..algebra import Array
-from ..checks import counted, number
-from ..errors import InputError
+from ..core.algebra import Array
+from ..core.checks import counted, number
+from ..core.errors import InputError
 from .record import Record
 
 LARGEST_RATIO = 1000

@@ -7,8 +7,8 @@ import os
 
 import numpy as np
 
-from ..checks import number
-from ..errors import InputError
+from ..core.checks import number
+from ..core.errors import InputError
 from . import afad, at2, columns, cosmos, esm, knet, simcenter, smc
 from .processing import resampled
 from .record import STANDARD_GRAVITY, Record

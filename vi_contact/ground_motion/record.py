@@ -8,9 +8,9 @@ from numbers import Real
 
 import numpy as np
 
-from ..algebra import Array
-from ..checks import shown
-from ..errors import InputError
+from ..core.algebra import Array
+from ..core.checks import shown
+from ..core.errors import InputError
 
 STANDARD_GRAVITY = 9.80665
 """Standard gravity [m/s²], the g of every record file."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ..errors import InputError
+from ..core.errors import InputError
 from .intensity import arias
 from .processing import scaled
 from .record import Record

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import shown
-from ..errors import InputError
+from ..core.checks import shown
+from ..core.errors import InputError
 from .record import UNITS, Record, file_dt, file_units
 from .text import HEAD, TextFile
 

@@ -11,8 +11,8 @@ import re
 
 import numpy as np
 
-from ..algebra import Array
-from ..errors import InputError
+from ..core.algebra import Array
+from ..core.errors import InputError
 from .record import UNITS, Record, file_dt, file_units
 from .text import TextFile
 

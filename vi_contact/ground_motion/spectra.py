@@ -15,9 +15,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..algebra import Array
-from ..checks import counted
-from ..errors import InputError
+from ..core.algebra import Array
+from ..core.checks import counted
+from ..core.errors import InputError
 from .record import Record
 
 PER_PERIOD, PER_STEP = 64, 4

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..checks import counted
-from ..errors import InputError
+from ..core.checks import counted
+from ..core.errors import InputError
 from .record import Record
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 
-from ..errors import InputError
+from ..core.errors import InputError
 from .record import UNITS, Record, canonical_units
 
 DIGITS = 9

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 from vi_contact.meshes.rows import Rows, cell_sides, found_in, number_alike
 
 Array = npt.NDArray[np.float64]

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 from vi_contact.meshes.checks import Array, check_cells, check_folds, check_sides
 from vi_contact.meshes.gmsh_session import MeshScript, session
 from vi_contact.meshes.mesh_file import copied

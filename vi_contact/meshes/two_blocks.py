@@ -19,7 +19,7 @@ import numpy as np
 if not __package__:  # run as a file of the source tree, maybe not installed
     sys.path[0] = str(Path(__file__).resolve().parents[2])
 
-from vi_contact.errors import InputError
+from vi_contact.core.errors import InputError
 from vi_contact.meshes.block import SIDES, BlockMesh
 from vi_contact.meshes.gmsh_session import write
 from vi_contact.meshes.grid import add_grid

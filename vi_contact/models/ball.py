@@ -14,8 +14,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import betaincinv
 
-from ..algebra import Array
-from ..errors import InputError
+from ..core.algebra import Array
+from ..core.errors import InputError
+from ..core.step import ContactProblem
+from ..core.surfaces import HalfSpace
+from ..core.system import SemiDiscreteSystem
 from ..exact.hertz import HertzImpact, contact_modulus
 from ..fem.assembly import assemble
 from ..fem.loads import Prescribed
@@ -24,9 +27,6 @@ from ..fem.trace import contact_surface
 from ..mass import MassLaw
 from ..materials import LinearElastic
 from ..meshes.ball import BallMesh
-from ..step import ContactProblem
-from ..surfaces import HalfSpace
-from ..system import SemiDiscreteSystem
 
 SHARE = 4.0
 FOOT = 1.3  # contact side over the largest contact radius

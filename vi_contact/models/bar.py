@@ -11,7 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from ..algebra import Array
+from ..core.algebra import Array
+from ..core.step import ContactProblem
+from ..core.surfaces import HalfSpace
+from ..core.system import SemiDiscreteSystem
 from ..exact.bar import PeriodicBar, ThrownBar
 from ..exact.bouncing_bar import BouncingBar
 from ..fem.assembly import assemble
@@ -22,9 +25,6 @@ from ..impact import ImpactLaw
 from ..mass import MassLaw
 from ..materials import LinearElastic, PlaneStrain, Solid
 from ..meshes.block import BlockMesh
-from ..step import ContactProblem
-from ..surfaces import HalfSpace
-from ..system import SemiDiscreteSystem
 
 SIDES = {1: ("left", "right"), 2: ("bottom", "top"), 3: ("bottom", "top")}  # foot and top of a BlockMesh
 UP = {1: 0, 2: 1, 3: 1}  # component of the bar's axis

@@ -10,18 +10,18 @@ from typing import Any
 
 import numpy as np
 
-from ..algebra import Array, Mask
 from ..bem.boundary_mesh import BoundaryMesh, circle, polygon
 from ..bem.contact import BoundaryContact, conditions_on
 from ..bem.energetic import energetic_blocks
 from ..bem.loads import traction_forces
 from ..bem.poincare_steklov import BoundaryProblem, PoincareSteklov
 from ..bem.two_bodies import TwoBodies
-from ..checks import function, instance, number, whole
-from ..errors import InputError
+from ..core.algebra import Array, Mask
+from ..core.checks import function, instance, number, whole
+from ..core.errors import InputError
+from ..core.surfaces import HalfSpace
 from ..friction import FrictionLaw, Frictionless
 from ..materials import LinearElastic
-from ..surfaces import HalfSpace
 
 Load = Callable[[float], float]
 BOTTOM, RIGHT, TOP, LEFT = range(4)  # sides of a box

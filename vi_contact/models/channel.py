@@ -13,9 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from ..algebra import Array, Mask
 from ..base_motion import BaseMotion
-from ..errors import InputError
+from ..core.algebra import Array, Mask
+from ..core.errors import InputError
+from ..core.step import ContactProblem, ImpactLaw, Recorder
+from ..core.surfaces import ContactSurface
+from ..core.system import SemiDiscreteSystem
 from ..excitation import Excitation, Harmonic
 from ..fem.assembly import assemble
 from ..fem.joined import together
@@ -28,9 +31,6 @@ from ..mass import ConsistentMass, MassLaw
 from ..materials import Damping, LinearElastic, NoDamping, PlaneStrain
 from ..meshes.channel import ChannelMesh
 from ..recorders import Contact, Energy, Probe
-from ..step import ContactProblem, ImpactLaw, Recorder
-from ..surfaces import ContactSurface
-from ..system import SemiDiscreteSystem
 from ..weight import own_weight
 from .channel_points import Openings, SoilProbe
 from .channel_sides import RockBelow, Rollers, Sides

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from ..algebra import Indices, Mask
-from ..errors import InputError
+from ..core.algebra import Indices, Mask
+from ..core.errors import InputError
+from ..core.step import ContactProblem, Report, State
+from ..core.surfaces import ContactSurface
 from ..fem.frames import FemSurface
 from ..recorders import Columns, Probe, Row
-from ..step import ContactProblem, Report, State
-from ..surfaces import ContactSurface
 
 
 @dataclass

@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from ..algebra import Array
 from ..base_motion import BaseMotion, base_motion
-from ..errors import InputError
+from ..core.algebra import Array
+from ..core.errors import InputError
+from ..core.step import Scheme
 from ..excitation import Excitation
 from ..fem.fields import XDMF
 from ..friction import Coulomb
@@ -21,7 +22,6 @@ from ..plotting import plot_certificate, plot_contact, plot_energy, plot_excitat
 from ..simulate import Solution, simulate
 from ..solvers.volume import Volume
 from ..solvers.volume_snes import ReducedNewton
-from ..step import Scheme
 from ..upgoing import upgoing
 from .channel import Channel, ChannelModel
 from .channel_sides import DashpotSides, Fixed, FreeFieldSides, RockBelow, Rollers, Sides, TiedSides

@@ -6,15 +6,15 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Protocol
 
-from ..algebra import Array
 from ..base_motion import BaseMotion
+from ..core.algebra import Array
+from ..core.step import Scheme
 from ..excitation import Excitation
 from ..fem.dashpots import CompliantBase, Dashpots
 from ..fem.free_field import FreeField
 from ..fem.loads import Prescribed
 from ..fem.ties import Tied
 from ..materials import LinearElastic
-from ..step import Scheme
 from ..time_steps import Schedule
 
 ENDS = ("left_side", "right_side")

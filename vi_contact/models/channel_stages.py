@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..base_motion import BaseMotion
+from ..core.step import ContactProblem, Solver, State
 from ..fem.staging import release
 from ..solvers.condensed import Condensed
 from ..static import static_equilibrium
-from ..step import ContactProblem, Solver, State
 from .channel import Channel, ChannelModel, build
 from .channel_sides import RockBelow, Rollers, Sides
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..core.step import Scheme, Solver
 from ..impact import ImpactLaw, Inelastic, NoImpact
 from ..mass import ConsistentMass, MassLaw
 from ..schemes.contact_stabilised import ContactStabilisedNewmark
@@ -23,7 +24,6 @@ from ..solvers.volume import Volume
 from ..solvers.volume_factorised import OneFactorisation
 from ..solvers.volume_snes import ReducedNewton, SemismoothNewton
 from ..solvers.volume_tao import TaoTron
-from ..step import Scheme, Solver
 
 
 @dataclass(frozen=True)

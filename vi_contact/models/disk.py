@@ -11,7 +11,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..checks import attributes, function, instance
+from ..core.checks import attributes, function, instance
+from ..core.step import ContactProblem, Report, State
+from ..core.surfaces import HalfSpace
+from ..core.system import SemiDiscreteSystem
 from ..fem.assembly import assemble
 from ..fem.mesh import build_mesh
 from ..fem.trace import contact_surface
@@ -19,9 +22,6 @@ from ..friction import FrictionLaw, Frictionless
 from ..mass import MassLaw
 from ..materials import LinearElastic, PlaneStrain
 from ..meshes.disk import DiskMesh
-from ..step import ContactProblem, Report, State
-from ..surfaces import HalfSpace
-from ..system import SemiDiscreteSystem
 
 
 @dataclass(frozen=True)

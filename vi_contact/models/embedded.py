@@ -11,8 +11,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..checks import instance
-from ..errors import InputError
+from ..core.checks import instance
+from ..core.errors import InputError
+from ..core.step import ContactProblem
+from ..core.surfaces import ContactSurface
+from ..core.system import SemiDiscreteSystem
 from ..fem.assembly import assemble
 from ..fem.joined import together
 from ..fem.loads import Traction
@@ -24,9 +27,6 @@ from ..materials import LinearElastic, PlaneStrain
 from ..meshes.block import BlockMesh
 from ..meshes.cut import Welded
 from ..meshes.two_blocks import Blocks
-from ..step import ContactProblem
-from ..surfaces import ContactSurface
-from ..system import SemiDiscreteSystem
 from .square import Square, concrete
 
 CONTACT = (("foot_bottom", "under_top"), ("foot_left", "left_wall_right"), ("foot_right", "right_wall_left"))

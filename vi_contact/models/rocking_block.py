@@ -20,8 +20,10 @@ from typing import Any
 
 import numpy as np
 
-from ..algebra import Array
-from ..errors import InputError
+from ..core.algebra import Array
+from ..core.errors import InputError
+from ..core.step import ContactProblem, Report, State
+from ..core.surfaces import HalfSpace
 from ..exact.housner import HousnerBlock
 from ..excitation import Excitation
 from ..fem.assembly import assemble
@@ -33,8 +35,6 @@ from ..materials import Damping, LinearElastic, PlaneStress, Rayleigh
 from ..meshes.block import BlockMesh
 from ..solvers.condensed import Condensed
 from ..static import static_equilibrium
-from ..step import ContactProblem, Report, State
-from ..surfaces import HalfSpace
 from ..time_steps import HalvedAtImpact
 
 RIGID = 200.0  # least sqrt(E/rho)/height over p (V3.1)

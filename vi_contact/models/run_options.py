@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from ..core.errors import InputError
+from ..core.step import ImpactLaw, Solver
 from ..cross_check import CrossChecked
-from ..errors import InputError
 from ..excitation import Excitation, GroundMotion
 from ..ground_motion import Record, pga, read_record, resampled, scaled, scaled_to_pga
-from ..step import ImpactLaw, Solver
 from .choices import SCHEMES, SOLVERS
 
 

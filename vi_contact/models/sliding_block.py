@@ -9,7 +9,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..errors import InputError
+from ..core.errors import InputError
+from ..core.step import ContactProblem, State
+from ..core.surfaces import HalfSpace
 from ..exact.sliding import SlidingBlock
 from ..excitation import Excitation
 from ..fem.assembly import assemble
@@ -21,8 +23,6 @@ from ..materials import Damping, LinearElastic, PlaneStress, Rayleigh
 from ..meshes.block import BlockMesh
 from ..solvers.condensed import Condensed
 from ..static import static_equilibrium
-from ..step import ContactProblem, State
-from ..surfaces import HalfSpace
 
 
 @dataclass(frozen=True)

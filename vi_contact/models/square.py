@@ -11,7 +11,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..checks import attributes, function, instance
+from ..core.checks import attributes, function, instance
+from ..core.step import ContactProblem
+from ..core.system import SemiDiscreteSystem
 from ..fem.assembly import assemble
 from ..fem.loads import Prescribed, Traction
 from ..fem.mesh import build_mesh
@@ -20,8 +22,6 @@ from ..friction import FrictionLaw, Frictionless
 from ..mass import MassLaw
 from ..materials import LinearElastic, PlaneStrain
 from ..meshes.block import BlockMesh
-from ..step import ContactProblem
-from ..system import SemiDiscreteSystem
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from ..errors import InputError
+from ..core.errors import InputError
+from ..core.step import ContactProblem, ImpactLaw
+from ..core.surfaces import ContactSurface, HalfSpace, empty_surface
+from ..core.system import SemiDiscreteSystem
 from ..excitation import Excitation, Harmonic
 from ..fem.assembly import assemble
 from ..fem.loads import BodyForce
@@ -22,9 +25,6 @@ from ..mass import ConsistentMass, MassLaw
 from ..materials import Damping, LinearElastic, NoDamping, PlaneStress
 from ..meshes.wall import WallMesh
 from ..modal import lowest_frequency
-from ..step import ContactProblem, ImpactLaw
-from ..surfaces import ContactSurface, HalfSpace, empty_surface
-from ..system import SemiDiscreteSystem
 from .run_options import check_word
 
 CASES = {

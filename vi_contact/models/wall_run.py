@@ -7,14 +7,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..algebra import Array
+from ..core.algebra import Array
+from ..core.step import ContactProblem, State
+from ..core.surfaces import ContactSurface
 from ..fem.fields import XDMF
 from ..plotting import plot_certificate, plot_contact, plot_energy, plot_excitation, plot_points
 from ..recorders import Contact, Energy, Probe
 from ..simulate import Solution, simulate
 from ..static import static_equilibrium
-from ..step import ContactProblem, State
-from ..surfaces import ContactSurface
 from .choices import SCHEMES, SOLVERS
 from .run_options import RunOptions, check_options, check_word, excitations, number_of_steps, records, solvers
 from .wall import BASE_INERTIA, CASES, Wall, build

@@ -15,10 +15,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..algebra import Array, Mask, Matrix
+from ..core.algebra import Array, Mask, Matrix
+from ..core.step import ContactProblem, EffectiveMatrix, PreparedSolver, State, StepProblem
+from ..core.surfaces import ContactSurface
 from ..solvers.condensed import Condensed
-from ..step import ContactProblem, EffectiveMatrix, PreparedSolver, State, StepProblem
-from ..surfaces import ContactSurface
 
 ROUND_OFF = 1e-12  # of the largest displacement or velocity: smaller gaps and velocities are zero
 

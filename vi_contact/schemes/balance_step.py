@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from ..core.step import ContactProblem
 from ..mass import MassLaw, Redistributed
-from ..step import ContactProblem
 from .guard import contact_in_the_balance, needs_no_impact_law
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from ..core.step import ContactProblem, Scheme
 from ..impact import NoImpact
 from ..mass import ConsistentMass
 from ..run_checks import check_problem_given, check_scheme
-from ..step import ContactProblem, Scheme
 from .trapezoidal import Trapezoidal
 from .zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 

@@ -13,11 +13,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..algebra import Mask
 from ..certified import TOLERANCE, CertifiedSolver
+from ..core.algebra import Mask
+from ..core.step import ContactProblem, EffectiveMatrix, State, StepProblem
+from ..core.surfaces import ContactSurface
 from ..solvers.condensed import Condensed
-from ..step import ContactProblem, EffectiveMatrix, State, StepProblem
-from ..surfaces import ContactSurface
 
 
 def relaxed(problem: ContactProblem, state: State) -> State:

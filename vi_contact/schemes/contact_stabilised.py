@@ -26,9 +26,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..algebra import Array, Mask
-from ..checks import flag
-from ..step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
+from ..core.algebra import Array, Mask
+from ..core.checks import flag
+from ..core.step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
 from .mass_projection import admissible
 from .position_step import position_step
 from .single_step import SingleStep, stepped

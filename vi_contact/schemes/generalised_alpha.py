@@ -32,10 +32,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..algebra import Array
-from ..checks import real, shown
-from ..errors import InputError
-from ..step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
+from ..core.algebra import Array
+from ..core.checks import real, shown
+from ..core.errors import InputError
+from ..core.step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
 from .acceleration import consistent_acceleration, without_inertia
 from .balance_step import BalanceStep
 from .contact_layer import at_rest_between, relaxed

@@ -6,9 +6,9 @@ import logging
 
 import numpy as np
 
-from ..errors import InputError
+from ..core.errors import InputError
+from ..core.step import ContactProblem
 from ..impact import NoImpact
-from ..step import ContactProblem
 
 log = logging.getLogger(__name__)
 

@@ -16,8 +16,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..checks import real, shown
-from ..errors import InputError
+from ..core.checks import real, shown
+from ..core.errors import InputError
 from .generalised_alpha import AlphaStep, Weights
 
 

@@ -24,10 +24,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..algebra import Array
-from ..checks import array, number
-from ..errors import InputError
-from ..step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
+from ..core.algebra import Array
+from ..core.checks import array, number
+from ..core.errors import InputError
+from ..core.step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
 from .acceleration import consistent_acceleration, without_inertia
 from .balance_step import BalanceStep
 from .contact_layer import at_rest_between, relaxed

@@ -14,12 +14,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..algebra import Array, Mask
 from ..certified import TOLERANCE, CertifiedSolver
-from ..errors import StepFailure
+from ..core.algebra import Array, Mask
+from ..core.errors import StepFailure
+from ..core.step import ContactProblem, State, StepProblem
 from ..friction import Frictionless
 from ..solvers.condensed import Condensed
-from ..step import ContactProblem, State, StepProblem
 from .acceleration import mass_matrix, rigid_part
 
 

@@ -25,7 +25,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..step import Balance, ContactProblem, State
+from ..core.step import Balance, ContactProblem, State
 from .generalised_alpha import AlphaStep, Weights, weighted
 
 

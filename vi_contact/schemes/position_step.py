@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ..algebra import Array, Mask
-from ..step import ContactProblem, EffectiveMatrix, State, StepProblem
+from ..core.algebra import Array, Mask
+from ..core.step import ContactProblem, EffectiveMatrix, State, StepProblem
 
 
 def position_step(

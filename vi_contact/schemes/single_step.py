@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ..algebra import Array
+from ..core.algebra import Array
+from ..core.step import ContactProblem, State, StepProblem, StepResult
 from ..mass import ConsistentMass, MassLaw
-from ..step import ContactProblem, State, StepProblem, StepResult
 from .guard import needs_mass
 
 

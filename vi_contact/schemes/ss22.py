@@ -16,9 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..checks import real, shown
-from ..errors import InputError
-from ..step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
+from ..core.checks import real, shown
+from ..core.errors import InputError
+from ..core.step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
 from .position_step import position_step
 from .single_step import SingleStep, stepped
 

@@ -16,10 +16,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..algebra import Array
-from ..checks import real, shown
-from ..errors import InputError
-from ..step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
+from ..core.algebra import Array
+from ..core.checks import real, shown
+from ..core.errors import InputError
+from ..core.step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
 from .position_step import position_step
 from .single_step import SingleStep, stepped
 

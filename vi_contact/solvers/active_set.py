@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import lapack
 
-from ..checks import attributes
+from ..core.checks import attributes
 from .lcp import LCP, Array, LCPResult, Mask, check_guess, cholesky, failure, scaled_dense
 
 PATIENCE = 10  # Júdice and Pires, Comput. Oper. Res. 21, 1994

@@ -19,11 +19,11 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..algebra import Array, Mask
-from ..checks import instance, provides
-from ..errors import InputError
-from ..step import ContactProblem, EffectiveMatrix, StepProblem, StepResult
-from ..surfaces import ContactSurface
+from ..core.algebra import Array, Mask
+from ..core.checks import instance, provides
+from ..core.errors import InputError
+from ..core.step import ContactProblem, EffectiveMatrix, StepProblem, StepResult
+from ..core.surfaces import ContactSurface
 from .active_set import ActiveSet
 from .friction_condensed import CondensedFriction
 from .friction_newton import FrictionNewton

@@ -18,8 +18,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..checks import provides, real, shown, whole
-from ..errors import InputError
+from ..core.checks import provides, real, shown, whole
+from ..core.errors import InputError
 from .lcp import Array
 
 

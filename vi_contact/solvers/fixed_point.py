@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..checks import attributes
+from ..core.checks import attributes
 from .extrapolation import Extrapolation, Plain, accelerated
 from .friction_newton import FrictionNewton
 from .friction_small import Blocks, FrictionMethod, FrictionResult, inner_method, observed_contraction

@@ -15,9 +15,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..algebra import Array, Indices, Mask
-from ..step import EffectiveMatrix, StepProblem
-from ..surfaces import ContactSurface
+from ..core.algebra import Array, Indices, Mask
+from ..core.step import EffectiveMatrix, StepProblem
+from ..core.surfaces import ContactSurface
 from .friction_small import FrictionMethod, FrictionResult
 from .slip_rate import RateIteration
 

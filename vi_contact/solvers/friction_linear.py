@@ -21,7 +21,7 @@ from typing import Any, Protocol
 import numpy as np
 from scipy.linalg import lapack
 
-from ..algebra import Array, Indices, Mask
+from ..core.algebra import Array, Indices, Mask
 
 KEPT = 8  # factors
 LARGE = 150  # unknowns from which (2) is faster, as measured

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..checks import attributes
+from ..core.checks import attributes
 from .friction_linear import Factors, LinearProblems
 from .friction_small import Blocks, FrictionResult, Step
 from .lcp import Array, Mask

@@ -25,8 +25,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..checks import provides
-from ..errors import InputError, StepFailure
+from ..core.checks import provides
+from ..core.errors import InputError, StepFailure
 from ..friction import project
 from .lcp import EPS, Array, Mask, check_gap, energy_scale, largest
 

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..checks import attributes
+from ..core.checks import attributes
 from .active_set import ActiveSet
 from .extrapolation import Extrapolation, Plain, accelerated
 from .friction_newton import FrictionNewton

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import lapack
 
-from ..checks import attributes
+from ..core.checks import attributes
 from .lcp import EPS, LCP, Array, LCPResult, Mask, cholesky, failure, largest, scaled_dense
 
 

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
-from ..errors import InputError, StepFailure
+from ..core.errors import InputError, StepFailure
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

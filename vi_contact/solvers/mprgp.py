@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..checks import attributes
-from ..errors import InputError
+from ..core.checks import attributes
+from ..core.errors import InputError
 from .lcp import (
     LCP,
     Array,

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from ..checks import attributes
+from ..core.checks import attributes
 from .friction_small import Blocks, FrictionResult, Step
 from .lcp import Array, Mask
 

@@ -18,8 +18,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..checks import attributes
-from ..errors import StepFailure
+from ..core.checks import attributes
+from ..core.errors import StepFailure
 from .extrapolation import Anderson, Extrapolation, accelerated
 from .friction_small import FrictionResult
 from .lcp import Array, largest

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..checks import attributes, real, shown
-from ..errors import InputError
+from ..core.checks import attributes, real, shown
+from ..core.errors import InputError
 from .friction_small import Blocks, FrictionResult
 from .lcp import Array, Mask
 

@@ -16,11 +16,11 @@ from typing import Any, Protocol, cast
 import numpy as np
 from petsc4py import PETSc
 
-from ..algebra import Array
-from ..checks import instance, provides, real, shown
-from ..errors import InputError, StepFailure
-from ..step import ContactProblem, EffectiveMatrix, StepProblem, StepResult
-from ..surfaces import ContactSurface
+from ..core.algebra import Array
+from ..core.checks import instance, provides, real, shown
+from ..core.errors import InputError, StepFailure
+from ..core.step import ContactProblem, EffectiveMatrix, StepProblem, StepResult
+from ..core.surfaces import ContactSurface
 from .volume_factorised import OneFactorisation
 from .volume_friction import VolumeFriction
 from .volume_friction_step import ScaledRubbing

@@ -18,9 +18,9 @@ from typing import Any, ClassVar
 import numpy as np
 from petsc4py import PETSc
 
-from ..algebra import Array
-from ..checks import whole
-from ..step import StepProblem
+from ..core.algebra import Array
+from ..core.checks import whole
+from ..core.step import StepProblem
 from .volume_held import HeldInverse
 from .volume_options import OptionLayers, Options, check_own_inverse
 from .volume_snes import NEWTON_OPTIONS, SnesDriver

@@ -17,10 +17,10 @@ from typing import Any
 
 import numpy as np
 
-from ..algebra import Array, Mask
-from ..errors import StepFailure
+from ..core.algebra import Array, Mask
+from ..core.errors import StepFailure
+from ..core.step import StepProblem, StepResult
 from ..friction import project
-from ..step import StepProblem, StepResult
 from .extrapolation import Anderson
 from .lcp import largest
 from .slip_rate import RateIteration

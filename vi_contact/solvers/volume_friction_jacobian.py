@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from petsc4py import PETSc
 
-from ..algebra import Array, Indices
+from ..core.algebra import Array, Indices
 from .volume_friction_step import ScaledRubbing
 from .volume_friction_system import RubbingSystem
 from .volume_system import renumbered

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..algebra import Array, Mask, max_abs
+from ..core.algebra import Array, Mask, max_abs
+from ..core.step import StepProblem
 from ..friction import project
-from ..step import StepProblem
 from .volume_friction_system import RubbingSystem
 from .volume_step import ScaledStep, fraction
 

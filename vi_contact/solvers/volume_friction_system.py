@@ -28,8 +28,8 @@ from typing import Any
 
 import numpy as np
 
-from ..algebra import Array, Mask
-from ..step import StepProblem
+from ..core.algebra import Array, Mask
+from ..core.step import StepProblem
 from .volume_system import BoundedSystem
 
 

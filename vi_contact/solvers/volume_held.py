@@ -6,8 +6,8 @@ import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from scipy.linalg.blas import dgemv
 
-from ..algebra import Array, Mask
-from ..errors import StepFailure
+from ..core.algebra import Array, Mask
+from ..core.errors import StepFailure
 from .volume_system import BoundedSystem
 
 

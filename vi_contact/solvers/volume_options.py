@@ -13,7 +13,7 @@ from typing import Any
 
 from petsc4py import PETSc
 
-from ..errors import InputError
+from ..core.errors import InputError
 from .volume_reasons import last_line
 
 Options = Mapping[str, object | None]

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from ..errors import StepFailure
+from ..core.errors import StepFailure
 
 NOT_A_NUMBER = -4  # SNES_DIVERGED_FNORM_NAN, in PETSc 3.25 SNES_DIVERGED_FUNCTION_NANORINF: the number stayed
 WORDS = {

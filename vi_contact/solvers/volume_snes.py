@@ -17,8 +17,8 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 from petsc4py import PETSc
 
-from ..algebra import Array
-from ..step import StepProblem
+from ..core.algebra import Array
+from ..core.step import StepProblem
 from .volume_friction_jacobian import RubbingJacobian
 from .volume_friction_step import ScaledRubbing
 from .volume_options import OptionLayers, Options, check_friction, check_reduced, check_semismooth

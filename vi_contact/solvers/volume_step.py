@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from ..algebra import Array, Mask, max_abs
-from ..step import StepProblem
+from ..core.algebra import Array, Mask, max_abs
+from ..core.step import StepProblem
 from .volume_reasons import NOT_A_NUMBER
 from .volume_system import BoundedSystem
 

@@ -19,10 +19,10 @@ import numpy as np
 import scipy.sparse as sp
 from petsc4py import PETSc
 
-from ..algebra import Array, Comm, Indices, Mask, SerialMatrix
-from ..errors import InputError
-from ..step import EffectiveMatrix, StepProblem
-from ..surfaces import ContactSurface
+from ..core.algebra import Array, Comm, Indices, Mask, SerialMatrix
+from ..core.errors import InputError
+from ..core.step import EffectiveMatrix, StepProblem
+from ..core.surfaces import ContactSurface
 
 
 class BoundedSystem:

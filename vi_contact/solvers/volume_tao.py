@@ -12,8 +12,8 @@ from typing import Any, ClassVar
 import numpy as np
 from petsc4py import PETSc
 
-from ..algebra import Array
-from ..step import StepProblem
+from ..core.algebra import Array
+from ..core.step import StepProblem
 from .volume_options import REDUCED_PC, OptionLayers, Options, refuse
 from .volume_snes import AssembledJacobian, weakly, write_bounds
 from .volume_step import ScaledStep

@@ -17,9 +17,11 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import shown
+from ..core.checks import shown
+from ..core.errors import InputError
+from ..core.step import ContactProblem, Recorder, Scheme, Solver
+from ..core.surfaces import ContactSurface, empty_surface
 from ..cross_check import CrossChecked
-from ..errors import InputError
 from ..excitation import Excitation
 from ..fem.assembly import assemble
 from ..fem.joined import together
@@ -36,8 +38,6 @@ from ..schemes.choice import completed
 from ..simulate import Solution, simulate
 from ..solvers.condensed import Condensed
 from ..static import initial_state, static_equilibrium
-from ..step import ContactProblem, Recorder, Scheme, Solver
-from ..surfaces import ContactSurface, empty_surface
 from ..time_steps import course
 from ..weight import with_weight
 from ..writer import FieldWriter

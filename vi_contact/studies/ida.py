@@ -21,8 +21,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..algebra import Array
-from ..errors import InputError
+from ..core.algebra import Array
+from ..core.errors import InputError
 from ..fem.mesh import alone
 from ..output import to_json, write_atomically
 from ..plotting_ida import Panel, plot_ida

@@ -17,7 +17,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError
+from ..core.errors import InputError
 from ..excitation import GroundMotion
 from ..ground_motion import Record, scaled
 from ..output import CHECKPOINT, SUMMARY, to_json, write_atomically

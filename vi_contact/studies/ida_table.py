@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ..algebra import Array
-from ..errors import InputError
+from ..core.algebra import Array
+from ..core.errors import InputError
 from ..ground_motion import scaled
 from ..run_folder import read_run
 from .case import Case

@@ -8,8 +8,8 @@ from functools import partial
 
 import numpy as np
 
-from ..algebra import Array
-from ..errors import InputError
+from ..core.algebra import Array
+from ..core.errors import InputError
 from ..ground_motion import Record, arias, cav, housner_intensity, pga, pgd, pgv, psa
 
 _MEASURES: dict[str, tuple[Callable[[Record], float], str, str, int]] = {

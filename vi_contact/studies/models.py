@@ -7,12 +7,12 @@ from dataclasses import dataclass, fields
 from inspect import signature
 from typing import Any, get_type_hints
 
+from ..core.step import Recorder
+from ..core.surfaces import ContactSurface
+from ..core.system import SemiDiscreteSystem
 from ..models import channel, wall
 from ..models.channel_sides import Sides
 from ..recorders import Contact, Energy, Probe
-from ..step import Recorder
-from ..surfaces import ContactSurface
-from ..system import SemiDiscreteSystem
 from .calls import Callee
 
 

@@ -6,8 +6,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from .. import friction, materials, surfaces
-from ..corners import FEATURE_ANGLE
+from .. import friction, materials
+from ..core import surfaces
+from ..core.corners import FEATURE_ANGLE
+from ..core.surfaces import ContactSurface
+from ..core.system import SemiDiscreteSystem
 from ..fem.dashpots import CompliantBase
 from ..fem.free_field import FreeField
 from ..fem.matching import Matching
@@ -16,8 +19,6 @@ from ..fem.pairs import contact_pair
 from ..fem.trace import contact_surface
 from ..ground_motion import Processing, Record, read_record
 from ..ground_motion.reader import LARGEST_PEAK
-from ..surfaces import ContactSurface
-from ..system import SemiDiscreteSystem
 from ..upgoing import UpgoingVelocity
 
 

@@ -10,8 +10,8 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Union, get_args, get_origin
 
-from ..checks import SHOWN, shown
-from ..errors import InputError
+from ..core.checks import SHOWN, shown
+from ..core.errors import InputError
 from .calls import GROUP, Call, Callee, Group, Items, Named, Node, Spot, Value, callee
 
 

@@ -6,7 +6,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from .. import excitation, friction, impact, mass, materials, recorders, surfaces, time_steps
+from .. import excitation, friction, impact, mass, materials, recorders, time_steps
+from ..core import surfaces
+from ..core.step import Recorder, Scheme, Solver
+from ..core.surfaces import ContactSurface
 from ..cross_check import CrossChecked
 from ..fem.dashpots import CompliantBase, Dashpots
 from ..fem.fields import XDMF
@@ -52,8 +55,6 @@ from ..solvers.uzawa import Uzawa
 from ..solvers.volume_factorised import OneFactorisation
 from ..solvers.volume_snes import ReducedNewton, SemismoothNewton
 from ..solvers.volume_tao import TaoTron
-from ..step import Recorder, Scheme, Solver
-from ..surfaces import ContactSurface
 from ..upgoing import UpgoingVelocity, upgoing
 from ..writer import FieldWriter
 from . import plain

@@ -20,12 +20,12 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from ..excitation import Excitation
+from ..friction import FrictionLaw, Frictionless
+from ..impact import ImpactLaw
+from ..mass import MassLaw
 from .algebra import Algebra, Array, Factor, Mask, Matrix
 from .errors import InputError
-from .excitation import Excitation
-from .friction import FrictionLaw, Frictionless
-from .impact import ImpactLaw
-from .mass import MassLaw
 from .problem_checks import check_problem
 from .surfaces import ContactSurface
 from .system import SemiDiscreteSystem
