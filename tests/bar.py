@@ -18,8 +18,8 @@ from vi_contact.core.algebra import Array, SerialAlgebra, SerialComm, SerialMatr
 from vi_contact.core.step import ContactProblem, Report, State
 from vi_contact.core.surfaces import ContactSurface
 from vi_contact.core.system import Load, SemiDiscreteSystem
+from vi_contact.laws.mass import ConsistentMass
 from vi_contact.march import march
-from vi_contact.mass import ConsistentMass
 from vi_contact.solvers.condensed import Condensed
 
 

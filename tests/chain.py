@@ -18,7 +18,7 @@ from vi_contact.core.errors import InputError
 from vi_contact.core.step import ContactProblem
 from vi_contact.core.surfaces import ContactSurface
 from vi_contact.core.system import Load, SemiDiscreteSystem
-from vi_contact.mass import ConsistentMass
+from vi_contact.laws.mass import ConsistentMass
 
 
 @dataclass(frozen=True)

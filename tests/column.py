@@ -18,7 +18,7 @@ from vi_contact.core.algebra import Array, SerialAlgebra, SerialComm, SerialMatr
 from vi_contact.core.step import ContactProblem
 from vi_contact.core.surfaces import ContactSurface
 from vi_contact.core.system import Load, SemiDiscreteSystem
-from vi_contact.materials import LinearElastic
+from vi_contact.laws.materials import LinearElastic
 
 UNIT = LinearElastic(E=2.0, nu=0.0, rho=1.0)  # c_S = 1, c_P = √2
 

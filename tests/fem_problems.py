@@ -18,16 +18,16 @@ from vi_contact.core.algebra import Array, Mask
 from vi_contact.core.step import ContactProblem, Scheme, Solver, State
 from vi_contact.core.surfaces import HalfSpace, empty_surface
 from vi_contact.core.system import SemiDiscreteSystem
-from vi_contact.excitation import Harmonic
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import BodyForce, Prescribed
 from vi_contact.fem.mesh import build_mesh
 from vi_contact.fem.petsc_algebra import as_petsc
 from vi_contact.fem.trace import contact_surface
-from vi_contact.impact import Inelastic
+from vi_contact.laws.excitation import Harmonic
+from vi_contact.laws.impact import Inelastic
+from vi_contact.laws.mass import ConsistentMass
+from vi_contact.laws.materials import LinearElastic, PlaneStress
 from vi_contact.march import march
-from vi_contact.mass import ConsistentMass
-from vi_contact.materials import LinearElastic, PlaneStress
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed

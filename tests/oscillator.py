@@ -10,7 +10,7 @@ from chain import chain_problem
 from scipy.linalg import expm
 
 from vi_contact.core.step import ContactProblem, State
-from vi_contact.excitation import Harmonic
+from vi_contact.laws.excitation import Harmonic
 
 FAR = 1e6  # gap that never closes
 SHAKEN = Harmonic(amplitude=3.0, frequency=0.7, phase=0.4, direction=(1.0,))

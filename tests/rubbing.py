@@ -10,8 +10,8 @@ from vi_contact.core.algebra import SerialAlgebra, SerialComm, SerialMatrix
 from vi_contact.core.step import ContactProblem
 from vi_contact.core.surfaces import ContactSurface
 from vi_contact.core.system import Load, SemiDiscreteSystem
-from vi_contact.friction import FrictionLaw
-from vi_contact.mass import ConsistentMass
+from vi_contact.laws.friction import FrictionLaw
+from vi_contact.laws.mass import ConsistentMass
 
 
 def rubbing_block(friction: FrictionLaw, *, gap: float = 0.05, damping: float = 0.0) -> ContactProblem:

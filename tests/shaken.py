@@ -9,7 +9,7 @@ import numpy as np
 from chain import chain_problem
 
 from vi_contact.core.step import ContactProblem, Report
-from vi_contact.excitation import Harmonic
+from vi_contact.laws.excitation import Harmonic
 
 SHAKE = Harmonic(-30.0, 3.0, phase=0.3, direction=(1.0,))
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from vi_contact import fem
 from vi_contact.core.algebra import Array
+from vi_contact.laws.materials import LinearElastic
 from vi_contact.march import march
-from vi_contact.materials import LinearElastic
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.soil_column import SoilColumn
 

@@ -19,11 +19,11 @@ from vi_contact.boundary_layer.scheme import BoundaryLayer
 from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.core.step import ContactProblem
 from vi_contact.exact.bar import ThrownBar
-from vi_contact.excitation import Harmonic
-from vi_contact.friction import Coulomb
-from vi_contact.impact import Inelastic, NoImpact
+from vi_contact.laws.excitation import Harmonic
+from vi_contact.laws.friction import Coulomb
+from vi_contact.laws.impact import Inelastic, NoImpact
+from vi_contact.laws.mass import ConsistentMass
 from vi_contact.march import march
-from vi_contact.mass import ConsistentMass
 from vi_contact.schemes.midpoint import Midpoint
 from vi_contact.simulate import simulate
 from vi_contact.static import initial_state
@@ -276,7 +276,7 @@ def test_two_stiff_blocks(comm):
     from two_bodies import thrown as with_velocities
 
     from vi_contact.fem.pairs import contact_pair
-    from vi_contact.materials import LinearElastic
+    from vi_contact.laws.materials import LinearElastic
 
     mesh = blocks(2, upper=(2, 1), lower=(2, 1), gap=0.02)
     system, tags = two_blocks(comm, mesh, LinearElastic(1e11, 0.0, 1000.0))

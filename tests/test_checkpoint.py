@@ -18,10 +18,10 @@ from chain import chain_problem
 
 from vi_contact.core.errors import InputError
 from vi_contact.core.step import ContactProblem, State
-from vi_contact.excitation import Harmonic
-from vi_contact.friction import Coulomb
-from vi_contact.impact import Inelastic, MassProjection
-from vi_contact.mass import ConsistentMass, Redistributed
+from vi_contact.laws.excitation import Harmonic
+from vi_contact.laws.friction import Coulomb
+from vi_contact.laws.impact import Inelastic, MassProjection
+from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.recorders import Contact, Energy, Probe
 from vi_contact.schemes.linear_multistep import LinearMultistep
 from vi_contact.schemes.moreau_jean import MoreauJean

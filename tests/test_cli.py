@@ -17,7 +17,7 @@ from vi_contact import cli_ranks
 from vi_contact.cli import main, parser, split_petsc
 from vi_contact.cli_options import impact_law
 from vi_contact.core.errors import InputError
-from vi_contact.impact import ComponentReset, Inelastic, MassProjection, Newton, NoImpact
+from vi_contact.laws.impact import ComponentReset, Inelastic, MassProjection, Newton, NoImpact
 
 pytestmark = pytest.mark.serial
 ROOT = Path(vi_contact.__file__).parent.parent

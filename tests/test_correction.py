@@ -15,7 +15,7 @@ from vi_contact.core.errors import StepFailure
 from vi_contact.core.step import ContactProblem, EffectiveMatrix, Scheme, StepProblem, StepResult
 from vi_contact.core.verify import kkt_residual
 from vi_contact.correction import Share, added, left_over, share_of
-from vi_contact.friction import Coulomb, ExponentialDecay, SlipRateCoulomb, Tresca
+from vi_contact.laws.friction import Coulomb, ExponentialDecay, SlipRateCoulomb, Tresca
 from vi_contact.schemes.moreau_jean import MoreauJean
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed

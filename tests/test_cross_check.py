@@ -14,8 +14,8 @@ from shaken import SHAKE, shaken
 
 from vi_contact.core.errors import InputError
 from vi_contact.cross_check import CrossChecked, cross_check
-from vi_contact.friction import Coulomb, Tresca
-from vi_contact.impact import Inelastic
+from vi_contact.laws.friction import Coulomb, Tresca
+from vi_contact.laws.impact import Inelastic
 from vi_contact.schemes.linear_multistep import LinearMultistep
 from vi_contact.schemes.ss22 import SS22
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor

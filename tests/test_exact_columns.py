@@ -9,7 +9,7 @@ from exact_checks import derivative_defect, wave_defect
 from vi_contact.core.errors import InputError
 from vi_contact.exact.columns import ObliqueImpact, ShearColumn
 from vi_contact.exact.two_bars import TwoBars
-from vi_contact.materials import LinearElastic
+from vi_contact.laws.materials import LinearElastic
 
 pytestmark = pytest.mark.serial
 UNIT = LinearElastic(E=2.0, nu=0.0, rho=1.0)  # c_S = 1, c_P = sqrt(2)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from vi_contact.core.errors import InputError
-from vi_contact.excitation import FullSine, GroundMotion, HalfSine, Harmonic, Rectangular, Ricker, Tabulated
 from vi_contact.ground_motion import Record
+from vi_contact.laws.excitation import FullSine, GroundMotion, HalfSine, Harmonic, Rectangular, Ricker, Tabulated
 
 pytestmark = pytest.mark.serial
 

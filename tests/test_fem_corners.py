@@ -217,7 +217,7 @@ def test_the_oblique_system_is_the_same_system(name):
 
 def test_redistributed_mass_at_oblique_corners():
     """No inertia on contact unknowns; all of the body's own: mass, centre and moments of inertia, with lumping too."""
-    from vi_contact.handing_over import rigid_motions
+    from vi_contact.laws.mass_transfer import rigid_motions
 
     for name, count, lumpings in (("trapezoid", 3, (0.0, 0.4, 1.0)), ("leaning box", 6, (0.4,))):
         fine = BODIES[name] | {"divisions": (12, 6) if count == 3 else (5, 5, 5)}
@@ -240,7 +240,7 @@ def test_redistributed_mass_at_oblique_corners():
 def test_lumped_mass_does_not_depend_on_the_frames():
     """Lumped mass before the contact nodes give theirs away: the kinetic energy of any rigid motion."""
     from vi_contact.core.corners import lumped_entries
-    from vi_contact.mass import _row_sums
+    from vi_contact.laws.mass import _row_sums
 
     system, tags = body("trapezoid")
     surface = fem.contact_surface(system, group(tags, *SIDES[:4]))

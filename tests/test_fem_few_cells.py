@@ -14,12 +14,12 @@ from fem_problems import CONCRETE, block
 
 from vi_contact.core.step import ContactProblem
 from vi_contact.core.surfaces import HalfSpace
-from vi_contact.excitation import Harmonic
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.fields import XDMF
 from vi_contact.fem.trace import contact_surface
-from vi_contact.friction import Coulomb, Frictionless
-from vi_contact.mass import ConsistentMass
+from vi_contact.laws.excitation import Harmonic
+from vi_contact.laws.friction import Coulomb, Frictionless
+from vi_contact.laws.mass import ConsistentMass
 from vi_contact.recorders import Contact, Energy, Probe
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.simulate import Solution, simulate

@@ -25,9 +25,9 @@ from vi_contact.fem.fields import XDMF
 from vi_contact.fem.loads import Prescribed
 from vi_contact.fem.stress import VonMises
 from vi_contact.fem.trace import contact_surface
-from vi_contact.friction import Coulomb
+from vi_contact.laws.friction import Coulomb
+from vi_contact.laws.materials import LinearElastic, PlaneStrain, PlaneStress, Section
 from vi_contact.march import march
-from vi_contact.materials import LinearElastic, PlaneStrain, PlaneStress, Section
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.simulate import Solution, simulate
 from vi_contact.solvers.condensed import Condensed

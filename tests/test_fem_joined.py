@@ -23,9 +23,9 @@ from vi_contact.fem.loads import BodyForce
 from vi_contact.fem.mesh import build_mesh
 from vi_contact.fem.pairs import contact_pair
 from vi_contact.fem.trace import contact_surface
-from vi_contact.friction import Coulomb, Frictionless
+from vi_contact.laws.friction import Coulomb, Frictionless
+from vi_contact.laws.mass import Redistributed
 from vi_contact.march import march
-from vi_contact.mass import Redistributed
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import Blocks
 from vi_contact.schemes.midpoint import Midpoint

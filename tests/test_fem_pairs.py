@@ -24,7 +24,7 @@ from vi_contact.fem.matching import NodeToNode
 from vi_contact.fem.mesh import build_mesh
 from vi_contact.fem.pairs import contact_pair
 from vi_contact.fem.trace import contact_surface
-from vi_contact.friction import Coulomb
+from vi_contact.laws.friction import Coulomb
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.cut import CutOpen
 from vi_contact.meshes.two_blocks import Blocks

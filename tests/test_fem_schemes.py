@@ -20,10 +20,10 @@ from vi_contact.cross_check import cross_check
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.mesh import build_mesh
 from vi_contact.fem.trace import contact_surface
-from vi_contact.friction import Coulomb, Tresca
+from vi_contact.laws.friction import Coulomb, Tresca
+from vi_contact.laws.mass import ConsistentMass, Redistributed
+from vi_contact.laws.materials import LinearElastic
 from vi_contact.march import march
-from vi_contact.mass import ConsistentMass, Redistributed
-from vi_contact.materials import LinearElastic
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.schemes.contact_stabilised import ContactStabilisedNewmark
 from vi_contact.schemes.moreau_jean import MoreauJean

@@ -10,11 +10,11 @@ from mpi4py import MPI
 from vi_contact.core.errors import InputError
 from vi_contact.core.step import ContactProblem
 from vi_contact.core.system import SemiDiscreteSystem
-from vi_contact.excitation import Harmonic
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import BodyForce, Prescribed, Traction
 from vi_contact.fem.mesh import Facets
-from vi_contact.materials import LinearElastic, Rayleigh
+from vi_contact.laws.excitation import Harmonic
+from vi_contact.laws.materials import LinearElastic, Rayleigh
 
 COMM = MPI.COMM_WORLD
 SOFT = LinearElastic(E=2.0e8, nu=0.2, rho=CONCRETE.rho)

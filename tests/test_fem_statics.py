@@ -15,8 +15,8 @@ from vi_contact.core.surfaces import ContactSurface, HalfSpace
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import BodyForce, Prescribed, Traction
 from vi_contact.fem.trace import contact_surface
+from vi_contact.laws.materials import LinearElastic, PlaneStress
 from vi_contact.march import march
-from vi_contact.materials import LinearElastic, PlaneStress
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.static import static_equilibrium

@@ -18,7 +18,7 @@ from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import BodyForce, Prescribed
 from vi_contact.fem.mesh import Facets
 from vi_contact.fem.trace import contact_surface
-from vi_contact.materials import PlaneStress
+from vi_contact.laws.materials import PlaneStress
 from vi_contact.static import initial_state
 
 COMM = MPI.COMM_WORLD

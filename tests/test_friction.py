@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vi_contact.core.errors import InputError
-from vi_contact.friction import (
+from vi_contact.laws.friction import (
     Coulomb,
     ExponentialDecay,
     Frictionless,

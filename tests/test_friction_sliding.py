@@ -21,10 +21,10 @@ from vi_contact.core.surfaces import HalfSpace
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import BodyForce
 from vi_contact.fem.trace import contact_surface
-from vi_contact.friction import Coulomb, ExponentialDecay, FrictionLaw, SlipRateCoulomb
+from vi_contact.laws.friction import Coulomb, ExponentialDecay, FrictionLaw, SlipRateCoulomb
+from vi_contact.laws.mass import ConsistentMass
+from vi_contact.laws.materials import LinearElastic, Rayleigh
 from vi_contact.march import march
-from vi_contact.mass import ConsistentMass
-from vi_contact.materials import LinearElastic, Rayleigh
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.static import static_equilibrium
 

@@ -16,7 +16,7 @@ from vi_contact.core.algebra import Array, SerialComm
 from vi_contact.core.errors import InputError
 from vi_contact.core.step import ContactProblem, State
 from vi_contact.core.surfaces import ContactSurface
-from vi_contact.friction import Coulomb, ExponentialDecay, FrictionLaw, SlipRateCoulomb, StaticKinetic, Tresca
+from vi_contact.laws.friction import Coulomb, ExponentialDecay, FrictionLaw, SlipRateCoulomb, StaticKinetic, Tresca
 from vi_contact.load_steps import quasi_static
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.nsgs import NSGS

@@ -15,8 +15,8 @@ from shaken import changes, shaken
 from vi_contact.core.algebra import SerialMatrix
 from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.core.step import ContactProblem, State, StepResult
-from vi_contact.friction import Coulomb
-from vi_contact.impact import Elastic, Inelastic
+from vi_contact.laws.friction import Coulomb
+from vi_contact.laws.impact import Elastic, Inelastic
 from vi_contact.schemes.linear_multistep import LinearMultistep
 from vi_contact.schemes.ss22 import SS22
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor

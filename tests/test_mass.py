@@ -17,11 +17,11 @@ from vi_contact.core.step import ContactProblem
 from vi_contact.core.surfaces import Touching
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.trace import contact_surface
-from vi_contact.friction import Coulomb
-from vi_contact.impact import Inelastic
+from vi_contact.laws.friction import Coulomb
+from vi_contact.laws.impact import Inelastic
+from vi_contact.laws.mass import ConsistentMass, Redistributed
+from vi_contact.laws.materials import Rayleigh
 from vi_contact.march import march
-from vi_contact.mass import ConsistentMass, Redistributed
-from vi_contact.materials import Rayleigh
 from vi_contact.schemes.trapezoidal import Trapezoidal
 from vi_contact.solvers.condensed import Condensed
 

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from vi_contact.core.errors import InputError
-from vi_contact.materials import (
+from vi_contact.laws.materials import (
     LinearElastic,
     MassProportional,
     NoDamping,

@@ -11,7 +11,7 @@ from chain import chain_problem
 from shaken import SHAKE, changes, shaken
 
 from vi_contact.core.errors import InputError
-from vi_contact.impact import Elastic, Inelastic
+from vi_contact.laws.impact import Elastic, Inelastic
 from vi_contact.schemes.linear_multistep import LinearMultistep
 from vi_contact.schemes.ss22 import SS22
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor

@@ -18,10 +18,10 @@ from vi_contact.core.verify import energy_balance
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import BodyForce
 from vi_contact.fem.trace import contact_surface
-from vi_contact.friction import Coulomb
+from vi_contact.laws.friction import Coulomb
+from vi_contact.laws.mass import ConsistentMass, Redistributed
+from vi_contact.laws.materials import LinearElastic, Rayleigh
 from vi_contact.march import march
-from vi_contact.mass import ConsistentMass, Redistributed
-from vi_contact.materials import LinearElastic, Rayleigh
 from vi_contact.schemes.contact_stabilised import ContactStabilisedNewmark
 from vi_contact.schemes.hht import HHT
 from vi_contact.schemes.houbolt import Houbolt

@@ -16,8 +16,8 @@ from chain import chain_problem
 from vi_contact import history as history_module
 from vi_contact.core.algebra import SerialComm
 from vi_contact.core.errors import InputError, ViContactError
-from vi_contact.excitation import Harmonic
 from vi_contact.history import HistoryFiles
+from vi_contact.laws.excitation import Harmonic
 from vi_contact.output import (
     hdf5_atomically,
     on_root,

@@ -11,7 +11,7 @@ from rubbing import rubbing_block
 
 from vi_contact import plotting_friction
 from vi_contact.core.errors import InputError
-from vi_contact.friction import Coulomb
+from vi_contact.laws.friction import Coulomb
 from vi_contact.plotting_friction import contact_states, plot_hysteresis, plot_states
 from vi_contact.recorders import Contact
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor

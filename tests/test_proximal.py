@@ -19,8 +19,8 @@ from vi_contact.fem.loads import BodyForce, Prescribed, Traction
 from vi_contact.fem.mesh import build_mesh
 from vi_contact.fem.pairs import contact_pair
 from vi_contact.fem.trace import contact_surface
-from vi_contact.friction import Coulomb
-from vi_contact.materials import LinearElastic
+from vi_contact.laws.friction import Coulomb
+from vi_contact.laws.materials import LinearElastic
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.channel import ChannelMesh
 from vi_contact.meshes.two_blocks import Blocks

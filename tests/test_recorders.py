@@ -12,8 +12,8 @@ from chain import chain_problem, chain_surface
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.core.step import ContactProblem, Report, State
-from vi_contact.excitation import Harmonic
-from vi_contact.impact import Inelastic, MassProjection, Newton
+from vi_contact.laws.excitation import Harmonic
+from vi_contact.laws.impact import Inelastic, MassProjection, Newton
 from vi_contact.march import march
 from vi_contact.recorders import Contact, Energy, Probe, Steps
 from vi_contact.schemes.linear_multistep import LinearMultistep

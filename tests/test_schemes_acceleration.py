@@ -23,9 +23,9 @@ from vi_contact.core.errors import InputError
 from vi_contact.core.step import ContactProblem, Report, State
 from vi_contact.core.verify import energies, energy_balance
 from vi_contact.exact.columns import ObliqueImpact
-from vi_contact.friction import Coulomb
-from vi_contact.impact import Inelastic, MassProjection
-from vi_contact.mass import ConsistentMass, Redistributed
+from vi_contact.laws.friction import Coulomb
+from vi_contact.laws.impact import Inelastic, MassProjection
+from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.schemes.acceleration import consistent_acceleration
 from vi_contact.schemes.generalised_alpha import GeneralisedAlpha
 from vi_contact.schemes.hht import HHT

@@ -17,8 +17,8 @@ from vi_contact.core.step import ContactProblem, EffectiveMatrix, State, StepPro
 from vi_contact.fem.loads import BodyForce, Traction
 from vi_contact.fem.pairs import contact_pair
 from vi_contact.fem.petsc_algebra import PetscAlgebra
-from vi_contact.friction import Coulomb
-from vi_contact.mass import Redistributed
+from vi_contact.laws.friction import Coulomb
+from vi_contact.laws.mass import Redistributed
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import TwoBlocks
 from vi_contact.schemes.contact_layer import relaxed

@@ -14,8 +14,8 @@ from oscillator import SHAKEN, amplification, observed_order
 
 from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.core.step import ContactProblem, State
-from vi_contact.excitation import Harmonic
-from vi_contact.mass import ConsistentMass, Redistributed
+from vi_contact.laws.excitation import Harmonic
+from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.schemes import mass_projection
 from vi_contact.schemes.contact_stabilised import ContactStabilisedNewmark
 from vi_contact.schemes.ss22 import SS22

@@ -9,7 +9,7 @@ from oscillator import observed_order
 from test_schemes_generalised_alpha import amplification
 
 from vi_contact.core.errors import InputError
-from vi_contact.mass import ConsistentMass, Redistributed
+from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.schemes.hht import HHT
 from vi_contact.schemes.newmark import Newmark
 

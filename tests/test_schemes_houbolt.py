@@ -9,7 +9,7 @@ import pytest
 from bar import bouncing, energy, period_three, run, thrown
 from oscillator import last_state, observed_order, oscillators
 
-from vi_contact.mass import ConsistentMass, Redistributed
+from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.schemes.houbolt import Houbolt
 from vi_contact.schemes.linear_multistep import LinearMultistep
 

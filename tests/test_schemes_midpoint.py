@@ -12,9 +12,9 @@ from test_schemes_zienkiewicz_wood_taylor import kane
 
 from vi_contact.core.errors import InputError
 from vi_contact.core.verify import energies, energy_balance
-from vi_contact.friction import Coulomb
-from vi_contact.impact import Inelastic
-from vi_contact.mass import ConsistentMass, Redistributed
+from vi_contact.laws.friction import Coulomb
+from vi_contact.laws.impact import Inelastic
+from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.schemes.midpoint import Midpoint
 from vi_contact.schemes.ss22 import SS22
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor

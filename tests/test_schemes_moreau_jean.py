@@ -14,9 +14,9 @@ from oscillator import FAR, amplification, observed_order
 
 from vi_contact.core.errors import InputError
 from vi_contact.core.step import ContactProblem, State
-from vi_contact.excitation import Harmonic
-from vi_contact.impact import Inelastic, NoImpact
-from vi_contact.mass import ConsistentMass, Redistributed
+from vi_contact.laws.excitation import Harmonic
+from vi_contact.laws.impact import Inelastic, NoImpact
+from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.recorders import Contact
 from vi_contact.schemes.moreau_jean import MoreauJean
 from vi_contact.static import initial_state

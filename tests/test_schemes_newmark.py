@@ -14,8 +14,8 @@ from shaken import changes, shaken
 
 from vi_contact.core.errors import InputError
 from vi_contact.core.verify import energy_balance
-from vi_contact.impact import Inelastic
-from vi_contact.mass import ConsistentMass, Redistributed
+from vi_contact.laws.impact import Inelastic
+from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.schemes.linear_multistep import LinearMultistep
 from vi_contact.schemes.newmark import Newmark
 from vi_contact.schemes.trapezoidal import Trapezoidal

@@ -11,8 +11,8 @@ from column import column
 from energy_checks import course
 from rubbing import rubbing_block
 
-from vi_contact.friction import Coulomb, Tresca
-from vi_contact.mass import ConsistentMass
+from vi_contact.laws.friction import Coulomb, Tresca
+from vi_contact.laws.mass import ConsistentMass
 from vi_contact.schemes.contact_stabilised import ContactStabilisedNewmark
 from vi_contact.schemes.moreau_jean import MoreauJean
 

@@ -9,7 +9,7 @@ from chain import chain_problem
 from oscillator import SHAKEN, amplification, dense, observed_order, oscillators
 
 from vi_contact.core.errors import InputError
-from vi_contact.impact import Inelastic
+from vi_contact.laws.impact import Inelastic
 from vi_contact.schemes.linear_multistep import LinearMultistep
 from vi_contact.schemes.ss22 import SS22
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor

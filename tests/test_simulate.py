@@ -16,8 +16,8 @@ from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.core.step import ContactProblem, EffectiveMatrix, Report, State, StepProblem, StepResult
 from vi_contact.core.surfaces import ContactSurface
 from vi_contact.cross_check import CrossChecked
-from vi_contact.excitation import Harmonic
-from vi_contact.impact import Inelastic
+from vi_contact.laws.excitation import Harmonic
+from vi_contact.laws.impact import Inelastic
 from vi_contact.march import march
 from vi_contact.recorders import Contact, Energy, Probe
 from vi_contact.schemes.linear_multistep import LinearMultistep

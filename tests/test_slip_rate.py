@@ -15,9 +15,9 @@ import vi_contact as vc
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.core.step import ContactProblem, Report
-from vi_contact.friction import Coulomb, ExponentialDecay, SlipRateCoulomb, StaticKinetic
+from vi_contact.laws.friction import Coulomb, ExponentialDecay, SlipRateCoulomb, StaticKinetic
+from vi_contact.laws.mass import ConsistentMass
 from vi_contact.march import march
-from vi_contact.mass import ConsistentMass
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.extrapolation import Plain
 from vi_contact.solvers.slip_rate import RateIteration

@@ -10,8 +10,8 @@ from chain import chain_problem
 from vi_contact.core.algebra import SerialAlgebra, SerialMatrix
 from vi_contact.core.errors import InputError, StepFailure, ViContactError
 from vi_contact.core.step import Certificate, EffectiveMatrix
-from vi_contact.excitation import Harmonic
-from vi_contact.friction import Frictionless
+from vi_contact.laws.excitation import Harmonic
+from vi_contact.laws.friction import Frictionless
 
 pytestmark = pytest.mark.serial
 

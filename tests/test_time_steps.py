@@ -19,9 +19,9 @@ from test_checkpoint import run as run_chain
 
 from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.core.step import ContactProblem, Report
-from vi_contact.impact import Inelastic, MassProjection
+from vi_contact.laws.impact import Inelastic, MassProjection
+from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.march import March
-from vi_contact.mass import ConsistentMass, Redistributed
 from vi_contact.recorders import Energy
 from vi_contact.schemes.linear_multistep import LinearMultistep
 from vi_contact.schemes.ss22 import SS22

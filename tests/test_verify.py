@@ -14,7 +14,7 @@ from shaken import changes, shaken
 from vi_contact.core.algebra import SerialMatrix
 from vi_contact.core.step import EffectiveMatrix, Report, StepProblem, StepResult
 from vi_contact.core.verify import energies, energy_balance, kkt_residual
-from vi_contact.impact import ComponentReset, Elastic, Inelastic, MassProjection, Newton
+from vi_contact.laws.impact import ComponentReset, Elastic, Inelastic, MassProjection, Newton
 from vi_contact.schemes.linear_multistep import LinearMultistep
 from vi_contact.schemes.ss22 import SS22
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor

@@ -21,7 +21,7 @@ from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.core.step import StepResult
 from vi_contact.core.verify import kkt_residual
-from vi_contact.friction import Coulomb, ExponentialDecay, SlipRateCoulomb, Tresca
+from vi_contact.laws.friction import Coulomb, ExponentialDecay, SlipRateCoulomb, Tresca
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.nsgs import NSGS
 from vi_contact.solvers.volume import ReducedNewton, Volume

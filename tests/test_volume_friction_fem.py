@@ -19,9 +19,9 @@ from vi_contact.cross_check import CrossChecked
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import BodyForce, Prescribed
 from vi_contact.fem.trace import contact_surface
-from vi_contact.friction import Coulomb, FrictionLaw, Tresca
+from vi_contact.laws.friction import Coulomb, FrictionLaw, Tresca
+from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.march import march
-from vi_contact.mass import ConsistentMass, Redistributed
 from vi_contact.schemes.trapezoidal import Trapezoidal
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed

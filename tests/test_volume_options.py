@@ -19,7 +19,7 @@ from volume_cases import Case, case, pushed_block
 
 from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.core.verify import kkt_residual
-from vi_contact.friction import Coulomb, Frictionless
+from vi_contact.laws.friction import Coulomb, Frictionless
 from vi_contact.solvers.volume import (
     OneFactorisation,
     ReducedNewton,

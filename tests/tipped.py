@@ -12,9 +12,9 @@ from vi_contact.core.surfaces import HalfSpace
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import BodyForce
 from vi_contact.fem.trace import contact_surface
-from vi_contact.friction import Coulomb, FrictionLaw, Tresca
-from vi_contact.mass import ConsistentMass
-from vi_contact.materials import LinearElastic
+from vi_contact.laws.friction import Coulomb, FrictionLaw, Tresca
+from vi_contact.laws.mass import ConsistentMass
+from vi_contact.laws.materials import LinearElastic
 
 POINTS = 13
 ROUGH_ON_ONE_SIDE = [Coulomb(tuple(np.linspace(0.0, 1.2, POINTS))), Tresca(tuple(np.linspace(0.0, 2e4, POINTS)))]

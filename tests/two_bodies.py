@@ -14,7 +14,7 @@ from vi_contact.core.step import ContactProblem
 from vi_contact.core.system import SemiDiscreteSystem
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.mesh import build_mesh
-from vi_contact.materials import LinearElastic
+from vi_contact.laws.materials import LinearElastic
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import TwoBlocks
 

@@ -21,12 +21,12 @@ __version__ = "0.1.0"
 _CONTENTS = {
     "core.errors": ("InputError", "Interrupted", "StepFailure", "ViContactError"),
     # values
-    "materials": (
+    "laws.materials": (
         "LinearElastic", "MassProportional", "NoDamping", "PlaneStrain", "PlaneStress", "Rayleigh", "Solid",
     ),
-    "friction": ("Coulomb", "ExponentialDecay", "Frictionless", "SlipRateCoulomb", "StaticKinetic", "Tresca"),
-    "impact": ("ComponentReset", "Elastic", "Inelastic", "MassProjection", "Newton", "NoImpact"),
-    "excitation": (
+    "laws.friction": ("Coulomb", "ExponentialDecay", "Frictionless", "SlipRateCoulomb", "StaticKinetic", "Tresca"),
+    "laws.impact": ("ComponentReset", "Elastic", "Inelastic", "MassProjection", "Newton", "NoImpact"),
+    "laws.excitation": (
         "FullSine", "GroundMotion", "HalfSine", "Harmonic", "Rectangular", "Ricker", "Tabulated",
     ),
     "base_motion": ("BaseMotion", "base_motion"),
@@ -38,7 +38,7 @@ _CONTENTS = {
         "scaled_to_arias", "scaled_to_pga", "scaled_to_psa", "synthetic", "tapered", "trimmed", "without_mean",
         "write_at2", "write_columns", "write_path_series",
     ),
-    "mass": ("ConsistentMass", "Redistributed"),
+    "laws.mass": ("ConsistentMass", "Redistributed"),
     "core.surfaces": ("AnalyticGap", "ContactSurface", "HalfSpace", "Touching"),
     "core.system": ("Load", "SemiDiscreteSystem"),
     # exact solutions to compare with
@@ -86,7 +86,7 @@ _CONTENTS = {
     "march": ("march",),
     "time_steps": ("HalvedAtImpact", "Schedule"),
     "static": ("static_equilibrium",),
-    "weight": ("with_weight",),
+    "laws.weight": ("with_weight",),
     "load_steps": ("quasi_static",),
     "simulate": ("Solution", "simulate"),
     "recorders": ("Contact", "Energy", "Probe"),

@@ -13,8 +13,8 @@ from math import inf
 from .core.algebra import Array
 from .core.errors import InputError
 from .core.step import ContactProblem, Scheme
+from .laws.mass import ConsistentMass
 from .march import march
-from .mass import ConsistentMass
 from .time_steps import LARGEST, HalvedAtImpact, Schedule, course
 
 

@@ -28,7 +28,7 @@ from .core.problem_checks import EXCITATION
 from .core.step import ContactProblem, Scheme
 from .core.surfaces import ContactSurface, empty_surface
 from .core.system import Load, Pace, SemiDiscreteSystem
-from .excitation import Excitation
+from .laws.excitation import Excitation
 from .run_checks import check_scheme
 from .schemes.trapezoidal import Trapezoidal
 from .time_steps import Schedule

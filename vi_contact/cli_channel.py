@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from .cli_options import add_output, add_shaking, add_step, chosen, impact_law
-from .materials import Damping, LinearElastic, NoDamping, Rayleigh
+from .laws.materials import Damping, LinearElastic, NoDamping, Rayleigh
 
 _SHAPE = (  # option, default, meaning
     ("width", 24.0, "width of the soil layer"), ("depth", 8.0, "depth of the soil layer"),

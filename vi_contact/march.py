@@ -9,7 +9,7 @@ import numpy as np
 
 from .certified import TOLERANCE, CertifiedSolver
 from .core.step import ContactProblem, EffectiveMatrix, Report, Scheme, Solver, State
-from .impact import Impact
+from .laws.impact import Impact
 from .run_checks import check_methods, check_pace, check_state, start_time
 from .schemes.choice import completed
 from .solvers.condensed import Condensed

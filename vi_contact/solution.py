@@ -11,7 +11,7 @@ import numpy as np
 
 from .core.algebra import Array
 from .core.step import State
-from .excitation import Excitation, GroundMotion
+from .laws.excitation import Excitation, GroundMotion
 from .output import to_json
 from .recorders import Columns
 from .tally import LEDGER

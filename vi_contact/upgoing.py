@@ -15,8 +15,8 @@ from .core.algebra import Array
 from .core.checks import flag, provides, real, shown
 from .core.errors import InputError
 from .core.problem_checks import EXCITATION
-from .excitation import Excitation, GroundMotion
 from .ground_motion import Record
+from .laws.excitation import Excitation, GroundMotion
 
 
 class UpgoingVelocity:

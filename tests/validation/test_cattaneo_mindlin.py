@@ -35,9 +35,9 @@ from vi_contact.fem.loads import Traction
 from vi_contact.fem.mesh import build_mesh
 from vi_contact.fem.pairs import contact_pair
 from vi_contact.fem.trace import contact_surface
-from vi_contact.friction import Coulomb
+from vi_contact.laws.friction import Coulomb
+from vi_contact.laws.materials import LinearElastic
 from vi_contact.load_steps import quasi_static
-from vi_contact.materials import LinearElastic
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import Blocks
 from vi_contact.solvers.condensed import Condensed

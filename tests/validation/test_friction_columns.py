@@ -14,8 +14,8 @@ from energy_checks import rounded
 
 from vi_contact.core.step import ContactProblem
 from vi_contact.exact.columns import ObliqueImpact, ShearColumn
-from vi_contact.friction import Coulomb, Tresca
-from vi_contact.mass import ConsistentMass, Redistributed
+from vi_contact.laws.friction import Coulomb, Tresca
+from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.recorders import Contact, Energy
 from vi_contact.schemes.trapezoidal import Trapezoidal
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor

@@ -19,9 +19,9 @@ from vi_contact.core.surfaces import HalfSpace
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import Traction
 from vi_contact.fem.trace import contact_surface
-from vi_contact.friction import Coulomb, FrictionLaw, Tresca
+from vi_contact.laws.friction import Coulomb, FrictionLaw, Tresca
+from vi_contact.laws.materials import LinearElastic
 from vi_contact.load_steps import quasi_static
-from vi_contact.materials import LinearElastic
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.static import static_equilibrium
 

@@ -26,7 +26,7 @@ from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import Prescribed, Traction
 from vi_contact.fem.mesh import build_mesh
 from vi_contact.fem.trace import contact_surface
-from vi_contact.materials import LinearElastic
+from vi_contact.laws.materials import LinearElastic
 from vi_contact.meshes.ball import BallMesh
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.static import static_equilibrium

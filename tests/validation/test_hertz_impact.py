@@ -24,9 +24,9 @@ from vi_contact.exact.hertz import HertzPoint
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.mesh import build_mesh
 from vi_contact.fem.trace import contact_surface
-from vi_contact.friction import Coulomb
+from vi_contact.laws.friction import Coulomb
+from vi_contact.laws.mass import Redistributed
 from vi_contact.march import march
-from vi_contact.mass import Redistributed
 from vi_contact.meshes.ball import BallMesh
 from vi_contact.models.ball import SHARE, Ball, BallModel, build, quasi_static
 

@@ -15,7 +15,7 @@ from mpi4py import MPI
 from vi_contact.core.algebra import Array, Mask
 from vi_contact.core.surfaces import AnalyticGap
 from vi_contact.exact.punch import StripPunch
-from vi_contact.materials import LinearElastic
+from vi_contact.laws.materials import LinearElastic
 
 COMM = MPI.COMM_WORLD
 PUNCH = StripPunch(half_width=0.05, force=2.0e6)

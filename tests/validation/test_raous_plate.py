@@ -22,9 +22,9 @@ from vi_contact.core.step import ContactProblem, Solver, State
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import Prescribed, Traction
 from vi_contact.fem.trace import contact_surface
-from vi_contact.friction import Coulomb, FrictionLaw, Frictionless
+from vi_contact.laws.friction import Coulomb, FrictionLaw, Frictionless
+from vi_contact.laws.materials import LinearElastic
 from vi_contact.load_steps import quasi_static
-from vi_contact.materials import LinearElastic
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.fixed_point import FixedPoint
 from vi_contact.solvers.friction_newton import FrictionNewton

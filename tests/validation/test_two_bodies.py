@@ -24,10 +24,10 @@ from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import Prescribed
 from vi_contact.fem.mesh import build_mesh
 from vi_contact.fem.pairs import contact_pair
-from vi_contact.friction import Coulomb, Frictionless
+from vi_contact.laws.friction import Coulomb, Frictionless
+from vi_contact.laws.mass import ConsistentMass, Redistributed
+from vi_contact.laws.materials import LinearElastic
 from vi_contact.march import march
-from vi_contact.mass import ConsistentMass, Redistributed
-from vi_contact.materials import LinearElastic
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.cut import Welded
 from vi_contact.meshes.two_blocks import TwoBlocks

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from vi_contact.impact import NoImpact
+from vi_contact.laws.impact import NoImpact
 from vi_contact.models.choices import SCHEMES
 from vi_contact.models.wall import Wall, WallModel, build
 from vi_contact.recorders import Contact, Energy, Probe

@@ -29,8 +29,8 @@ from ..core.errors import InputError
 from ..core.step import ContactProblem
 from ..core.surfaces import ContactSurface
 from ..core.system import Load, SemiDiscreteSystem
-from ..friction import FrictionLaw, Frictionless
-from ..mass import ConsistentMass
+from ..laws.friction import FrictionLaw, Frictionless
+from ..laws.mass import ConsistentMass
 from .elements import Elements, beam_matrices, rod_matrices
 from .space import BeamSpace
 from .values import Rod, Start, TimoshenkoBeam

@@ -27,7 +27,7 @@ from ..core.errors import InputError
 from ..core.initial_gap import admissible_gap
 from ..core.step import EffectiveMatrix, StepProblem
 from ..core.surfaces import ContactSurface, Obstacle, Touching, nodal_frames
-from ..friction import FrictionLaw, Frictionless
+from ..laws.friction import FrictionLaw, Frictionless
 from .boundary_mesh import BoundaryMesh
 from .energetic import summed
 from .poincare_steklov import CondensedCompliance

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..core.checks import array, counted, flag, instance, mask, shape_of
 from ..core.errors import InputError
-from ..materials import LinearElastic
+from ..laws.materials import LinearElastic
 from .boundary_mesh import BoundaryMesh
 from .convolution_quadrature import ConvolutionQuadrature, Frequencies
 from .energetic import NUMBERS, check_time_step

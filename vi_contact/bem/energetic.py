@@ -23,7 +23,7 @@ from scipy.linalg import cho_factor, cho_solve, lu_factor, lu_solve
 
 from ..core.checks import array, attributes, counted, flag, instance, mask, number, shape_of, whole
 from ..core.errors import InputError
-from ..materials import LinearElastic
+from ..laws.materials import LinearElastic
 from .boundary_mesh import BoundaryMesh
 from .operators import Operators, check_body
 from .quadrature import Orders

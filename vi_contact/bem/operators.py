@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..core.checks import instance, number
-from ..materials import LinearElastic
+from ..laws.materials import LinearElastic
 from .boundary_mesh import BoundaryMesh
 from .boundary_operators import Galerkin, OperatorMatrices
 from .fundamental_solution import LaplaceKernels, TimeKernels

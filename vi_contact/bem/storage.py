@@ -10,7 +10,7 @@ import numpy as np
 
 from ..core import checks
 from ..core.errors import InputError
-from ..materials import LinearElastic
+from ..laws.materials import LinearElastic
 from .boundary_mesh import BoundaryMesh
 from .element_pairs import ElementPairs
 from .energetic import EnergeticBlocks, energetic_blocks

@@ -21,7 +21,7 @@ from ..core.algebra import Array
 from ..core.checks import attributes, instance, whole
 from ..core.errors import InputError, StepFailure
 from ..core.step import StepResult
-from ..friction import project
+from ..laws.friction import project
 from .contact import BoundaryContact
 from .contact_run import ContactRun, run_of
 from .energetic import summed

@@ -23,7 +23,7 @@ from ..core.algebra import Array
 from ..core.checks import instance
 from ..core.errors import InputError, StepFailure
 from ..core.step import ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
-from ..impact import NoImpact
+from ..laws.impact import NoImpact
 from ..schemes.midpoint import Midpoint
 from ..solvers.condensed import Condensed
 from .contact_law import ContactLayer

@@ -20,10 +20,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..excitation import Excitation
-from ..friction import FrictionLaw, Frictionless
-from ..impact import ImpactLaw
-from ..mass import MassLaw
+from ..laws.excitation import Excitation
+from ..laws.friction import FrictionLaw, Frictionless
+from ..laws.impact import ImpactLaw
+from ..laws.mass import MassLaw
 from .algebra import Algebra, Array, Factor, Mask, Matrix
 from .errors import InputError
 from .problem_checks import check_problem

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from ..core.algebra import Array
 from ..core.checks import attributes
-from ..materials import LinearElastic
+from ..laws.materials import LinearElastic
 from .waves import History, reflected
 
 

@@ -25,7 +25,7 @@ import numpy as np
 from ..core.algebra import Array
 from ..core.checks import attributes
 from ..core.errors import InputError
-from ..materials import LinearElastic
+from ..laws.materials import LinearElastic
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core.algebra import Array
-from ..materials import LinearElastic
+from ..laws.materials import LinearElastic
 from .surface_waves import dashpot_energy
 
 

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..core.algebra import Array
 from ..core.checks import attributes
-from ..materials import LinearElastic
+from ..laws.materials import LinearElastic
 
 
 @dataclass(frozen=True)

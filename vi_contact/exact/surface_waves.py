@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 
 from ..core.algebra import Array
 from ..core.errors import InputError
-from ..materials import LinearElastic
+from ..laws.materials import LinearElastic
 
 
 def rayleigh_speed(material: LinearElastic) -> float:

@@ -19,7 +19,7 @@ import ufl
 from ..core.algebra import Array, Mask
 from ..core.errors import InputError
 from ..core.system import Load, SemiDiscreteSystem
-from ..materials import Damping, LinearElastic, Section
+from ..laws.materials import Damping, LinearElastic, Section
 from . import compat
 from .assembly_checks import check_body, check_boundaries, check_initial
 from .dashpots import CompliantBase, DashpotMatrix, Dashpots, incoming, tell

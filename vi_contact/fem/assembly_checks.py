@@ -12,7 +12,7 @@ from dolfinx.mesh import Mesh
 
 from ..core.checks import flag, instance, provides, refuse, several
 from ..core.errors import InputError
-from ..materials import Damping, LinearElastic, NoDamping, PlaneStrain, PlaneStress, Section, Solid
+from ..laws.materials import Damping, LinearElastic, NoDamping, PlaneStrain, PlaneStress, Section, Solid
 from .dashpots import Dashpots
 from .groups import cells_of, facets_of, field_given
 from .loads import BodyForce, Prescribed, Traction

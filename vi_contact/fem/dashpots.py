@@ -28,7 +28,7 @@ from ..core.algebra import Array
 from ..core.checks import function, instance, real, shown
 from ..core.errors import InputError
 from ..core.system import Pace
-from ..materials import LinearElastic
+from ..laws.materials import LinearElastic
 from . import compat
 from .groups import facets_of
 from .mesh import Facets

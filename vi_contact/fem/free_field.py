@@ -27,8 +27,8 @@ from ..core.errors import InputError
 from ..core.problem_checks import EXCITATION
 from ..core.step import Scheme
 from ..core.system import Pace
-from ..excitation import Excitation
-from ..materials import Section
+from ..laws.excitation import Excitation
+from ..laws.materials import Section
 from ..run_checks import check_scheme
 from ..schemes.trapezoidal import Trapezoidal
 from ..soil_column import SoilColumn

@@ -24,8 +24,8 @@ from ..fem.assembly import assemble
 from ..fem.loads import Prescribed
 from ..fem.mesh import build_mesh
 from ..fem.trace import contact_surface
-from ..mass import MassLaw
-from ..materials import LinearElastic
+from ..laws.mass import MassLaw
+from ..laws.materials import LinearElastic
 from ..meshes.ball import BallMesh
 
 SHARE = 4.0

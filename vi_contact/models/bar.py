@@ -21,9 +21,9 @@ from ..fem.assembly import assemble
 from ..fem.loads import BodyForce
 from ..fem.mesh import build_mesh
 from ..fem.trace import contact_surface
-from ..impact import ImpactLaw
-from ..mass import MassLaw
-from ..materials import LinearElastic, PlaneStrain, Solid
+from ..laws.impact import ImpactLaw
+from ..laws.mass import MassLaw
+from ..laws.materials import LinearElastic, PlaneStrain, Solid
 from ..meshes.block import BlockMesh
 
 SIDES = {1: ("left", "right"), 2: ("bottom", "top"), 3: ("bottom", "top")}  # foot and top of a BlockMesh

@@ -20,8 +20,8 @@ from ..core.algebra import Array, Mask
 from ..core.checks import function, instance, number, whole
 from ..core.errors import InputError
 from ..core.surfaces import HalfSpace
-from ..friction import FrictionLaw, Frictionless
-from ..materials import LinearElastic
+from ..laws.friction import FrictionLaw, Frictionless
+from ..laws.materials import LinearElastic
 
 Load = Callable[[float], float]
 BOTTOM, RIGHT, TOP, LEFT = range(4)  # sides of a box

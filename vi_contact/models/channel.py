@@ -19,19 +19,19 @@ from ..core.errors import InputError
 from ..core.step import ContactProblem, ImpactLaw, Recorder
 from ..core.surfaces import ContactSurface
 from ..core.system import SemiDiscreteSystem
-from ..excitation import Excitation, Harmonic
 from ..fem.assembly import assemble
 from ..fem.joined import together
 from ..fem.loads import Prescribed, as_tuple
 from ..fem.mesh import build_mesh
 from ..fem.pairs import contact_pair
-from ..friction import FrictionLaw, Frictionless
-from ..impact import Inelastic, MassProjection
-from ..mass import ConsistentMass, MassLaw
-from ..materials import Damping, LinearElastic, NoDamping, PlaneStrain
+from ..laws.excitation import Excitation, Harmonic
+from ..laws.friction import FrictionLaw, Frictionless
+from ..laws.impact import Inelastic, MassProjection
+from ..laws.mass import ConsistentMass, MassLaw
+from ..laws.materials import Damping, LinearElastic, NoDamping, PlaneStrain
+from ..laws.weight import own_weight
 from ..meshes.channel import ChannelMesh
 from ..recorders import Contact, Energy, Probe
-from ..weight import own_weight
 from .channel_points import Openings, SoilProbe
 from .channel_sides import RockBelow, Rollers, Sides
 

@@ -13,11 +13,11 @@ from ..base_motion import BaseMotion, base_motion
 from ..core.algebra import Array
 from ..core.errors import InputError
 from ..core.step import Scheme
-from ..excitation import Excitation
 from ..fem.fields import XDMF
-from ..friction import Coulomb
-from ..impact import Inelastic, MassProjection
-from ..materials import LinearElastic
+from ..laws.excitation import Excitation
+from ..laws.friction import Coulomb
+from ..laws.impact import Inelastic, MassProjection
+from ..laws.materials import LinearElastic
 from ..plotting import plot_certificate, plot_contact, plot_energy, plot_excitation, plot_points
 from ..simulate import Solution, simulate
 from ..solvers.volume import Volume

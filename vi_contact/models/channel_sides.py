@@ -9,12 +9,12 @@ from typing import Any, ClassVar, Protocol
 from ..base_motion import BaseMotion
 from ..core.algebra import Array
 from ..core.step import Scheme
-from ..excitation import Excitation
 from ..fem.dashpots import CompliantBase, Dashpots
 from ..fem.free_field import FreeField
 from ..fem.loads import Prescribed
 from ..fem.ties import Tied
-from ..materials import LinearElastic
+from ..laws.excitation import Excitation
+from ..laws.materials import LinearElastic
 from ..time_steps import Schedule
 
 ENDS = ("left_side", "right_side")

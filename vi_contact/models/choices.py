@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..core.step import Scheme, Solver
-from ..impact import ImpactLaw, Inelastic, NoImpact
-from ..mass import ConsistentMass, MassLaw
+from ..laws.impact import ImpactLaw, Inelastic, NoImpact
+from ..laws.mass import ConsistentMass, MassLaw
 from ..schemes.contact_stabilised import ContactStabilisedNewmark
 from ..schemes.generalised_alpha import GeneralisedAlpha
 from ..schemes.hht import HHT

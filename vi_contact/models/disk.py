@@ -18,9 +18,9 @@ from ..core.system import SemiDiscreteSystem
 from ..fem.assembly import assemble
 from ..fem.mesh import build_mesh
 from ..fem.trace import contact_surface
-from ..friction import FrictionLaw, Frictionless
-from ..mass import MassLaw
-from ..materials import LinearElastic, PlaneStrain
+from ..laws.friction import FrictionLaw, Frictionless
+from ..laws.mass import MassLaw
+from ..laws.materials import LinearElastic, PlaneStrain
 from ..meshes.disk import DiskMesh
 
 

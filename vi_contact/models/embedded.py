@@ -21,9 +21,9 @@ from ..fem.joined import together
 from ..fem.loads import Traction
 from ..fem.mesh import build_mesh
 from ..fem.pairs import contact_pair
-from ..friction import FrictionLaw, Frictionless
-from ..mass import MassLaw
-from ..materials import LinearElastic, PlaneStrain
+from ..laws.friction import FrictionLaw, Frictionless
+from ..laws.mass import MassLaw
+from ..laws.materials import LinearElastic, PlaneStrain
 from ..meshes.block import BlockMesh
 from ..meshes.cut import Welded
 from ..meshes.two_blocks import Blocks

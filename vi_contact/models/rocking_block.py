@@ -25,13 +25,13 @@ from ..core.errors import InputError
 from ..core.step import ContactProblem, Report, State
 from ..core.surfaces import HalfSpace
 from ..exact.housner import HousnerBlock
-from ..excitation import Excitation
 from ..fem.assembly import assemble
 from ..fem.gravity import geometric_stiffness
 from ..fem.loads import BodyForce, Prescribed
 from ..fem.mesh import build_mesh
 from ..fem.trace import contact_surface
-from ..materials import Damping, LinearElastic, PlaneStress, Rayleigh
+from ..laws.excitation import Excitation
+from ..laws.materials import Damping, LinearElastic, PlaneStress, Rayleigh
 from ..meshes.block import BlockMesh
 from ..solvers.condensed import Condensed
 from ..static import static_equilibrium

@@ -13,13 +13,13 @@ from ..core.errors import InputError
 from ..core.step import ContactProblem, State
 from ..core.surfaces import HalfSpace
 from ..exact.sliding import SlidingBlock
-from ..excitation import Excitation
 from ..fem.assembly import assemble
 from ..fem.loads import BodyForce
 from ..fem.mesh import build_mesh
 from ..fem.trace import contact_surface
-from ..friction import Coulomb
-from ..materials import Damping, LinearElastic, PlaneStress, Rayleigh
+from ..laws.excitation import Excitation
+from ..laws.friction import Coulomb
+from ..laws.materials import Damping, LinearElastic, PlaneStress, Rayleigh
 from ..meshes.block import BlockMesh
 from ..solvers.condensed import Condensed
 from ..static import static_equilibrium

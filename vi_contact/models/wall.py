@@ -13,16 +13,16 @@ from ..core.errors import InputError
 from ..core.step import ContactProblem, ImpactLaw
 from ..core.surfaces import ContactSurface, HalfSpace, empty_surface
 from ..core.system import SemiDiscreteSystem
-from ..excitation import Excitation, Harmonic
 from ..fem.assembly import assemble
 from ..fem.loads import BodyForce
 from ..fem.mesh import Facets, build_mesh
 from ..fem.petsc_algebra import MpiComm
 from ..fem.trace import contact_surface
 from ..ground_motion import STANDARD_GRAVITY
-from ..impact import Inelastic
-from ..mass import ConsistentMass, MassLaw
-from ..materials import Damping, LinearElastic, NoDamping, PlaneStress
+from ..laws.excitation import Excitation, Harmonic
+from ..laws.impact import Inelastic
+from ..laws.mass import ConsistentMass, MassLaw
+from ..laws.materials import Damping, LinearElastic, NoDamping, PlaneStress
 from ..meshes.wall import WallMesh
 from ..modal import lowest_frequency
 from .run_options import check_word

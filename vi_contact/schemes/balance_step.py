@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..core.step import ContactProblem
-from ..mass import MassLaw, Redistributed
+from ..laws.mass import MassLaw, Redistributed
 from .guard import contact_in_the_balance, needs_no_impact_law
 
 

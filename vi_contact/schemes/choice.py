@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ..core.step import ContactProblem, Scheme
-from ..impact import NoImpact
-from ..mass import ConsistentMass
+from ..laws.impact import NoImpact
+from ..laws.mass import ConsistentMass
 from ..run_checks import check_problem_given, check_scheme
 from .trapezoidal import Trapezoidal
 from .zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..core.errors import InputError
 from ..core.step import ContactProblem
-from ..impact import NoImpact
+from ..laws.impact import NoImpact
 
 log = logging.getLogger(__name__)
 

@@ -18,7 +18,7 @@ from ..certified import TOLERANCE, CertifiedSolver
 from ..core.algebra import Array, Mask
 from ..core.errors import StepFailure
 from ..core.step import ContactProblem, State, StepProblem
-from ..friction import Frictionless
+from ..laws.friction import Frictionless
 from ..solvers.condensed import Condensed
 from .acceleration import mass_matrix, rigid_part
 

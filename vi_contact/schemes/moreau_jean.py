@@ -36,7 +36,7 @@ from ..core.algebra import Array, Mask, max_abs
 from ..core.checks import flag, real, shown
 from ..core.errors import InputError
 from ..core.step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
-from ..impact import NoImpact
+from ..laws.impact import NoImpact
 from .single_step import SingleStep, stepped
 
 ROUND_OFF = 1e-12  # of the largest displacement: smaller gaps are closed

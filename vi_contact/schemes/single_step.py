@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from ..core.algebra import Array
 from ..core.step import ContactProblem, State, StepProblem, StepResult
-from ..mass import ConsistentMass, MassLaw
+from ..laws.mass import ConsistentMass, MassLaw
 from .guard import needs_mass
 
 

@@ -27,7 +27,7 @@ import numpy as np
 
 from ..core.checks import provides
 from ..core.errors import InputError, StepFailure
-from ..friction import project
+from ..laws.friction import project
 from .lcp import EPS, Array, Mask, check_gap, energy_scale, largest
 
 

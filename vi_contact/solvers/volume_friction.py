@@ -20,7 +20,7 @@ import numpy as np
 from ..core.algebra import Array, Mask
 from ..core.errors import StepFailure
 from ..core.step import StepProblem, StepResult
-from ..friction import project
+from ..laws.friction import project
 from .extrapolation import Anderson
 from .lcp import largest
 from .slip_rate import RateIteration

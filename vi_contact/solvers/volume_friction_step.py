@@ -8,7 +8,7 @@ import numpy as np
 
 from ..core.algebra import Array, Mask, max_abs
 from ..core.step import StepProblem
-from ..friction import project
+from ..laws.friction import project
 from .volume_friction_system import RubbingSystem
 from .volume_step import ScaledStep, fraction
 

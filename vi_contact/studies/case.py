@@ -22,15 +22,16 @@ from ..core.errors import InputError
 from ..core.step import ContactProblem, Recorder, Scheme, Solver
 from ..core.surfaces import ContactSurface, empty_surface
 from ..cross_check import CrossChecked
-from ..excitation import Excitation
 from ..fem.assembly import assemble
 from ..fem.joined import together
 from ..fem.mesh import Tags, build_mesh, read_mesh
 from ..folder_lock import locked
-from ..friction import FrictionLaw, Frictionless
-from ..impact import ImpactLaw
-from ..mass import MassLaw
-from ..materials import LinearElastic
+from ..laws.excitation import Excitation
+from ..laws.friction import FrictionLaw, Frictionless
+from ..laws.impact import ImpactLaw
+from ..laws.mass import MassLaw
+from ..laws.materials import LinearElastic
+from ..laws.weight import with_weight
 from ..meshes.gmsh_session import MeshScript
 from ..output import on_root, run_folder, write_atomically
 from ..recorders import Contact, Energy, Steps
@@ -39,7 +40,6 @@ from ..simulate import Solution, simulate
 from ..solvers.condensed import Condensed
 from ..static import initial_state, static_equilibrium
 from ..time_steps import course
-from ..weight import with_weight
 from ..writer import FieldWriter
 from .calls import Callee, Named, Node, Spot, callee, groups, needs_mesh
 from .models import Parts

@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import Any
 
 from ..core.errors import InputError
-from ..excitation import GroundMotion
 from ..ground_motion import Record, scaled
+from ..laws.excitation import GroundMotion
 from ..output import CHECKPOINT, SUMMARY, to_json, write_atomically
 from .case import Case, read_case
 

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from .. import friction, materials
 from ..core import surfaces
 from ..core.corners import FEATURE_ANGLE
 from ..core.surfaces import ContactSurface
@@ -19,6 +18,7 @@ from ..fem.pairs import contact_pair
 from ..fem.trace import contact_surface
 from ..ground_motion import Processing, Record, read_record
 from ..ground_motion.reader import LARGEST_PEAK
+from ..laws import friction, materials
 from ..upgoing import UpgoingVelocity
 
 

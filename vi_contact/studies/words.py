@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from .. import excitation, friction, impact, mass, materials, recorders, time_steps
+from .. import recorders, time_steps
 from ..core import surfaces
 from ..core.step import Recorder, Scheme, Solver
 from ..core.surfaces import ContactSurface
@@ -20,6 +20,7 @@ from ..fem.mortar import DualMortar
 from ..fem.reactions import Reactions
 from ..fem.section_forces import SectionForces
 from ..ground_motion import Record, synthetic
+from ..laws import excitation, friction, impact, mass, materials
 from ..meshes.ball import BallMesh
 from ..meshes.block import BlockMesh
 from ..meshes.channel import ChannelMesh

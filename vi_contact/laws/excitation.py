@@ -18,10 +18,10 @@ from typing import Protocol
 
 import numpy as np
 
-from .core.algebra import Array
-from .core.checks import attributes, instance, number, several
-from .core.errors import InputError
-from .ground_motion import Record
+from ..core.algebra import Array
+from ..core.checks import attributes, instance, number, several
+from ..core.errors import InputError
+from ..ground_motion import Record
 
 
 class Excitation(Protocol):

@@ -9,8 +9,8 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
-from .core.checks import number
-from .core.errors import InputError
+from ..core.checks import number
+from ..core.errors import InputError
 
 EXTREME = 1e100  # beyond it, and below its inverse, squares are no numbers any more
 

@@ -21,12 +21,12 @@ from typing import Protocol
 
 import numpy as np
 
-from .core.algebra import Array, Factor, Indices, Mask
-from .core.checks import function, real, shown
-from .core.corners import with_open_faces
-from .core.errors import InputError
-from .core.surfaces import ContactSurface
-from .core.system import SemiDiscreteSystem
+from ..core.algebra import Array, Factor, Indices, Mask
+from ..core.checks import function, real, shown
+from ..core.corners import with_open_faces
+from ..core.errors import InputError
+from ..core.surfaces import ContactSurface
+from ..core.system import SemiDiscreteSystem
 
 
 @dataclass(frozen=True)

@@ -18,9 +18,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from .core.algebra import Array
-from .core.checks import function, real, shown
-from .core.errors import InputError
+from ..core.algebra import Array
+from ..core.checks import function, real, shown
+from ..core.errors import InputError
 
 
 class FrictionLaw(Protocol):

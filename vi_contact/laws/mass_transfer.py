@@ -14,9 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .core.algebra import Array, Indices, Mask, Matrix
-from .core.errors import InputError
-from .core.system import SemiDiscreteSystem
+from ..core.algebra import Array, Indices, Mask, Matrix
+from ..core.errors import InputError
+from ..core.system import SemiDiscreteSystem
 
 KEPT = 1e-10  # of a rigid motion, in the units of the neighbourhood
 NOTHING = 1e-10  # of a node's own mass: neighbours with less cannot carry it

@@ -14,13 +14,13 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from .core.algebra import Array, Comm, Indices, Mask, Matrix, max_abs
-from .core.checks import provides, real, shown
-from .core.corners import lumped_entries
-from .core.errors import InputError
-from .core.surfaces import ContactSurface
-from .core.system import SemiDiscreteSystem
-from .handing_over import from_neighbours, rigid_motions
+from ..core.algebra import Array, Comm, Indices, Mask, Matrix, max_abs
+from ..core.checks import provides, real, shown
+from ..core.corners import lumped_entries
+from ..core.errors import InputError
+from ..core.surfaces import ContactSurface
+from ..core.system import SemiDiscreteSystem
+from .mass_transfer import from_neighbours, rigid_motions
 
 LIGHT = 1e-9  # of the diagonal entry of M: a row sum that is no mass
 LARGEST_CORRECTION = 0.35  # of a node's lumped mass: beyond, the mesh is too coarse to move mass about
