@@ -118,7 +118,7 @@ def acceleration(text: str) -> float:
 def _read(options: argparse.Namespace, path: str) -> Any:
     """The record of a file after the processing asked for."""
     from .ground_motion import Processing, read_record
-    from .ground_motion.reader import LARGEST_PEAK
+    from .ground_motion.formats.reader import LARGEST_PEAK
 
     steps = Processing(
         trim=options.trim, pad=options.pad, mean=options.remove_mean, taper=options.taper, low=options.low,

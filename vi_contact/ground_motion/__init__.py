@@ -4,6 +4,8 @@ from .baseline import baseline_corrected
 from .chain import Processing
 from .ec8 import EC8Spectrum
 from .filters import filtered, tapered, without_mean
+from .formats.reader import read_record
+from .formats.writer import write_at2, write_columns, write_path_series
 from .info import motion_info, record_info
 from .intensity import (
     arias,
@@ -20,13 +22,11 @@ from .intensity import (
 )
 from .kanai_tajimi import Envelope, KanaiTajimi, synthetic
 from .processing import integrated, resampled, scaled, scaled_to_pga
-from .reader import read_record
 from .record import STANDARD_GRAVITY, UNITS, Record
 from .scaling import scaled_to_arias, scaled_to_psa
 from .spectra import ResponseSpectrum, fourier_spectrum, response_spectrum
 from .spectral_intensity import housner_intensity, mean_period, predominant_period, psa
 from .window import padded, trimmed
-from .writer import write_at2, write_columns, write_path_series
 
 __all__ = [
     "STANDARD_GRAVITY", "UNITS", "EC8Spectrum", "Envelope", "KanaiTajimi", "Processing", "Record", "ResponseSpectrum",

@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 
 from .chain import Processing
+from .formats.reader import LARGEST_PEAK, read_record
 from .intensity import arias, cav, d5_95, pga, pga_time, pgd, pgv, rms
 from .processing import integrated
-from .reader import LARGEST_PEAK, read_record
 from .record import STANDARD_GRAVITY, UNITS, Record
 from .spectral_intensity import housner_intensity, mean_period, predominant_period
 

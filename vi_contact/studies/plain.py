@@ -17,7 +17,7 @@ from ..fem.mesh import Facets
 from ..fem.pairs import contact_pair
 from ..fem.trace import contact_surface
 from ..ground_motion import Processing, Record, read_record
-from ..ground_motion.reader import LARGEST_PEAK
+from ..ground_motion.formats.reader import LARGEST_PEAK
 from ..laws import friction, materials
 from ..upgoing import UpgoingVelocity
 

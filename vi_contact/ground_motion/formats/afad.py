@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..core.errors import InputError
-from .record import UNITS, Record, file_dt, file_units
+from ...core.errors import InputError
+from ..record import UNITS, Record, file_dt, file_units
 from .text import TextFile, filled, to_float
 
 COMPONENTS = ("N-S", "E-W", "U-D")

@@ -11,7 +11,7 @@ import re
 from collections.abc import Callable, Sequence
 from enum import Enum
 
-from ..core.errors import InputError
+from ...core.errors import InputError
 
 _WORD = re.compile(r"[^\s;]++")
 _INSIDE = re.compile(r"(?<=\d),(?=\d)")

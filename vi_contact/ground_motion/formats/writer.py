@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 
-from ..core.errors import InputError
-from .record import UNITS, Record, canonical_units
+from ...core.errors import InputError
+from ..record import UNITS, Record, canonical_units
 
 DIGITS = 9
 """Significant digits of a written sample; what is read back differs by half a unit in the last of them."""

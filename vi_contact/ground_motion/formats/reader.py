@@ -7,11 +7,11 @@ import os
 
 import numpy as np
 
-from ..core.checks import number
-from ..core.errors import InputError
+from ...core.checks import number
+from ...core.errors import InputError
+from ..processing import resampled
+from ..record import STANDARD_GRAVITY, Record
 from . import afad, at2, columns, cosmos, esm, knet, simcenter, smc
-from .processing import resampled
-from .record import STANDARD_GRAVITY, Record
 from .text import TextFile, load_text
 
 SEVERAL = (cosmos, afad, simcenter)

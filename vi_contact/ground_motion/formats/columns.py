@@ -13,11 +13,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..core.algebra import Array
-from ..core.checks import counted, number
-from ..core.errors import InputError
+from ...core.algebra import Array
+from ...core.checks import counted, number
+from ...core.errors import InputError
+from ..record import UNITS, Record, file_dt, file_units
 from .at2 import begin_data
-from .record import UNITS, Record, file_dt, file_units
 from .text import TextFile, filled
 
 JITTER = 1e-6

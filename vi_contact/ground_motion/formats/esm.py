@@ -9,8 +9,8 @@ import re
 
 import numpy as np
 
-from ..core.errors import InputError
-from .record import UNITS, Record, file_dt, file_units
+from ...core.errors import InputError
+from ..record import UNITS, Record, file_dt, file_units
 from .text import TextFile, filled, to_float
 
 NEEDED = ("SAMPLING_INTERVAL_S", "NDATA", "UNITS")

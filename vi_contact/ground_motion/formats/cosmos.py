@@ -14,9 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core.algebra import Array
-from ..core.errors import InputError
-from .record import UNITS, Record, file_dt, file_units
+from ...core.algebra import Array
+from ...core.errors import InputError
+from ..record import UNITS, Record, file_dt, file_units
 from .text import NUMBER, TextFile, number, whole
 
 STEP = 33

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from ..core.checks import shown
-from ..core.errors import InputError
-from .record import UNITS, Record, file_dt, file_units
+from ...core.checks import shown
+from ...core.errors import InputError
+from ..record import UNITS, Record, file_dt, file_units
 from .text import HEAD, TextFile
 
 

@@ -12,8 +12,8 @@ import re
 
 import numpy as np
 
-from ..core.errors import InputError
-from .record import UNITS, Record, file_dt, file_units
+from ...core.errors import InputError
+from ..record import UNITS, Record, file_dt, file_units
 from .text import NUMBER, TextFile, filled, number, whole
 
 HEADER_LINES = 8

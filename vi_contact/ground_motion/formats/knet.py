@@ -10,8 +10,8 @@ import re
 
 import numpy as np
 
-from ..core.errors import InputError
-from .record import UNITS, Record, file_dt, file_units
+from ...core.errors import InputError
+from ..record import UNITS, Record, file_dt, file_units
 from .text import NUMBER, TextFile, filled, number
 
 KEYS = ("Origin Time", "Station Code", "Record Time", "Sampling Freq(Hz)", "Duration Time(s)", "Dir.", "Scale Factor",

@@ -11,9 +11,9 @@ import re
 
 import numpy as np
 
-from ..core.algebra import Array
-from ..core.errors import InputError
-from .record import UNITS, Record, file_dt, file_units
+from ...core.algebra import Array
+from ...core.errors import InputError
+from ..record import UNITS, Record, file_dt, file_units
 from .text import TextFile
 
 TEXT_LINES, INTEGER_LINES, REAL_LINES = 11, 6, 10

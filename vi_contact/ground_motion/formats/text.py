@@ -10,8 +10,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from ..core.checks import LARGEST, shown
-from ..core.errors import InputError
+from ...core.checks import LARGEST, shown
+from ...core.errors import InputError
 from .commas import Commas, commas_of
 
 NUMBER = r"[+-]?(?:(?<![\d.])\d++(?:\.\d*+)?|(?<!\d)\.\d++)(?:[EeDd][+-]?\d++)?"
