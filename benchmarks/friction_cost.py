@@ -20,7 +20,7 @@ from step_cost import DIVISIONS, SCHEME, LinearSteps, StepsWithContact, memory  
 
 import vi_contact as vc
 from vi_contact.models.wall import Wall, build
-from vi_contact.solvers.extrapolation import Anderson
+from vi_contact.solvers.friction.extrapolation import Anderson
 
 ROUTES: dict[str, Any] = {
     "FrictionNewton": vc.Condensed(),

@@ -33,9 +33,9 @@ import vi_contact as vc  # noqa: E402
 from vi_contact.meshes.channel import ChannelMesh  # noqa: E402
 from vi_contact.models import channel  # noqa: E402
 from vi_contact.models.wall import Wall, build  # noqa: E402
-from vi_contact.solvers.volume import Volume  # noqa: E402
-from vi_contact.solvers.volume_factorised import OneFactorisation  # noqa: E402
-from vi_contact.solvers.volume_snes import ReducedNewton  # noqa: E402
+from vi_contact.solvers.volume.one_factorisation import OneFactorisation  # noqa: E402
+from vi_contact.solvers.volume.route import Volume  # noqa: E402
+from vi_contact.solvers.volume.snes import ReducedNewton  # noqa: E402
 from vi_contact.static import initial_state  # noqa: E402
 
 SCHEME = vc.ZienkiewiczWoodTaylor(phi=0.5)

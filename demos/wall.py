@@ -25,8 +25,8 @@ from vi_contact import fem
 from vi_contact.models import wall as wall_model
 from vi_contact.models.wall_run import draw
 from vi_contact.plotting import plot_runs
-from vi_contact.solvers.volume import Volume
-from vi_contact.solvers.volume_snes import ReducedNewton
+from vi_contact.solvers.volume.route import Volume
+from vi_contact.solvers.volume.snes import ReducedNewton
 
 # Parameters ----------------------------------------------------------------------------------------------------------
 WALL = wall_model.Wall(height=9.0, width=6.0, thickness=0.20, divisions=(8, 12))  # [m]

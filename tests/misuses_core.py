@@ -22,7 +22,7 @@ from mpi4py import MPI
 import vi_contact as vc
 from vi_contact import fem
 from vi_contact.meshes.block import BlockMesh
-from vi_contact.solvers.volume import OneFactorisation, Volume
+from vi_contact.solvers.volume.route import OneFactorisation, Volume
 
 Wrong = Mapping[str, Any]
 HUGE = 10**5000  # more digits than Python prints

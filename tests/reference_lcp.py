@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 
-from vi_contact.solvers.lcp import LCP, Array, Mask
+from vi_contact.solvers.normal.lcp import LCP, Array, Mask
 
 
 def enumerate_lcp(G: Array, q: Array, bilateral: Mask) -> Array:

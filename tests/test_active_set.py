@@ -7,9 +7,9 @@ import pytest
 from reference_lcp import KINDS, degenerate, enumerate_lcp, generic, problems, spd
 
 from vi_contact.core.errors import StepFailure
-from vi_contact.solvers import active_set
-from vi_contact.solvers.active_set import ActiveSet
-from vi_contact.solvers.lcp import LCP
+from vi_contact.solvers.normal import active_set
+from vi_contact.solvers.normal.active_set import ActiveSet
+from vi_contact.solvers.normal.lcp import LCP
 
 pytestmark = pytest.mark.serial
 

@@ -20,10 +20,10 @@ from vi_contact.laws.friction import Coulomb, Frictionless
 from vi_contact.schemes.linear_multistep import LinearMultistep
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers import condensed
-from vi_contact.solvers.active_set import ActiveSet
 from vi_contact.solvers.condensed import AppliedDelassus, Condensed
-from vi_contact.solvers.hildreth import Hildreth
-from vi_contact.solvers.mprgp import ProjectedCG
+from vi_contact.solvers.normal.active_set import ActiveSet
+from vi_contact.solvers.normal.hildreth import Hildreth
+from vi_contact.solvers.normal.projected_cg import ProjectedCG
 
 pytestmark = pytest.mark.serial
 HALF, DT = ZienkiewiczWoodTaylor(), 5e-3

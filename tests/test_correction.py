@@ -10,17 +10,17 @@ import pytest
 from fem_problems import max_over_ranks, shaken_wall
 from mpi4py import MPI
 
-from vi_contact.certified import NEAR, TOLERANCE, CertifiedSolver
 from vi_contact.core.errors import StepFailure
 from vi_contact.core.step import ContactProblem, EffectiveMatrix, Scheme, StepProblem, StepResult
 from vi_contact.core.verify import kkt_residual
-from vi_contact.correction import Share, added, left_over, share_of
 from vi_contact.laws.friction import Coulomb, ExponentialDecay, SlipRateCoulomb, Tresca
 from vi_contact.schemes.moreau_jean import MoreauJean
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
+from vi_contact.solvers.certified import NEAR, TOLERANCE, CertifiedSolver
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.solvers.nsgs import NSGS
-from vi_contact.solvers.volume import OneFactorisation, ReducedNewton, Volume
+from vi_contact.solvers.correction import Share, added, left_over, share_of
+from vi_contact.solvers.friction.nsgs import NSGS
+from vi_contact.solvers.volume.route import OneFactorisation, ReducedNewton, Volume
 from vi_contact.static import initial_state
 
 COMM = MPI.COMM_WORLD

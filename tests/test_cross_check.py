@@ -19,11 +19,11 @@ from vi_contact.laws.impact import Inelastic
 from vi_contact.schemes.linear_multistep import LinearMultistep
 from vi_contact.schemes.ss22 import SS22
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
-from vi_contact.solvers.active_set import ActiveSet
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.solvers.hildreth import Hildreth
-from vi_contact.solvers.mprgp import ProjectedCG
-from vi_contact.solvers.nsgs import NSGS
+from vi_contact.solvers.friction.nsgs import NSGS
+from vi_contact.solvers.normal.active_set import ActiveSet
+from vi_contact.solvers.normal.hildreth import Hildreth
+from vi_contact.solvers.normal.projected_cg import ProjectedCG
 from vi_contact.time_steps import HalvedAtImpact, Schedule
 
 pytestmark = pytest.mark.serial

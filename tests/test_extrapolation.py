@@ -10,7 +10,7 @@ import pytest
 
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
-from vi_contact.solvers.extrapolation import Aitken, Anderson, Plain
+from vi_contact.solvers.friction.extrapolation import Aitken, Anderson, Plain
 
 pytestmark = pytest.mark.serial
 

@@ -30,7 +30,7 @@ from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.extract import MeshArrays
 from vi_contact.meshes.from_arrays import add_arrays
 from vi_contact.meshes.two_blocks import Blocks
-from vi_contact.solvers.volume import Volume
+from vi_contact.solvers.volume.route import Volume
 
 COMM = MPI.COMM_WORLD
 SIDES = ("left", "bottom", "right", "top", "back", "front")

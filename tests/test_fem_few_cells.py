@@ -24,7 +24,7 @@ from vi_contact.recorders import Contact, Energy, Probe
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.simulate import Solution, simulate
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.solvers.volume import Volume
+from vi_contact.solvers.volume.route import Volume
 
 FEW = {
     "bar": {"lengths": (2.0,), "divisions": (1,)},

@@ -32,7 +32,7 @@ from vi_contact.meshes.two_blocks import Blocks, TwoBlocks
 from vi_contact.schemes.midpoint import Midpoint
 from vi_contact.schemes.trapezoidal import Trapezoidal
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.solvers.volume import OneFactorisation, ReducedNewton, Volume
+from vi_contact.solvers.volume.route import OneFactorisation, ReducedNewton, Volume
 from vi_contact.static import static_equilibrium
 
 COMM = MPI.COMM_WORLD

@@ -28,7 +28,7 @@ from vi_contact.meshes.block import BlockMesh
 from vi_contact.schemes.contact_stabilised import ContactStabilisedNewmark
 from vi_contact.schemes.moreau_jean import MoreauJean
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.solvers.volume import OneFactorisation, ReducedNewton, Volume
+from vi_contact.solvers.volume.route import OneFactorisation, ReducedNewton, Volume
 from vi_contact.time_steps import HalvedAtImpact
 
 STEPS = 80

@@ -10,7 +10,6 @@ import pytest
 from column import column
 from test_friction_methods import small
 
-from vi_contact.certified import CertifiedSolver
 from vi_contact.core.step import ContactProblem, Report
 from vi_contact.core.surfaces import ContactSurface
 from vi_contact.laws.friction import Coulomb, Frictionless, Tresca
@@ -19,9 +18,10 @@ from vi_contact.march import march
 from vi_contact.schemes.trapezoidal import Trapezoidal
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers import condensed
+from vi_contact.solvers.certified import CertifiedSolver
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.solvers.friction_newton import FrictionNewton
-from vi_contact.solvers.mprgp import ProjectedCG
+from vi_contact.solvers.friction.newton import FrictionNewton
+from vi_contact.solvers.normal.projected_cg import ProjectedCG
 
 pytestmark = pytest.mark.serial
 SCHEME, DT = ZienkiewiczWoodTaylor(), 1e-2

@@ -24,7 +24,7 @@ from vi_contact.march import march
 from vi_contact.schemes.trapezoidal import Trapezoidal
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.solvers.nsgs import NSGS
+from vi_contact.solvers.friction.nsgs import NSGS
 
 SCHEMES = [(ZienkiewiczWoodTaylor(), ConsistentMass()), (Trapezoidal(), Redistributed())]
 NAMES = ["midpoint", "trapezoidal"]

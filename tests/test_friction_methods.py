@@ -10,14 +10,14 @@ import pytest
 
 from vi_contact.core.algebra import Array, Mask
 from vi_contact.core.errors import InputError, StepFailure
-from vi_contact.solvers import friction_linear
-from vi_contact.solvers.active_set import ActiveSet
-from vi_contact.solvers.extrapolation import Aitken, Anderson, Plain
-from vi_contact.solvers.fixed_point import FixedPoint, contraction
-from vi_contact.solvers.friction_newton import FrictionNewton
-from vi_contact.solvers.given_forces import GivenForces
-from vi_contact.solvers.nsgs import NSGS
-from vi_contact.solvers.uzawa import Uzawa
+from vi_contact.solvers.friction import linear as friction_linear
+from vi_contact.solvers.friction.extrapolation import Aitken, Anderson, Plain
+from vi_contact.solvers.friction.fixed_point import FixedPoint, contraction
+from vi_contact.solvers.friction.given_forces import GivenForces
+from vi_contact.solvers.friction.newton import FrictionNewton
+from vi_contact.solvers.friction.nsgs import NSGS
+from vi_contact.solvers.friction.uzawa import Uzawa
+from vi_contact.solvers.normal.active_set import ActiveSet
 
 pytestmark = pytest.mark.serial
 METHODS = [

@@ -7,9 +7,9 @@ import pytest
 from reference_lcp import generic, mixed
 
 from vi_contact.core.errors import StepFailure
-from vi_contact.solvers.active_set import ActiveSet
-from vi_contact.solvers.hildreth import Hildreth
-from vi_contact.solvers.lcp import LCP
+from vi_contact.solvers.normal.active_set import ActiveSet
+from vi_contact.solvers.normal.hildreth import Hildreth
+from vi_contact.solvers.normal.lcp import LCP
 
 pytestmark = pytest.mark.serial
 

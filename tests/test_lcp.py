@@ -7,7 +7,7 @@ import pytest
 from reference_lcp import spd
 
 from vi_contact.core.errors import InputError
-from vi_contact.solvers.lcp import LCP, energy_scale, largest_eigenvalue, scaled_dense
+from vi_contact.solvers.normal.lcp import LCP, energy_scale, largest_eigenvalue, scaled_dense
 
 pytestmark = pytest.mark.serial
 

@@ -19,7 +19,7 @@ from vi_contact.core.surfaces import ContactSurface
 from vi_contact.laws.friction import Coulomb, ExponentialDecay, FrictionLaw, SlipRateCoulomb, StaticKinetic, Tresca
 from vi_contact.load_steps import quasi_static
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.solvers.nsgs import NSGS
+from vi_contact.solvers.friction.nsgs import NSGS
 from vi_contact.static import static_equilibrium
 
 pytestmark = pytest.mark.serial

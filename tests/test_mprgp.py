@@ -8,9 +8,9 @@ import scipy.sparse as sp
 from reference_lcp import generic, spd
 
 from vi_contact.core.errors import InputError, StepFailure
-from vi_contact.solvers.active_set import ActiveSet
-from vi_contact.solvers.lcp import LCP
-from vi_contact.solvers.mprgp import ProjectedCG
+from vi_contact.solvers.normal.active_set import ActiveSet
+from vi_contact.solvers.normal.lcp import LCP
+from vi_contact.solvers.normal.projected_cg import ProjectedCG
 
 pytestmark = pytest.mark.serial
 

@@ -27,7 +27,7 @@ from vi_contact.meshes.two_blocks import Blocks
 from vi_contact.models.channel import Channel, build
 from vi_contact.rigid_bodies import RigidBodies
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.solvers.nsgs import NSGS
+from vi_contact.solvers.friction.nsgs import NSGS
 from vi_contact.static import initial_state, static_equilibrium
 
 COMM = MPI.COMM_WORLD

@@ -9,10 +9,10 @@ import pytest
 from reference_lcp import KINDS, enumerate_lcp, from_solution, generic, mixed, problems, spd
 
 from vi_contact.core.errors import InputError
-from vi_contact.solvers.active_set import ActiveSet
-from vi_contact.solvers.hildreth import Hildreth
-from vi_contact.solvers.lcp import LCP
-from vi_contact.solvers.mprgp import ProjectedCG
+from vi_contact.solvers.normal.active_set import ActiveSet
+from vi_contact.solvers.normal.hildreth import Hildreth
+from vi_contact.solvers.normal.lcp import LCP
+from vi_contact.solvers.normal.projected_cg import ProjectedCG
 
 pytestmark = pytest.mark.serial
 

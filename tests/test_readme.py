@@ -17,7 +17,7 @@ from vi_contact.cli import parser
 
 pytestmark = pytest.mark.serial
 ROOT = Path(__file__).resolve().parents[1]
-MODULES = ("vi_contact", "vi_contact.fem", "vi_contact.ground_motion", "vi_contact.solvers.volume")
+MODULES = ("vi_contact", "vi_contact.fem", "vi_contact.ground_motion", "vi_contact.solvers.volume.route")
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
 
 

@@ -25,7 +25,7 @@ from vi_contact.schemes.trapezoidal import Trapezoidal
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.simulate import simulate
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.solvers.hildreth import Hildreth
+from vi_contact.solvers.normal.hildreth import Hildreth
 
 serial = pytest.mark.serial
 

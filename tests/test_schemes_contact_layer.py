@@ -24,7 +24,7 @@ from vi_contact.meshes.two_blocks import TwoBlocks
 from vi_contact.schemes.contact_layer import relaxed
 from vi_contact.simulate import simulate
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.solvers.volume import ReducedNewton, Volume
+from vi_contact.solvers.volume.route import ReducedNewton, Volume
 
 COMM = MPI.COMM_WORLD
 Rows = list[float]

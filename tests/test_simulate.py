@@ -24,7 +24,7 @@ from vi_contact.schemes.linear_multistep import LinearMultistep
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.simulate import Solution, simulate
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.solvers.hildreth import Hildreth
+from vi_contact.solvers.normal.hildreth import Hildreth
 from vi_contact.static import static_equilibrium
 
 pytestmark = pytest.mark.serial

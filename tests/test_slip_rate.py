@@ -19,8 +19,8 @@ from vi_contact.laws.friction import Coulomb, ExponentialDecay, SlipRateCoulomb,
 from vi_contact.laws.mass import ConsistentMass
 from vi_contact.march import march
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.solvers.extrapolation import Plain
-from vi_contact.solvers.slip_rate import RateIteration
+from vi_contact.solvers.friction.extrapolation import Plain
+from vi_contact.solvers.friction.slip_rate import RateIteration
 from vi_contact.static import static_equilibrium
 
 pytestmark = pytest.mark.serial

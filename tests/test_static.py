@@ -21,8 +21,8 @@ from vi_contact.laws.materials import LinearElastic
 from vi_contact.march import march
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.solvers.mprgp import ProjectedCG
-from vi_contact.solvers.volume import ReducedNewton, Volume
+from vi_contact.solvers.normal.projected_cg import ProjectedCG
+from vi_contact.solvers.volume.route import ReducedNewton, Volume
 from vi_contact.static import static_equilibrium
 
 COMM = MPI.COMM_WORLD

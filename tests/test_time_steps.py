@@ -526,7 +526,7 @@ def test_another_plan_is_refused(tmp_path: Path):
 def test_halved_wall_on_any_number_of_ranks(comm: Any, shared_tmp: Path, solver: str):
     """All ranks halve the same steps; the restart is the straight run, with factors of four dts."""
     pytest.importorskip("dolfinx")
-    from vi_contact.solvers.volume import Volume
+    from vi_contact.solvers.volume.route import Volume
 
     more = {"dt": HalvedAtImpact(Schedule(((1.0 / 280.0, 0.1), (1.0 / 560.0, inf))), 2), "scheme": HALF}
     more["solver"] = Condensed() if solver == "condensed" else Volume()

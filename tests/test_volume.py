@@ -15,7 +15,7 @@ pytest.importorskip("petsc4py")
 from volume_cases import Case, block, case, pushed_block
 
 from vi_contact.core.verify import kkt_residual
-from vi_contact.solvers.volume import (
+from vi_contact.solvers.volume.route import (
     OneFactorisation,
     ReducedNewton,
     SemismoothNewton,

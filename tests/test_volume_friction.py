@@ -23,8 +23,8 @@ from vi_contact.core.step import StepResult
 from vi_contact.core.verify import kkt_residual
 from vi_contact.laws.friction import Coulomb, ExponentialDecay, SlipRateCoulomb, Tresca
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.solvers.nsgs import NSGS
-from vi_contact.solvers.volume import ReducedNewton, Volume
+from vi_contact.solvers.friction.nsgs import NSGS
+from vi_contact.solvers.volume.route import ReducedNewton, Volume
 
 M = 8  # contact points of pushed_block
 VOLUME = Volume(method=ReducedNewton())

@@ -25,7 +25,7 @@ from vi_contact.march import march
 from vi_contact.schemes.trapezoidal import Trapezoidal
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.solvers.volume import ReducedNewton, Volume
+from vi_contact.solvers.volume.route import ReducedNewton, Volume
 
 
 def compared(problem: ContactProblem, scheme: Any, steps: int) -> tuple[CrossChecked, list[tuple[int, int, int]]]:

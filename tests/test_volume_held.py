@@ -12,10 +12,10 @@ pytest.importorskip("petsc4py")
 from volume_cases import Case, pushed_block
 
 from vi_contact.core.verify import kkt_residual
-from vi_contact.solvers.volume import ReducedNewton, Volume
-from vi_contact.solvers.volume_held import HeldInverse
-from vi_contact.solvers.volume_step import ScaledStep
-from vi_contact.solvers.volume_system import BoundedSystem
+from vi_contact.solvers.volume.bounded_system import BoundedSystem
+from vi_contact.solvers.volume.held_points import HeldInverse
+from vi_contact.solvers.volume.route import ReducedNewton, Volume
+from vi_contact.solvers.volume.scaled_step import ScaledStep
 
 M = 8
 SPRINGS = {"compliance": np.array([0.3, 0.0] * 4), "scale": 2.0}

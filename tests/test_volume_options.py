@@ -20,14 +20,14 @@ from volume_cases import Case, case, pushed_block
 from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.core.verify import kkt_residual
 from vi_contact.laws.friction import Coulomb, Frictionless
-from vi_contact.solvers.volume import (
+from vi_contact.solvers.volume.failures import NOT_A_NUMBER, raised, stopped
+from vi_contact.solvers.volume.route import (
     OneFactorisation,
     ReducedNewton,
     SemismoothNewton,
     TaoTron,
     Volume,
 )
-from vi_contact.solvers.volume_reasons import NOT_A_NUMBER, raised, stopped
 
 METHODS = (ReducedNewton(), OneFactorisation(), SemismoothNewton(), TaoTron())
 PREFIX = "vi_contact_volume_"

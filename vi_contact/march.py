@@ -7,11 +7,11 @@ from functools import partial
 
 import numpy as np
 
-from .certified import TOLERANCE, CertifiedSolver
 from .core.step import ContactProblem, EffectiveMatrix, Report, Scheme, Solver, State
 from .laws.impact import Impact
 from .run_checks import check_methods, check_pace, check_state, start_time
 from .schemes.choice import completed
+from .solvers.certified import TOLERANCE, CertifiedSolver
 from .solvers.condensed import Condensed
 from .static import initial_state
 from .time_steps import Course, TimeSteps, course

@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from .certified import TOLERANCE
 from .checkpoint import Place, read_checkpoint
 from .core.algebra import Comm
 from .core.checks import flag, instance, provides, several, whole
@@ -20,6 +19,7 @@ from .run import Comparison, Run, Settings
 from .run_checks import check_methods, check_pace, check_state, start_time
 from .schemes.choice import completed
 from .solution import Solution
+from .solvers.certified import TOLERANCE
 from .solvers.condensed import Condensed
 from .static import initial_state
 from .stored_rows import StoredRows

@@ -21,8 +21,8 @@ from vi_contact.schemes.trapezoidal import Trapezoidal
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.simulate import simulate
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.solvers.fixed_point import FixedPoint
-from vi_contact.solvers.nsgs import NSGS
+from vi_contact.solvers.friction.fixed_point import FixedPoint
+from vi_contact.solvers.friction.nsgs import NSGS
 
 pytestmark = pytest.mark.serial
 PAIRS = [(ZienkiewiczWoodTaylor(), ConsistentMass()), (Trapezoidal(), Redistributed())]

@@ -21,11 +21,11 @@ from vi_contact.core.step import ContactProblem, StepProblem
 from vi_contact.cross_check import cross_check
 from vi_contact.march import march
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
-from vi_contact.solvers.active_set import ActiveSet
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.solvers.hildreth import Hildreth
-from vi_contact.solvers.mprgp import ProjectedCG
-from vi_contact.solvers.volume import OneFactorisation, ReducedNewton, SemismoothNewton, TaoTron, Volume
+from vi_contact.solvers.normal.active_set import ActiveSet
+from vi_contact.solvers.normal.hildreth import Hildreth
+from vi_contact.solvers.normal.projected_cg import ProjectedCG
+from vi_contact.solvers.volume.route import OneFactorisation, ReducedNewton, SemismoothNewton, TaoTron, Volume
 
 COMM = MPI.COMM_WORLD
 SCHEME = ZienkiewiczWoodTaylor(phi=0.5)

@@ -23,7 +23,7 @@ from vi_contact.march import march
 from vi_contact.modal import lowest_frequency
 from vi_contact.models.wall import Wall
 from vi_contact.solvers.condensed import Condensed, PreparedCondensed
-from vi_contact.solvers.hildreth import Hildreth
+from vi_contact.solvers.normal.hildreth import Hildreth
 
 pytestmark = pytest.mark.slow
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..certified import TOLERANCE
 from ..core.checks import instance, number
 from ..core.errors import StepFailure
 from ..core.step import StepProblem, StepResult
 from ..core.verify import kkt_residual
+from ..solvers.certified import TOLERANCE
 from ..solvers.condensed import Condensed
 from .contact import BoundaryContact
 from .contact_run import ContactRun, run_of

@@ -20,8 +20,8 @@ from ..laws.impact import Inelastic, MassProjection
 from ..laws.materials import LinearElastic
 from ..plotting import plot_certificate, plot_contact, plot_energy, plot_excitation, plot_points
 from ..simulate import Solution, simulate
-from ..solvers.volume import Volume
-from ..solvers.volume_snes import ReducedNewton
+from ..solvers.volume.route import Volume
+from ..solvers.volume.snes import ReducedNewton
 from ..upgoing import upgoing
 from .channel import Channel, ChannelModel
 from .channel_sides import DashpotSides, Fixed, FreeFieldSides, RockBelow, Rollers, Sides, TiedSides

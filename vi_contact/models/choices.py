@@ -18,12 +18,12 @@ from ..schemes.ss22 import SS22
 from ..schemes.trapezoidal import Trapezoidal
 from ..schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from ..solvers.condensed import Condensed
-from ..solvers.hildreth import Hildreth
-from ..solvers.mprgp import ProjectedCG
-from ..solvers.volume import Volume
-from ..solvers.volume_factorised import OneFactorisation
-from ..solvers.volume_snes import ReducedNewton, SemismoothNewton
-from ..solvers.volume_tao import TaoTron
+from ..solvers.normal.hildreth import Hildreth
+from ..solvers.normal.projected_cg import ProjectedCG
+from ..solvers.volume.one_factorisation import OneFactorisation
+from ..solvers.volume.route import Volume
+from ..solvers.volume.snes import ReducedNewton, SemismoothNewton
+from ..solvers.volume.tao import TaoTron
 
 
 @dataclass(frozen=True)

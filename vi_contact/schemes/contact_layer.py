@@ -13,10 +13,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..certified import TOLERANCE, CertifiedSolver
 from ..core.algebra import Mask
 from ..core.step import ContactProblem, EffectiveMatrix, State, StepProblem
 from ..core.surfaces import ContactSurface
+from ..solvers.certified import TOLERANCE, CertifiedSolver
 from ..solvers.condensed import Condensed
 
 

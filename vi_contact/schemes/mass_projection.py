@@ -14,11 +14,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..certified import TOLERANCE, CertifiedSolver
 from ..core.algebra import Array, Mask
 from ..core.errors import StepFailure
 from ..core.step import ContactProblem, State, StepProblem
 from ..laws.friction import Frictionless
+from ..solvers.certified import TOLERANCE, CertifiedSolver
 from ..solvers.condensed import Condensed
 from .acceleration import mass_matrix, rigid_part
 

@@ -24,13 +24,13 @@ from ..core.checks import instance, provides
 from ..core.errors import InputError
 from ..core.step import ContactProblem, EffectiveMatrix, StepProblem, StepResult
 from ..core.surfaces import ContactSurface
-from .active_set import ActiveSet
-from .friction_condensed import CondensedFriction
-from .friction_newton import FrictionNewton
-from .friction_small import FrictionMethod, inner_method
-from .lcp import LCPResult
-from .mprgp import ProjectedCG
-from .slip_rate import RateIteration
+from .friction.condensed import CondensedFriction
+from .friction.newton import FrictionNewton
+from .friction.problem import FrictionMethod, inner_method
+from .friction.slip_rate import RateIteration
+from .normal.active_set import ActiveSet
+from .normal.lcp import LCPResult
+from .normal.projected_cg import ProjectedCG
 
 STORED_ENTRIES = 200_000  # of A⁻¹E over all ranks: beyond it a second back-substitution is cheaper than the product
 

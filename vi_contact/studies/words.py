@@ -43,19 +43,21 @@ from ..schemes.newmark import Newmark
 from ..schemes.ss22 import SS22
 from ..schemes.trapezoidal import Trapezoidal
 from ..schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
-from ..solvers import extrapolation, friction_small, volume
-from ..solvers.active_set import ActiveSet
 from ..solvers.condensed import Condensed, SmallMethod
-from ..solvers.fixed_point import FixedPoint
-from ..solvers.friction_newton import FrictionNewton
-from ..solvers.given_forces import GivenForces
-from ..solvers.hildreth import Hildreth
-from ..solvers.mprgp import ProjectedCG
-from ..solvers.nsgs import NSGS
-from ..solvers.uzawa import Uzawa
-from ..solvers.volume_factorised import OneFactorisation
-from ..solvers.volume_snes import ReducedNewton, SemismoothNewton
-from ..solvers.volume_tao import TaoTron
+from ..solvers.friction import extrapolation
+from ..solvers.friction import problem as friction_small
+from ..solvers.friction.fixed_point import FixedPoint
+from ..solvers.friction.given_forces import GivenForces
+from ..solvers.friction.newton import FrictionNewton
+from ..solvers.friction.nsgs import NSGS
+from ..solvers.friction.uzawa import Uzawa
+from ..solvers.normal.active_set import ActiveSet
+from ..solvers.normal.hildreth import Hildreth
+from ..solvers.normal.projected_cg import ProjectedCG
+from ..solvers.volume import route as volume
+from ..solvers.volume.one_factorisation import OneFactorisation
+from ..solvers.volume.snes import ReducedNewton, SemismoothNewton
+from ..solvers.volume.tao import TaoTron
 from ..upgoing import UpgoingVelocity, upgoing
 from ..writer import FieldWriter
 from . import plain

@@ -1,0 +1,83 @@
+"""Steps that are certified or refused: a solver, the methods to escalate to, and the certificate of every answer.
+
+An answer whose certificate comes near the tolerance, as round-off makes it where a factor meets bodies of very unlike
+stiffness, is corrected by what it leaves over (``correction``) before it is judged.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..core.errors import StepFailure
+from ..core.step import Certificate, ContactProblem, EffectiveMatrix, PreparedSolver, Solver, StepProblem, StepResult
+from ..core.surfaces import ContactSurface
+from ..core.verify import kkt_residual
+from .correction import corrected
+
+TOLERANCE = 1e-9
+NEAR = 1e-2  # of the tolerance: round-off of ordinary steps stays a hundred times below, and is left as it is
+FAR = 1e-4  # residuals above are not round-off
+ADVICE = "try a smaller dt, another solver, or check the data of this time"
+
+
+class CertifiedSolver:
+    """A solver and the methods to escalate to, all bound to one effective matrix; nothing uncertified leaves it."""
+
+    def __init__(
+        self,
+        problem: ContactProblem,
+        A: EffectiveMatrix,
+        scale: float,
+        solvers: Sequence[Solver],
+        tolerance: float,
+        *,
+        surface: ContactSurface | None = None,
+        advice: str = ADVICE,
+    ) -> None:
+        for solver in solvers:
+            solver.check(problem)
+        self._surface, self._A, self._scale = surface or problem.surface, A, scale
+        self._advice = advice
+        self._solvers, self._tolerance = solvers, tolerance
+        self._prepared: dict[int, PreparedSolver] = {}
+        self._get(0)
+
+    def _get(self, rank: int) -> PreparedSolver:
+        """The solver of that rank of escalation, prepared when first needed."""
+        if rank not in self._prepared:
+            self._prepared[rank] = self._solvers[rank].prepare(self._A, self._surface, self._scale)
+        return self._prepared[rank]
+
+    def solve(self, step: StepProblem) -> tuple[StepResult, Certificate, bool]:
+        """(result, certificate, escalated) of the first method below tolerance; StepFailure when there is none."""
+        refuse_nan(step)
+        tried = []
+        for rank in range(len(self._solvers)):
+            try:
+                result = self._get(rank).solve(step)
+            except StepFailure as failure:
+                tried.append(str(failure))
+                continue
+            certificate = kkt_residual(step, result)
+            if NEAR * self._tolerance < certificate.worst < FAR:
+                solve, goal = self._get(rank).solve, NEAR * self._tolerance
+                result, certificate = corrected(step, result, certificate, solve, goal)
+            if certificate.worst <= self._tolerance:
+                return result, certificate, rank > 0
+            tried.append(f"{result.method}: {certificate}")
+        raise StepFailure(
+            f"step {step.k} at t = {step.t:.6g} s stayed above the certificate tolerance {self._tolerance:g} "
+            f"({'; '.join(tried)}): {self._advice}"
+        )
+
+
+def refuse_nan(step: StepProblem) -> None:
+    """A NaN would spread silently through every solver; asked of all ranks, so that all stop."""
+    bad = float(not np.isfinite(np.sum(step.b)))
+    if step.surface.comm.max(np.array([bad]))[0]:
+        raise StepFailure(
+            f"the load of step {step.k} at t = {step.t:.6g} s contains NaN or infinite values: "
+            "check the excitation, the tractions and the initial data"
+        )

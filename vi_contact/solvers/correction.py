@@ -1,0 +1,116 @@
+"""Residual correction: what an answer leaves over is a step of its own, small, and solved by the same solver.
+
+The answer (x0, r0) stays, but for a share s of its reactions. The contract of ``step.py`` for d = x - x0 and
+q = r - (1 - s) r0 is the contract again, because reactions that obey the laws form a cone at every point:
+
+    A d = (b - A x0 - (1 - s) Bᵀr0) - Bᵀq,    |q_t| <= s cohesion + slope q_n, along the slip B_t d - (slip0 - B_t x0)
+    0 <= q_n  ⊥  (bound - B_n x0 + (1 - s) compliance r0_n / scale) - B_n d + compliance q_n / scale >= 0
+
+Its solution is that of the step, exactly, whatever s is, as long as no reaction falls by more than its share: q_n >= 0
+leaves r_n >= (1 - s) r0_n. But a solver passes through numbers as large as A⁻¹Bᵀq, and their round-off is now s times
+what it was. Where a stiff body rests on a soft one, or on nothing but contact, A⁻¹Bᵀr is millions of times x.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..core.algebra import Array
+from ..core.errors import StepFailure
+from ..core.step import Certificate, StepProblem, StepResult
+from ..core.verify import kkt_residual
+from ..laws.friction import FrictionLaw
+
+MARGIN = 2.0**10  # share over residual: reactions may be that much more wrong than the residual tells
+LEAST = 2.0**-30
+ROUNDS = 3
+
+
+@dataclass(frozen=True)
+class Share:
+    """A friction law whose limit is counted in shares of the reactions: s limit(r / s)."""
+
+    law: FrictionLaw
+    share: float
+
+    def limit(self, r_n: Array, weights: Array, scale: float) -> Array:
+        """The cohesive part is a share of what it was, the slope is the same."""
+        return self.share * self.law.limit(r_n / self.share, weights, scale)
+
+    def slope(self, weights: Array) -> Array:
+        """That of the law."""
+        return self.law.slope(weights)
+
+    def at(self, speed: Array) -> FrictionLaw:
+        """Itself, for a law that does not know the slip rate."""
+        law = self.law.at(speed)
+        return self if law is self.law else Share(law, self.share)
+
+
+def share_of(residual: float) -> float:
+    """The share of its reactions that an answer with this residual gives back, a power of two: it loses no digit."""
+    return float(np.clip(np.exp2(np.ceil(np.log2(max(residual, LEAST) * MARGIN))), LEAST, 1.0))
+
+
+def left_over(step: StepProblem, answer: StepResult, share: float) -> StepProblem:
+    """The step for d and q of the head of this file."""
+    surface, x = step.surface, answer.x
+    r_n, r_t = kept(step, answer, share)
+    return replace(
+        step,
+        b=step.b - step.A @ x - surface.reaction_load(r_n, len(x), r_t),
+        bound=step.bound - surface.normal_values(x) + surface.compliance * r_n / step.scale,
+        guess=np.zeros_like(x),
+        active=answer.active,
+        friction=step.friction if step.slip0 is None or share == 1.0 else Share(step.friction, share),
+        slip0=None if step.slip0 is None else step.slip0 - surface.tangential_values(x),
+    )
+
+
+def added(step: StepProblem, answer: StepResult, found: StepResult, share: float) -> StepResult:
+    """The answer with the solution of what it left over."""
+    r_n, r_t = kept(step, answer, share)
+    if found.r_t is not None:
+        r_t = found.r_t if r_t is None else r_t + found.r_t
+    return replace(
+        found, x=answer.x + found.x, r_n=r_n + found.r_n, r_t=r_t, iterations=answer.iterations + found.iterations
+    )
+
+
+def kept(step: StepProblem, answer: StepResult, share: float) -> tuple[Array, Array | None]:
+    """1 - s times the reactions, those outside the cone, or no farther than s from its edge, on its edge: whether they
+    stick or slip, what is missing then lies in the cone of q."""
+    surface = step.surface
+    r_n = np.where(surface.bilateral, answer.r_n, np.maximum(answer.r_n, 0.0))
+    if answer.r_t is None or step.slip0 is None:
+        return (1.0 - share) * r_n, None
+    law = step.friction_at(surface.tangential_values(answer.x) - step.slip0)
+    limit, size = law.limit(r_n, surface.weights, step.scale), np.linalg.norm(answer.r_t, axis=1)
+    onto = np.divide(limit, size, out=np.ones_like(size), where=size > (1.0 - share) * limit)
+    return (1.0 - share) * r_n, (1.0 - share) * onto[:, None] * answer.r_t
+
+
+def corrected(
+    step: StepProblem,
+    result: StepResult,
+    certificate: Certificate,
+    solve: Callable[[StepProblem], StepResult],
+    goal: float,
+) -> tuple[StepResult, Certificate]:
+    """The result after corrections that brought its certificate to the goal, or as near to it as they got."""
+    for _ in range(ROUNDS):
+        share = share_of(certificate.worst)
+        try:
+            better = added(step, result, solve(left_over(step, result, share)), share)
+        except StepFailure:
+            break
+        found, before = kkt_residual(step, better), certificate.worst
+        if not found.worst < before:
+            break
+        result, certificate = replace(better, method=result.method, history=result.history), found
+        if not goal < found.worst < 0.5 * before:
+            break
+    return result, certificate

@@ -1,0 +1,123 @@
+"""Faster fixed-point iterations: the next point x from the points tried so far and their images g(x).
+
+    plain       x <- g(x)
+    Aitken      x <- x + omega f,  f = g(x) - x;      omega <- -omega f_old·(f - f_old)/|f - f_old|²
+    Anderson    x <- g(x) - sum_j gamma_j (g_j+1 - g_j),    f = sum_j gamma_j (f_j+1 - f_j) in the least-squares sense
+
+All need one image a step and nothing else. Aitken takes one relaxation factor for the whole vector (Irons and Tuck,
+Int. J. Numer. Methods Eng. 1, 1969); Anderson combines the last ``depth`` differences (J. ACM 12, 1965; Walker and Ni,
+SIAM J. Numer. Anal. 49, 2011), is the secant method for one unknown, and on linear problems is equivalent to GMRES.
+Where a plain step lets f grow along itself, f·f_old >= |f_old|², g expands and both would turn back: the next step is
+plain again, and what was tried before is forgotten.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from ...core.checks import provides, real, shown, whole
+from ...core.errors import InputError
+from ..normal.lcp import Array
+
+
+class Sequence(Protocol):
+    """The memory of one iteration."""
+
+    def next(self, x: Array, image: Array) -> Array:
+        """The point to try after x (n,), whose image is g(x) (n,)."""
+        ...
+
+
+class Extrapolation(Protocol):
+    """A way to choose the next point: Plain, Aitken or Anderson."""
+
+    def start(self) -> Sequence: ...
+
+
+def accelerated(owner: str, value: Any) -> None:
+    """InputError unless it is an extrapolation."""
+    provides(owner, "extrapolation", value, ("start",), "give Plain(), Aitken() or Anderson()", lacks=("step",))
+
+
+@dataclass(frozen=True)
+class Plain:
+    """The image itself."""
+
+    def start(self) -> Sequence:
+        """Needs no memory."""
+        return _Plain()
+
+
+class _Plain:
+    def next(self, x: Array, image: Array) -> Array:
+        """See Sequence."""
+        return image
+
+
+@dataclass(frozen=True)
+class Aitken:
+    """One relaxation factor for all unknowns, between 1/``limit`` and ``limit``. InputError for limit <= 1."""
+
+    limit: float = 10.0
+
+    def __post_init__(self) -> None:
+        if not 1.0 < real(self.limit) < np.inf:
+            raise InputError(f"Aitken: limit is {shown(self.limit)}; give the largest relaxation factor, more than 1")
+
+    def start(self) -> Sequence:
+        """An empty memory; the first step is plain."""
+        return _Aitken(self.limit)
+
+
+class _Aitken:
+    def __init__(self, limit: float) -> None:
+        self._limit, self._omega = limit, 1.0
+        self._old: Array | None = None
+
+    def next(self, x: Array, image: Array) -> Array:
+        """See Sequence."""
+        f = image - x
+        if self._old is not None:
+            change = f - self._old
+            omega, size = -self._omega * float(self._old @ change), float(change @ change)
+            self._omega = float(np.clip(omega / size, 1.0 / self._limit, self._limit)) if omega > 0.0 else 1.0
+        self._old = f
+        return np.asarray(x + self._omega * f)
+
+
+@dataclass(frozen=True)
+class Anderson:
+    """The last ``depth`` differences combined, after ``after`` plain steps. InputError for depth < 1 or after < 0."""
+
+    depth: int = 5
+    after: int = 0
+
+    def __post_init__(self) -> None:
+        whole("Anderson", "depth", self.depth, least=1)
+        whole("Anderson", "after", self.after)
+
+    def start(self) -> Sequence:
+        """An empty memory."""
+        return _Anderson(self)
+
+
+class _Anderson:
+    def __init__(self, settings: Anderson) -> None:
+        self._settings, self._count = settings, 0
+        self._points: list[tuple[Array, Array]] = []  # (f, g)
+
+    def next(self, x: Array, image: Array) -> Array:
+        """See Sequence."""
+        self._count += 1
+        f_new, kept = image - x, self._points[-self._settings.depth :]
+        if kept and np.array_equal(x, kept[-1][1]) and float(f_new @ kept[-1][0]) >= float(kept[-1][0] @ kept[-1][0]):
+            kept = []
+        self._points = [*kept, (f_new, image.copy())]
+        if self._count <= self._settings.after or len(self._points) < 2:
+            return image
+        f, g = (np.column_stack(part) for part in zip(*self._points, strict=True))
+        gamma, *_ = np.linalg.lstsq(np.diff(f), f[:, -1], rcond=1e-10)
+        return np.asarray(image - np.diff(g) @ gamma)

@@ -1,0 +1,87 @@
+"""Alternation with given forces: the normal problem with r_t given, then the tangential problem with r_n given.
+
+Seed 000 carries tangential forces C_T that are given (eq. 6); they enter the right-hand side, gamma of eq. 40, and what
+is left is the minimum of eq. 42 over normal reactions. With friction C_T is found by turns (Panagiotopoulos, Ing.-Arch.
+44, 1975), with the parts G_nn, G_nt, G_tt of the Delassus operator:
+
+    normal        0 <= r_n  perpendicular to  (q_n + G_nt r_t) + G_nn r_n >= 0               r_t = C_T given
+    tangential    minimum of ½ r_tᵀ G_tt r_t + r_t·(q_t + G_tn r_n) over |r_t| <= limit(r_n)     r_n given
+
+Block Gauss-Seidel: under Tresca's law the exact minimum over one block after the other, which converges for every G;
+under Coulomb's when coupling and friction are moderate, linearly. ``extrapolation`` acts on r_t.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ...core.checks import attributes
+from ..normal.active_set import ActiveSet
+from ..normal.lcp import Array, Mask, largest
+from .extrapolation import Extrapolation, Plain, accelerated
+from .newton import FrictionNewton
+from .problem import Blocks, FrictionMethod, FrictionResult, inner_method
+
+
+@dataclass(frozen=True)
+class GivenForces:
+    """Settings. ``tolerance``: change of the tangential reactions relative to the largest; ``tangential``: method for
+    the tangential problems.
+
+    In the result ``iterations`` counts pairs of problems and ``history`` the relative change in each.
+    """
+
+    tolerance: float = 1e-11
+    max_iterations: int = 1000
+    tangential: FrictionMethod = field(default_factory=FrictionNewton)
+    extrapolation: Extrapolation = field(default_factory=Plain)
+
+    def __post_init__(self) -> None:
+        attributes(self, positive=("tolerance",), counts=("max_iterations",))
+        inner_method("GivenForces", "tangential", self.tangential)
+        accelerated("GivenForces", self.extrapolation)
+
+    def prepare(self, G: Array, bilateral: Mask) -> PreparedGivenForces:
+        """Check and scale G (m d, m d)."""
+        return PreparedGivenForces(self, G, bilateral)
+
+
+class PreparedGivenForces:
+    """One G, many right-hand sides."""
+
+    def __init__(self, method: GivenForces, G: Array, bilateral: Mask) -> None:
+        self.method = method
+        self.blocks = Blocks(G, bilateral)
+        d, matrix = self.blocks.dimension, self.blocks.matrix
+        self._normal = ActiveSet().prepare(matrix[::d, ::d].copy(), bilateral)
+        apart = matrix.copy()  # normal unknowns out of reach of the tangential problem
+        apart[::d], apart[:, ::d] = 0.0, 0.0
+        np.fill_diagonal(apart[::d, ::d], 1.0)
+        self._tangential = method.tangential.prepare(apart, np.zeros_like(bilateral))
+
+    def solve(self, q: Array, cohesion: Array, slope: Array, guess: Array | Mask | None = None) -> FrictionResult:
+        """See PreparedFriction."""
+        step = self.blocks.step(q, cohesion, slope)
+        r = step.start(guess)
+        sequence, history, none = self.method.extrapolation.start(), [1.0], np.zeros(step.count)
+        while step.unit > 0.0 and self.method.tolerance < history[-1] and len(history) <= self.method.max_iterations:
+            given, active = r[:, 1:].copy(), r[:, 0] > 0.0
+            r[:, 0] = 0.0
+            r[:, 0] = self._normal.solve(step.w(r)[:, 0], active).r
+            r[:, 1:] = 0.0
+            w = step.w(r)
+            w[:, 0] = np.inf
+            r[:, 1:] = self._tangential.solve(w, step.limit(r[:, 0]), none).r[:, 1:]
+            size = max(largest(r[:, 1:]), largest(given))
+            history.append(largest(r[:, 1:] - given) / size if size else 0.0)
+            if history[-1] > self.method.tolerance:
+                r[:, 1:] = sequence.next(given.ravel(), r[:, 1:].ravel()).reshape(given.shape)
+        return step.result(
+            r,
+            iterations=len(history) - 1,
+            method=self.method,
+            tolerance=100.0 * self.method.tolerance,
+            history=tuple(history[1:]),
+        )

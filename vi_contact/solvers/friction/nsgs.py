@@ -1,0 +1,152 @@
+"""Nonsmooth Gauss-Seidel for contact with friction: one node after another, each solved exactly.
+
+Given the reactions of all other nodes, a node is open, or it sticks, or it slips:
+
+    open   r_n = 0, r_t the minimum over |r_t| <= cohesion, if w_n >= 0 then; otherwise w_n = 0 gives r_n(r_t) and
+    stick  S r_t = -q'          if |r_t| <= limit(r_n(r_t))
+    slip   (S + lambda) r_t = -q',   |r_t| = limit(r_n(r_t)),   lambda > 0 by a scalar root (closed form in 2D)
+
+with S and q' the tangential block and right-hand side after the elimination of r_n. Sources: Moreau (Comput. Methods
+Appl. Mech. Eng. 177, 1999) and Jean (same volume). Under Tresca's law it is coordinate descent of a convex function and
+converges for every G; under Coulomb's it converges in practice, linearly, for friction that is not large.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+
+from ...core.checks import attributes
+from ..normal.lcp import Array, Mask
+from .problem import Blocks, FrictionResult, Step
+
+
+@dataclass(frozen=True)
+class NSGS:
+    """Settings. ``tolerance``: largest |F| of the natural map relative to r = 0.
+
+    In the result ``iterations`` counts sweeps and ``history`` the residual after each.
+    """
+
+    tolerance: float = 1e-12
+    max_iterations: int = 5000
+
+    def __post_init__(self) -> None:
+        attributes(self, positive=("tolerance",), counts=("max_iterations",))
+
+    def prepare(self, G: Array, bilateral: Mask) -> PreparedNSGS:
+        """Check and scale G (m d, m d)."""
+        return PreparedNSGS(self, G, bilateral)
+
+
+class PreparedNSGS:
+    """One G, many right-hand sides."""
+
+    def __init__(self, method: NSGS, G: Array, bilateral: Mask) -> None:
+        self.method = method
+        self.blocks = Blocks(G, bilateral)
+
+    def solve(self, q: Array, cohesion: Array, slope: Array, guess: Array | Mask | None = None) -> FrictionResult:
+        """See PreparedFriction."""
+        step = self.blocks.step(q, cohesion, slope)
+        r = step.start(guess if step.unit > 0.0 else None)
+        history: list[float] = []
+        nodes = _nodes(step) if step.unit > 0.0 else []
+        while step.unit > 0.0 and len(history) < self.method.max_iterations:
+            r = _sweep(step, nodes, r)
+            residual = step.residual(r, step.w(r))
+            history.append(residual / step.unit)
+            if residual <= max(self.method.tolerance * step.unit, step.rounding(r)):
+                break
+        return step.result(
+            r,
+            iterations=len(history),
+            method=self.method,
+            tolerance=self.method.tolerance,
+            history=tuple(history),
+        )
+
+
+def sweeps(step: Step, r: Array, number: int) -> Array:
+    """r after so many sweeps."""
+    nodes = _nodes(step)
+    for _ in range(number):
+        r = _sweep(step, nodes, r)
+    return r
+
+
+def _nodes(step: Step) -> list[_Node]:
+    return [_Node(step, i) for i in range(step.count)]
+
+
+def _sweep(step: Step, nodes: list[_Node], r: Array) -> Array:
+    d = step.blocks.dimension
+    matrix, flat = step.blocks.matrix, r.copy().ravel()
+    for i, node in enumerate(nodes):
+        rows = slice(i * d, (i + 1) * d)
+        here = flat[rows].copy()
+        flat[rows] = 0.0
+        flat[rows] = node.solve(step.q[i] + matrix[rows] @ flat, here)
+    return flat.reshape(r.shape)
+
+
+class _Node:
+    """The problem of one node."""
+
+    def __init__(self, step: Step, i: int) -> None:
+        d = step.blocks.dimension
+        block = step.blocks.matrix[i * d : (i + 1) * d, i * d : (i + 1) * d]
+        self.normal, self.coupling, self.tangential = float(block[0, 0]), block[0, 1:], block[1:, 1:]
+        self.condensed = self.tangential - np.outer(self.coupling, self.coupling) / self.normal
+        self.cohesion, self.slope = float(step.cohesion[i]), float(step.slope[i])
+        self.bilateral = bool(step.blocks.bilateral[i])
+
+    def solve(self, q: Array, old: Array) -> Array:
+        """The reactions of the node when all others give it q."""
+        q_n, q_t = float(q[0]), q[1:]
+        if not self.bilateral:
+            r_t = on_disk(self.tangential, q_t, lambda r_t: self.cohesion)
+            if q_n + self.coupling @ r_t >= 0.0:
+                return np.concatenate([[0.0], r_t])
+
+        def pressure(r_t: Array) -> float:
+            return float(-(q_n + self.coupling @ r_t) / self.normal)
+
+        r_t = on_disk(
+            self.condensed,
+            q_t - self.coupling * (q_n / self.normal),
+            lambda r_t: self.cohesion + self.slope * max(pressure(r_t), 0.0),
+        )
+        r_n = pressure(r_t)
+        return np.concatenate([[r_n if self.bilateral else max(r_n, 0.0)], r_t])
+
+
+def on_disk(S: Array, q: Array, limit: Callable[[Array], float]) -> Array:
+    """r with S r = -q when |r| <= limit(r), else (S + lambda) r = -q on |r| = limit(r), lambda > 0.
+
+    S (k, k) symmetric positive definite. r falls from S⁻¹q to 0 as lambda grows; the root of |r| - limit is bracketed
+    in s = 1/(1 + lambda/trace S) between 0 and 1.
+    """
+    if len(q) == 0 or not q.any():
+        return np.zeros(len(q))
+    values, vectors = (np.diag(S), np.eye(1)) if len(q) == 1 else np.linalg.eigh(S)
+    part, unit = vectors.T @ q, float(np.sum(values))
+
+    def reaction(s: float) -> Array:
+        return np.asarray(vectors @ (-s * part / (s * values + (1.0 - s) * unit)))
+
+    def outside(s: float) -> float:
+        r = reaction(s)
+        return float(np.linalg.norm(r)) - limit(r)
+
+    if outside(1.0) <= 0.0:
+        return reaction(1.0)
+    if outside(0.0) >= 0.0:
+        return np.zeros(len(q))
+    root = brentq(outside, 0.0, 1.0, xtol=1e-300, rtol=8.9e-16, maxiter=200)
+    r = reaction(root)
+    size, radius = float(np.linalg.norm(r)), limit(r)
+    return r * (radius / size) if size > radius else r

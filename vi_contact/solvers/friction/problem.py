@@ -1,0 +1,199 @@
+"""The small problem of a step with friction, its residual, and the scaling all its methods share.
+
+    w = q + G r;    0 <= r_n  perpendicular to  w_n >= 0   (bilateral rows: w_n = 0, r_n free)
+    |r_t| <= limit(r_n) = cohesion + slope max(r_n, 0),    r_t = -limit w_t/|w_t| where w_t is not zero          (1)
+
+G (m d, m d) is the Delassus operator of normal and tangential unknowns, node by node (r_n, then the d - 1 components
+of r_t), symmetric positive definite; q_n is the gap and q_t minus the slip that the step without reactions would have,
+w_n the gap and w_t minus the slip. Tresca's law has slope 0: (1) is then the minimum of ½ rᵀG r + qᵀr over a product of
+half-lines and disks, and unique. Coulomb's has cohesion 0: a solution exists (with s_i = limit the Tresca problems map
+bounded sets of s into themselves continuously, Brouwer), and is unique for small slopes only.
+
+(1) holds where the natural map vanishes (Alart and Curnier, Comput. Methods Appl. Mech. Eng. 92, 1991, with y = r - w):
+
+    F_n = r_n - max(y_n, 0)   (bilateral: w_n),      F_t = r_t - projection of y_t on the disk |r_t| <= limit(r_n)   (2)
+
+Scaling. Normal rows are multiplied by G_nn^(-1/2), tangential ones by one number for each node (disks stay disks),
+the mean of G_tt to the same power: reactions and displacements are then both in sqrt(J), as in lcp.py.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+
+from ...core.checks import provides
+from ...core.errors import InputError, StepFailure
+from ...laws.friction import project
+from ..normal.lcp import EPS, Array, Mask, check_gap, energy_scale, largest
+
+
+@dataclass(frozen=True)
+class FrictionResult:
+    """What a friction method returns when it has reached its tolerance or the limit that rounding sets.
+
+    ``r`` (m, d): r_n >= 0 exactly in unilateral rows, |r_t| <= limit(r_n) but for the last digit; ``active`` (m,):
+    r_n > 0 or bilateral; ``stick`` (m,): w_t = 0 but for the residual reached, under a limit that is not zero;
+    ``residual``: largest |F| of (2) over that of r = 0. Each method tells what ``iterations`` and ``history`` count.
+    """
+
+    r: Array
+    active: Mask
+    stick: Mask
+    iterations: int
+    residual: float
+    method: object
+    history: tuple[float, ...] = ()
+
+
+class PreparedFriction(Protocol):
+    """A friction method bound to one G."""
+
+    def solve(self, q: Array, cohesion: Array, slope: Array, guess: Array | Mask | None = None) -> FrictionResult:
+        """q (m, d), cohesion (m,) [as r], slope (m,). ``guess``: predicted contact set (m,), or reactions (m, d).
+
+        Raises StepFailure when the tolerance is not reached."""
+        ...
+
+
+class FrictionMethod(Protocol):
+    """A method for (1): FrictionNewton, NSGS, FixedPoint, GivenForces or Uzawa."""
+
+    def prepare(self, G: Array, bilateral: Mask) -> PreparedFriction: ...
+
+
+def inner_method(owner: str, meaning: str, value: Any) -> None:
+    """InputError unless it is a method for the small problem with friction."""
+    remedy = "give FrictionNewton(), NSGS(), FixedPoint(), GivenForces() or Uzawa()"
+    provides(owner, meaning, value, ("prepare",), remedy, lacks=("solve", "check"))
+
+
+@dataclass(frozen=True)
+class Step:
+    """(1) in scaled numbers: q (m, d), cohesion and slope (m,)."""
+
+    blocks: Blocks
+    q: Array
+    cohesion: Array
+    slope: Array
+
+    @property
+    def count(self) -> int:
+        """m."""
+        return len(self.cohesion)
+
+    def moved(self, r: Array) -> Array:
+        """G r (m, d), from the rows that carry something when they are few."""
+        carried = np.flatnonzero(r)
+        matrix = self.blocks.matrix
+        product = matrix @ r.ravel() if len(carried) > 0.25 * r.size else r.ravel()[carried] @ matrix[carried]
+        return np.asarray(product.reshape(r.shape))
+
+    def w(self, r: Array) -> Array:
+        """q + G r (m, d)."""
+        return self.q + self.moved(r)
+
+    def limit(self, r_n: Array) -> Array:
+        """cohesion + slope max(r_n, 0)."""
+        return self.cohesion + self.slope * np.maximum(r_n, 0.0)
+
+    def residual(self, r: Array, w: Array) -> float:
+        """max |F| of (2)."""
+        y = r - w
+        normal = np.where(self.blocks.bilateral, w[:, 0], r[:, 0] - np.maximum(y[:, 0], 0.0))
+        tangential = r[:, 1:] - project(y[:, 1:], self.limit(r[:, 0]))
+        return max(largest(normal), largest(tangential))
+
+    @cached_property
+    def unit(self) -> float:
+        """The residual of r = 0: what there is to resolve."""
+        return self.residual(np.zeros_like(self.q), self.q)
+
+    def rounding(self, r: Array) -> float:
+        """Residuals below this are rounding errors of q + G r."""
+        return 16.0 * EPS * self.blocks.norm * largest(r)
+
+    def admissible(self, r: Array) -> Array:
+        """r with r_n >= 0 and r_t within its disk: removes rounding errors, and whatever else is outside."""
+        r_n = np.where(self.blocks.bilateral, r[:, 0], np.maximum(r[:, 0], 0.0))
+        return np.column_stack([r_n, project(r[:, 1:], self.limit(r_n))])
+
+    def start(self, guess: Array | Mask | None) -> Array:
+        """Reactions to start from: those guessed; or what opens the guessed set row by row, times the number that
+        makes ½ rᵀG r + qᵀr least."""
+        if guess is None:
+            return np.zeros_like(self.q)
+        if guess.dtype != bool:
+            return self.admissible(guess / self.blocks.scale)
+        held = guess & np.isfinite(self.q[:, 0])
+        r = self.admissible(np.where(held[:, None], -self.q, 0.0))
+        carried = r != 0.0
+        if carried.any():
+            r *= -(self.q[carried] @ r[carried]) / np.vdot(self.moved(r), r)
+        return r
+
+    def result(
+        self,
+        r: Array,
+        *,
+        iterations: int,
+        method: object,
+        tolerance: float,
+        history: tuple[float, ...] = (),
+        w: Array | None = None,
+    ) -> FrictionResult:
+        """Back to newtons; StepFailure when the residual is above ``tolerance`` and above rounding. ``w`` of r, when
+        it is known."""
+        inside = self.admissible(r)
+        if w is None or not np.array_equal(inside, r):
+            w = self.w(inside)
+        r = inside
+        residual, unit = self.residual(r, w), self.unit or 1.0
+        rounding = self.rounding(r)
+        if not residual <= max(tolerance * unit, rounding):
+            raise StepFailure(
+                f"{method} stopped after {iterations} iterations with residual {residual / unit:.1e}: try another "
+                "friction method (FrictionNewton, NSGS, FixedPoint), or a smaller step of time or load"
+            )
+        still = np.linalg.norm(w[:, 1:], axis=1) <= 4.0 * max(residual, rounding)
+        active = (r[:, 0] > 0.0) | self.blocks.bilateral
+        stick = still & (self.limit(r[:, 0]) > 0.0)
+        return FrictionResult(r * self.blocks.scale, active, stick, iterations, residual / unit, method, history)
+
+
+class Blocks:
+    """d G d with its scale (m, d): what the methods work on."""
+
+    def __init__(self, G: Array, bilateral: Mask) -> None:
+        m = len(bilateral)
+        d = G.shape[0] // m if m else 1
+        if G.ndim != 2 or G.shape != (m * d, m * d):
+            raise InputError(f"The Delassus operator has shape {G.shape} for {m} points: give m d rows, node by node.")
+        if not np.isfinite(G).all():
+            raise InputError("The Delassus operator contains NaN or infinity: check the factorisation it came from.")
+        scale = energy_scale(G).reshape(m, d)
+        if d > 1:
+            scale[:, 1:] = np.mean(scale[:, 1:] ** -2.0, axis=1)[:, None] ** -0.5
+        self.scale, self.bilateral, self.count, self.dimension = scale, bilateral.copy(), m, d
+        matrix = scale.ravel()[:, None] * G * scale.ravel()
+        if largest(matrix - matrix.T) > 1e-8:
+            raise InputError("The Delassus operator is not symmetric: use a symmetric effective matrix A.")
+        self.matrix = np.ascontiguousarray(0.5 * (matrix + matrix.T))
+        self.norm = float(np.abs(self.matrix).sum(axis=1).max(initial=0.0))
+
+    def step(self, q: Array, cohesion: Array, slope: Array) -> Step:
+        """Problem (1) in scaled numbers."""
+        check_gap(q[:, 0], self.bilateral)
+        if not np.isfinite(q[:, 1:]).all():
+            raise InputError("The slip without reactions contains NaN or infinity: check the loads of this step.")
+        normal, tangential = self.scale[:, 0], self.scale[:, -1]
+        return Step(self, q * self.scale, cohesion / tangential, slope * (normal / tangential))
+
+
+def observed_contraction(history: Any) -> float:
+    """Mean factor between successive changes, of those above rounding (1e-10 of the first); NaN for fewer than two."""
+    changes = [change for change in history if change > 1e-10 * history[0]]
+    return float((changes[-1] / changes[0]) ** (1.0 / (len(changes) - 1))) if len(changes) > 1 else float("nan")

@@ -1,0 +1,66 @@
+"""Friction coefficients that depend on the slip rate of the step itself: an outer iteration over ordinary problems.
+
+    mu <- mu(|v|),    v = rate_factor w_t(mu),    w_t(mu): slip of the step with the coefficients mu given           (1)
+
+It starts from rest, mu(0), and every inner problem from the reactions of the one before. With the mass m that a point
+slips with, (1) contracts with the factor c |mu'(v)|, c = r_n dt/m or, in a velocity scheme, P_n/m. One point whose
+friction weakens with the rate converges for every dt: v(mu) falls with mu, so that (1) climbs from rest to the smallest
+rate that solves the step, which is no rate at all as long as the point can stick. For c |mu'| > 1 there may be other
+solutions, and extrapolation, which begins after four plain steps, might end in one. Friction that grows with the rate
+has one solution, but plain iterations need c mu' < 1; beyond that Anderson's method takes over, a secant method for one
+point.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ...core.checks import attributes
+from ...core.errors import StepFailure
+from ..normal.lcp import Array, largest
+from .extrapolation import Anderson, Extrapolation, accelerated
+from .problem import FrictionResult
+
+
+@dataclass(frozen=True)
+class RateIteration:
+    """Settings. ``tolerance``: change of the coefficients relative to the largest; ``extrapolation``: the next guess.
+
+    ``iterations`` of the result counts those of all inner problems, ``history`` is the change in each iteration.
+    """
+
+    tolerance: float = 1e-12
+    max_iterations: int = 200
+    extrapolation: Extrapolation = field(default_factory=lambda: Anderson(depth=5, after=4))
+
+    def __post_init__(self) -> None:
+        attributes(self, positive=("tolerance",), counts=("max_iterations",))
+        accelerated("RateIteration", self.extrapolation)
+
+    def solve(
+        self,
+        mu: Array,
+        solved: Callable[[Array, FrictionResult | None], FrictionResult],
+        image: Callable[[FrictionResult], Array],
+    ) -> FrictionResult:
+        """From mu (m,), those at rest. ``solved``: the problem of given coefficients, starting from the last result;
+        ``image``: the coefficients at its slip rates. StepFailure when the tolerance is not reached."""
+        sequence, spent = self.extrapolation.start(), 0
+        history: list[float] = []
+        found: FrictionResult | None = None
+        while len(history) < self.max_iterations:
+            found = solved(mu, found)
+            spent += found.iterations
+            new = image(found)
+            size = max(largest(new), largest(mu))
+            history.append(largest(new - mu) / size if size else 0.0)
+            if history[-1] <= self.tolerance:
+                return replace(found, iterations=spent, history=tuple(history))
+            mu = np.maximum(sequence.next(mu, new), 0.0)
+        raise StepFailure(
+            f"{self} stopped with a change of {history[-1] if history else np.inf:.1e} of the friction coefficients: "
+            "take a smaller time step, or let mu(v) vary less with the slip rate"
+        )

@@ -1,0 +1,79 @@
+"""Uzawa's method: a gradient step on the reactions, then the projection onto the friction cone's cross-section.
+
+Seed 003, "Uzawa algorithm" and its algebraic form, with Lambda = r, U - G the gap and slip, here -w = -(q + G r):
+
+    r <- Pr_C(r - rho w),    Pr_C(y)_n = max(y_n, 0),    Pr_C(y)_t = y_t min(1, F/|y_t|),    F = limit(r_n)
+
+F is Tresca's threshold, or Coulomb's limit of the r_n just found. Under Tresca's law this is the projected gradient
+method for a convex function and converges for 0 < rho < 2/lambda_max(G); the best uniform factor, (k - 1)/(k + 1) with
+the condition number k of G, is reached at rho = 2/(lambda_min + lambda_max), which is taken when no rho is given. G is
+that of friction_small.py's scaled numbers, in which rho is dimensionless. Slow by nature: errors shrink by 1 - 2/k.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...core.checks import attributes, real, shown
+from ...core.errors import InputError
+from ..normal.lcp import Array, Mask
+from .problem import Blocks, FrictionResult
+
+
+@dataclass(frozen=True)
+class Uzawa:
+    """Settings. ``tolerance``: largest |F| of the natural map relative to r = 0; ``rho`` > 0, or None: see above.
+
+    In the result ``iterations`` counts projections and ``history`` the residual after each. InputError for rho <= 0.
+    """
+
+    tolerance: float = 1e-12
+    max_iterations: int = 100_000
+    rho: float | None = None
+
+    def __post_init__(self) -> None:
+        attributes(self, positive=("tolerance",), counts=("max_iterations",))
+        if self.rho is not None and not 0.0 < real(self.rho) < np.inf:
+            raise InputError(f"Uzawa: rho is {shown(self.rho)}; give a positive number, or None for an automatic one")
+
+    def prepare(self, G: Array, bilateral: Mask) -> PreparedUzawa:
+        """Check and scale G (m d, m d)."""
+        return PreparedUzawa(self, G, bilateral)
+
+
+class PreparedUzawa:
+    """One G, many right-hand sides. ``rho`` is the one in use."""
+
+    def __init__(self, method: Uzawa, G: Array, bilateral: Mask) -> None:
+        self.method = method
+        self.blocks = Blocks(G, bilateral)
+        self.rho = method.rho or self._best()
+
+    def _best(self) -> float:
+        """2/(lambda_min + lambda_max)."""
+        if not self.blocks.count:
+            return 1.0
+        values = np.linalg.eigvalsh(self.blocks.matrix)
+        return float(2.0 / (values[0] + values[-1]))
+
+    def solve(self, q: Array, cohesion: Array, slope: Array, guess: Array | Mask | None = None) -> FrictionResult:
+        """See PreparedFriction."""
+        step = self.blocks.step(q, cohesion, slope)
+        r, history = step.start(guess if step.unit > 0.0 else None), [1.0]
+        w = step.w(r)
+        while step.unit > 0.0 and len(history) <= self.method.max_iterations:
+            r = step.admissible(r - self.rho * w)
+            w = step.w(r)
+            residual = step.residual(r, w)
+            history.append(residual / step.unit)
+            if not np.isfinite(residual) or residual <= max(self.method.tolerance * step.unit, step.rounding(r)):
+                break
+        return step.result(
+            r,
+            iterations=len(history) - 1,
+            method=self.method,
+            tolerance=self.method.tolerance,
+            history=tuple(history[1:]),
+        )

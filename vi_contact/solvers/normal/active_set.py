@@ -1,0 +1,170 @@
+"""The primal-dual active-set method with a finite fallback: the default for dense contact problems.
+
+Guess which rows are active, solve  G_aa r_a = -q_a  with r = 0 elsewhere, move every row with the wrong sign (r < 0 in
+the set, w < 0 out of it) to the other side, repeat until no sign is wrong: then r solves the problem exactly. This is
+the semismooth Newton method for  r = max(0, r - c w)  of Hintermüller, Ito and Kunisch (SIAM J. Optim. 13, 2002); after
+the first guess r or w is zero in every row, so that c drops out. The same iteration is Newton-min and full exchange.
+
+It ends in at most m changes for M-matrices but may cycle for others from m = 3 on (Ben Gharbia and Gilbert, Math.
+Program. 134, 2012), or wander when G is ill-conditioned. When a set comes back, or the count of wrong signs has not
+fallen below its minimum for PATIENCE changes, the method of Lawson and Hanson (Solving Least Squares Problems, 1974,
+ch. 23, there for least squares) takes over: it admits one row at a time and keeps r >= 0, so that ½ rᵀG r + qᵀr falls
+at every set it completes. No such set can return: it ends, in practice after about as many changes as there are rows.
+(Murty's single exchanges, the other finite fallback, took up to 1000 changes where this one took 150.)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import lapack
+
+from ...core.checks import attributes
+from .lcp import LCP, Array, LCPResult, Mask, check_guess, cholesky, failure, scaled_dense
+
+PATIENCE = 10  # Júdice and Pires, Comput. Oper. Res. 21, 1994
+
+
+@dataclass(frozen=True)
+class ActiveSet:
+    """Settings. ``max_iterations``: set changes allowed; ``tolerance``: residual above which the answer is refused.
+
+    In the result ``iterations`` is the number of changes of the set (0: the guess was right) and ``history`` the number
+    of rows that changed sides in each.
+    """
+
+    tolerance: float = 1e-9
+    max_iterations: int = 1000
+
+    def __post_init__(self) -> None:
+        attributes(self, positive=("tolerance",), counts=("max_iterations",))
+
+    def prepare(self, G: Array, bilateral: Mask) -> PreparedActiveSet:
+        """Check and factor G (m, m) once for many right-hand sides. InputError when it is not SPD."""
+        return PreparedActiveSet(self, G, bilateral)
+
+    def solve(self, problem: LCP, *, guess: Array | Mask | None = None) -> LCPResult:
+        """Solve one problem. ``guess``: the active set, or reactions whose signs tell it; None: the rows with q < 0.
+
+        Raises StepFailure when no set fits within ``max_iterations`` or G is too ill-conditioned for ``tolerance``.
+        """
+        return self.prepare(problem.G, problem.bilateral).solve(problem.q, guess)  # type: ignore[arg-type]
+
+
+class PreparedActiveSet:
+    """One G, many q. Remembers the factor of the last set: a step on the same set costs triangular solves only."""
+
+    def __init__(self, method: ActiveSet, G: Array, bilateral: Mask) -> None:
+        self.method = method
+        self._scaled = scaled_dense(G, bilateral)
+        cholesky(self._scaled.matrix)  # if the whole is positive definite, so is every part
+        self._factor = _Factor(np.zeros(bilateral.size, dtype=bool), self._scaled.matrix)
+
+    def solve(self, q: Array, guess: Array | Mask | None = None) -> LCPResult:
+        """See ActiveSet.solve; q (m,) [m]."""
+        scaled = self._scaled
+        gap = scaled.gap(q)
+        unit = scaled.violation(gap)
+        if unit == 0.0:
+            return scaled.no_contact(self.method)
+        r, w, history = self._search(self._start(gap, guess), gap)
+        residual = scaled.complementarity(r, w) / unit
+        if residual > self.method.tolerance:
+            advice = "G is too ill-conditioned; remove contacts that nearly depend on others"
+            raise failure(self.method, iterations=len(history), residual=residual, advice=advice)
+        return scaled.result(r, residual, iterations=len(history), method=self.method, history=history)
+
+    def _start(self, gap: Array, guess: Array | Mask | None) -> Mask:
+        active = gap < 0.0 if guess is None else (check_guess(guess, gap.size) > 0) & (gap < np.inf)
+        return active | self._scaled.bilateral if self._scaled.any_bilateral else active
+
+    def _search(self, active: Mask, gap: Array) -> tuple[Array, Array, tuple[float, ...]]:
+        """The r and w of the first set without wrong signs, and how many rows changed sides in each change."""
+        history: list[float] = []
+        seen: set[bytes] = set()
+        fewest, patience = gap.size + 1, PATIENCE
+        while True:
+            r, w = self._on_set(active, gap)
+            wrong = self._wrong(active, r, w)
+            count = int(np.count_nonzero(wrong))
+            if count == 0:
+                return *self._cut(r, w, gap), tuple(history)
+            fewest, patience = (count, PATIENCE) if count < fewest else (fewest, patience - 1)
+            if patience == 0 or active.tobytes() in seen:
+                return *self._descend(self._positive(r), gap, history), tuple(history)
+            seen.add(active.tobytes())
+            self._count(history, count, r, w, gap)
+            active = active ^ wrong
+
+    def _descend(self, r: Array, gap: Array, history: list[float]) -> tuple[Array, Array]:
+        """Lawson–Hanson from an admissible r; adds to ``history``."""
+        active = (r > 0.0) | self._scaled.bilateral
+        while True:
+            target, w = self._on_set(active, gap)
+            leaving = active & ~self._scaled.bilateral & (target < 0.0)
+            if leaving.any():  # go only as far as the first reaction that vanishes
+                share = np.full(r.size, np.inf)
+                share[leaving] = r[leaving] / (r[leaving] - target[leaving])
+                change: Mask = share == share.min()
+                r = self._positive(np.where(change, 0.0, r + share.min() * (target - r)))
+            else:
+                r = target
+                if not self._wrong(active, r, w).any():
+                    return r, w
+                change = np.arange(r.size) == np.argmin(np.where(active, np.inf, w))
+            self._count(history, int(np.count_nonzero(change)), r, w, gap)
+            active = active ^ change
+
+    def _count(self, history: list[float], rows: int, r: Array, w: Array, gap: Array) -> None:
+        """Record a change of the set, or raise StepFailure when there have been too many."""
+        if len(history) == self.method.max_iterations:
+            raise failure(
+                self.method,
+                iterations=len(history),
+                residual=self._scaled.complementarity(r, w) / self._scaled.violation(gap),
+                advice="take a smaller step of time or load, or raise max_iterations",
+            )
+        history.append(float(rows))
+
+    def _on_set(self, active: Mask, gap: Array) -> tuple[Array, Array]:
+        if self._factor.key != active.tobytes():
+            self._factor = _Factor(active, self._scaled.matrix)
+        return self._factor.solve(gap)
+
+    def _wrong(self, active: Mask, r: Array, w: Array) -> Mask:
+        """Rows whose sign is wrong by more than rounding: grazing rows (r = w = 0) fit either side."""
+        wrong: Mask = np.where(active, r, w) < -self._scaled.rounding(r)
+        return wrong & ~self._scaled.bilateral if self._scaled.any_bilateral else wrong
+
+    def _positive(self, r: Array) -> Array:
+        cut: Array = np.maximum(r, 0.0)
+        return np.where(self._scaled.bilateral, r, cut) if self._scaled.any_bilateral else cut
+
+    def _cut(self, r: Array, w: Array, gap: Array) -> tuple[Array, Array]:
+        """Cut reactions that are negative by rounding, so that r >= 0 holds exactly."""
+        cut = self._positive(r)
+        return (cut, gap + self._scaled.matrix @ cut) if (cut != r).any() else (r, w)
+
+
+class _Factor:
+    """Cholesky factor of G_aa of one set, and the rows of G that carry its reactions to all gaps."""
+
+    def __init__(self, active: Mask, matrix: Array) -> None:
+        self.key = active.tobytes()
+        self._index = np.flatnonzero(active)
+        self._rows = matrix[self._index]
+        self._lower = cholesky(self._rows[:, self._index]) if self._index.size else None
+
+    def solve(self, gap: Array) -> tuple[Array, Array]:
+        """r (m,) with r = 0 off the set, and w = gap + G r.
+
+        No iterative refinement: the residual of Cholesky is at rounding level already (measured gain below a factor 2
+        for conditions up to 1e10).
+        """
+        r = np.zeros(gap.size)
+        if self._lower is None:
+            return r, gap.copy()
+        part, _ = lapack.dpotrs(self._lower, -gap[self._index], lower=1)
+        r[self._index] = part
+        return r, gap + part @ self._rows

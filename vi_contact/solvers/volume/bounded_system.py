@@ -1,0 +1,143 @@
+"""The step as a problem with simple bounds: what every PETSc method of the volume route sees.
+
+    lower <= z <= upper,   A z - b >= 0 where z = lower,  <= 0 where z = upper,  = 0 elsewhere
+
+On a rigid support z = x and the bounded unknowns are the normal displacements. A point on a spring k = scale/compliance
+keeps law (5) of seed 000 on an enlarged body (the remark after its eq. 6): the far end w = x_n - compliance r_n / scale
+of the spring is a further unknown, and the bound is on w,
+
+    z = (x, w),    [[A + Bᵀ k B, -Bᵀ k], [-k B, k]] z = (b, 0) - reactions,    w <= bound.
+
+The spring unknowns of a rank follow its body unknowns. ``local`` arrays below have one entry per owned contact point.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from petsc4py import PETSc
+
+from ...core.algebra import Array, Comm, Indices, Mask, SerialMatrix
+from ...core.errors import InputError
+from ...core.step import EffectiveMatrix, StepProblem
+from ...core.surfaces import ContactSurface
+
+
+class BoundedSystem:
+    """A, the contact surface and its springs as one system of ``size`` owned unknowns, ``bounded`` of them with bounds.
+
+    Attributes:
+        soft: (local) True where the support is a spring.
+        spring, feet: stiffness k of these springs, in the unit of A, and the positions in x of their body ends.
+        bounded: (local) position of the bounded unknown in z.
+    """
+
+    def __init__(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> None:
+        self.A, self.surface, self.scale = A, surface, scale
+        self.rows = A.matrix.rows
+        compliance = surface.compliance[surface.slots]
+        self.soft: Mask = compliance > 0.0
+        self.spring = scale / compliance[self.soft]
+        self.feet = surface.owned[self.soft]
+        self.size = self.rows + len(self.spring)
+        self.bounded = surface.owned.copy()
+        self.bounded[self.soft] = self.rows + np.arange(len(self.spring))
+
+    @property
+    def comm(self) -> Any:
+        """The PETSc communicator."""
+        matrix = self.A.matrix
+        return PETSc.COMM_SELF if isinstance(matrix, SerialMatrix) else matrix.mat.comm  # type: ignore[attr-defined]
+
+    def max(self, *values: float) -> Array:
+        """Maxima over the ranks."""
+        return np.asarray(self.surface.comm.max(np.array(values)))
+
+    def shared(self, local: Array) -> Array:
+        """Values of the owned contact points -> (m,), the same on all ranks."""
+        values = np.zeros(self.surface.count)
+        values[self.surface.slots] = local
+        return self.surface.comm.sum(values)
+
+    def apply(self, z: Array) -> Array:
+        """A z."""
+        result = np.empty(self.size)
+        result[: self.rows] = self.A @ z[: self.rows]
+        if self.soft.any():
+            force = self.spring * (z[self.feet] - z[self.rows :])
+            result[self.feet] += force
+            result[self.rows :] = -force
+        return result
+
+    def load(self, b: Array) -> Array:
+        """(b, 0)."""
+        return np.concatenate([b, np.zeros(self.size - self.rows)])
+
+    def bounds(self, step: StepProblem) -> tuple[Array, Array]:
+        """(lower, upper) of the owned unknowns; an infinite bound leaves its point free, bilateral or not."""
+        if np.isnan(step.bound).any():
+            raise InputError("the bound of the contact conditions contains NaN: check the gap and the time scheme")
+        lower, upper = np.full(self.size, -np.inf), np.full(self.size, np.inf)
+        bound = step.bound[self.surface.slots]
+        upper[self.bounded] = bound
+        held = self.surface.bilateral[self.surface.slots] & np.isfinite(bound)
+        lower[self.bounded[held]] = bound[held]
+        return lower, upper
+
+    def start(self, step: StepProblem) -> Array:
+        """The guess, with springs at rest and the predicted contacts on their bounds."""
+        z = np.concatenate([step.guess, step.guess[self.feet]])
+        closed = self.predicted(step)[self.surface.slots]
+        z[self.bounded[closed]] = step.bound[self.surface.slots][closed]
+        return z
+
+    def predicted(self, step: StepProblem) -> Mask:
+        """(m,) the contact set to start from."""
+        return (step.active | self.surface.bilateral) & np.isfinite(step.bound)
+
+    def reactions(self, f: Array) -> Array:
+        """(local) r_n from the residual f = A z - b; on a spring k (x_n - w). Meaningful where the bound is active."""
+        return np.asarray(-f[self.bounded])
+
+    def norm(self) -> float:
+        """Upper bound of the largest absolute row sum of A."""
+        matrix = self.A.matrix
+        if isinstance(matrix, SerialMatrix):
+            largest = float(abs(matrix.csr).sum(axis=1).max())
+        else:
+            largest = float(matrix.mat.norm(PETSc.NormType.NORM_INFINITY))  # type: ignore[attr-defined]
+        return largest + 2.0 * float(self.max(np.max(self.spring, initial=0.0))[0])
+
+    def assembled(self) -> Any:
+        """A as an AIJ matrix: the given one when it is a PETSc matrix on a rigid support, else a new one."""
+        matrix = self.A.matrix
+        if isinstance(matrix, SerialMatrix):
+            indptr, columns, values = matrix.csr.indptr, matrix.csr.indices, matrix.csr.data
+        else:
+            mat = matrix.mat  # type: ignore[attr-defined]
+            if not self.surface.compliance.any():
+                return mat
+            indptr, columns, values = mat.getValuesCSR()
+        first, columns, total = renumbered(self.surface.comm, self.rows, self.size, columns)
+        body = sp.csr_matrix((values, columns, indptr), shape=(self.rows, total)).tocoo()
+        feet, tips = self.feet, np.arange(self.rows, self.size)
+        local = np.concatenate([body.row, feet, feet, tips, tips])
+        remote = np.concatenate([body.col, first + feet, first + tips, first + feet, first + tips])
+        k = self.spring
+        entries = np.concatenate([body.data, k, -k, -k, k])
+        csr = sp.csr_matrix((entries, (local, remote)), shape=(self.size, total))
+        arrays = (csr.indptr.astype(PETSc.IntType), csr.indices.astype(PETSc.IntType), csr.data)
+        size = (self.size, total)
+        return PETSc.Mat().createAIJ((size, size), csr=arrays, comm=self.comm)
+
+
+def renumbered(comm: Comm, old_size: int, new_size: int, columns: Any) -> tuple[int, Indices, int]:
+    """First global number of this rank, global column numbers and total, where every rank's part grows at its end."""
+    sizes = np.zeros((comm.size, 2))
+    sizes[comm.rank] = old_size, new_size
+    sizes = comm.sum(sizes)
+    old, new = (np.concatenate([[0], np.cumsum(column)]).astype(np.int64) for column in sizes.T)
+    owner = np.searchsorted(old, columns, side="right") - 1
+    return int(new[comm.rank]), columns + (new - old)[owner], int(new[-1])

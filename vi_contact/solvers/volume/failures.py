@@ -1,0 +1,67 @@
+"""PETSc's reasons for stopping, in words, and the StepFailure made of them.
+
+PETSc 3.25 has other names for some reasons and other words for some errors; both are settled here.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from ...core.errors import StepFailure
+
+NOT_A_NUMBER = -4  # SNES_DIVERGED_FNORM_NAN, in PETSc 3.25 SNES_DIVERGED_FUNCTION_NANORINF: the number stayed
+WORDS = {
+    "DIVERGED_FUNCTION_DOMAIN": "the residual could not be evaluated",
+    "DIVERGED_FUNCTION_COUNT": "too many residual evaluations",
+    "DIVERGED_LINEAR_SOLVE": "a linear system could not be solved",
+    "DIVERGED_FNORM_NAN": "the residual is not a number",
+    "DIVERGED_FUNCTION_NANORINF": "the residual is not a number",
+    "DIVERGED_OBJECTIVE_NANORINF": "the objective is not a number",
+    "DIVERGED_MAX_IT": "the iteration limit was reached",
+    "DIVERGED_LINE_SEARCH": "the line search found no descent",
+    "DIVERGED_INNER": "the inner solve failed",
+    "DIVERGED_LOCAL_MIN": "the merit function has a minimum that is no solution",
+    "DIVERGED_DTOL": "the residual grew without limit",
+    "DIVERGED_MAXITS": "the iteration limit was reached",
+    "DIVERGED_NAN": "the objective is not a number",
+    "DIVERGED_MAXFCN": "too many evaluations of the objective",
+    "DIVERGED_LS_FAILURE": "the line search found no descent",
+    "DIVERGED_TR_REDUCTION": "the trust region shrank to nothing",
+}
+CHECK_NUMBERS = "check the load, the guess and the bound of this step for NaN"
+ADVICE = {
+    "DIVERGED_LINEAR_SOLVE": "check that the body is held or that mass enters A, and that A is positive definite",
+    **dict.fromkeys((name for name, words in WORDS.items() if words.endswith("not a number")), CHECK_NUMBERS),
+}
+GENERAL_ADVICE = "check that the body is held, try a smaller step, another method, or a larger iteration limit"
+
+
+def name_of(reasons: type, reason: int) -> str:
+    """The longest name of a reason in one of petsc4py's classes of reasons: CONVERGED_..., DIVERGED_..."""
+    names = [name for name, value in vars(reasons).items() if value == reason and not name.startswith("_")]
+    return max(names, key=len, default=f"reason {reason}")
+
+
+def stopped(method: str, reasons: type, reason: int, iterations: int, worst: float) -> StepFailure:
+    """The failure of a solver that stopped with a reason <= 0."""
+    name = name_of(reasons, reason)
+    words = WORDS.get(name, "no convergence")
+    return StepFailure(
+        f"{method} stopped after {iterations} iterations with relative residual {worst:.2g}, {name} ({words}): "
+        f"{ADVICE.get(name, GENERAL_ADVICE)}"
+    )
+
+
+def raised(method: str, error: Any) -> StepFailure:
+    """The failure of a PETSc call that raised."""
+    said = last_line(error)
+    advice = "check that A is positive definite and that load, guess and bound are finite, or try another method"
+    if re.search(r"\bnan\b", said, re.IGNORECASE):  # error 72, "Inf or NaN", or 83, "generated infinity or NaN"
+        said, advice = f"not a number: {said}", CHECK_NUMBERS
+    return StepFailure(f"{method} stopped with PETSc error {getattr(error, 'ierr', 'unknown')} ({said}): {advice}")
+
+
+def last_line(error: Any) -> str:
+    """What is wrong, which PETSc tells at the end of its trace."""
+    return str(error).splitlines()[-1].split("] ", 1)[-1].strip()

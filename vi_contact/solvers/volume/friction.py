@@ -1,0 +1,134 @@
+"""Friction on the volume route: Coulomb's law as a sequence of Tresca problems on all unknowns, by SNES.
+
+    s <- cohesion + slope max(r_n(s), 0)
+
+Every problem of given thresholds s is solved to round-off, as the mixed complementarity problem of
+volume_friction_system.py; Tresca's law is one such problem. It shares nothing with the condensed route but A, b and the
+extrapolation of thresholds; references: fixed_point.py. The first problem of Coulomb's law is without friction, every
+other starts from the solution before, its sliding points on their new thresholds, and then mostly costs one
+factorisation. A law that depends on the slip rate makes this a sequence of such sequences: slip_rate.py.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...core.algebra import Array, Mask
+from ...core.errors import StepFailure
+from ...core.step import StepProblem, StepResult
+from ...laws.friction import project
+from ..friction.extrapolation import Anderson
+from ..friction.slip_rate import RateIteration
+from ..normal.lcp import largest
+from .bounded_system import BoundedSystem
+from .failures import stopped
+from .friction_step import Rubbing, ScaledRubbing
+from .friction_system import RubbingSystem
+
+TOLERANCE = 1e-11  # change of the thresholds relative to the largest: the error of the friction cone
+NOISE = 1e-10  # below this, changes that do not shrink are those of round-off
+PROBLEMS = 200
+EXTRAPOLATION = Anderson(depth=5, after=3)
+
+
+@dataclass(frozen=True)
+class Found:
+    """The solution of a sequence, or of one problem: r_n (m,), slip (L,), zero where points stick, SNES iterations."""
+
+    state: Rubbing
+    r_n: Array
+    active: Mask
+    slip: Array
+    iterations: int
+    history: tuple[float, ...] = ()
+
+
+class VolumeFriction:
+    """The step with friction of one A; ``driver`` is the PETSc solver, made by ``make`` from the scaled step."""
+
+    def __init__(self, body: BoundedSystem, tolerance: float, make: Callable[[ScaledRubbing], Any], name: str) -> None:
+        self._body, self._name = body, name
+        self._rubbing = RubbingSystem(body)
+        self._scaled = ScaledRubbing(self._rubbing, tolerance)
+        self.driver = make(self._scaled)
+
+    def solve(self, step: StepProblem) -> StepResult:
+        """The step; StepFailure with PETSc's reason, or when the thresholds do not settle."""
+        surface, law = self._body.surface, step.friction
+        cohesion = law.limit(np.zeros(surface.count), surface.weights, step.scale)
+        slope = law.slope(surface.weights)
+        still = np.zeros((surface.count, surface.tangents.shape[1]))
+        if step.friction_at(still) is law:
+            return self._result(step, self._sequence(step, cohesion, slope, None))
+
+        def solved(mu: Array, before: Any) -> Any:
+            return self._sequence(step, cohesion, mu, before)
+
+        def coefficients(found: Any) -> Array:
+            return step.friction_at(self._rubbing.shared(found.slip)).slope(surface.weights)
+
+        found: Any = RateIteration().solve(slope, solved, coefficients)
+        return self._result(step, found)
+
+    def _sequence(self, step: StepProblem, cohesion: Array, slope: Array, before: Found | None) -> Found:
+        """Coulomb's problem with a coefficient (m,) that is given, from the solution of another one."""
+        sequence, spent = EXTRAPOLATION.start(), 0
+        history: list[float] = []
+        limit = cohesion if before is None else cohesion + slope * np.maximum(before.r_n, 0.0)
+        if before is None:
+            start, spent = self._first(step, limit)
+        else:
+            start = self._scaled.moved(before.state, before.slip, limit)
+        while len(history) < PROBLEMS:
+            found = self._tresca(step, limit, start)
+            spent += found.iterations
+            new = cohesion + slope * np.maximum(found.r_n, 0.0)
+            size = max(largest(new), largest(limit))
+            change = largest(new - limit) / size if size else 0.0
+            if change <= TOLERANCE or (change <= NOISE and history and change >= history[-1]):
+                return Found(found.state, found.r_n, found.active, found.slip, spent, tuple(history))
+            history.append(change)
+            limit = np.maximum(sequence.next(limit, new), 0.0)
+            start = self._scaled.moved(found.state, found.slip, limit)
+        raise StepFailure(
+            f"{self._name} stopped after {PROBLEMS} Tresca problems with a change of {history[-1]:.1e} of the friction "
+            "thresholds: take a smaller step of time or load, or use Condensed()"
+        )
+
+    def _first(self, step: StepProblem, limit: Array) -> tuple[Rubbing, int]:
+        """The guess, sliding as predicted, and no iterations; with disks the solution without friction, whose slip
+        gives the directions that Newton's method needs."""
+        rubbing, scaled = self._rubbing, self._scaled
+        state = Rubbing(self._body.start(step), np.zeros(len(rubbing.tangent)), np.zeros(len(rubbing.pairs)))
+        if not (rubbing.any_disk and limit.any()):
+            return scaled.moved(state, state.z[rubbing.tangent] - rubbing.origin(step), limit), 0
+        free = self._tresca(step, np.zeros_like(limit), state)
+        return scaled.moved(free.state, free.slip, limit), free.iterations
+
+    def _tresca(self, step: StepProblem, limit: Array, start: Rubbing) -> Found:
+        """The problem with thresholds (m,)."""
+        body, scaled, driver = self._body, self._scaled, self.driver
+        scaled.rub(step, limit, start)
+        y, F, reason, iterations = driver.run()
+        if reason <= 0 and not scaled.accepts(y, F):
+            raise stopped(self._name, driver.reasons, reason, iterations, scaled.worst)
+        state = scaled.physical(y)
+        active = scaled.active(y, F)
+        r_n = np.where(active, body.reactions(F * scaled.r_ref), 0.0)
+        slip = scaled.slip(state.z, scaled.sliding(y))
+        return Found(state, body.shared(r_n), body.shared(active.astype(float)) > 0.0, slip, iterations)
+
+    def _result(self, step: StepProblem, found: Found) -> StepResult:
+        """x, with sticking points put exactly where they were, and r_t within the last digit of its disk."""
+        surface, rubbing = self._body.surface, self._rubbing
+        law = step.friction_at(rubbing.shared(found.slip))
+        limit = law.limit(found.r_n, surface.weights, step.scale)
+        x = found.state.z[: self._body.rows]
+        stick = (found.slip == 0.0) & (limit > 0.0)[surface.slots][rubbing.point]
+        x[rubbing.tangent[stick]] = rubbing.origin(step)[stick]
+        r_t = project(rubbing.shared(found.state.reaction), limit)
+        return StepResult(x, found.r_n, found.active, found.iterations, self._name, r_t=r_t, history=found.history)

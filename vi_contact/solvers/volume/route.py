@@ -1,0 +1,206 @@
+"""The volume route: the one-step problem solved on all unknowns by PETSc's VI and bound-constrained solvers.
+
+    A x = b - B_nᵀ r_n,    0 <= r_n  ⊥  bound - B_n x + compliance r_n / scale >= 0
+
+In the rotated basis every condition is a bound on one unknown, which is all that SNES-VI and TAO know of contact. With
+friction the tangential reactions become bounded unknowns too (volume_friction.py); then there is nothing to minimise,
+and only SNES can do it. Reference: PETSc manual, chapters SNES (variational inequalities) and TAO.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Protocol, cast
+
+import numpy as np
+from petsc4py import PETSc
+
+from ...core.algebra import Array
+from ...core.checks import instance, provides, real, shown
+from ...core.errors import InputError, StepFailure
+from ...core.step import ContactProblem, EffectiveMatrix, StepProblem, StepResult
+from ...core.surfaces import ContactSurface
+from .bounded_system import BoundedSystem
+from .failures import raised, stopped
+from .friction import VolumeFriction
+from .friction_step import ScaledRubbing
+from .one_factorisation import OneFactorisation
+from .options import OptionLayers, Options
+from .scaled_step import ScaledStep
+from .snes import ReducedNewton, SemismoothNewton
+from .tao import TaoTron
+
+__all__ = ["OneFactorisation", "ReducedNewton", "SemismoothNewton", "TaoTron", "Volume"]
+
+
+class Driver(Protocol):
+    """A PETSc solver bound to a ScaledStep."""
+
+    solver: Any
+    reasons: type
+
+    def run(self) -> tuple[Array, Array, int, int]:
+        """(y, F(y), PETSc's reason, iterations) of the scaled step."""
+        ...
+
+    def destroy(self) -> None: ...
+
+
+class Method(Protocol):
+    """How the bounded problem is solved: settings that make a driver and choose where it starts.
+
+    One that ``carries_friction`` is a FrictionMethod.
+    """
+
+    @property
+    def carries_friction(self) -> bool: ...
+
+    def defaults(self, ranks: int) -> Options: ...
+    def driver(self, scaled: ScaledStep, layers: OptionLayers) -> Any: ...
+    def start(self, driver: Any, system: BoundedSystem, step: StepProblem) -> Array: ...
+
+
+class FrictionMethod(Method, Protocol):
+    """A method that carries friction: its settings for the larger system."""
+
+    def friction_defaults(self) -> Options: ...
+    def friction_driver(self, scaled: ScaledRubbing, layers: OptionLayers) -> Any: ...
+
+
+@dataclass(frozen=True)
+class Volume:
+    """Settings of the volume route.
+
+    Attributes:
+        method: OneFactorisation (fast), ReducedNewton (the reference), SemismoothNewton or TaoTron.
+        petsc_options: PETSc options without prefix, e.g. {"snes_monitor": None}; command-line options go before them.
+        prefix: what these options are called on the command line and in PETSC_OPTIONS.
+        tolerance: largest relative error accepted when a solver stops improving above round-off.
+    """
+
+    method: Method = field(default_factory=OneFactorisation)
+    petsc_options: Mapping[str, object | None] = field(default_factory=dict)
+    prefix: str = "vi_contact_volume_"
+    tolerance: float = 1e-9
+
+    def __post_init__(self) -> None:
+        names = ("carries_friction", "defaults", "driver", "start")
+        provides("Volume", "method", self.method, names, "give OneFactorisation(), ReducedNewton() or another")
+        instance("Volume", "petsc_options", self.petsc_options, Mapping, "give a dict of PETSc options without prefix")
+        instance("Volume", "prefix", self.prefix, str, "give a text such as 'vi_contact_volume_'")
+        if not 0.0 < real(self.tolerance) < 1.0:
+            raise InputError(f"Volume tolerance is {shown(self.tolerance)}: give a relative error below 1, such as "
+                             "1e-9")
+
+    def check(self, problem: ContactProblem) -> None:
+        """InputError for friction that the method cannot carry, without a tangent, or of a wrong number of values."""
+        if not problem.frictional:
+            return
+        surface, law = problem.surface, problem.friction
+        if not self.method.carries_friction:
+            raise InputError(
+                f"Volume({self.method}) only enforces bounds on displacements and would ignore {law}: use "
+                "Volume(ReducedNewton()), or Condensed(), the condensed route"
+            )
+        if surface.tangents.shape[1] == 0:
+            raise InputError(f"Volume would ignore {law}: a body in one dimension cannot slide, use Frictionless()")
+        law.limit(np.zeros(surface.count), surface.weights, 1.0)
+
+    def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> PreparedVolume:
+        """The solver for one effective matrix; collective. InputError for options that cannot work."""
+        return PreparedVolume(self, A, surface, scale)
+
+
+class PreparedVolume:
+    """A PETSc solver bound to A; ``snes`` or ``tao`` is the PETSc object. ``close`` frees it.
+
+    Without ``close`` it is freed at the first ``prepare`` after its last reference: destruction is collective, and
+    Python's is not, so petsc4py only puts it aside.
+    """
+
+    def __init__(self, settings: Volume, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> None:
+        self._system = BoundedSystem(A, surface, scale)
+        PETSc.garbage_cleanup(self._system.comm)
+        self._settings, self._method = settings, settings.method
+        defaults = settings.method.defaults(surface.comm.size)
+        self._layers = OptionLayers(settings.prefix, defaults, settings.petsc_options)
+        self._scaled = ScaledStep(self._system, settings.tolerance)
+        self._name = f"Volume({getattr(settings.method, 'petsc_type', type(settings.method).__name__)})"
+        self._friction: VolumeFriction | None = None
+        self._driver: Driver | None = self._make()
+
+    def _make(self) -> Driver:
+        driver: Driver = self._method.driver(self._scaled, self._layers)
+        return driver
+
+    def _rubbing(self) -> VolumeFriction:
+        """The problem with friction, made at the first step that has some, in the place of the other one."""
+        if self._friction is None:
+            self.close()
+            settings, method = self._settings, cast(FrictionMethod, self._settings.method)
+            layers = OptionLayers(settings.prefix, method.friction_defaults(), settings.petsc_options)
+            self._friction = VolumeFriction(
+                self._system, settings.tolerance, lambda scaled: method.friction_driver(scaled, layers), self._name
+            )
+        return self._friction
+
+    @property
+    def snes(self) -> Any:
+        """The SNES object; None when the method is TAO's or the solver is closed."""
+        return self._petsc("SNES")
+
+    @property
+    def tao(self) -> Any:
+        """The TAO object; None when the method is SNES's or the solver is closed."""
+        return self._petsc("TAO")
+
+    def _petsc(self, kind: str) -> Any:
+        driver = self._driver if self._friction is None else self._friction.driver
+        solver = None if driver is None else driver.solver
+        return solver if isinstance(solver, getattr(PETSc, kind)) else None
+
+    def close(self) -> None:
+        """Free the PETSc objects; collective."""
+        if self._driver is not None:
+            self._driver.destroy()
+            self._driver = None
+        if self._friction is not None:
+            self._friction.driver.destroy()
+            self._friction = None
+
+    def solve(self, step: StepProblem) -> StepResult:
+        """The step; StepFailure with PETSc's reason when it does not converge."""
+        try:
+            return self._solve(step) if step.slip0 is None else self._rubbing().solve(step)
+        except PETSc.Error as error:
+            self.close()  # its state is unknown; the next step gets a new one
+            if error.__cause__ is not None:
+                raise error.__cause__ from None  # raised in one of our callbacks; PETSc before 3.22 passes it on
+            raise raised(self._name, error) from error
+        except StepFailure:
+            self.close()
+            raise
+
+    def _solve(self, step: StepProblem) -> StepResult:
+        """The step without friction."""
+        if self._driver is None:
+            self._driver = self._make()
+        self._scaled.set(step, self._method.start(self._driver, self._system, step))
+        y, F, reason, iterations = self._driver.run()
+        if reason <= 0 and not self._scaled.accepts(y, F):
+            raise stopped(self._name, self._driver.reasons, reason, iterations, self._scaled.worst)
+        return self._result(y, F, iterations)
+
+    def _result(self, y: Array, F: Array, iterations: int) -> StepResult:
+        """x, and r_n on the active set. Off it r_n is zero, so that what is left of F shows in the certificate."""
+        system, scaled = self._system, self._scaled
+        active = scaled.active(y, F)
+        r_n = np.where(active, system.reactions(F * scaled.r_ref), 0.0)
+        return StepResult(
+            x=y[: system.rows] * scaled.x_ref,
+            r_n=system.shared(r_n),
+            active=system.shared(active.astype(float)) > 0.0,
+            iterations=iterations,
+            method=self._name,
+        )

@@ -1,0 +1,138 @@
+"""One step in the numbers PETSc computes with, and the test that decides when it is solved.
+
+PETSc's VI and bound-constrained solvers carry absolute tolerances in unknown units (solver notes P1, P18). They are
+handed z / x_ref and (A z - b) / r_ref instead, with powers of two for x_ref and r_ref, so that both are near one in
+any system of units and scaling loses no digit: a bound stays exactly a bound.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from petsc4py import PETSc
+
+from ...core.algebra import Array, Mask, max_abs
+from ...core.step import StepProblem
+from .bounded_system import BoundedSystem
+from .failures import NOT_A_NUMBER
+
+ROUND_OFF = 1e-14  # backward error |A z - b| / (|A| |z| + |b|), largest entries, of a solve that cannot be improved
+
+
+class ScaledStep:
+    """F(y) = (A x_ref y - b) / r_ref with bounds on y, for the step set last."""
+
+    def __init__(self, system: BoundedSystem, tolerance: float) -> None:
+        self.system, self.tolerance = system, tolerance
+        self._norm = system.norm()
+
+    def set(self, step: StepProblem, start: Array) -> None:
+        """Take a step that starts from z = start."""
+        system = self.system
+        self.b = system.load(step.b)
+        lower, upper = system.bounds(step)
+        z_max, bound_max, b_max = system.max(max_abs(start), max_abs(upper[np.isfinite(upper)]), max_abs(self.b))
+        if z_max == 0.0:
+            z_max = self._along(self.b, b_max)
+        if b_max == 0.0:
+            b_max = float(system.max(max_abs(system.apply(start)))[0])
+        self.x_ref, self.r_ref = _power_of_two(max(z_max, bound_max)), _power_of_two(b_max)
+        self.lower, self.upper = lower / self.x_ref, upper / self.x_ref
+        self.start = start / self.x_ref
+        self._b_max = b_max / self.r_ref
+        self._worst = np.inf
+
+    def _along(self, b: Array, b_max: float) -> float:
+        """Size of the minimiser of ½ zᵀA z - bᵀz along b: the size of z when nothing else is known."""
+        if b_max == 0.0:
+            return 0.0
+        unit = b / b_max
+        bb, bAb = self.system.surface.comm.sum(np.array([unit @ unit, unit @ self.system.apply(unit)]))
+        return b_max * bb / bAb if bAb > 0.0 else 0.0
+
+    def residual(self, y: Array) -> Array:
+        """F(y)."""
+        return np.asarray((self.system.apply(y * self.x_ref) - self.b) / self.r_ref)
+
+    def function(self, _solver: Any, y: Any, F: Any) -> None:
+        """F(y) as a PETSc callback (SNES function, TAO gradient)."""
+        self.last = self.residual(y.array_r)
+        F.array[:] = self.last
+
+    def objective(self, _solver: Any, y: Any, G: Any) -> float:
+        """f(y) - f(origin) and the gradient F(y), for TAO; f(y) = ½ y·Hy - y·b/r_ref, H = A x_ref / r_ref.
+
+        A line search compares values, which agree in all their digits where the gradient still has eight to lose.
+        """
+        values = y.array_r
+        F = self.residual(values)
+        G.array[:] = F
+        energy = 0.5 * ((values - self._zero[0]) @ (F + self._zero[1]))
+        return float(self.system.surface.comm.sum(np.array([energy]))[0])
+
+    def measure_from(self, y: Array) -> None:
+        """Take y as the origin of the objective."""
+        self._zero = y, self.residual(y)
+
+    def active(self, y: Array, F: Array) -> Mask:
+        """(local) the natural map's choice: where the reaction exceeds the remaining gap."""
+        i = self.system.bounded
+        return np.asarray((self.upper[i] - y[i] < -F[i]) | (self.lower[i] == self.upper[i]))
+
+    def errors(self, y: Array, F: Array) -> tuple[float, float, float]:
+        """Largest |F| off the active set and |gap| on it, relative as in the certificate; backward error of F."""
+        system, i = self.system, self.system.bounded
+        active = self.active(y, F)
+        gap = (self.upper[i] - y[i])[active]
+        force = F.copy()
+        force[i[active]] = 0.0
+        force[system.feet] += force[system.rows :]  # the body feels what is left over on its springs
+        Ax = F + self.b / self.r_ref
+        Ax[system.feet] += F[system.rows :]
+        local = (max_abs(force), max_abs(gap), max_abs(y), max_abs(Ax[: system.rows]), float(np.isnan(F).any()))
+        force_max, gap_max, y_max, Ax_max, broken = system.max(*local)
+        if broken:
+            return np.nan, np.nan, np.nan
+        size = self._norm * y_max * self.x_ref / self.r_ref + self._b_max
+        return (
+            fraction(force_max, max(self._b_max, Ax_max)),
+            fraction(gap_max, y_max),
+            fraction(force_max, size),
+        )
+
+    def verdict(self, y: Array, F: Array) -> int:
+        """A SNES convergence reason: 0 to go on, 2 solved to round-off, 4 below the tolerance and no longer improving.
+
+        PETSc's own tests are relative to the first residual, which a good prediction makes unreachable (P2).
+        """
+        force, gap, backward = self.errors(y, F)
+        if np.isnan(force):
+            return NOT_A_NUMBER
+        worst, before = max(force, gap), self._worst
+        self._worst = worst
+        if backward <= ROUND_OFF and worst <= self.tolerance and gap <= ROUND_OFF:
+            return int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_ABS)
+        if 0.5 * before < worst <= self.tolerance and np.isfinite(before):
+            return int(PETSc.SNES.ConvergedReason.CONVERGED_SNORM_RELATIVE)
+        return 0
+
+    def accepts(self, y: Array, F: Array) -> bool:
+        """True below the tolerance: a solver whose line search fails at the floor of round-off is done."""
+        force, gap, _ = self.errors(y, F)
+        self._worst = max(force, gap)
+        return self._worst <= self.tolerance
+
+    @property
+    def worst(self) -> float:
+        """The larger error found last."""
+        return self._worst
+
+
+def _power_of_two(value: float) -> float:
+    """The power of two next above the value; one for zero, infinity and NaN, which PETSc reports itself."""
+    return float(np.exp2(np.ceil(np.log2(value)))) if 0.0 < value < np.inf else 1.0
+
+
+def fraction(value: float, reference: float) -> float:
+    return value / reference if reference > 0.0 else value

@@ -1,0 +1,252 @@
+"""PETSc SNES for variational inequalities on all unknowns, and its two assembled methods.
+
+``ReducedNewton`` is VINEWTONRSLS, which without a line search is the primal-dual active set method: solve with the
+active points held, project, read the next active set off the signs of the residual. ``SemismoothNewton`` is
+VINEWTONSSLS on the Fischer-Burmeister function. Both factorise in every iteration and share nothing with the condensed
+route but A and b.
+"""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+from petsc4py import PETSc
+
+from ...core.algebra import Array
+from ...core.step import StepProblem
+from .bounded_system import BoundedSystem
+from .friction_jacobian import RubbingJacobian
+from .friction_step import ScaledRubbing
+from .options import OptionLayers, Options, check_friction, check_reduced, check_semismooth
+from .scaled_step import ScaledStep
+
+# Line search: `bt` throttles changes of the active set, 16 to 50 iterations instead of 5 to 7 (P3).
+# Tolerances: ours decide (ScaledStep.verdict); one of these set by the user stops earlier, relative to |b|.
+NEWTON_OPTIONS: Options = {
+    "snes_linesearch_type": "none",
+    "snes_vi_zero_tolerance": 0.0,
+    "snes_rtol": 0.0,
+    "snes_atol": 0.0,
+    "snes_stol": 0.0,
+    "snes_max_it": 100,
+}
+MUMPS_OPTIONS: Options = {
+    "ksp_type": "preonly",
+    "pc_factor_mat_solver_type": "mumps",
+    "mat_mumps_icntl_20": 0,  # distributed right-hand sides crash (P12)
+}
+
+
+class Jacobian(Protocol):
+    """The matrix of F for SNES: ``rescale`` when the units of a step change, ``evaluate`` as the SNES callback."""
+
+    mat: Any
+
+    def rescale(self, ratio: float) -> None: ...
+    def evaluate(self, snes: Any, y: Any, J: Any, P: Any) -> None: ...
+    def destroy(self) -> None: ...
+
+
+class Preconditioner(Protocol):
+    """A PETSc preconditioner in Python."""
+
+    def apply(self, pc: Any, r: Any, y: Any) -> None: ...
+
+
+class SnesDriver:
+    """A SNES object bound to a scaled step; ``solver`` is the PETSc object."""
+
+    reasons = PETSc.SNES.ConvergedReason
+
+    def __init__(
+        self,
+        scaled: ScaledStep,
+        layers: OptionLayers,
+        jacobian: Jacobian,
+        *,
+        snes_type: str,
+        check: Callable[[Any, OptionLayers], None],
+        inverse: Preconditioner | None = None,
+    ) -> None:
+        self._scaled, self._layers, self._jacobian = scaled, layers, jacobian
+        self._y, self._F = jacobian.mat.createVecs()
+        self._lower, self._upper = self._y.duplicate(), self._y.duplicate()
+        self.solver = PETSc.SNES().create(scaled.system.comm)
+        self.solver.setOptionsPrefix(layers.prefix)
+        self.solver.setType(snes_type)  # before the convergence test, which it would overwrite (P7)
+        self._test = Test(scaled)
+        self.solver.setFunction(weakly(scaled.function), self._F)
+        self.solver.setJacobian(weakly(jacobian.evaluate), jacobian.mat)
+        self.solver.setVariableBounds(self._lower, self._upper)
+        self.solver.setConvergenceTest(weakly(self._test.reason))
+        if inverse is not None:
+            self.solver.ksp.setType("preonly")
+            self.solver.ksp.pc.setType("python")
+            self.solver.ksp.pc.setPythonContext(SimpleNamespace(apply=weakly(inverse.apply)))
+        layers.apply(self.solver, check)
+
+    def run(self) -> tuple[Array, Array, int, int]:
+        """(y, F(y), PETSc's reason, iterations) of the scaled step."""
+        scaled, snes = self._scaled, self.solver
+        self._jacobian.rescale(scaled.x_ref / scaled.r_ref)
+        self._y.array[:] = scaled.start
+        write_bounds(scaled, self._lower, self._upper)
+        with self._layers.in_force():
+            snes.solve(None, self._y)
+        y, F = np.array(self._y.array_r), np.array(self._F.array_r)
+        return y, F, snes.getConvergedReason(), snes.getIterationNumber()
+
+    def destroy(self) -> None:
+        """Free the PETSc objects; collective."""
+        for item in (self.solver, self._jacobian, self._y, self._F, self._lower, self._upper):
+            item.destroy()
+
+
+class Test:
+    """The SNES convergence test: our verdict, or a tolerance that the user set, which then counts relative to |b|."""
+
+    def __init__(self, scaled: ScaledStep) -> None:
+        self._scaled, self._first = scaled, 0.0
+
+    def reason(self, snes: Any, iteration: int, norms: tuple[float, float, float]) -> int:
+        """PETSc's reason to stop, 0 to go on."""
+        reason = self._scaled.verdict(snes.getSolution().array_r, snes.getFunction()[0].array_r)
+        if reason:
+            return reason
+        rtol, atol, _, _ = snes.getTolerances()
+        if iteration == 0:
+            self._first = norms[2]
+        if norms[2] < atol:
+            return int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_ABS)
+        if iteration and norms[2] < rtol * self._first:
+            return int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_RELATIVE)
+        return 0
+
+
+def weakly(method: Callable[..., Any]) -> Callable[..., Any]:
+    """The bound method without keeping its object alive: what PETSc may hold.
+
+    petsc4py frees a solver late and all at once; whatever PETSc object only its callbacks kept alive would then be lost
+    to the clean-up and never be freed.
+    """
+    reference = weakref.WeakMethod(method)
+
+    def call(*arguments: Any) -> Any:
+        alive = reference()
+        assert alive is not None, "a PETSc solver outlived its driver"
+        return alive(*arguments)
+
+    return call
+
+
+def write_bounds(scaled: ScaledStep, lower: Any, upper: Any) -> None:
+    """The bounds of a step in PETSc's vectors; only PETSc's own infinities mean no bound (P9)."""
+    lower.array[:] = np.maximum(scaled.lower, PETSc.NINFINITY)
+    upper.array[:] = np.minimum(scaled.upper, PETSc.INFINITY)
+
+
+class AssembledJacobian:
+    """H = A x_ref / r_ref as an AIJ matrix, symmetric positive definite."""
+
+    def __init__(self, system: BoundedSystem) -> None:
+        self._A = system.assembled()
+        self._own = self._A is not getattr(system.A.matrix, "mat", None)
+        self.mat = self._A.duplicate(copy=True)
+        self._ratio = np.nan
+
+    def rescale(self, ratio: float) -> None:
+        """Take the units of a step."""
+        if ratio != self._ratio:
+            self._ratio = ratio
+            self._copy()
+            self.mat.setOption(PETSc.Mat.Option.SPD, True)
+
+    def evaluate(self, snes: Any, y: Any, J: Any, P: Any) -> None:
+        """Constant."""
+
+    def _copy(self) -> None:
+        self._A.copy(self.mat, structure=PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        self.mat.scale(self._ratio)
+
+    def destroy(self) -> None:
+        """Free what this object made."""
+        self.mat.destroy()
+        if self._own:
+            self._A.destroy()
+
+
+class SemismoothJacobian(AssembledJacobian):
+    """H again for every iteration: VINEWTONSSLS overwrites it by D_a + D_b H, which is not symmetric (P8)."""
+
+    def rescale(self, ratio: float) -> None:
+        """Take the units of a step."""
+        self._ratio = ratio
+
+    def evaluate(self, snes: Any, y: Any, J: Any, P: Any) -> None:
+        """A fresh copy."""
+        self._copy()
+        self.mat.setOption(PETSc.Mat.Option.SYMMETRIC, False)
+
+
+@dataclass(frozen=True)
+class ReducedNewton:
+    """SNES VINEWTONRSLS, Cholesky by MUMPS on each reduced matrix: the reference. Iterations are factorisations.
+
+    Other linear solvers by ``petsc_options``, e.g. {"ksp_type": "cg", "pc_type": "hypre"}; gamg, mg and fieldsplit are
+    refused, they do not survive the reduction. With friction LU in the place of Cholesky.
+    """
+
+    carries_friction: ClassVar[bool] = True
+
+    def defaults(self, ranks: int) -> Options:
+        """Options before the user's."""
+        return {**NEWTON_OPTIONS, **MUMPS_OPTIONS, "pc_type": "cholesky"}
+
+    def driver(self, scaled: ScaledStep, layers: OptionLayers) -> SnesDriver:
+        """The SNES object."""
+        return SnesDriver(
+            scaled, layers, AssembledJacobian(scaled.system), snes_type="vinewtonrsls", check=check_reduced
+        )
+
+    def start(self, driver: SnesDriver, system: BoundedSystem, step: StepProblem) -> Array:
+        """The guess with the predicted contacts on their bounds."""
+        return system.start(step)
+
+    def friction_defaults(self) -> Options:
+        """Options before the user's: LU, the system with friction is not symmetric. Its zeros on the diagonal delay
+        pivots, for which MUMPS on several ranks needs room: it stops with INFOG(1) = -9 when it has only the usual."""
+        return {**NEWTON_OPTIONS, **MUMPS_OPTIONS, "pc_type": "lu", "mat_mumps_icntl_14": 200}
+
+    def friction_driver(self, scaled: ScaledRubbing, layers: OptionLayers) -> SnesDriver:
+        """The SNES object of a step with friction."""
+        jacobian = RubbingJacobian(scaled)
+        return SnesDriver(scaled, layers, jacobian, snes_type="vinewtonrsls", check=check_friction)
+
+
+@dataclass(frozen=True)
+class SemismoothNewton:
+    """SNES VINEWTONSSLS, LU by MUMPS: a diagnostic. Its iterates may penetrate by about 1e-13 of the displacement.
+
+    With springs 1e6 times stiffer or softer than the body its line search fails or not, as rounding will have it.
+    """
+
+    carries_friction: ClassVar[bool] = False
+
+    def defaults(self, ranks: int) -> Options:
+        """Options before the user's."""
+        return {**NEWTON_OPTIONS, **MUMPS_OPTIONS, "snes_linesearch_type": "bt", "pc_type": "lu"}
+
+    def driver(self, scaled: ScaledStep, layers: OptionLayers) -> SnesDriver:
+        """The SNES object."""
+        return SnesDriver(
+            scaled, layers, SemismoothJacobian(scaled.system), snes_type="vinewtonssls", check=check_semismooth
+        )
+
+    def start(self, driver: SnesDriver, system: BoundedSystem, step: StepProblem) -> Array:
+        """The guess with the predicted contacts on their bounds."""
+        return system.start(step)

@@ -1,0 +1,128 @@
+"""PETSc TAO on the same bounds: minimise ½ xᵀA x - bᵀx subject to x_n <= bound, as a second opinion.
+
+TAO's tolerances and trust regions are absolute (P18), which the scaled step makes harmless; its own convergence tests
+are replaced by ``ScaledStep.verdict``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from petsc4py import PETSc
+
+from ...core.algebra import Array
+from ...core.step import StepProblem
+from .bounded_system import BoundedSystem
+from .options import REDUCED_PC, OptionLayers, Options, refuse
+from .scaled_step import ScaledStep
+from .snes import AssembledJacobian, weakly, write_bounds
+
+
+def tao_options(ranks: int) -> Options:
+    """Give TRON's defaults; PETSc has no incomplete Cholesky for several ranks."""
+    return {
+        "tao_gatol": 0.0,
+        "tao_grtol": 0.0,
+        "tao_gttol": 0.0,
+        "tao_steptol": 0.0,
+        "tao_max_it": 200,
+        "pc_type": "icc" if ranks == 1 else "bjacobi",
+        "sub_pc_type": "icc",
+    }
+
+
+def check_tao(tao: Any, layers: OptionLayers) -> None:
+    """Refuse other types and preconditioners that give wrong answers, also when they come from options (docs/petsc.md:
+    many types ignore bounds, and bqpip reports garbage as converged)."""
+    if tao.getType() != "tron":
+        refuse(f"TAO type {tao.getType()}", "other types ignore bounds, or stop short or wrong", "leave it out")
+    pc = layers.chosen("pc_type")
+    if pc in REDUCED_PC:
+        refuse(f"pc_type {pc} with TAO tron", REDUCED_PC[pc], "use icc, bjacobi or hypre")
+
+
+class TaoDriver:
+    """A TAO object bound to a scaled step; ``solver`` is the PETSc object."""
+
+    reasons = PETSc.TAO.Reason
+
+    def __init__(self, scaled: ScaledStep, layers: OptionLayers) -> None:
+        self._scaled, self._layers = scaled, layers
+        self._hessian = AssembledJacobian(scaled.system)
+        self._y, G = self._hessian.mat.createVecs()
+        self._vectors = [self._y, G, self._y.duplicate(), self._y.duplicate()]
+        self.solver = PETSc.TAO().create(scaled.system.comm)
+        self.solver.setOptionsPrefix(layers.prefix)
+        self.solver.setType("tron")
+        self._test = Test(scaled)
+        self.solver.setObjectiveGradient(weakly(scaled.objective), G)
+        self.solver.setHessian(weakly(self._hessian.evaluate), self._hessian.mat)
+        self.solver.setVariableBounds((self._vectors[2], self._vectors[3]))
+        self.solver.setSolution(self._y)
+        self.solver.setConvergenceTest(weakly(self._test.reason))
+        layers.apply(self.solver, check_tao)
+
+    def run(self) -> tuple[Array, Array, int, int]:
+        """(y, F(y), PETSc's reason, iterations) of the scaled step."""
+        scaled, tao = self._scaled, self.solver
+        self._hessian.rescale(scaled.x_ref / scaled.r_ref)
+        y = np.clip(scaled.start, scaled.lower, scaled.upper)
+        write_bounds(scaled, self._vectors[2], self._vectors[3])
+        iterations, before = 0, np.inf
+        while True:
+            scaled.measure_from(y)
+            self._y.array[:] = y
+            with self._layers.in_force():
+                tao.solve(self._y)
+            y, reason = np.array(self._y.array_r), tao.getConvergedReason()
+            F, iterations = scaled.residual(y), iterations + tao.getIterationNumber()
+            failed = reason == PETSc.TAO.Reason.DIVERGED_LS_FAILURE and not scaled.accepts(y, F)
+            if not (failed and scaled.worst <= 0.9 * before):  # NaN ends it too
+                return y, F, reason, iterations
+            before = scaled.worst  # the values compared were round-off: measured from here they have all digits again
+
+    def destroy(self) -> None:
+        """Free the PETSc objects; collective."""
+        for item in (self.solver, self._hessian, *self._vectors):
+            item.destroy()
+
+
+class Test:
+    """The TAO convergence test: PETSc's own, which only the user's tolerances switch on, then our verdict."""
+
+    def __init__(self, scaled: ScaledStep) -> None:
+        self._scaled = scaled
+
+    def reason(self, tao: Any) -> int | None:
+        """PETSc's reason to stop, None to go on."""
+        if tao.getConvergedReason():
+            return None
+        y = tao.getSolution().array_r
+        reason = self._scaled.verdict(y, self._scaled.residual(y))  # TRON overwrites its gradient by the projected one
+        if reason < 0:
+            return int(PETSc.TAO.Reason.DIVERGED_NAN)
+        return int(PETSc.TAO.Reason.CONVERGED_USER) if reason else None
+
+
+@dataclass(frozen=True)
+class TaoTron:
+    """TAO TRON: trust region Newton with projected searches; conjugate gradients with incomplete Cholesky inside.
+
+    Slow, or a StepFailure, with springs more than about 1e3 times stiffer than the body: they shrink its trust region.
+    """
+
+    carries_friction: ClassVar[bool] = False
+
+    def defaults(self, ranks: int) -> Options:
+        """Options before the user's."""
+        return tao_options(ranks)
+
+    def driver(self, scaled: ScaledStep, layers: OptionLayers) -> TaoDriver:
+        """The TAO object."""
+        return TaoDriver(scaled, layers)
+
+    def start(self, driver: TaoDriver, system: BoundedSystem, step: StepProblem) -> Array:
+        """The guess with the predicted contacts on their bounds."""
+        return system.start(step)
