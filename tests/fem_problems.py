@@ -19,10 +19,10 @@ from vi_contact.core.step import ContactProblem, Scheme, Solver, State
 from vi_contact.core.surfaces import HalfSpace, empty_surface
 from vi_contact.core.system import SemiDiscreteSystem
 from vi_contact.fem.assembly import assemble
+from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import BodyForce, Prescribed
 from vi_contact.fem.mesh import build_mesh
 from vi_contact.fem.petsc_algebra import as_petsc
-from vi_contact.fem.trace import contact_surface
 from vi_contact.laws.excitation import Harmonic
 from vi_contact.laws.impact import Inelastic
 from vi_contact.laws.mass import ConsistentMass

@@ -13,8 +13,8 @@ from vi_contact.core.algebra import Array
 from vi_contact.core.step import ContactProblem
 from vi_contact.core.surfaces import Obstacle
 from vi_contact.fem.assembly import assemble
+from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import Prescribed, Traction
-from vi_contact.fem.trace import contact_surface
 from vi_contact.laws.materials import LinearElastic
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.static import static_equilibrium

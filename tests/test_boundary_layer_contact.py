@@ -275,7 +275,7 @@ def test_two_stiff_blocks(comm):
     from two_bodies import blocks, momenta, two_blocks
     from two_bodies import thrown as with_velocities
 
-    from vi_contact.fem.pairs import contact_pair
+    from vi_contact.fem.contact.pairs import contact_pair
     from vi_contact.laws.materials import LinearElastic
 
     mesh = blocks(2, upper=(2, 1), lower=(2, 1), gap=0.02)

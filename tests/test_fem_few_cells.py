@@ -15,8 +15,8 @@ from fem_problems import CONCRETE, block
 from vi_contact.core.step import ContactProblem
 from vi_contact.core.surfaces import HalfSpace
 from vi_contact.fem.assembly import assemble
-from vi_contact.fem.fields import XDMF
-from vi_contact.fem.trace import contact_surface
+from vi_contact.fem.contact.surface import contact_surface
+from vi_contact.fem.output.fields import XDMF
 from vi_contact.laws.excitation import Harmonic
 from vi_contact.laws.friction import Coulomb, Frictionless
 from vi_contact.laws.mass import ConsistentMass

@@ -21,10 +21,10 @@ from vi_contact.core.errors import InputError
 from vi_contact.core.step import ContactProblem
 from vi_contact.core.surfaces import empty_surface
 from vi_contact.fem.assembly import assemble
-from vi_contact.fem.fields import XDMF
+from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import Prescribed
-from vi_contact.fem.stress import VonMises
-from vi_contact.fem.trace import contact_surface
+from vi_contact.fem.output.fields import XDMF
+from vi_contact.fem.output.stress import VonMises
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.materials import LinearElastic, PlaneStrain, PlaneStress, Section
 from vi_contact.march import march

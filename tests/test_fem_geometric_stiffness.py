@@ -18,10 +18,10 @@ from vi_contact.core.errors import InputError
 from vi_contact.core.step import ContactProblem, State
 from vi_contact.core.surfaces import HalfSpace
 from vi_contact.fem.assembly import assemble
-from vi_contact.fem.gravity import geometric_stiffness, initial_stress_matrix
+from vi_contact.fem.contact.surface import contact_surface
+from vi_contact.fem.initial_stress import geometric_stiffness, initial_stress_matrix
 from vi_contact.fem.loads import BodyForce, Prescribed, Traction
 from vi_contact.fem.petsc_algebra import PetscMatrix
-from vi_contact.fem.trace import contact_surface
 from vi_contact.march import march
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed

@@ -18,11 +18,11 @@ from vi_contact.core.errors import InputError
 from vi_contact.core.step import ContactProblem
 from vi_contact.core.surfaces import AnalyticGap, ContactSurface, HalfSpace, empty_surface
 from vi_contact.fem.assembly import assemble
-from vi_contact.fem.joined import together
+from vi_contact.fem.contact.joined import together
+from vi_contact.fem.contact.pairs import contact_pair
+from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import BodyForce
 from vi_contact.fem.mesh import build_mesh
-from vi_contact.fem.pairs import contact_pair
-from vi_contact.fem.trace import contact_surface
 from vi_contact.laws.friction import Coulomb, Frictionless
 from vi_contact.laws.mass import Redistributed
 from vi_contact.march import march

@@ -19,10 +19,10 @@ from vi_contact.core.errors import InputError
 from vi_contact.core.step import ContactProblem
 from vi_contact.cross_check import cross_check
 from vi_contact.fem.assembly import assemble
+from vi_contact.fem.contact.mortar import DualMortar
+from vi_contact.fem.contact.pairs import contact_pair, side_of
+from vi_contact.fem.contact.surface import nodes_on
 from vi_contact.fem.mesh import build_mesh
-from vi_contact.fem.mortar import DualMortar
-from vi_contact.fem.pairs import contact_pair, side_of
-from vi_contact.fem.trace import nodes_on
 from vi_contact.laws.friction import Coulomb, Frictionless
 from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.laws.materials import LinearElastic

@@ -19,11 +19,11 @@ from vi_contact.core.errors import InputError
 from vi_contact.core.step import ContactProblem
 from vi_contact.core.surfaces import HalfSpace
 from vi_contact.fem.assembly import assemble
+from vi_contact.fem.contact.matching import NodeToNode
+from vi_contact.fem.contact.pairs import contact_pair
+from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import BodyForce, Prescribed
-from vi_contact.fem.matching import NodeToNode
 from vi_contact.fem.mesh import build_mesh
-from vi_contact.fem.pairs import contact_pair
-from vi_contact.fem.trace import contact_surface
 from vi_contact.laws.friction import Coulomb
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.cut import CutOpen

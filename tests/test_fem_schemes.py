@@ -18,8 +18,8 @@ from vi_contact.core.step import ContactProblem
 from vi_contact.core.surfaces import HalfSpace
 from vi_contact.cross_check import cross_check
 from vi_contact.fem.assembly import assemble
+from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.mesh import build_mesh
-from vi_contact.fem.trace import contact_surface
 from vi_contact.laws.friction import Coulomb, Tresca
 from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.laws.materials import LinearElastic

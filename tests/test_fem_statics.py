@@ -13,8 +13,8 @@ from vi_contact.core.algebra import Array
 from vi_contact.core.step import ContactProblem, State
 from vi_contact.core.surfaces import ContactSurface, HalfSpace
 from vi_contact.fem.assembly import assemble
+from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import BodyForce, Prescribed, Traction
-from vi_contact.fem.trace import contact_surface
 from vi_contact.laws.materials import LinearElastic, PlaneStress
 from vi_contact.march import march
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor

@@ -15,9 +15,9 @@ from vi_contact.core.errors import InputError
 from vi_contact.core.step import ContactProblem
 from vi_contact.core.surfaces import AnalyticGap, HalfSpace, Touching
 from vi_contact.fem.assembly import assemble
+from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import BodyForce, Prescribed
 from vi_contact.fem.mesh import Facets
-from vi_contact.fem.trace import contact_surface
 from vi_contact.laws.materials import PlaneStress
 from vi_contact.static import initial_state
 

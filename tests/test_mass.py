@@ -16,7 +16,7 @@ from vi_contact.core.errors import InputError
 from vi_contact.core.step import ContactProblem
 from vi_contact.core.surfaces import Touching
 from vi_contact.fem.assembly import assemble
-from vi_contact.fem.trace import contact_surface
+from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.impact import Inelastic
 from vi_contact.laws.mass import ConsistentMass, Redistributed

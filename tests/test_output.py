@@ -174,7 +174,7 @@ def test_full_disk_on_all_ranks(comm: Any, shared_tmp: Path) -> None:
     pytest.importorskip("dolfinx")
     from fem_problems import shaken_wall
 
-    from vi_contact.fem.fields import XDMF
+    from vi_contact.fem.output.fields import XDMF
 
     wall = shaken_wall(comm)
     for name in ("history.csv", "run.log"):

@@ -15,10 +15,10 @@ from vi_contact.core.step import Certificate, ContactProblem, EffectiveMatrix, S
 from vi_contact.core.surfaces import HalfSpace
 from vi_contact.core.verify import kkt_residual
 from vi_contact.fem.assembly import assemble
+from vi_contact.fem.contact.pairs import contact_pair
+from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import BodyForce, Prescribed, Traction
 from vi_contact.fem.mesh import build_mesh
-from vi_contact.fem.pairs import contact_pair
-from vi_contact.fem.trace import contact_surface
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.materials import LinearElastic
 from vi_contact.meshes.block import BlockMesh

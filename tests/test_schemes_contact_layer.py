@@ -14,8 +14,8 @@ from two_bodies import two_blocks
 
 from vi_contact.core.algebra import Array, SerialAlgebra
 from vi_contact.core.step import ContactProblem, EffectiveMatrix, State, StepProblem
+from vi_contact.fem.contact.pairs import contact_pair
 from vi_contact.fem.loads import BodyForce, Traction
-from vi_contact.fem.pairs import contact_pair
 from vi_contact.fem.petsc_algebra import PetscAlgebra
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.mass import Redistributed

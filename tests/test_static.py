@@ -14,8 +14,8 @@ from vi_contact.core.errors import InputError
 from vi_contact.core.step import ContactProblem, State
 from vi_contact.core.surfaces import HalfSpace
 from vi_contact.fem.assembly import assemble
+from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import BodyForce, Prescribed, Traction
-from vi_contact.fem.trace import contact_surface
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.materials import LinearElastic
 from vi_contact.march import march

@@ -31,10 +31,10 @@ from vi_contact.core.step import ContactProblem
 from vi_contact.core.surfaces import AnalyticGap
 from vi_contact.exact.hertz import HertzLine
 from vi_contact.fem.assembly import assemble
+from vi_contact.fem.contact.pairs import contact_pair
+from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import Traction
 from vi_contact.fem.mesh import build_mesh
-from vi_contact.fem.pairs import contact_pair
-from vi_contact.fem.trace import contact_surface
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.materials import LinearElastic
 from vi_contact.load_steps import quasi_static

@@ -29,8 +29,8 @@ from vi_contact.core.algebra import Array
 from vi_contact.core.step import ContactProblem, State
 from vi_contact.core.surfaces import HalfSpace
 from vi_contact.fem.assembly import assemble
+from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import Prescribed, Traction
-from vi_contact.fem.trace import contact_surface
 from vi_contact.laws.materials import LinearElastic
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.volume.route import ReducedNewton, Volume

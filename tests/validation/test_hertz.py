@@ -23,9 +23,9 @@ from vi_contact.core.step import ContactProblem
 from vi_contact.core.surfaces import AnalyticGap, HalfSpace
 from vi_contact.exact.hertz import HertzLine, HertzPoint, contact_modulus
 from vi_contact.fem.assembly import assemble
+from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import Prescribed, Traction
 from vi_contact.fem.mesh import build_mesh
-from vi_contact.fem.trace import contact_surface
 from vi_contact.laws.materials import LinearElastic
 from vi_contact.meshes.ball import BallMesh
 from vi_contact.solvers.condensed import Condensed

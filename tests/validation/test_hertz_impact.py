@@ -22,8 +22,8 @@ from vi_contact.core.surfaces import HalfSpace, Touching
 from vi_contact.core.verify import energy_balance
 from vi_contact.exact.hertz import HertzPoint
 from vi_contact.fem.assembly import assemble
+from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.mesh import build_mesh
-from vi_contact.fem.trace import contact_surface
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.mass import Redistributed
 from vi_contact.march import march

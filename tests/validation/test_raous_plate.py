@@ -20,8 +20,8 @@ from mpi4py import MPI
 from vi_contact.core.algebra import Array
 from vi_contact.core.step import ContactProblem, Solver, State
 from vi_contact.fem.assembly import assemble
+from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import Prescribed, Traction
-from vi_contact.fem.trace import contact_surface
 from vi_contact.laws.friction import Coulomb, FrictionLaw, Frictionless
 from vi_contact.laws.materials import LinearElastic
 from vi_contact.load_steps import quasi_static

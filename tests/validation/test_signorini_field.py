@@ -19,8 +19,8 @@ from mpi4py import MPI
 from vi_contact.core.step import ContactProblem, State
 from vi_contact.core.surfaces import HalfSpace
 from vi_contact.fem.assembly import assemble
+from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import BodyForce, Prescribed
-from vi_contact.fem.trace import contact_surface
 from vi_contact.march import march
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed

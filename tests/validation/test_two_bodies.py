@@ -21,9 +21,9 @@ from vi_contact.core.step import ContactProblem
 from vi_contact.cross_check import cross_check
 from vi_contact.exact.two_bars import TwoBars
 from vi_contact.fem.assembly import assemble
+from vi_contact.fem.contact.pairs import contact_pair
 from vi_contact.fem.loads import Prescribed
 from vi_contact.fem.mesh import build_mesh
-from vi_contact.fem.pairs import contact_pair
 from vi_contact.laws.friction import Coulomb, Frictionless
 from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.laws.materials import LinearElastic

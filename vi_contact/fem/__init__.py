@@ -11,12 +11,12 @@ _HOME = {
     "assemble": "assembly",
     "BodyForce": "loads", "Prescribed": "loads", "TangentialTraction": "loads", "Traction": "loads",
     "Tied": "ties", "Dashpots": "dashpots", "CompliantBase": "dashpots", "FreeField": "free_field",
-    "contact_surface": "trace",
-    "contact_pair": "pairs", "NodeToNode": "matching", "DualMortar": "mortar", "together": "joined",
-    "geometric_stiffness": "gravity", "release": "staging",
+    "contact_surface": "contact.surface",
+    "contact_pair": "contact.pairs", "NodeToNode": "contact.matching", "DualMortar": "contact.mortar", "together": "contact.joined",
+    "geometric_stiffness": "initial_stress", "release": "released_supports",
     "boundary_curve": "boundary_elements",
-    "XDMF": "fields",
-    "Reactions": "reactions", "SectionForces": "section_forces",
+    "XDMF": "output.fields",
+    "Reactions": "output.reactions", "SectionForces": "output.section_forces",
 }
 """Public name -> module of this folder it lives in."""
 

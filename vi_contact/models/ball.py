@@ -21,9 +21,9 @@ from ..core.surfaces import HalfSpace
 from ..core.system import SemiDiscreteSystem
 from ..exact.hertz import HertzImpact, contact_modulus
 from ..fem.assembly import assemble
+from ..fem.contact.surface import contact_surface
 from ..fem.loads import Prescribed
 from ..fem.mesh import build_mesh
-from ..fem.trace import contact_surface
 from ..laws.mass import MassLaw
 from ..laws.materials import LinearElastic
 from ..meshes.ball import BallMesh

@@ -18,9 +18,9 @@ from ..core.system import SemiDiscreteSystem
 from ..exact.bar import PeriodicBar, ThrownBar
 from ..exact.bouncing_bar import BouncingBar
 from ..fem.assembly import assemble
+from ..fem.contact.surface import contact_surface
 from ..fem.loads import BodyForce
 from ..fem.mesh import build_mesh
-from ..fem.trace import contact_surface
 from ..laws.impact import ImpactLaw
 from ..laws.mass import MassLaw
 from ..laws.materials import LinearElastic, PlaneStrain, Solid

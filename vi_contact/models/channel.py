@@ -20,10 +20,10 @@ from ..core.step import ContactProblem, ImpactLaw, Recorder
 from ..core.surfaces import ContactSurface
 from ..core.system import SemiDiscreteSystem
 from ..fem.assembly import assemble
-from ..fem.joined import together
+from ..fem.contact.joined import together
+from ..fem.contact.pairs import contact_pair
 from ..fem.loads import Prescribed, as_tuple
 from ..fem.mesh import build_mesh
-from ..fem.pairs import contact_pair
 from ..laws.excitation import Excitation, Harmonic
 from ..laws.friction import FrictionLaw, Frictionless
 from ..laws.impact import Inelastic, MassProjection

@@ -12,7 +12,7 @@ from ..core.algebra import Indices, Mask
 from ..core.errors import InputError
 from ..core.step import ContactProblem, Report, State
 from ..core.surfaces import ContactSurface
-from ..fem.frames import FemSurface
+from ..fem.contact.frames import FemSurface
 from ..recorders import Columns, Probe, Row
 
 

@@ -13,7 +13,7 @@ from ..base_motion import BaseMotion, base_motion
 from ..core.algebra import Array
 from ..core.errors import InputError
 from ..core.step import Scheme
-from ..fem.fields import XDMF
+from ..fem.output.fields import XDMF
 from ..laws.excitation import Excitation
 from ..laws.friction import Coulomb
 from ..laws.impact import Inelastic, MassProjection

@@ -8,7 +8,7 @@ from typing import Any
 
 from ..base_motion import BaseMotion
 from ..core.step import ContactProblem, Solver, State
-from ..fem.staging import release
+from ..fem.released_supports import release
 from ..solvers.condensed import Condensed
 from ..static import static_equilibrium
 from .channel import Channel, ChannelModel, build

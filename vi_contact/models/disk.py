@@ -16,8 +16,8 @@ from ..core.step import ContactProblem, Report, State
 from ..core.surfaces import HalfSpace
 from ..core.system import SemiDiscreteSystem
 from ..fem.assembly import assemble
+from ..fem.contact.surface import contact_surface
 from ..fem.mesh import build_mesh
-from ..fem.trace import contact_surface
 from ..laws.friction import FrictionLaw, Frictionless
 from ..laws.mass import MassLaw
 from ..laws.materials import LinearElastic, PlaneStrain

@@ -17,10 +17,10 @@ from ..core.step import ContactProblem
 from ..core.surfaces import ContactSurface
 from ..core.system import SemiDiscreteSystem
 from ..fem.assembly import assemble
-from ..fem.joined import together
+from ..fem.contact.joined import together
+from ..fem.contact.pairs import contact_pair
 from ..fem.loads import Traction
 from ..fem.mesh import build_mesh
-from ..fem.pairs import contact_pair
 from ..laws.friction import FrictionLaw, Frictionless
 from ..laws.mass import MassLaw
 from ..laws.materials import LinearElastic, PlaneStrain

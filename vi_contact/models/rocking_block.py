@@ -26,10 +26,10 @@ from ..core.step import ContactProblem, Report, State
 from ..core.surfaces import HalfSpace
 from ..exact.housner import HousnerBlock
 from ..fem.assembly import assemble
-from ..fem.gravity import geometric_stiffness
+from ..fem.contact.surface import contact_surface
+from ..fem.initial_stress import geometric_stiffness
 from ..fem.loads import BodyForce, Prescribed
 from ..fem.mesh import build_mesh
-from ..fem.trace import contact_surface
 from ..laws.excitation import Excitation
 from ..laws.materials import Damping, LinearElastic, PlaneStress, Rayleigh
 from ..meshes.block import BlockMesh

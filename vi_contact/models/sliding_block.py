@@ -14,9 +14,9 @@ from ..core.step import ContactProblem, State
 from ..core.surfaces import HalfSpace
 from ..exact.sliding import SlidingBlock
 from ..fem.assembly import assemble
+from ..fem.contact.surface import contact_surface
 from ..fem.loads import BodyForce
 from ..fem.mesh import build_mesh
-from ..fem.trace import contact_surface
 from ..laws.excitation import Excitation
 from ..laws.friction import Coulomb
 from ..laws.materials import Damping, LinearElastic, PlaneStress, Rayleigh

@@ -15,9 +15,9 @@ from ..core.checks import attributes, function, instance
 from ..core.step import ContactProblem
 from ..core.system import SemiDiscreteSystem
 from ..fem.assembly import assemble
+from ..fem.contact.surface import contact_surface
 from ..fem.loads import Prescribed, Traction
 from ..fem.mesh import build_mesh
-from ..fem.trace import contact_surface
 from ..laws.friction import FrictionLaw, Frictionless
 from ..laws.mass import MassLaw
 from ..laws.materials import LinearElastic, PlaneStrain

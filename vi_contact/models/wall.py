@@ -14,10 +14,10 @@ from ..core.step import ContactProblem, ImpactLaw
 from ..core.surfaces import ContactSurface, HalfSpace, empty_surface
 from ..core.system import SemiDiscreteSystem
 from ..fem.assembly import assemble
+from ..fem.contact.surface import contact_surface
 from ..fem.loads import BodyForce
 from ..fem.mesh import Facets, build_mesh
 from ..fem.petsc_algebra import MpiComm
-from ..fem.trace import contact_surface
 from ..ground_motion import STANDARD_GRAVITY
 from ..laws.excitation import Excitation, Harmonic
 from ..laws.impact import Inelastic

@@ -10,7 +10,7 @@ from typing import Any
 from ..core.algebra import Array
 from ..core.step import ContactProblem, State
 from ..core.surfaces import ContactSurface
-from ..fem.fields import XDMF
+from ..fem.output.fields import XDMF
 from ..plotting import plot_certificate, plot_contact, plot_energy, plot_excitation, plot_points
 from ..recorders import Contact, Energy, Probe
 from ..simulate import Solution, simulate

@@ -23,7 +23,7 @@ from ..core.step import ContactProblem, Recorder, Scheme, Solver
 from ..core.surfaces import ContactSurface, empty_surface
 from ..cross_check import CrossChecked
 from ..fem.assembly import assemble
-from ..fem.joined import together
+from ..fem.contact.joined import together
 from ..fem.mesh import Tags, build_mesh, read_mesh
 from ..folder_lock import locked
 from ..laws.excitation import Excitation

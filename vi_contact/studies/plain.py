@@ -10,12 +10,12 @@ from ..core import surfaces
 from ..core.corners import FEATURE_ANGLE
 from ..core.surfaces import ContactSurface
 from ..core.system import SemiDiscreteSystem
+from ..fem.contact.matching import Matching
+from ..fem.contact.pairs import contact_pair
+from ..fem.contact.surface import contact_surface
 from ..fem.dashpots import CompliantBase
 from ..fem.free_field import FreeField
-from ..fem.matching import Matching
 from ..fem.mesh import Facets
-from ..fem.pairs import contact_pair
-from ..fem.trace import contact_surface
 from ..ground_motion import Processing, Record, read_record
 from ..ground_motion.formats.reader import LARGEST_PEAK
 from ..laws import friction, materials

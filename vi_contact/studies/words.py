@@ -11,14 +11,14 @@ from ..core import surfaces
 from ..core.step import Recorder, Scheme, Solver
 from ..core.surfaces import ContactSurface
 from ..cross_check import CrossChecked
+from ..fem.contact.matching import Matching, NodeToNode
+from ..fem.contact.mortar import DualMortar
 from ..fem.dashpots import CompliantBase, Dashpots
-from ..fem.fields import XDMF
 from ..fem.loads import BodyForce, Prescribed, TangentialTraction, Traction
-from ..fem.matching import Matching, NodeToNode
 from ..fem.mesh import Cells, Facets
-from ..fem.mortar import DualMortar
-from ..fem.reactions import Reactions
-from ..fem.section_forces import SectionForces
+from ..fem.output.fields import XDMF
+from ..fem.output.reactions import Reactions
+from ..fem.output.section_forces import SectionForces
 from ..ground_motion import Record, synthetic
 from ..laws import excitation, friction, impact, mass, materials
 from ..meshes.ball import BallMesh

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core.checks import array, column_name
-from ..core.errors import InputError
-from ..core.step import ContactProblem, Report, State
-from ..recorders import Columns, Row
-from .groups import facets_of
-from .mesh import Facets
+from ...core.checks import array, column_name
+from ...core.errors import InputError
+from ...core.step import ContactProblem, Report, State
+from ...recorders import Columns, Row
+from ..groups import facets_of
+from ..mesh import Facets
+from ..space import FemSpace
 from .nodal_work import Loads, NodalWork, check_actions, rigid_fields
-from .space import FemSpace
 
 
 @dataclass

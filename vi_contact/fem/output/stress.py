@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import ufl
 
-from ..core.algebra import Array
-from . import compat
+from ...core.algebra import Array
+from .. import compat
 
 
 class VonMises:

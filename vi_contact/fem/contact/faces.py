@@ -16,14 +16,14 @@ import scipy.sparse as sp
 import ufl
 from scipy.sparse.csgraph import connected_components
 
-from ..core.algebra import Array, Indices, Mask
-from ..core.checks import number
-from ..core.errors import InputError
-from ..meshes.rows import number_alike
-from . import compat
+from ...core.algebra import Array, Indices, Mask
+from ...core.checks import number
+from ...core.errors import InputError
+from ...meshes.rows import number_alike
+from .. import compat
+from ..mesh import Facets, node_numbers
+from ..space import FemSpace
 from .frames import Nodes, at
-from .mesh import Facets, node_numbers
-from .space import FemSpace
 
 log = logging.getLogger(__name__)
 LEANING = 0.9  # cosine of the angle (26°) up to which a normal counts as lying in a symmetry plane

@@ -24,8 +24,8 @@ from typing import ClassVar
 import numpy as np
 import scipy.sparse as sp
 
-from ..core.algebra import Array
-from ..core.errors import InputError
+from ...core.algebra import Array
+from ...core.errors import InputError
 from .matching import Matched, Side, refuse_same_way
 
 COVERED = 1e-3  # of a segment: less of it in front of side 2 is no contact

@@ -24,14 +24,14 @@ from xml.sax.saxutils import quoteattr
 import h5py
 import numpy as np
 
-from ..core.algebra import Array, Indices, Mask
-from ..core.checks import real, shown
-from ..core.errors import InputError
-from ..core.step import ContactProblem, Report, State
-from ..output import FIELDS, FIELDS_INDEX, hdf5_atomically, on_root, write_atomically
-from . import compat
-from .mesh import node_numbers
-from .space import FemSpace, known_matrices, space_of
+from ...core.algebra import Array, Indices, Mask
+from ...core.checks import real, shown
+from ...core.errors import InputError
+from ...core.step import ContactProblem, Report, State
+from ...output import FIELDS, FIELDS_INDEX, hdf5_atomically, on_root, write_atomically
+from .. import compat
+from ..mesh import node_numbers
+from ..space import FemSpace, known_matrices, space_of
 from .stress import VonMises
 
 _VTK_ORDER = {"Quadrilateral": [0, 1, 3, 2], "Hexahedron": [0, 1, 3, 2, 4, 5, 7, 6]}

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core.algebra import Array, Mask
-from ..core.errors import InputError
-from . import compat
-from .groups import cells_of
-from .mesh import Cells
-from .space import FemSpace
+from ...core.algebra import Array, Mask
+from ...core.errors import InputError
+from .. import compat
+from ..groups import cells_of
+from ..mesh import Cells
+from ..space import FemSpace
 
 ON_LINE = 1e-6  # of the length of the cut: what counts as lying on it
 COVERED = 1e-3  # of its length: what the element sides on it may miss

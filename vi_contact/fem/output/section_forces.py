@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core.checks import array, column_name, instance, several
-from ..core.errors import InputError
-from ..core.step import ContactProblem, Report, State
-from ..recorders import Columns, Row
+from ...core.checks import array, column_name, instance, several
+from ...core.errors import InputError
+from ...core.step import ContactProblem, Report, State
+from ...recorders import Columns, Row
+from ..groups import cells_of
+from ..mesh import Cells
 from .cuts import find_cut
-from .groups import cells_of
-from .mesh import Cells
 from .nodal_work import Loads, NodalWork, check_actions, check_labels
 
 _QUANTITIES = {

@@ -19,19 +19,19 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 
-from ..core.algebra import Array, Mask
-from ..core.checks import provides
-from ..core.corners import FEATURE_ANGLE
-from ..core.errors import InputError
-from ..core.surfaces import ContactSurface
-from ..core.system import SemiDiscreteSystem
-from . import compat
+from ...core.algebra import Array, Mask
+from ...core.checks import provides
+from ...core.corners import FEATURE_ANGLE
+from ...core.errors import InputError
+from ...core.surfaces import ContactSurface
+from ...core.system import SemiDiscreteSystem
+from .. import compat
+from ..mesh import Facets, node_numbers
+from ..space import FemSpace
 from .faces import Boundary, boundary, checked_angle, split, tell_corners
 from .frames import Conditions, Facing, Frames, Nodes, at, joined_nodes, surface_of
 from .matching import Matched, Matching, NodeToNode, Side
-from .mesh import Facets, node_numbers
-from .space import FemSpace
-from .trace import contact_space, listed, nodes_on, snapped
+from .surface import contact_space, listed, nodes_on, snapped
 
 log = logging.getLogger(__name__)
 

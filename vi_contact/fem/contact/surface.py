@@ -9,18 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from ..core.algebra import Array
-from ..core.checks import array, provides, several
-from ..core.corners import FEATURE_ANGLE, PARALLEL
-from ..core.errors import InputError
-from ..core.initial_gap import admissible_gap, facing
-from ..core.surfaces import ContactSurface, Obstacle, Touching
-from ..core.system import SemiDiscreteSystem
+from ...core.algebra import Array
+from ...core.checks import array, provides, several
+from ...core.corners import FEATURE_ANGLE, PARALLEL
+from ...core.errors import InputError
+from ...core.initial_gap import admissible_gap, facing
+from ...core.surfaces import ContactSurface, Obstacle, Touching
+from ...core.system import SemiDiscreteSystem
+from ..groups import facets_of
+from ..mesh import Facets
+from ..space import FemSpace, space_of
 from .faces import boundary, checked_angle, in_symmetry_planes, integrals, split, tell_corners
 from .frames import Conditions, Nodes, at, surface_of
-from .groups import facets_of
-from .mesh import Facets
-from .space import FemSpace, space_of
 
 log = logging.getLogger(__name__)
 

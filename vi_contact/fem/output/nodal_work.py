@@ -16,14 +16,14 @@ import numpy as np
 import scipy.sparse as sp
 import ufl
 
-from ..core.algebra import Array, Mask
-from ..core.checks import array, instance
-from ..core.errors import InputError
-from ..core.step import ContactProblem, Report, State
-from . import compat
-from .groups import facets_of
-from .loads import BodyForce, TangentialTraction, Traction, as_tuple, evaluate, is_constant
-from .space import FemSpace, known_matrices, space_of
+from ...core.algebra import Array, Mask
+from ...core.checks import array, instance
+from ...core.errors import InputError
+from ...core.step import ContactProblem, Report, State
+from .. import compat
+from ..groups import facets_of
+from ..loads import BodyForce, TangentialTraction, Traction, as_tuple, evaluate, is_constant
+from ..space import FemSpace, known_matrices, space_of
 
 log = logging.getLogger(__name__)
 

@@ -12,9 +12,9 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
-from ..core.algebra import Array, Indices
-from ..core.checks import attributes
-from ..core.errors import InputError
+from ...core.algebra import Array, Indices
+from ...core.checks import attributes
+from ...core.errors import InputError
 from .frames import Nodes, at
 
 CHUNK = 256  # rows of the tables of distances

@@ -17,12 +17,12 @@ import numpy as np
 import scipy.sparse as sp
 from petsc4py import PETSc
 
-from ..core.algebra import Array, Indices, Mask
-from ..core.corners import PARALLEL, at_right_angles
-from ..core.errors import InputError
-from ..core.surfaces import ContactSurface, nodal_frames
-from .petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc
-from .space import FemSpace
+from ...core.algebra import Array, Indices, Mask
+from ...core.corners import PARALLEL, at_right_angles
+from ...core.errors import InputError
+from ...core.surfaces import ContactSurface, nodal_frames
+from ..petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc
+from ..space import FemSpace
 
 INDEPENDENT = 0.01  # least singular value of a node's directions: two that turn by 0.8° (CHOSEN; T has 1 over it)
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ..core.algebra import Array
-from ..core.errors import InputError
-from ..core.surfaces import ContactSurface
+from ...core.algebra import Array
+from ...core.errors import InputError
+from ...core.surfaces import ContactSurface
 from .frames import FemSurface, Frames, surface_of
 
 Motion = Callable[[float], Array]
