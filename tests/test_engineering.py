@@ -14,10 +14,10 @@ from chain import chain_problem
 import vi_contact as vc
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
-from vi_contact.floor_spectra import konno_ohmachi
-from vi_contact.peak_values import HEADER
+from vi_contact.engineering.floor_spectra import konno_ohmachi
+from vi_contact.engineering.peak_values import HEADER
+from vi_contact.engineering.racking import racking
 from vi_contact.plotting_maps import arc_position, thinned
-from vi_contact.racking import racking
 
 pytestmark = pytest.mark.serial
 

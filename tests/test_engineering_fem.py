@@ -14,10 +14,10 @@ from vi_contact.base_motion import base_motion
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.core.surfaces import nodal_frames
+from vi_contact.engineering.resultants import tangent_vectors
 from vi_contact.fem import compat
 from vi_contact.fem.contact.frames import block_of
 from vi_contact.models.channel import Channel, build
-from vi_contact.resultants import tangent_vectors
 from vi_contact.static import initial_state
 
 WIDTH, HEIGHT = 0.5, 4.0

@@ -18,7 +18,7 @@ from chain import chain_problem
 import vi_contact as vc
 from vi_contact.cli import main
 from vi_contact.core.errors import InputError
-from vi_contact.peak_values import peaks
+from vi_contact.engineering.peak_values import peaks
 from vi_contact.plotting_report import header_facts, shown_periods, table_rows
 from vi_contact.run_folder import read_run
 

@@ -66,7 +66,7 @@ def _add_actions(parsers: dict[str, argparse.ArgumentParser]) -> None:
 
 
 def _report(options: argparse.Namespace) -> str:
-    from .peak_values import peaks, write_peaks
+    from .engineering.peak_values import peaks, write_peaks
     from .plotting_report import plot_report
     from .run_folder import read_run
 
@@ -79,7 +79,7 @@ def _report(options: argparse.Namespace) -> str:
 
 
 def _peaks(options: argparse.Namespace) -> str:
-    from .peak_values import peaks, write_peaks
+    from .engineering.peak_values import peaks, write_peaks
     from .run_folder import read_run
 
     run = read_run(options.folder)
@@ -92,7 +92,7 @@ def _peaks(options: argparse.Namespace) -> str:
 
 
 def _spectrum(options: argparse.Namespace) -> str:
-    from .floor_spectra import floor_spectrum, recorded_motion
+    from .engineering.floor_spectra import floor_spectrum, recorded_motion
     from .plotting_motion import plot_spectra
     from .run_folder import read_run
 
@@ -116,7 +116,7 @@ def _spectrum(options: argparse.Namespace) -> str:
 
 
 def _transfer(options: argparse.Namespace) -> str:
-    from .floor_spectra import transfer_function
+    from .engineering.floor_spectra import transfer_function
     from .plotting_engineering import plot_transfer
     from .run_folder import read_run
 
@@ -133,7 +133,7 @@ def _transfer(options: argparse.Namespace) -> str:
 
 
 def _loop(options: argparse.Namespace) -> str:
-    from .peak_values import hysteresis
+    from .engineering.peak_values import hysteresis
     from .plotting_engineering import plot_loop
     from .run_folder import read_run
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from .floor_spectra import TransferFunction
-from .peak_values import Loop
+from .engineering.floor_spectra import TransferFunction
+from .engineering.peak_values import Loop
 from .plotting import STYLE, plain, save, scaled
 
 

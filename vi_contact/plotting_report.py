@@ -12,9 +12,9 @@ import numpy as np
 
 from .core.algebra import Array
 from .core.errors import InputError
-from .floor_spectra import recorded_motion
+from .engineering.floor_spectra import recorded_motion
+from .engineering.peak_values import Peak, peaks
 from .ground_motion import STANDARD_GRAVITY, Record, response_spectrum
-from .peak_values import Peak, peaks
 from .plotting import _LEDGER, STYLE, _log, scaled
 from .plotting_maps import arc_position, draw_map, thinned
 from .run_folder import RunFolder

@@ -13,6 +13,7 @@ from ..core.errors import InputError
 from ..core.step import ContactProblem, ImpactLaw
 from ..core.surfaces import ContactSurface, HalfSpace, empty_surface
 from ..core.system import SemiDiscreteSystem
+from ..engineering.modal import lowest_frequency
 from ..fem.assembly import assemble
 from ..fem.contact.surface import contact_surface
 from ..fem.loads import BodyForce
@@ -24,7 +25,6 @@ from ..laws.impact import Inelastic
 from ..laws.mass import ConsistentMass, MassLaw
 from ..laws.materials import Damping, LinearElastic, NoDamping, PlaneStress
 from ..meshes.wall import WallMesh
-from ..modal import lowest_frequency
 from .run_options import check_word
 
 CASES = {

@@ -11,6 +11,8 @@ from ..core import surfaces
 from ..core.step import Recorder, Scheme, Solver
 from ..core.surfaces import ContactSurface
 from ..cross_check import CrossChecked
+from ..engineering.racking import Racking
+from ..engineering.resultants import Resultants
 from ..fem.contact.matching import Matching, NodeToNode
 from ..fem.contact.mortar import DualMortar
 from ..fem.dashpots import CompliantBase, Dashpots
@@ -30,8 +32,6 @@ from ..meshes.gmsh_session import MeshScript
 from ..meshes.two_blocks import Blocks, TwoBlocks
 from ..meshes.wall import WallMesh
 from ..models import channel_sides
-from ..racking import Racking
-from ..resultants import Resultants
 from ..schemes.contact_stabilised import ContactStabilisedNewmark
 from ..schemes.generalised_alpha import GeneralisedAlpha
 from ..schemes.hht import HHT

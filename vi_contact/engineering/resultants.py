@@ -19,12 +19,12 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from .core.algebra import Array, Mask
-from .core.checks import array, column_name, function, instance, provides
-from .core.errors import InputError
-from .core.step import ContactProblem, Report, State
-from .core.surfaces import nodal_frames
-from .recorders import AXES, Columns, Row
+from ..core.algebra import Array, Mask
+from ..core.checks import array, column_name, function, instance, provides
+from ..core.errors import InputError
+from ..core.step import ContactProblem, Report, State
+from ..core.surfaces import nodal_frames
+from ..recorders import AXES, Columns, Row
 
 Where = Callable[[Array, Array], Mask]
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from .core.checks import instance, whole
-from .core.errors import InputError
-from .core.system import SemiDiscreteSystem
+from ..core.checks import instance, whole
+from ..core.errors import InputError
+from ..core.system import SemiDiscreteSystem
 
 
 def lowest_frequency(system: SemiDiscreteSystem, *, max_iterations: int = 2000) -> float:

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .core.algebra import Array
-from .core.checks import array, counted, flag, instance, number
-from .core.errors import InputError
-from .ground_motion import Record, ResponseSpectrum, response_spectrum
+from ..core.algebra import Array
+from ..core.checks import array, counted, flag, instance, number
+from ..core.errors import InputError
+from ..ground_motion import Record, ResponseSpectrum, response_spectrum
 from .peak_values import column_of
 
 BANDWIDTH = 40.0
