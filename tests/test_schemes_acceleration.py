@@ -26,7 +26,7 @@ from vi_contact.exact.columns import ObliqueImpact
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.impact import Inelastic, MassProjection
 from vi_contact.laws.mass import ConsistentMass, Redistributed
-from vi_contact.schemes.acceleration import consistent_acceleration
+from vi_contact.schemes.consistent_data import consistent_acceleration
 from vi_contact.schemes.generalised_alpha import GeneralisedAlpha
 from vi_contact.schemes.hht import HHT
 from vi_contact.schemes.houbolt import Houbolt

@@ -29,7 +29,7 @@ from dataclasses import dataclass
 from ..core.algebra import Array, Mask
 from ..core.checks import flag
 from ..core.step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
-from .mass_projection import admissible
+from .admissible_predictor import admissible
 from .position_step import position_step
 from .single_step import SingleStep, stepped
 

@@ -36,8 +36,8 @@ from ..core.algebra import Array
 from ..core.checks import real, shown
 from ..core.errors import InputError
 from ..core.step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
-from .acceleration import consistent_acceleration, without_inertia
 from .balance_step import BalanceStep
+from .consistent_data import consistent_acceleration, without_inertia
 from .contact_layer import at_rest_between, relaxed
 from .position_step import position_step
 

@@ -20,7 +20,7 @@ from ..core.step import ContactProblem, State, StepProblem
 from ..laws.friction import Frictionless
 from ..solvers.certified import TOLERANCE, CertifiedSolver
 from ..solvers.condensed import Condensed
-from .acceleration import mass_matrix, rigid_part
+from .consistent_data import mass_matrix, rigid_part
 
 
 def admissible(problem: ContactProblem, state: State, u: Array, dt: float) -> tuple[Array, Mask]:
