@@ -33,10 +33,10 @@ import vi_contact as vc  # noqa: E402
 from vi_contact.meshes.channel import ChannelMesh  # noqa: E402
 from vi_contact.models import channel  # noqa: E402
 from vi_contact.models.wall import Wall, build  # noqa: E402
+from vi_contact.run.static import initial_state  # noqa: E402
 from vi_contact.solvers.volume.one_factorisation import OneFactorisation  # noqa: E402
 from vi_contact.solvers.volume.route import Volume  # noqa: E402
 from vi_contact.solvers.volume.snes import ReducedNewton  # noqa: E402
-from vi_contact.static import initial_state  # noqa: E402
 
 SCHEME = vc.ZienkiewiczWoodTaylor(phi=0.5)
 DIVISIONS = {1e3: (18, 27), 2e3: (26, 39), 2e4: (82, 123), 2e5: (167, 600)}  # up to 600 contact points

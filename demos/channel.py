@@ -33,7 +33,7 @@ from vi_contact.models.channel_run import REFERENCE
 from vi_contact.plotting import History, plot_energy, plot_excitation
 from vi_contact.plotting_channel_mesh import animate
 from vi_contact.plotting_friction import plot_states
-from vi_contact.static import static_equilibrium
+from vi_contact.run.static import static_equilibrium
 
 # Parameters ----------------------------------------------------------------------------------------------------------
 CHANNEL = Channel(ChannelMesh(width=24.0, depth=8.0, outer_width=4.0, height=3.0, wall=0.5, slab=0.5, size=0.5))  # [m]

@@ -19,7 +19,7 @@ from vi_contact.core.step import ContactProblem, Report, State
 from vi_contact.core.surfaces import ContactSurface
 from vi_contact.core.system import Load, SemiDiscreteSystem
 from vi_contact.laws.mass import ConsistentMass
-from vi_contact.march import march
+from vi_contact.run.march import march
 from vi_contact.solvers.condensed import Condensed
 
 

@@ -10,7 +10,7 @@ from mpi4py import MPI
 import vi_contact as vc
 from vi_contact.base_motion import base_motion
 from vi_contact.models.channel import Channel, ChannelModel, build
-from vi_contact.simulate import Solution
+from vi_contact.run.simulate import Solution
 
 SCHEME = vc.ZienkiewiczWoodTaylor(phi=0.5)
 CHANNEL = Channel()

@@ -10,7 +10,7 @@ from bar import before_impact, energy, run
 
 from vi_contact.core.step import ContactProblem, State
 from vi_contact.core.verify import energies, energy_balance
-from vi_contact.static import initial_state
+from vi_contact.run.static import initial_state
 
 
 @dataclass(frozen=True)

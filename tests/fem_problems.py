@@ -27,8 +27,8 @@ from vi_contact.laws.excitation import Harmonic
 from vi_contact.laws.impact import Inelastic
 from vi_contact.laws.mass import ConsistentMass
 from vi_contact.laws.materials import LinearElastic, PlaneStress
-from vi_contact.march import march
 from vi_contact.meshes.block import BlockMesh
+from vi_contact.run.march import march
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
 

@@ -16,8 +16,8 @@ from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import Prescribed, Traction
 from vi_contact.laws.materials import LinearElastic
+from vi_contact.run.static import static_equilibrium
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.static import static_equilibrium
 
 
 def growing(h: float, length: float, *, growth: float = 1.15) -> Array:

@@ -23,11 +23,11 @@ from vi_contact.laws.excitation import Harmonic
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.impact import Inelastic, NoImpact
 from vi_contact.laws.mass import ConsistentMass
-from vi_contact.march import march
+from vi_contact.run.march import march
+from vi_contact.run.simulate import simulate
+from vi_contact.run.static import initial_state
+from vi_contact.run.time_steps import Schedule
 from vi_contact.schemes.midpoint import Midpoint
-from vi_contact.simulate import simulate
-from vi_contact.static import initial_state
-from vi_contact.time_steps import Schedule
 
 serial = pytest.mark.serial
 IMPEDANCE = 30.0  # rho c of the bar of V1.1 [kg/(m² s)]

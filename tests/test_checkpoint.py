@@ -22,13 +22,13 @@ from vi_contact.laws.excitation import Harmonic
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.impact import Inelastic, MassProjection
 from vi_contact.laws.mass import ConsistentMass, Redistributed
-from vi_contact.recorders import Contact, Energy, Probe
+from vi_contact.run.recorders import Contact, Energy, Probe
+from vi_contact.run.simulate import Solution, simulate
 from vi_contact.schemes.linear_multistep import LinearMultistep
 from vi_contact.schemes.moreau_jean import MoreauJean
 from vi_contact.schemes.ss22 import SS22
 from vi_contact.schemes.trapezoidal import Trapezoidal
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
-from vi_contact.simulate import Solution, simulate
 from vi_contact.solvers.condensed import Condensed
 
 FILES = ("history.csv", "columns.json")

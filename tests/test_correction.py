@@ -14,6 +14,7 @@ from vi_contact.core.errors import StepFailure
 from vi_contact.core.step import ContactProblem, EffectiveMatrix, Scheme, StepProblem, StepResult
 from vi_contact.core.verify import kkt_residual
 from vi_contact.laws.friction import Coulomb, ExponentialDecay, SlipRateCoulomb, Tresca
+from vi_contact.run.static import initial_state
 from vi_contact.schemes.moreau_jean import MoreauJean
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.certified import NEAR, TOLERANCE, CertifiedSolver
@@ -21,7 +22,6 @@ from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.correction import Share, added, left_over, share_of
 from vi_contact.solvers.friction.nsgs import NSGS
 from vi_contact.solvers.volume.route import OneFactorisation, ReducedNewton, Volume
-from vi_contact.static import initial_state
 
 COMM = MPI.COMM_WORLD
 DECAY = SlipRateCoulomb(ExponentialDecay(0.6, 0.3, 0.05))

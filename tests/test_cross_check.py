@@ -13,9 +13,10 @@ from rubbing import rubbing_block
 from shaken import SHAKE, shaken
 
 from vi_contact.core.errors import InputError
-from vi_contact.cross_check import CrossChecked, cross_check
 from vi_contact.laws.friction import Coulomb, Tresca
 from vi_contact.laws.impact import Inelastic
+from vi_contact.run.cross_check import CrossChecked, cross_check
+from vi_contact.run.time_steps import HalvedAtImpact, Schedule
 from vi_contact.schemes.linear_multistep import LinearMultistep
 from vi_contact.schemes.ss22 import SS22
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
@@ -24,7 +25,6 @@ from vi_contact.solvers.friction.nsgs import NSGS
 from vi_contact.solvers.normal.active_set import ActiveSet
 from vi_contact.solvers.normal.hildreth import Hildreth
 from vi_contact.solvers.normal.projected_cg import ProjectedCG
-from vi_contact.time_steps import HalvedAtImpact, Schedule
 
 pytestmark = pytest.mark.serial
 HALF = ZienkiewiczWoodTaylor()

@@ -11,7 +11,7 @@ from test_demos import demo
 
 from demos.pictures import deformed
 from demos.pictures.boundary import SHEAR, plot_panels
-from vi_contact.output import HISTORY_H5
+from vi_contact.run.files.folder import HISTORY_H5
 
 pytestmark = pytest.mark.serial
 

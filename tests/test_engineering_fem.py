@@ -18,7 +18,7 @@ from vi_contact.engineering.resultants import tangent_vectors
 from vi_contact.fem import compat
 from vi_contact.fem.contact.frames import block_of
 from vi_contact.models.channel import Channel, build
-from vi_contact.static import initial_state
+from vi_contact.run.static import initial_state
 
 WIDTH, HEIGHT = 0.5, 4.0
 TIP, WIND, WEIGHT = (2000.0, -5000.0), 700.0, (300.0, -24000.0)  # Pa, Pa, N/m³

@@ -20,7 +20,7 @@ import vi_contact as vc
 from vi_contact.cli import main
 from vi_contact.core.errors import InputError
 from vi_contact.plotting_report import header_facts, plot_report, table_rows
-from vi_contact.run_folder import ContactGeometry, RunFolder, read_run
+from vi_contact.run.files.reading import ContactGeometry, RunFolder, read_run
 
 pytestmark = pytest.mark.serial
 pytest.importorskip("matplotlib")

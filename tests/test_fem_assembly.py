@@ -17,10 +17,10 @@ from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import BodyForce, Prescribed, Traction
 from vi_contact.fem.mesh import Cells
 from vi_contact.laws.materials import LinearElastic, MassProportional, PlaneStrain, PlaneStress, Rayleigh
-from vi_contact.march import march
+from vi_contact.run.march import march
+from vi_contact.run.static import static_equilibrium
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.static import static_equilibrium
 
 COMM = MPI.COMM_WORLD
 bodies = pytest.mark.parametrize("name", BODIES)

@@ -20,9 +20,9 @@ from vi_contact.fem.output.fields import XDMF
 from vi_contact.laws.excitation import Harmonic
 from vi_contact.laws.friction import Coulomb, Frictionless
 from vi_contact.laws.mass import ConsistentMass
-from vi_contact.recorders import Contact, Energy, Probe
+from vi_contact.run.recorders import Contact, Energy, Probe
+from vi_contact.run.simulate import Solution, simulate
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
-from vi_contact.simulate import Solution, simulate
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.volume.route import Volume
 

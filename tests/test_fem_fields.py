@@ -27,9 +27,9 @@ from vi_contact.fem.output.fields import XDMF
 from vi_contact.fem.output.stress import VonMises
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.materials import LinearElastic, PlaneStrain, PlaneStress, Section
-from vi_contact.march import march
+from vi_contact.run.march import march
+from vi_contact.run.simulate import Solution, simulate
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
-from vi_contact.simulate import Solution, simulate
 from vi_contact.solvers.condensed import Condensed
 
 DT = 1.0 / 560.0

@@ -22,10 +22,10 @@ from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.initial_stress import geometric_stiffness, initial_stress_matrix
 from vi_contact.fem.loads import BodyForce, Prescribed, Traction
 from vi_contact.fem.petsc_algebra import PetscMatrix
-from vi_contact.march import march
+from vi_contact.run.march import march
+from vi_contact.run.static import static_equilibrium
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.static import static_equilibrium
 
 COMM = MPI.COMM_WORLD
 

@@ -25,9 +25,9 @@ from vi_contact.fem.loads import BodyForce
 from vi_contact.fem.mesh import build_mesh
 from vi_contact.laws.friction import Coulomb, Frictionless
 from vi_contact.laws.mass import Redistributed
-from vi_contact.march import march
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import Blocks
+from vi_contact.run.march import march
 from vi_contact.schemes.midpoint import Midpoint
 
 COMM = MPI.COMM_WORLD

@@ -17,7 +17,6 @@ from two_bodies import forces, momenta, per_body, relative, thrown, two_blocks
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.core.step import ContactProblem
-from vi_contact.cross_check import cross_check
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.mortar import DualMortar
 from vi_contact.fem.contact.pairs import contact_pair, side_of
@@ -26,14 +25,15 @@ from vi_contact.fem.mesh import build_mesh
 from vi_contact.laws.friction import Coulomb, Frictionless
 from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.laws.materials import LinearElastic
-from vi_contact.march import march
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import Blocks, TwoBlocks
+from vi_contact.run.cross_check import cross_check
+from vi_contact.run.march import march
+from vi_contact.run.static import static_equilibrium
 from vi_contact.schemes.midpoint import Midpoint
 from vi_contact.schemes.trapezoidal import Trapezoidal
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.volume.route import OneFactorisation, ReducedNewton, Volume
-from vi_contact.static import static_equilibrium
 
 COMM = MPI.COMM_WORLD
 shapes = pytest.mark.parametrize("simplices", [False, True], ids=["tensor", "simplices"])

@@ -16,20 +16,20 @@ from mpi4py import MPI
 
 from vi_contact.core.step import ContactProblem
 from vi_contact.core.surfaces import HalfSpace
-from vi_contact.cross_check import cross_check
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.mesh import build_mesh
 from vi_contact.laws.friction import Coulomb, Tresca
 from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.laws.materials import LinearElastic
-from vi_contact.march import march
 from vi_contact.meshes.block import BlockMesh
+from vi_contact.run.cross_check import cross_check
+from vi_contact.run.march import march
+from vi_contact.run.time_steps import HalvedAtImpact
 from vi_contact.schemes.contact_stabilised import ContactStabilisedNewmark
 from vi_contact.schemes.moreau_jean import MoreauJean
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.volume.route import OneFactorisation, ReducedNewton, Volume
-from vi_contact.time_steps import HalvedAtImpact
 
 STEPS = 80
 SCHEMES = {

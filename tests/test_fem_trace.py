@@ -19,7 +19,7 @@ from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import BodyForce, Prescribed
 from vi_contact.fem.mesh import Facets
 from vi_contact.laws.materials import PlaneStress
-from vi_contact.static import initial_state
+from vi_contact.run.static import initial_state
 
 COMM = MPI.COMM_WORLD
 GROUND = HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))

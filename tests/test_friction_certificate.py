@@ -15,8 +15,8 @@ from vi_contact.core.surfaces import ContactSurface
 from vi_contact.core.verify import kkt_residual
 from vi_contact.laws.friction import Coulomb, FrictionLaw, Tresca
 from vi_contact.laws.mass import ConsistentMass
-from vi_contact.march import march
-from vi_contact.recorders import Contact
+from vi_contact.run.march import march
+from vi_contact.run.recorders import Contact
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
 

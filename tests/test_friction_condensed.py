@@ -14,7 +14,7 @@ from vi_contact.core.step import ContactProblem, Report
 from vi_contact.core.surfaces import ContactSurface
 from vi_contact.laws.friction import Coulomb, Frictionless, Tresca
 from vi_contact.laws.mass import ConsistentMass, Redistributed
-from vi_contact.march import march
+from vi_contact.run.march import march
 from vi_contact.schemes.trapezoidal import Trapezoidal
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers import condensed

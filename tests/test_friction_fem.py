@@ -20,7 +20,7 @@ from vi_contact.fem.loads import BodyForce, Prescribed
 from vi_contact.laws.friction import Coulomb, FrictionLaw, Tresca
 from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.laws.materials import LinearElastic
-from vi_contact.march import march
+from vi_contact.run.march import march
 from vi_contact.schemes.trapezoidal import Trapezoidal
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed

@@ -24,9 +24,9 @@ from vi_contact.fem.loads import BodyForce
 from vi_contact.laws.friction import Coulomb, ExponentialDecay, FrictionLaw, SlipRateCoulomb
 from vi_contact.laws.mass import ConsistentMass
 from vi_contact.laws.materials import LinearElastic, Rayleigh
-from vi_contact.march import march
+from vi_contact.run.march import march
+from vi_contact.run.static import static_equilibrium
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.static import static_equilibrium
 
 G, SLOPE = 9.81, pi / 6.0
 MIDPOINT = vc.ZienkiewiczWoodTaylor()

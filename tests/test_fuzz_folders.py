@@ -21,13 +21,13 @@ import numpy as np
 import pytest
 from test_checkpoint import chain, difference, run
 
-from vi_contact.checkpoint import checksum, read_checkpoint
 from vi_contact.core.errors import InputError
 from vi_contact.core.step import State
-from vi_contact.run_folder import read_run
+from vi_contact.run.files.checkpoint import checksum, read_checkpoint
+from vi_contact.run.files.reading import read_run
+from vi_contact.run.files.writer import Writer
+from vi_contact.run.simulate import Solution
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
-from vi_contact.simulate import Solution
-from vi_contact.writer import Writer
 
 pytestmark = pytest.mark.serial
 CHECKPOINTS, FOLDERS, SECONDS, SEED = 400, 100, 10.0, 0  # how many, and what one may take at most
@@ -49,8 +49,8 @@ def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
         raise Killed
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("vi_contact.run.Run._rescue", lambda *_: None)
-        patch.setattr("vi_contact.writer.Writer.close", kill)
+        patch.setattr("vi_contact.run.session.Run._rescue", lambda *_: None)
+        patch.setattr("vi_contact.run.files.writer.Writer.close", kill)
         with pytest.raises(Killed):
             run(folder, 52, problem=PROBLEM)
     assert (folder / "history.journal").stat().st_size > 0

@@ -20,7 +20,7 @@ from vi_contact.cli import main
 from vi_contact.core.errors import InputError
 from vi_contact.engineering.peak_values import peaks
 from vi_contact.plotting_report import header_facts, shown_periods, table_rows
-from vi_contact.run_folder import read_run
+from vi_contact.run.files.reading import read_run
 
 pytestmark = pytest.mark.serial
 pytest.importorskip("matplotlib")

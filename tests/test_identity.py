@@ -21,7 +21,7 @@ import vi_contact as vc
 from vi_contact import fem
 from vi_contact.core.algebra import Array, SerialMatrix
 from vi_contact.core.errors import InputError, StepFailure
-from vi_contact.run_checks import check_pace
+from vi_contact.run.checks import check_pace
 
 COMM = MPI.COMM_WORLD
 STEEL = vc.LinearElastic(E=2.0e9, nu=0.3, rho=2000.0)

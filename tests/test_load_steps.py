@@ -17,10 +17,10 @@ from vi_contact.core.errors import InputError
 from vi_contact.core.step import ContactProblem, State
 from vi_contact.core.surfaces import ContactSurface
 from vi_contact.laws.friction import Coulomb, ExponentialDecay, FrictionLaw, SlipRateCoulomb, StaticKinetic, Tresca
-from vi_contact.load_steps import quasi_static
+from vi_contact.run.quasi_static import quasi_static
+from vi_contact.run.static import static_equilibrium
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.friction.nsgs import NSGS
-from vi_contact.static import static_equilibrium
 
 pytestmark = pytest.mark.serial
 STIFFNESS, THRESHOLD, H = 4.0e6, 50.0, 0.1  # EA of the bar [N], friction per length [N/m], distance of its nodes [m]

@@ -17,11 +17,11 @@ from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.core.step import ContactProblem, State, StepResult
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.impact import Elastic, Inelastic
+from vi_contact.run.static import static_equilibrium
 from vi_contact.schemes.linear_multistep import LinearMultistep
 from vi_contact.schemes.ss22 import SS22
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.static import static_equilibrium
 
 pytestmark = pytest.mark.serial
 HALF, NEWMARK = ZienkiewiczWoodTaylor(), LinearMultistep.newmark()

@@ -21,7 +21,7 @@ from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.impact import Inelastic
 from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.laws.materials import Rayleigh
-from vi_contact.march import march
+from vi_contact.run.march import march
 from vi_contact.schemes.trapezoidal import Trapezoidal
 from vi_contact.solvers.condensed import Condensed
 

@@ -21,7 +21,8 @@ from vi_contact.fem.loads import BodyForce
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.laws.materials import LinearElastic, Rayleigh
-from vi_contact.march import march
+from vi_contact.run.march import march
+from vi_contact.run.static import static_equilibrium
 from vi_contact.schemes.contact_stabilised import ContactStabilisedNewmark
 from vi_contact.schemes.hht import HHT
 from vi_contact.schemes.houbolt import Houbolt
@@ -30,7 +31,6 @@ from vi_contact.schemes.moreau_jean import MoreauJean
 from vi_contact.schemes.newmark import Newmark
 from vi_contact.schemes.trapezoidal import Trapezoidal
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.static import static_equilibrium
 
 SCHEMES = [
     (Trapezoidal(), Redistributed()), (Newmark(), Redistributed()), (HHT(-0.1), Redistributed()),

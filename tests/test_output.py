@@ -13,12 +13,11 @@ import numpy as np
 import pytest
 from chain import chain_problem
 
-from vi_contact import history as history_module
 from vi_contact.core.algebra import SerialComm
 from vi_contact.core.errors import InputError, ViContactError
-from vi_contact.history import HistoryFiles
 from vi_contact.laws.excitation import Harmonic
-from vi_contact.output import (
+from vi_contact.run.files import history as history_module
+from vi_contact.run.files.folder import (
     hdf5_atomically,
     on_root,
     run_folder,
@@ -27,13 +26,14 @@ from vi_contact.output import (
     write_all,
     write_atomically,
 )
-from vi_contact.recorders import Contact, Energy, Probe, Row
-from vi_contact.run_folder import read_run
+from vi_contact.run.files.history import HistoryFiles
+from vi_contact.run.files.reading import read_run
+from vi_contact.run.files.stored_rows import StoredRows
+from vi_contact.run.files.table import Block, StoredHistory, Table
+from vi_contact.run.recorders import Contact, Energy, Probe, Row
+from vi_contact.run.simulate import Solution, simulate
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
-from vi_contact.simulate import Solution, simulate
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.stored_rows import StoredRows
-from vi_contact.table import Block, StoredHistory, Table
 
 
 def run(out: Path | None, steps: int = 30, **more: Any) -> Solution:
@@ -146,7 +146,7 @@ def test_unwritable_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     """Told before any work: not a folder, or one that takes no file (mocked, as root may write anywhere)."""
     (tmp_path / "file").write_text("")
     asked: list[int] = []
-    monkeypatch.setattr("vi_contact.run.March", lambda *_, **__: asked.append(1) or iter(()))
+    monkeypatch.setattr("vi_contact.run.session.March", lambda *_, **__: asked.append(1) or iter(()))
     with pytest.raises(InputError, match=r"output folder '.*file' cannot be written \(File exists\): choose another"):
         run(tmp_path / "file")
     with pytest.raises(InputError, match=r"output folder '.*below' cannot be written \(Not a directory\)"):
@@ -155,7 +155,7 @@ def test_unwritable_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     def refuse(*_: Any) -> None:
         raise PermissionError(errno.EACCES, "Permission denied")
 
-    monkeypatch.setattr("vi_contact.output.write_all", refuse)
+    monkeypatch.setattr("vi_contact.run.files.folder.write_all", refuse)
     with pytest.raises(InputError, match=r"cannot be written \(Permission denied\)"):
         run(tmp_path / "closed")
     assert asked == []
@@ -238,7 +238,7 @@ def test_whole_files_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
     """An atomic write that fails leaves the old content and no litter."""
     path = tmp_path / "checkpoint.npz"
     write_atomically(path, b"old")
-    monkeypatch.setattr("vi_contact.output.write_all", Disk(2))
+    monkeypatch.setattr("vi_contact.run.files.folder.write_all", Disk(2))
     with pytest.raises(OSError, match="No space left") as caught:
         write_atomically(path, b"new content")
     assert caught.value.filename == str(path)
@@ -346,7 +346,7 @@ def test_damaged_histories_are_told(tmp_path: Path) -> None:
 def test_long_histories_stay_on_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Beyond a number of bytes the memory lets go of rows; histories, facts and restart are the same."""
     kept = run(tmp_path / "kept", 300)
-    monkeypatch.setattr("vi_contact.table.KEPT", 10_000)
+    monkeypatch.setattr("vi_contact.run.files.table.KEPT", 10_000)
     long = run(tmp_path / "long", 280)
     assert isinstance(long.history, StoredHistory) and len(long.history) == len(long.columns)
     long = run(tmp_path / "long", 300, restart=True)
@@ -365,7 +365,7 @@ def test_long_histories_stay_on_disk(tmp_path: Path, monkeypatch: pytest.MonkeyP
 @pytest.mark.serial
 def test_memory_does_not_grow_with_steps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Without a folder the bytes of the numbers, some hundred a step; with one nothing beyond what is kept at most."""
-    monkeypatch.setattr("vi_contact.table.KEPT", 0)
+    monkeypatch.setattr("vi_contact.run.files.table.KEPT", 0)
     made: Any = {"iterations": 2, "certificate": 1e-12, "escalated": 0} | {f"c{i}": 1.0 for i in range(35)}
     columns = {name: ("-", name) for name in ("t", "k", *made)}
     peaks = {}
@@ -388,7 +388,7 @@ def test_hdf5_on_a_full_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     hdf5_atomically(path, lambda file: file.create_dataset("x", data=np.arange(1000.0)))
     before = path.read_bytes()
     for room in (0, 100, 2000, 5000):
-        monkeypatch.setattr("vi_contact.output.write_all", Disk(room))
+        monkeypatch.setattr("vi_contact.run.files.folder.write_all", Disk(room))
         with pytest.raises(OSError, match="No space left") as caught:
             hdf5_atomically(path, lambda file: file.create_dataset("x", data=np.arange(2000.0)))
         assert caught.value.filename == str(path)

@@ -26,7 +26,7 @@ from vi_contact.plotting_channel import (
 )
 from vi_contact.plotting_channel_mesh import animate, read_bodies
 from vi_contact.plotting_channel_run import film, illustrate
-from vi_contact.static import static_equilibrium
+from vi_contact.run.static import static_equilibrium
 
 pytestmark = pytest.mark.serial
 pytest.importorskip("matplotlib")

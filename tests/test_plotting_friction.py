@@ -13,9 +13,9 @@ from vi_contact import plotting_friction
 from vi_contact.core.errors import InputError
 from vi_contact.laws.friction import Coulomb
 from vi_contact.plotting_friction import contact_states, plot_hysteresis, plot_states
-from vi_contact.recorders import Contact
+from vi_contact.run.recorders import Contact
+from vi_contact.run.simulate import simulate
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
-from vi_contact.simulate import simulate
 from vi_contact.solvers.condensed import Condensed
 
 pytestmark = pytest.mark.serial

@@ -25,10 +25,10 @@ from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.channel import ChannelMesh
 from vi_contact.meshes.two_blocks import Blocks
 from vi_contact.models.channel import Channel, build
-from vi_contact.rigid_bodies import RigidBodies
+from vi_contact.run.rigid_bodies import RigidBodies
+from vi_contact.run.static import initial_state, static_equilibrium
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.friction.nsgs import NSGS
-from vi_contact.static import initial_state, static_equilibrium
 
 COMM = MPI.COMM_WORLD
 WIDTH, HEIGHT, WEIGHT, LEAN, MU = 80.0, 100.0, 23544.0, 0.05, 0.6  # m, m, N/m³, of the weight, -

@@ -14,12 +14,12 @@ from vi_contact.core.errors import InputError
 from vi_contact.core.step import ContactProblem, Report, State
 from vi_contact.laws.excitation import Harmonic
 from vi_contact.laws.impact import Inelastic, MassProjection, Newton
-from vi_contact.march import march
-from vi_contact.recorders import Contact, Energy, Probe, Steps
+from vi_contact.run.march import march
+from vi_contact.run.recorders import Contact, Energy, Probe, Steps
+from vi_contact.run.simulate import simulate
 from vi_contact.schemes.linear_multistep import LinearMultistep
 from vi_contact.schemes.ss22 import SS22
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
-from vi_contact.simulate import simulate
 from vi_contact.solvers.condensed import Condensed
 
 pytestmark = pytest.mark.serial

@@ -13,17 +13,17 @@ import numpy as np
 import pytest
 from test_checkpoint import chain, equal_files, rubbing_box, run, run_wall, wall
 
-from vi_contact.checkpoint import checksum
 from vi_contact.core.errors import InputError
 from vi_contact.core.step import ContactProblem
-from vi_contact.identity import difference, identity, text_of
 from vi_contact.laws.excitation import Harmonic, Tabulated
 from vi_contact.laws.friction import Coulomb, SlipRateCoulomb
 from vi_contact.laws.impact import Elastic
+from vi_contact.run.files.checkpoint import checksum
+from vi_contact.run.files.identity import difference, identity, text_of
+from vi_contact.run.simulate import simulate
 from vi_contact.schemes.ss22 import SS22
 from vi_contact.schemes.trapezoidal import Trapezoidal
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
-from vi_contact.simulate import simulate
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.normal.hildreth import Hildreth
 

@@ -17,7 +17,6 @@ from column import column
 from oscillator import SHAKEN
 from shaken import changes, shaken
 
-from vi_contact.checkpoint import Place, Problem, read_checkpoint, write_checkpoint
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.core.step import ContactProblem, Report, State
@@ -26,6 +25,8 @@ from vi_contact.exact.columns import ObliqueImpact
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.impact import Inelastic, MassProjection
 from vi_contact.laws.mass import ConsistentMass, Redistributed
+from vi_contact.run.files.checkpoint import Place, Problem, read_checkpoint, write_checkpoint
+from vi_contact.run.static import initial_state, static_equilibrium
 from vi_contact.schemes.consistent_data import consistent_acceleration
 from vi_contact.schemes.generalised_alpha import GeneralisedAlpha
 from vi_contact.schemes.hht import HHT
@@ -34,7 +35,6 @@ from vi_contact.schemes.linear_multistep import LinearMultistep
 from vi_contact.schemes.newmark import Newmark
 from vi_contact.schemes.ss22 import SS22
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.static import initial_state, static_equilibrium
 
 pytestmark = pytest.mark.serial
 CONSISTENT, MASSLESS = ConsistentMass(), Redistributed()

@@ -21,8 +21,8 @@ from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.mass import Redistributed
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import TwoBlocks
+from vi_contact.run.simulate import simulate
 from vi_contact.schemes.contact_layer import relaxed
-from vi_contact.simulate import simulate
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.volume.route import ReducedNewton, Volume
 

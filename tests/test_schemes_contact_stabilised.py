@@ -16,11 +16,11 @@ from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.core.step import ContactProblem, State
 from vi_contact.laws.excitation import Harmonic
 from vi_contact.laws.mass import ConsistentMass, Redistributed
+from vi_contact.run.static import initial_state
 from vi_contact.schemes import admissible_predictor as mass_projection
 from vi_contact.schemes.contact_stabilised import ContactStabilisedNewmark
 from vi_contact.schemes.ss22 import SS22
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
-from vi_contact.static import initial_state
 
 pytestmark = pytest.mark.serial
 STABILISED = ContactStabilisedNewmark()

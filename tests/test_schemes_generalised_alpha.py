@@ -11,10 +11,10 @@ from oscillator import SHAKEN, dense, observed_order, oscillators
 
 from vi_contact.core.errors import InputError
 from vi_contact.laws.mass import ConsistentMass, Redistributed
+from vi_contact.run.static import initial_state
 from vi_contact.schemes.generalised_alpha import AlphaStep, GeneralisedAlpha
 from vi_contact.schemes.hht import HHT
 from vi_contact.schemes.newmark import Newmark
-from vi_contact.static import initial_state
 
 pytestmark = pytest.mark.serial
 RADII = (0.0, 0.3, 0.5, 0.8, 1.0)

@@ -17,10 +17,10 @@ from vi_contact.core.step import ContactProblem, State
 from vi_contact.laws.excitation import Harmonic
 from vi_contact.laws.impact import Inelastic, NoImpact
 from vi_contact.laws.mass import ConsistentMass, Redistributed
-from vi_contact.recorders import Contact
+from vi_contact.run.recorders import Contact
+from vi_contact.run.static import initial_state
+from vi_contact.run.time_steps import HalvedAtImpact
 from vi_contact.schemes.moreau_jean import MoreauJean
-from vi_contact.static import initial_state
-from vi_contact.time_steps import HalvedAtImpact
 
 pytestmark = pytest.mark.serial
 MASS: dict[str, Any] = {"mass": ConsistentMass()}

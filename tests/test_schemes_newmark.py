@@ -16,11 +16,11 @@ from vi_contact.core.errors import InputError
 from vi_contact.core.verify import energy_balance
 from vi_contact.laws.impact import Inelastic
 from vi_contact.laws.mass import ConsistentMass, Redistributed
+from vi_contact.run.static import initial_state
+from vi_contact.run.time_steps import Schedule
 from vi_contact.schemes.linear_multistep import LinearMultistep
 from vi_contact.schemes.newmark import Newmark
 from vi_contact.schemes.trapezoidal import Trapezoidal
-from vi_contact.static import initial_state
-from vi_contact.time_steps import Schedule
 
 pytestmark = pytest.mark.serial
 MEMBERS = pytest.mark.parametrize(("beta", "gamma"), [(0.25, 0.5), (0.3025, 0.6), (0.4, 0.5)])

@@ -15,10 +15,10 @@ from shaken import shaken
 from vi_contact.core.step import ContactProblem
 from vi_contact.core.verify import energy_balance
 from vi_contact.laws.mass import ConsistentMass, Redistributed
+from vi_contact.run.static import initial_state, static_equilibrium
 from vi_contact.schemes.trapezoidal import Trapezoidal
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.static import initial_state, static_equilibrium
 
 pytestmark = pytest.mark.serial
 DEFAULT = Trapezoidal()

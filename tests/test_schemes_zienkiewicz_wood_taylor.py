@@ -9,8 +9,8 @@ from chain import chain_problem
 from oscillator import SHAKEN, amplification, dense, exact, last_state, observed_order, oscillators
 
 from vi_contact.core.errors import InputError
+from vi_contact.run.static import initial_state
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
-from vi_contact.static import initial_state
 
 pytestmark = pytest.mark.serial
 HALF = ZienkiewiczWoodTaylor()

@@ -15,17 +15,17 @@ from chain import chain_problem
 from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.core.step import ContactProblem, EffectiveMatrix, Report, State, StepProblem, StepResult
 from vi_contact.core.surfaces import ContactSurface
-from vi_contact.cross_check import CrossChecked
 from vi_contact.laws.excitation import Harmonic
 from vi_contact.laws.impact import Inelastic
-from vi_contact.march import march
-from vi_contact.recorders import Contact, Energy, Probe
+from vi_contact.run.cross_check import CrossChecked
+from vi_contact.run.march import march
+from vi_contact.run.recorders import Contact, Energy, Probe
+from vi_contact.run.simulate import Solution, simulate
+from vi_contact.run.static import static_equilibrium
 from vi_contact.schemes.linear_multistep import LinearMultistep
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
-from vi_contact.simulate import Solution, simulate
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.normal.hildreth import Hildreth
-from vi_contact.static import static_equilibrium
 
 pytestmark = pytest.mark.serial
 

@@ -17,11 +17,11 @@ from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.core.step import ContactProblem, Report
 from vi_contact.laws.friction import Coulomb, ExponentialDecay, SlipRateCoulomb, StaticKinetic
 from vi_contact.laws.mass import ConsistentMass
-from vi_contact.march import march
+from vi_contact.run.march import march
+from vi_contact.run.static import static_equilibrium
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.friction.extrapolation import Plain
 from vi_contact.solvers.friction.slip_rate import RateIteration
-from vi_contact.static import static_equilibrium
 
 pytestmark = pytest.mark.serial
 MIDPOINT, BACKWARD = vc.ZienkiewiczWoodTaylor(), vc.ZienkiewiczWoodTaylor(phi=1.0)

@@ -18,12 +18,12 @@ from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import BodyForce, Prescribed, Traction
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.materials import LinearElastic
-from vi_contact.march import march
+from vi_contact.run.march import march
+from vi_contact.run.static import static_equilibrium
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.normal.projected_cg import ProjectedCG
 from vi_contact.solvers.volume.route import ReducedNewton, Volume
-from vi_contact.static import static_equilibrium
 
 COMM = MPI.COMM_WORLD
 G = 9.80665

@@ -18,14 +18,14 @@ import pytest
 from test_checkpoint import equal_files, run, run_wall
 from test_simulate import summary_of
 
-from vi_contact import folder_lock
 from vi_contact.cli import main
 from vi_contact.core.algebra import SerialComm
 from vi_contact.core.errors import InputError, Interrupted
 from vi_contact.core.step import ContactProblem, Report, State
-from vi_contact.folder_lock import locked
-from vi_contact.recorders import Contact, Energy
-from vi_contact.stop_signals import SIGNALS, StopSignals
+from vi_contact.run.files import lock as folder_lock
+from vi_contact.run.files.lock import locked
+from vi_contact.run.recorders import Contact, Energy
+from vi_contact.run.stop_signals import SIGNALS, StopSignals
 
 serial = pytest.mark.serial
 TESTS, PACKAGE = str(Path(__file__).parent), str(Path(__file__).parents[1])
@@ -128,7 +128,7 @@ def test_in_a_thread() -> None:
 @serial
 def test_second_ctrl_c() -> None:
     """It ends the process at once, whatever it does."""
-    code = ("import os, signal, time\nfrom vi_contact.stop_signals import StopSignals\nwith StopSignals():\n"
+    code = ("import os, signal, time\nfrom vi_contact.run.stop_signals import StopSignals\nwith StopSignals():\n"
             "    os.kill(os.getpid(), signal.SIGINT)\n    os.kill(os.getpid(), signal.SIGINT)\n    time.sleep(600)")
     done = subprocess.run([sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": PACKAGE}, timeout=300)
     assert done.returncode == -signal.SIGINT
@@ -255,7 +255,7 @@ def test_a_file_system_without_locks(
     def refuse(*_: Any) -> None:
         raise OSError(95, "Operation not supported")
 
-    monkeypatch.setattr("vi_contact.folder_lock.fcntl.flock", refuse)
+    monkeypatch.setattr("vi_contact.run.files.lock.fcntl.flock", refuse)
     run(tmp_path, 5)
     assert "file system without locks (Operation not supported)" in caplog.text
 

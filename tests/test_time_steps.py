@@ -21,16 +21,16 @@ from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.core.step import ContactProblem, Report
 from vi_contact.laws.impact import Inelastic, MassProjection
 from vi_contact.laws.mass import ConsistentMass, Redistributed
-from vi_contact.march import March
-from vi_contact.recorders import Energy
+from vi_contact.run.march import March
+from vi_contact.run.recorders import Energy
+from vi_contact.run.simulate import simulate
+from vi_contact.run.static import initial_state
+from vi_contact.run.time_steps import Course, HalvedAtImpact, Schedule, course
 from vi_contact.schemes.linear_multistep import LinearMultistep
 from vi_contact.schemes.ss22 import SS22
 from vi_contact.schemes.trapezoidal import Trapezoidal
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
-from vi_contact.simulate import simulate
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.static import initial_state
-from vi_contact.time_steps import Course, HalvedAtImpact, Schedule, course
 
 serial = pytest.mark.serial
 HALF, NEWMARK, DISSIPATIVE = ZienkiewiczWoodTaylor(), LinearMultistep.newmark(), LinearMultistep.newmark(0.3025, 0.6)

@@ -15,10 +15,10 @@ from vi_contact.core.algebra import SerialMatrix
 from vi_contact.core.step import EffectiveMatrix, Report, StepProblem, StepResult
 from vi_contact.core.verify import energies, energy_balance, kkt_residual
 from vi_contact.laws.impact import ComponentReset, Elastic, Inelastic, MassProjection, Newton
+from vi_contact.run.static import initial_state
 from vi_contact.schemes.linear_multistep import LinearMultistep
 from vi_contact.schemes.ss22 import SS22
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
-from vi_contact.static import initial_state
 
 pytestmark = pytest.mark.serial
 HALF, NEWMARK = ZienkiewiczWoodTaylor(), LinearMultistep.newmark()

@@ -15,13 +15,13 @@ from tipped import ROUGH_ON_ONE_SIDE, RUBBER, tipped
 
 from vi_contact.core.step import ContactProblem
 from vi_contact.core.surfaces import HalfSpace
-from vi_contact.cross_check import CrossChecked
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import BodyForce, Prescribed
 from vi_contact.laws.friction import Coulomb, FrictionLaw, Tresca
 from vi_contact.laws.mass import ConsistentMass, Redistributed
-from vi_contact.march import march
+from vi_contact.run.cross_check import CrossChecked
+from vi_contact.run.march import march
 from vi_contact.schemes.trapezoidal import Trapezoidal
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed

@@ -13,14 +13,14 @@ from vi_contact.ground_motion import read_record
 from vi_contact.laws.excitation import GroundMotion, Harmonic
 from vi_contact.laws.impact import Elastic, Inelastic
 from vi_contact.laws.materials import LinearElastic, Rayleigh
-from vi_contact.march import march
 from vi_contact.models import wall_run
 from vi_contact.models.wall import CASES, STANDARD_GRAVITY, Wall, build
 from vi_contact.models.wall_run import WallRun, run_wall
+from vi_contact.run.march import march
+from vi_contact.run.simulate import simulate
+from vi_contact.run.static import static_equilibrium
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
-from vi_contact.simulate import simulate
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.static import static_equilibrium
 
 COMM = MPI.COMM_WORLD
 COARSE = Wall(divisions=(4, 6))

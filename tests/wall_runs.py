@@ -13,8 +13,8 @@ from vi_contact.core.algebra import Array, Mask
 from vi_contact.core.step import ContactProblem, State
 from vi_contact.core.verify import energy_balance
 from vi_contact.laws.impact import Inelastic, MassProjection
-from vi_contact.march import march
 from vi_contact.models.wall import Wall, WallModel, build
+from vi_contact.run.march import march
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
 

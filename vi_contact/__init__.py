@@ -11,9 +11,9 @@ from typing import Any
 
 # Functions that share their module's name are bound here, before somebody imports the module and takes the name.
 from .base_motion import base_motion  # noqa: F401
-from .cross_check import cross_check  # noqa: F401
-from .march import march  # noqa: F401
-from .simulate import simulate  # noqa: F401
+from .run.cross_check import cross_check  # noqa: F401
+from .run.march import march  # noqa: F401
+from .run.simulate import simulate  # noqa: F401
 from .upgoing import upgoing  # noqa: F401
 
 __version__ = "0.1.0"
@@ -58,7 +58,7 @@ _CONTENTS = {
     # contract
     "core.step": ("Certificate", "ContactProblem", "Report", "State", "StepProblem", "StepResult"),
     # schemes
-    "schemes.choice": ("completed",),
+    "run.defaults": ("completed",),
     "schemes.trapezoidal": ("Trapezoidal",),
     "schemes.zienkiewicz_wood_taylor": ("ZienkiewiczWoodTaylor",),
     "schemes.ss22": ("SS22",),
@@ -83,20 +83,20 @@ _CONTENTS = {
     "solvers.friction.extrapolation": ("Aitken", "Anderson", "Plain"),
     "solvers.friction.slip_rate": ("RateIteration",),
     # the loop and what listens to it
-    "march": ("march",),
-    "time_steps": ("HalvedAtImpact", "Schedule"),
-    "static": ("static_equilibrium",),
+    "run.march": ("march",),
+    "run.time_steps": ("HalvedAtImpact", "Schedule"),
+    "run.static": ("static_equilibrium",),
     "laws.weight": ("with_weight",),
-    "load_steps": ("quasi_static",),
-    "simulate": ("Solution", "simulate"),
-    "recorders": ("Contact", "Energy", "Probe"),
+    "run.quasi_static": ("quasi_static",),
+    "run.simulate": ("Solution", "simulate"),
+    "run.recorders": ("Contact", "Energy", "Probe"),
     # what engineers ask of a run
     "engineering.resultants": ("Resultants", "contact_summary"),
     "engineering.racking": ("Racking",),
     "engineering.floor_spectra": ("TransferFunction", "floor_spectrum", "recorded_motion", "transfer_function"),
     "engineering.peak_values": ("Loop", "Peak", "hysteresis", "peaks", "write_peaks"),
-    "run_folder": ("RunFolder", "read_run"),
-    "cross_check": ("CrossChecked", "cross_check"),
+    "run.files.reading": ("RunFolder", "read_run"),
+    "run.cross_check": ("CrossChecked", "cross_check"),
     "core.verify": ("energy_balance", "kkt_residual"),
     "engineering.modal": ("lowest_frequency",),
     # contact in a boundary layer (seed 001)

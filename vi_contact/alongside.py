@@ -14,8 +14,8 @@ from .core.algebra import Array
 from .core.errors import InputError
 from .core.step import ContactProblem, Scheme
 from .laws.mass import ConsistentMass
-from .march import march
-from .time_steps import LARGEST, HalvedAtImpact, Schedule, course
+from .run.march import march
+from .run.time_steps import LARGEST, HalvedAtImpact, Schedule, course
 
 
 def given_steps(dt: float | Schedule) -> None:

@@ -29,9 +29,9 @@ from .core.step import ContactProblem, Scheme
 from .core.surfaces import ContactSurface, empty_surface
 from .core.system import Load, Pace, SemiDiscreteSystem
 from .laws.excitation import Excitation
-from .run_checks import check_scheme
+from .run.checks import check_scheme
+from .run.time_steps import Schedule
 from .schemes.trapezoidal import Trapezoidal
-from .time_steps import Schedule
 
 
 class PointSpace:

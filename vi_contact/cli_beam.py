@@ -51,7 +51,7 @@ def _run(options: argparse.Namespace) -> str:
     from .beam.tip import ExactFriction, RegularisedFriction, TipFriction
     from .beam.values import TimoshenkoBeam
     from .core.algebra import SerialComm
-    from .output import run_folder
+    from .run.files.folder import run_folder
 
     beam = TimoshenkoBeam(
         options.length, options.rho, options.area, options.inertia, options.E, options.G, options.shear_factor,

@@ -68,7 +68,7 @@ def _add_actions(parsers: dict[str, argparse.ArgumentParser]) -> None:
 def _report(options: argparse.Namespace) -> str:
     from .engineering.peak_values import peaks, write_peaks
     from .plotting_report import plot_report
-    from .run_folder import read_run
+    from .run.files.reading import read_run
 
     run = read_run(options.folder)
     out = output_file(options.out or Path(options.folder) / "report.pdf", picture=True)
@@ -80,7 +80,7 @@ def _report(options: argparse.Namespace) -> str:
 
 def _peaks(options: argparse.Namespace) -> str:
     from .engineering.peak_values import peaks, write_peaks
-    from .run_folder import read_run
+    from .run.files.reading import read_run
 
     run = read_run(options.folder)
     rows = peaks(run.history, run.columns, options.columns or None)
@@ -94,7 +94,7 @@ def _peaks(options: argparse.Namespace) -> str:
 def _spectrum(options: argparse.Namespace) -> str:
     from .engineering.floor_spectra import floor_spectrum, recorded_motion
     from .plotting_motion import plot_spectra
-    from .run_folder import read_run
+    from .run.files.reading import read_run
 
     run, periods = read_run(options.folder), spaced("--periods", options.periods)
     table = _table_path(options)
@@ -118,7 +118,7 @@ def _spectrum(options: argparse.Namespace) -> str:
 def _transfer(options: argparse.Namespace) -> str:
     from .engineering.floor_spectra import transfer_function
     from .plotting_engineering import plot_transfer
-    from .run_folder import read_run
+    from .run.files.reading import read_run
 
     run, table = read_run(options.folder), _table_path(options)
     given = None if options.frequencies is None else spaced("--frequencies", options.frequencies)
@@ -135,7 +135,7 @@ def _transfer(options: argparse.Namespace) -> str:
 def _loop(options: argparse.Namespace) -> str:
     from .engineering.peak_values import hysteresis
     from .plotting_engineering import plot_loop
-    from .run_folder import read_run
+    from .run.files.reading import read_run
 
     run, table = read_run(options.folder), _table_path(options)
     loop = hysteresis(run.history, options.deformation, options.force, sign=-1.0 if options.turn else 1.0)
@@ -149,7 +149,7 @@ def _loop(options: argparse.Namespace) -> str:
 
 
 def _table_path(options: argparse.Namespace) -> Path:
-    from .output import FILES
+    from .run.files.folder import FILES
 
     folder = Path(options.folder)
     path = options.out or folder / f"{options.action}.csv"
@@ -157,7 +157,7 @@ def _table_path(options: argparse.Namespace) -> Path:
 
 
 def _write(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
-    from .output import sentence, write_atomically
+    from .run.files.folder import sentence, write_atomically
 
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")

@@ -10,7 +10,7 @@ from .core.algebra import Array
 from .core.errors import InputError
 from .plotting_channel import Outline, opening, plot_envelope, plot_interface, plot_openings, plot_rocking
 from .plotting_channel_mesh import animate, read_bodies
-from .run_folder import read_run
+from .run.files.reading import read_run
 
 FILM_FRAMES = 48  # at most: a film of two megabytes
 DRAWN = 0.15  # of the channel's height: how large its largest displacement is drawn

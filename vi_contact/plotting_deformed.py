@@ -13,7 +13,7 @@ import numpy as np
 
 from .core.algebra import Array, Indices
 from .core.errors import InputError
-from .output import FIELDS, HISTORY_H5
+from .run.files.folder import FIELDS, HISTORY_H5
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from .engineering.peak_values import Peak, peaks
 from .ground_motion import STANDARD_GRAVITY, Record, response_spectrum
 from .plotting import _LEDGER, STYLE, _log, scaled
 from .plotting_maps import arc_position, draw_map, thinned
-from .run_folder import RunFolder
+from .run.files.reading import RunFolder
 
 PAGE = (8.27, 11.69)  # inches, A4
 SIDES, TOP = (0.085, 0.95), 0.87  # of the page's width and height: where the panels are

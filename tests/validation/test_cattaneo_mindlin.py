@@ -37,11 +37,11 @@ from vi_contact.fem.loads import Traction
 from vi_contact.fem.mesh import build_mesh
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.materials import LinearElastic
-from vi_contact.load_steps import quasi_static
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import Blocks
+from vi_contact.run.quasi_static import quasi_static
+from vi_contact.run.static import static_equilibrium
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.static import static_equilibrium
 
 pytestmark = pytest.mark.slow
 

@@ -16,10 +16,10 @@ from vi_contact.core.step import ContactProblem
 from vi_contact.exact.columns import ObliqueImpact, ShearColumn
 from vi_contact.laws.friction import Coulomb, Tresca
 from vi_contact.laws.mass import ConsistentMass, Redistributed
-from vi_contact.recorders import Contact, Energy
+from vi_contact.run.recorders import Contact, Energy
+from vi_contact.run.simulate import simulate
 from vi_contact.schemes.trapezoidal import Trapezoidal
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
-from vi_contact.simulate import simulate
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.friction.fixed_point import FixedPoint
 from vi_contact.solvers.friction.nsgs import NSGS

@@ -21,9 +21,9 @@ from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import Traction
 from vi_contact.laws.friction import Coulomb, FrictionLaw, Tresca
 from vi_contact.laws.materials import LinearElastic
-from vi_contact.load_steps import quasi_static
+from vi_contact.run.quasi_static import quasi_static
+from vi_contact.run.static import static_equilibrium
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.static import static_equilibrium
 
 pytestmark = pytest.mark.slow
 

@@ -28,8 +28,8 @@ from vi_contact.fem.loads import Prescribed, Traction
 from vi_contact.fem.mesh import build_mesh
 from vi_contact.laws.materials import LinearElastic
 from vi_contact.meshes.ball import BallMesh
+from vi_contact.run.static import static_equilibrium
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.static import static_equilibrium
 
 pytestmark = pytest.mark.slow
 

@@ -26,9 +26,9 @@ from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.mesh import build_mesh
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.mass import Redistributed
-from vi_contact.march import march
 from vi_contact.meshes.ball import BallMesh
 from vi_contact.models.ball import SHARE, Ball, BallModel, build, quasi_static
+from vi_contact.run.march import march
 
 COMM = MPI.COMM_WORLD
 

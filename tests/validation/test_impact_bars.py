@@ -20,8 +20,8 @@ from vi_contact.core.algebra import Array
 from vi_contact.exact.bar import PeriodicBar, ThrownBar
 from vi_contact.exact.bouncing_bar import BouncingBar
 from vi_contact.laws.mass import ConsistentMass, Redistributed
-from vi_contact.march import march
 from vi_contact.models.bar import Bar, build
+from vi_contact.run.march import march
 from vi_contact.schemes.contact_stabilised import ContactStabilisedNewmark
 from vi_contact.schemes.midpoint import Midpoint
 from vi_contact.schemes.moreau_jean import MoreauJean

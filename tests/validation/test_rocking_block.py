@@ -16,7 +16,7 @@ from mpi4py import MPI
 import vi_contact as vc
 from vi_contact.core.algebra import Array
 from vi_contact.models import rocking_block as rocking
-from vi_contact.time_steps import TimeSteps
+from vi_contact.run.time_steps import TimeSteps
 
 pytestmark = pytest.mark.serial  # ranks change none of these numbers: cheaper tests show it
 

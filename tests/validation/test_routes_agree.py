@@ -18,8 +18,8 @@ from fem_problems import BOX_DT, WALL_DT, Run, max_over_ranks, run, shaken_wall,
 from mpi4py import MPI
 
 from vi_contact.core.step import ContactProblem, StepProblem
-from vi_contact.cross_check import cross_check
-from vi_contact.march import march
+from vi_contact.run.cross_check import cross_check
+from vi_contact.run.march import march
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.normal.active_set import ActiveSet

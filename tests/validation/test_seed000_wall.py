@@ -16,12 +16,12 @@ from wall_runs import POINTS, SCHEME, follow, history, model, problem
 
 from vi_contact.core.algebra import Array
 from vi_contact.core.step import ContactProblem, EffectiveMatrix
-from vi_contact.cross_check import cross_check
 from vi_contact.engineering.modal import lowest_frequency
 from vi_contact.laws.impact import MassProjection
 from vi_contact.laws.materials import LinearElastic
-from vi_contact.march import march
 from vi_contact.models.wall import Wall
+from vi_contact.run.cross_check import cross_check
+from vi_contact.run.march import march
 from vi_contact.solvers.condensed import Condensed, PreparedCondensed
 from vi_contact.solvers.normal.hildreth import Hildreth
 

@@ -23,8 +23,6 @@ from vi_contact.core.step import ContactProblem
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import Traction
 from vi_contact.fem.mesh import build_mesh
-from vi_contact.load_steps import quasi_static
-from vi_contact.march import march
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.cut import Welded
 from vi_contact.meshes.extract import MeshArrays
@@ -32,6 +30,8 @@ from vi_contact.meshes.from_arrays import add_arrays, arrays_of
 from vi_contact.meshes.rows import cell_sides
 from vi_contact.models.embedded import CONTACT, Embedded, build
 from vi_contact.models.square import concrete
+from vi_contact.run.march import march
+from vi_contact.run.quasi_static import quasi_static
 from vi_contact.solvers.condensed import Condensed
 
 pytestmark = pytest.mark.serial  # ranks change none of these numbers: cheaper tests show it

@@ -21,10 +21,10 @@ from vi_contact.core.surfaces import HalfSpace
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import BodyForce, Prescribed
-from vi_contact.march import march
+from vi_contact.run.march import march
+from vi_contact.run.static import static_equilibrium
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.static import static_equilibrium
 
 SHEAR, NU, X0 = 0.4, 0.3, 1.0 / 7.0
 one_rank = pytest.mark.serial  # finer meshes: the coarser rows of both tables are computed on any number of ranks

@@ -18,7 +18,6 @@ from two_bodies import SOFT, blocks, momenta, per_body, relative, thrown, two_bl
 
 from vi_contact.core.algebra import Array
 from vi_contact.core.step import ContactProblem
-from vi_contact.cross_check import cross_check
 from vi_contact.exact.two_bars import TwoBars
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.pairs import contact_pair
@@ -27,16 +26,17 @@ from vi_contact.fem.mesh import build_mesh
 from vi_contact.laws.friction import Coulomb, Frictionless
 from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.laws.materials import LinearElastic
-from vi_contact.march import march
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.cut import Welded
 from vi_contact.meshes.two_blocks import TwoBlocks
+from vi_contact.run.cross_check import cross_check
+from vi_contact.run.march import march
+from vi_contact.run.static import static_equilibrium
 from vi_contact.schemes.contact_stabilised import ContactStabilisedNewmark
 from vi_contact.schemes.midpoint import Midpoint
 from vi_contact.schemes.trapezoidal import Trapezoidal
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.volume.route import OneFactorisation, ReducedNewton, Volume
-from vi_contact.static import static_equilibrium
 
 pytestmark = pytest.mark.slow
 

@@ -11,9 +11,9 @@ from mpi4py import MPI
 from vi_contact.laws.impact import NoImpact
 from vi_contact.models.choices import SCHEMES
 from vi_contact.models.wall import Wall, WallModel, build
-from vi_contact.recorders import Contact, Energy, Probe
+from vi_contact.run.recorders import Contact, Energy, Probe
+from vi_contact.run.simulate import Solution, simulate
 from vi_contact.schemes.trapezoidal import Trapezoidal
-from vi_contact.simulate import Solution, simulate
 
 COMM = MPI.COMM_WORLD
 

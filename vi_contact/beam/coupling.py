@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from ..core.checks import array, number, whole
 from ..core.errors import InputError
 from ..core.step import Scheme
-from ..march import march
+from ..run.march import march
 from ..schemes.midpoint import Midpoint
 from .contract import rod_problem
 from .elements import Elements

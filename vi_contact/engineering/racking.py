@@ -11,7 +11,7 @@ from ..core.algebra import Array
 from ..core.checks import array, column_name, instance
 from ..core.errors import InputError
 from ..core.step import ContactProblem, Report, State
-from ..recorders import Columns, Row
+from ..run.recorders import Columns, Row
 
 
 def racking(corners: Array, displacements: Array) -> tuple[Array, Array]:

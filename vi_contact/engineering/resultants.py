@@ -24,7 +24,7 @@ from ..core.checks import array, column_name, function, instance, provides
 from ..core.errors import InputError
 from ..core.step import ContactProblem, Report, State
 from ..core.surfaces import nodal_frames
-from ..recorders import AXES, Columns, Row
+from ..run.recorders import AXES, Columns, Row
 
 Where = Callable[[Array, Array], Mask]
 

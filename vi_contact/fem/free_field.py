@@ -29,10 +29,10 @@ from ..core.step import Scheme
 from ..core.system import Pace
 from ..laws.excitation import Excitation
 from ..laws.materials import Section
-from ..run_checks import check_scheme
+from ..run.checks import check_scheme
+from ..run.time_steps import Schedule
 from ..schemes.trapezoidal import Trapezoidal
 from ..soil_column import SoilColumn
-from ..time_steps import Schedule
 from . import compat
 from .dashpots import CompliantBase, DashpotMatrix, Dashpots
 from .petsc_algebra import PetscMatrix

@@ -22,7 +22,7 @@ import ufl
 from ..core.algebra import Array
 from ..core.step import ContactProblem, State
 from ..core.system import Load, SemiDiscreteSystem
-from ..run_checks import check_problem_given, check_sizes
+from ..run.checks import check_problem_given, check_sizes
 from . import compat
 from .petsc_algebra import PetscMatrix
 from .space import FemSpace, known_matrices, space_of

@@ -19,8 +19,8 @@ import numpy as np
 from ..core.algebra import Array, max_abs
 from ..core.errors import InputError
 from ..core.step import ContactProblem, State
-from ..run_checks import check_problem_given, check_sizes
-from ..static import initial_state
+from ..run.checks import check_problem_given, check_sizes
+from ..run.static import initial_state
 from .space import FemSpace
 
 log = logging.getLogger(__name__)

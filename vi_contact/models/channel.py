@@ -31,7 +31,7 @@ from ..laws.mass import ConsistentMass, MassLaw
 from ..laws.materials import Damping, LinearElastic, NoDamping, PlaneStrain
 from ..laws.weight import own_weight
 from ..meshes.channel import ChannelMesh
-from ..recorders import Contact, Energy, Probe
+from ..run.recorders import Contact, Energy, Probe
 from .channel_points import Openings, SoilProbe
 from .channel_sides import RockBelow, Rollers, Sides
 

@@ -13,7 +13,7 @@ from ..core.errors import InputError
 from ..core.step import ContactProblem, Report, State
 from ..core.surfaces import ContactSurface
 from ..fem.contact.frames import FemSurface
-from ..recorders import Columns, Probe, Row
+from ..run.recorders import Columns, Probe, Row
 
 
 @dataclass

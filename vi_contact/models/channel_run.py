@@ -19,7 +19,7 @@ from ..laws.friction import Coulomb
 from ..laws.impact import Inelastic, MassProjection
 from ..laws.materials import LinearElastic
 from ..plotting import plot_certificate, plot_contact, plot_energy, plot_excitation, plot_points
-from ..simulate import Solution, simulate
+from ..run.simulate import Solution, simulate
 from ..solvers.volume.route import Volume
 from ..solvers.volume.snes import ReducedNewton
 from ..upgoing import upgoing

@@ -15,7 +15,7 @@ from ..fem.loads import Prescribed
 from ..fem.ties import Tied
 from ..laws.excitation import Excitation
 from ..laws.materials import LinearElastic
-from ..time_steps import Schedule
+from ..run.time_steps import Schedule
 
 ENDS = ("left_side", "right_side")
 

@@ -9,8 +9,8 @@ from typing import Any
 from ..base_motion import BaseMotion
 from ..core.step import ContactProblem, Solver, State
 from ..fem.released_supports import release
+from ..run.static import static_equilibrium
 from ..solvers.condensed import Condensed
-from ..static import static_equilibrium
 from .channel import Channel, ChannelModel, build
 from .channel_sides import RockBelow, Rollers, Sides
 

@@ -33,9 +33,9 @@ from ..fem.mesh import build_mesh
 from ..laws.excitation import Excitation
 from ..laws.materials import Damping, LinearElastic, PlaneStress, Rayleigh
 from ..meshes.block import BlockMesh
+from ..run.static import static_equilibrium
+from ..run.time_steps import HalvedAtImpact
 from ..solvers.condensed import Condensed
-from ..static import static_equilibrium
-from ..time_steps import HalvedAtImpact
 
 RIGID = 200.0  # least sqrt(E/rho)/height over p (V3.1)
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from ..core.errors import InputError
 from ..core.step import ImpactLaw, Solver
-from ..cross_check import CrossChecked
 from ..ground_motion import Record, pga, read_record, resampled, scaled, scaled_to_pga
 from ..laws.excitation import Excitation, GroundMotion
+from ..run.cross_check import CrossChecked
 from .choices import SCHEMES, SOLVERS
 
 

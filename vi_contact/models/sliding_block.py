@@ -21,8 +21,8 @@ from ..laws.excitation import Excitation
 from ..laws.friction import Coulomb
 from ..laws.materials import Damping, LinearElastic, PlaneStress, Rayleigh
 from ..meshes.block import BlockMesh
+from ..run.static import static_equilibrium
 from ..solvers.condensed import Condensed
-from ..static import static_equilibrium
 
 
 @dataclass(frozen=True)

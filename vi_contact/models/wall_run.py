@@ -12,9 +12,9 @@ from ..core.step import ContactProblem, State
 from ..core.surfaces import ContactSurface
 from ..fem.output.fields import XDMF
 from ..plotting import plot_certificate, plot_contact, plot_energy, plot_excitation, plot_points
-from ..recorders import Contact, Energy, Probe
-from ..simulate import Solution, simulate
-from ..static import static_equilibrium
+from ..run.recorders import Contact, Energy, Probe
+from ..run.simulate import Solution, simulate
+from ..run.static import static_equilibrium
 from .choices import SCHEMES, SOLVERS
 from .run_options import RunOptions, check_options, check_word, excitations, number_of_steps, records, solvers
 from .wall import BASE_INERTIA, CASES, Wall, build

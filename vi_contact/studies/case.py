@@ -21,11 +21,9 @@ from ..core.checks import shown
 from ..core.errors import InputError
 from ..core.step import ContactProblem, Recorder, Scheme, Solver
 from ..core.surfaces import ContactSurface, empty_surface
-from ..cross_check import CrossChecked
 from ..fem.assembly import assemble
 from ..fem.contact.joined import together
 from ..fem.mesh import Tags, build_mesh, read_mesh
-from ..folder_lock import locked
 from ..laws.excitation import Excitation
 from ..laws.friction import FrictionLaw, Frictionless
 from ..laws.impact import ImpactLaw
@@ -33,14 +31,16 @@ from ..laws.mass import MassLaw
 from ..laws.materials import LinearElastic
 from ..laws.weight import with_weight
 from ..meshes.gmsh_session import MeshScript
-from ..output import on_root, run_folder, write_atomically
-from ..recorders import Contact, Energy, Steps
-from ..schemes.choice import completed
-from ..simulate import Solution, simulate
+from ..run.cross_check import CrossChecked
+from ..run.defaults import completed
+from ..run.files.folder import on_root, run_folder, write_atomically
+from ..run.files.lock import locked
+from ..run.files.writer import FieldWriter
+from ..run.recorders import Contact, Energy, Steps
+from ..run.simulate import Solution, simulate
+from ..run.static import initial_state, static_equilibrium
+from ..run.time_steps import course
 from ..solvers.condensed import Condensed
-from ..static import initial_state, static_equilibrium
-from ..time_steps import course
-from ..writer import FieldWriter
 from .calls import Callee, Named, Node, Spot, callee, groups, needs_mesh
 from .models import Parts
 from .plain import MeshFile

@@ -24,8 +24,8 @@ import numpy as np
 from ..core.algebra import Array
 from ..core.errors import InputError
 from ..fem.mesh import alone
-from ..output import to_json, write_atomically
 from ..plotting_ida import Panel, plot_ida
+from ..run.files.folder import to_json, write_atomically
 from .case import Case
 from .ida_runs import OneRun, Shaking, executed, read_json, refuse_mpirun, shakings
 from .ida_table import Row, tabulated

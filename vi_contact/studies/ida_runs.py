@@ -20,7 +20,7 @@ from typing import Any
 from ..core.errors import InputError
 from ..ground_motion import Record, scaled
 from ..laws.excitation import GroundMotion
-from ..output import CHECKPOINT, SUMMARY, to_json, write_atomically
+from ..run.files.folder import CHECKPOINT, SUMMARY, to_json, write_atomically
 from .case import Case, read_case
 
 ROW = "row.json"

@@ -13,7 +13,7 @@ import numpy as np
 from ..core.algebra import Array
 from ..core.errors import InputError
 from ..ground_motion import scaled
-from ..run_folder import read_run
+from ..run.files.reading import read_run
 from .case import Case
 from .ida_runs import ROW, Shaking, read_row
 from .measures import Demand, Intensity

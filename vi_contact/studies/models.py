@@ -12,7 +12,7 @@ from ..core.surfaces import ContactSurface
 from ..core.system import SemiDiscreteSystem
 from ..models import channel, wall
 from ..models.channel_sides import Sides
-from ..recorders import Contact, Energy, Probe
+from ..run.recorders import Contact, Energy, Probe
 from .calls import Callee
 
 

@@ -6,11 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from .. import recorders, time_steps
 from ..core import surfaces
 from ..core.step import Recorder, Scheme, Solver
 from ..core.surfaces import ContactSurface
-from ..cross_check import CrossChecked
 from ..engineering.racking import Racking
 from ..engineering.resultants import Resultants
 from ..fem.contact.matching import Matching, NodeToNode
@@ -32,6 +30,9 @@ from ..meshes.gmsh_session import MeshScript
 from ..meshes.two_blocks import Blocks, TwoBlocks
 from ..meshes.wall import WallMesh
 from ..models import channel_sides
+from ..run import recorders, time_steps
+from ..run.cross_check import CrossChecked
+from ..run.files.writer import FieldWriter
 from ..schemes.contact_stabilised import ContactStabilisedNewmark
 from ..schemes.generalised_alpha import GeneralisedAlpha
 from ..schemes.hht import HHT
@@ -59,7 +60,6 @@ from ..solvers.volume.one_factorisation import OneFactorisation
 from ..solvers.volume.snes import ReducedNewton, SemismoothNewton
 from ..solvers.volume.tao import TaoTron
 from ..upgoing import UpgoingVelocity, upgoing
-from ..writer import FieldWriter
 from . import plain
 from .calls import Callee, callee
 from .models import MODELS, Parts

@@ -28,7 +28,7 @@ from ...core.algebra import Array, Indices, Mask
 from ...core.checks import real, shown
 from ...core.errors import InputError
 from ...core.step import ContactProblem, Report, State
-from ...output import FIELDS, FIELDS_INDEX, hdf5_atomically, on_root, write_atomically
+from ...run.files.folder import FIELDS, FIELDS_INDEX, hdf5_atomically, on_root, write_atomically
 from .. import compat
 from ..mesh import node_numbers
 from ..space import FemSpace, known_matrices, space_of

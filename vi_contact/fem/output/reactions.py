@@ -10,7 +10,7 @@ import numpy as np
 from ...core.checks import array, column_name
 from ...core.errors import InputError
 from ...core.step import ContactProblem, Report, State
-from ...recorders import Columns, Row
+from ...run.recorders import Columns, Row
 from ..groups import facets_of
 from ..mesh import Facets
 from ..space import FemSpace

@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from .core.algebra import max_abs
-from .core.checks import instance, number, provides, real, refuse, several, shown, whole
-from .core.errors import InputError
-from .core.step import ContactProblem, State
-from .core.system import Pace
+from ..core.algebra import max_abs
+from ..core.checks import instance, number, provides, real, refuse, several, shown, whole
+from ..core.errors import InputError
+from ..core.step import ContactProblem, State
+from ..core.system import Pace
 from .time_steps import HalvedAtImpact, Schedule, TimeSteps, described
 
 SCHEME = ("check", "start", "jump", "effective_matrix", "step", "finish", "balance")

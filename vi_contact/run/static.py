@@ -6,13 +6,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .core.checks import number
-from .core.errors import InputError
-from .core.step import ContactProblem, EffectiveMatrix, Solver, State, StepProblem, StepResult
+from ..core.checks import number
+from ..core.errors import InputError
+from ..core.step import ContactProblem, EffectiveMatrix, Solver, State, StepProblem, StepResult
+from ..solvers.certified import TOLERANCE, CertifiedSolver, refuse_nan
+from ..solvers.condensed import Condensed
+from .checks import check_methods, check_problem_given
 from .proximal import Proximal
-from .run_checks import check_methods, check_problem_given
-from .solvers.certified import TOLERANCE, CertifiedSolver, refuse_nan
-from .solvers.condensed import Condensed
 
 ADVICE = "try another solver, or smaller load steps, and check the data"
 

@@ -12,9 +12,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from .core.algebra import Comm
-from .core.errors import InputError
-from .output import on_root
+from ...core.algebra import Comm
+from ...core.errors import InputError
+from .folder import on_root
 
 log = logging.getLogger(__name__)
 LOCK = ".lock"

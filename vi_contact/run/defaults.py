@@ -7,9 +7,9 @@ from dataclasses import replace
 from ..core.step import ContactProblem, Scheme
 from ..laws.impact import NoImpact
 from ..laws.mass import ConsistentMass
-from ..run_checks import check_problem_given, check_scheme
-from .trapezoidal import Trapezoidal
-from .zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
+from ..schemes.trapezoidal import Trapezoidal
+from ..schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
+from .checks import check_problem_given, check_scheme
 
 
 def completed(problem: ContactProblem, scheme: Scheme | None) -> tuple[ContactProblem, Scheme]:

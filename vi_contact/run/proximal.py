@@ -20,12 +20,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .core.algebra import Array, Mask, max_abs
-from .core.errors import InputError, StepFailure
-from .core.step import Certificate, ContactProblem, EffectiveMatrix, Solver, StepProblem, StepResult
-from .core.verify import kkt_residual
+from ..core.algebra import Array, Mask, max_abs
+from ..core.errors import InputError, StepFailure
+from ..core.step import Certificate, ContactProblem, EffectiveMatrix, Solver, StepProblem, StepResult
+from ..core.verify import kkt_residual
+from ..solvers.correction import MARGIN, added, kept, left_over, share_of
 from .rigid_bodies import RigidBodies, body_springs
-from .solvers.correction import MARGIN, added, kept, left_over, share_of
 
 ITERATIONS = 200
 STIFFER = 1e3  # springs for solvers that the weak ones defeat

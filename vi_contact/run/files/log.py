@@ -67,7 +67,7 @@ class RunLog:
 
 def versions() -> dict[str, str]:
     """Version of everything that computes in this process."""
-    from . import __version__
+    from ... import __version__
 
     found = {
         "vi_contact": __version__,

@@ -11,15 +11,15 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .core.algebra import max_abs
-from .core.checks import number, provides, several
-from .core.errors import InputError
-from .core.step import ContactProblem, EffectiveMatrix, PreparedSolver, Scheme, Solver, State, StepProblem, StepResult
-from .core.surfaces import ContactSurface
+from ..core.algebra import max_abs
+from ..core.checks import number, provides, several
+from ..core.errors import InputError
+from ..core.step import ContactProblem, EffectiveMatrix, PreparedSolver, Scheme, Solver, State, StepProblem, StepResult
+from ..core.surfaces import ContactSurface
+from .checks import check_solver
+from .compare_runs import Opinion, Overall, WholeRun
 from .march import march
-from .run_checks import check_solver
 from .time_steps import TimeSteps
-from .whole_run import Opinion, Overall, WholeRun
 
 OPINION = ("name", "times", "impulse", "mean_towards")
 

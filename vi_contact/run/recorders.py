@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from .core.algebra import Array
-from .core.checks import array, attributes, column_name, instance
-from .core.errors import InputError, StepFailure
-from .core.step import ContactProblem, Report, State
-from .core.verify import Energies, energies, energy_balance
+from ..core.algebra import Array
+from ..core.checks import array, attributes, column_name, instance
+from ..core.errors import InputError, StepFailure
+from ..core.step import ContactProblem, Report, State
+from ..core.verify import Energies, energies, energy_balance
 
 Columns = Mapping[str, tuple[str, str]]
 Row = Mapping[str, Any]

@@ -14,17 +14,17 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from .checkpoint import Place, Problem
-from .core.errors import Interrupted
-from .core.step import ContactProblem, Recorder, Report, Scheme, Solver, State, StepResult
+from ..core.errors import Interrupted
+from ..core.step import ContactProblem, Recorder, Report, Scheme, Solver, State, StepResult
+from .files.checkpoint import Place, Problem
+from .files.log import Progress, versions
+from .files.table import Table
+from .files.writer import Writer
 from .march import March
 from .recorders import refuse_overflow
-from .run_log import Progress, versions
 from .solution import Solution, energy_warning, sampling_warning
 from .stop_signals import StopSignals
-from .table import Table
 from .time_steps import Course, TimeSteps, described, longest
-from .writer import Writer
 
 log = logging.getLogger(__name__)
 TIMED = 10_000  # the last steps, of which seconds_per_step is the median

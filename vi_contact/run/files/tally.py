@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .core.algebra import Array
+from ...core.algebra import Array
 
 LEDGER = (
     ("work_input", "input work"),

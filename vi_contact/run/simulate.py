@@ -7,25 +7,25 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from .checkpoint import Place, read_checkpoint
-from .core.algebra import Comm
-from .core.checks import flag, instance, provides, several, whole
-from .core.errors import InputError
-from .core.step import ContactProblem, Recorder, Scheme, Solver, State
-from .folder_lock import locked
-from .output import on_root, run_folder
+from ..core.algebra import Comm
+from ..core.checks import flag, instance, provides, several, whole
+from ..core.errors import InputError
+from ..core.step import ContactProblem, Recorder, Scheme, Solver, State
+from ..solvers.certified import TOLERANCE
+from ..solvers.condensed import Condensed
+from .checks import check_methods, check_pace, check_state, start_time
+from .defaults import completed
+from .files.checkpoint import Place, read_checkpoint
+from .files.folder import on_root, run_folder
+from .files.lock import locked
+from .files.stored_rows import StoredRows
+from .files.table import Block, Table
+from .files.writer import FieldWriter, Writer
 from .recorders import Columns, Contact, Energy, Row, Steps
-from .run import Comparison, Run, Settings
-from .run_checks import check_methods, check_pace, check_state, start_time
-from .schemes.choice import completed
+from .session import Comparison, Run, Settings
 from .solution import Solution
-from .solvers.certified import TOLERANCE
-from .solvers.condensed import Condensed
 from .static import initial_state
-from .stored_rows import StoredRows
-from .table import Block, Table
 from .time_steps import TimeSteps, course
-from .writer import FieldWriter, Writer
 
 __all__ = ["Solution", "simulate"]
 

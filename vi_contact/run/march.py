@@ -7,12 +7,12 @@ from functools import partial
 
 import numpy as np
 
-from .core.step import ContactProblem, EffectiveMatrix, Report, Scheme, Solver, State
-from .laws.impact import Impact
-from .run_checks import check_methods, check_pace, check_state, start_time
-from .schemes.choice import completed
-from .solvers.certified import TOLERANCE, CertifiedSolver
-from .solvers.condensed import Condensed
+from ..core.step import ContactProblem, EffectiveMatrix, Report, Scheme, Solver, State
+from ..laws.impact import Impact
+from ..solvers.certified import TOLERANCE, CertifiedSolver
+from ..solvers.condensed import Condensed
+from .checks import check_methods, check_pace, check_state, start_time
+from .defaults import completed
 from .static import initial_state
 from .time_steps import Course, TimeSteps, course
 

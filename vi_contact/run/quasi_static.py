@@ -17,11 +17,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from .core.checks import real, shown
-from .core.errors import InputError
-from .core.step import ContactProblem, Solver, State
-from .run_checks import check_methods, check_problem_given, check_sizes
-from .solvers.certified import TOLERANCE
+from ..core.checks import real, shown
+from ..core.errors import InputError
+from ..core.step import ContactProblem, Solver, State
+from ..solvers.certified import TOLERANCE
+from .checks import check_methods, check_problem_given, check_sizes
 from .static import Equilibria, initial_state
 
 

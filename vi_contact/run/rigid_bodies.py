@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .core.algebra import Array, Comm, Indices, Matrix
-from .core.step import ContactProblem
-from .core.system import SemiDiscreteSystem
-from .laws.mass_transfer import rigid_motions
+from ..core.algebra import Array, Comm, Indices, Matrix
+from ..core.step import ContactProblem
+from ..core.system import SemiDiscreteSystem
+from ..laws.mass_transfer import rigid_motions
 
 FREE = 1e-10  # wᵀKw over the body's largest K_ii, for motions w of size one, that is round-off
 WEAK, STRONG = 4e-6, 1e-4  # of a stiffness: see body_springs

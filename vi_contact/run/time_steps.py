@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from math import ceil, inf, isfinite
 from typing import Any
 
-from .core.checks import number, shown, whole
-from .core.errors import InputError
+from ..core.checks import number, shown, whole
+from ..core.errors import InputError
 
 HALVINGS = 20  # at most: a millionth of the base step
 SLACK = 1e-6  # of a step: round-off of the times t + dt + … of a run does not add a step to a piece

@@ -21,12 +21,12 @@ from typing import Any
 
 import numpy as np
 
-from .core.checks import array, number, shown, whole
-from .core.errors import InputError
-from .core.step import ContactProblem, Scheme, State
+from ...core.checks import array, number, shown, whole
+from ...core.errors import InputError
+from ...core.step import ContactProblem, Scheme, State
+from ..time_steps import TimeSteps
+from .folder import CHECKPOINT, FORMAT, check_format, on_root, write_atomically
 from .identity import FIXED, Identity, difference, identity
-from .output import CHECKPOINT, FORMAT, check_format, on_root, write_atomically
-from .time_steps import TimeSteps
 
 log = logging.getLogger(__name__)
 Arrays = dict[str, Any]

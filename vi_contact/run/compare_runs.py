@@ -11,9 +11,9 @@ from typing import Protocol
 
 import numpy as np
 
-from .core.algebra import Array, max_abs
-from .core.errors import InputError
-from .core.step import ContactProblem, Report
+from ..core.algebra import Array, max_abs
+from ..core.errors import InputError
+from ..core.step import ContactProblem, Report
 
 
 class Opinion(Protocol):

@@ -16,10 +16,10 @@ from typing import Any
 import h5py
 import numpy as np
 
-from .core.algebra import Array
-from .core.errors import InputError
-from .output import HISTORY_CSV, HISTORY_H5, JOURNAL, check_folder_format
-from .recorders import Row
+from ...core.algebra import Array
+from ...core.errors import InputError
+from ..recorders import Row
+from .folder import HISTORY_CSV, HISTORY_H5, JOURNAL, check_folder_format
 from .table import BLOCK, Block, Table
 
 

@@ -20,8 +20,9 @@ from typing import Any
 import h5py
 import numpy as np
 
-from .core.surfaces import ContactSurface
-from .output import (
+from ...core.surfaces import ContactSurface
+from ..recorders import Columns, Row
+from .folder import (
     COLUMNS,
     FORMAT,
     HISTORY_CSV,
@@ -32,7 +33,6 @@ from .output import (
     write_all,
     write_atomically,
 )
-from .recorders import Columns, Row
 from .stored_rows import StoredArrays, StoredRows, line_of, read_blocks, record_of
 from .table import Block, Table
 

@@ -17,9 +17,9 @@ from typing import Any, TypeVar
 import h5py
 import numpy as np
 
-from .core.algebra import Comm
-from .core.checks import shown
-from .core.errors import InputError, ViContactError
+from ...core.algebra import Comm
+from ...core.checks import shown
+from ...core.errors import InputError, ViContactError
 
 T = TypeVar("T")
 

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from .core.algebra import Array
-from .core.step import State
-from .laws.excitation import Excitation, GroundMotion
-from .output import to_json
+from ..core.algebra import Array
+from ..core.step import State
+from ..laws.excitation import Excitation, GroundMotion
+from .files.folder import to_json
+from .files.tally import LEDGER
 from .recorders import Columns
-from .tally import LEDGER
 
 CREATED = 0.01  # of the largest energy: more than schemes without a fault gain at sensible time steps
 

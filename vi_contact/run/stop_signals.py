@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from .core.algebra import Comm
+from ..core.algebra import Comm
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 

@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from .core.algebra import Array
-from .core.step import ContactProblem, Scheme
-from .core.surfaces import ContactSurface
-from .core.system import SemiDiscreteSystem
-from .time_steps import HalvedAtImpact, Schedule, TimeSteps, described
+from ...core.algebra import Array
+from ...core.step import ContactProblem, Scheme
+from ...core.surfaces import ContactSurface
+from ...core.system import SemiDiscreteSystem
+from ..time_steps import HalvedAtImpact, Schedule, TimeSteps, described
 
 SAME = 1e-8  # relative difference of numbers that count as equal: above round-off, below what anybody means to change
 GOLDEN = 0.6180339887498949

@@ -11,11 +11,11 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from ...core.algebra import Array
+from ...core.step import ContactProblem, Report, State
+from ..recorders import Row
 from .checkpoint import Place, Problem, write_checkpoint
-from .core.algebra import Array
-from .core.step import ContactProblem, Report, State
-from .history import HistoryFiles
-from .output import (
+from .folder import (
     ABOUT,
     FIELDS,
     FORMAT,
@@ -28,8 +28,8 @@ from .output import (
     to_json,
     write_atomically,
 )
-from .recorders import Row
-from .run_log import RunLog, versions
+from .history import HistoryFiles
+from .log import RunLog, versions
 from .stored_rows import StoredRows, times_of
 from .table import Table
 

@@ -14,10 +14,10 @@ from typing import Any
 import h5py
 import numpy as np
 
-from .core.algebra import Array, Mask
-from .core.checks import SHOWN, shown
-from .core.errors import InputError
-from .output import COLUMNS, HISTORY_CSV, HISTORY_H5, SUMMARY, check_folder_format
+from ...core.algebra import Array, Mask
+from ...core.checks import SHOWN, shown
+from ...core.errors import InputError
+from .folder import COLUMNS, HISTORY_CSV, HISTORY_H5, SUMMARY, check_folder_format
 
 BYTES = 100_000_000  # of a JSON file
 DENSEST = 1100  # bytes in memory for one on disk: zeros that are packed
