@@ -10,7 +10,6 @@ from fem_problems import CONCRETE, block, linear
 
 import vi_contact as vc
 from vi_contact import fem
-from vi_contact.base_motion import base_motion
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.core.surfaces import nodal_frames
@@ -19,6 +18,7 @@ from vi_contact.fem import compat
 from vi_contact.fem.contact.frames import block_of
 from vi_contact.models.channel import Channel, build
 from vi_contact.run.static import initial_state
+from vi_contact.soil.moving_base import base_motion
 
 WIDTH, HEIGHT = 0.5, 4.0
 TIP, WIND, WEIGHT = (2000.0, -5000.0), 700.0, (300.0, -24000.0)  # Pa, Pa, N/m³

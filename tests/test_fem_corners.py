@@ -20,7 +20,6 @@ from two_bodies import SOFT, forces, relative
 
 import vi_contact as vc
 from vi_contact import fem
-from vi_contact.base_motion import base_motion
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.core.step import ContactProblem
@@ -30,6 +29,7 @@ from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.extract import MeshArrays
 from vi_contact.meshes.from_arrays import add_arrays
 from vi_contact.meshes.two_blocks import Blocks
+from vi_contact.soil.moving_base import base_motion
 from vi_contact.solvers.volume.route import Volume
 
 COMM = MPI.COMM_WORLD

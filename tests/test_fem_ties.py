@@ -11,7 +11,7 @@ import vi_contact as vc
 from vi_contact import fem
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.block import BlockMesh
-from vi_contact.soil_column import SoilColumn
+from vi_contact.soil.soil_column import SoilColumn
 
 SHAKE = (vc.Ricker(2.0, 4.0), vc.Ricker(1.0, 6.0, direction=(0.0, 1.0)))
 STIFF = vc.LinearElastic.from_wave_speeds(900.0, 500.0, 2200.0)

@@ -9,12 +9,13 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
-# Functions that share their module's name are bound here, before somebody imports the module and takes the name.
-from .base_motion import base_motion  # noqa: F401
 from .run.cross_check import cross_check  # noqa: F401
 from .run.march import march  # noqa: F401
 from .run.simulate import simulate  # noqa: F401
-from .upgoing import upgoing  # noqa: F401
+
+# Functions that share their module's name are bound here, before somebody imports the module and takes the name.
+from .soil.moving_base import base_motion  # noqa: F401
+from .soil.upgoing_wave import upgoing  # noqa: F401
 
 __version__ = "0.1.0"
 
@@ -29,9 +30,9 @@ _CONTENTS = {
     "laws.excitation": (
         "FullSine", "GroundMotion", "HalfSine", "Harmonic", "Rectangular", "Ricker", "Tabulated",
     ),
-    "base_motion": ("BaseMotion", "base_motion"),
-    "upgoing": ("UpgoingVelocity", "upgoing"),
-    "soil_column": ("SoilColumn",),
+    "soil.moving_base": ("BaseMotion", "base_motion"),
+    "soil.upgoing_wave": ("UpgoingVelocity", "upgoing"),
+    "soil.soil_column": ("SoilColumn",),
     "ground_motion": (
         "EC8Spectrum", "Envelope", "KanaiTajimi", "Processing", "Record", "ResponseSpectrum", "baseline_corrected",
         "filtered", "motion_info", "padded", "read_record", "resampled", "response_spectrum", "scaled",

@@ -20,10 +20,10 @@ from ..core.algebra import Array, Mask
 from ..core.errors import InputError
 from ..core.system import Load, SemiDiscreteSystem
 from ..laws.materials import Damping, LinearElastic, Section
+from ..soil.free_field import free_field_loads
 from . import compat
 from .assembly_checks import check_body, check_boundaries, check_initial
 from .dashpots import CompliantBase, DashpotMatrix, Dashpots, incoming, tell
-from .free_field import free_field_loads
 from .loads import BodyForce, Prescribed, TangentialTraction, Traction, as_tuple, evaluate, is_constant
 from .mesh import Cells, Facets
 from .petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc

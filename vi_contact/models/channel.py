@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from ..base_motion import BaseMotion
 from ..core.algebra import Array, Mask
 from ..core.errors import InputError
 from ..core.step import ContactProblem, ImpactLaw, Recorder
@@ -32,6 +31,7 @@ from ..laws.materials import Damping, LinearElastic, NoDamping, PlaneStrain
 from ..laws.weight import own_weight
 from ..meshes.channel import ChannelMesh
 from ..run.recorders import Contact, Energy, Probe
+from ..soil.moving_base import BaseMotion
 from .channel_points import Openings, SoilProbe
 from .channel_sides import RockBelow, Rollers, Sides
 

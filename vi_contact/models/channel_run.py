@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from ..base_motion import BaseMotion, base_motion
 from ..core.algebra import Array
 from ..core.errors import InputError
 from ..core.step import Scheme
@@ -20,9 +19,10 @@ from ..laws.impact import Inelastic, MassProjection
 from ..laws.materials import LinearElastic
 from ..plotting import plot_certificate, plot_contact, plot_energy, plot_excitation, plot_points
 from ..run.simulate import Solution, simulate
+from ..soil.moving_base import BaseMotion, base_motion
+from ..soil.upgoing_wave import upgoing
 from ..solvers.volume.route import Volume
 from ..solvers.volume.snes import ReducedNewton
-from ..upgoing import upgoing
 from .channel import Channel, ChannelModel
 from .channel_sides import DashpotSides, Fixed, FreeFieldSides, RockBelow, Rollers, Sides, TiedSides
 from .channel_stages import AtRest, at_rest

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ..base_motion import BaseMotion
 from ..core.step import ContactProblem, Solver, State
 from ..fem.released_supports import release
 from ..run.static import static_equilibrium
+from ..soil.moving_base import BaseMotion
 from ..solvers.condensed import Condensed
 from .channel import Channel, ChannelModel, build
 from .channel_sides import RockBelow, Rollers, Sides

@@ -14,12 +14,12 @@ from ..fem.contact.matching import Matching
 from ..fem.contact.pairs import contact_pair
 from ..fem.contact.surface import contact_surface
 from ..fem.dashpots import CompliantBase
-from ..fem.free_field import FreeField
 from ..fem.mesh import Facets
 from ..ground_motion import Processing, Record, read_record
 from ..ground_motion.formats.reader import LARGEST_PEAK
 from ..laws import friction, materials
-from ..upgoing import UpgoingVelocity
+from ..soil.free_field import FreeField
+from ..soil.upgoing_wave import UpgoingVelocity
 
 
 class MeshFile:

@@ -44,6 +44,7 @@ from ..schemes.newmark import Newmark
 from ..schemes.ss22 import SS22
 from ..schemes.trapezoidal import Trapezoidal
 from ..schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
+from ..soil.upgoing_wave import UpgoingVelocity, upgoing
 from ..solvers.condensed import Condensed, SmallMethod
 from ..solvers.friction import extrapolation
 from ..solvers.friction import problem as friction_small
@@ -59,7 +60,6 @@ from ..solvers.volume import route as volume
 from ..solvers.volume.one_factorisation import OneFactorisation
 from ..solvers.volume.snes import ReducedNewton, SemismoothNewton
 from ..solvers.volume.tao import TaoTron
-from ..upgoing import UpgoingVelocity, upgoing
 from . import plain
 from .calls import Callee, callee
 from .models import MODELS, Parts

@@ -11,12 +11,12 @@ import math
 
 import numpy as np
 
-from .core.algebra import Array
-from .core.checks import flag, provides, real, shown
-from .core.errors import InputError
-from .core.problem_checks import EXCITATION
-from .ground_motion import Record
-from .laws.excitation import Excitation, GroundMotion
+from ..core.algebra import Array
+from ..core.checks import flag, provides, real, shown
+from ..core.errors import InputError
+from ..core.problem_checks import EXCITATION
+from ..ground_motion import Record
+from ..laws.excitation import Excitation, GroundMotion
 
 
 class UpgoingVelocity:

@@ -10,12 +10,12 @@ from __future__ import annotations
 from bisect import bisect_right
 from math import inf
 
-from .core.algebra import Array
-from .core.errors import InputError
-from .core.step import ContactProblem, Scheme
-from .laws.mass import ConsistentMass
-from .run.march import march
-from .run.time_steps import LARGEST, HalvedAtImpact, Schedule, course
+from ..core.algebra import Array
+from ..core.errors import InputError
+from ..core.step import ContactProblem, Scheme
+from ..laws.mass import ConsistentMass
+from ..run.march import march
+from ..run.time_steps import LARGEST, HalvedAtImpact, Schedule, course
 
 
 def given_steps(dt: float | Schedule) -> None:

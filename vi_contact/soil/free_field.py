@@ -19,24 +19,24 @@ from typing import Any
 
 import numpy as np
 
-from ..alongside import Alongside, given_steps
-from ..base_motion import BaseMotion
 from ..core.algebra import Array
 from ..core.checks import provides
 from ..core.errors import InputError
 from ..core.problem_checks import EXCITATION
 from ..core.step import Scheme
 from ..core.system import Pace
+from ..fem import compat
+from ..fem.dashpots import CompliantBase, DashpotMatrix, Dashpots
+from ..fem.petsc_algebra import PetscMatrix
+from ..fem.space import FemSpace
 from ..laws.excitation import Excitation
 from ..laws.materials import Section
 from ..run.checks import check_scheme
 from ..run.time_steps import Schedule
 from ..schemes.trapezoidal import Trapezoidal
-from ..soil_column import SoilColumn
-from . import compat
-from .dashpots import CompliantBase, DashpotMatrix, Dashpots
-from .petsc_algebra import PetscMatrix
-from .space import FemSpace
+from .companion import Alongside, given_steps
+from .moving_base import BaseMotion
+from .soil_column import SoilColumn
 
 Base = Excitation | Sequence[Excitation] | BaseMotion | CompliantBase
 

@@ -16,13 +16,13 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from .base_motion import PointSpace
-from .core.algebra import Array, SerialAlgebra, SerialComm, SerialMatrix
-from .core.checks import array, shown
-from .core.errors import InputError
-from .core.step import ContactProblem
-from .core.surfaces import empty_surface
-from .core.system import Load, SemiDiscreteSystem
+from ..core.algebra import Array, SerialAlgebra, SerialComm, SerialMatrix
+from ..core.checks import array, shown
+from ..core.errors import InputError
+from ..core.step import ContactProblem
+from ..core.surfaces import empty_surface
+from ..core.system import Load, SemiDiscreteSystem
+from .moving_base import PointSpace
 
 
 @dataclass(frozen=True)
