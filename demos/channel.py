@@ -28,8 +28,8 @@ from demos.pictures.channel import plot_beside, plot_layout, plot_moments
 from vi_contact import fem
 from vi_contact import plotting_channel as pictures
 from vi_contact.meshes.channel import ChannelMesh
-from vi_contact.models.channel import Channel, ChannelModel, build
-from vi_contact.models.channel_run import REFERENCE
+from vi_contact.models.channel.model import Channel, ChannelModel, build
+from vi_contact.models.channel.run import REFERENCE
 from vi_contact.plotting import History, plot_energy, plot_excitation
 from vi_contact.plotting_channel_mesh import animate
 from vi_contact.plotting_friction import plot_states

@@ -15,10 +15,10 @@ from vi_contact.cli import main
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.channel import ChannelMesh
 from vi_contact.meshes.extract import arrays_from_script
-from vi_contact.models.channel import BODIES, Channel, build
-from vi_contact.models.channel_points import SoilProbe
-from vi_contact.models.channel_run import ChannelRun, prepared
-from vi_contact.models.channel_sides import Fixed, Rollers, TiedSides
+from vi_contact.models.channel.model import BODIES, Channel, build
+from vi_contact.models.channel.points import SoilProbe
+from vi_contact.models.channel.run import ChannelRun, prepared
+from vi_contact.models.channel.sides import Fixed, Rollers, TiedSides
 from vi_contact.models.choices import SCHEMES
 from vi_contact.models.wall import STANDARD_GRAVITY
 

@@ -8,8 +8,8 @@ from fem_problems import block
 from mpi4py import MPI
 
 from vi_contact.core.errors import InputError
-from vi_contact.fem.boundary_elements import boundary_curve
 from vi_contact.fem.mesh import node_numbers
+from vi_contact.models.boundary_curve import boundary_curve
 
 COMM = MPI.COMM_WORLD
 

@@ -14,7 +14,7 @@ from demos.pictures.channel import plot_beside, plot_layout, plot_moments
 from vi_contact import fem, plotting
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.channel import ChannelMesh
-from vi_contact.models.channel import Channel, ChannelModel, build
+from vi_contact.models.channel.model import Channel, ChannelModel, build
 from vi_contact.plotting_channel import (
     SHOWN,
     Outline,

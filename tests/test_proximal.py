@@ -24,7 +24,7 @@ from vi_contact.laws.materials import LinearElastic
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.channel import ChannelMesh
 from vi_contact.meshes.two_blocks import Blocks
-from vi_contact.models.channel import Channel, build
+from vi_contact.models.channel.model import Channel, build
 from vi_contact.run.rigid_bodies import RigidBodies
 from vi_contact.run.static import initial_state, static_equilibrium
 from vi_contact.solvers.condensed import Condensed

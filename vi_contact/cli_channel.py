@@ -73,8 +73,8 @@ def _channel(options: argparse.Namespace) -> str:
     from mpi4py import MPI
 
     from .meshes.channel import ChannelMesh
-    from .models.channel import Channel
-    from .models.channel_run import CONTACTS, ChannelRun, run_channel
+    from .models.channel.model import Channel
+    from .models.channel.run import CONTACTS, ChannelRun, run_channel
     from .plotting_channel_run import illustrate
 
     lengths = {name.replace("-", "_"): getattr(options, name.replace("-", "_")) for name, _, _ in _SHAPE}

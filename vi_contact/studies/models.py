@@ -10,8 +10,9 @@ from typing import Any, get_type_hints
 from ..core.step import Recorder
 from ..core.surfaces import ContactSurface
 from ..core.system import SemiDiscreteSystem
-from ..models import channel, wall
-from ..models.channel_sides import Sides
+from ..models import wall
+from ..models.channel import model as channel
+from ..models.channel.sides import Sides
 from ..run.recorders import Contact, Energy, Probe
 from .calls import Callee
 

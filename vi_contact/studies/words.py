@@ -29,7 +29,7 @@ from ..meshes.disk import DiskMesh
 from ..meshes.gmsh_session import MeshScript
 from ..meshes.two_blocks import Blocks, TwoBlocks
 from ..meshes.wall import WallMesh
-from ..models import channel_sides
+from ..models.channel import sides as channel_sides
 from ..run import recorders, time_steps
 from ..run.cross_check import CrossChecked
 from ..run.files.writer import FieldWriter

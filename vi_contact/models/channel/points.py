@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from ..core.algebra import Indices, Mask
-from ..core.errors import InputError
-from ..core.step import ContactProblem, Report, State
-from ..core.surfaces import ContactSurface
-from ..fem.contact.frames import FemSurface
-from ..run.recorders import Columns, Probe, Row
+from ...core.algebra import Indices, Mask
+from ...core.errors import InputError
+from ...core.step import ContactProblem, Report, State
+from ...core.surfaces import ContactSurface
+from ...fem.contact.frames import FemSurface
+from ...run.recorders import Columns, Probe, Row
 
 
 @dataclass

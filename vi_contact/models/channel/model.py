@@ -13,27 +13,27 @@ from typing import Any
 
 import numpy as np
 
-from ..core.algebra import Array, Mask
-from ..core.errors import InputError
-from ..core.step import ContactProblem, ImpactLaw, Recorder
-from ..core.surfaces import ContactSurface
-from ..core.system import SemiDiscreteSystem
-from ..fem.assembly import assemble
-from ..fem.contact.joined import together
-from ..fem.contact.pairs import contact_pair
-from ..fem.loads import Prescribed, as_tuple
-from ..fem.mesh import build_mesh
-from ..laws.excitation import Excitation, Harmonic
-from ..laws.friction import FrictionLaw, Frictionless
-from ..laws.impact import Inelastic, MassProjection
-from ..laws.mass import ConsistentMass, MassLaw
-from ..laws.materials import Damping, LinearElastic, NoDamping, PlaneStrain
-from ..laws.weight import own_weight
-from ..meshes.channel import ChannelMesh
-from ..run.recorders import Contact, Energy, Probe
-from ..soil.moving_base import BaseMotion
-from .channel_points import Openings, SoilProbe
-from .channel_sides import RockBelow, Rollers, Sides
+from ...core.algebra import Array, Mask
+from ...core.errors import InputError
+from ...core.step import ContactProblem, ImpactLaw, Recorder
+from ...core.surfaces import ContactSurface
+from ...core.system import SemiDiscreteSystem
+from ...fem.assembly import assemble
+from ...fem.contact.joined import together
+from ...fem.contact.pairs import contact_pair
+from ...fem.loads import Prescribed, as_tuple
+from ...fem.mesh import build_mesh
+from ...laws.excitation import Excitation, Harmonic
+from ...laws.friction import FrictionLaw, Frictionless
+from ...laws.impact import Inelastic, MassProjection
+from ...laws.mass import ConsistentMass, MassLaw
+from ...laws.materials import Damping, LinearElastic, NoDamping, PlaneStrain
+from ...laws.weight import own_weight
+from ...meshes.channel import ChannelMesh
+from ...run.recorders import Contact, Energy, Probe
+from ...soil.moving_base import BaseMotion
+from .points import Openings, SoilProbe
+from .sides import RockBelow, Rollers, Sides
 
 BODIES = ("channel", "soil")  # in the order of their nodes
 SIDES = ("base", "left", "right")  # of the contact, in the order of its conditions

@@ -9,25 +9,25 @@ from typing import Any
 
 import numpy as np
 
-from ..core.algebra import Array
-from ..core.errors import InputError
-from ..core.step import Scheme
-from ..fem.output.fields import XDMF
-from ..laws.excitation import Excitation
-from ..laws.friction import Coulomb
-from ..laws.impact import Inelastic, MassProjection
-from ..laws.materials import LinearElastic
-from ..plotting import plot_certificate, plot_contact, plot_energy, plot_excitation, plot_points
-from ..run.simulate import Solution, simulate
-from ..soil.moving_base import BaseMotion, base_motion
-from ..soil.upgoing_wave import upgoing
-from ..solvers.volume.route import Volume
-from ..solvers.volume.snes import ReducedNewton
-from .channel import Channel, ChannelModel
-from .channel_sides import DashpotSides, Fixed, FreeFieldSides, RockBelow, Rollers, Sides, TiedSides
-from .channel_stages import AtRest, at_rest
-from .choices import SCHEMES, SOLVERS
-from .run_options import RunOptions, check_options, check_word, excitations, number_of_steps, records, solvers
+from ...core.algebra import Array
+from ...core.errors import InputError
+from ...core.step import Scheme
+from ...fem.output.fields import XDMF
+from ...laws.excitation import Excitation
+from ...laws.friction import Coulomb
+from ...laws.impact import Inelastic, MassProjection
+from ...laws.materials import LinearElastic
+from ...plotting import plot_certificate, plot_contact, plot_energy, plot_excitation, plot_points
+from ...run.simulate import Solution, simulate
+from ...soil.moving_base import BaseMotion, base_motion
+from ...soil.upgoing_wave import upgoing
+from ...solvers.volume.route import Volume
+from ...solvers.volume.snes import ReducedNewton
+from ..choices import SCHEMES, SOLVERS
+from ..run_options import RunOptions, check_options, check_word, excitations, number_of_steps, records, solvers
+from .model import Channel, ChannelModel
+from .sides import DashpotSides, Fixed, FreeFieldSides, RockBelow, Rollers, Sides, TiedSides
+from .stages import AtRest, at_rest
 
 CONTACTS = {
     "sliding": "Buried channel, unilateral contact, free sliding",

@@ -6,16 +6,16 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Protocol
 
-from ..core.algebra import Array
-from ..core.step import Scheme
-from ..fem.dashpots import CompliantBase, Dashpots
-from ..fem.loads import Prescribed
-from ..fem.ties import Tied
-from ..laws.excitation import Excitation
-from ..laws.materials import LinearElastic
-from ..run.time_steps import Schedule
-from ..soil.free_field import FreeField
-from ..soil.moving_base import BaseMotion
+from ...core.algebra import Array
+from ...core.step import Scheme
+from ...fem.dashpots import CompliantBase, Dashpots
+from ...fem.loads import Prescribed
+from ...fem.ties import Tied
+from ...laws.excitation import Excitation
+from ...laws.materials import LinearElastic
+from ...run.time_steps import Schedule
+from ...soil.free_field import FreeField
+from ...soil.moving_base import BaseMotion
 
 ENDS = ("left_side", "right_side")
 

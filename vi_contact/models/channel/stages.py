@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ..core.step import ContactProblem, Solver, State
-from ..fem.released_supports import release
-from ..run.static import static_equilibrium
-from ..soil.moving_base import BaseMotion
-from ..solvers.condensed import Condensed
-from .channel import Channel, ChannelModel, build
-from .channel_sides import RockBelow, Rollers, Sides
+from ...core.step import ContactProblem, Solver, State
+from ...fem.released_supports import release
+from ...run.static import static_equilibrium
+from ...soil.moving_base import BaseMotion
+from ...solvers.condensed import Condensed
+from .model import Channel, ChannelModel, build
+from .sides import RockBelow, Rollers, Sides
 
 
 @dataclass(frozen=True)
