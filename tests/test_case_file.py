@@ -23,8 +23,8 @@ from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import TwoBlocks
 from vi_contact.models.wall import Wall, build
 from vi_contact.studies import Case, read_case, run_case
-from vi_contact.studies.toml_file import with_settings
-from vi_contact.studies.words import words
+from vi_contact.studies.cases.toml_file import with_settings
+from vi_contact.studies.cases.vocabulary import words
 
 ROOT = Path(__file__).resolve().parents[1]
 WALL = ROOT / "demos" / "cases" / "wall.toml"

@@ -18,7 +18,7 @@ from vi_contact.core.errors import InputError
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.gmsh_session import session, write
 from vi_contact.studies import IDA, read_case, run_ida
-from vi_contact.studies.ida_runs import read_row
+from vi_contact.studies.ida.runs import read_row
 
 pytestmark = pytest.mark.serial
 
@@ -174,7 +174,7 @@ def test_the_columns_are_those_of_a_run(folder: Path) -> None:
 def test_no_run_that_finished_is_a_failure(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
                                            capsys: pytest.CaptureFixture[str]) -> None:
     row = {"status": "failed", "reason": "no luck"}
-    monkeypatch.setattr("vi_contact.studies.ida.run_ida", lambda *_, **__: [row, row])
+    monkeypatch.setattr("vi_contact.studies.ida.ida.run_ida", lambda *_, **__: [row, row])
     monkeypatch.setattr("signal.signal", lambda *_: None)
     given = ["ida", case(folder), "--motions", str(folder / "motion.at2"), "--edp", "u_x_top", "--scales", "1",
              "--out", str(tmp_path / "ida")]

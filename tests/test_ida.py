@@ -23,8 +23,8 @@ from vi_contact.core.errors import InputError
 from vi_contact.ground_motion import Record, arias, pga, psa, read_record, scaled, tapered
 from vi_contact.plotting_ida import Panel, plot_ida
 from vi_contact.studies import IDA, read_case, run_ida
-from vi_contact.studies.ida_runs import OneRun, Shaking, executed, quoted
-from vi_contact.studies.measures import demand, fractiles, intensity
+from vi_contact.studies.ida.measures import demand, fractiles, intensity
+from vi_contact.studies.ida.runs import OneRun, Shaking, executed, quoted
 
 pytestmark = pytest.mark.serial
 ROOT = Path(__file__).resolve().parents[1]
@@ -163,7 +163,7 @@ def test_parts_levels_and_runs_that_die(study: Path) -> None:
 
 def test_stopping_stops_the_runs(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Ctrl-C between two rows: processes that go on are stopped, also where SIGINT is ignored, and leave no row."""
-    monkeypatch.setattr("vi_contact.studies.ida_runs.PATIENCE", 1.0)
+    monkeypatch.setattr("vi_contact.studies.ida.runs.PATIENCE", 1.0)
     case, shaking = read_case("wall.toml"), Shaking("motion_1", (Path("motion_1.at2"),))
     wrong = OneRun(case, shaking, 1.0, study / "runs" / "wrong", "it cannot")
     long = OneRun(case, shaking, 1.0, study / "runs" / "long")

@@ -26,7 +26,7 @@ def add_case_commands(commands: Any) -> None:
 def _run(options: argparse.Namespace) -> str:
     from mpi4py import MPI
 
-    from .studies.case import read_case
+    from .studies.cases.case import read_case
 
     comm = MPI.COMM_WORLD
     case = read_case(options.case, options.settings)

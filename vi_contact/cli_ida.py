@@ -50,8 +50,8 @@ def _part(text: str) -> tuple[int, int]:
 
 
 def _ida(options: argparse.Namespace) -> str:
-    from .studies.case import read_case
-    from .studies.ida import IDA, run_ida
+    from .studies.cases.case import read_case
+    from .studies.ida.ida import IDA, run_ida
 
     try:
         launch = shlex.split(options.launch)

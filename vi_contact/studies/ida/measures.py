@@ -8,9 +8,9 @@ from functools import partial
 
 import numpy as np
 
-from ..core.algebra import Array
-from ..core.errors import InputError
-from ..ground_motion import Record, arias, cav, housner_intensity, pga, pgd, pgv, psa
+from ...core.algebra import Array
+from ...core.errors import InputError
+from ...ground_motion import Record, arias, cav, housner_intensity, pga, pgd, pgv, psa
 
 _MEASURES: dict[str, tuple[Callable[[Record], float], str, str, int]] = {
     "pga": (pga, "m/s²", "peak ground acceleration", 1),

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ..core.checks import shown
-from ..core.errors import InputError
+from ...core.checks import shown
+from ...core.errors import InputError
 
 BYTES, DEPTH = 10_000_000, 20  # of a case file; of tables and lists in each other
 _TOO_DEEP = "is nested too deep: give tables and lists as docs/studies.md has them"

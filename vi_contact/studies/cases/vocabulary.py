@@ -6,64 +6,64 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..core import surfaces
-from ..core.step import Recorder, Scheme, Solver
-from ..core.surfaces import ContactSurface
-from ..engineering.racking import Racking
-from ..engineering.resultants import Resultants
-from ..fem.contact.matching import Matching, NodeToNode
-from ..fem.contact.mortar import DualMortar
-from ..fem.dashpots import CompliantBase, Dashpots
-from ..fem.loads import BodyForce, Prescribed, TangentialTraction, Traction
-from ..fem.mesh import Cells, Facets
-from ..fem.output.fields import XDMF
-from ..fem.output.reactions import Reactions
-from ..fem.output.section_forces import SectionForces
-from ..ground_motion import Record, synthetic
-from ..laws import excitation, friction, impact, mass, materials
-from ..meshes.ball import BallMesh
-from ..meshes.block import BlockMesh
-from ..meshes.channel import ChannelMesh
-from ..meshes.cut import CutOpen, Welded
-from ..meshes.disk import DiskMesh
-from ..meshes.gmsh_session import MeshScript
-from ..meshes.two_blocks import Blocks, TwoBlocks
-from ..meshes.wall import WallMesh
-from ..models.channel import sides as channel_sides
-from ..run import recorders, time_steps
-from ..run.cross_check import CrossChecked
-from ..run.files.writer import FieldWriter
-from ..schemes.contact_stabilised import ContactStabilisedNewmark
-from ..schemes.generalised_alpha import GeneralisedAlpha
-from ..schemes.hht import HHT
-from ..schemes.houbolt import Houbolt
-from ..schemes.linear_multistep import LinearMultistep
-from ..schemes.midpoint import Midpoint
-from ..schemes.moreau_jean import MoreauJean
-from ..schemes.newmark import Newmark
-from ..schemes.ss22 import SS22
-from ..schemes.trapezoidal import Trapezoidal
-from ..schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
-from ..soil.upgoing_wave import UpgoingVelocity, upgoing
-from ..solvers.condensed import Condensed, SmallMethod
-from ..solvers.friction import extrapolation
-from ..solvers.friction import problem as friction_small
-from ..solvers.friction.fixed_point import FixedPoint
-from ..solvers.friction.given_forces import GivenForces
-from ..solvers.friction.newton import FrictionNewton
-from ..solvers.friction.nsgs import NSGS
-from ..solvers.friction.uzawa import Uzawa
-from ..solvers.normal.active_set import ActiveSet
-from ..solvers.normal.hildreth import Hildreth
-from ..solvers.normal.projected_cg import ProjectedCG
-from ..solvers.volume import route as volume
-from ..solvers.volume.one_factorisation import OneFactorisation
-from ..solvers.volume.snes import ReducedNewton, SemismoothNewton
-from ..solvers.volume.tao import TaoTron
-from . import plain
-from .calls import Callee, callee
-from .models import MODELS, Parts
-from .reading import Words
+from ...core import surfaces
+from ...core.step import Recorder, Scheme, Solver
+from ...core.surfaces import ContactSurface
+from ...engineering.racking import Racking
+from ...engineering.resultants import Resultants
+from ...fem.contact.matching import Matching, NodeToNode
+from ...fem.contact.mortar import DualMortar
+from ...fem.dashpots import CompliantBase, Dashpots
+from ...fem.loads import BodyForce, Prescribed, TangentialTraction, Traction
+from ...fem.mesh import Cells, Facets
+from ...fem.output.fields import XDMF
+from ...fem.output.reactions import Reactions
+from ...fem.output.section_forces import SectionForces
+from ...ground_motion import Record, synthetic
+from ...laws import excitation, friction, impact, mass, materials
+from ...meshes.ball import BallMesh
+from ...meshes.block import BlockMesh
+from ...meshes.channel import ChannelMesh
+from ...meshes.cut import CutOpen, Welded
+from ...meshes.disk import DiskMesh
+from ...meshes.gmsh_session import MeshScript
+from ...meshes.two_blocks import Blocks, TwoBlocks
+from ...meshes.wall import WallMesh
+from ...models.channel import sides as channel_sides
+from ...run import recorders, time_steps
+from ...run.cross_check import CrossChecked
+from ...run.files.writer import FieldWriter
+from ...schemes.contact_stabilised import ContactStabilisedNewmark
+from ...schemes.generalised_alpha import GeneralisedAlpha
+from ...schemes.hht import HHT
+from ...schemes.houbolt import Houbolt
+from ...schemes.linear_multistep import LinearMultistep
+from ...schemes.midpoint import Midpoint
+from ...schemes.moreau_jean import MoreauJean
+from ...schemes.newmark import Newmark
+from ...schemes.ss22 import SS22
+from ...schemes.trapezoidal import Trapezoidal
+from ...schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
+from ...soil.upgoing_wave import UpgoingVelocity, upgoing
+from ...solvers.condensed import Condensed, SmallMethod
+from ...solvers.friction import extrapolation
+from ...solvers.friction import problem as friction_small
+from ...solvers.friction.fixed_point import FixedPoint
+from ...solvers.friction.given_forces import GivenForces
+from ...solvers.friction.newton import FrictionNewton
+from ...solvers.friction.nsgs import NSGS
+from ...solvers.friction.uzawa import Uzawa
+from ...solvers.normal.active_set import ActiveSet
+from ...solvers.normal.hildreth import Hildreth
+from ...solvers.normal.projected_cg import ProjectedCG
+from ...solvers.volume import route as volume
+from ...solvers.volume.one_factorisation import OneFactorisation
+from ...solvers.volume.snes import ReducedNewton, SemismoothNewton
+from ...solvers.volume.tao import TaoTron
+from . import table_functions as plain
+from .model_tables import MODELS, Parts
+from .parsing import Words
+from .table_calls import Callee, callee
 
 
 def _named(*functions: Any) -> dict[str, Callee]:

@@ -21,16 +21,16 @@ from pathlib import Path
 
 import numpy as np
 
-from ..core.algebra import Array
-from ..core.errors import InputError
-from ..fem.mesh import alone
-from ..plotting_ida import Panel, plot_ida
-from ..run.files.folder import to_json, write_atomically
-from .case import Case
-from .ida_runs import OneRun, Shaking, executed, read_json, refuse_mpirun, shakings
-from .ida_table import Row, tabulated
+from ...core.algebra import Array
+from ...core.errors import InputError
+from ...fem.mesh import alone
+from ...plotting_ida import Panel, plot_ida
+from ...run.files.folder import to_json, write_atomically
+from ..cases.case import Case
+from ..cases.parsing import nearest
 from .measures import Demand, Intensity, demand, fractiles, intensity
-from .reading import nearest
+from .runs import OneRun, Shaking, executed, read_json, refuse_mpirun, shakings
+from .table import Row, tabulated
 
 SHARES = (0.16, 0.50, 0.84)
 TABLE, COLUMNS, FIGURE, STUDY, RUNS = "ida.csv", "columns.json", "ida.png", "ida.json", "runs"

@@ -6,20 +6,20 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ..core import surfaces
-from ..core.corners import FEATURE_ANGLE
-from ..core.surfaces import ContactSurface
-from ..core.system import SemiDiscreteSystem
-from ..fem.contact.matching import Matching
-from ..fem.contact.pairs import contact_pair
-from ..fem.contact.surface import contact_surface
-from ..fem.dashpots import CompliantBase
-from ..fem.mesh import Facets
-from ..ground_motion import Processing, Record, read_record
-from ..ground_motion.formats.reader import LARGEST_PEAK
-from ..laws import friction, materials
-from ..soil.free_field import FreeField
-from ..soil.upgoing_wave import UpgoingVelocity
+from ...core import surfaces
+from ...core.corners import FEATURE_ANGLE
+from ...core.surfaces import ContactSurface
+from ...core.system import SemiDiscreteSystem
+from ...fem.contact.matching import Matching
+from ...fem.contact.pairs import contact_pair
+from ...fem.contact.surface import contact_surface
+from ...fem.dashpots import CompliantBase
+from ...fem.mesh import Facets
+from ...ground_motion import Processing, Record, read_record
+from ...ground_motion.formats.reader import LARGEST_PEAK
+from ...laws import friction, materials
+from ...soil.free_field import FreeField
+from ...soil.upgoing_wave import UpgoingVelocity
 
 
 class MeshFile:

@@ -17,11 +17,11 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from ..core.errors import InputError
-from ..ground_motion import Record, scaled
-from ..laws.excitation import GroundMotion
-from ..run.files.folder import CHECKPOINT, SUMMARY, to_json, write_atomically
-from .case import Case, read_case
+from ...core.errors import InputError
+from ...ground_motion import Record, scaled
+from ...laws.excitation import GroundMotion
+from ...run.files.folder import CHECKPOINT, SUMMARY, to_json, write_atomically
+from ..cases.case import Case, read_case
 
 ROW = "row.json"
 SAID = "failure.txt"

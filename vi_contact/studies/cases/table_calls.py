@@ -17,7 +17,7 @@ from dataclasses import dataclass, field, is_dataclass
 from inspect import Parameter, signature
 from typing import Any, Protocol, get_type_hints
 
-from ..core.errors import InputError
+from ...core.errors import InputError
 
 Context = Mapping[str, Any]
 GIVEN = ("comm", "mesh", "system", "excitations", "time_step", "time_scheme")  # parameters that the context supplies

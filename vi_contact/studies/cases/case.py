@@ -17,36 +17,36 @@ from typing import Any
 
 import numpy as np
 
-from ..core.checks import shown
-from ..core.errors import InputError
-from ..core.step import ContactProblem, Recorder, Scheme, Solver
-from ..core.surfaces import ContactSurface, empty_surface
-from ..fem.assembly import assemble
-from ..fem.contact.joined import together
-from ..fem.mesh import Tags, build_mesh, read_mesh
-from ..laws.excitation import Excitation
-from ..laws.friction import FrictionLaw, Frictionless
-from ..laws.impact import ImpactLaw
-from ..laws.mass import MassLaw
-from ..laws.materials import LinearElastic
-from ..laws.weight import with_weight
-from ..meshes.gmsh_session import MeshScript
-from ..run.cross_check import CrossChecked
-from ..run.defaults import completed
-from ..run.files.folder import on_root, run_folder, write_atomically
-from ..run.files.lock import locked
-from ..run.files.writer import FieldWriter
-from ..run.recorders import Contact, Energy, Steps
-from ..run.simulate import Solution, simulate
-from ..run.static import initial_state, static_equilibrium
-from ..run.time_steps import course
-from ..solvers.condensed import Condensed
-from .calls import Callee, Named, Node, Spot, callee, groups, needs_mesh
-from .models import Parts
-from .plain import MeshFile
-from .reading import Words, arguments, nearest, read
+from ...core.checks import shown
+from ...core.errors import InputError
+from ...core.step import ContactProblem, Recorder, Scheme, Solver
+from ...core.surfaces import ContactSurface, empty_surface
+from ...fem.assembly import assemble
+from ...fem.contact.joined import together
+from ...fem.mesh import Tags, build_mesh, read_mesh
+from ...laws.excitation import Excitation
+from ...laws.friction import FrictionLaw, Frictionless
+from ...laws.impact import ImpactLaw
+from ...laws.mass import MassLaw
+from ...laws.materials import LinearElastic
+from ...laws.weight import with_weight
+from ...meshes.gmsh_session import MeshScript
+from ...run.cross_check import CrossChecked
+from ...run.defaults import completed
+from ...run.files.folder import on_root, run_folder, write_atomically
+from ...run.files.lock import locked
+from ...run.files.writer import FieldWriter
+from ...run.recorders import Contact, Energy, Steps
+from ...run.simulate import Solution, simulate
+from ...run.static import initial_state, static_equilibrium
+from ...run.time_steps import course
+from ...solvers.condensed import Condensed
+from .model_tables import Parts
+from .parsing import Words, arguments, nearest, read
+from .table_calls import Callee, Named, Node, Spot, callee, groups, needs_mesh
+from .table_functions import MeshFile
 from .toml_file import read_toml, with_settings
-from .words import words
+from .vocabulary import words
 
 COPY = "case.toml"
 _HINTS: dict[str, Any] = {

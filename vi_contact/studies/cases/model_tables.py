@@ -7,14 +7,14 @@ from dataclasses import dataclass, fields
 from inspect import signature
 from typing import Any, get_type_hints
 
-from ..core.step import Recorder
-from ..core.surfaces import ContactSurface
-from ..core.system import SemiDiscreteSystem
-from ..models import wall
-from ..models.channel import model as channel
-from ..models.channel.sides import Sides
-from ..run.recorders import Contact, Energy, Probe
-from .calls import Callee
+from ...core.step import Recorder
+from ...core.surfaces import ContactSurface
+from ...core.system import SemiDiscreteSystem
+from ...models import wall
+from ...models.channel import model as channel
+from ...models.channel.sides import Sides
+from ...run.recorders import Contact, Energy, Probe
+from .table_calls import Callee
 
 
 @dataclass(frozen=True)

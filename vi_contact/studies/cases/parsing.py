@@ -10,9 +10,9 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Union, get_args, get_origin
 
-from ..core.checks import SHOWN, shown
-from ..core.errors import InputError
-from .calls import GROUP, Call, Callee, Group, Items, Named, Node, Spot, Value, callee
+from ...core.checks import SHOWN, shown
+from ...core.errors import InputError
+from .table_calls import GROUP, Call, Callee, Group, Items, Named, Node, Spot, Value, callee
 
 
 @dataclass(frozen=True)

@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from ..core.algebra import Array
-from ..core.errors import InputError
-from ..ground_motion import scaled
-from ..run.files.reading import read_run
-from .case import Case
-from .ida_runs import ROW, Shaking, read_row
+from ...core.algebra import Array
+from ...core.errors import InputError
+from ...ground_motion import scaled
+from ...run.files.reading import read_run
+from ..cases.case import Case
 from .measures import Demand, Intensity
+from .runs import ROW, Shaking, read_row
 
 Row = dict[str, Any]
 Units = dict[str, tuple[str, str]]
