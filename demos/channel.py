@@ -26,13 +26,13 @@ from mpi4py import MPI
 import vi_contact as vc
 from demos.pictures.channel import plot_beside, plot_layout, plot_moments
 from vi_contact import fem
-from vi_contact import plotting_channel as pictures
 from vi_contact.meshes.channel import ChannelMesh
 from vi_contact.models.channel.model import Channel, ChannelModel, build
 from vi_contact.models.channel.run import REFERENCE
-from vi_contact.plotting import History, plot_energy, plot_excitation
-from vi_contact.plotting_channel_mesh import animate
-from vi_contact.plotting_friction import plot_states
+from vi_contact.plots import channel as pictures
+from vi_contact.plots.channel_mesh import animate
+from vi_contact.plots.friction import plot_states
+from vi_contact.plots.histories import History, plot_energy, plot_excitation
 from vi_contact.run.static import static_equilibrium
 
 # Parameters ----------------------------------------------------------------------------------------------------------

@@ -25,7 +25,7 @@ from demos.pictures.deformed import plot_snapshots
 from vi_contact import fem
 from vi_contact.models.embedded import Embedded, build
 from vi_contact.models.square import concrete
-from vi_contact.plotting import History, plot_runs
+from vi_contact.plots.histories import History, plot_runs
 
 # Parameters ----------------------------------------------------------------------------------------------------------
 CELLS = 10  # along a side of the box

@@ -24,7 +24,7 @@ import vi_contact as vc
 from demos.pictures.deformed import plot_snapshots, plot_tractions
 from vi_contact import fem
 from vi_contact.models.square import Square, build, concrete
-from vi_contact.plotting import History, plot_runs
+from vi_contact.plots.histories import History, plot_runs
 
 # Parameters ----------------------------------------------------------------------------------------------------------
 BOX = concrete(cells=20)

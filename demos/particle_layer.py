@@ -21,7 +21,7 @@ import numpy as np
 
 import vi_contact as vc
 from demos.pictures.layer import plot_cut_off, plot_parameters
-from vi_contact.plotting_layer import plot_particle
+from vi_contact.plots.layer import plot_particle
 
 # Parameters ----------------------------------------------------------------------------------------------------------
 STIFFNESSES = (0.5, 1.0, 2.0, 5.0, 10.0)  # k [N/m]

@@ -25,7 +25,7 @@ import vi_contact as vc
 from demos.pictures.rocking import plot_pulses, plot_rocking
 from vi_contact import fem
 from vi_contact.models import rocking_block as rocking
-from vi_contact.plotting import plot_certificate, plot_energy
+from vi_contact.plots.histories import plot_certificate, plot_energy
 
 # Parameters ----------------------------------------------------------------------------------------------------------
 SHAPE = vc.HousnerBlock(width=0.4, height=2.0)  # [m]

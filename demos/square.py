@@ -26,7 +26,7 @@ import vi_contact as vc
 from demos.pictures.deformed import plot_snapshots, plot_tractions
 from vi_contact import fem
 from vi_contact.models.square import Square, build
-from vi_contact.plotting import History, plot_runs
+from vi_contact.plots.histories import History, plot_runs
 
 # Parameters ----------------------------------------------------------------------------------------------------------
 SQUARE = Square(cells=20, pressure=0.1)  # h = dt = 0.05, as the source has it

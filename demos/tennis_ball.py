@@ -27,7 +27,7 @@ import vi_contact as vc
 from demos.pictures.deformed import plot_snapshots, plot_tractions
 from vi_contact import fem
 from vi_contact.models.disk import Disk, Momentum, Push, build
-from vi_contact.plotting import History, plot_runs
+from vi_contact.plots.histories import History, plot_runs
 
 # Parameters ----------------------------------------------------------------------------------------------------------
 DISK = Disk(radius=0.5, size=0.04, push=Push(height=0.05, rise=1.0))  # h = 2 dt = 0.04

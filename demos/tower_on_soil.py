@@ -24,7 +24,7 @@ import vi_contact as vc
 from vi_contact import fem
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import TwoBlocks
-from vi_contact.plotting import plot_certificate, plot_energy
+from vi_contact.plots.histories import plot_certificate, plot_energy
 
 # Parameters ----------------------------------------------------------------------------------------------------------
 SOIL = vc.LinearElastic.from_wave_speeds(500.0, 250.0, 1900.0)  # c_P, c_S [m/s], rho [kg/m³]

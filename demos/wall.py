@@ -24,7 +24,7 @@ import vi_contact as vc
 from vi_contact import fem
 from vi_contact.models import wall as wall_model
 from vi_contact.models.wall_run import draw
-from vi_contact.plotting import plot_runs
+from vi_contact.plots.histories import plot_runs
 from vi_contact.solvers.volume.route import Volume
 from vi_contact.solvers.volume.snes import ReducedNewton
 

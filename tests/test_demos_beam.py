@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vi_contact import beam, cli, plotting
+from vi_contact import beam, cli
+from vi_contact.plots import histories as plotting
 
 pytestmark = pytest.mark.serial
 ROOT = Path(__file__).resolve().parents[1]
@@ -49,7 +50,7 @@ def test_the_timoshenko_beam_demo(tmp_path: Path, capsys: pytest.CaptureFixture[
 
 def test_every_axis_has_a_label(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Quantity and unit; curves in every panel."""
-    from vi_contact import plotting_beam
+    from vi_contact.plots import beam as plotting_beam
 
     seen: list[Any] = []
     save = plotting.save

@@ -17,7 +17,7 @@ from vi_contact.core.errors import InputError
 from vi_contact.engineering.floor_spectra import konno_ohmachi
 from vi_contact.engineering.peak_values import HEADER
 from vi_contact.engineering.racking import racking
-from vi_contact.plotting_maps import arc_position, thinned
+from vi_contact.plots.maps import arc_position, thinned
 
 pytestmark = pytest.mark.serial
 

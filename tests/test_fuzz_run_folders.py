@@ -19,7 +19,7 @@ import vi_contact as vc
 from vi_contact.cli import main
 from vi_contact.core.errors import InputError
 from vi_contact.engineering.peak_values import peaks
-from vi_contact.plotting_report import header_facts, shown_periods, table_rows
+from vi_contact.plots.report import header_facts, shown_periods, table_rows
 from vi_contact.run.files.reading import read_run
 
 pytestmark = pytest.mark.serial

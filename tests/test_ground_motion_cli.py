@@ -19,7 +19,7 @@ from vi_contact.ground_motion import (
     response_spectrum,
     write_at2,
 )
-from vi_contact.plotting_motion import plot_motion, plot_spectra
+from vi_contact.plots.records import plot_motion, plot_spectra
 
 pytestmark = pytest.mark.serial
 

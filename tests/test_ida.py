@@ -21,7 +21,7 @@ pytest.importorskip("dolfinx")
 from vi_contact.cli import main
 from vi_contact.core.errors import InputError
 from vi_contact.ground_motion import Record, arias, pga, psa, read_record, scaled, tapered
-from vi_contact.plotting_ida import Panel, plot_ida
+from vi_contact.plots.ida import Panel, plot_ida
 from vi_contact.studies import IDA, read_case, run_ida
 from vi_contact.studies.ida.measures import demand, fractiles, intensity
 from vi_contact.studies.ida.runs import OneRun, Shaking, executed, quoted

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vi_contact import plotting
+from vi_contact.plots import histories as plotting
 
 pytestmark = pytest.mark.serial
 pytest.importorskip("matplotlib")

@@ -11,11 +11,12 @@ import pytest
 
 import vi_contact as vc
 from demos.pictures.channel import plot_beside, plot_layout, plot_moments
-from vi_contact import fem, plotting
+from vi_contact import fem
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.channel import ChannelMesh
 from vi_contact.models.channel.model import Channel, ChannelModel, build
-from vi_contact.plotting_channel import (
+from vi_contact.plots import histories as plotting
+from vi_contact.plots.channel import (
     SHOWN,
     Outline,
     opening,
@@ -24,8 +25,8 @@ from vi_contact.plotting_channel import (
     plot_openings,
     plot_rocking,
 )
-from vi_contact.plotting_channel_mesh import animate, read_bodies
-from vi_contact.plotting_channel_run import film, illustrate
+from vi_contact.plots.channel_mesh import animate, read_bodies
+from vi_contact.plots.channel_run import film, illustrate
 from vi_contact.run.static import static_equilibrium
 
 pytestmark = pytest.mark.serial
@@ -60,7 +61,7 @@ def figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
         seen.append(figure)
         return plotting.save(figure, path)
 
-    for module in ("vi_contact.plotting_channel", "demos.pictures.channel"):
+    for module in ("vi_contact.plots.channel", "demos.pictures.channel"):
         monkeypatch.setattr(f"{module}.save", keep)
     return seen
 

@@ -92,7 +92,7 @@ def _force(options: argparse.Namespace, elements: Any, steps: int) -> Any:
 
 
 def _pictures(run: Any, folder: Path) -> None:
-    from .plotting_beam import plot_beam_energies, plot_shapes, plot_tips
+    from .plots.beam import plot_beam_energies, plot_shapes, plot_tips
 
     end = float(run.history["t"][-1])
     plot_beam_energies({"beam": run}, folder / "energy.png", title="Energy of the beam")

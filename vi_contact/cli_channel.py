@@ -75,7 +75,7 @@ def _channel(options: argparse.Namespace) -> str:
     from .meshes.channel import ChannelMesh
     from .models.channel.model import Channel
     from .models.channel.run import CONTACTS, ChannelRun, run_channel
-    from .plotting_channel_run import illustrate
+    from .plots.channel_run import illustrate
 
     lengths = {name.replace("-", "_"): getattr(options, name.replace("-", "_")) for name, _, _ in _SHAPE}
     run = ChannelRun(

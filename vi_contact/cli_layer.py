@@ -94,7 +94,7 @@ def _integrated(impact: Any, metric: str) -> tuple[float, ...]:
 
 
 def _draw(impacts: list[Any], path: Path) -> Path:
-    from .plotting_layer import plot_particle
+    from .plots.layer import plot_particle
 
     path.parent.mkdir(parents=True, exist_ok=True)
     groups: dict[str, list[tuple[str, Any]]] = {}

@@ -164,7 +164,7 @@ def _convert(options: argparse.Namespace) -> str:
 
 def _plot(options: argparse.Namespace) -> str:
     from .ground_motion.record import canonical_units
-    from .plotting_motion import plot_motion
+    from .plots.records import plot_motion
 
     out = output_file(options.out or Path(options.file).stem + ".png", reads=[options.file], picture=True)
     record = _read(options, options.file)
@@ -177,7 +177,7 @@ def _spectrum(options: argparse.Namespace) -> str:
 
     from .ground_motion import response_spectrum
     from .ground_motion.record import UNITS, canonical_units
-    from .plotting_motion import plot_spectra
+    from .plots.records import plot_spectra
 
     units = canonical_units("--out-units", options.out_units)
     target = _target(options)

@@ -67,7 +67,7 @@ def _add_actions(parsers: dict[str, argparse.ArgumentParser]) -> None:
 
 def _report(options: argparse.Namespace) -> str:
     from .engineering.peak_values import peaks, write_peaks
-    from .plotting_report import plot_report
+    from .plots.report import plot_report
     from .run.files.reading import read_run
 
     run = read_run(options.folder)
@@ -93,7 +93,7 @@ def _peaks(options: argparse.Namespace) -> str:
 
 def _spectrum(options: argparse.Namespace) -> str:
     from .engineering.floor_spectra import floor_spectrum, recorded_motion
-    from .plotting_motion import plot_spectra
+    from .plots.records import plot_spectra
     from .run.files.reading import read_run
 
     run, periods = read_run(options.folder), spaced("--periods", options.periods)
@@ -117,7 +117,7 @@ def _spectrum(options: argparse.Namespace) -> str:
 
 def _transfer(options: argparse.Namespace) -> str:
     from .engineering.floor_spectra import transfer_function
-    from .plotting_engineering import plot_transfer
+    from .plots.spectra import plot_transfer
     from .run.files.reading import read_run
 
     run, table = read_run(options.folder), _table_path(options)
@@ -134,7 +134,7 @@ def _transfer(options: argparse.Namespace) -> str:
 
 def _loop(options: argparse.Namespace) -> str:
     from .engineering.peak_values import hysteresis
-    from .plotting_engineering import plot_loop
+    from .plots.spectra import plot_loop
     from .run.files.reading import read_run
 
     run, table = read_run(options.folder), _table_path(options)

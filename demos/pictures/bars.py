@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from vi_contact.core.algebra import Array
-from vi_contact.plotting import STYLE, History, save
+from vi_contact.plots.histories import STYLE, History, save
 
 COLUMNS = ("displacement of the foot [m]", "contact force / section [Pa]", "energy / exact energy [-]")
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from vi_contact.core.algebra import Array
-from vi_contact.plotting import STYLE, History, panels, save
+from vi_contact.plots.histories import STYLE, History, panels, save
 
 
 def plot_rubbing(history: History, path: str | Path, *, mu: float, gap: float, title: str) -> Path:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from vi_contact.core.algebra import Array
-from vi_contact.plotting import STYLE, save, scaled
+from vi_contact.plots.histories import STYLE, save, scaled
 
 ARROW = 0.3  # length of the longest arrow of a row over the size of its bodies
 

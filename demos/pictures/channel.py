@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from vi_contact.plotting import STYLE, History, panels, save
-from vi_contact.plotting_channel import LEGEND, RUNS, unit_of
-from vi_contact.plotting_channel_mesh import (
+from vi_contact.plots.channel import LEGEND, RUNS, unit_of
+from vi_contact.plots.channel_mesh import (
     AROUND,
     CONCRETE,
     CONTACT,
@@ -23,6 +22,7 @@ from vi_contact.plotting_channel_mesh import (
     plane,
     read_bodies,
 )
+from vi_contact.plots.histories import STYLE, History, panels, save
 
 
 def plot_layout(

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from vi_contact.core.algebra import Array
-from vi_contact.plotting import STYLE, save, scaled
-from vi_contact.plotting_deformed import Frames, Tractions, read_frames, read_tractions
+from vi_contact.plots.deformed import Frames, Tractions, read_frames, read_tractions
+from vi_contact.plots.histories import STYLE, save, scaled
 
 ARROW = 0.3  # length of the longest arrow over the size of the body
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from vi_contact.core.algebra import Array
 from vi_contact.exact.hertz import HertzImpact
-from vi_contact.plotting import STYLE, save
+from vi_contact.plots.histories import STYLE, save
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ from vi_contact.boundary_layer.layer import Layer
 from vi_contact.boundary_layer.particle import ParticleImpact
 from vi_contact.boundary_layer.trajectory import Trajectory
 from vi_contact.core.algebra import Array
-from vi_contact.plotting import save
-from vi_contact.plotting_layer import COLOURS, grid
+from vi_contact.plots.histories import save
+from vi_contact.plots.layer import COLOURS, grid
 
 
 def plot_parameters(values: Sequence[float], dampers: Sequence[float], path: str | Path) -> Path:

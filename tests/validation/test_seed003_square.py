@@ -15,7 +15,7 @@ import vi_contact as vc
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.models.square import Square, SquareModel, build
-from vi_contact.plotting_deformed import read_frames, read_tractions
+from vi_contact.plots.deformed import read_frames, read_tractions
 
 pytestmark = pytest.mark.slow
 

@@ -11,7 +11,7 @@ from ..core.algebra import Array
 from ..core.step import ContactProblem, State
 from ..core.surfaces import ContactSurface
 from ..fem.output.fields import XDMF
-from ..plotting import plot_certificate, plot_contact, plot_energy, plot_excitation, plot_points
+from ..plots.histories import plot_certificate, plot_contact, plot_energy, plot_excitation, plot_points
 from ..run.recorders import Contact, Energy, Probe
 from ..run.simulate import Solution, simulate
 from ..run.static import static_equilibrium

@@ -17,7 +17,7 @@ from ...laws.excitation import Excitation
 from ...laws.friction import Coulomb
 from ...laws.impact import Inelastic, MassProjection
 from ...laws.materials import LinearElastic
-from ...plotting import plot_certificate, plot_contact, plot_energy, plot_excitation, plot_points
+from ...plots.histories import plot_certificate, plot_contact, plot_energy, plot_excitation, plot_points
 from ...run.simulate import Solution, simulate
 from ...soil.moving_base import BaseMotion, base_motion
 from ...soil.upgoing_wave import upgoing

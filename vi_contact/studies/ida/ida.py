@@ -24,7 +24,7 @@ import numpy as np
 from ...core.algebra import Array
 from ...core.errors import InputError
 from ...fem.mesh import alone
-from ...plotting_ida import Panel, plot_ida
+from ...plots.ida import Panel, plot_ida
 from ...run.files.folder import to_json, write_atomically
 from ..cases.case import Case
 from ..cases.parsing import nearest

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from .beam.algorithm import BeamRun
-from .plotting import STYLE, panels, save
+from ..beam.algorithm import BeamRun
+from .histories import STYLE, panels, save
 
 _QUANTITIES = ("(A) rotation [-]", "(B) angular speed [1/s]", "(C) displacement [m]", "(D) velocity [m/s]")
 

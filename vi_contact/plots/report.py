@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from .core.algebra import Array
-from .core.errors import InputError
-from .engineering.floor_spectra import recorded_motion
-from .engineering.peak_values import Peak, peaks
-from .ground_motion import STANDARD_GRAVITY, Record, response_spectrum
-from .plotting import _LEDGER, STYLE, _log, scaled
-from .plotting_maps import arc_position, draw_map, thinned
-from .run.files.reading import RunFolder
+from ..core.algebra import Array
+from ..core.errors import InputError
+from ..engineering.floor_spectra import recorded_motion
+from ..engineering.peak_values import Peak, peaks
+from ..ground_motion import STANDARD_GRAVITY, Record, response_spectrum
+from ..run.files.reading import RunFolder
+from .histories import _LEDGER, STYLE, _log, scaled
+from .maps import arc_position, draw_map, thinned
 
 PAGE = (8.27, 11.69)  # inches, A4
 SIDES, TOP = (0.085, 0.95), 0.87  # of the page's width and height: where the panels are

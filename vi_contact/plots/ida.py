@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from .core.algebra import Array
-from .plotting import STYLE, plain, scaled
+from ..core.algebra import Array
+from .histories import STYLE, plain, scaled
 
 _FRACTILES = (("16 %", "tab:blue", "--"), ("50 %", "black", "-"), ("84 %", "tab:red", "--"))
 

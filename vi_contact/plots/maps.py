@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from .core.algebra import Array, Indices
-from .plotting import _edges, scaled
+from ..core.algebra import Array, Indices
+from .histories import _edges, scaled
 
 STRAIGHT = 1e-6  # of its length: what a line of points may deviate
 ROWS = 1200  # of a map: more instants than a page has dots are gathered

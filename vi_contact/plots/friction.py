@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from .core.algebra import Array
-from .core.errors import InputError
-from .plotting import STYLE, History, _edges, length_unit, panels, save, scaled
+from ..core.algebra import Array
+from ..core.errors import InputError
+from .histories import STYLE, History, _edges, length_unit, panels, save, scaled
 
 OPEN, STICK, SLIP = 1, 2, 3  # as contact_status in fields.xdmf
 _COLOURS = {OPEN: ("open", "white"), STICK: ("stick", "tab:blue"), SLIP: ("slip", "tab:orange")}

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from .core.algebra import Array
-from .ground_motion import (
+from ..core.algebra import Array
+from ..ground_motion import (
     STANDARD_GRAVITY,
     UNITS,
     EC8Spectrum,
@@ -21,7 +21,7 @@ from .ground_motion import (
     integrated,
     pga,
 )
-from .plotting import STYLE, length_unit, panels, plain, save
+from .histories import STYLE, length_unit, panels, plain, save
 
 SAMPLES_A_PERIOD = 10
 """A spectrum is drawn pale at periods with fewer samples of the record than this."""

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from .boundary_layer.particle import ParticleImpact
-from .plotting import STYLE, save
+from ..boundary_layer.particle import ParticleImpact
+from .histories import STYLE, save
 
 COLOURS = ("tab:blue", "tab:orange", "tab:green", "tab:red", "tab:purple")
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from .engineering.floor_spectra import TransferFunction
-from .engineering.peak_values import Loop
-from .plotting import STYLE, plain, save, scaled
+from ..engineering.floor_spectra import TransferFunction
+from ..engineering.peak_values import Loop
+from .histories import STYLE, plain, save, scaled
 
 
 def _panel(size: tuple[float, float]) -> tuple[Any, Any]:

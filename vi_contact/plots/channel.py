@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from .core.algebra import Array, Mask
-from .core.errors import InputError
-from .plotting import STYLE, History, _edges, panels, save, scaled
-from .plotting_maps import thinned
+from ..core.algebra import Array, Mask
+from ..core.errors import InputError
+from .histories import STYLE, History, _edges, panels, save, scaled
+from .maps import thinned
 
 SHOWN = {  # panels of plot_openings: point -> outward normal of the channel there
     "tops of the walls": {"19": (-1.0, 0.0), "13": (1.0, 0.0)},

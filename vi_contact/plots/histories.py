@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from .core.algebra import Array
+from ..core.algebra import Array
 
 History = Mapping[str, Array]
 _UNITS = ((1.0, "m"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm"))

@@ -11,9 +11,9 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from .core.algebra import Array, Indices
-from .core.errors import InputError
-from .run.files.folder import FIELDS, HISTORY_H5
+from ..core.algebra import Array, Indices
+from ..core.errors import InputError
+from ..run.files.folder import FIELDS, HISTORY_H5
 
 
 @dataclass(frozen=True)

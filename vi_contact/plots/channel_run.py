@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from .core.algebra import Array
-from .core.errors import InputError
-from .plotting_channel import Outline, opening, plot_envelope, plot_interface, plot_openings, plot_rocking
-from .plotting_channel_mesh import animate, read_bodies
-from .run.files.reading import read_run
+from ..core.algebra import Array
+from ..core.errors import InputError
+from ..run.files.reading import read_run
+from .channel import Outline, opening, plot_envelope, plot_interface, plot_openings, plot_rocking
+from .channel_mesh import animate, read_bodies
 
 FILM_FRAMES = 48  # at most: a film of two megabytes
 DRAWN = 0.15  # of the channel's height: how large its largest displacement is drawn

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from .core.algebra import Array, Indices, Mask
-from .core.errors import InputError
-from .plotting import STYLE, History, scaled
-from .plotting_deformed import Frames, Tractions, read_frames, read_tractions
+from ..core.algebra import Array, Indices, Mask
+from ..core.errors import InputError
+from .deformed import Frames, Tractions, read_frames, read_tractions
+from .histories import STYLE, History, scaled
 
 SOIL, CONCRETE, CONTACT = "#efe3c8", "#9aa3ab", "tab:red"
 MAP = "YlOrRd"  # colours of pressures
