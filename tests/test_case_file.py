@@ -16,7 +16,7 @@ from mpi4py import MPI
 
 import vi_contact as vc
 from vi_contact import fem
-from vi_contact.cli import main
+from vi_contact.cli.main import main
 from vi_contact.core.errors import InputError
 from vi_contact.core.surfaces import empty_surface
 from vi_contact.meshes.block import BlockMesh

@@ -13,7 +13,7 @@ pytest.importorskip("dolfinx")
 from mpi4py import MPI
 
 import vi_contact as vc
-from vi_contact.cli import main
+from vi_contact.cli.main import main
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.gmsh_session import session, write
@@ -210,7 +210,7 @@ def test_out_of_memory_is_one_sentence(error: Exception, monkeypatch: pytest.Mon
     def fails(options: object) -> str:
         raise error
 
-    monkeypatch.setattr("vi_contact.cli_motion._info", fails)
+    monkeypatch.setattr("vi_contact.cli.motion._info", fails)
     assert "out of memory: take a coarser mesh" in said(capsys, ["motion", "info", "file"])
 
 
@@ -219,6 +219,6 @@ def test_other_errors_keep_their_traceback(monkeypatch: pytest.MonkeyPatch) -> N
     def fails(options: object) -> str:
         raise KeyError(json.dumps("defect"))
 
-    monkeypatch.setattr("vi_contact.cli_motion._info", fails)
+    monkeypatch.setattr("vi_contact.cli.motion._info", fails)
     with pytest.raises(KeyError):
         main(["motion", "info", "file"])

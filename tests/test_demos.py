@@ -15,7 +15,7 @@ import h5py
 import numpy as np
 import pytest
 
-from vi_contact.cli import main
+from vi_contact.cli.main import main
 from vi_contact.ground_motion import Record, pga, read_record
 
 ROOT = Path(__file__).resolve().parents[1]

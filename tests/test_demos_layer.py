@@ -10,7 +10,7 @@ import pytest
 from test_demos import demo
 
 from demos.pictures.layer import plot_thin_limit
-from vi_contact.cli import main
+from vi_contact.cli.main import main
 
 serial = pytest.mark.serial
 

@@ -17,8 +17,8 @@ pytest.importorskip("dolfinx")
 pytest.importorskip("matplotlib")
 
 import vi_contact as vc
-from vi_contact.cli import main
-from vi_contact.cli_errors import printable
+from vi_contact.cli.errors import printable
+from vi_contact.cli.main import main
 
 pytestmark = pytest.mark.serial
 COUNT = 300

@@ -6,8 +6,8 @@ import math
 import numpy as np
 import pytest
 
-from vi_contact.cli import main
-from vi_contact.cli_motion import acceleration
+from vi_contact.cli.main import main
+from vi_contact.cli.motion import acceleration
 from vi_contact.ground_motion import (
     EC8Spectrum,
     Record,

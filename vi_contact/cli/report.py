@@ -9,8 +9,8 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from .cli_options import output_file, spaced, table_beside_picture
-from .core.errors import ViContactError
+from ..core.errors import ViContactError
+from .options import output_file, spaced, table_beside_picture
 
 _ACTIONS = {
     "peaks": "largest and smallest value of every column, as a table",
@@ -66,9 +66,9 @@ def _add_actions(parsers: dict[str, argparse.ArgumentParser]) -> None:
 
 
 def _report(options: argparse.Namespace) -> str:
-    from .engineering.peak_values import peaks, write_peaks
-    from .plots.report import plot_report
-    from .run.files.reading import read_run
+    from ..engineering.peak_values import peaks, write_peaks
+    from ..plots.report import plot_report
+    from ..run.files.reading import read_run
 
     run = read_run(options.folder)
     out = output_file(options.out or Path(options.folder) / "report.pdf", picture=True)
@@ -79,8 +79,8 @@ def _report(options: argparse.Namespace) -> str:
 
 
 def _peaks(options: argparse.Namespace) -> str:
-    from .engineering.peak_values import peaks, write_peaks
-    from .run.files.reading import read_run
+    from ..engineering.peak_values import peaks, write_peaks
+    from ..run.files.reading import read_run
 
     run = read_run(options.folder)
     rows = peaks(run.history, run.columns, options.columns or None)
@@ -92,9 +92,9 @@ def _peaks(options: argparse.Namespace) -> str:
 
 
 def _spectrum(options: argparse.Namespace) -> str:
-    from .engineering.floor_spectra import floor_spectrum, recorded_motion
-    from .plots.records import plot_spectra
-    from .run.files.reading import read_run
+    from ..engineering.floor_spectra import floor_spectrum, recorded_motion
+    from ..plots.records import plot_spectra
+    from ..run.files.reading import read_run
 
     run, periods = read_run(options.folder), spaced("--periods", options.periods)
     table = _table_path(options)
@@ -116,9 +116,9 @@ def _spectrum(options: argparse.Namespace) -> str:
 
 
 def _transfer(options: argparse.Namespace) -> str:
-    from .engineering.floor_spectra import transfer_function
-    from .plots.spectra import plot_transfer
-    from .run.files.reading import read_run
+    from ..engineering.floor_spectra import transfer_function
+    from ..plots.spectra import plot_transfer
+    from ..run.files.reading import read_run
 
     run, table = read_run(options.folder), _table_path(options)
     given = None if options.frequencies is None else spaced("--frequencies", options.frequencies)
@@ -133,9 +133,9 @@ def _transfer(options: argparse.Namespace) -> str:
 
 
 def _loop(options: argparse.Namespace) -> str:
-    from .engineering.peak_values import hysteresis
-    from .plots.spectra import plot_loop
-    from .run.files.reading import read_run
+    from ..engineering.peak_values import hysteresis
+    from ..plots.spectra import plot_loop
+    from ..run.files.reading import read_run
 
     run, table = read_run(options.folder), _table_path(options)
     loop = hysteresis(run.history, options.deformation, options.force, sign=-1.0 if options.turn else 1.0)
@@ -149,7 +149,7 @@ def _loop(options: argparse.Namespace) -> str:
 
 
 def _table_path(options: argparse.Namespace) -> Path:
-    from .run.files.folder import FILES
+    from ..run.files.folder import FILES
 
     folder = Path(options.folder)
     path = options.out or folder / f"{options.action}.csv"
@@ -157,7 +157,7 @@ def _table_path(options: argparse.Namespace) -> Path:
 
 
 def _write(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
-    from .run.files.folder import sentence, write_atomically
+    from ..run.files.folder import sentence, write_atomically
 
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")

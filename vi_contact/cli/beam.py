@@ -6,8 +6,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from .core.checks import counted
-from .core.errors import InputError
+from ..core.checks import counted
+from ..core.errors import InputError
 
 
 def add_beam_command(commands: Any) -> None:
@@ -45,13 +45,13 @@ def add_beam_command(commands: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> str:
-    from .beam.algorithm import BeamStepper, run_beam
-    from .beam.elements import Elements
-    from .beam.source_data import published_elements, published_mu, published_start
-    from .beam.tip import ExactFriction, RegularisedFriction, TipFriction
-    from .beam.values import TimoshenkoBeam
-    from .core.algebra import SerialComm
-    from .run.files.folder import run_folder
+    from ..beam.algorithm import BeamStepper, run_beam
+    from ..beam.elements import Elements
+    from ..beam.source_data import published_elements, published_mu, published_start
+    from ..beam.tip import ExactFriction, RegularisedFriction, TipFriction
+    from ..beam.values import TimoshenkoBeam
+    from ..core.algebra import SerialComm
+    from ..run.files.folder import run_folder
 
     beam = TimoshenkoBeam(
         options.length, options.rho, options.area, options.inertia, options.E, options.G, options.shear_factor,
@@ -75,9 +75,9 @@ def _run(options: argparse.Namespace) -> str:
 
 def _force(options: argparse.Namespace, elements: Any, steps: int) -> Any:
     """t -> |r_N|."""
-    from .beam.coupling import rod_forces
-    from .beam.source_data import readings
-    from .beam.values import Rod
+    from ..beam.coupling import rod_forces
+    from ..beam.source_data import readings
+    from ..beam.values import Rod
 
     if options.force is not None:
         return lambda t: options.force
@@ -92,7 +92,7 @@ def _force(options: argparse.Namespace, elements: Any, steps: int) -> Any:
 
 
 def _pictures(run: Any, folder: Path) -> None:
-    from .plots.beam import plot_beam_energies, plot_shapes, plot_tips
+    from ..plots.beam import plot_beam_energies, plot_shapes, plot_tips
 
     end = float(run.history["t"][-1])
     plot_beam_energies({"beam": run}, folder / "energy.png", title="Energy of the beam")

@@ -8,8 +8,8 @@ import re
 from pathlib import Path
 from typing import Any
 
-from .cli_options import output_file, spaced
-from .core.errors import InputError
+from ..core.errors import InputError
+from .options import output_file, spaced
 
 _FORMATS = {".at2": "at2", ".th": "path", ".g3": "path", ".acc": "path"}
 _QUANTITY = re.compile(r"([-+]?[\d.]++(?:[eE][-+]?\d++)?)(.*+)")
@@ -104,7 +104,7 @@ def _add_spectrum(one: argparse.ArgumentParser) -> None:
 
 def acceleration(text: str) -> float:
     """Metres per second squared of "3.0", "0.3g", "0.3 g" or "300gal"."""
-    from .ground_motion.record import UNITS, canonical_units
+    from ..ground_motion.record import UNITS, canonical_units
 
     match = _QUANTITY.fullmatch(text.strip())
     try:
@@ -117,8 +117,8 @@ def acceleration(text: str) -> float:
 
 def _read(options: argparse.Namespace, path: str) -> Any:
     """The record of a file after the processing asked for."""
-    from .ground_motion import Processing, read_record
-    from .ground_motion.formats.reader import LARGEST_PEAK
+    from ..ground_motion import Processing, read_record
+    from ..ground_motion.formats.reader import LARGEST_PEAK
 
     steps = Processing(
         trim=options.trim, pad=options.pad, mean=options.remove_mean, taper=options.taper, low=options.low,
@@ -141,13 +141,13 @@ def _psa(words: list[str] | None) -> tuple[float, float] | None:
 
 
 def _info(options: argparse.Namespace) -> str:
-    from .ground_motion import record_info
+    from ..ground_motion import record_info
 
     return "\n\n".join(record_info(_read(options, path)) for path in options.file)
 
 
 def _convert(options: argparse.Namespace) -> str:
-    from .ground_motion import pga, write_at2, write_columns, write_path_series
+    from ..ground_motion import pga, write_at2, write_columns, write_path_series
 
     output_file(options.out, reads=[options.file])
     record = _read(options, options.file)
@@ -163,8 +163,8 @@ def _convert(options: argparse.Namespace) -> str:
 
 
 def _plot(options: argparse.Namespace) -> str:
-    from .ground_motion.record import canonical_units
-    from .plots.records import plot_motion
+    from ..ground_motion.record import canonical_units
+    from ..plots.records import plot_motion
 
     out = output_file(options.out or Path(options.file).stem + ".png", reads=[options.file], picture=True)
     record = _read(options, options.file)
@@ -175,9 +175,9 @@ def _plot(options: argparse.Namespace) -> str:
 def _spectrum(options: argparse.Namespace) -> str:
     import numpy as np
 
-    from .ground_motion import response_spectrum
-    from .ground_motion.record import UNITS, canonical_units
-    from .plots.records import plot_spectra
+    from ..ground_motion import response_spectrum
+    from ..ground_motion.record import UNITS, canonical_units
+    from ..plots.records import plot_spectra
 
     units = canonical_units("--out-units", options.out_units)
     target = _target(options)
@@ -208,7 +208,7 @@ def _spectrum(options: argparse.Namespace) -> str:
 
 def _target(options: argparse.Namespace) -> Any:
     """The Eurocode 8 spectrum asked for, at the first damping, or None."""
-    from .ground_motion import EC8Spectrum
+    from ..ground_motion import EC8Spectrum
 
     if (options.ec8 is None) != (options.ag is None):
         raise InputError("--ec8 and --ag belong together: give the ground type and the design ground acceleration")

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from .cli_options import add_restart
+from .options import add_restart
 
 
 def add_case_commands(commands: Any) -> None:
@@ -26,7 +26,7 @@ def add_case_commands(commands: Any) -> None:
 def _run(options: argparse.Namespace) -> str:
     from mpi4py import MPI
 
-    from .studies.cases.case import read_case
+    from ..studies.cases.case import read_case
 
     comm = MPI.COMM_WORLD
     case = read_case(options.case, options.settings)

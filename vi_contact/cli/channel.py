@@ -6,8 +6,8 @@ import argparse
 from collections.abc import Sequence
 from typing import Any
 
-from .cli_options import add_output, add_shaking, add_step, chosen, impact_law
-from .laws.materials import Damping, LinearElastic, NoDamping, Rayleigh
+from ..laws.materials import Damping, LinearElastic, NoDamping, Rayleigh
+from .options import add_output, add_shaking, add_step, chosen, impact_law
 
 _SHAPE = (  # option, default, meaning
     ("width", 24.0, "width of the soil layer"), ("depth", 8.0, "depth of the soil layer"),
@@ -72,10 +72,10 @@ def _damping(given: Sequence[float] | None) -> Damping:
 def _channel(options: argparse.Namespace) -> str:
     from mpi4py import MPI
 
-    from .meshes.channel import ChannelMesh
-    from .models.channel.model import Channel
-    from .models.channel.run import CONTACTS, ChannelRun, run_channel
-    from .plots.channel_run import illustrate
+    from ..meshes.channel import ChannelMesh
+    from ..models.channel.model import Channel
+    from ..models.channel.run import CONTACTS, ChannelRun, run_channel
+    from ..plots.channel_run import illustrate
 
     lengths = {name.replace("-", "_"): getattr(options, name.replace("-", "_")) for name, _, _ in _SHAPE}
     run = ChannelRun(

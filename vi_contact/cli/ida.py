@@ -7,8 +7,8 @@ import shlex
 import signal
 from typing import Any
 
-from .core.checks import shown
-from .core.errors import InputError, ViContactError
+from ..core.checks import shown
+from ..core.errors import InputError, ViContactError
 
 
 def add_ida_commands(commands: Any) -> None:
@@ -50,8 +50,8 @@ def _part(text: str) -> tuple[int, int]:
 
 
 def _ida(options: argparse.Namespace) -> str:
-    from .studies.cases.case import read_case
-    from .studies.ida.ida import IDA, run_ida
+    from ..studies.cases.case import read_case
+    from ..studies.ida.ida import IDA, run_ida
 
     try:
         launch = shlex.split(options.launch)

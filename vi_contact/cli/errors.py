@@ -10,9 +10,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from textwrap import shorten
 from typing import Any, NoReturn
 
-from .core.checks import SHOWN, shown
-from .core.errors import InputError, ViContactError
-from .run.files.folder import sentence
+from ..core.checks import SHOWN, shown
+from ..core.errors import InputError, ViContactError
+from ..run.files.folder import sentence
 
 PETSC_ERR_MEM = 55  # of petscsystypes.h
 _ARGUMENT = re.compile(r"(?<= )(\w++)= ?")

@@ -9,8 +9,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from .core.checks import counted, shown
-from .core.errors import InputError
+from ..core.checks import counted, shown
+from ..core.errors import InputError
 
 SHAKING = ("motion", "vertical", "units", "scale", "pga", "resample")
 STEP = ("solver", "scheme", "dt", "steps", "cross_check")
@@ -130,7 +130,7 @@ def table_beside_picture(path: str | Path, *, reads: Iterable[str | Path] = ()) 
 
 def impact_law(name: str | None, projection: bool) -> Any:
     """The impact law of --impact, read as an M-orthogonal impulse or as a reset; None for the run's own choice."""
-    from .laws.impact import ComponentReset, Elastic, Inelastic, MassProjection, Newton, NoImpact
+    from ..laws.impact import ComponentReset, Elastic, Inelastic, MassProjection, Newton, NoImpact
 
     if name is None and not projection:
         return None

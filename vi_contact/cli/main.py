@@ -8,18 +8,18 @@ import traceback
 from collections.abc import Sequence
 from pathlib import Path
 
-from . import __version__
-from .cli_beam import add_beam_command
-from .cli_case import add_case_commands
-from .cli_channel import add_channel_commands
-from .cli_errors import Parser, check_words, printable, told
-from .cli_ida import add_ida_commands
-from .cli_layer import add_layer_command
-from .cli_motion import add_motion_commands
-from .cli_options import add_output, add_shaking, add_step, chosen, impact_law
-from .cli_ranks import fail_together, rank
-from .cli_report import add_report_commands
-from .core.errors import Interrupted, ViContactError
+from .. import __version__
+from ..core.errors import Interrupted, ViContactError
+from .beam import add_beam_command
+from .case import add_case_commands
+from .channel import add_channel_commands
+from .errors import Parser, check_words, printable, told
+from .ida import add_ida_commands
+from .layer import add_layer_command
+from .motion import add_motion_commands
+from .options import add_output, add_shaking, add_step, chosen, impact_law
+from .ranks import fail_together, rank
+from .report import add_report_commands
 
 _DESCRIPTION = """Dynamic unilateral contact of elastic structures: exact non-penetration, a closed energy ledger and a
 certificate for every time step. Run under "mpirun -n N" for any number of ranks. Options -vi_contact_volume_... go to
@@ -81,8 +81,8 @@ def _wall(options: argparse.Namespace) -> str:
 def _wall_case(options: argparse.Namespace, case: str, out: Path) -> str:
     from mpi4py import MPI
 
-    from .models.wall import BASE_INERTIA, Wall
-    from .models.wall_run import WallRun, run_wall
+    from ..models.wall import BASE_INERTIA, Wall
+    from ..models.wall_run import WallRun, run_wall
 
     nx, ny = options.divisions or (8, 12)
     run = WallRun(

@@ -6,8 +6,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from .cli_options import output_file
-from .core.errors import InputError
+from ..core.errors import InputError
+from .options import output_file
 
 _METRICS = ("dominant", "full", "blended", "flat")
 
@@ -36,8 +36,8 @@ def add_layer_command(commands: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> str:
-    from .boundary_layer.layer import Layer
-    from .boundary_layer.particle import ParticleImpact, layer_for
+    from ..boundary_layer.layer import Layer
+    from ..boundary_layer.particle import ParticleImpact, layer_for
 
     if options.metric not in _METRICS:
         raise InputError(f"unknown metric '{options.metric}': give {', '.join(_METRICS)}")
@@ -73,9 +73,9 @@ def _integrated(impact: Any, metric: str) -> tuple[float, ...]:
     import numpy as np
     from scipy.integrate import cumulative_trapezoid
 
-    from .boundary_layer.metric import Metric
-    from .boundary_layer.motion import ConstrainedSystem
-    from .boundary_layer.trajectory import layer_motion
+    from ..boundary_layer.metric import Metric
+    from ..boundary_layer.motion import ConstrainedSystem
+    from ..boundary_layer.trajectory import layer_motion
 
     layer = impact.layer
     body = ConstrainedSystem(np.array([[impact.mass]]), lambda q: float(q[0]), lambda q: np.ones(1))
@@ -94,7 +94,7 @@ def _integrated(impact: Any, metric: str) -> tuple[float, ...]:
 
 
 def _draw(impacts: list[Any], path: Path) -> Path:
-    from .plots.layer import plot_particle
+    from ..plots.layer import plot_particle
 
     path.parent.mkdir(parents=True, exist_ok=True)
     groups: dict[str, list[tuple[str, Any]]] = {}
