@@ -30,10 +30,10 @@ import numpy as np  # noqa: E402
 from mpi4py import MPI  # noqa: E402
 
 import vi_contact as vc  # noqa: E402
+from vi_contact.core.step import initial_state  # noqa: E402
 from vi_contact.meshes.channel import ChannelMesh  # noqa: E402
 from vi_contact.models.channel import model as channel  # noqa: E402
 from vi_contact.models.wall import Wall, build  # noqa: E402
-from vi_contact.run.static import initial_state  # noqa: E402
 from vi_contact.solvers.volume.one_factorisation import OneFactorisation  # noqa: E402
 from vi_contact.solvers.volume.route import Volume  # noqa: E402
 from vi_contact.solvers.volume.snes import ReducedNewton  # noqa: E402

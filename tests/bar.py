@@ -15,7 +15,8 @@ import scipy.sparse as sp
 from chain import ChainSpace
 
 from vi_contact.core.algebra import Array, SerialAlgebra, SerialComm, SerialMatrix
-from vi_contact.core.step import ContactProblem, Report, State
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.step import Report, State
 from vi_contact.core.surfaces import ContactSurface
 from vi_contact.core.system import Load, SemiDiscreteSystem
 from vi_contact.laws.mass import ConsistentMass

@@ -15,7 +15,7 @@ import scipy.sparse as sp
 from bar import bar_matrices
 
 from vi_contact.core.algebra import Array, SerialAlgebra, SerialComm, SerialMatrix
-from vi_contact.core.step import ContactProblem
+from vi_contact.core.problem import ContactProblem
 from vi_contact.core.surfaces import ContactSurface
 from vi_contact.core.system import Load, SemiDiscreteSystem
 from vi_contact.laws.materials import LinearElastic

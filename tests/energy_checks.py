@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from bar import before_impact, energy, run
 
-from vi_contact.core.step import ContactProblem, State
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.step import State, initial_state
 from vi_contact.core.verify import energies, energy_balance
-from vi_contact.run.static import initial_state
 
 
 @dataclass(frozen=True)

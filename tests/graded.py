@@ -10,7 +10,7 @@ import numpy as np
 from fem_problems import block
 
 from vi_contact.core.algebra import Array
-from vi_contact.core.step import ContactProblem
+from vi_contact.core.problem import ContactProblem
 from vi_contact.core.surfaces import Obstacle
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface

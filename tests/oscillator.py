@@ -9,7 +9,8 @@ from bar import run
 from chain import chain_problem
 from scipy.linalg import expm
 
-from vi_contact.core.step import ContactProblem, State
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.step import State
 from vi_contact.laws.excitation import Harmonic
 
 FAR = 1e6  # gap that never closes

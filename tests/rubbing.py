@@ -7,10 +7,10 @@ from chain import ChainSpace
 from volume_cases import block
 
 from vi_contact.core.algebra import SerialAlgebra, SerialComm, SerialMatrix
-from vi_contact.core.step import ContactProblem
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.protocols import FrictionLaw
 from vi_contact.core.surfaces import ContactSurface
 from vi_contact.core.system import Load, SemiDiscreteSystem
-from vi_contact.laws.friction import FrictionLaw
 from vi_contact.laws.mass import ConsistentMass
 
 

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from chain import chain_problem
 
-from vi_contact.core.step import ContactProblem, Report
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.step import Report
 from vi_contact.laws.excitation import Harmonic
 
 SHAKE = Harmonic(-30.0, 3.0, phase=0.3, direction=(1.0,))

@@ -17,7 +17,8 @@ from vi_contact.boundary_layer.layer import Layer
 from vi_contact.boundary_layer.metric import Metric
 from vi_contact.boundary_layer.scheme import BoundaryLayer
 from vi_contact.core.errors import InputError, StepFailure
-from vi_contact.core.step import ContactProblem
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.step import initial_state
 from vi_contact.exact.bar import ThrownBar
 from vi_contact.laws.excitation import Harmonic
 from vi_contact.laws.friction import Coulomb
@@ -25,7 +26,6 @@ from vi_contact.laws.impact import Inelastic, NoImpact
 from vi_contact.laws.mass import ConsistentMass
 from vi_contact.run.march import march
 from vi_contact.run.simulate import simulate
-from vi_contact.run.static import initial_state
 from vi_contact.run.time_steps import Schedule
 from vi_contact.schemes.midpoint import Midpoint
 

@@ -13,6 +13,7 @@ from mpi4py import MPI
 import vi_contact as vc
 from vi_contact.cli.main import main
 from vi_contact.core.errors import InputError
+from vi_contact.core.units import STANDARD_GRAVITY
 from vi_contact.meshes.channel import ChannelMesh
 from vi_contact.meshes.extract import arrays_from_script
 from vi_contact.models.channel.model import BODIES, Channel, build
@@ -20,7 +21,6 @@ from vi_contact.models.channel.points import SoilProbe
 from vi_contact.models.channel.run import ChannelRun, prepared
 from vi_contact.models.channel.sides import Fixed, Rollers, TiedSides
 from vi_contact.models.choices import SCHEMES
-from vi_contact.models.wall import STANDARD_GRAVITY
 
 COMM = MPI.COMM_WORLD
 serial = pytest.mark.serial

@@ -17,7 +17,8 @@ import pytest
 from chain import chain_problem
 
 from vi_contact.core.errors import InputError
-from vi_contact.core.step import ContactProblem, State
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.step import State
 from vi_contact.laws.excitation import Harmonic
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.impact import Inelastic, MassProjection

@@ -13,10 +13,12 @@ from shaken import SHAKE, shaken
 
 from vi_contact.core.algebra import SerialComm
 from vi_contact.core.errors import InputError
-from vi_contact.core.step import ContactProblem, StepProblem
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.protocols import Frictionless
+from vi_contact.core.step import StepProblem
 from vi_contact.core.surfaces import ContactSurface, empty_surface
 from vi_contact.core.verify import kkt_residual
-from vi_contact.laws.friction import Coulomb, Frictionless
+from vi_contact.laws.friction import Coulomb
 from vi_contact.schemes.linear_multistep import LinearMultistep
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers import condensed

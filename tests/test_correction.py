@@ -11,10 +11,10 @@ from fem_problems import max_over_ranks, shaken_wall
 from mpi4py import MPI
 
 from vi_contact.core.errors import StepFailure
-from vi_contact.core.step import ContactProblem, EffectiveMatrix, Scheme, StepProblem, StepResult
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.step import EffectiveMatrix, Scheme, StepProblem, StepResult, initial_state
 from vi_contact.core.verify import kkt_residual
 from vi_contact.laws.friction import Coulomb, ExponentialDecay, SlipRateCoulomb, Tresca
-from vi_contact.run.static import initial_state
 from vi_contact.schemes.moreau_jean import MoreauJean
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.certified import NEAR, TOLERANCE, CertifiedSolver

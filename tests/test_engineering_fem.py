@@ -12,12 +12,12 @@ import vi_contact as vc
 from vi_contact import fem
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
+from vi_contact.core.step import initial_state
 from vi_contact.core.surfaces import nodal_frames
 from vi_contact.engineering.resultants import tangent_vectors
 from vi_contact.fem import compat
 from vi_contact.fem.contact.frames import block_of
 from vi_contact.models.channel.model import Channel, build
-from vi_contact.run.static import initial_state
 from vi_contact.soil.moving_base import base_motion
 
 WIDTH, HEIGHT = 0.5, 4.0

@@ -22,7 +22,7 @@ import vi_contact as vc
 from vi_contact import fem
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
-from vi_contact.core.step import ContactProblem
+from vi_contact.core.problem import ContactProblem
 from vi_contact.core.surfaces import ContactSurface
 from vi_contact.fem.mesh import Facets
 from vi_contact.meshes.block import BlockMesh

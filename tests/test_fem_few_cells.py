@@ -12,13 +12,14 @@ pytest.importorskip("dolfinx")
 
 from fem_problems import CONCRETE, block
 
-from vi_contact.core.step import ContactProblem
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.protocols import Frictionless
 from vi_contact.core.surfaces import HalfSpace
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.output.fields import XDMF
 from vi_contact.laws.excitation import Harmonic
-from vi_contact.laws.friction import Coulomb, Frictionless
+from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.mass import ConsistentMass
 from vi_contact.run.recorders import Contact, Energy, Probe
 from vi_contact.run.simulate import Solution, simulate

@@ -18,7 +18,7 @@ from fem_problems import BOX_DT, CONCRETE, block, field, shaken_wall, thrown_box
 from tipped import ROUGH_ON_ONE_SIDE, tipped
 
 from vi_contact.core.errors import InputError
-from vi_contact.core.step import ContactProblem
+from vi_contact.core.problem import ContactProblem
 from vi_contact.core.surfaces import empty_surface
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface

@@ -15,7 +15,8 @@ from two_bodies import SOFT, blocks, forces, momenta, per_body, relative, thrown
 
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
-from vi_contact.core.step import ContactProblem
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.protocols import Frictionless
 from vi_contact.core.surfaces import AnalyticGap, ContactSurface, HalfSpace, empty_surface
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.joined import together
@@ -23,7 +24,7 @@ from vi_contact.fem.contact.pairs import contact_pair
 from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import BodyForce
 from vi_contact.fem.mesh import build_mesh
-from vi_contact.laws.friction import Coulomb, Frictionless
+from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.mass import Redistributed
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import Blocks

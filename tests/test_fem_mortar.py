@@ -16,13 +16,14 @@ from two_bodies import forces, momenta, per_body, relative, thrown, two_blocks
 
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
-from vi_contact.core.step import ContactProblem
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.protocols import Frictionless
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.mortar import DualMortar
 from vi_contact.fem.contact.pairs import contact_pair, side_of
 from vi_contact.fem.contact.surface import nodes_on
 from vi_contact.fem.mesh import build_mesh
-from vi_contact.laws.friction import Coulomb, Frictionless
+from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.laws.materials import LinearElastic
 from vi_contact.meshes.block import BlockMesh

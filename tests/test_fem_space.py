@@ -8,7 +8,7 @@ from fem_problems import BODIES, CONCRETE, block, field, held_by, linear, max_ov
 from mpi4py import MPI
 
 from vi_contact.core.errors import InputError
-from vi_contact.core.step import ContactProblem
+from vi_contact.core.problem import ContactProblem
 from vi_contact.core.system import SemiDiscreteSystem
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import BodyForce, Prescribed, Traction

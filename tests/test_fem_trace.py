@@ -12,14 +12,14 @@ from mpi4py import MPI
 
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
-from vi_contact.core.step import ContactProblem
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.step import initial_state
 from vi_contact.core.surfaces import AnalyticGap, HalfSpace, Touching
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import BodyForce, Prescribed
 from vi_contact.fem.mesh import Facets
 from vi_contact.laws.materials import PlaneStress
-from vi_contact.run.static import initial_state
 
 COMM = MPI.COMM_WORLD
 GROUND = HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))

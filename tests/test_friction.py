@@ -6,15 +6,8 @@ import numpy as np
 import pytest
 
 from vi_contact.core.errors import InputError
-from vi_contact.laws.friction import (
-    Coulomb,
-    ExponentialDecay,
-    Frictionless,
-    SlipRateCoulomb,
-    StaticKinetic,
-    Tresca,
-    project,
-)
+from vi_contact.core.protocols import Frictionless
+from vi_contact.laws.friction import Coulomb, ExponentialDecay, SlipRateCoulomb, StaticKinetic, Tresca, project
 
 pytestmark = pytest.mark.serial
 

@@ -10,10 +10,11 @@ import pytest
 from column import column
 
 from vi_contact.core.errors import InputError
+from vi_contact.core.protocols import FrictionLaw
 from vi_contact.core.step import Report, StepResult
 from vi_contact.core.surfaces import ContactSurface
 from vi_contact.core.verify import kkt_residual
-from vi_contact.laws.friction import Coulomb, FrictionLaw, Tresca
+from vi_contact.laws.friction import Coulomb, Tresca
 from vi_contact.laws.mass import ConsistentMass
 from vi_contact.run.march import march
 from vi_contact.run.recorders import Contact

@@ -10,9 +10,11 @@ import pytest
 from column import column
 from test_friction_methods import small
 
-from vi_contact.core.step import ContactProblem, Report
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.protocols import Frictionless
+from vi_contact.core.step import Report
 from vi_contact.core.surfaces import ContactSurface
-from vi_contact.laws.friction import Coulomb, Frictionless, Tresca
+from vi_contact.laws.friction import Coulomb, Tresca
 from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.run.march import march
 from vi_contact.schemes.trapezoidal import Trapezoidal

@@ -16,12 +16,13 @@ from fem_problems import block, thrown_box, turned
 import vi_contact as vc
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
-from vi_contact.core.step import ContactProblem
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.protocols import FrictionLaw
 from vi_contact.core.surfaces import HalfSpace
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import BodyForce
-from vi_contact.laws.friction import Coulomb, ExponentialDecay, FrictionLaw, SlipRateCoulomb
+from vi_contact.laws.friction import Coulomb, ExponentialDecay, SlipRateCoulomb
 from vi_contact.laws.mass import ConsistentMass
 from vi_contact.laws.materials import LinearElastic, Rayleigh
 from vi_contact.run.march import march

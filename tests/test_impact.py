@@ -11,7 +11,8 @@ from chain import chain_problem, chain_surface, chain_system
 from shaken import shaken
 
 from vi_contact.core.errors import InputError
-from vi_contact.laws.impact import ComponentReset, Elastic, Impact, Inelastic, MassProjection, Newton, NoImpact
+from vi_contact.core.protocols import Impact
+from vi_contact.laws.impact import ComponentReset, Elastic, Inelastic, MassProjection, Newton, NoImpact
 from vi_contact.schemes.linear_multistep import LinearMultistep
 from vi_contact.schemes.ss22 import SS22
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor

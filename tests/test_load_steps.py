@@ -14,9 +14,11 @@ from column import column, rubbing_mass, two_component_system
 
 from vi_contact.core.algebra import Array, SerialComm
 from vi_contact.core.errors import InputError
-from vi_contact.core.step import ContactProblem, State
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.protocols import FrictionLaw
+from vi_contact.core.step import State
 from vi_contact.core.surfaces import ContactSurface
-from vi_contact.laws.friction import Coulomb, ExponentialDecay, FrictionLaw, SlipRateCoulomb, StaticKinetic, Tresca
+from vi_contact.laws.friction import Coulomb, ExponentialDecay, SlipRateCoulomb, StaticKinetic, Tresca
 from vi_contact.run.quasi_static import quasi_static
 from vi_contact.run.static import static_equilibrium
 from vi_contact.solvers.condensed import Condensed

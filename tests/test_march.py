@@ -14,7 +14,8 @@ from shaken import changes, shaken
 
 from vi_contact.core.algebra import SerialMatrix
 from vi_contact.core.errors import InputError, StepFailure
-from vi_contact.core.step import ContactProblem, State, StepResult
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.step import State, StepResult
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.impact import Elastic, Inelastic
 from vi_contact.run.static import static_equilibrium

@@ -13,7 +13,7 @@ from fem_problems import BODIES, CONCRETE, block, dense, spread, turned
 from mpi4py import MPI
 
 from vi_contact.core.errors import InputError
-from vi_contact.core.step import ContactProblem
+from vi_contact.core.problem import ContactProblem
 from vi_contact.core.surfaces import Touching
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface

@@ -12,7 +12,7 @@ from fem_problems import block
 from mpi4py import MPI
 
 from vi_contact.core.errors import InputError
-from vi_contact.core.step import ContactProblem
+from vi_contact.core.problem import ContactProblem
 from vi_contact.core.surfaces import HalfSpace
 from vi_contact.core.verify import energy_balance
 from vi_contact.fem.assembly import assemble

@@ -15,22 +15,16 @@ from chain import chain_problem
 
 from vi_contact.core.algebra import SerialComm
 from vi_contact.core.errors import InputError, ViContactError
+from vi_contact.core.files import hdf5_atomically, on_root, sentence, to_json, write_all, write_atomically
+from vi_contact.core.step import Row
 from vi_contact.laws.excitation import Harmonic
 from vi_contact.run.files import history as history_module
-from vi_contact.run.files.folder import (
-    hdf5_atomically,
-    on_root,
-    run_folder,
-    sentence,
-    to_json,
-    write_all,
-    write_atomically,
-)
+from vi_contact.run.files.folder import run_folder
 from vi_contact.run.files.history import HistoryFiles
 from vi_contact.run.files.reading import read_run
 from vi_contact.run.files.stored_rows import StoredRows
 from vi_contact.run.files.table import Block, StoredHistory, Table
-from vi_contact.run.recorders import Contact, Energy, Probe, Row
+from vi_contact.run.recorders import Contact, Energy, Probe
 from vi_contact.run.simulate import Solution, simulate
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed

@@ -11,7 +11,8 @@ from fem_problems import CONCRETE, block, linear
 from mpi4py import MPI
 
 from vi_contact.core.errors import InputError, StepFailure
-from vi_contact.core.step import Certificate, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.step import Certificate, EffectiveMatrix, State, StepProblem, StepResult, initial_state
 from vi_contact.core.surfaces import HalfSpace
 from vi_contact.core.verify import kkt_residual
 from vi_contact.fem.assembly import assemble
@@ -26,7 +27,7 @@ from vi_contact.meshes.channel import ChannelMesh
 from vi_contact.meshes.two_blocks import Blocks
 from vi_contact.models.channel.model import Channel, build
 from vi_contact.run.rigid_bodies import RigidBodies
-from vi_contact.run.static import initial_state, static_equilibrium
+from vi_contact.run.static import static_equilibrium
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.friction.nsgs import NSGS
 

@@ -11,7 +11,8 @@ from chain import chain_problem, chain_surface
 
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
-from vi_contact.core.step import ContactProblem, Report, State
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.step import Report, State
 from vi_contact.laws.excitation import Harmonic
 from vi_contact.laws.impact import Inelastic, MassProjection, Newton
 from vi_contact.run.march import march

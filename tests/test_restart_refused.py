@@ -14,7 +14,7 @@ import pytest
 from test_checkpoint import chain, equal_files, rubbing_box, run, run_wall, wall
 
 from vi_contact.core.errors import InputError
-from vi_contact.core.step import ContactProblem
+from vi_contact.core.problem import ContactProblem
 from vi_contact.laws.excitation import Harmonic, Tabulated
 from vi_contact.laws.friction import Coulomb, SlipRateCoulomb
 from vi_contact.laws.impact import Elastic

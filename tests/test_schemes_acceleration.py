@@ -19,14 +19,15 @@ from shaken import changes, shaken
 
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
-from vi_contact.core.step import ContactProblem, Report, State
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.step import Report, State, initial_state
 from vi_contact.core.verify import energies, energy_balance
 from vi_contact.exact.columns import ObliqueImpact
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.impact import Inelastic, MassProjection
 from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.run.files.checkpoint import Place, Problem, read_checkpoint, write_checkpoint
-from vi_contact.run.static import initial_state, static_equilibrium
+from vi_contact.run.static import static_equilibrium
 from vi_contact.schemes.consistent_data import consistent_acceleration
 from vi_contact.schemes.generalised_alpha import GeneralisedAlpha
 from vi_contact.schemes.hht import HHT

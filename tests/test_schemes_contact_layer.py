@@ -13,7 +13,8 @@ from mpi4py import MPI
 from two_bodies import two_blocks
 
 from vi_contact.core.algebra import Array, SerialAlgebra
-from vi_contact.core.step import ContactProblem, EffectiveMatrix, State, StepProblem
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.step import EffectiveMatrix, State, StepProblem
 from vi_contact.fem.contact.pairs import contact_pair
 from vi_contact.fem.loads import BodyForce, Traction
 from vi_contact.fem.petsc_algebra import PetscAlgebra

@@ -13,10 +13,10 @@ from energy_checks import course
 from oscillator import SHAKEN, amplification, observed_order
 
 from vi_contact.core.errors import InputError, StepFailure
-from vi_contact.core.step import ContactProblem, State
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.step import State, initial_state
 from vi_contact.laws.excitation import Harmonic
 from vi_contact.laws.mass import ConsistentMass, Redistributed
-from vi_contact.run.static import initial_state
 from vi_contact.schemes import admissible_predictor as mass_projection
 from vi_contact.schemes.contact_stabilised import ContactStabilisedNewmark
 from vi_contact.schemes.ss22 import SS22

@@ -10,8 +10,8 @@ from bar import energy, period_three, run
 from oscillator import SHAKEN, dense, observed_order, oscillators
 
 from vi_contact.core.errors import InputError
+from vi_contact.core.step import initial_state
 from vi_contact.laws.mass import ConsistentMass, Redistributed
-from vi_contact.run.static import initial_state
 from vi_contact.schemes.generalised_alpha import AlphaStep, GeneralisedAlpha
 from vi_contact.schemes.hht import HHT
 from vi_contact.schemes.newmark import Newmark

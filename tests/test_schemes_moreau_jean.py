@@ -13,12 +13,12 @@ from energy_checks import course
 from oscillator import FAR, amplification, observed_order
 
 from vi_contact.core.errors import InputError
-from vi_contact.core.step import ContactProblem, State
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.step import State, initial_state
 from vi_contact.laws.excitation import Harmonic
 from vi_contact.laws.impact import Inelastic, NoImpact
 from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.run.recorders import Contact
-from vi_contact.run.static import initial_state
 from vi_contact.run.time_steps import HalvedAtImpact
 from vi_contact.schemes.moreau_jean import MoreauJean
 

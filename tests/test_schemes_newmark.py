@@ -13,10 +13,10 @@ from oscillator import observed_order
 from shaken import changes, shaken
 
 from vi_contact.core.errors import InputError
+from vi_contact.core.step import initial_state
 from vi_contact.core.verify import energy_balance
 from vi_contact.laws.impact import Inelastic
 from vi_contact.laws.mass import ConsistentMass, Redistributed
-from vi_contact.run.static import initial_state
 from vi_contact.run.time_steps import Schedule
 from vi_contact.schemes.linear_multistep import LinearMultistep
 from vi_contact.schemes.newmark import Newmark

@@ -12,10 +12,11 @@ from bar import bar, before_impact, bouncing, energy, period_three, run, thrown
 from oscillator import last_state, observed_order, oscillators
 from shaken import shaken
 
-from vi_contact.core.step import ContactProblem
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.step import initial_state
 from vi_contact.core.verify import energy_balance
 from vi_contact.laws.mass import ConsistentMass, Redistributed
-from vi_contact.run.static import initial_state, static_equilibrium
+from vi_contact.run.static import static_equilibrium
 from vi_contact.schemes.trapezoidal import Trapezoidal
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed

@@ -9,7 +9,7 @@ from chain import chain_problem
 from oscillator import SHAKEN, amplification, dense, exact, last_state, observed_order, oscillators
 
 from vi_contact.core.errors import InputError
-from vi_contact.run.static import initial_state
+from vi_contact.core.step import initial_state
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 
 pytestmark = pytest.mark.serial

@@ -13,7 +13,8 @@ import pytest
 from chain import chain_problem
 
 from vi_contact.core.errors import InputError, StepFailure
-from vi_contact.core.step import ContactProblem, EffectiveMatrix, Report, State, StepProblem, StepResult
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.step import EffectiveMatrix, Report, State, StepProblem, StepResult
 from vi_contact.core.surfaces import ContactSurface
 from vi_contact.laws.excitation import Harmonic
 from vi_contact.laws.impact import Inelastic

@@ -14,7 +14,8 @@ from scipy.integrate import solve_ivp
 import vi_contact as vc
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError, StepFailure
-from vi_contact.core.step import ContactProblem, Report
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.step import Report
 from vi_contact.laws.friction import Coulomb, ExponentialDecay, SlipRateCoulomb, StaticKinetic
 from vi_contact.laws.mass import ConsistentMass
 from vi_contact.run.march import march

@@ -9,9 +9,9 @@ from chain import chain_problem
 
 from vi_contact.core.algebra import SerialAlgebra, SerialMatrix
 from vi_contact.core.errors import InputError, StepFailure, ViContactError
+from vi_contact.core.protocols import Frictionless
 from vi_contact.core.step import Certificate, EffectiveMatrix
 from vi_contact.laws.excitation import Harmonic
-from vi_contact.laws.friction import Frictionless
 
 pytestmark = pytest.mark.serial
 

@@ -21,7 +21,8 @@ from test_simulate import summary_of
 from vi_contact.cli.main import main
 from vi_contact.core.algebra import SerialComm
 from vi_contact.core.errors import InputError, Interrupted
-from vi_contact.core.step import ContactProblem, Report, State
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.step import Report, State
 from vi_contact.run.files import lock as folder_lock
 from vi_contact.run.files.lock import locked
 from vi_contact.run.recorders import Contact, Energy

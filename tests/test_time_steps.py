@@ -18,13 +18,13 @@ from test_checkpoint import chain, difference, equal_files, round_off, run_wall,
 from test_checkpoint import run as run_chain
 
 from vi_contact.core.errors import InputError, StepFailure
-from vi_contact.core.step import ContactProblem, Report
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.step import Report, initial_state
 from vi_contact.laws.impact import Inelastic, MassProjection
 from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.run.march import March
 from vi_contact.run.recorders import Energy
 from vi_contact.run.simulate import simulate
-from vi_contact.run.static import initial_state
 from vi_contact.run.time_steps import Course, HalvedAtImpact, Schedule, course
 from vi_contact.schemes.linear_multistep import LinearMultistep
 from vi_contact.schemes.ss22 import SS22

@@ -12,10 +12,9 @@ from chain import chain_problem
 from shaken import changes, shaken
 
 from vi_contact.core.algebra import SerialMatrix
-from vi_contact.core.step import EffectiveMatrix, Report, StepProblem, StepResult
+from vi_contact.core.step import EffectiveMatrix, Report, StepProblem, StepResult, initial_state
 from vi_contact.core.verify import energies, energy_balance, kkt_residual
 from vi_contact.laws.impact import ComponentReset, Elastic, Inelastic, MassProjection, Newton
-from vi_contact.run.static import initial_state
 from vi_contact.schemes.linear_multistep import LinearMultistep
 from vi_contact.schemes.ss22 import SS22
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor

@@ -18,8 +18,9 @@ from petsc4py import PETSc
 from volume_cases import Case, case, pushed_block
 
 from vi_contact.core.errors import InputError, StepFailure
+from vi_contact.core.protocols import Frictionless
 from vi_contact.core.verify import kkt_residual
-from vi_contact.laws.friction import Coulomb, Frictionless
+from vi_contact.laws.friction import Coulomb
 from vi_contact.solvers.volume.failures import NOT_A_NUMBER, raised, stopped
 from vi_contact.solvers.volume.route import (
     OneFactorisation,

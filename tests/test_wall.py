@@ -8,13 +8,14 @@ from fem_problems import field, max_over_ranks
 from mpi4py import MPI
 
 from vi_contact.core.errors import InputError
+from vi_contact.core.units import STANDARD_GRAVITY
 from vi_contact.engineering.modal import lowest_frequency
 from vi_contact.ground_motion import read_record
 from vi_contact.laws.excitation import GroundMotion, Harmonic
 from vi_contact.laws.impact import Elastic, Inelastic
 from vi_contact.laws.materials import LinearElastic, Rayleigh
 from vi_contact.models import wall_run
-from vi_contact.models.wall import CASES, STANDARD_GRAVITY, Wall, build
+from vi_contact.models.wall import CASES, Wall, build
 from vi_contact.models.wall_run import WallRun, run_wall
 from vi_contact.run.march import march
 from vi_contact.run.simulate import simulate

@@ -10,7 +10,8 @@ import numpy as np
 from mpi4py import MPI
 
 from vi_contact.core.algebra import Array, Mask
-from vi_contact.core.step import ContactProblem, State
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.step import State
 from vi_contact.core.verify import energy_balance
 from vi_contact.laws.impact import Inelastic, MassProjection
 from vi_contact.models.wall import Wall, WallModel, build

@@ -12,7 +12,7 @@ import pytest
 from column import UNIT, column, rubbing_mass
 from energy_checks import rounded
 
-from vi_contact.core.step import ContactProblem
+from vi_contact.core.problem import ContactProblem
 from vi_contact.exact.columns import ObliqueImpact, ShearColumn
 from vi_contact.laws.friction import Coulomb, Tresca
 from vi_contact.laws.mass import ConsistentMass, Redistributed

@@ -14,12 +14,14 @@ from mpi4py import MPI
 
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
-from vi_contact.core.step import ContactProblem, State
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.protocols import FrictionLaw
+from vi_contact.core.step import State
 from vi_contact.core.surfaces import HalfSpace
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import Traction
-from vi_contact.laws.friction import Coulomb, FrictionLaw, Tresca
+from vi_contact.laws.friction import Coulomb, Tresca
 from vi_contact.laws.materials import LinearElastic
 from vi_contact.run.quasi_static import quasi_static
 from vi_contact.run.static import static_equilibrium

@@ -17,7 +17,7 @@ from test_mass import inertia
 
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
-from vi_contact.core.step import ContactProblem
+from vi_contact.core.problem import ContactProblem
 from vi_contact.core.surfaces import HalfSpace, Touching
 from vi_contact.core.verify import energy_balance
 from vi_contact.exact.hertz import HertzPoint

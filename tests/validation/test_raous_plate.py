@@ -18,11 +18,13 @@ from fem_problems import block
 from mpi4py import MPI
 
 from vi_contact.core.algebra import Array
-from vi_contact.core.step import ContactProblem, Solver, State
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.protocols import FrictionLaw, Frictionless
+from vi_contact.core.step import Solver, State
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import Prescribed, Traction
-from vi_contact.laws.friction import Coulomb, FrictionLaw, Frictionless
+from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.materials import LinearElastic
 from vi_contact.run.quasi_static import quasi_static
 from vi_contact.run.static import static_equilibrium

@@ -17,7 +17,8 @@ import pytest
 from fem_problems import BOX_DT, WALL_DT, Run, max_over_ranks, run, shaken_wall, thrown_box, turned
 from mpi4py import MPI
 
-from vi_contact.core.step import ContactProblem, StepProblem
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.step import StepProblem
 from vi_contact.run.cross_check import cross_check
 from vi_contact.run.march import march
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor

@@ -19,7 +19,7 @@ from two_bodies import relative
 import vi_contact as vc
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
-from vi_contact.core.step import ContactProblem
+from vi_contact.core.problem import ContactProblem
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import Traction
 from vi_contact.fem.mesh import build_mesh

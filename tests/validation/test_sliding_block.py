@@ -12,7 +12,7 @@ from mpi4py import MPI
 import vi_contact as vc
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
-from vi_contact.laws.excitation import Excitation
+from vi_contact.core.protocols import Excitation
 from vi_contact.models import sliding_block as sliding
 
 pytestmark = pytest.mark.serial  # ranks change none of these numbers: cheaper tests show it

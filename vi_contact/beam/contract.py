@@ -26,10 +26,10 @@ import scipy.sparse as sp
 from ..core.algebra import Array, SerialAlgebra, SerialComm, SerialMatrix
 from ..core.checks import function, instance, number, provides
 from ..core.errors import InputError
-from ..core.step import ContactProblem
+from ..core.problem import ContactProblem
+from ..core.protocols import FrictionLaw, Frictionless
 from ..core.surfaces import ContactSurface
 from ..core.system import Load, SemiDiscreteSystem
-from ..laws.friction import FrictionLaw, Frictionless
 from ..laws.mass import ConsistentMass
 from .elements import Elements, beam_matrices, rod_matrices
 from .space import BeamSpace

@@ -25,9 +25,9 @@ from ..core.checks import array, flag, function, instance, integers, provides
 from ..core.corners import FEATURE_ANGLE
 from ..core.errors import InputError
 from ..core.initial_gap import admissible_gap
+from ..core.protocols import FrictionLaw, Frictionless
 from ..core.step import EffectiveMatrix, StepProblem
 from ..core.surfaces import ContactSurface, Obstacle, Touching, nodal_frames
-from ..laws.friction import FrictionLaw, Frictionless
 from .boundary_mesh import BoundaryMesh
 from .energetic import summed
 from .poincare_steklov import CondensedCompliance

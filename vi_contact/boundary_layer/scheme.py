@@ -22,7 +22,8 @@ import numpy as np
 from ..core.algebra import Array
 from ..core.checks import instance
 from ..core.errors import InputError, StepFailure
-from ..core.step import ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
+from ..core.problem import ContactProblem
+from ..core.step import EffectiveMatrix, State, StepProblem, StepResult
 from ..laws.impact import NoImpact
 from ..schemes.midpoint import Midpoint
 from ..solvers.condensed import Condensed

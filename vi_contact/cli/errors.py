@@ -12,7 +12,7 @@ from typing import Any, NoReturn
 
 from ..core.checks import SHOWN, shown
 from ..core.errors import InputError, ViContactError
-from ..run.files.folder import sentence
+from ..core.files import sentence
 
 PETSC_ERR_MEM = 55  # of petscsystypes.h
 _ARGUMENT = re.compile(r"(?<= )(\w++)= ?")

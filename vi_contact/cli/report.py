@@ -157,7 +157,7 @@ def _table_path(options: argparse.Namespace) -> Path:
 
 
 def _write(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
-    from ..run.files.folder import sentence, write_atomically
+    from ..core.files import sentence, write_atomically
 
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")

@@ -7,7 +7,7 @@ Sizes are compared on all ranks together, so that all of them raise the same sen
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,26 +17,25 @@ from .errors import InputError
 from .surfaces import ContactSurface
 from .system import SemiDiscreteSystem
 
-if TYPE_CHECKING:
-    from .step import ContactProblem
-
 EXCITATION = ("acceleration", "direction", "duration")
 
 
-def check_problem(problem: ContactProblem) -> None:
-    """InputError, on all ranks, for parts of the wrong kind or size, or made for another system. Collective."""
-    owner, system, surface = "ContactProblem", problem.system, problem.surface
+def check_parts(
+    system: Any, surface: Any, friction: Any, impact: Any, mass: Any, excitations: tuple[Any, ...], *, frictional: bool
+) -> None:
+    """Raise InputError, on all ranks, for parts of the wrong kind or size, or made for another system. Collective."""
+    owner = "ContactProblem"
     instance(owner, "system", system, SemiDiscreteSystem, "give a system, such as fem.assemble returns")
     instance(owner, "surface", surface, ContactSurface, "give a contact surface, such as fem.contact_surface returns")
-    provides(owner, "friction", problem.friction, ("limit", "slope", "at"), "give Coulomb(mu) or another friction law")
-    if problem.impact is not None:
-        provides(owner, "impact", problem.impact, ("target", "apply"), "give Inelastic() or another law, or None")
-    if problem.mass is not None:
+    provides(owner, "friction", friction, ("limit", "slope", "at"), "give Coulomb(mu) or another friction law")
+    if impact is not None:
+        provides(owner, "impact", impact, ("target", "apply"), "give Inelastic() or another law, or None")
+    if mass is not None:
         remedy = "give Redistributed() or ConsistentMass(), or None"
-        provides(owner, "mass", problem.mass, ("apply",), remedy, lacks=("target",))
-    for excitation in problem.excitations:
+        provides(owner, "mass", mass, ("apply",), remedy, lacks=("target",))
+    for excitation in excitations:
         _check_excitation(excitation, system)
-    if system.absolute and problem.excitations:
+    if system.absolute and excitations:
         raise InputError(
             "a compliant base is shaken by its own upgoing motion: leave the excitation of the problem out, its "
             "inertia load is that of a rigid base"
@@ -50,7 +49,7 @@ def check_problem(problem: ContactProblem) -> None:
         raise InputError(f"ContactProblem: the surface is shared by {surface.comm.size} ranks and the system by "
                          f"{system.algebra.comm.size}: make both on the same ranks")
     refuse((*_of_system(system), *_of_surface(surface, system)), surface.comm)
-    if problem.frictional:
+    if frictional:
         refuse_rubbing(surface)
 
 

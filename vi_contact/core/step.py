@@ -13,94 +13,18 @@ have shape (m,) or, tangential ones, (m, d - 1), and are equal on all ranks; r_t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
 
-from ..laws.excitation import Excitation
-from ..laws.friction import FrictionLaw, Frictionless
-from ..laws.impact import ImpactLaw
-from ..laws.mass import MassLaw
 from .algebra import Algebra, Array, Factor, Mask, Matrix
 from .errors import InputError
-from .problem_checks import check_problem
+from .problem import ContactProblem
+from .protocols import FrictionLaw, Frictionless, MassLaw
 from .surfaces import ContactSurface
-from .system import SemiDiscreteSystem
-
-
-@dataclass(frozen=True)
-class ContactProblem:
-    """A semi-discrete system, a contact surface, what shakes it and how it rubs and rebounds.
-
-    The system is turned into the surface's nodal frames once, here. ``impact=None`` leaves velocities alone;
-    ``mass=None`` leaves the choice of the mass matrix to the time scheme. InputError, on all ranks, for parts of the
-    wrong kind or size, and for a surface that was made for another system. Collective.
-    """
-
-    system: SemiDiscreteSystem
-    surface: ContactSurface
-    friction: FrictionLaw = field(default_factory=Frictionless)
-    impact: ImpactLaw | None = None
-    excitation: Excitation | Sequence[Excitation] = ()
-    mass: MassLaw | None = None
-
-    def __post_init__(self) -> None:
-        check_problem(self)
-
-    @property
-    def excitations(self) -> tuple[Excitation, ...]:
-        """The excitations as a tuple."""
-        return tuple(self.excitation) if isinstance(self.excitation, Sequence) else (self.excitation,)
-
-    @cached_property
-    def equations(self) -> SemiDiscreteSystem:
-        """The system in the rotated basis, with the inertia loads -M r a_g(t) of the excitations; schemes see this."""
-        system = self.turned
-        if self.mass is not None:
-            system = self.mass.apply(system, self.surface, tangential=self.frictional)
-        system = self._relative(system)
-        return system.with_load(
-            *((-system.inertia(np.asarray(one.direction, dtype=float)), one.acceleration) for one in self.excitations)
-        )
-
-    @cached_property
-    def static_load(self) -> SemiDiscreteSystem:
-        """The system in the basis of the equations, without excitation: the gravity stage."""
-        return self._relative(self.turned)
-
-    @cached_property
-    def turned(self) -> SemiDiscreteSystem:
-        """The system in the nodal frames, every body in its own unknowns."""
-        surface = self.surface
-        return self.system if surface.basis is None else self.system.in_basis(surface.basis, surface.dual)
-
-    def _relative(self, system: SemiDiscreteSystem) -> SemiDiscreteSystem:
-        return system if self.surface.coupling is None else system.in_relative(self.surface.coupling)
-
-    @property
-    def frictional(self) -> bool:
-        """Whether tangential reactions can occur at all."""
-        return not isinstance(self.friction, Frictionless)
-
-    def slip_origin(self, u: Array, start: float, end: float) -> Array | None:
-        """B_t u plus what the obstacle slides until then: where the slip of a step is zero; None without friction."""
-        if not self.frictional:
-            return None
-        origin, sliding = self.surface.tangential_values(u), self.surface.sliding(start, end)
-        return origin if sliding is None else origin + sliding
-
-    def cartesian(self, x: Array) -> Array:
-        """T R x: unknowns of the equations back to the system's own."""
-        x = x if self.surface.coupling is None else self.surface.coupling @ x
-        return x if self.surface.basis is None else self.surface.basis @ x
-
-    def ground_acceleration(self, t: float) -> Array:
-        """Vector a_g(t) [m/s²] summed over the excitations."""
-        parts = (one.acceleration(t) * np.asarray(one.direction, dtype=float) for one in self.excitations)
-        return np.asarray(sum(parts, np.zeros(self.system.influence.shape[1])))
 
 
 @dataclass(frozen=True)
@@ -317,3 +241,26 @@ class Recorder(Protocol):
     def row(self, report: Report) -> Mapping[str, Any]:
         """The row of a step: numbers, or arrays (which go to HDF5 only)."""
         ...
+
+
+Columns = Mapping[str, tuple[str, str]]
+
+
+Row = Mapping[str, Any]
+
+
+AXES = "xyz"
+
+
+def initial_state(problem: ContactProblem, t: float = 0.0) -> State:
+    """u0, v0 of the system, in the rotated basis, no reaction; InputError when u0 penetrates the obstacle."""
+    system, surface = problem.equations, problem.surface
+    gap = surface.gap(t) - surface.normal_values(system.u0)
+    u_max = float(surface.comm.max(np.array([np.max(np.abs(system.u0), initial=0.0)]))[0])
+    size = max(u_max, float(np.max(surface.gap0, initial=0.0)))
+    if len(gap) and gap.min() < -1e-9 * size:
+        raise InputError(
+            f"the initial displacement penetrates the obstacle by {-gap.min():.3g} m: reduce it or enlarge the gap"
+        )
+    none = np.zeros(surface.count)
+    return State(t, 0, system.u0.copy(), system.v0.copy(), none, surface.bilateral.copy())

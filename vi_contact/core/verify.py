@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from .algebra import Array, max_abs
-from .step import Balance, Certificate, ContactProblem, State, StepProblem, StepResult
+from .problem import ContactProblem
+from .step import Balance, Certificate, State, StepProblem, StepResult
 from .system import SemiDiscreteSystem
 
 ROUNDED = 1e-5  # of |A||x|, and of what friction is compared with: see Certificate

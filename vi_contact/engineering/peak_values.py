@@ -13,8 +13,8 @@ import numpy as np
 from ..core.algebra import Array
 from ..core.checks import instance, number, several
 from ..core.errors import InputError, ViContactError
-from ..run.files.folder import sentence, write_atomically
-from ..run.recorders import Columns
+from ..core.files import sentence, write_atomically
+from ..core.step import Columns
 
 HEADER = ("name", "quantity", "unit", "max", "t_max", "min", "t_min")
 GROWS = "; at impacts its peak depends on dt"

@@ -10,8 +10,8 @@ import numpy as np
 from ..core.algebra import Array
 from ..core.checks import array, column_name, instance
 from ..core.errors import InputError
-from ..core.step import ContactProblem, Report, State
-from ..run.recorders import Columns, Row
+from ..core.problem import ContactProblem
+from ..core.step import Columns, Report, Row, State
 
 
 def racking(corners: Array, displacements: Array) -> tuple[Array, Array]:

@@ -22,9 +22,9 @@ import numpy as np
 from ..core.algebra import Array, Mask
 from ..core.checks import array, column_name, function, instance, provides
 from ..core.errors import InputError
-from ..core.step import ContactProblem, Report, State
+from ..core.problem import ContactProblem
+from ..core.step import AXES, Columns, Report, Row, State
 from ..core.surfaces import nodal_frames
-from ..run.recorders import AXES, Columns, Row
 
 Where = Callable[[Array, Array], Mask]
 

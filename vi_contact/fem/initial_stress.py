@@ -20,9 +20,10 @@ from typing import Any
 import ufl
 
 from ..core.algebra import Array
-from ..core.step import ContactProblem, State
+from ..core.problem import ContactProblem
+from ..core.state_checks import check_problem_given, check_sizes
+from ..core.step import State
 from ..core.system import Load, SemiDiscreteSystem
-from ..run.checks import check_problem_given, check_sizes
 from . import compat
 from .petsc_algebra import PetscMatrix
 from .space import FemSpace, known_matrices, space_of

@@ -18,9 +18,9 @@ import numpy as np
 
 from ..core.algebra import Array, max_abs
 from ..core.errors import InputError
-from ..core.step import ContactProblem, State
-from ..run.checks import check_problem_given, check_sizes
-from ..run.static import initial_state
+from ..core.problem import ContactProblem
+from ..core.state_checks import check_problem_given, check_sizes
+from ..core.step import State, initial_state
 from .space import FemSpace
 
 log = logging.getLogger(__name__)

@@ -12,19 +12,30 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
+from mpi4py import MPI
 
 from ..core.algebra import Array, Indices
 from ..core.errors import InputError
 from .groups import components_given, facets_of
 from .mesh import Facets
 
-if TYPE_CHECKING:
-    from .space import FemSpace
-
 CLOSE = 1e-6  # of the body's size: nodes farther from the place of their partner have none
+
+
+class BodyNodes(Protocol):
+    """The nodes of a body on this rank: ``nodes`` their original numbers, ``points`` (n, d) where they are [m]."""
+
+    comm: MPI.Comm
+    dimension: int
+    size: float
+    nodes: Indices
+    points: Array
+
+    def facet_blocks(self, facets: Indices) -> Indices:
+        """Return rows of ``points``: the owned nodes of local facets."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +61,7 @@ class Pairs:
     components: tuple[int, ...]
 
 
-def paired(space: FemSpace, tied: Sequence[Tied]) -> list[Pairs]:
+def paired(space: BodyNodes, tied: Sequence[Tied]) -> list[Pairs]:
     """The nodes of every tie. Collective.
 
     InputError when nodes have no partner, when a node is tied twice, or a component that does not exist.
@@ -63,7 +74,7 @@ def paired(space: FemSpace, tied: Sequence[Tied]) -> list[Pairs]:
     return found
 
 
-def _pairs(space: FemSpace, tie: Tied) -> Pairs:
+def _pairs(space: BodyNodes, tie: Tied) -> Pairs:
     first, second = (_nodes(space, facets) for facets in (tie.first, tie.second))
     names = f"'{tie.first.name}' and '{tie.second.name}'"
     if len(first[0]) != len(second[0]) or not len(first[0]):
@@ -83,7 +94,7 @@ def _pairs(space: FemSpace, tie: Tied) -> Pairs:
     return Pairs(first[0], second[0][partner], components)
 
 
-def _nodes(space: FemSpace, facets: Facets) -> tuple[Indices, Array]:
+def _nodes(space: BodyNodes, facets: Facets) -> tuple[Indices, Array]:
     """(original numbers, points) of the nodes of facets, ascending, on every rank."""
     blocks = space.facet_blocks(facets.indices)
     parts = space.comm.bcast(space.comm.gather((space.nodes[blocks], space.points[blocks])))

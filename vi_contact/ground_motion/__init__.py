@@ -1,5 +1,6 @@
 """Ground motions: readers and writers of record files, processing, spectra, intensity measures, synthetic motions."""
 
+from ..core.units import STANDARD_GRAVITY
 from .baseline import baseline_corrected
 from .chain import Processing
 from .ec8 import EC8Spectrum
@@ -22,7 +23,7 @@ from .intensity import (
 )
 from .kanai_tajimi import Envelope, KanaiTajimi, synthetic
 from .processing import integrated, resampled, scaled, scaled_to_pga
-from .record import STANDARD_GRAVITY, UNITS, Record
+from .record import UNITS, Record
 from .scaling import scaled_to_arias, scaled_to_psa
 from .spectra import ResponseSpectrum, fourier_spectrum, response_spectrum
 from .spectral_intensity import housner_intensity, mean_period, predominant_period, psa

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import os
 
+from ..core.units import STANDARD_GRAVITY
 from .chain import Processing
 from .formats.reader import LARGEST_PEAK, read_record
 from .intensity import arias, cav, d5_95, pga, pga_time, pgd, pgv, rms
 from .processing import integrated
-from .record import STANDARD_GRAVITY, UNITS, Record
+from .record import UNITS, Record
 from .spectral_intensity import housner_intensity, mean_period, predominant_period
 
 

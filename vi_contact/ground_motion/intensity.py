@@ -8,8 +8,9 @@ import numpy as np
 
 from ..core.algebra import Array
 from ..core.errors import InputError
+from ..core.units import STANDARD_GRAVITY
 from .processing import integrated
-from .record import STANDARD_GRAVITY, Record
+from .record import Record
 
 
 def pga(record: Record) -> float:

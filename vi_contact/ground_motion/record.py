@@ -11,9 +11,7 @@ import numpy as np
 from ..core.algebra import Array
 from ..core.checks import shown
 from ..core.errors import InputError
-
-STANDARD_GRAVITY = 9.80665
-"""Standard gravity [m/s²], the g of every record file."""
+from ..core.units import STANDARD_GRAVITY
 
 UNITS = {"m/s2": 1.0, "cm/s2": 0.01, "gal": 0.01, "g": STANDARD_GRAVITY, "g/10": 0.1 * STANDARD_GRAVITY, "mm/s2": 0.001,
          "in/s2": 0.0254, "ft/s2": 0.3048}

@@ -14,36 +14,14 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Protocol
 
 import numpy as np
 
 from ..core.algebra import Array
 from ..core.checks import attributes, instance, number, several
 from ..core.errors import InputError
+from ..core.protocols import Excitation
 from ..ground_motion import Record
-
-
-class Excitation(Protocol):
-    """The contract of every excitation."""
-
-    @property
-    def direction(self) -> tuple[float, ...]:
-        """Components of the direction, one per space dimension, not all zero."""
-        ...
-
-    @property
-    def duration(self) -> float:
-        """Time [s] after which the acceleration stays zero or negligible; infinite if it never does."""
-        ...
-
-    def acceleration(self, t: float) -> float:
-        """Acceleration [m/s²] at time t [s], positive along the direction."""
-        ...
-
-    def __call__(self, t: float) -> Array:
-        """The vector acceleration(t) · direction [m/s²], shape (d,)."""
-        ...
 
 
 def _vector(self: Excitation, t: float) -> Array:

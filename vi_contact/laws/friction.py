@@ -14,53 +14,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from ..core.algebra import Array
 from ..core.checks import function, real, shown
 from ..core.errors import InputError
-
-
-class FrictionLaw(Protocol):
-    """What a solver asks of a friction law."""
-
-    def limit(self, r_n: Array, weights: Array, scale: float) -> Array:
-        """Largest tangential reaction of each node, shape (n,), in the unit of r_n.
-
-        r_n: normal reactions, shape (n,) [N or N s]; weights: tributary lengths or areas, shape (n,) [m or m²];
-        scale: 1 for forces, dt [s] for impulses.
-        """
-        ...
-
-    def slope(self, weights: Array) -> Array:
-        """d limit / d r_n of each node under pressure, shape (n,); limit does not grow with tension."""
-        ...
-
-    def at(self, speed: Array) -> FrictionLaw:
-        """The law at slip rates |v| [m/s], shape (n,), with a slope of its own.
-
-        ``limit`` and ``slope`` of a law itself are those at rest. A law that does not know rates returns itself.
-        """
-        ...
-
-
-@dataclass(frozen=True)
-class Frictionless:
-    """No tangential reaction: limit = 0."""
-
-    def limit(self, r_n: Array, weights: Array, scale: float) -> Array:
-        """Zeros, shape (n,)."""
-        return np.zeros_like(r_n, dtype=float)
-
-    def slope(self, weights: Array) -> Array:
-        """Zeros, shape (n,)."""
-        return np.zeros(len(weights))
-
-    def at(self, speed: Array) -> Frictionless:
-        """Itself: the law does not know the slip rate."""
-        return self
 
 
 @dataclass(frozen=True)

@@ -21,46 +21,18 @@ from typing import Protocol
 
 import numpy as np
 
-from ..core.algebra import Array, Factor, Indices, Mask
+from ..core.algebra import Array, Factor, Indices
 from ..core.checks import function, real, shown
 from ..core.corners import with_open_faces
 from ..core.errors import InputError
+from ..core.protocols import Impact
 from ..core.surfaces import ContactSurface
 from ..core.system import SemiDiscreteSystem
-
-
-@dataclass(frozen=True)
-class Impact:
-    """What an impact law is told of the m conditions.
-
-    Attributes:
-        before: normal velocities before the step [m/s], > 0 towards the obstacle.
-        v_n: normal velocities that the step left [m/s].
-        active: which are closed. closing: which have just closed.
-    """
-
-    before: Array
-    v_n: Array
-    active: Mask
-    closing: Mask
-
 
 STORED_ENTRIES = 200_000  # of M⁻¹Bᵀ over all ranks: beyond it a back-substitution is cheaper than the product
 
 
 READING = "give ComponentReset() or MassProjection()"
-
-
-class ImpactLaw(Protocol):
-    """Post-impact velocity law: one of this file, or the user's own object with these two methods."""
-
-    def target(self, impact: Impact) -> Array:
-        """Normal velocities (m,) after the impact; NaN where the law leaves the velocity alone."""
-        ...
-
-    def apply(self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array) -> Array:
-        """The velocity vector that has these normal velocities."""
-        ...
 
 
 class Reading(Protocol):

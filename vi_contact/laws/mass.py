@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -24,14 +24,6 @@ from .mass_transfer import from_neighbours, rigid_motions
 
 LIGHT = 1e-9  # of the diagonal entry of M: a row sum that is no mass
 LARGEST_CORRECTION = 0.35  # of a node's lumped mass: beyond, the mesh is too coarse to move mass about
-
-
-class MassLaw(Protocol):
-    """Turns the system, in the rotated basis, into one with the wanted mass matrix."""
-
-    def apply(
-        self, system: SemiDiscreteSystem, surface: ContactSurface, *, tangential: bool
-    ) -> SemiDiscreteSystem: ...
 
 
 def mass_law(owner: str, value: Any) -> None:

@@ -16,7 +16,8 @@ from scipy.special import betaincinv
 
 from ..core.algebra import Array
 from ..core.errors import InputError
-from ..core.step import ContactProblem
+from ..core.problem import ContactProblem
+from ..core.protocols import MassLaw
 from ..core.surfaces import HalfSpace
 from ..core.system import SemiDiscreteSystem
 from ..exact.hertz import HertzImpact, contact_modulus
@@ -24,7 +25,6 @@ from ..fem.assembly import assemble
 from ..fem.contact.surface import contact_surface
 from ..fem.loads import Prescribed
 from ..fem.mesh import build_mesh
-from ..laws.mass import MassLaw
 from ..laws.materials import LinearElastic
 from ..meshes.ball import BallMesh
 

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from ..core.algebra import Array
-from ..core.step import ContactProblem
+from ..core.problem import ContactProblem
+from ..core.protocols import ImpactLaw, MassLaw
 from ..core.surfaces import HalfSpace
 from ..core.system import SemiDiscreteSystem
 from ..exact.bar import PeriodicBar, ThrownBar
@@ -21,8 +22,6 @@ from ..fem.assembly import assemble
 from ..fem.contact.surface import contact_surface
 from ..fem.loads import BodyForce
 from ..fem.mesh import build_mesh
-from ..laws.impact import ImpactLaw
-from ..laws.mass import MassLaw
 from ..laws.materials import LinearElastic, PlaneStrain, Solid
 from ..meshes.block import BlockMesh
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..core.protocols import ImpactLaw, MassLaw
 from ..core.step import Scheme, Solver
-from ..laws.impact import ImpactLaw, Inelastic, NoImpact
-from ..laws.mass import ConsistentMass, MassLaw
+from ..laws.impact import Inelastic, NoImpact
+from ..laws.mass import ConsistentMass
 from ..schemes.contact_stabilised import ContactStabilisedNewmark
 from ..schemes.generalised_alpha import GeneralisedAlpha
 from ..schemes.hht import HHT

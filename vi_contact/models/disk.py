@@ -12,14 +12,14 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..core.checks import attributes, function, instance
-from ..core.step import ContactProblem, Report, State
+from ..core.problem import ContactProblem
+from ..core.protocols import FrictionLaw, Frictionless, MassLaw
+from ..core.step import Report, State
 from ..core.surfaces import HalfSpace
 from ..core.system import SemiDiscreteSystem
 from ..fem.assembly import assemble
 from ..fem.contact.surface import contact_surface
 from ..fem.mesh import build_mesh
-from ..laws.friction import FrictionLaw, Frictionless
-from ..laws.mass import MassLaw
 from ..laws.materials import LinearElastic, PlaneStrain
 from ..meshes.disk import DiskMesh
 

@@ -13,7 +13,8 @@ from typing import Any
 
 from ..core.checks import instance
 from ..core.errors import InputError
-from ..core.step import ContactProblem
+from ..core.problem import ContactProblem
+from ..core.protocols import FrictionLaw, Frictionless, MassLaw
 from ..core.surfaces import ContactSurface
 from ..core.system import SemiDiscreteSystem
 from ..fem.assembly import assemble
@@ -21,8 +22,6 @@ from ..fem.contact.joined import together
 from ..fem.contact.pairs import contact_pair
 from ..fem.loads import Traction
 from ..fem.mesh import build_mesh
-from ..laws.friction import FrictionLaw, Frictionless
-from ..laws.mass import MassLaw
 from ..laws.materials import LinearElastic, PlaneStrain
 from ..meshes.block import BlockMesh
 from ..meshes.cut import Welded

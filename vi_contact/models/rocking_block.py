@@ -22,7 +22,9 @@ import numpy as np
 
 from ..core.algebra import Array
 from ..core.errors import InputError
-from ..core.step import ContactProblem, Report, State
+from ..core.problem import ContactProblem
+from ..core.protocols import Excitation
+from ..core.step import Report, State
 from ..core.surfaces import HalfSpace
 from ..exact.housner import HousnerBlock
 from ..fem.assembly import assemble
@@ -30,7 +32,6 @@ from ..fem.contact.surface import contact_surface
 from ..fem.initial_stress import geometric_stiffness
 from ..fem.loads import BodyForce, Prescribed
 from ..fem.mesh import build_mesh
-from ..laws.excitation import Excitation
 from ..laws.materials import Damping, LinearElastic, PlaneStress, Rayleigh
 from ..meshes.block import BlockMesh
 from ..run.static import static_equilibrium

@@ -6,9 +6,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from ..core.errors import InputError
-from ..core.step import ImpactLaw, Solver
+from ..core.protocols import Excitation, ImpactLaw
+from ..core.step import Solver
 from ..ground_motion import Record, pga, read_record, resampled, scaled, scaled_to_pga
-from ..laws.excitation import Excitation, GroundMotion
+from ..laws.excitation import GroundMotion
 from ..run.cross_check import CrossChecked
 from .choices import SCHEMES, SOLVERS
 

@@ -10,14 +10,15 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..core.errors import InputError
-from ..core.step import ContactProblem, State
+from ..core.problem import ContactProblem
+from ..core.protocols import Excitation
+from ..core.step import State
 from ..core.surfaces import HalfSpace
 from ..exact.sliding import SlidingBlock
 from ..fem.assembly import assemble
 from ..fem.contact.surface import contact_surface
 from ..fem.loads import BodyForce
 from ..fem.mesh import build_mesh
-from ..laws.excitation import Excitation
 from ..laws.friction import Coulomb
 from ..laws.materials import Damping, LinearElastic, PlaneStress, Rayleigh
 from ..meshes.block import BlockMesh

@@ -12,14 +12,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..core.checks import attributes, function, instance
-from ..core.step import ContactProblem
+from ..core.problem import ContactProblem
+from ..core.protocols import FrictionLaw, Frictionless, MassLaw
 from ..core.system import SemiDiscreteSystem
 from ..fem.assembly import assemble
 from ..fem.contact.surface import contact_surface
 from ..fem.loads import Prescribed, Traction
 from ..fem.mesh import build_mesh
-from ..laws.friction import FrictionLaw, Frictionless
-from ..laws.mass import MassLaw
 from ..laws.materials import LinearElastic, PlaneStrain
 from ..meshes.block import BlockMesh
 

@@ -10,7 +10,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from ..core.errors import InputError
-from ..core.step import ContactProblem, ImpactLaw
+from ..core.problem import ContactProblem
+from ..core.protocols import Excitation, ImpactLaw, MassLaw
 from ..core.surfaces import ContactSurface, HalfSpace, empty_surface
 from ..core.system import SemiDiscreteSystem
 from ..engineering.modal import lowest_frequency
@@ -20,9 +21,9 @@ from ..fem.loads import BodyForce
 from ..fem.mesh import Facets, build_mesh
 from ..fem.petsc_algebra import MpiComm
 from ..ground_motion import STANDARD_GRAVITY
-from ..laws.excitation import Excitation, Harmonic
+from ..laws.excitation import Harmonic
 from ..laws.impact import Inelastic
-from ..laws.mass import ConsistentMass, MassLaw
+from ..laws.mass import ConsistentMass
 from ..laws.materials import Damping, LinearElastic, NoDamping, PlaneStress
 from ..meshes.wall import WallMesh
 from .run_options import check_word

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from ..core.algebra import Array
-from ..core.step import ContactProblem, State
+from ..core.problem import ContactProblem
+from ..core.step import State
 from ..core.surfaces import ContactSurface
 from ..fem.output.fields import XDMF
 from ..plots.histories import plot_certificate, plot_contact, plot_energy, plot_excitation, plot_points

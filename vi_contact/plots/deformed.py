@@ -13,7 +13,8 @@ import numpy as np
 
 from ..core.algebra import Array, Indices
 from ..core.errors import InputError
-from ..run.files.folder import FIELDS, HISTORY_H5
+from ..core.files import FIELDS
+from ..run.files.folder import HISTORY_H5
 
 
 @dataclass(frozen=True)

@@ -7,16 +7,18 @@ belong to runs with the same: systems and surfaces carry their ``Pace``, and it 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import fields
 from typing import Any
 
 import numpy as np
 
 from ..core.algebra import max_abs
-from ..core.checks import instance, number, provides, real, refuse, several, shown, whole
+from ..core.checks import provides, real, several, shown
 from ..core.errors import InputError
-from ..core.step import ContactProblem, State
+from ..core.problem import ContactProblem
+from ..core.state_checks import check_sizes
+from ..core.step import State
 from ..core.system import Pace
 from .time_steps import HalvedAtImpact, Schedule, TimeSteps, described
 
@@ -46,27 +48,6 @@ def check_methods(owner: str, solver: Any, escalation: Any, tolerance: Any) -> N
         raise InputError(f"{owner}: tolerance is {shown(tolerance)}; give a relative residual above 0, such as 1e-9")
 
 
-def check_problem_given(owner: str, value: Any) -> None:
-    """InputError unless it is a contact problem."""
-    instance(owner, "problem", value, ContactProblem, "give a ContactProblem(system, surface, …)")
-
-
-def start_time(owner: str, state: Any) -> float:
-    """The time of a state [s], 0 of None; InputError for anything else."""
-    if state is None:
-        return 0.0
-    instance(owner, "state", state, State, "give a state, of static_equilibrium or of a run, or None")
-    whole(owner, "k of the state", state.k)
-    return number(owner, "t of the state", state.t, unit="s")
-
-
-def check_sizes(owner: str, problem: ContactProblem, state: Any) -> None:
-    """InputError, on all ranks, for a state of another problem. Collective."""
-    start_time(owner, state)
-    instance(owner, "state", state, State, "give a state, of static_equilibrium or of a run")
-    refuse((f"{owner}: {text}" for text in _of_state(problem, state)), problem.surface.comm)
-
-
 def check_state(owner: str, problem: ContactProblem, state: State, *, dt: float, tolerance: float, scheme: Any) -> None:
     """InputError, on all ranks, for a state of another problem, or one that penetrates the obstacle. Collective.
 
@@ -85,21 +66,6 @@ def check_state(owner: str, problem: ContactProblem, state: State, *, dt: float,
             f"{owner}: the state lies {-gap[worst]:.3g} m inside the obstacle at ({where}): start from one with every "
             "gap >= 0"
         )
-
-
-def _of_state(problem: ContactProblem, state: State) -> Iterator[str]:
-    """What is wrong with a state on this rank."""
-    n, m, d = problem.system.rows, problem.surface.count, problem.system.influence.shape[1]
-    shapes: dict[str, tuple[int, ...]] = {"u": (n,), "v": (n,), "r_n": (m,), "active": (m,), "r_t": (m, d - 1)}
-    for name, shape in shapes.items():
-        value = getattr(state, name)
-        if name == "r_t" and value is None:
-            continue
-        kinds, wanted = ("b", "True or False") if name == "active" else ("iuf", "finite real numbers")
-        if not isinstance(value, np.ndarray) or value.shape != shape:
-            yield f"the state has {name} of shape {np.shape(value)} and the problem needs {shape}: give one of its own"
-        elif value.dtype.kind not in kinds or not np.all(np.isfinite(value)):
-            yield f"{name} of the state is {shown(value)}: give {wanted}"
 
 
 def check_pace(problem: ContactProblem, scheme: Any, plan: TimeSteps) -> None:

@@ -13,7 +13,8 @@ import numpy as np
 
 from ..core.algebra import Array, max_abs
 from ..core.errors import InputError
-from ..core.step import ContactProblem, Report
+from ..core.problem import ContactProblem
+from ..core.step import Report
 
 
 class Opinion(Protocol):

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ..core.step import ContactProblem, Scheme
+from ..core.problem import ContactProblem
+from ..core.state_checks import check_problem_given
+from ..core.step import Scheme
 from ..laws.impact import NoImpact
 from ..laws.mass import ConsistentMass
 from ..schemes.trapezoidal import Trapezoidal
 from ..schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
-from .checks import check_problem_given, check_scheme
+from .checks import check_scheme
 
 
 def completed(problem: ContactProblem, scheme: Scheme | None) -> tuple[ContactProblem, Scheme]:

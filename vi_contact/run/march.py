@@ -7,13 +7,14 @@ from functools import partial
 
 import numpy as np
 
-from ..core.step import ContactProblem, EffectiveMatrix, Report, Scheme, Solver, State
-from ..laws.impact import Impact
+from ..core.problem import ContactProblem
+from ..core.protocols import Impact
+from ..core.state_checks import start_time
+from ..core.step import EffectiveMatrix, Report, Scheme, Solver, State, initial_state
 from ..solvers.certified import TOLERANCE, CertifiedSolver
 from ..solvers.condensed import Condensed
-from .checks import check_methods, check_pace, check_state, start_time
+from .checks import check_methods, check_pace, check_state
 from .defaults import completed
-from .static import initial_state
 from .time_steps import Course, TimeSteps, course
 
 

@@ -22,7 +22,8 @@ import numpy as np
 
 from ..core.algebra import Array, Mask, max_abs
 from ..core.errors import InputError, StepFailure
-from ..core.step import Certificate, ContactProblem, EffectiveMatrix, Solver, StepProblem, StepResult
+from ..core.problem import ContactProblem
+from ..core.step import Certificate, EffectiveMatrix, Solver, StepProblem, StepResult
 from ..core.verify import kkt_residual
 from ..solvers.correction import MARGIN, added, kept, left_over, share_of
 from .rigid_bodies import RigidBodies, body_springs

@@ -19,10 +19,12 @@ import numpy as np
 
 from ..core.checks import real, shown
 from ..core.errors import InputError
-from ..core.step import ContactProblem, Solver, State
+from ..core.problem import ContactProblem
+from ..core.state_checks import check_problem_given, check_sizes
+from ..core.step import Solver, State, initial_state
 from ..solvers.certified import TOLERANCE
-from .checks import check_methods, check_problem_given, check_sizes
-from .static import Equilibria, initial_state
+from .checks import check_methods
+from .static import Equilibria
 
 
 def quasi_static(

@@ -15,12 +15,9 @@ import numpy as np
 from ..core.algebra import Array
 from ..core.checks import array, attributes, column_name, instance
 from ..core.errors import InputError, StepFailure
-from ..core.step import ContactProblem, Report, State
+from ..core.problem import ContactProblem
+from ..core.step import AXES, Columns, Report, Row, State
 from ..core.verify import Energies, energies, energy_balance
-
-Columns = Mapping[str, tuple[str, str]]
-Row = Mapping[str, Any]
-AXES = "xyz"
 
 
 def refuse_overflow(row: Row) -> None:

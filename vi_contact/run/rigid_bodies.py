@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core.algebra import Array, Comm, Indices, Matrix
-from ..core.step import ContactProblem
+from ..core.problem import ContactProblem
 from ..core.system import SemiDiscreteSystem
 from ..laws.mass_transfer import rigid_motions
 

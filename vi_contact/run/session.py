@@ -15,7 +15,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..core.errors import Interrupted
-from ..core.step import ContactProblem, Recorder, Report, Scheme, Solver, State, StepResult
+from ..core.problem import ContactProblem
+from ..core.step import Recorder, Report, Scheme, Solver, State, StepResult
 from .files.checkpoint import Place, Problem
 from .files.log import Progress, versions
 from .files.table import Table

@@ -10,21 +10,23 @@ from typing import Any
 from ..core.algebra import Comm
 from ..core.checks import flag, instance, provides, several, whole
 from ..core.errors import InputError
-from ..core.step import ContactProblem, Recorder, Scheme, Solver, State
+from ..core.files import on_root
+from ..core.problem import ContactProblem
+from ..core.state_checks import start_time
+from ..core.step import Columns, Recorder, Row, Scheme, Solver, State, initial_state
 from ..solvers.certified import TOLERANCE
 from ..solvers.condensed import Condensed
-from .checks import check_methods, check_pace, check_state, start_time
+from .checks import check_methods, check_pace, check_state
 from .defaults import completed
 from .files.checkpoint import Place, read_checkpoint
-from .files.folder import on_root, run_folder
+from .files.folder import run_folder
 from .files.lock import locked
 from .files.stored_rows import StoredRows
 from .files.table import Block, Table
 from .files.writer import FieldWriter, Writer
-from .recorders import Columns, Contact, Energy, Row, Steps
+from .recorders import Contact, Energy, Steps
 from .session import Comparison, Run, Settings
 from .solution import Solution
-from .static import initial_state
 from .time_steps import TimeSteps, course
 
 __all__ = ["Solution", "simulate"]

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from ..core.algebra import Array
-from ..core.step import State
-from ..laws.excitation import Excitation, GroundMotion
-from .files.folder import to_json
+from ..core.files import to_json
+from ..core.protocols import Excitation
+from ..core.step import Columns, State
+from ..laws.excitation import GroundMotion
 from .files.tally import LEDGER
-from .recorders import Columns
 
 CREATED = 0.01  # of the largest energy: more than schemes without a fault gain at sensible time steps
 

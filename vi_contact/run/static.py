@@ -7,28 +7,15 @@ from collections.abc import Callable
 import numpy as np
 
 from ..core.checks import number
-from ..core.errors import InputError
-from ..core.step import ContactProblem, EffectiveMatrix, Solver, State, StepProblem, StepResult
+from ..core.problem import ContactProblem
+from ..core.state_checks import check_problem_given
+from ..core.step import EffectiveMatrix, Solver, State, StepProblem, StepResult, initial_state
 from ..solvers.certified import TOLERANCE, CertifiedSolver, refuse_nan
 from ..solvers.condensed import Condensed
-from .checks import check_methods, check_problem_given
+from .checks import check_methods
 from .proximal import Proximal
 
 ADVICE = "try another solver, or smaller load steps, and check the data"
-
-
-def initial_state(problem: ContactProblem, t: float = 0.0) -> State:
-    """u0, v0 of the system, in the rotated basis, no reaction; InputError when u0 penetrates the obstacle."""
-    system, surface = problem.equations, problem.surface
-    gap = surface.gap(t) - surface.normal_values(system.u0)
-    u_max = float(surface.comm.max(np.array([np.max(np.abs(system.u0), initial=0.0)]))[0])
-    size = max(u_max, float(np.max(surface.gap0, initial=0.0)))
-    if len(gap) and gap.min() < -1e-9 * size:
-        raise InputError(
-            f"the initial displacement penetrates the obstacle by {-gap.min():.3g} m: reduce it or enlarge the gap"
-        )
-    none = np.zeros(surface.count)
-    return State(t, 0, system.u0.copy(), system.v0.copy(), none, surface.bilateral.copy())
 
 
 def static_equilibrium(

@@ -16,8 +16,9 @@ import numpy as np
 
 from ..core.algebra import Array, Mask
 from ..core.errors import StepFailure
-from ..core.step import ContactProblem, State, StepProblem
-from ..laws.friction import Frictionless
+from ..core.problem import ContactProblem
+from ..core.protocols import Frictionless
+from ..core.step import State, StepProblem
 from ..solvers.certified import TOLERANCE, CertifiedSolver
 from ..solvers.condensed import Condensed
 from .consistent_data import mass_matrix, rigid_part

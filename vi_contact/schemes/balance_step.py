@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from ..core.step import ContactProblem
-from ..laws.mass import MassLaw, Redistributed
+from ..core.problem import ContactProblem
+from ..core.protocols import MassLaw
+from ..laws.mass import Redistributed
 from .guard import contact_in_the_balance, needs_no_impact_law
 
 

@@ -16,7 +16,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..core.algebra import Array, Mask, Matrix
-from ..core.step import ContactProblem, EffectiveMatrix, PreparedSolver, State, StepProblem
+from ..core.problem import ContactProblem
+from ..core.step import EffectiveMatrix, PreparedSolver, State, StepProblem
 from ..core.surfaces import ContactSurface
 from ..solvers.condensed import Condensed
 

@@ -14,7 +14,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..core.algebra import Mask
-from ..core.step import ContactProblem, EffectiveMatrix, State, StepProblem
+from ..core.problem import ContactProblem
+from ..core.step import EffectiveMatrix, State, StepProblem
 from ..core.surfaces import ContactSurface
 from ..solvers.certified import TOLERANCE, CertifiedSolver
 from ..solvers.condensed import Condensed

@@ -28,7 +28,8 @@ from dataclasses import dataclass
 
 from ..core.algebra import Array, Mask
 from ..core.checks import flag
-from ..core.step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
+from ..core.problem import ContactProblem
+from ..core.step import Balance, EffectiveMatrix, State, StepProblem, StepResult
 from .admissible_predictor import admissible
 from .position_step import position_step
 from .single_step import SingleStep, stepped

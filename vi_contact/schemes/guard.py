@@ -7,7 +7,7 @@ import logging
 import numpy as np
 
 from ..core.errors import InputError
-from ..core.step import ContactProblem
+from ..core.problem import ContactProblem
 from ..laws.impact import NoImpact
 
 log = logging.getLogger(__name__)

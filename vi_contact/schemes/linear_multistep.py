@@ -27,7 +27,8 @@ import numpy as np
 from ..core.algebra import Array
 from ..core.checks import array, number
 from ..core.errors import InputError
-from ..core.step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
+from ..core.problem import ContactProblem
+from ..core.step import Balance, EffectiveMatrix, State, StepProblem, StepResult
 from .balance_step import BalanceStep
 from .consistent_data import consistent_acceleration, without_inertia
 from .contact_layer import at_rest_between, relaxed

@@ -35,7 +35,8 @@ import numpy as np
 from ..core.algebra import Array, Mask, max_abs
 from ..core.checks import flag, real, shown
 from ..core.errors import InputError
-from ..core.step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
+from ..core.problem import ContactProblem
+from ..core.step import Balance, EffectiveMatrix, State, StepProblem, StepResult
 from ..laws.impact import NoImpact
 from .single_step import SingleStep, stepped
 

@@ -25,7 +25,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..core.step import Balance, ContactProblem, State
+from ..core.problem import ContactProblem
+from ..core.step import Balance, State
 from .generalised_alpha import AlphaStep, Weights, weighted
 
 

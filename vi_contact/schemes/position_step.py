@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from ..core.algebra import Array, Mask
-from ..core.step import ContactProblem, EffectiveMatrix, State, StepProblem
+from ..core.problem import ContactProblem
+from ..core.step import EffectiveMatrix, State, StepProblem
 
 
 def position_step(

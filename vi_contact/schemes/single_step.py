@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ..core.algebra import Array
-from ..core.step import ContactProblem, State, StepProblem, StepResult
-from ..laws.mass import ConsistentMass, MassLaw
+from ..core.problem import ContactProblem
+from ..core.protocols import MassLaw
+from ..core.step import State, StepProblem, StepResult
+from ..laws.mass import ConsistentMass
 from .guard import needs_mass
 
 

@@ -18,8 +18,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from ..core.step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
-from ..laws.mass import MassLaw, Redistributed, mass_law
+from ..core.problem import ContactProblem
+from ..core.protocols import MassLaw
+from ..core.step import Balance, EffectiveMatrix, State, StepProblem, StepResult
+from ..laws.mass import Redistributed, mass_law
 from .contact_layer import at_rest_between, relaxed
 from .guard import contact_in_the_balance, needs_no_impact_law
 from .position_step import position_step

@@ -19,7 +19,8 @@ from dataclasses import dataclass
 from ..core.algebra import Array
 from ..core.checks import real, shown
 from ..core.errors import InputError
-from ..core.step import Balance, ContactProblem, EffectiveMatrix, State, StepProblem, StepResult
+from ..core.problem import ContactProblem
+from ..core.step import Balance, EffectiveMatrix, State, StepProblem, StepResult
 from .position_step import position_step
 from .single_step import SingleStep, stepped
 

@@ -12,7 +12,8 @@ from math import inf
 
 from ..core.algebra import Array
 from ..core.errors import InputError
-from ..core.step import ContactProblem, Scheme
+from ..core.problem import ContactProblem
+from ..core.step import Scheme
 from ..laws.mass import ConsistentMass
 from ..run.march import march
 from ..run.time_steps import LARGEST, HalvedAtImpact, Schedule, course

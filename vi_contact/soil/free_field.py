@@ -23,13 +23,13 @@ from ..core.algebra import Array
 from ..core.checks import provides
 from ..core.errors import InputError
 from ..core.problem_checks import EXCITATION
+from ..core.protocols import Excitation
 from ..core.step import Scheme
 from ..core.system import Pace
 from ..fem import compat
 from ..fem.dashpots import CompliantBase, DashpotMatrix, Dashpots
 from ..fem.petsc_algebra import PetscMatrix
 from ..fem.space import FemSpace
-from ..laws.excitation import Excitation
 from ..laws.materials import Section
 from ..run.checks import check_scheme
 from ..run.time_steps import Schedule

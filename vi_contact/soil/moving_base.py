@@ -23,11 +23,12 @@ import scipy.sparse as sp
 from ..core.algebra import Array, SerialAlgebra, SerialComm, SerialMatrix
 from ..core.checks import provides
 from ..core.errors import InputError
+from ..core.problem import ContactProblem
 from ..core.problem_checks import EXCITATION
-from ..core.step import ContactProblem, Scheme
+from ..core.protocols import Excitation
+from ..core.step import Scheme
 from ..core.surfaces import ContactSurface, empty_surface
 from ..core.system import Load, Pace, SemiDiscreteSystem
-from ..laws.excitation import Excitation
 from ..run.checks import check_scheme
 from ..run.time_steps import Schedule
 from ..schemes.trapezoidal import Trapezoidal

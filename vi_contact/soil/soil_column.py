@@ -19,7 +19,7 @@ import scipy.sparse as sp
 from ..core.algebra import Array, SerialAlgebra, SerialComm, SerialMatrix
 from ..core.checks import array, shown
 from ..core.errors import InputError
-from ..core.step import ContactProblem
+from ..core.problem import ContactProblem
 from ..core.surfaces import empty_surface
 from ..core.system import Load, SemiDiscreteSystem
 from .moving_base import PointSpace

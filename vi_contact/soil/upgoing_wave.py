@@ -15,8 +15,9 @@ from ..core.algebra import Array
 from ..core.checks import flag, provides, real, shown
 from ..core.errors import InputError
 from ..core.problem_checks import EXCITATION
+from ..core.protocols import Excitation
 from ..ground_motion import Record
-from ..laws.excitation import Excitation, GroundMotion
+from ..laws.excitation import GroundMotion
 
 
 class UpgoingVelocity:

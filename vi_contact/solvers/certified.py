@@ -11,7 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..core.errors import StepFailure
-from ..core.step import Certificate, ContactProblem, EffectiveMatrix, PreparedSolver, Solver, StepProblem, StepResult
+from ..core.problem import ContactProblem
+from ..core.step import Certificate, EffectiveMatrix, PreparedSolver, Solver, StepProblem, StepResult
 from ..core.surfaces import ContactSurface
 from ..core.verify import kkt_residual
 from .correction import corrected

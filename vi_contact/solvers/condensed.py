@@ -22,7 +22,8 @@ import numpy as np
 from ..core.algebra import Array, Mask
 from ..core.checks import instance, provides
 from ..core.errors import InputError
-from ..core.step import ContactProblem, EffectiveMatrix, StepProblem, StepResult
+from ..core.problem import ContactProblem
+from ..core.step import EffectiveMatrix, StepProblem, StepResult
 from ..core.surfaces import ContactSurface
 from .friction.condensed import CondensedFriction
 from .friction.newton import FrictionNewton

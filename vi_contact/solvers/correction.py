@@ -20,9 +20,9 @@ import numpy as np
 
 from ..core.algebra import Array
 from ..core.errors import StepFailure
+from ..core.protocols import FrictionLaw
 from ..core.step import Certificate, StepProblem, StepResult
 from ..core.verify import kkt_residual
-from ..laws.friction import FrictionLaw
 
 MARGIN = 2.0**10  # share over residual: reactions may be that much more wrong than the residual tells
 LEAST = 2.0**-30

@@ -27,8 +27,9 @@ import numpy as np
 from ...core.algebra import Array, Indices, Mask
 from ...core.checks import real, shown
 from ...core.errors import InputError
-from ...core.step import ContactProblem, Report, State
-from ...run.files.folder import FIELDS, FIELDS_INDEX, hdf5_atomically, on_root, write_atomically
+from ...core.files import FIELDS, FIELDS_INDEX, hdf5_atomically, on_root, write_atomically
+from ...core.problem import ContactProblem
+from ...core.step import Report, State
 from .. import compat
 from ..mesh import node_numbers
 from ..space import FemSpace, known_matrices, space_of

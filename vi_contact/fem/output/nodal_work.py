@@ -19,7 +19,8 @@ import ufl
 from ...core.algebra import Array, Mask
 from ...core.checks import array, instance
 from ...core.errors import InputError
-from ...core.step import ContactProblem, Report, State
+from ...core.problem import ContactProblem
+from ...core.step import Report, State
 from .. import compat
 from ..groups import facets_of
 from ..loads import BodyForce, TangentialTraction, Traction, as_tuple, evaluate, is_constant

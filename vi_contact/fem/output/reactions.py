@@ -9,8 +9,8 @@ import numpy as np
 
 from ...core.checks import array, column_name
 from ...core.errors import InputError
-from ...core.step import ContactProblem, Report, State
-from ...run.recorders import Columns, Row
+from ...core.problem import ContactProblem
+from ...core.step import Columns, Report, Row, State
 from ..groups import facets_of
 from ..mesh import Facets
 from ..space import FemSpace

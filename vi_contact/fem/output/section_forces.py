@@ -9,8 +9,8 @@ import numpy as np
 
 from ...core.checks import array, column_name, instance, several
 from ...core.errors import InputError
-from ...core.step import ContactProblem, Report, State
-from ...run.recorders import Columns, Row
+from ...core.problem import ContactProblem
+from ...core.step import Columns, Report, Row, State
 from ..groups import cells_of
 from ..mesh import Cells
 from .cuts import find_cut

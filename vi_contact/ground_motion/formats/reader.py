@@ -9,8 +9,9 @@ import numpy as np
 
 from ...core.checks import number
 from ...core.errors import InputError
+from ...core.units import STANDARD_GRAVITY
 from ..processing import resampled
-from ..record import STANDARD_GRAVITY, Record
+from ..record import Record
 from . import afad, at2, columns, cosmos, esm, knet, simcenter, smc
 from .text import TextFile, load_text
 

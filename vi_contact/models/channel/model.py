@@ -15,7 +15,9 @@ import numpy as np
 
 from ...core.algebra import Array, Mask
 from ...core.errors import InputError
-from ...core.step import ContactProblem, ImpactLaw, Recorder
+from ...core.problem import ContactProblem
+from ...core.protocols import Excitation, FrictionLaw, Frictionless, ImpactLaw, MassLaw
+from ...core.step import Recorder
 from ...core.surfaces import ContactSurface
 from ...core.system import SemiDiscreteSystem
 from ...fem.assembly import assemble
@@ -23,10 +25,9 @@ from ...fem.contact.joined import together
 from ...fem.contact.pairs import contact_pair
 from ...fem.loads import Prescribed, as_tuple
 from ...fem.mesh import build_mesh
-from ...laws.excitation import Excitation, Harmonic
-from ...laws.friction import FrictionLaw, Frictionless
+from ...laws.excitation import Harmonic
 from ...laws.impact import Inelastic, MassProjection
-from ...laws.mass import ConsistentMass, MassLaw
+from ...laws.mass import ConsistentMass
 from ...laws.materials import Damping, LinearElastic, NoDamping, PlaneStrain
 from ...laws.weight import own_weight
 from ...meshes.channel import ChannelMesh

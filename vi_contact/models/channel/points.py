@@ -10,10 +10,11 @@ import numpy as np
 
 from ...core.algebra import Indices, Mask
 from ...core.errors import InputError
-from ...core.step import ContactProblem, Report, State
+from ...core.problem import ContactProblem
+from ...core.step import Columns, Report, Row, State
 from ...core.surfaces import ContactSurface
 from ...fem.contact.frames import FemSurface
-from ...run.recorders import Columns, Probe, Row
+from ...run.recorders import Probe
 
 
 @dataclass

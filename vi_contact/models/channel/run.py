@@ -11,9 +11,9 @@ import numpy as np
 
 from ...core.algebra import Array
 from ...core.errors import InputError
+from ...core.protocols import Excitation
 from ...core.step import Scheme
 from ...fem.output.fields import XDMF
-from ...laws.excitation import Excitation
 from ...laws.friction import Coulomb
 from ...laws.impact import Inelastic, MassProjection
 from ...laws.materials import LinearElastic

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar, Protocol
 
 from ...core.algebra import Array
+from ...core.protocols import Excitation
 from ...core.step import Scheme
 from ...fem.dashpots import CompliantBase, Dashpots
 from ...fem.loads import Prescribed
 from ...fem.ties import Tied
-from ...laws.excitation import Excitation
 from ...laws.materials import LinearElastic
 from ...run.time_steps import Schedule
 from ...soil.free_field import FreeField

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ...core.step import ContactProblem, Solver, State
+from ...core.problem import ContactProblem
+from ...core.step import Solver, State
 from ...fem.released_supports import release
 from ...run.static import static_equilibrium
 from ...soil.moving_base import BaseMotion

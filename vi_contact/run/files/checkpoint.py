@@ -23,9 +23,11 @@ import numpy as np
 
 from ...core.checks import array, number, shown, whole
 from ...core.errors import InputError
-from ...core.step import ContactProblem, Scheme, State
+from ...core.files import on_root, write_atomically
+from ...core.problem import ContactProblem
+from ...core.step import Scheme, State
 from ..time_steps import TimeSteps
-from .folder import CHECKPOINT, FORMAT, check_format, on_root, write_atomically
+from .folder import CHECKPOINT, FORMAT, check_format
 from .identity import FIXED, Identity, difference, identity
 
 log = logging.getLogger(__name__)

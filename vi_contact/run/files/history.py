@@ -20,19 +20,10 @@ from typing import Any
 import h5py
 import numpy as np
 
+from ...core.files import hdf5_atomically, to_json, write_all, write_atomically
+from ...core.step import Columns, Row
 from ...core.surfaces import ContactSurface
-from ..recorders import Columns, Row
-from .folder import (
-    COLUMNS,
-    FORMAT,
-    HISTORY_CSV,
-    HISTORY_H5,
-    JOURNAL,
-    hdf5_atomically,
-    to_json,
-    write_all,
-    write_atomically,
-)
+from .folder import COLUMNS, FORMAT, HISTORY_CSV, HISTORY_H5, JOURNAL
 from .stored_rows import StoredArrays, StoredRows, line_of, read_blocks, record_of
 from .table import Block, Table
 

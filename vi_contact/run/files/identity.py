@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 
 from ...core.algebra import Array
-from ...core.step import ContactProblem, Scheme
+from ...core.problem import ContactProblem
+from ...core.step import Scheme
 from ...core.surfaces import ContactSurface
 from ...core.system import SemiDiscreteSystem
 from ..time_steps import HalvedAtImpact, Schedule, TimeSteps, described

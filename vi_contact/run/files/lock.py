@@ -14,7 +14,7 @@ from typing import Any
 
 from ...core.algebra import Comm
 from ...core.errors import InputError
-from .folder import on_root
+from ...core.files import on_root
 
 log = logging.getLogger(__name__)
 LOCK = ".lock"

@@ -18,7 +18,7 @@ import numpy as np
 
 from ...core.algebra import Array
 from ...core.errors import InputError
-from ..recorders import Row
+from ...core.step import Row
 from .folder import HISTORY_CSV, HISTORY_H5, JOURNAL, check_folder_format
 from .table import BLOCK, Block, Table
 

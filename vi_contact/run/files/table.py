@@ -14,7 +14,7 @@ import numpy as np
 from ...core.algebra import Array
 from ...core.checks import shown
 from ...core.errors import InputError, ViContactError
-from ..recorders import Columns, Row
+from ...core.step import Columns, Row
 from .tally import Tally
 
 BLOCK = 256  # rows that are turned into columns together

@@ -12,22 +12,11 @@ from typing import Any, Protocol
 import numpy as np
 
 from ...core.algebra import Array
-from ...core.step import ContactProblem, Report, State
-from ..recorders import Row
+from ...core.files import FIELDS, on_root, to_json, write_atomically
+from ...core.problem import ContactProblem
+from ...core.step import Report, Row, State
 from .checkpoint import Place, Problem, write_checkpoint
-from .folder import (
-    ABOUT,
-    FIELDS,
-    FORMAT,
-    HISTORY_H5,
-    LOG,
-    SUMMARY,
-    clear,
-    on_root,
-    remove_litter,
-    to_json,
-    write_atomically,
-)
+from .folder import ABOUT, FORMAT, HISTORY_H5, LOG, SUMMARY, clear, remove_litter
 from .history import HistoryFiles
 from .log import RunLog, versions
 from .stored_rows import StoredRows, times_of

@@ -19,7 +19,8 @@ from petsc4py import PETSc
 from ...core.algebra import Array
 from ...core.checks import instance, provides, real, shown
 from ...core.errors import InputError, StepFailure
-from ...core.step import ContactProblem, EffectiveMatrix, StepProblem, StepResult
+from ...core.problem import ContactProblem
+from ...core.step import EffectiveMatrix, StepProblem, StepResult
 from ...core.surfaces import ContactSurface
 from .bounded_system import BoundedSystem
 from .failures import raised, stopped

@@ -19,26 +19,25 @@ import numpy as np
 
 from ...core.checks import shown
 from ...core.errors import InputError
-from ...core.step import ContactProblem, Recorder, Scheme, Solver
+from ...core.files import on_root, write_atomically
+from ...core.problem import ContactProblem
+from ...core.protocols import Excitation, FrictionLaw, Frictionless, ImpactLaw, MassLaw
+from ...core.step import Recorder, Scheme, Solver, initial_state
 from ...core.surfaces import ContactSurface, empty_surface
 from ...fem.assembly import assemble
 from ...fem.contact.joined import together
 from ...fem.mesh import Tags, build_mesh, read_mesh
-from ...laws.excitation import Excitation
-from ...laws.friction import FrictionLaw, Frictionless
-from ...laws.impact import ImpactLaw
-from ...laws.mass import MassLaw
 from ...laws.materials import LinearElastic
 from ...laws.weight import with_weight
 from ...meshes.gmsh_session import MeshScript
 from ...run.cross_check import CrossChecked
 from ...run.defaults import completed
-from ...run.files.folder import on_root, run_folder, write_atomically
+from ...run.files.folder import run_folder
 from ...run.files.lock import locked
 from ...run.files.writer import FieldWriter
 from ...run.recorders import Contact, Energy, Steps
 from ...run.simulate import Solution, simulate
-from ...run.static import initial_state, static_equilibrium
+from ...run.static import static_equilibrium
 from ...run.time_steps import course
 from ...solvers.condensed import Condensed
 from .model_tables import Parts

@@ -23,9 +23,9 @@ import numpy as np
 
 from ...core.algebra import Array
 from ...core.errors import InputError
+from ...core.files import to_json, write_atomically
 from ...fem.mesh import alone
 from ...plots.ida import Panel, plot_ida
-from ...run.files.folder import to_json, write_atomically
 from ..cases.case import Case
 from ..cases.parsing import nearest
 from .measures import Demand, Intensity, demand, fractiles, intensity

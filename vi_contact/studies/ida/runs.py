@@ -18,9 +18,10 @@ from pathlib import Path
 from typing import Any
 
 from ...core.errors import InputError
+from ...core.files import to_json, write_atomically
 from ...ground_motion import Record, scaled
 from ...laws.excitation import GroundMotion
-from ...run.files.folder import CHECKPOINT, SUMMARY, to_json, write_atomically
+from ...run.files.folder import CHECKPOINT, SUMMARY
 from ..cases.case import Case, read_case
 
 ROW = "row.json"

@@ -1,0 +1,141 @@
+"""Write files that a crash cannot spoil, on rank 0 alone, with failures told to all ranks."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+from .algebra import Comm
+from .errors import ViContactError
+
+if TYPE_CHECKING:
+    import h5py
+
+T = TypeVar("T")
+
+FIELDS = "fields"  # the folder of an XDMF series inside a run folder
+FIELDS_INDEX = "fields.xdmf"
+
+_FULL = (errno.ENOSPC, errno.EDQUOT)
+_REFUSED = (errno.EACCES, errno.EPERM, errno.EROFS)
+
+
+def on_root(comm: Comm, action: Callable[[], T]) -> T | None:
+    """The action's value on rank 0, None elsewhere; what it raises there is raised on every rank.
+
+    An OSError becomes a ViContactError of one sentence with path and reason. Collective.
+    """
+    value: T | None = None
+    failure: Exception | None = None
+    if comm.rank == 0:
+        try:
+            value = action()
+        except OSError as error:
+            failure = ViContactError(sentence(error))
+            failure.__cause__ = error
+        except Exception as error:  # the other ranks must not wait for this one
+            failure = error
+    told = failure if isinstance(failure, ViContactError) or failure is None else ViContactError(f"rank 0: {failure!r}")
+    kind, text = comm.bcast((type(told), str(told)) if told is not None else (None, ""))
+    if failure is not None:
+        raise failure
+    if kind is not None:
+        raise kind(text)
+    return value
+
+
+def sentence(error: OSError) -> str:
+    """One sentence: what happened to which file, and the remedy."""
+    path = error.filename or "the output folder"
+    if error.errno in _FULL:
+        return (
+            f"the disk is full: '{path}' could not be written; what was written before is kept, "
+            "free some space and restart from the last checkpoint"
+        )
+    if error.errno in _REFUSED:
+        return f"'{path}' cannot be written ({error.strerror}): choose another output folder or change its permissions"
+    return f"'{path}' cannot be read or written ({error.strerror or error}): choose another output folder"
+
+
+def write_atomically(path: Path, data: bytes) -> None:
+    """The file has its old content or all of the new one, whatever happens; OSError names it."""
+    with _whole_or_not_at_all(path) as file:
+        write_all(file, data)
+
+
+def write_all(file: Any, data: bytes) -> None:
+    """Every byte to an unbuffered file: one call may write less when the disk fills up."""
+    view = memoryview(data)
+    while view:
+        view = view[file.write(view) :]
+
+
+def to_json(facts: Mapping[str, Any]) -> str:
+    """Strict JSON of numbers, texts, arrays and mappings; NaN and infinity become null."""
+    return json.dumps(_plain(facts), indent=2, ensure_ascii=False, allow_nan=False)
+
+
+def _plain(value: Any) -> Any:
+    """Types that JSON knows."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(one) for key, one in value.items()}
+    if isinstance(value, np.ndarray | list | tuple):
+        return [_plain(one) for one in value]
+    if isinstance(value, np.generic):
+        return _plain(value.item())
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    return value
+
+
+@contextmanager
+def _whole_or_not_at_all(path: Path) -> Iterator[Any]:
+    """Open an unbuffered file beside ``path`` that takes its place at the end; OSError names ``path``."""
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        with open(temporary, "w+b", buffering=0) as file:
+            yield file
+            os.fsync(file.fileno())
+        os.replace(temporary, path)
+    except OSError as error:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+        raise OSError(error.errno, error.strerror or str(error), str(path)) from error
+
+
+def hdf5_atomically(path: Path, fill: Callable[[h5py.File], None]) -> None:
+    """The same for an HDF5 file, which need not fit the memory."""
+    import h5py  # late: the package is imported without it
+
+    with _whole_or_not_at_all(path) as raw:
+        kept = _Kept(raw)
+        with h5py.File(kept, "w", driver="fileobj") as file:
+            fill(file)
+        if kept.error is not None:
+            raise kept.error
+
+
+class _Kept:
+    """A file for HDF5, which does not survive a full disk: the error is kept, and what comes after it is dropped."""
+
+    def __init__(self, file: Any) -> None:
+        self._file = file
+        self.error: OSError | None = None
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._file, name)
+
+    def write(self, data: Any) -> int:
+        if self.error is None:
+            try:
+                write_all(self._file, data)
+            except OSError as error:
+                self.error = error
+        return len(data)

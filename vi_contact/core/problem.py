@@ -1,0 +1,90 @@
+"""State the problem that is marched: a semi-discrete system, its contact surface, and the laws of both."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from .algebra import Array
+from .problem_checks import check_parts
+from .protocols import Excitation, FrictionLaw, Frictionless, ImpactLaw, MassLaw
+from .surfaces import ContactSurface
+from .system import SemiDiscreteSystem
+
+
+@dataclass(frozen=True)
+class ContactProblem:
+    """A semi-discrete system, a contact surface, what shakes it and how it rubs and rebounds.
+
+    The system is turned into the surface's nodal frames once, here. ``impact=None`` leaves velocities alone;
+    ``mass=None`` leaves the choice of the mass matrix to the time scheme. InputError, on all ranks, for parts of the
+    wrong kind or size, and for a surface that was made for another system. Collective.
+    """
+
+    system: SemiDiscreteSystem
+    surface: ContactSurface
+    friction: FrictionLaw = field(default_factory=Frictionless)
+    impact: ImpactLaw | None = None
+    excitation: Excitation | Sequence[Excitation] = ()
+    mass: MassLaw | None = None
+
+    def __post_init__(self) -> None:
+        check_parts(
+            self.system, self.surface, self.friction, self.impact, self.mass, self.excitations,
+            frictional=self.frictional,
+        )
+
+    @property
+    def excitations(self) -> tuple[Excitation, ...]:
+        """The excitations as a tuple."""
+        return tuple(self.excitation) if isinstance(self.excitation, Sequence) else (self.excitation,)
+
+    @cached_property
+    def equations(self) -> SemiDiscreteSystem:
+        """The system in the rotated basis, with the inertia loads -M r a_g(t) of the excitations; schemes see this."""
+        system = self.turned
+        if self.mass is not None:
+            system = self.mass.apply(system, self.surface, tangential=self.frictional)
+        system = self._relative(system)
+        return system.with_load(
+            *((-system.inertia(np.asarray(one.direction, dtype=float)), one.acceleration) for one in self.excitations)
+        )
+
+    @cached_property
+    def static_load(self) -> SemiDiscreteSystem:
+        """The system in the basis of the equations, without excitation: the gravity stage."""
+        return self._relative(self.turned)
+
+    @cached_property
+    def turned(self) -> SemiDiscreteSystem:
+        """The system in the nodal frames, every body in its own unknowns."""
+        surface = self.surface
+        return self.system if surface.basis is None else self.system.in_basis(surface.basis, surface.dual)
+
+    def _relative(self, system: SemiDiscreteSystem) -> SemiDiscreteSystem:
+        return system if self.surface.coupling is None else system.in_relative(self.surface.coupling)
+
+    @property
+    def frictional(self) -> bool:
+        """Whether tangential reactions can occur at all."""
+        return not isinstance(self.friction, Frictionless)
+
+    def slip_origin(self, u: Array, start: float, end: float) -> Array | None:
+        """B_t u plus what the obstacle slides until then: where the slip of a step is zero; None without friction."""
+        if not self.frictional:
+            return None
+        origin, sliding = self.surface.tangential_values(u), self.surface.sliding(start, end)
+        return origin if sliding is None else origin + sliding
+
+    def cartesian(self, x: Array) -> Array:
+        """T R x: unknowns of the equations back to the system's own."""
+        x = x if self.surface.coupling is None else self.surface.coupling @ x
+        return x if self.surface.basis is None else self.surface.basis @ x
+
+    def ground_acceleration(self, t: float) -> Array:
+        """Vector a_g(t) [m/s²] summed over the excitations."""
+        parts = (one.acceleration(t) * np.asarray(one.direction, dtype=float) for one in self.excitations)
+        return np.asarray(sum(parts, np.zeros(self.system.influence.shape[1])))
