@@ -79,7 +79,7 @@ def stages(mesh: Any, tags: Any, dt: float) -> tuple[vc.ContactProblem, vc.State
     rollers = [fem.Prescribed(side, components=(0,)) for side in sides]
     gravity = fem.assemble(mesh, cells, clamped=tags["lower_bottom"], prescribed=rollers)
     base = fem.CompliantBase(tags["lower_bottom"], ROCK, motion=vc.upgoing(OUTCROP, dt=1e-3))
-    free_field = [fem.FreeField(side, base=base, dt=dt) for side in sides]
+    free_field = [soil.FreeField(side, base=base) for side in sides]
     dynamic = fem.assemble(mesh, cells, dashpots=[base, *free_field], damping=DAMPING)
     static, problem = (
         vc.ContactProblem(

@@ -129,7 +129,7 @@ class ContactSurface:
         motion: how far the obstacle has moved towards the body at time t, (m,) [m]; None for one at rest.
         slide: how far it has moved along the tangents at time t, (m, d-1) [m]; None for one at rest.
         space: of the systems that it was made for; None when it was made by hand.
-        paces: of motions of the obstacle that were computed with time steps of their own (``system.Pace``).
+        companions: motions of the obstacle that are marched beside the run, with its scheme and time steps.
         nodes: (m,) numbers of the nodes, to be told apart only: several conditions may be of one. None: one each.
         frictionless_corners: True when nodes with several conditions are allowed beside friction, see there.
     """
@@ -149,7 +149,7 @@ class ContactSurface:
     motion: Callable[[float], Array] | None = None
     slide: Callable[[float], Array] | None = None
     space: Any = field(default=None, repr=False)
-    paces: tuple[Any, ...] = ()
+    companions: tuple[Any, ...] = ()
     dual: Matrix | None = None
     nodes: Indices | None = None
     frictionless_corners: bool = False

@@ -110,16 +110,6 @@ def _turned(T: Matrix, function: Callable[[float], Array]) -> Callable[[float], 
 
 
 @dataclass(frozen=True)
-class Pace:
-    """Scheme and time steps (a number or a Schedule) that the motion ``name`` was computed with: the run's own, or the
-    motion is another one."""
-
-    name: str
-    scheme: Any
-    dt: Any
-
-
-@dataclass(frozen=True)
 class SemiDiscreteSystem:
     """M u'' + C u' + K u = f(t) on the free unknowns; prescribed displacements are already eliminated into f.
 
@@ -139,7 +129,7 @@ class SemiDiscreteSystem:
             place, and a body with such nodes cannot turn.
         notes: which motion its boundaries expect and the like, for log and summary of a run.
         absolute: True when a boundary lets waves in: displacements are those of space, and nothing else may shake it.
-        paces: of the motions among its loads that were computed with time steps of their own.
+        companions: motions among its loads that are marched beside the run, with its scheme and time steps.
     """
 
     algebra: Algebra
@@ -157,7 +147,7 @@ class SemiDiscreteSystem:
     tied: Mask | None = None
     notes: tuple[str, ...] = ()
     absolute: bool = False
-    paces: tuple[Pace, ...] = ()
+    companions: tuple[Any, ...] = ()
     _cache: dict[str, Any] = field(default_factory=dict, compare=False, repr=False)
 
     def __post_init__(self) -> None:

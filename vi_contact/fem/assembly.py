@@ -20,10 +20,9 @@ from ..core.algebra import Array, Mask
 from ..core.errors import InputError
 from ..core.system import Load, SemiDiscreteSystem
 from ..laws.materials import Damping, LinearElastic, Section
-from ..soil.free_field import free_field_loads
 from . import compat
 from .assembly_checks import check_body, check_boundaries, check_initial
-from .dashpots import CompliantBase, DashpotMatrix, Dashpots, incoming, tell
+from .dashpots import BoundaryLoads, DashpotMatrix, Dashpots, describe_boundaries
 from .loads import BodyForce, Prescribed, TangentialTraction, Traction, as_tuple, evaluate, is_constant
 from .mesh import Cells, Facets
 from .petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc
@@ -81,6 +80,7 @@ def assemble(
     dampers = [(1.0, PetscMatrix(one)) for one in (damper, *(one.mat for one in absorbers)) if one is not None]
     damper = as_petsc(algebra.combine(dampers)).mat if dampers else None
     load = assemble_loads(space, section, as_tuple(loads), (stiffness, damper, mass))
+    acting = [one.dashpots.loads(one, forms) for one in absorbers]
 
     def reduced(full: Any) -> PetscMatrix:
         return PetscMatrix(full.PtAP(space.selection))
@@ -91,7 +91,7 @@ def assemble(
         M=M,
         C=None if damper is None else reduced(damper),
         K=reduced(stiffness),
-        load=with_waves(load, absorbers, forms),
+        load=_with_boundaries(load, acting),
         influence=rigid,
         base_mass=_base_mass(space, PetscMatrix(mass), M, rigid) if base_inertia else None,
         u0=_initial(space, "initial displacement", initial_displacement),
@@ -99,9 +99,9 @@ def assemble(
         space=space,
         floating=floats(space),
         tied=space.tied_unknowns,
-        notes=tell(boundaries, mesh.comm.rank),
-        absolute=any(isinstance(one, CompliantBase) for one in boundaries),
-        paces=tuple(pace for one in (*moved, *boundaries) for pace in one.paces),
+        notes=describe_boundaries(boundaries, mesh.comm.rank),
+        absolute=any(one.lets_waves_in for one in boundaries),
+        companions=tuple(one for part in (*moved, *acting) for one in part.companions),
     )
     forms.own(system)
     return system
@@ -112,10 +112,11 @@ def _rigid(space: FemSpace) -> Array:
     return np.column_stack([space.restrict(np.tile(e, (len(space.nodes), 1))) for e in np.eye(space.dimension)])
 
 
-def with_waves(load: Load, absorbers: Sequence[DashpotMatrix], forms: ElasticForms) -> Load:
-    """The load with what comes in through absorbing boundaries."""
-    elastic, viscous = free_field_loads(absorbers, forms)
-    return replace(load, general=load.general + elastic, viscous=load.viscous + incoming(absorbers) + viscous)
+def _with_boundaries(load: Load, acting: Sequence[BoundaryLoads]) -> Load:
+    """Add what boundaries put on the body to the load."""
+    elastic = tuple(one for part in acting for one in part.elastic)
+    viscous = tuple(one for part in acting for one in part.viscous)
+    return replace(load, general=load.general + elastic, viscous=load.viscous + viscous)
 
 
 def _base_mass(space: FemSpace, full: PetscMatrix, M: PetscMatrix, rigid: Array) -> Array:

@@ -27,7 +27,6 @@ import ufl
 from ..core.algebra import Array
 from ..core.checks import function, instance, real, shown
 from ..core.errors import InputError
-from ..core.system import Pace
 from ..laws.materials import LinearElastic
 from . import compat
 from .groups import facets_of
@@ -37,6 +36,19 @@ from .space import FemSpace
 
 log = logging.getLogger(__name__)
 HELD = 1e-12  # of all: a share of the dashpots' resistance that is none
+
+
+@dataclass(frozen=True)
+class BoundaryLoads:
+    """What a boundary puts on the body: functions t [s] -> (n,) [N] on the free unknowns.
+
+    ``elastic`` and ``viscous`` enter the load as its general and viscous parts; ``companions`` are the motions behind
+    them that are marched beside the run.
+    """
+
+    elastic: tuple[Callable[[float], Array], ...] = ()
+    viscous: tuple[Callable[[float], Array], ...] = ()
+    companions: tuple[Any, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -62,9 +74,13 @@ class Dashpots:
                 raise InputError(f"{owner} factor {name} is {shown(value)}: give zero or a positive number")
 
     @property
-    def paces(self) -> tuple[Pace, ...]:
-        """Of motions that were computed with time steps of their own: none here."""
-        return ()
+    def lets_waves_in(self) -> bool:
+        """Whether the motion of the run comes in here, so that displacements are those of space."""
+        return False
+
+    def loads(self, matrix: DashpotMatrix, forms: Any) -> BoundaryLoads:
+        """Return what acts on the body here besides the dashpots: nothing. ``forms``: ``ElasticForms``. Collective."""
+        return BoundaryLoads()
 
     @property
     def expects(self) -> str:
@@ -81,6 +97,14 @@ class CompliantBase(Dashpots):
     def __post_init__(self) -> None:
         super().__post_init__()
         function("CompliantBase", "motion", self.motion, "give upgoing(record), or a function of the time [s]")
+
+    @property
+    def lets_waves_in(self) -> bool:
+        return True
+
+    def loads(self, matrix: DashpotMatrix, forms: Any) -> BoundaryLoads:
+        """Return the load of the upgoing wave, 2 Pᵀ D v_up."""
+        return BoundaryLoads(viscous=(matrix.moved_by(self.motion, 2.0),))
 
     @property
     def expects(self) -> str:
@@ -158,15 +182,8 @@ def _resistances(forms: Any, dashpots: Dashpots) -> tuple[Any, Any]:
     return fields[0], fields[1]
 
 
-def incoming(absorbers: Sequence[DashpotMatrix]) -> tuple[Callable[[float], Array], ...]:
-    """The loads of upgoing waves, 2 Pᵀ D v_up."""
-    return tuple(
-        one.moved_by(one.dashpots.motion, 2.0) for one in absorbers if isinstance(one.dashpots, CompliantBase)
-    )
-
-
-def tell(boundaries: Sequence[Dashpots], rank: int) -> tuple[str, ...]:
-    """What each boundary expects, logged on rank 0."""
+def describe_boundaries(boundaries: Sequence[Dashpots], rank: int) -> tuple[str, ...]:
+    """Return what each boundary expects, logged on rank 0."""
     notes = tuple(f"{type(one).__name__} on '{one.facets.name}' {one.expects}" for one in boundaries)
     for note in notes if rank == 0 else ():
         log.info("%s", note)

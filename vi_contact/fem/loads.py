@@ -16,7 +16,6 @@ import numpy as np
 
 from ..core.algebra import Array, Comm
 from ..core.checks import function, refuse, shown
-from ..core.system import Pace
 from .groups import components_given, facets_of, field_given
 from .mesh import Facets
 
@@ -89,11 +88,10 @@ class Prescribed:
         return any(value is not _zero for value in self.motions)
 
     @property
-    def paces(self) -> tuple[Pace, ...]:
-        """Of motions that were computed with time steps of their own, such as those of ``BaseMotion``."""
+    def companions(self) -> tuple[Any, ...]:
+        """Motions that are marched beside the run: of objects whose methods are given, such as ``BaseMotion``."""
         owners = {id(owner): owner for owner in (getattr(value, "__self__", None) for value in self.motions)}
-        found = (getattr(owner, "pace", None) for owner in owners.values())
-        return tuple(pace for pace in found if isinstance(pace, Pace))
+        return tuple(one for owner in owners.values() for one in getattr(owner, "companions", ()))
 
     def same_motion(self, other: Prescribed) -> bool:
         """Whether both say the same of the components that both prescribe."""

@@ -1,14 +1,8 @@
 """Checks of what marches a problem: scheme, solvers, tolerance, the state it starts from, and its time steps.
-
-Motions that were computed beforehand with a scheme and time steps of their own (``base_motion``, ``fem.FreeField``)
-belong to runs with the same: systems and surfaces carry their ``Pace``, and it is compared with that of the run.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
-from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -18,9 +12,8 @@ from ..core.checks import provides, real, several, shown
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.state_checks import check_sizes
-from ..core.step import State
-from ..core.system import Pace
-from .time_steps import HalvedAtImpact, Schedule, TimeSteps, described
+from ..core.step import Scheme, State
+from .time_steps import TimeSteps
 
 SCHEME = ("check", "start", "jump", "effective_matrix", "step", "finish", "balance")
 SLACK = 10.0  # of the tolerance, and of the largest displacement: what a state may penetrate
@@ -68,39 +61,7 @@ def check_state(owner: str, problem: ContactProblem, state: State, *, dt: float,
         )
 
 
-def check_pace(problem: ContactProblem, scheme: Any, plan: TimeSteps) -> None:
-    """InputError naming a motion that was computed with other time steps, or another scheme, than those of the run."""
-    for pace in (*problem.system.paces, *problem.surface.paces):
-        if not _same_steps(pace.dt, plan):
-            raise _other_pace(pace, f"dt = {_steps(pace.dt)}", f"dt = {_steps(plan)}")
-        if _rule(pace.scheme) != _rule(scheme):
-            raise _other_pace(pace, repr(pace.scheme), repr(scheme))
-
-
-def _other_pace(pace: Pace, its: str, ours: str) -> InputError:
-    return InputError(f"{pace.name} was computed with {its} and the run has {ours}: give both the same")
-
-
-def _steps(plan: TimeSteps) -> str:
-    return f"{plan} s" if isinstance(plan, float | int) else str(described(plan))
-
-
-def _same_steps(one: float | Schedule, other: TimeSteps) -> bool:
-    """Whether two plans have the same steps; halved ones are known to nobody beforehand."""
-    if isinstance(other, HalvedAtImpact):
-        return False
-    pairs = [plan.pieces if isinstance(plan, Schedule) else ((plan, math.inf),) for plan in (one, other)]
-    if len(pairs[0]) != len(pairs[1]):
-        return False
-    numbers = [np.array(pieces, dtype=float) for pieces in pairs]
-    return bool(np.allclose(numbers[0], numbers[1], rtol=SAME, atol=0.0))
-
-
-def _rule(scheme: Any) -> Any:
-    """What of a scheme makes its steps: all but the mass that it proposes for contact nodes."""
-    names: Sequence[str] = [one.name for one in fields(scheme) if one.name != "mass"] if _is_value(scheme) else ()
-    return (type(scheme), *(getattr(scheme, name) for name in names)) if _is_value(scheme) else scheme
-
-
-def _is_value(scheme: Any) -> bool:
-    return hasattr(scheme, "__dataclass_fields__")
+def bind_companions(problem: ContactProblem, scheme: Scheme, dt: TimeSteps) -> None:
+    """Hand scheme and time steps to the motions that are marched beside the run; nothing to do when they have them."""
+    for companion in (*problem.system.companions, *problem.surface.companions):
+        companion.bind(scheme, dt)

@@ -13,7 +13,7 @@ from ..core.state_checks import start_time
 from ..core.step import EffectiveMatrix, Report, Scheme, Solver, State, initial_state
 from ..solvers.certified import TOLERANCE, CertifiedSolver
 from ..solvers.condensed import Condensed
-from .checks import check_methods, check_pace, check_state
+from .checks import bind_companions, check_methods, check_state
 from .defaults import completed
 from .time_steps import Course, TimeSteps, course
 
@@ -39,19 +39,18 @@ def march(
     a halved step are yielded one by one, and ``state.k`` counts them, but they are one of the ``steps``.
     A step whose certificate exceeds ``tolerance`` goes to the solvers of ``escalation`` in turn, then raises
     StepFailure with step, time, residuals and advice. ``state`` continues from a static stage or a checkpoint.
-    InputError, at the call, for arguments of the wrong kind, a state of another problem or inside the obstacle, and
-    motions that were computed with another scheme or dt.
+    InputError, at the call, for arguments of the wrong kind, and a state of another problem or inside the obstacle.
     """
     check_methods("march", solver, escalation, tolerance)
     problem, scheme = completed(problem, scheme)
     plan = course(dt, steps, t_end, start_time("march", state))
-    check_pace(problem, scheme, dt)
+    bind_companions(problem, scheme, dt)
     if state is None:
         state = initial_state(problem)
     else:
         check_state("march", problem, state, dt=plan.dt(0), tolerance=tolerance, scheme=scheme)
     solvers = [Condensed() if solver is None else solver, *escalation]
-    return iter(March(problem, scheme=scheme, solvers=solvers, course=plan, state=state, tolerance=tolerance))
+    return iter(March(problem, scheme=scheme, solvers=solvers, course=plan, dt=dt, state=state, tolerance=tolerance))
 
 
 class March:
@@ -69,13 +68,14 @@ class March:
         scheme: Scheme,
         solvers: Sequence[Solver],
         course: Course,
+        dt: TimeSteps,
         state: State,
         tolerance: float,
         base: int = 0,
         halved: int = 0,
     ) -> None:
         scheme.check(problem)
-        self._problem, self._scheme, self._course = problem, scheme, course
+        self._problem, self._scheme, self._course, self._plan = problem, scheme, course, dt
         self._solvers = _Solvers(problem, scheme, solvers, tolerance)
         self._state = state
         self.base, self.halved, self.ended, self.dt = base, halved, True, float("nan")
@@ -83,6 +83,7 @@ class March:
     def __iter__(self) -> Iterator[tuple[State, Report]]:
         while self.base < self._course.steps:
             dt = self._course.dt(self.base)
+            bind_companions(self._problem, self._scheme, self._plan)  # another run of the problem may be under way
             self._solvers.keep([dt / 2**level for level in range(self._course.halvings + 1)])
             self._state, self.dt = self._restarted(dt), dt
             levels = [0]  # how often the parts of the base step that are left were halved

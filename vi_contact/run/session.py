@@ -124,8 +124,8 @@ class Run:
     def _march(self, writer: Writer, signals: StopSignals) -> None:
         s, place = self.settings, self.place
         loop = March(
-            s.problem, scheme=s.scheme, solvers=[s.solver, *s.escalation], course=self.course, state=place.state,
-            tolerance=s.tolerance, base=place.base, halved=place.halved,
+            s.problem, scheme=s.scheme, solvers=[s.solver, *s.escalation], course=self.course, dt=s.dt,
+            state=place.state, tolerance=s.tolerance, base=place.base, halved=place.halved,
         )
         worst, begin = 0.0, time.perf_counter()
         with Progress(self.left, shown=s.progress and s.root) as progress:

@@ -16,7 +16,7 @@ from ..core.state_checks import start_time
 from ..core.step import Columns, Recorder, Row, Scheme, Solver, State, initial_state
 from ..solvers.certified import TOLERANCE
 from ..solvers.condensed import Condensed
-from .checks import check_methods, check_pace, check_state
+from .checks import bind_companions, check_methods, check_state
 from .defaults import completed
 from .files.checkpoint import Place, read_checkpoint
 from .files.folder import run_folder
@@ -83,7 +83,7 @@ def simulate(
     problem, scheme = completed(problem, scheme)
     solver = Condensed() if solver is None else solver
     first = course(dt, steps, t_end, start_time("simulate", state)).dt(0)
-    check_pace(problem, scheme, dt)
+    bind_companions(problem, scheme, dt)
     scheme.check(problem)
     solver.check(problem)
     if state is not None:

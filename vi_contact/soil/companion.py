@@ -1,6 +1,6 @@
-"""Small linear systems marched in step with a run: the ground, or a free-field column, with the run's own scheme.
+"""March a small linear system beside a run: the ground, or a free-field column, with the run's own scheme and steps.
 
-What they do is needed at the times at which the run's loads are evaluated. Displacement and velocity are straight lines
+What it does is needed at the times at which the run's loads are evaluated. Displacement and velocity are straight lines
 between the steps, as in the schemes' own averages of them, so that a load made of them enters the run's equation of
 motion with the same weights as the run's own u and v.
 """
@@ -8,52 +8,62 @@ motion with the same weights as the run's own u and v.
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import cached_property
 from math import inf
+from typing import Any
 
 from ..core.algebra import Array
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
-from ..core.step import Scheme
+from ..core.step import Scheme, State
 from ..laws.mass import ConsistentMass
 from ..run.march import march
-from ..run.time_steps import LARGEST, HalvedAtImpact, Schedule, course
+from ..run.time_steps import LARGEST, HalvedAtImpact, Schedule, TimeSteps
 
 
-def given_steps(dt: float | Schedule) -> None:
-    """InputError for time steps that the run itself chooses, and for what are none."""
-    if isinstance(dt, HalvedAtImpact):
-        raise InputError(f"the time step {dt!r} is found while the run goes: a motion computed alongside needs dt "
-                         "as a number or a Schedule")
-    course(dt, 1, None)
+class CompanionRun:
+    """u(t) and v(t) of a serial system without contact, marched as far as somebody asks, from rest at t = 0.
 
-
-def _endless(dt: float | Schedule) -> float | Schedule:
-    """A plan whose last piece does not end: only the times of a run are asked for."""
-    return Schedule((*dt.pieces[:-1], (dt.pieces[-1][0], inf))) if isinstance(dt, Schedule) else dt
-
-
-class Alongside:
-    """u(t) and v(t) of a system without contact, marched as far as somebody asks.
-
-    ``scheme`` and ``dt`` [s] (a number or a Schedule) must be those of the run, which begins at t = 0; before that the
-    system is as it starts. ``mass`` is consistent. Each rank marches its own copy: the system is serial.
-    InputError for time steps that the run itself chooses.
+    ``name`` is for messages; ``problem`` makes the system when it is first needed. A run *binds* it: it hands over its
+    scheme and its plan of time steps, and the motion is then the one that this scheme integrates with these steps.
+    Mass is consistent. Each rank marches its own copy.
     """
 
-    def __init__(self, problem: ContactProblem, *, scheme: Scheme, dt: float | Schedule) -> None:
-        given_steps(dt)
-        self.scheme, self.dt = scheme, dt
-        system = problem.system
-        self._steps = march(
-            ContactProblem(system, problem.surface, excitation=problem.excitation, mass=ConsistentMass()),
-            scheme=scheme, dt=_endless(dt), steps=LARGEST,
-        )
+    def __init__(self, name: str, problem: Callable[[], ContactProblem]) -> None:
+        self.name, self._make = name, problem
+        self._bound: tuple[Scheme, TimeSteps] | None = None
+        self._steps: Iterator[tuple[State, Any]] = iter(())
+        self._t, self._u, self._v = [0.0], [], []  # type: ignore[var-annotated]
+
+    @cached_property
+    def _problem(self) -> ContactProblem:
+        return replace(self._make(), mass=ConsistentMass())
+
+    def bind(self, scheme: Scheme, dt: TimeSteps) -> None:
+        """March with this scheme and these time steps [s] from now on; nothing happens when they are those it has.
+
+        InputError for steps that the run itself chooses while it goes (``HalvedAtImpact``).
+        """
+        if self._bound is not None and self._bound == (scheme, dt):
+            return
+        if isinstance(dt, HalvedAtImpact):
+            raise InputError(f"{self.name} is marched beside the run and needs its time steps beforehand, but the run "
+                             f"has {dt!r}: give dt as a number or a Schedule")
+        self._bound = scheme, dt
+        self._steps = march(self._problem, scheme=scheme, dt=_endless(dt), steps=LARGEST)
+        system = self._problem.system
         self._t, self._u, self._v = [0.0], [system.u0.copy()], [system.v0.copy()]
 
     def at(self, t: float) -> tuple[Array, Array]:
-        """(u, v) at time t [s]."""
+        """Return (u, v) at time t [s]; up to t = 0 the system is as it starts. InputError before a run has bound it."""
         if t <= 0.0:
-            return self._u[0], self._v[0]
+            return self._problem.system.u0.copy(), self._problem.system.v0.copy()
+        if self._bound is None:
+            raise InputError(f"{self.name} is asked for its motion at t = {t:g} s, but no run has bound it yet: use it in "
+                             "a run (a function of your own around it hides it: give its own methods), or call "
+                             "bind(scheme, dt) first")
         while self._t[-1] < t:
             state, _ = next(self._steps)
             self._t.append(state.t)
@@ -64,3 +74,8 @@ class Alongside:
             return self._u[k], self._v[k]
         w = (t - self._t[k]) / (self._t[k + 1] - self._t[k])
         return (1.0 - w) * self._u[k] + w * self._u[k + 1], (1.0 - w) * self._v[k] + w * self._v[k + 1]
+
+
+def _endless(dt: float | Schedule) -> float | Schedule:
+    """A plan whose last piece does not end: only the times of a run are asked for."""
+    return Schedule((*dt.pieces[:-1], (dt.pieces[-1][0], inf))) if isinstance(dt, Schedule) else dt

@@ -12,9 +12,8 @@ held: for a gravity stage put the sides on rollers, then ``release`` them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -22,19 +21,15 @@ import numpy as np
 from ..core.algebra import Array
 from ..core.checks import provides
 from ..core.errors import InputError
+from ..core.problem import ContactProblem
 from ..core.problem_checks import EXCITATION
 from ..core.protocols import Excitation
-from ..core.step import Scheme
-from ..core.system import Pace
 from ..fem import compat
-from ..fem.dashpots import CompliantBase, DashpotMatrix, Dashpots
+from ..fem.dashpots import BoundaryLoads, CompliantBase, DashpotMatrix, Dashpots
 from ..fem.petsc_algebra import PetscMatrix
 from ..fem.space import FemSpace
 from ..laws.materials import Section
-from ..run.checks import check_scheme
-from ..run.time_steps import Schedule
-from ..schemes.trapezoidal import Trapezoidal
-from .companion import Alongside, given_steps
+from .companion import CompanionRun
 from .moving_base import BaseMotion
 from .soil_column import SoilColumn
 
@@ -46,34 +41,24 @@ class FreeField(Dashpots):
     """One vertical side of a body in the plane, its lowest node at the base.
 
     ``base``: the run's excitations (rigid base, frame of the ground), its ``BaseMotion`` (prescribed base) or its
-    ``CompliantBase``. ``dt`` [s] and ``scheme`` (Trapezoidal() when None) must be those of the run, from t = 0:
-    ``march`` refuses others.
+    ``CompliantBase``. The column behind the side is marched with the scheme and the time steps of the run, from t = 0.
     """
 
     base: Base = field(repr=False)
-    dt: float | Schedule
-    scheme: Scheme | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        given_steps(self.dt)
-        check_scheme("FreeField", self.scheme)
         if isinstance(self.base, BaseMotion | CompliantBase):
             return
         for one in self.base if isinstance(self.base, Sequence) else (self.base,):
             remedy = "give the excitations of the run, its BaseMotion or its CompliantBase"
             provides("FreeField", "base", one, EXCITATION, remedy)
 
-    @property
-    def rule(self) -> Scheme:
-        """The scheme that marches the column."""
-        return Trapezoidal() if self.scheme is None else self.scheme
-
-    @property
-    def paces(self) -> tuple[Pace, ...]:
-        """Its own, and that of the motion of its base."""
-        mine = Pace(f"FreeField on '{self.facets.name}'", self.rule, self.dt)
-        return (mine, self.base.pace) if isinstance(self.base, BaseMotion) else (mine,)
+    def loads(self, matrix: DashpotMatrix, forms: Any) -> BoundaryLoads:
+        """Return the stress of the free field on the side, D v_ff, and the column that both are taken from."""
+        side = FreeFieldSide(matrix, self, forms)
+        beside = self.base.companions if isinstance(self.base, BaseMotion) else ()
+        return BoundaryLoads((side.elastic,), (side.viscous,), (side.run, *beside))
 
     @property
     def expects(self) -> str:
@@ -89,9 +74,9 @@ class FreeFieldSide:
     rigid base, or held on a compliant one.
     """
 
-    def __init__(self, absorber: DashpotMatrix, forms: Any) -> None:
-        assert isinstance(absorber.dashpots, FreeField)
-        self.space, self.given = absorber.space, absorber.dashpots
+    def __init__(self, absorber: DashpotMatrix, given: FreeField, forms: Any) -> None:
+        self.space, self.given = absorber.space, given
+        self.run = CompanionRun(f"FreeField on '{given.facets.name}'", self._problem)
         if self.space.dimension != 2:
             raise InputError("FreeField is for bodies in the plane: tie the sides of others, or put dashpots on them")
         self._section: Section = forms.section
@@ -113,23 +98,21 @@ class FreeFieldSide:
             raise InputError(f"the lowest node of free-field side '{name}' is held, but its base is compliant: leave "
                              "the base free")
 
-    @cached_property
-    def _march(self) -> Alongside:
+    def _problem(self) -> ContactProblem:
+        """The column on its base."""
         base, column = self.given.base, self.column
         if isinstance(base, CompliantBase):
             shear, normal = _foot(column, base, self._section)
-            problem = column.on_dashpots(shear, normal, base.motion)
-        elif isinstance(base, BaseMotion):
-            problem = column.on_rigid_base(lambda t: base.at(t)[2], lambda t: base.at(t)[1])
-        else:
-            shaken = tuple(base) if isinstance(base, Sequence) else (base,)
-            problem = column.on_rigid_base(lambda t: np.sum([one(t) for one in shaken], axis=0))
-        return Alongside(problem, scheme=self.given.rule, dt=self.given.dt)
+            return column.on_dashpots(shear, normal, base.motion)
+        if isinstance(base, BaseMotion):
+            return column.on_rigid_base(lambda t: base.at(t)[2], lambda t: base.at(t)[1])
+        shaken = tuple(base) if isinstance(base, Sequence) else (base,)
+        return column.on_rigid_base(lambda t: np.sum([one(t) for one in shaken], axis=0))
 
     def motion(self, t: float) -> tuple[Array, Array]:
         """(u_ff, v_ff) at the heights of the column, (n+1, 2), in the frame of the run."""
         base, foot = self.given.base, np.zeros((1, 2))
-        u, v = (x.reshape(-1, 2) for x in self._march.at(t))
+        u, v = (x.reshape(-1, 2) for x in self.run.at(t))
         if isinstance(base, CompliantBase):
             return u, v
         u, v = np.vstack([foot, u]), np.vstack([foot, v])
@@ -159,14 +142,6 @@ class FreeFieldSide:
         force = np.zeros((len(self.space.nodes), 2))
         force[self._blocks] = at_nodes[self._rows]
         return self.space.pull(force.ravel())
-
-
-def free_field_loads(
-    absorbers: Sequence[DashpotMatrix], forms: Any
-) -> tuple[tuple[Callable[[float], Array], ...], tuple[Callable[[float], Array], ...]]:
-    """(elastic, viscous) loads of the free-field sides among the absorbing boundaries."""
-    sides = [FreeFieldSide(one, forms) for one in absorbers if isinstance(one.dashpots, FreeField)]
-    return tuple(side.elastic for side in sides), tuple(side.viscous for side in sides)
 
 
 def _foot(column: SoilColumn, base: CompliantBase, section: Section) -> tuple[float, float]:

@@ -26,13 +26,9 @@ from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.problem_checks import EXCITATION
 from ..core.protocols import Excitation
-from ..core.step import Scheme
 from ..core.surfaces import ContactSurface, empty_surface
-from ..core.system import Load, Pace, SemiDiscreteSystem
-from ..run.checks import check_scheme
-from ..run.time_steps import Schedule
-from ..schemes.trapezoidal import Trapezoidal
-from .companion import Alongside
+from ..core.system import Load, SemiDiscreteSystem
+from .companion import CompanionRun
 
 
 class PointSpace:
@@ -69,7 +65,7 @@ class BaseMotion:
     """
 
     excitations: tuple[Excitation, ...]
-    path: Alongside = field(repr=False)
+    path: CompanionRun = field(repr=False)
 
     def at(self, t: float) -> tuple[Array, Array, Array]:
         """(u_g, v_g, a_g) at time t, each (d,)."""
@@ -77,9 +73,9 @@ class BaseMotion:
         return u, v, np.sum([excitation(t) for excitation in self.excitations], axis=0)
 
     @property
-    def pace(self) -> Pace:
-        """Whose steps the run must have."""
-        return Pace("base_motion", self.path.scheme, self.path.dt)
+    def companions(self) -> tuple[CompanionRun, ...]:
+        """What a run binds to its scheme and time steps."""
+        return (self.path,)
 
     def displacement(self, points: Array, t: float) -> Array:
         """u_g at every point."""
@@ -106,20 +102,16 @@ class BaseMotion:
         moved = surface.moving(
             lambda t: -self.at(t)[0] @ normal, lambda t: np.tensordot(self.at(t)[0], tangential, axes=1)
         )
-        return replace(moved, paces=(*surface.paces, self.pace))
+        return replace(moved, companions=(*surface.companions, self.path))
 
 
-def base_motion(
-    excitation: Excitation | Sequence[Excitation], dt: float | Schedule, scheme: Scheme | None = None
-) -> BaseMotion:
-    """The ground motion that ``scheme`` (Trapezoidal() when None) makes of an acceleration with time step dt [s].
+def base_motion(excitation: Excitation | Sequence[Excitation]) -> BaseMotion:
+    """Return the ground motion that the run's scheme makes of an acceleration, with the run's time steps.
 
-    Use with the same dt and scheme as the run, from t = 0: systems and surfaces that it moves remember them, and
-    ``march`` refuses others (a function of your own around ``at`` hides them). What the acceleration leaves behind (a
-    final velocity, a drift) is in it: correct the baseline of a record first (``baseline_corrected``).
+    Systems and surfaces that it moves hand it to the run, which binds it (``CompanionRun.bind``). What the acceleration
+    leaves behind (a final velocity, a drift) is in it: correct the baseline of a record first (``baseline_corrected``).
     InputError for no excitation, or excitations of different dimensions.
     """
-    check_scheme("base_motion", scheme)
     excitations = tuple(excitation) if isinstance(excitation, Sequence) else (excitation,)
     for one in excitations:
         provides("base_motion", "excitation", one, EXCITATION, "give Harmonic(…), GroundMotion(record) or another")
@@ -134,4 +126,4 @@ def base_motion(
         floating=True,
     )
     problem = ContactProblem(system, empty_surface(SerialComm(), d))
-    return BaseMotion(excitations, Alongside(problem, scheme=Trapezoidal() if scheme is None else scheme, dt=dt))
+    return BaseMotion(excitations, CompanionRun("base_motion", lambda: problem))

@@ -5,7 +5,9 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
-_HOME = {"Case": "cases.case", "read_case": "cases.case", "run_case": "cases.case", "IDA": "ida.ida", "run_ida": "ida.ida"}
+_HOME = {
+    "Case": "cases.case", "read_case": "cases.case", "run_case": "cases.case", "IDA": "ida.ida", "run_ida": "ida.ida",
+}
 """Public name -> module of this folder it lives in."""
 
 __all__ = sorted(_HOME)

@@ -38,7 +38,7 @@ def together(*surfaces: ContactSurface) -> ContactSurface:
         parts,
         motion=_joined([(surface.motion, (surface.count,)) for surface in made]),
         slide=_slide(made, Frames(parts)),
-        paces=tuple(pace for surface in made for pace in surface.paces),
+        companions=tuple(one for surface in made for one in surface.companions),
         **data,
     )
     return joined.with_frictionless_corners() if all(one.frictionless_corners for one in made) else joined

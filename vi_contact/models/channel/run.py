@@ -12,7 +12,6 @@ import numpy as np
 from ...core.algebra import Array
 from ...core.errors import InputError
 from ...core.protocols import Excitation
-from ...core.step import Scheme
 from ...fem.output.fields import XDMF
 from ...laws.friction import Coulomb
 from ...laws.impact import Inelastic, MassProjection
@@ -123,9 +122,9 @@ def prepared(run: ChannelRun, comm: Any) -> Prepared:
     impact = run.impact
     if impact is None:
         impact = Inelastic(MassProjection()) if isinstance(choice.impact, Inelastic) else choice.impact
-    base = _base(run, shaking, dt, choice.scheme)
+    base = _base(run, shaking, dt)
     rest = at_rest(
-        run.channel, comm, sides=_sides(run, base or shaking, dt, choice.scheme), weighing=GRAVITY[run.gravity],
+        run.channel, comm, sides=_sides(run, base or shaking), weighing=GRAVITY[run.gravity],
         base=base, solver=SOLVERS[run.solver],
         friction=None if run.mu is None else Coulomb(run.mu), bilateral=run.contact == "bilateral",
         excitation=shaking if base is None else (), impact=impact, mass=choice.mass,
@@ -133,21 +132,19 @@ def prepared(run: ChannelRun, comm: Any) -> Prepared:
     return Prepared(rest.model, rest.problem, rest.start, dt, number_of_steps(run, dt, shaking))
 
 
-def _base(
-    run: ChannelRun, shaking: Sequence[Excitation], dt: float, scheme: Scheme
-) -> BaseMotion | RockBelow | None:
+def _base(run: ChannelRun, shaking: Sequence[Excitation], dt: float) -> BaseMotion | RockBelow | None:
     """What moves the bottom of the layer, if not an inertia load."""
     if run.base == "relative":
         return None
     if run.base == "prescribed":
-        return base_motion(shaking, dt, scheme)
+        return base_motion(shaking)
     waves = [upgoing(one, dt=getattr(getattr(one, "record", None), "dt", 0.1 * dt)) for one in shaking]
     return RockBelow(lambda t: np.asarray(sum(wave(t) for wave in waves)), run.rock)
 
 
-def _sides(run: ChannelRun, base: Any, dt: float, scheme: Scheme) -> Sides:
+def _sides(run: ChannelRun, base: Any) -> Sides:
     name = run.sides or ("rollers" if run.vertical is None else "tied")
-    return SIDES.get(name) or FreeFieldSides(base, dt, scheme)
+    return SIDES.get(name) or FreeFieldSides(base)
 
 
 def draw(history: Mapping[str, Array], model: ChannelModel, out: Path, *, title: str) -> None:

@@ -8,12 +8,10 @@ from typing import Any, ClassVar, Protocol
 
 from ...core.algebra import Array
 from ...core.protocols import Excitation
-from ...core.step import Scheme
 from ...fem.dashpots import CompliantBase, Dashpots
 from ...fem.loads import Prescribed
 from ...fem.ties import Tied
 from ...laws.materials import LinearElastic
-from ...run.time_steps import Schedule
 from ...soil.free_field import FreeField
 from ...soil.moving_base import BaseMotion
 
@@ -96,13 +94,11 @@ class DashpotSides:
 @dataclass(frozen=True)
 class FreeFieldSides:
     """Dashpots on the difference to the free field, and its stresses: exact for level ground, waves from the channel
-    leave. ``base``, ``dt`` [s] and ``scheme`` are those of the run, as fem.FreeField wants them."""
+    leave. ``base`` is that of the run, as ``soil.FreeField`` wants it."""
 
     firm: ClassVar[bool] = False
     base: Excitation | Sequence[Excitation] | BaseMotion | RockBelow = field(repr=False)
-    dt: float | Schedule
-    scheme: Scheme | None = None
 
     def conditions(self, tags: Any, motion: Mapping[str, Any]) -> dict[str, Any]:
         base = self.base.absorber(tags) if isinstance(self.base, RockBelow) else self.base
-        return {"dashpots": [FreeField(tags[end], base=base, dt=self.dt, scheme=self.scheme) for end in ENDS]}
+        return {"dashpots": [FreeField(tags[end], base=base) for end in ENDS]}

@@ -184,10 +184,7 @@ class Case:
             parts: Parts = self._made("model", comm=comm)
             return parts
         mesh, tags = self._mesh(comm)
-        system = self._made(
-            "system", mesh=mesh, tags=tags, excitations=self.excitations(), time_step=self._made("run")["dt"],
-            time_scheme=self._made("scheme"),
-        )
+        system = self._made("system", mesh=mesh, tags=tags, excitations=self.excitations())
         system = self._made("gravity", system=system) if "gravity" in self.nodes else system
         surfaces = self._several("contact", system=system, tags=tags)
         surface = together(*surfaces) if len(surfaces) > 1 else (*surfaces, None)[0]

@@ -20,7 +20,7 @@ from typing import Any, Protocol, get_type_hints
 from ...core.errors import InputError
 
 Context = Mapping[str, Any]
-GIVEN = ("comm", "mesh", "system", "excitations", "time_step", "time_scheme")  # parameters that the context supplies
+GIVEN = ("comm", "mesh", "system", "excitations")  # parameters that the context supplies
 
 
 class Node(Protocol):

@@ -70,12 +70,12 @@ def compliant_base(
 
 
 def free_field(
-    excitations: Any, time_step: Any, time_scheme: Any, facets: Facets, *, base: CompliantBase | None = None,
+    excitations: Any, facets: Facets, *, base: CompliantBase | None = None,
     material: materials.LinearElastic | None = None, normal: float = 1.0, tangential: float = 1.0,
 ) -> FreeField:
-    """On the base of the run's excitations, or a compliant one; with its time step and scheme."""
+    """On the base of the run's excitations, or a compliant one."""
     foot = excitations if base is None else base
-    return FreeField(facets, material, normal, tangential, base=foot, dt=time_step, scheme=time_scheme)
+    return FreeField(facets, material, normal, tangential, base=foot)
 
 
 def slip_rate(mu: friction.ExponentialDecay | friction.StaticKinetic) -> friction.SlipRateCoulomb:
