@@ -19,13 +19,14 @@ from mpi4py import MPI
 from step_cost import DIVISIONS, SCHEME, LinearSteps, StepsWithContact, memory  # first: it sets the number of threads
 
 import vi_contact as vc
+from vi_contact import solvers
 from vi_contact.models.wall import Wall, build
 from vi_contact.solvers.friction.extrapolation import Anderson
 
 ROUTES: dict[str, Any] = {
     "FrictionNewton": vc.Condensed(),
-    "FixedPoint": vc.Condensed(friction_method=vc.FixedPoint()),
-    "FixedPoint, Anderson": vc.Condensed(friction_method=vc.FixedPoint(extrapolation=Anderson())),
+    "FixedPoint": vc.Condensed(friction_method=solvers.FixedPoint()),
+    "FixedPoint, Anderson": vc.Condensed(friction_method=solvers.FixedPoint(extrapolation=Anderson())),
 }
 HEADER = (
     f"{'unknowns':>9} {'points':>6} {'route':<21} {'linear ms':>9} {'step ms':>9} {'ratio':>6} {'mean':>6} {'iter':>5}"

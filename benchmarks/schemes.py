@@ -33,6 +33,7 @@ from mpi4py import MPI  # noqa: E402
 
 import vi_contact as vc  # noqa: E402
 from vi_contact import fem  # noqa: E402
+from vi_contact.exact import PeriodicBar, ThrownBar  # noqa: E402
 from vi_contact.meshes.block import BlockMesh  # noqa: E402
 from vi_contact.models.bar import Bar, build  # noqa: E402
 
@@ -66,7 +67,7 @@ def energy(report: Any) -> float:
 
 def oscillation(elements: int, courant: float, scheme: Any, mass: Any) -> float:
     """max |p/300 - 1| over 0.6 < t < 1.067 (V1.1)."""
-    bar = Bar(vc.ThrownBar(), elements=elements)
+    bar = Bar(ThrownBar(), elements=elements)
     dt = bar.time_step(courant)
     worst = 0.0
     for state, _ in march(build(bar, MPI.COMM_WORLD).problem(mass=mass), scheme, dt, int(1.067 / dt)):
@@ -78,7 +79,7 @@ def oscillation(elements: int, courant: float, scheme: Any, mass: Any) -> float:
 def bounces(elements: int, courant: float, count: int, scheme: Any, mass: Any) -> dict[str, Any]:
     """Energies of V1.3 after 1, 4 and ``count`` bounces over 1/8; relative L2 error of the force of four bounces, and
     their largest force over the exact one."""
-    bar = Bar(vc.PeriodicBar(), elements=elements)
+    bar = Bar(PeriodicBar(), elements=elements)
     dt = bar.time_step(courant)
     per_bounce = round(3.0 / dt)
     problem = build(bar, MPI.COMM_WORLD).problem(mass=mass)

@@ -24,10 +24,11 @@ from mpi4py import MPI
 
 import vi_contact as vc
 from demos.pictures.bars import plot_bounces
+from vi_contact import exact
 from vi_contact.models.bar import Bar, build
 
 # Parameters ----------------------------------------------------------------------------------------------------------
-BAR = Bar(vc.PeriodicBar(), elements=100, dimension=1)  # dimension=2: a strip of 3 elements across
+BAR = Bar(exact.PeriodicBar(), elements=100, dimension=1)  # dimension=2: a strip of 3 elements across
 COURANT = 0.5  # dt c / h
 BOUNCES = 4
 SCHEMES = {  # name -> (scheme, mass matrix; None: the scheme's own choice)

@@ -24,16 +24,18 @@ from mpi4py import MPI
 
 import vi_contact as vc
 from demos.pictures.layer import plot_layered_bar, plot_thin_limit
+from vi_contact import boundary_layer
+from vi_contact.exact import BouncingBar, ThrownBar
 from vi_contact.models import wall
 from vi_contact.models.bar import Bar, build
 
 # Parameters ----------------------------------------------------------------------------------------------------------
-BARS = (Bar(vc.ThrownBar(), elements=100), Bar(vc.BouncingBar(), elements=100))
-T_END = {vc.ThrownBar: 1.4, vc.BouncingBar: 16.0 / 3.0}  # one impact, one period [s]
+BARS = (Bar(ThrownBar(), elements=100), Bar(BouncingBar(), elements=100))
+T_END = {ThrownBar: 1.4, BouncingBar: 16.0 / 3.0}  # one impact, one period [s]
 WIDTHS = (1.0, 0.5, 0.25, 0.1)  # b [m] of the bar's layers
-BLOCK = Bar(vc.ThrownBar(length=0.3, E=1e9, rho=1.0, height=0.02, speed=10.0), elements=3, dimension=2)
+BLOCK = Bar(ThrownBar(length=0.3, E=1e9, rho=1.0, height=0.02, speed=10.0), elements=3, dimension=2)
 WANTED = (1.0, 0.8, 0.5, 0.2)  # restitutions of the block
-METRICS = (vc.Metric.BLENDED, vc.Metric.FLAT)
+METRICS = (boundary_layer.Metric.BLENDED, boundary_layer.Metric.FLAT)
 PASSAGE = 20  # time steps per b/V
 WALL_WIDTHS, WALL_SPEED = (4e-6, 2e-6, 1e-6, 5e-7), 1e-2  # b [m], V [m/s] of the wall's layers
 WALL_STEPS, WALL_PERIODS = 640, 1.5  # time steps per period of the shaking
@@ -60,7 +62,7 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
     return numbers
 
 
-def rebounds(wanted: tuple[float, ...], metrics: tuple[vc.Metric, ...]) -> dict[str, float]:
+def rebounds(wanted: tuple[float, ...], metrics: tuple[boundary_layer.Metric, ...]) -> dict[str, float]:
     """The block's velocity after the impact over the one before."""
     model, numbers, width = build(BLOCK, MPI.COMM_WORLD), {}, 0.01
     problem = model.problem(mass=vc.ConsistentMass())
@@ -68,9 +70,9 @@ def rebounds(wanted: tuple[float, ...], metrics: tuple[vc.Metric, ...]) -> dict[
     weight = case.rho * case.length  # mass over contact area
     for metric in metrics:
         for e in wanted:
-            law = vc.contact_layer(e, mass=weight, speed=case.speed, width=width, metric=metric)
+            law = boundary_layer.contact_layer(e, mass=weight, speed=case.speed, width=width, metric=metric)
             dt = width / case.speed / PASSAGE
-            for state, _ in vc.march(problem, scheme=vc.BoundaryLayer(law=law), dt=dt, t_end=0.012):
+            for state, _ in vc.march(problem, scheme=boundary_layer.BoundaryLayer(law=law), dt=dt, t_end=0.012):
                 v = problem.cartesian(state.v)
             momentum = system.algebra.dot(system.influence[:, -1], system.M @ v)
             found = momentum / (weight * model.bar.section * case.speed)
@@ -81,20 +83,20 @@ def rebounds(wanted: tuple[float, ...], metrics: tuple[vc.Metric, ...]) -> dict[
 
 
 def thin_limit(
-    bar: Bar, widths: tuple[float, ...], metrics: tuple[vc.Metric, ...], out: Path
+    bar: Bar, widths: tuple[float, ...], metrics: tuple[boundary_layer.Metric, ...], out: Path
 ) -> dict[str, float]:
     """The bar's foot for every width, and beside it the exact inequality on the same mesh."""
     model, numbers, case = build(bar, MPI.COMM_WORLD), {}, bar.case
     name, t_end = type(case).__name__, T_END[type(case)]
-    speed = case.speed if isinstance(case, vc.ThrownBar) else float(np.sqrt(2.0 * case.gravity * case.height))
+    speed = case.speed if isinstance(case, ThrownBar) else float(np.sqrt(2.0 * case.gravity * case.height))
     problem = model.problem(mass=vc.ConsistentMass())
     schemes = {"exact inequality": (vc.Midpoint(), bar.time_step(0.5))}
     for metric in metrics:
         for width in widths:
             mass = np.sqrt(case.E * case.rho) * width / speed
-            law = vc.contact_layer(0.5, mass=mass, speed=speed, width=width, metric=metric)
+            law = boundary_layer.contact_layer(0.5, mass=mass, speed=speed, width=width, metric=metric)
             dt = min(width / speed / PASSAGE, bar.time_step(0.5))
-            schemes[f"{metric.name} b {width:g}"] = (vc.BoundaryLayer(law=law), dt)
+            schemes[f"{metric.name} b {width:g}"] = (boundary_layer.BoundaryLayer(law=law), dt)
     fine = np.linspace(0.0, t_end, 2001)
     curve = (fine, case.height + case.displacement(0.0, fine), case.force(fine))
     impulse, runs = float(np.mean(curve[2])) * t_end, {}
@@ -132,8 +134,11 @@ def shaken_wall(widths: tuple[float, ...], steps: int, periods: float, out: Path
     numbers["wall: largest displacement"] = float(np.max(np.abs(reference)))
     for width in widths:
         mass = np.sqrt(concrete.E * concrete.rho) * width / WALL_SPEED
-        law = vc.contact_layer(0.5, mass=mass, speed=WALL_SPEED, width=width, metric=vc.Metric.FLAT)
-        found = displacements(replace(exact, surface=law.set_back(exact.surface)), vc.BoundaryLayer(law=law))
+        law = boundary_layer.contact_layer(
+            0.5, mass=mass, speed=WALL_SPEED, width=width, metric=boundary_layer.Metric.FLAT
+        )
+        scheme = boundary_layer.BoundaryLayer(law=law)
+        found = displacements(replace(exact, surface=law.set_back(exact.surface)), scheme)
         errors.append(float(np.sqrt(np.mean((found - reference) ** 2))))
         numbers |= {f"wall b {width:g}: error": errors[-1], f"wall b {width:g}: deepest": float(found.max())}
         if MPI.COMM_WORLD.rank == 0:

@@ -19,16 +19,16 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the sou
 
 import numpy as np
 
-import vi_contact as vc
 from demos.pictures.layer import plot_bounces_of_body, plot_thin_limit
+from vi_contact import boundary_layer
 
 # Parameters ----------------------------------------------------------------------------------------------------------
-BODY = vc.RigidBody(mass=2.0, inertia=(0.2, 0.3, 0.4), point=(0.3, -0.2, -0.5))  # V5.2
+BODY = boundary_layer.RigidBody(mass=2.0, inertia=(0.2, 0.3, 0.4), point=(0.3, -0.2, -0.5))  # V5.2
 BEFORE = np.array([0.3, 0.0, -1.0, 0.5, -0.4, 0.2])  # velocity of the mass centre, spin in the body
 RESTITUTION = 0.593624
 WIDTHS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)  # b [m]
-EGG = vc.RigidBody(
-    mass=2.0, inertia=(0.1, 0.136, 0.164), point=vc.Ellipsoid((0.5, 0.4, 0.3)), gravity=(0.0, 0.0, -9.81)
+EGG = boundary_layer.RigidBody(
+    mass=2.0, inertia=(0.1, 0.136, 0.164), point=boundary_layer.Ellipsoid((0.5, 0.4, 0.3)), gravity=(0.0, 0.0, -9.81)
 )
 START = np.array([0.0, 0.0, 1.5, 0.92, 0.25, -0.2, 0.2])  # mass centre, quaternion
 THROW = np.array([0.3, 0.0, 0.0, 0.5, -0.4, 3.0])
@@ -57,8 +57,8 @@ def thin_limit(widths: tuple[float, ...], out: Path) -> dict[str, float]:
           "  b [m]        e    duration/b   largest difference of velocities")
     errors = []
     for width in widths:
-        layer = vc.layer_for(RESTITUTION, mass=BODY.normal_mass(at_plane), speed=-rate, width=width)
-        motion = vc.layer_motion(
+        layer = boundary_layer.layer_for(RESTITUTION, mass=BODY.normal_mass(at_plane), speed=-rate, width=width)
+        motion = boundary_layer.layer_motion(
             BODY.system(), layer, q0=at_plane + np.eye(7)[2] * width, v0=BEFORE, t_end=1.0, contacts=1
         )
         errors.append(float(np.max(np.abs(motion.v[-1] - exact))))
@@ -72,11 +72,12 @@ def thin_limit(widths: tuple[float, ...], out: Path) -> dict[str, float]:
 
 def tumbling(t_end: float, out: Path) -> dict[str, float]:
     """The ellipsoid: contacts, and its energy against the losses of the impact map."""
-    wanted = vc.layer_for(EGG_E, mass=1.0, speed=5.0, width=EGG_WIDTH)
-    layer = vc.Layer(EGG_WIDTH, k=wanted.k, c=wanted.c)  # V is the speed of each impact: e is the same in all
+    wanted = boundary_layer.layer_for(EGG_E, mass=1.0, speed=5.0, width=EGG_WIDTH)
+    # V is the speed of each impact: e is the same in all
+    layer = boundary_layer.Layer(EGG_WIDTH, k=wanted.k, c=wanted.c)
     q0 = START.copy()
     q0[3:] /= np.linalg.norm(q0[3:])
-    motion = vc.layer_motion(EGG.system(), layer, q0=q0, v0=THROW, t_end=t_end, rtol=1e-9, refine=8)
+    motion = boundary_layer.layer_motion(EGG.system(), layer, q0=q0, v0=THROW, t_end=t_end, rtol=1e-9, refine=8)
     energy = np.array([EGG.energy(q, v) for q, v in zip(motion.q, motion.v, strict=True)])
     still = np.full(len(energy), energy[0])
     print("\n   t [s]   rate in [m/s]      e     g_11 [kg]   energy lost [J]   ½ g_11 (1 - e²) ρ̇²   deepest/b")

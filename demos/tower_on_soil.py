@@ -21,7 +21,7 @@ import numpy as np
 from mpi4py import MPI
 
 import vi_contact as vc
-from vi_contact import fem
+from vi_contact import fem, soil
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import TwoBlocks
 from vi_contact.plots.histories import plot_certificate, plot_energy
@@ -78,7 +78,7 @@ def stages(mesh: Any, tags: Any, dt: float) -> tuple[vc.ContactProblem, vc.State
     sides = [tags["lower_left"], tags["lower_right"]]
     rollers = [fem.Prescribed(side, components=(0,)) for side in sides]
     gravity = fem.assemble(mesh, cells, clamped=tags["lower_bottom"], prescribed=rollers)
-    base = fem.CompliantBase(tags["lower_bottom"], ROCK, motion=vc.upgoing(OUTCROP, dt=1e-3))
+    base = fem.CompliantBase(tags["lower_bottom"], ROCK, motion=soil.upgoing(OUTCROP, dt=1e-3))
     free_field = [soil.FreeField(side, base=base) for side in sides]
     dynamic = fem.assemble(mesh, cells, dashpots=[base, *free_field], damping=DAMPING)
     static, problem = (

@@ -20,7 +20,7 @@ from dolfinx.mesh import meshtags
 from mpi4py import MPI
 
 import vi_contact as vc
-from vi_contact import fem
+from vi_contact import core, engineering, fem, ground_motion, soil, solvers
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.solvers.volume.route import OneFactorisation, Volume
 
@@ -120,7 +120,7 @@ def values() -> Table:
         (vc.Rectangular, wave | {"duration": 1.0}, {"amplitude": NUMBER, "duration": POSITIVE}),
         (vc.Tabulated, {"times": (0.0, 1.0), "values": (0.0, 1.0)},
          {"times": VECTOR | {"back": (1.0, 0.0), "one": (0.0,)}, "values": VECTOR | {"three": (0.0, 1.0, 2.0)}}),
-        (vc.GroundMotion, {"record": vc.Record(np.ones(9), 0.01)}, {"record": NEEDED, "scale": NUMBER}),
+        (vc.GroundMotion, {"record": ground_motion.Record(np.ones(9), 0.01)}, {"record": NEEDED, "scale": NUMBER}),
         (vc.Tresca, {"threshold": 1.0}, {"threshold": coefficient}),
         (vc.Coulomb, {"mu": 0.3}, {"mu": coefficient}),
         (vc.SlipRateCoulomb, {"mu": np.ones_like}, {"mu": FUNCTION | {"none": None}}),
@@ -145,20 +145,20 @@ def values() -> Table:
         (vc.LinearMultistep, {"a": (0.5, 0.0, -0.5), "b": (0.25, 0.5, 0.25), "gamma": (1.0, -2.0, 1.0)},
          {"a": VECTOR, "b": VECTOR, "gamma": VECTOR, "mu": NUMBER | {"zero": 0.0}}),
         (vc.LinearMultistep.newmark, {}, {"beta": POSITIVE, "gamma": NUMBER}),
-        (vc.Condensed, {}, {"method": METHOD | {"with friction": vc.NSGS(), "solver": vc.Condensed()},
-                            "friction_method": METHOD | {"without": vc.ActiveSet()}, "rates": METHOD}),
-        (vc.ActiveSet, {}, RULE),
-        (vc.Hildreth, {}, {"tolerance": POSITIVE, "max_sweeps": COUNT, "primal": FLAG, "record": FLAG}),
-        (vc.ProjectedCG, {}, RULE),
-        (vc.FrictionNewton, {}, RULE),
-        (vc.NSGS, {}, RULE),
-        (vc.FixedPoint, {}, RULE | {"tresca": METHOD, "extrapolation": METHOD}),
-        (vc.GivenForces, {}, RULE | {"tangential": METHOD, "extrapolation": METHOD}),
-        (vc.Uzawa, {}, RULE | {"rho": but(POSITIVE, "none")}),
-        (vc.RateIteration, {}, RULE | {"extrapolation": METHOD}),
-        (vc.Aitken, {}, {"limit": POSITIVE | {"one": 1.0}}),
-        (vc.Anderson, {}, {"depth": COUNT, "after": but(COUNT, "zero")}),
-        (Volume, {}, {"method": METHOD | {"of the other route": vc.ActiveSet()}, "tolerance": SHARE,
+        (vc.Condensed, {}, {"method": METHOD | {"with friction": solvers.NSGS(), "solver": vc.Condensed()},
+                            "friction_method": METHOD | {"without": solvers.ActiveSet()}, "rates": METHOD}),
+        (solvers.ActiveSet, {}, RULE),
+        (solvers.Hildreth, {}, {"tolerance": POSITIVE, "max_sweeps": COUNT, "primal": FLAG, "record": FLAG}),
+        (solvers.ProjectedCG, {}, RULE),
+        (solvers.FrictionNewton, {}, RULE),
+        (solvers.NSGS, {}, RULE),
+        (solvers.FixedPoint, {}, RULE | {"tresca": METHOD, "extrapolation": METHOD}),
+        (solvers.GivenForces, {}, RULE | {"tangential": METHOD, "extrapolation": METHOD}),
+        (solvers.Uzawa, {}, RULE | {"rho": but(POSITIVE, "none")}),
+        (solvers.RateIteration, {}, RULE | {"extrapolation": METHOD}),
+        (solvers.Aitken, {}, {"limit": POSITIVE | {"one": 1.0}}),
+        (solvers.Anderson, {}, {"depth": COUNT, "after": but(COUNT, "zero")}),
+        (Volume, {}, {"method": METHOD | {"of the other route": solvers.ActiveSet()}, "tolerance": SHARE,
                       "petsc_options": {"text": "snes_monitor", "list": ["snes_monitor"]}, "prefix": {"none": None}}),
         (OneFactorisation, {}, {"exchanges": but(COUNT, "zero"), "limit": but(COUNT, "zero")}),
         (vc.Schedule, {"pieces": ((0.1, 1.0),)},
@@ -169,35 +169,35 @@ def values() -> Table:
          {"points": LABELS | {"nan": {"a": (nan, 0.0)}, "texts": {"a": ("x", "y")}, "mixed": {"a": (0.0,), "b": (0.0,
           0.0)}},
           "velocity": FLAG, "acceleration": FLAG}),
-        (vc.Resultants, {"name": "base", "centre": (0.0, 0.0)},
+        (engineering.Resultants, {"name": "base", "centre": (0.0, 0.0)},
          {"name": {"none": None, "spaces": "a b", "number": 0.5}, "centre": VECTOR, "where": FUNCTION,
           "normal": but(VECTOR, "none")}),
-        (vc.Racking, {"frames": {"a": [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]}},
+        (engineering.Racking, {"frames": {"a": [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]}},
          {"frames": LABELS | {"line": {"a": [(0.0, 0.0)] * 4}, "three": {"a": [(0.0, 0.0)] * 3}}}),
         (vc.CrossChecked, {"primary": vc.Condensed(), "others": [vc.Condensed()]},
          {"primary": NEEDED, "others": {"one": vc.Condensed(), "texts": ["nsgs"], "none": None}}),
-        (vc.SoilColumn, {"heights": np.arange(3.0)} | dict.fromkeys(("lame", "shear", "rho", "alpha", "beta"),
+        (soil.SoilColumn, {"heights": np.arange(3.0)} | dict.fromkeys(("lame", "shear", "rho", "alpha", "beta"),
          np.ones(2)),
          {"heights": VECTOR | {"down": np.array([1.0, 0.0]), "one": np.zeros(1)}, "rho": VECTOR, "lame": VECTOR}),
-        (vc.Load, {"constant": np.zeros(3)}, {
+        (core.Load, {"constant": np.zeros(3)}, {
             "constant": VECTOR, "separable": {"one": (np.zeros(3), np.sin), "function": np.sin, "none": None},
             "general": {"function": np.sin, "texts": ("a",)}, "viscous": {"number": (1.0,)}}),
-        (vc.peaks, {"history": HISTORY, "columns": COLUMNS},
+        (engineering.peaks, {"history": HISTORY, "columns": COLUMNS},
          {"history": NEEDED, "columns": NEEDED, "names": {"text": "u", "unknown column": ["w"],
           "number for a column": [1]}}),
-        (vc.hysteresis, {"history": HISTORY, "deformation": "u", "force": "u"},
+        (engineering.hysteresis, {"history": HISTORY, "deformation": "u", "force": "u"},
          {"history": NEEDED, "deformation": {"none": None, "unknown column": "w"},
           "force": {"no name of a column": 1}, "sign": NUMBER}),
-        (vc.floor_spectrum, {"history": HISTORY, "column": "a_x_top", "periods": np.ones(1)},
+        (engineering.floor_spectrum, {"history": HISTORY, "column": "a_x_top", "periods": np.ones(1)},
          {"history": NEEDED, "column": {"none": None, "displacement": "u", "unknown": "a_x_b"}, "relative": FLAG}),
-        (vc.transfer_function, {"history": HISTORY, "surface": "a_x_top", "base": "a_x_top"},
+        (engineering.transfer_function, {"history": HISTORY, "surface": "a_x_top", "base": "a_x_top"},
          {"history": NEEDED, "surface": {"none": None, "displacement column": "u"}, "frequencies": but(VECTOR,
           "number", "none"),
           "bandwidth": but(POSITIVE, "none"), "floor": POSITIVE}),
         (fem.NodeToNode, {}, {"tolerance": POSITIVE}),
-        (vc.upgoing, {"motion": vc.Ricker(1.0, 1.0), "dt": 0.1},
+        (soil.upgoing, {"motion": vc.Ricker(1.0, 1.0), "dt": 0.1},
          {"motion": NEEDED, "dt": POSITIVE, "outcrop": FLAG}),
-        (vc.base_motion, {"excitation": vc.Ricker(1.0, 1.0), "dt": 0.1},
+        (soil.base_motion, {"excitation": vc.Ricker(1.0, 1.0), "dt": 0.1},
          {"excitation": NEEDED, "dt": STEP | {"halved": vc.HalvedAtImpact(0.1)},
           "scheme": THING | {"class itself": vc.HHT}}),
     ]
@@ -274,7 +274,7 @@ def of_the_mesh() -> Table:
          "comm": NEEDED}),
         (vc.with_weight, {"system": b.system}, {"system": NEEDED, "acceleration": NUMBER,
                                                 "direction": but(VECTOR, "none") | {"long": (2.0, 0.0)}}),
-        (vc.lowest_frequency, {"system": b.system}, {"system": NEEDED, "max_iterations": COUNT}),
+        (engineering.lowest_frequency, {"system": b.system}, {"system": NEEDED, "max_iterations": COUNT}),
         (fem.geometric_stiffness, {"problem": b.problem, "state": b.state}, {"problem": NEEDED, "state": states()}),
         (fem.release, {"static": b.problem, "state": b.state, "problem": b.problem},
          {"static": NEEDED, "problem": NEEDED, "state": states()}),
@@ -321,15 +321,15 @@ def runs() -> Table:
     inside = replace(state, u=state.u + 1.0, k=0)
     other = fem.contact_surface(b.held_left, b.tags["right"])
     far = replace(chain_surface(3), owned=np.array([7]))
-    again = vc.base_motion(vc.Ricker(1.0, 1.0), 1e-3)
+    again = soil.base_motion(vc.Ricker(1.0, 1.0), 1e-3)
     moving = again.carrying(b.surface, b.system)
     paced = {"base_motion": vc.ContactProblem(b.system, moving)}
-    excitation = {"record": vc.Record(np.ones(9), 0.01), "text": "elcentro", "number": 3.0, "class": vc.Harmonic,
-                  "in space": vc.Harmonic(1.0, 1.0, direction=(1.0, 0.0, 0.0)), "list": [None]}
+    excitation = {"record": ground_motion.Record(np.ones(9), 0.01), "text": "elcentro", "number": 3.0,
+                  "class": vc.Harmonic, "in space": vc.Harmonic(1.0, 1.0, direction=(1.0, 0.0, 0.0)), "list": [None]}
     march = {
         "problem": NEEDED | {"system": b.system} | paced, "scheme": THING | {"class itself": vc.HHT,
         "solver": vc.Condensed()},
-        "solver": THING | {"class itself": vc.Condensed, "scheme": vc.HHT(), "method": vc.ActiveSet(),
+        "solver": THING | {"class itself": vc.Condensed, "scheme": vc.HHT(), "method": solvers.ActiveSet(),
         "name": "condensed"},
         "dt": STEP, "steps": {"text": "3", "half": 2.5, "negative": -1, "nan": nan, "both": None},
         "state": states() | {"inside": inside, "of another": chain_state()},
@@ -370,7 +370,7 @@ def runs() -> Table:
             "checkpoint_every": COUNT | {"none": None}, "progress": FLAG, "cross_check": THING,
             "fields": {"without a folder": fem.XDMF()}, "t_end": {"both": 1.0},
         }),
-        (vc.cross_check, given | {"solvers": (vc.Condensed(), vc.Condensed(vc.Hildreth()))}, {
+        (vc.cross_check, given | {"solvers": (vc.Condensed(), vc.Condensed(solvers.Hildreth()))}, {
             "problem": NEEDED, "solvers": {"one": vc.Condensed(), "alone": [vc.Condensed()],
             "texts for a solver": ["a", "b"], "none": None},
             "scheme": THING, "dt": STEP, "steps": {"text": "3", "half": 2.5}, "state": states(), "bound": POSITIVE,

@@ -19,6 +19,7 @@ from vi_contact.beam.tip import ExactFriction, RegularisedFriction
 from vi_contact.beam.values import Rod, Start, TimoshenkoBeam
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
+from vi_contact.exact import PeriodicBar
 
 pytestmark = pytest.mark.serial
 MU, PUSH = 0.3, 100.0
@@ -87,7 +88,7 @@ def test_rate_dependent_friction() -> None:
 def test_rod_of_period_three() -> None:
     """V1.3 with the wall on the right: displacement of the tip, contact impulse 1/2 a period, energy; observed order
     between 0.4 and 0.95."""
-    bar, errors = vc.PeriodicBar(), []
+    bar, errors = PeriodicBar(), []
     for n in (50, 100, 200):
         problem = rod_problem(Rod(1.0, 1.0, 1.0, 1.0), Elements(n), Start(u=lambda x: -0.5 * x))
         dt = 0.5 / n

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import vi_contact as vc
+from vi_contact import solvers
 from vi_contact.bem import (
     BoundaryProblem,
     ConvolutionProblem,
@@ -32,8 +33,8 @@ LAWS = {
     "none": vc.Frictionless(), "Tresca": vc.Tresca(0.05), "Coulomb": vc.Coulomb(0.5), "weak Coulomb": vc.Coulomb(0.1),
 }
 METHODS = (
-    vc.Condensed(vc.Hildreth()), vc.Condensed(vc.ProjectedCG()), vc.Condensed(friction_method=vc.NSGS()),
-    vc.Condensed(friction_method=vc.FixedPoint()),
+    vc.Condensed(solvers.Hildreth()), vc.Condensed(solvers.ProjectedCG()), vc.Condensed(friction_method=solvers.NSGS()),
+    vc.Condensed(friction_method=solvers.FixedPoint()),
 )
 
 
@@ -88,7 +89,7 @@ def test_energy_from_boundary_data_alone(law):
 @pytest.mark.parametrize("method", METHODS)
 def test_all_methods_for_the_small_problem_agree(method):
     """The contract: Condensed with any of its methods solves a boundary element step."""
-    law = "none" if not isinstance(method.method, vc.ActiveSet) else "weak Coulomb"
+    law = "none" if not isinstance(method.method, solvers.ActiveSet) else "weak Coulomb"
     found = march_contact(BoundaryContact(condensed(), friction=LAWS[law]), solver=method)
     assert away(found, run(law)) < 1e-7
 

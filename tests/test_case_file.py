@@ -15,13 +15,14 @@ pytest.importorskip("dolfinx")
 from mpi4py import MPI
 
 import vi_contact as vc
-from vi_contact import fem
+from vi_contact import engineering, fem, ground_motion
 from vi_contact.cli.main import main
 from vi_contact.core.errors import InputError
 from vi_contact.core.surfaces import empty_surface
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import TwoBlocks
 from vi_contact.models.wall import Wall, build
+from vi_contact.soil import upgoing
 from vi_contact.studies import Case, read_case, run_case
 from vi_contact.studies.cases.toml_file import with_settings
 from vi_contact.studies.cases.vocabulary import words
@@ -151,7 +152,7 @@ def test_a_pair_with_weight_and_record_to_the_last_bit(shared_tmp: Path) -> None
     )
     system = vc.with_weight(system, acceleration=9.81)
     surface = fem.contact_pair(system, tags["upper_bottom"], tags["lower_top"])
-    record = vc.scaled_to_pga(vc.read_record(shared_tmp / "motion.txt", "g"), 4.0)
+    record = ground_motion.scaled_to_pga(vc.read_record(shared_tmp / "motion.txt", "g"), 4.0)
     problem = vc.ContactProblem(
         system, surface, friction=vc.Coulomb(0.3), excitation=vc.GroundMotion(record, scale=1.5)
     )
@@ -159,7 +160,7 @@ def test_a_pair_with_weight_and_record_to_the_last_bit(shared_tmp: Path) -> None
     foot = fem.Reactions("foot", tags["lower_bottom"], (1.0, 0.0))
     expected = vc.simulate(
         problem, dt=0.005, t_end=0.1, state=rest, progress=False,
-        record=[vc.Energy(), vc.Contact(), foot, vc.Resultants("joint", (1.0, 1.0))],
+        record=[vc.Energy(), vc.Contact(), foot, engineering.Resultants("joint", (1.0, 1.0))],
     )
     assert len(found.history["t"]) == 21 and np.abs(found.history["a_g_x"]).max() == pytest.approx(6.0, rel=1e-12)
     weight = 9.81 * (2000.0 * 1.0) + 1e3
@@ -258,7 +259,7 @@ def test_soil_boundaries(shared_tmp: Path) -> None:
     its excitations."""
     found = run_case(write(shared_tmp, COMPLIANT), COMM, progress=False)
     mesh, tags = fem.build_mesh(BlockMesh(lengths=(6.0, 8.0), divisions=(4, 8)), COMM)
-    base = fem.CompliantBase(tags["bottom"], motion=vc.upgoing(vc.Ricker(2.0, 4.0), dt=0.004))
+    base = fem.CompliantBase(tags["bottom"], motion=upgoing(vc.Ricker(2.0, 4.0), dt=0.004))
     sides = [fem.FreeField(tags[side], base=base, dt=0.004) for side in ("left", "right")]
     soil = vc.LinearElastic.from_wave_speeds(400.0, 200.0, 2000.0)
     system = fem.assemble(mesh, soil, dashpots=[base, *sides])

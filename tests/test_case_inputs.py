@@ -12,7 +12,7 @@ pytest.importorskip("dolfinx")
 
 from mpi4py import MPI
 
-import vi_contact as vc
+from vi_contact import ground_motion
 from vi_contact.cli.main import main
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.block import BlockMesh
@@ -53,8 +53,8 @@ def folder(tmp_path: Path) -> Path:
     """A case beside its mesh and its record; what is run is run from elsewhere."""
     (tmp_path / "case" / "meshes").mkdir(parents=True)
     write(BlockMesh(divisions=(4, 8)), tmp_path / "case" / "meshes" / "block.msh")
-    motion = vc.synthetic(vc.KanaiTajimi(s0=0.01), 0.1, 0.01, seed=1)
-    vc.write_at2(motion, tmp_path / "case" / "motion.at2", "g")
+    motion = ground_motion.synthetic(ground_motion.KanaiTajimi(s0=0.01), 0.1, 0.01, seed=1)
+    ground_motion.write_at2(motion, tmp_path / "case" / "motion.at2", "g")
     return tmp_path / "case"
 
 

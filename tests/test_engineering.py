@@ -12,6 +12,7 @@ import pytest
 from chain import chain_problem
 
 import vi_contact as vc
+from vi_contact import engineering
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.engineering.floor_spectra import konno_ohmachi
@@ -51,7 +52,7 @@ def history(geometry: Points, r_n: Any, gap: Any, r_t: Any = None) -> dict[str, 
 def test_footing() -> None:
     """N up, T to the right, M anticlockwise about the middle; e is where N acts; the left end has lifted off."""
     rows = history(FOOTING, [[0.0, 30.0, 10.0]], [[2e-3, 0.0, 0.0]], [[0.0, 6.0, 2.0]])
-    found = vc.contact_summary(rows, FOOTING, centre=(1.0, 0.0))
+    found = engineering.contact_summary(rows, FOOTING, centre=(1.0, 0.0))
     expected = {
         "uplift": 0.25, "opening": 2e-3, "slip": 0.3, "N": 40.0, "T": -8.0, "M": 10.0, "e": 0.25, "height": 0.0,
         "force_x": -8.0, "force_y": 40.0,  # the tangent of n = (0, -1) is (1, 0): friction on the body points left
@@ -62,7 +63,7 @@ def test_footing() -> None:
 def test_wall_thrust_and_its_height() -> None:
     """The thrust pushes a wall on the left of its soil to the left; its height counts from the centre's level."""
     rows = history(WALL, [[5.0, 3.0, 2.0], [0.0, 0.0, 0.0]], [[0.0] * 3, [1.0] * 3])
-    found = vc.contact_summary(rows, WALL, centre=(4.0, 0.5))
+    found = engineering.contact_summary(rows, WALL, centre=(4.0, 0.5))
     assert found["N"].tolist() == [10.0, 0.0]
     assert found["force_x"].tolist() == [-10.0, 0.0]
     assert found["height"][0] == pytest.approx((5.0 * 0.5 + 3.0 * 1.5 + 2.0 * 2.5) / 10.0, rel=1e-14)
@@ -79,15 +80,15 @@ def test_part_by_position_and_by_direction() -> None:
         np.concatenate([FOOTING.weights, WALL.weights]),
     )
     rows = history(corner, [[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]], [[0.0] * 6])
-    floor = vc.contact_summary(rows, corner, centre=(1.0, 0.0), where=lambda x, n: n[:, 1] < -0.5)
-    high = vc.contact_summary(rows, corner, centre=(4.0, 2.0), where=lambda x, n: x[:, 1] >= 2.0)
+    floor = engineering.contact_summary(rows, corner, centre=(1.0, 0.0), where=lambda x, n: n[:, 1] < -0.5)
+    high = engineering.contact_summary(rows, corner, centre=(4.0, 2.0), where=lambda x, n: x[:, 1] >= 2.0)
     assert (floor["N"][0], high["N"][0]) == (6.0, 11.0)
     assert high["height"][0] == pytest.approx(6.0 / 11.0)
     ring = Points(corner.points, np.vstack([FOOTING.normals, -FOOTING.normals]), np.tile(FOOTING.weights, 2))
     with pytest.raises(InputError, match="cancel"):
-        vc.contact_summary(rows, ring, centre=(0.0, 0.0))
+        engineering.contact_summary(rows, ring, centre=(0.0, 0.0))
     rows = history(ring, [[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]], [[0.0] * 6])
-    both = vc.contact_summary(rows, ring, centre=(0.0, 0.0), normal=(0.0, -3.0))
+    both = engineering.contact_summary(rows, ring, centre=(0.0, 0.0), normal=(0.0, -3.0))
     assert both["N"][0] == pytest.approx(6.0 - 15.0)
 
 
@@ -95,7 +96,7 @@ def test_three_dimensions() -> None:
     """M is a vector, T and e are sizes: N = 3 at (1, 2) with a drag along x."""
     surface = Points(np.array([[1.0, 2.0, 0.0]]), np.array([[0.0, 0.0, -1.0]]), np.ones(1))
     rows = {"t": np.zeros(1), "pressure": np.full((1, 1), 3.0), "gap": np.zeros((1, 1)), "active": np.ones((1, 1))}
-    found = vc.contact_summary(rows, surface, centre=(0.0, 0.0, 0.0))
+    found = engineering.contact_summary(rows, surface, centre=(0.0, 0.0, 0.0))
     assert (found["M_x"][0], found["M_y"][0], found["M_z"][0]) == (6.0, -3.0, 0.0)
     assert found["e"][0] == pytest.approx(np.sqrt(5.0))
     assert (found["N"][0], found["T"][0]) == (3.0, 0.0)
@@ -109,11 +110,11 @@ def test_bad_parts_are_refused() -> None:
         ({"centre": (0.0, 0.0), "where": lambda x, n: np.arange(2)}, "boolean mask"),
     ):
         with pytest.raises(InputError, match=text):
-            vc.contact_summary(rows, FOOTING, **data)
+            engineering.contact_summary(rows, FOOTING, **data)
     with pytest.raises(InputError, match="no column gap"):
-        vc.contact_summary({"t": rows["t"], "pressure": rows["pressure"]}, FOOTING, centre=(0.0, 0.0))
+        engineering.contact_summary({"t": rows["t"], "pressure": rows["pressure"]}, FOOTING, centre=(0.0, 0.0))
     with pytest.raises(InputError, match="letters"):
-        vc.Resultants("left toe", (0.0, 0.0))
+        engineering.Resultants("left toe", (0.0, 0.0))
 
 
 def test_recorder_agrees_with_the_summary() -> None:
@@ -122,10 +123,10 @@ def test_recorder_agrees_with_the_summary() -> None:
         4, gap=1e-3, left_gap=2e-3, excitation=vc.Harmonic(3.0, 2.0, direction=(1.0,)), consistent=True
     )
     right = {"where": lambda x, n: n[:, 0] > 0.0}
-    recorder = vc.Resultants("right", (0.0,), **right)
+    recorder = engineering.Resultants("right", (0.0,), **right)
     scheme = vc.ZienkiewiczWoodTaylor()
     solution = vc.simulate(problem, scheme=scheme, dt=5e-3, steps=200, record=[vc.Contact(), recorder], progress=False)
-    after = vc.contact_summary(solution.history, problem.surface, centre=(0.0,), **right)
+    after = engineering.contact_summary(solution.history, problem.surface, centre=(0.0,), **right)
     assert {"uplift", "opening", "N", "force_x", "height"} <= set(after)
     assert 0.0 < after["uplift"].mean() < 1.0
     for name, values in after.items():
@@ -145,9 +146,9 @@ def test_racking_ignores_rigid_motion() -> None:
     bent[2:, 0] = [0.004, 0.008]  # the mean of both walls: 1.5e-3
     assert racking(box, bent)[0] == pytest.approx(1.5e-3, rel=1e-12)
     with pytest.raises(InputError, match="four corners"):
-        vc.Racking({"a": box[:3]})
+        engineering.Racking({"a": box[:3]})
     with pytest.raises(InputError, match="one line"):
-        vc.Racking({"a": [[0, 0], [1, 1], [2, 2], [3, 3]]})
+        engineering.Racking({"a": [[0, 0], [1, 1], [2, 2], [3, 3]]})
 
 
 COLUMNS = {"t": ("s", "time"), "a": ("m", "a length"), "b": ("N", "a force"), "c": ("m", "nothing")}
@@ -158,7 +159,7 @@ def test_peaks_table(tmp_path: Path) -> None:
     t = np.arange(5.0)
     rows = {"t": t, "a": np.array([0.0, 3.0, -1.0, 3.0, -1.0]), "b": np.array([np.nan, 2.0, 5.0, 1.0, 1.0]),
             "c": np.full(5, np.nan)}
-    path = vc.write_peaks(tmp_path / "peaks.csv", vc.peaks(rows, COLUMNS))
+    path = engineering.write_peaks(tmp_path / "peaks.csv", engineering.peaks(rows, COLUMNS))
     with path.open(newline="") as file:
         read = list(csv.reader(file))
     assert tuple(read[0]) == HEADER
@@ -168,13 +169,14 @@ def test_peaks_table(tmp_path: Path) -> None:
         ["c", "nothing", "m", "nan", "nan", "nan", "nan"],
     ]
     with pytest.raises(InputError, match="no column 'd': it has t, a, b, c"):
-        vc.peaks(rows, COLUMNS, ["d"])
+        engineering.peaks(rows, COLUMNS, ["d"])
 
 
 def test_loop_work_is_its_area() -> None:
     """x = sin, F = k x + c cos: secant stiffness k, work pi c a cycle, for a damper of the amplitude 1."""
     t = np.linspace(0.0, 2.0 * np.pi, 2001)
-    loop = vc.hysteresis({"t": t, "x": np.sin(t), "f": -(7.0 * np.sin(t) + 0.5 * np.cos(t))}, "x", "f", sign=-1.0)
+    history = {"t": t, "x": np.sin(t), "f": -(7.0 * np.sin(t) + 0.5 * np.cos(t))}
+    loop = engineering.hysteresis(history, "x", "f", sign=-1.0)
     assert loop.work[-1] == pytest.approx(0.5 * np.pi, rel=1e-5)
     assert loop.stiffness == pytest.approx(7.0, rel=1e-5)
 
@@ -201,32 +203,32 @@ def resting() -> dict[str, Array]:
 def test_transfer_function_of_an_oscillator(resting: dict[str, Array]) -> None:
     """|absolute/ground| = sqrt(1 + (2 z r)²)/sqrt((1 - r²)² + (2 z r)²): 1 % up to twice its frequency, 10.05 at it."""
     frequencies = np.array([1.0, 2.5, 4.0, 5.0, 6.0, 8.0, 10.0])
-    raw = vc.transfer_function(resting, "a_x_top", frequencies=frequencies, bandwidth=None)
+    raw = engineering.transfer_function(resting, "a_x_top", frequencies=frequencies, bandwidth=None)
     r = 2.0 * np.pi * frequencies / OMEGA
     exact = np.sqrt(1.0 + (2.0 * ZETA * r) ** 2) / np.sqrt((1.0 - r**2) ** 2 + (2.0 * ZETA * r) ** 2)
     assert np.abs(raw.amplitude / exact - 1.0).max() < 0.01
-    smooth = vc.transfer_function(resting, "a_x_top", frequencies=np.linspace(3.0, 7.0, 81))
+    smooth = engineering.transfer_function(resting, "a_x_top", frequencies=np.linspace(3.0, 7.0, 81))
     assert smooth.peak[0] == pytest.approx(5.0, abs=0.15)
     assert 0.8 * exact.max() < smooth.peak[1] < exact.max()
-    same = vc.transfer_function(resting, "a_g_x", "a_g_x")
+    same = engineering.transfer_function(resting, "a_g_x", "a_g_x")
     assert np.nanmax(np.abs(same.amplitude - 1.0)) < 1e-12
     with pytest.raises(InputError, match="half the sampling"):
-        vc.transfer_function(resting, "a_x_top", frequencies=np.array([1e6]))
+        engineering.transfer_function(resting, "a_x_top", frequencies=np.array([1e6]))
     with pytest.raises(InputError, match="zero throughout"):
-        vc.transfer_function(resting | {"a_g_x": np.zeros(len(resting["t"]))}, "a_x_top")
+        engineering.transfer_function(resting | {"a_g_x": np.zeros(len(resting["t"]))}, "a_x_top")
 
 
 def test_floor_spectrum_and_its_frame(resting: dict[str, Array]) -> None:
     """A stiff oscillator on the mass feels its peak absolute acceleration; relative motion is absolute less ground."""
     periods = np.array([0.02, 1.0])
-    spectrum = vc.floor_spectrum(resting, "a_x_top", periods)
+    spectrum = engineering.floor_spectrum(resting, "a_x_top", periods)
     assert spectrum.psa[0] == pytest.approx(np.abs(resting["a_x_top"]).max(), rel=0.03)
-    motions = [vc.recorded_motion(resting, "a_x_top", relative=one).acceleration for one in (False, True)]
-    ground = vc.recorded_motion(resting, "a_g_x").acceleration
+    motions = [engineering.recorded_motion(resting, "a_x_top", relative=one).acceleration for one in (False, True)]
+    ground = engineering.recorded_motion(resting, "a_g_x").acceleration
     assert np.abs(motions[0] - motions[1] - ground).max() < 1e-14
-    assert np.abs(vc.recorded_motion(resting, "a_g_x", relative=True).acceleration).max() == 0.0
+    assert np.abs(engineering.recorded_motion(resting, "a_g_x", relative=True).acceleration).max() == 0.0
     with pytest.raises(InputError, match="no acceleration"):
-        vc.recorded_motion(resting, "u_x_top")
+        engineering.recorded_motion(resting, "u_x_top")
 
 
 def test_velocities_know_the_jumps_of_impacts() -> None:
@@ -239,7 +241,7 @@ def test_velocities_know_the_jumps_of_impacts() -> None:
         probe = vc.Probe({"end": (3.0,)}, velocity=True, acceleration=True)
         scheme = vc.ZienkiewiczWoodTaylor()
         rows = vc.simulate(problem, scheme=scheme, dt=5e-3, steps=200, record=[probe], progress=False).history
-        a, v = (vc.recorded_motion(rows, f"{kind}_x_end", relative=True).acceleration for kind in "av")
+        a, v = (engineering.recorded_motion(rows, f"{kind}_x_end", relative=True).acceleration for kind in "av")
         assert 5e-3 * v.sum() == pytest.approx(rows["v_x_end"][-1], abs=1e-12 * np.abs(rows["v_x_end"]).max())
         difference = np.abs(a - v)[1:].max() / np.abs(v).max()
         assert difference < 1e-10 if same else difference > 1e-2
@@ -248,7 +250,7 @@ def test_velocities_know_the_jumps_of_impacts() -> None:
 def test_uneven_steps_are_brought_to_even_ones() -> None:
     """A line stays a line."""
     t = np.array([0.0, 0.1, 0.2, 0.25, 0.3, 0.4, 0.5])
-    record = vc.recorded_motion({"t": t, "a_x_top": 3.0 * t}, "a_x_top")
+    record = engineering.recorded_motion({"t": t, "a_x_top": 3.0 * t}, "a_x_top")
     assert record.dt == pytest.approx(0.1)
     assert np.abs(record.acceleration - 3.0 * record.times).max() < 1e-14 and len(record.acceleration) == 6
 
@@ -287,4 +289,4 @@ def test_thinned_maps_keep_peaks() -> None:
 
 def test_racking_of_nothing_is_refused():
     with pytest.raises(InputError, match="Racking: frames is empty; give labels and four corners each"):
-        vc.Racking({})
+        engineering.Racking({})

@@ -9,7 +9,7 @@ import pytest
 from fem_problems import CONCRETE, block, linear
 
 import vi_contact as vc
-from vi_contact import fem
+from vi_contact import engineering, fem, solvers
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.core.step import initial_state
@@ -145,7 +145,7 @@ def histories(comm: Any, moving: bool) -> dict[str, Array]:
     record = [
         fem.Reactions("foot", tags["bottom"], (1.0, 0.0)),
         fem.SectionForces({"low": ((0.0, 1.0), (2.0, 1.0)), "foot": ((0.0, 0.0), (2.0, 0.0))}),
-        vc.Racking({"wall": ((0.0, 0.0), (2.0, 0.0), (2.0, 6.0), (0.0, 6.0))}),
+        engineering.Racking({"wall": ((0.0, 0.0), (2.0, 0.0), (2.0, 6.0), (0.0, 6.0))}),
     ]
     solution = vc.simulate(
         problem, scheme=SCHEME, dt=DT, steps=STEPS, record=record, progress=False
@@ -221,7 +221,7 @@ def test_s3_7_winkler_moment_and_rotation(comm: Any) -> None:
     problem, _ = block_on_springs(
         comm, 160, 1e6, prescribed=lambda tags: fem.Prescribed(tags["top"], displacement=turned)
     )
-    recorder = vc.Resultants("base", (B, 0.0))
+    recorder = engineering.Resultants("base", (B, 0.0))
     start = vc.static_equilibrium(problem, solver=vc.Condensed())
     rows = [recorder.start(problem, start)]
     rows += [
@@ -253,7 +253,7 @@ def test_s3_7_lift_off_and_uplift_under_a_horizontal_load(comm: Any) -> None:
             loads=lambda tags, load=load: load,
         )
         state = vc.static_equilibrium(problem, solver=vc.Condensed())
-        row = vc.Resultants("base", (B, 0.0)).start(problem, state)
+        row = engineering.Resultants("base", (B, 0.0)).start(problem, state)
         held = fem.Reactions("base", tags["bottom"], (B, 0.0), load).start(problem, state)
         assert row["N_base"] == pytest.approx(BLOCK_WEIGHT, rel=1e-6)
         assert row["M_base"] == pytest.approx(BLOCK_WEIGHT * h * part, rel=1e-6)
@@ -302,9 +302,9 @@ def test_friction_of_walls_in_all_directions(comm: Any, angle: float) -> None:
     problem = vc.ContactProblem(
         system, fem.contact_surface(system, tags["bottom"], obstacle=ground), friction=vc.Coulomb(0.3)
     )
-    state = vc.static_equilibrium(problem, solver=vc.Condensed(friction_method=vc.FrictionNewton()))
+    state = vc.static_equilibrium(problem, solver=vc.Condensed(friction_method=solvers.FrictionNewton()))
     whole = vc.Contact().start(problem, state)
-    row = vc.Resultants("base", tuple(turn @ [1.0, 0.0])).start(problem, state)
+    row = engineering.Resultants("base", tuple(turn @ [1.0, 0.0])).start(problem, state)
     size = row["N_base"]
     assert row["T_base"] < -0.05 * size  # against the push, along t = (-n_y, n_x) of the face
     for axis in "xy":
@@ -323,9 +323,9 @@ def test_friction_resultants_are_the_recorded_forces(comm: Any) -> None:
         system, tags["bottom"], obstacle=vc.HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))
     )
     problem = vc.ContactProblem(system, surface, friction=vc.Coulomb(0.3))
-    state = vc.static_equilibrium(problem, solver=vc.Condensed(friction_method=vc.FrictionNewton()))
+    state = vc.static_equilibrium(problem, solver=vc.Condensed(friction_method=solvers.FrictionNewton()))
     whole = vc.Contact().start(problem, state)
-    row = vc.Resultants("base", (1.0, 0.0)).start(problem, state)
+    row = engineering.Resultants("base", (1.0, 0.0)).start(problem, state)
     held = fem.Reactions("left", tags["left"], (1.0, 0.0), push).start(problem, state)
     assert abs(whole["friction_force_x"]) > 0.0
     assert row["T_base"] == pytest.approx(whole["friction_force_x"], rel=1e-12)
@@ -335,7 +335,7 @@ def test_friction_resultants_are_the_recorded_forces(comm: Any) -> None:
     total = row["M_base"] + held["reaction_M_left"] + moment_of_push
     assert total == pytest.approx(0.0, abs=1e-9 * abs(moment_of_push))
     halves = [
-        vc.Resultants(name, (1.0, 0.0), where=mask).start(problem, state)
+        engineering.Resultants(name, (1.0, 0.0), where=mask).start(problem, state)
         for name, mask in (("a", lambda x, n: x[:, 0] <= 1.0), ("b", lambda x, n: x[:, 0] > 1.0))
     ]
     assert halves[0]["M_a"] + halves[1]["M_b"] == pytest.approx(row["M_base"], rel=1e-12)
@@ -349,10 +349,10 @@ def test_wall_of_the_channel_is_in_equilibrium(comm: Any) -> None:
     x, y = model.channel.shape.x, model.channel.shape.y
     left, inner, top_of_slab = x[1], x[2], y[2]
     problem = model.problem(friction=vc.Coulomb(0.5))
-    state = vc.static_equilibrium(problem, solver=vc.Condensed(friction_method=vc.FrictionNewton()))
+    state = vc.static_equilibrium(problem, solver=vc.Condensed(friction_method=solvers.FrictionNewton()))
     middle = (0.5 * (left + inner), top_of_slab)
-    whole = vc.Resultants("all", middle, normal=(0.0, -1.0)).start(problem, state)
-    above_cut = vc.Resultants(
+    whole = engineering.Resultants("all", middle, normal=(0.0, -1.0)).start(problem, state)
+    above_cut = engineering.Resultants(
         "wall", middle, where=lambda p, n: (n[:, 0] < -0.5) & (p[:, 1] > top_of_slab + 1e-6)
     ).start(problem, state)
     cut = {"foot": ((left, top_of_slab), (inner, top_of_slab))}

@@ -17,6 +17,7 @@ import pytest
 from chain import chain_problem
 
 import vi_contact as vc
+from vi_contact import engineering
 from vi_contact.cli.main import main
 from vi_contact.core.errors import InputError
 from vi_contact.plots.report import header_facts, plot_report, table_rows
@@ -33,7 +34,7 @@ def solved(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, vc.Solution]
     folder = tmp_path_factory.mktemp("run") / "chain"
     shake = vc.Ricker(3.0, 6.0, direction=(1.0,))
     problem = chain_problem(3, gap=1e-3, left_gap=2e-3, excitation=shake, consistent=True, damping=1e-3)
-    right = vc.Resultants("right", (0.0,), where=lambda x, n: n[:, 0] > 0.0)
+    right = engineering.Resultants("right", (0.0,), where=lambda x, n: n[:, 0] > 0.0)
     record = [vc.Energy(), vc.Contact(), vc.Probe({"end": (3.0,)}, acceleration=True), right]
     scheme = vc.ZienkiewiczWoodTaylor()
     run = vc.simulate(problem, scheme=scheme, dt=5e-3, steps=300, record=record, out=folder, progress=False)
@@ -58,7 +59,7 @@ def test_a_folder_holds_what_the_run_returned(solved: tuple[Path, vc.Solution]) 
     for name, values in run.history.items():
         assert np.array_equal(read.history[name], values, equal_nan=True), name
     assert read.facts["steps"] == 300 and read.contact is not None
-    again = vc.contact_summary(read.history, read.contact, centre=(0.0,), where=lambda x, n: n[:, 0] > 0.0)
+    again = engineering.contact_summary(read.history, read.contact, centre=(0.0,), where=lambda x, n: n[:, 0] > 0.0)
     assert np.array_equal(again["N"], run.history["N_right"])
 
 
@@ -71,7 +72,7 @@ def test_killed_and_damaged_runs(solved: tuple[Path, vc.Solution], tmp_path: Pat
     read = read_run(tmp_path)
     assert len(read.history["t"]) == 300 and read.facts == {} and read.contact is None
     assert dict(header_facts(read))["status"] == "not ended"
-    assert "pressure" not in read.history and vc.peaks(read.history, read.columns)
+    assert "pressure" not in read.history and engineering.peaks(read.history, read.columns)
     (tmp_path / "history.csv").write_text(text.replace("\n0.005", "\nwrong", 1))
     with pytest.raises(InputError, match="damaged"):
         read_run(tmp_path)

@@ -7,7 +7,8 @@ import pytest
 
 from vi_contact.core.errors import InputError
 from vi_contact.ground_motion import Record
-from vi_contact.laws.excitation import FullSine, GroundMotion, HalfSine, Harmonic, Rectangular, Ricker, Tabulated
+from vi_contact.ground_motion.excitation import GroundMotion
+from vi_contact.laws.excitation import FullSine, HalfSine, Harmonic, Rectangular, Ricker, Tabulated
 
 pytestmark = pytest.mark.serial
 

@@ -12,7 +12,7 @@ from fem_problems import linear
 from soil import SOIL, burst, energies, history, strip
 
 import vi_contact as vc
-from vi_contact import fem
+from vi_contact import exact, fem, soil
 from vi_contact.core.errors import InputError
 from vi_contact.exact.packet import WavePacket
 
@@ -102,7 +102,7 @@ def test_oblique_waves(comm, wave, angle, length):
     ((state, _),) = deque(vc.march(linear(system), dt=dt, steps=steps), maxlen=1)
     left = system.kinetic_energy(state.v) + system.strain_energy(state.u)
     share = left / (system.kinetic_energy(system.v0) + system.strain_energy(system.u0))
-    assert share == pytest.approx(vc.dashpot_energy(material, slope, wave=wave), rel=0.2)
+    assert share == pytest.approx(exact.dashpot_energy(material, slope, wave=wave), rel=0.2)
     assert share == pytest.approx(packet.reflected(), rel=0.15)
 
 
@@ -118,7 +118,7 @@ def test_compliant_base(comm, wave):
     """V8.2: the surface moves with 2 v_up(t - H/c), the base with v_up(t) + v_up(t - 2H/c); then silence. 1 %."""
     speed, direction = WAVES[wave]
     shake = vc.Ricker(1.0, speed / 15.0, direction=direction)  # 30 cells in the wavelength of the peak
-    up = vc.upgoing(shake, dt=1e-4)
+    up = soil.upgoing(shake, dt=1e-4)
     problem, crossing = linear(soil_on_compliant_base(comm, up)), 30.0 / speed
     dt = 0.7 * 0.5 / speed  # where the lead of consistent mass and the lag of the trapezoidal rule are equal
     steps = math.ceil((shake.duration + 2.2 * crossing) / dt)
@@ -134,7 +134,7 @@ def test_compliant_base(comm, wave):
 def test_the_base_says_what_it_expects(comm, caplog):
     """In the log, and in the summary of a run; a second shaking is refused."""
     with caplog.at_level(logging.INFO, logger="vi_contact.fem.dashpots"):
-        system = soil_on_compliant_base(comm, vc.upgoing(vc.Ricker(1.0, 10.0), dt=1e-3))
+        system = soil_on_compliant_base(comm, soil.upgoing(vc.Ricker(1.0, 10.0), dt=1e-3))
     assert comm.rank or "expects the upgoing motion, half the velocity of an outcrop" in caplog.text
     run = vc.simulate(linear(system), dt=1e-3, steps=2, progress=False)
     assert "CompliantBase on 'bottom' expects the upgoing motion" in run.facts["boundaries"][0]

@@ -11,11 +11,11 @@ from soil import SOIL, history, strip
 from test_fem_ties import SHAKE, STIFF, middles
 
 import vi_contact as vc
-from vi_contact import fem
+from vi_contact import fem, soil
 from vi_contact.core.errors import InputError
 
 DT, STEPS = 2e-3, 150
-UP = vc.upgoing(vc.Ricker(2.0, 4.0, direction=(1.0, 0.5)), dt=DT)
+UP = soil.upgoing(vc.Ricker(2.0, 4.0, direction=(1.0, 0.5)), dt=DT)
 POINTS = [(x, y) for y in (0.0, 3.0, 8.0) for x in (0.0, 3.0, 6.0)]
 SCHEMES = {"trapezoidal": vc.Trapezoidal(), "zwt": vc.ZienkiewiczWoodTaylor()}
 
@@ -25,7 +25,7 @@ def layered(comm, kind, scheme, *, simplices=False, n=1):
     mesh, tags = strip(comm, 6.0, 8.0, (4 * n, 8 * n), simplices=simplices)
     upper = middles(mesh)[:, 1] > 4.0
     soft, stiff = (fem.Cells(n, np.flatnonzero(m).astype(np.int32), mesh) for n, m in (("a", upper), ("b", ~upper)))
-    ground = vc.base_motion(SHAKE, DT, scheme)
+    ground = soil.base_motion(SHAKE, DT, scheme)
     base = {"relative": SHAKE, "moved": ground, "compliant": fem.CompliantBase(tags["bottom"], motion=UP)}[kind]
     moved = fem.Prescribed(tags["bottom"], ground.displacement, ground.velocity, ground.acceleration)
     data = {"clamped": tags["bottom"] if kind == "relative" else (), "prescribed": moved if kind == "moved" else (),

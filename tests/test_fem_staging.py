@@ -10,7 +10,7 @@ import pytest
 from soil import SOIL, strip
 
 import vi_contact as vc
-from vi_contact import fem
+from vi_contact import fem, soil
 from vi_contact.core.errors import InputError
 from vi_contact.core.surfaces import empty_surface
 
@@ -65,7 +65,7 @@ def test_without_the_reactions_it_falls(comm):
 @pytest.mark.serial
 def test_motion_on_top_of_gravity(comm):
     """While all points stay closed, the response is the one without gravity on bilateral points."""
-    up = vc.upgoing(vc.Ricker(0.05, 8.0), dt=1e-3)
+    up = soil.upgoing(vc.Ricker(0.05, 8.0), dt=1e-3)
     static, state, dynamic, points = stages(comm, motion=up)
     problem, start = fem.release(static, state, dynamic)
     rows = [(s.u - start.u, s.active) for s, _ in vc.march(problem, dt=DT, steps=60, state=start)]

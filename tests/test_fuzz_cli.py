@@ -17,6 +17,7 @@ pytest.importorskip("dolfinx")
 pytest.importorskip("matplotlib")
 
 import vi_contact as vc
+from vi_contact import ground_motion
 from vi_contact.cli.errors import printable
 from vi_contact.cli.main import main
 
@@ -99,8 +100,9 @@ WRONG: dict[str, dict[str, list[str]]] = {  # command -> option -> values; an op
 def places(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """A record, a case, a run folder and an empty folder."""
     folder = tmp_path_factory.mktemp("cli")
-    motion = vc.scaled_to_pga(vc.synthetic(vc.KanaiTajimi(s0=0.01), 2.0, 0.01, seed=1), 1.0)
-    vc.write_at2(motion, folder / "motion.at2", "g")
+    noise = ground_motion.synthetic(ground_motion.KanaiTajimi(s0=0.01), 2.0, 0.01, seed=1)
+    motion = ground_motion.scaled_to_pga(noise, 1.0)
+    ground_motion.write_at2(motion, folder / "motion.at2", "g")
     case = Path(__file__).resolve().parents[1] / "demos" / "cases" / "wall.toml"
     text = '[friction]\ntype = "Coulomb"\nmu = 0.3\n[[excitation]]'
     (folder / "case.toml").write_text(case.read_text("utf-8").replace("[[excitation]]", text, 1), "utf-8")

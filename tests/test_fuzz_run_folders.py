@@ -16,6 +16,7 @@ import pytest
 from chain import chain_problem
 
 import vi_contact as vc
+from vi_contact import ground_motion
 from vi_contact.cli.main import main
 from vi_contact.core.errors import InputError
 from vi_contact.engineering.peak_values import peaks
@@ -170,9 +171,9 @@ def test_arrays_of_other_files_are_not_followed(run: Path, tmp_path: Path) -> No
 
 def test_the_spectrum_begins_at_a_few_steps(run: Path) -> None:
     """Not at a part of the duration: 0.31 s for a record of 31 s."""
-    record = vc.Record(np.ones(3118), 0.01)
+    record = ground_motion.Record(np.ones(3118), 0.01)
     assert shown_periods(record)[[0, -1]].tolist() == pytest.approx([0.04, 10.0])
-    assert shown_periods(vc.Record(np.ones(50), 0.01))[[0, -1]].tolist() == pytest.approx([0.04, 1.0])
+    assert shown_periods(ground_motion.Record(np.ones(50), 0.01))[[0, -1]].tolist() == pytest.approx([0.04, 1.0])
 
 
 def test_peak_accelerations_are_marked(run: Path) -> None:
@@ -185,7 +186,7 @@ def test_peak_accelerations_are_marked(run: Path) -> None:
     (0.01, False), (0.02, True), (vc.Schedule(((0.005, 0.1), (0.04, math.inf))), True), (vc.HalvedAtImpact(0.02), True),
 ])
 def test_a_step_longer_than_the_record_s_warns_once(dt: Any, told: bool, tmp_path: Path) -> None:
-    shake = vc.GroundMotion(vc.Record(np.sin(np.arange(30.0)), 0.01), direction=(1.0,))
+    shake = vc.GroundMotion(ground_motion.Record(np.sin(np.arange(30.0)), 0.01), direction=(1.0,))
     problem = chain_problem(3, gap=1e-3, excitation=shake, consistent=True)
     done = vc.simulate(problem, scheme=vc.ZienkiewiczWoodTaylor(), dt=dt, t_end=0.2, out=tmp_path, progress=False)
     log = (tmp_path / "run.log").read_text("utf-8")

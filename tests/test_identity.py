@@ -18,7 +18,7 @@ from fem_problems import block
 from mpi4py import MPI
 
 import vi_contact as vc
-from vi_contact import fem
+from vi_contact import fem, soil
 from vi_contact.core.algebra import Array, SerialMatrix
 from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.run.checks import check_pace
@@ -109,7 +109,7 @@ def test_a_start_inside_the_obstacle() -> None:
 def test_motions_belong_to_runs_with_their_scheme_and_steps() -> None:
     """base_motion, as prescribed motion and as an obstacle that goes along, and FreeField, also behind other loads."""
     mesh, tags = body()
-    ground = vc.base_motion(SHAKE, DT, vc.HHT())
+    ground = soil.base_motion(SHAKE, DT, vc.HHT())
     moved = fem.Prescribed(tags["bottom"], ground.displacement, ground.velocity, ground.acceleration)
     sides = [fem.FreeField(tags[side], base=ground, dt=DT, scheme=vc.HHT()) for side in ("left", "right")]
     system = fem.assemble(mesh, STEEL, prescribed=moved, dashpots=sides)

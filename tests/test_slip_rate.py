@@ -12,6 +12,7 @@ from rubbing import rubbing_block
 from scipy.integrate import solve_ivp
 
 import vi_contact as vc
+from vi_contact import solvers
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.core.problem import ContactProblem
@@ -206,7 +207,9 @@ def rubbed() -> list[Report]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("method", [vc.FrictionNewton(), vc.FixedPoint(), vc.GivenForces(), vc.Uzawa()], ids=repr)
+@pytest.mark.parametrize(
+    "method", [solvers.FrictionNewton(), solvers.FixedPoint(), solvers.GivenForces(), solvers.Uzawa()], ids=repr
+)
 def test_several_points_with_every_method(method: Any, rubbed: list[Report]) -> None:
     """A block that rubs along a wall with three points: certified with the exact law, the same with all methods; few
     outer iterations, logged with every step."""

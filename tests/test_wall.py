@@ -11,7 +11,8 @@ from vi_contact.core.errors import InputError
 from vi_contact.core.units import STANDARD_GRAVITY
 from vi_contact.engineering.modal import lowest_frequency
 from vi_contact.ground_motion import read_record
-from vi_contact.laws.excitation import GroundMotion, Harmonic
+from vi_contact.ground_motion.excitation import GroundMotion
+from vi_contact.laws.excitation import Harmonic
 from vi_contact.laws.impact import Elastic, Inelastic
 from vi_contact.laws.materials import LinearElastic, Rayleigh
 from vi_contact.models import wall_run

@@ -1,7 +1,25 @@
-"""Seed 001: contact in a thin layer before the boundary of the configuration space, by b-geometry.
+"""Model contact in a thin layer before the obstacle, as a smooth force: b-geometry.
 
-layer.py: the boundary force (25) and its cut-off; particle.py: the closed form (36) to (38); metric.py: b-metric and
-b-affinities (8) to (21); motion.py: equations (26) to (28) of any system as ordinary differential equations;
-trajectory.py integrates them; rigid_body.py: the second example; bilateral.py: equality constraints (29) to (34);
-contact_law.py, scheme.py: the law at the contact nodes of a finite element body. docs/boundary_layer.md.
+``layer``: the boundary force and its cut-off; ``particle``: its closed form; ``metric``: b-metric and b-affinities;
+``motion``: any constrained system as ordinary differential equations, which ``trajectory`` integrates;
+``rigid_body``: a rolling ellipsoid; ``bilateral``: equality constraints; ``contact_law`` and ``scheme``: the law at the
+contact nodes of a finite element body. See docs/theory/boundary_layer.md.
 """
+
+from __future__ import annotations
+
+from ..core.lazy import lazy
+
+_CONTENTS = {
+    "bilateral": ("bilateral_motion",),
+    "contact_law": ("ContactLayer", "contact_layer"),
+    "layer": ("Layer",),
+    "metric": ("Metric",),
+    "motion": ("ConstrainedSystem",),
+    "particle": ("ParticleImpact", "layer_for"),
+    "rigid_body": ("Ellipsoid", "RigidBody"),
+    "scheme": ("BoundaryLayer",),
+    "trajectory": ("layer_motion",),
+}
+__all__ = sorted(name for names in _CONTENTS.values() for name in names)
+__getattr__, __dir__ = lazy(__name__, _CONTENTS)

@@ -8,8 +8,8 @@ import traceback
 from collections.abc import Sequence
 from pathlib import Path
 
-from .. import __version__
 from ..core.errors import Interrupted, ViContactError
+from ..core.version import __version__
 from .beam import add_beam_command
 from .case import add_case_commands
 from .channel import add_channel_commands

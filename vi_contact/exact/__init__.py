@@ -1,1 +1,23 @@
-"""Exact solutions: closed forms that tests, demos and users compare a computation with. numpy and scipy only."""
+"""Hold exact solutions, closed forms that tests, demos and users compare a computation with."""
+
+from __future__ import annotations
+
+from ..core.lazy import lazy
+
+_CONTENTS = {
+    "bar": ("PeriodicBar", "ThrownBar"),
+    "bouncing_bar": ("BouncingBar",),
+    "columns": ("ObliqueImpact", "ShearColumn"),
+    "hertz": ("HertzImpact", "HertzLine", "HertzPoint", "contact_modulus", "contact_radius"),
+    "housner": ("HousnerBlock",),
+    "lining": ("ThickLining", "ThinLining"),
+    "punch": ("RoundPunch", "StripPunch"),
+    "racking": ("BoxFrame", "ChannelFrame", "racking_ratio"),
+    "rigid_wall": ("RigidWall",),
+    "site_response": ("SoilLayer",),
+    "sliding": ("SlidingBlock",),
+    "surface_waves": ("dashpot_energy", "dashpot_reflection", "rayleigh_motion", "rayleigh_speed"),
+    "two_bars": ("TwoBars",),
+}
+__all__ = sorted(name for names in _CONTENTS.values() for name in names)
+__getattr__, __dir__ = lazy(__name__, _CONTENTS)

@@ -1,33 +1,25 @@
-"""Finite elements on DOLFINx. Names are imported when first used: `import vi_contact` needs no such library."""
+"""Assemble bodies with finite elements on DOLFINx: meshes, systems, contact surfaces, output of fields."""
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import Any
+from ..core.lazy import lazy
 
-_HOME = {
-    "read_mesh": "mesh", "build_mesh": "mesh", "node_numbers": "mesh",
-    "Cells": "mesh", "Facets": "mesh", "Tags": "mesh",
-    "assemble": "assembly",
-    "BodyForce": "loads", "Prescribed": "loads", "TangentialTraction": "loads", "Traction": "loads",
-    "Tied": "ties", "Dashpots": "dashpots", "CompliantBase": "dashpots",
-    "contact_surface": "contact.surface",
-    "contact_pair": "contact.pairs", "NodeToNode": "contact.matching", "DualMortar": "contact.mortar",
-    "together": "contact.joined",
-    "geometric_stiffness": "initial_stress", "release": "released_supports",
-    "XDMF": "output.fields",
-    "Reactions": "output.reactions", "SectionForces": "output.section_forces",
+_CONTENTS = {
+    "assembly": ("assemble",),
+    "contact.joined": ("together",),
+    "contact.matching": ("NodeToNode",),
+    "contact.mortar": ("DualMortar",),
+    "contact.pairs": ("contact_pair",),
+    "contact.surface": ("contact_surface",),
+    "dashpots": ("CompliantBase", "Dashpots"),
+    "initial_stress": ("geometric_stiffness",),
+    "loads": ("BodyForce", "Prescribed", "TangentialTraction", "Traction"),
+    "mesh": ("Cells", "Facets", "Tags", "build_mesh", "node_numbers", "read_mesh"),
+    "output.fields": ("XDMF",),
+    "output.reactions": ("Reactions",),
+    "output.section_forces": ("SectionForces",),
+    "released_supports": ("release",),
+    "ties": ("Tied",),
 }
-"""Public name -> module of this folder it lives in."""
-
-__all__ = sorted(_HOME)
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
-
-
-def __dir__() -> list[str]:
-    return __all__
+__all__ = sorted(name for names in _CONTENTS.values() for name in names)
+__getattr__, __dir__ = lazy(__name__, _CONTENTS)

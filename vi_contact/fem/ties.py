@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from mpi4py import MPI
@@ -34,7 +34,7 @@ class BodyNodes(Protocol):
     nodes: Indices
     points: Array
 
-    def facet_blocks(self, facets: Indices) -> Indices:
+    def facet_blocks(self, facets: Any) -> Indices:
         """Return rows of ``points``: the owned nodes of local facets."""
 
 

@@ -4,6 +4,7 @@ from ..core.units import STANDARD_GRAVITY
 from .baseline import baseline_corrected
 from .chain import Processing
 from .ec8 import EC8Spectrum
+from .excitation import GroundMotion
 from .filters import filtered, tapered, without_mean
 from .formats.reader import read_record
 from .formats.writer import write_at2, write_columns, write_path_series
@@ -30,7 +31,8 @@ from .spectral_intensity import housner_intensity, mean_period, predominant_peri
 from .window import padded, trimmed
 
 __all__ = [
-    "STANDARD_GRAVITY", "UNITS", "EC8Spectrum", "Envelope", "KanaiTajimi", "Processing", "Record", "ResponseSpectrum",
+    "STANDARD_GRAVITY", "UNITS", "EC8Spectrum", "Envelope", "GroundMotion",
+    "KanaiTajimi", "Processing", "Record", "ResponseSpectrum",
     "arias", "baseline_corrected", "bracketed_duration", "cav", "d5_95", "filtered", "fourier_spectrum",
     "housner_intensity", "husid", "integrated", "mean_period", "motion_info", "padded", "pga", "pga_time", "pgd", "pgv",
     "predominant_period", "psa", "read_record", "record_info", "resampled", "response_spectrum", "rms", "scaled",

@@ -1,0 +1,16 @@
+"""State how materials, friction, impacts, contact masses and the ground behave."""
+
+from __future__ import annotations
+
+from ..core.lazy import lazy
+
+_CONTENTS = {
+    "excitation": ("FullSine", "HalfSine", "Harmonic", "Rectangular", "Ricker", "Tabulated"),
+    "friction": ("Coulomb", "ExponentialDecay", "SlipRateCoulomb", "StaticKinetic", "Tresca"),
+    "impact": ("ComponentReset", "Elastic", "Inelastic", "MassProjection", "Newton", "NoImpact"),
+    "mass": ("ConsistentMass", "Redistributed"),
+    "materials": ("LinearElastic", "MassProportional", "NoDamping", "PlaneStrain", "PlaneStress", "Rayleigh", "Solid"),
+    "weight": ("with_weight",),
+}
+__all__ = sorted(name for names in _CONTENTS.values() for name in names)
+__getattr__, __dir__ = lazy(__name__, _CONTENTS)

@@ -15,18 +15,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-import numpy as np
-
-from ..core.algebra import Array
-from ..core.checks import attributes, instance, number, several
+from ..core.checks import number
 from ..core.errors import InputError
-from ..core.protocols import Excitation
-from ..ground_motion import Record
-
-
-def _vector(self: Excitation, t: float) -> Array:
-    """The vector acceleration(t) · direction [m/s²], shape (d,)."""
-    return self.acceleration(t) * np.array(self.direction)
+from ..core.excitation_values import check_excitation, finite_tuple, vector
 
 
 @dataclass(frozen=True)
@@ -42,7 +33,7 @@ class Harmonic:
     direction: tuple[float, ...] = (1.0, 0.0)
 
     def __post_init__(self) -> None:
-        _check(self, finite=("amplitude", "phase"), positive=("frequency",))
+        check_excitation(self, finite=("amplitude", "phase"), positive=("frequency",))
 
     @property
     def duration(self) -> float:
@@ -53,7 +44,7 @@ class Harmonic:
         """amplitude · sin(2 pi frequency t + phase) [m/s²]."""
         return self.amplitude * math.sin(2.0 * math.pi * self.frequency * t + self.phase)
 
-    __call__ = _vector
+    __call__ = vector
 
 
 @dataclass(frozen=True)
@@ -71,7 +62,7 @@ class Ricker:
     direction: tuple[float, ...] = (1.0, 0.0)
 
     def __post_init__(self) -> None:
-        _check(self, finite=("amplitude",), positive=("frequency",))
+        check_excitation(self, finite=("amplitude",), positive=("frequency",))
         if self.delay is not None:
             number("Ricker", "delay", self.delay, not_negative=True, unit="seconds")
 
@@ -90,7 +81,7 @@ class Ricker:
         x = (math.pi * self.frequency * (t - self.peak_time)) ** 2
         return self.amplitude * (1.0 - 2.0 * x) * math.exp(-x)
 
-    __call__ = _vector
+    __call__ = vector
 
 
 @dataclass(frozen=True)
@@ -105,13 +96,13 @@ class HalfSine:
     direction: tuple[float, ...] = (1.0, 0.0)
 
     def __post_init__(self) -> None:
-        _check(self, finite=("amplitude",), positive=("duration",))
+        check_excitation(self, finite=("amplitude",), positive=("duration",))
 
     def acceleration(self, t: float) -> float:
         """amplitude · sin(pi t / duration) [m/s²] inside the pulse."""
         return self.amplitude * math.sin(math.pi * t / self.duration) if 0.0 <= t < self.duration else 0.0
 
-    __call__ = _vector
+    __call__ = vector
 
 
 @dataclass(frozen=True)
@@ -126,13 +117,13 @@ class FullSine:
     direction: tuple[float, ...] = (1.0, 0.0)
 
     def __post_init__(self) -> None:
-        _check(self, finite=("amplitude",), positive=("duration",))
+        check_excitation(self, finite=("amplitude",), positive=("duration",))
 
     def acceleration(self, t: float) -> float:
         """amplitude · sin(2 pi t / duration) [m/s²] inside the pulse."""
         return self.amplitude * math.sin(2.0 * math.pi * t / self.duration) if 0.0 <= t < self.duration else 0.0
 
-    __call__ = _vector
+    __call__ = vector
 
 
 @dataclass(frozen=True)
@@ -147,13 +138,13 @@ class Rectangular:
     direction: tuple[float, ...] = (1.0, 0.0)
 
     def __post_init__(self) -> None:
-        _check(self, finite=("amplitude",), positive=("duration",))
+        check_excitation(self, finite=("amplitude",), positive=("duration",))
 
     def acceleration(self, t: float) -> float:
         """amplitude [m/s²] inside the pulse."""
         return self.amplitude if 0.0 <= t < self.duration else 0.0
 
-    __call__ = _vector
+    __call__ = vector
 
 
 @dataclass(frozen=True)
@@ -169,9 +160,9 @@ class Tabulated:
     direction: tuple[float, ...] = (1.0, 0.0)
 
     def __post_init__(self) -> None:
-        _check(self)
+        check_excitation(self)
         for name in ("times", "values"):
-            object.__setattr__(self, name, _finite_tuple("Tabulated", name, getattr(self, name)))
+            object.__setattr__(self, name, finite_tuple("Tabulated", name, getattr(self, name)))
         if len(self.times) != len(self.values) or len(self.times) < 2:
             raise InputError(f"Tabulated: {len(self.times)} times and {len(self.values)} values; "
                              "give one value per time and at least two of each")
@@ -194,54 +185,4 @@ class Tabulated:
         w = (t - times[k - 1]) / (times[k] - times[k - 1])
         return (1.0 - w) * values[k - 1] + w * values[k]
 
-    __call__ = _vector
-
-
-@dataclass(frozen=True)
-class GroundMotion:
-    """A recorded motion: a(t) = scale · (straight lines between the samples of `record`, sample k at k · dt).
-
-    Zero before the first and after the last sample. scale: a factor; for a peak use `scaled_to_pga(record, pga)`.
-    Raises InputError unless scale is finite. Solve with a time step no longer than the record's, or resample it first.
-    """
-
-    record: Record
-    direction: tuple[float, ...] = (1.0, 0.0)
-    scale: float = 1.0
-
-    def __post_init__(self) -> None:
-        instance("GroundMotion", "record", self.record, Record, "pass a Record, such as read_record(path)")
-        _check(self, finite=("scale",))
-
-    @property
-    def duration(self) -> float:
-        """Time of the last sample [s]."""
-        return self.record.duration
-
-    def acceleration(self, t: float) -> float:
-        """scale · linear interpolation between the two samples around t [m/s²]."""
-        record = self.record
-        if not 0.0 <= t <= record.duration:
-            return 0.0
-        position = t / record.dt
-        k = min(int(position), record.acceleration.size - 2)
-        w = position - k
-        return self.scale * float((1.0 - w) * record.acceleration[k] + w * record.acceleration[k + 1])
-
-    __call__ = _vector
-
-
-def _check(excitation: Excitation, *, finite: tuple[str, ...] = (), positive: tuple[str, ...] = ()) -> None:
-    """Raise InputError for a bad number or direction; turn the direction into a tuple of floats."""
-    attributes(excitation, finite=finite, positive=positive)
-    owner = type(excitation).__name__
-    direction = _finite_tuple(owner, "direction", excitation.direction)
-    if not 1 <= len(direction) <= 3 or not any(direction):
-        raise InputError(f"{owner}: direction is {direction!r}; give one to three components, not all zero")
-    object.__setattr__(excitation, "direction", direction)
-
-
-def _finite_tuple(owner: str, name: str, values: Sequence[float]) -> tuple[float, ...]:
-    """`values` as a tuple of floats; InputError naming the first entry that is not a finite number."""
-    entries = several(owner, name, values, "give a sequence of numbers")
-    return tuple(number(owner, f"{name}[{k}]", value) for k, value in enumerate(entries))
+    __call__ = vector

@@ -10,7 +10,7 @@ from ..core.algebra import Array
 from ..core.checks import array, instance, number
 from ..core.errors import InputError
 from ..core.system import SemiDiscreteSystem
-from ..ground_motion import STANDARD_GRAVITY
+from ..core.units import STANDARD_GRAVITY
 
 
 def with_weight(

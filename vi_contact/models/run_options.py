@@ -9,7 +9,7 @@ from ..core.errors import InputError
 from ..core.protocols import Excitation, ImpactLaw
 from ..core.step import Solver
 from ..ground_motion import Record, pga, read_record, resampled, scaled, scaled_to_pga
-from ..laws.excitation import GroundMotion
+from ..ground_motion.excitation import GroundMotion
 from ..run.cross_check import CrossChecked
 from .choices import SCHEMES, SOLVERS
 

@@ -14,13 +14,13 @@ from ..core.problem import ContactProblem
 from ..core.protocols import Excitation, ImpactLaw, MassLaw
 from ..core.surfaces import ContactSurface, HalfSpace, empty_surface
 from ..core.system import SemiDiscreteSystem
+from ..core.units import STANDARD_GRAVITY
 from ..engineering.modal import lowest_frequency
 from ..fem.assembly import assemble
 from ..fem.contact.surface import contact_surface
 from ..fem.loads import BodyForce
 from ..fem.mesh import Facets, build_mesh
 from ..fem.petsc_algebra import MpiComm
-from ..ground_motion import STANDARD_GRAVITY
 from ..laws.excitation import Harmonic
 from ..laws.impact import Inelastic
 from ..laws.mass import ConsistentMass

@@ -1,0 +1,20 @@
+"""March a problem, listen to it with recorders, and keep what it did in a folder."""
+
+from __future__ import annotations
+
+from ..core.lazy import lazy
+
+_CONTENTS = {
+    "cross_check": ("CrossChecked", "cross_check"),
+    "defaults": ("completed",),
+    "files.reading": ("RunFolder", "read_run"),
+    "march": ("march",),
+    "quasi_static": ("quasi_static",),
+    "recorders": ("Contact", "Energy", "Probe"),
+    "simulate": ("simulate",),
+    "solution": ("Solution",),
+    "static": ("static_equilibrium",),
+    "time_steps": ("HalvedAtImpact", "Schedule"),
+}
+__all__ = sorted(name for names in _CONTENTS.values() for name in names)
+__getattr__, __dir__ = lazy(__name__, _CONTENTS)

@@ -61,8 +61,8 @@ class CompanionRun:
         if t <= 0.0:
             return self._problem.system.u0.copy(), self._problem.system.v0.copy()
         if self._bound is None:
-            raise InputError(f"{self.name} is asked for its motion at t = {t:g} s, but no run has bound it yet: use it in "
-                             "a run (a function of your own around it hides it: give its own methods), or call "
+            raise InputError(f"{self.name} is asked for its motion at t = {t:g} s, but no run has bound it yet: use it "
+                             "in a run (a function of your own around it hides it: give its own methods), or call "
                              "bind(scheme, dt) first")
         while self._t[-1] < t:
             state, _ = next(self._steps)

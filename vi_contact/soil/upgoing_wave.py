@@ -17,7 +17,7 @@ from ..core.errors import InputError
 from ..core.problem_checks import EXCITATION
 from ..core.protocols import Excitation
 from ..ground_motion import Record
-from ..laws.excitation import GroundMotion
+from ..ground_motion.excitation import GroundMotion
 
 
 class UpgoingVelocity:

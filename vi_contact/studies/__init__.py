@@ -1,23 +1,12 @@
-"""Studies of a problem that is written down: case files, and many runs of one case. Names are imported when used."""
+"""Study a problem that is written down: case files, and many runs of one case."""
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import Any
+from ..core.lazy import lazy
 
-_HOME = {
-    "Case": "cases.case", "read_case": "cases.case", "run_case": "cases.case", "IDA": "ida.ida", "run_ida": "ida.ida",
+_CONTENTS = {
+    "cases.case": ("Case", "read_case", "run_case"),
+    "ida.ida": ("IDA", "run_ida"),
 }
-"""Public name -> module of this folder it lives in."""
-
-__all__ = sorted(_HOME)
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
-
-
-def __dir__() -> list[str]:
-    return __all__
+__all__ = sorted(name for names in _CONTENTS.values() for name in names)
+__getattr__, __dir__ = lazy(__name__, _CONTENTS)

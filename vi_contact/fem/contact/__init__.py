@@ -1,0 +1,1 @@
+"""Make contact surfaces: facets to conditions, nodal frames, pairs of bodies."""

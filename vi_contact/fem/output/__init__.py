@@ -1,0 +1,1 @@
+"""Write fields of a run, and resultants that need elements: reactions, section forces, nodal work."""

@@ -1,0 +1,1 @@
+"""Read and write the formats of strong-motion records."""

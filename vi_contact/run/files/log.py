@@ -15,6 +15,8 @@ import h5py
 import numpy as np
 import scipy
 
+from ...core.version import __version__
+
 LOGGER = logging.getLogger("vi_contact")
 log = logging.getLogger(__name__)
 SHARE, SECONDS = 0.1, 30.0  # a line in the log for every tenth of the run, or this often
@@ -67,7 +69,6 @@ class RunLog:
 
 def versions() -> dict[str, str]:
     """Version of everything that computes in this process."""
-    from ... import __version__
 
     found = {
         "vi_contact": __version__,

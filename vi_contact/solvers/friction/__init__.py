@@ -1,0 +1,1 @@
+"""Solve for normal and tangential reactions on the contact points, Tresca or Coulomb."""

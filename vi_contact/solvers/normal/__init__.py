@@ -1,0 +1,1 @@
+"""Solve for normal reactions on the contact points: the linear complementarity problem."""

@@ -1,0 +1,5 @@
+"""Solve the step in the volume, with PETSc's variational-inequality solvers: the whole u, no condensation."""
+
+from .route import Volume
+
+__all__ = ["Volume"]

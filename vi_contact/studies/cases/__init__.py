@@ -1,0 +1,1 @@
+"""Read case files: TOML tables to values, by an allow-list of words."""

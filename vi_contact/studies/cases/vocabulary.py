@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ...core import surfaces
+from ...core import protocols, surfaces
 from ...core.step import Recorder, Scheme, Solver
 from ...core.surfaces import ContactSurface
 from ...engineering.racking import Racking
@@ -19,7 +19,7 @@ from ...fem.mesh import Cells, Facets
 from ...fem.output.fields import XDMF
 from ...fem.output.reactions import Reactions
 from ...fem.output.section_forces import SectionForces
-from ...ground_motion import Record, synthetic
+from ...ground_motion import GroundMotion, Record, synthetic
 from ...laws import excitation, friction, impact, mass, materials
 from ...meshes.ball import BallMesh
 from ...meshes.block import BlockMesh
@@ -99,13 +99,13 @@ def _choices() -> dict[Any, Mapping[str, Callee]]:
         surfaces.Obstacle: _named(surfaces.Touching, surfaces.HalfSpace),
         channel_sides.Sides: _named(channel_sides.Rollers, channel_sides.Fixed, channel_sides.TiedSides),
         Matching: _named(NodeToNode, DualMortar),
-        friction.FrictionLaw: _named(friction.Frictionless, friction.Tresca, friction.Coulomb) | rate,
-        impact.ImpactLaw: _named(impact.NoImpact, impact.Inelastic, impact.Newton, impact.Elastic),
+        protocols.FrictionLaw: _named(protocols.Frictionless, friction.Tresca, friction.Coulomb) | rate,
+        protocols.ImpactLaw: _named(impact.NoImpact, impact.Inelastic, impact.Newton, impact.Elastic),
         impact.Reading: _named(impact.ComponentReset, impact.MassProjection),
-        mass.MassLaw: _named(mass.ConsistentMass, mass.Redistributed),
-        excitation.Excitation: _named(
+        protocols.MassLaw: _named(mass.ConsistentMass, mass.Redistributed),
+        protocols.Excitation: _named(
             excitation.Harmonic, excitation.Ricker, excitation.HalfSine, excitation.FullSine, excitation.Rectangular,
-            excitation.Tabulated, excitation.GroundMotion,
+            excitation.Tabulated, GroundMotion,
         ),
         Record: {"read_record": callee(plain.record, name="read_record"), "synthetic": callee(synthetic)},
         Scheme: _named(

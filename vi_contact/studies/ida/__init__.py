@@ -1,0 +1,1 @@
+"""Run incremental dynamic analyses: many records and scales of one case."""

@@ -20,7 +20,7 @@ from typing import Any
 from ...core.errors import InputError
 from ...core.files import to_json, write_atomically
 from ...ground_motion import Record, scaled
-from ...laws.excitation import GroundMotion
+from ...ground_motion.excitation import GroundMotion
 from ...run.files.folder import CHECKPOINT, SUMMARY
 from ..cases.case import Case, read_case
 

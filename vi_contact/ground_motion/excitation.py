@@ -1,0 +1,43 @@
+"""Shake a body with a recorded ground motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..core.checks import instance
+from ..core.excitation_values import check_excitation, vector
+from .record import Record
+
+
+@dataclass(frozen=True)
+class GroundMotion:
+    """A recorded motion: a(t) = scale · (straight lines between the samples of `record`, sample k at k · dt).
+
+    Zero before the first and after the last sample. scale: a factor; for a peak use `scaled_to_pga(record, pga)`.
+    Raises InputError unless scale is finite. Solve with a time step no longer than the record's, or resample it first.
+    """
+
+    record: Record
+    direction: tuple[float, ...] = (1.0, 0.0)
+    scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        instance("GroundMotion", "record", self.record, Record, "pass a Record, such as read_record(path)")
+        check_excitation(self, finite=("scale",))
+
+    @property
+    def duration(self) -> float:
+        """Time of the last sample [s]."""
+        return self.record.duration
+
+    def acceleration(self, t: float) -> float:
+        """scale · linear interpolation between the two samples around t [m/s²]."""
+        record = self.record
+        if not 0.0 <= t <= record.duration:
+            return 0.0
+        position = t / record.dt
+        k = min(int(position), record.acceleration.size - 2)
+        w = position - k
+        return self.scale * float((1.0 - w) * record.acceleration[k] + w * record.acceleration[k + 1])
+
+    __call__ = vector
