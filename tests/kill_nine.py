@@ -22,7 +22,7 @@ import sys
 sys.path.insert(0, {tests!r})
 from mpi4py import MPI
 from pathlib import Path
-from test_checkpoint import run_wall
+from marched_chain import run_wall
 folder = Path({folder!r})
 run_wall(MPI.COMM_WORLD, folder, {steps}, checkpoint_every=5, restart=(folder / "checkpoint.npz").is_file())
 """

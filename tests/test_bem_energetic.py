@@ -7,13 +7,13 @@ from dataclasses import replace
 import h5py
 import numpy as np
 import pytest
+from bem_rod import rod, smooth_integral, smooth_load
 from plane_waves import MATERIAL, SQUARE, pulse
 
 from vi_contact import LinearElastic
 from vi_contact.bem import (
     BoundaryMesh,
     BoundaryProblem,
-    EnergeticBlocks,
     Marching,
     PoincareSteklov,
     circle,
@@ -28,12 +28,6 @@ from vi_contact.bem import (
 from vi_contact.core.errors import InputError
 
 pytestmark = pytest.mark.serial
-
-
-@pytest.fixture(scope="module")
-def blocks() -> dict[int, EnergeticBlocks]:
-    """Squares of 5 and 10 elements a side, c_P dt = h, six crossings of the square."""
-    return {k: energetic_blocks(polygon(SQUARE, 1.0 / k), MATERIAL, dt=1.0 / k, steps=6 * k) for k in (5, 10)}
 
 
 @pytest.mark.parametrize("symmetric", [True, False])
@@ -74,28 +68,9 @@ def test_plane_pulses_in_other_shapes(shape, fine):
     assert errors[1] < fine and np.log2(errors[0] / errors[1]) > 1.8
 
 
-def rod(blocks: EnergeticBlocks, load, *, symmetric: bool = True, rho: float = 1.0) -> BoundaryProblem:
-    """The square between rollers on a fixed base, pulled at its top by load(t): a rod with c = 1, length 1."""
-    mesh = blocks.mesh
-    fixed = np.zeros((2, len(mesh)), bool)
-    fixed[1] = mesh.nodes_of(mesh.labels == 0)
-    fixed[0] = mesh.nodes_of(np.isin(mesh.labels, (1, 3)))
-    forces = traction_forces(mesh, lambda x, n, t: n * load(t), dt=blocks.dt, steps=blocks.steps,
-                             elements=mesh.labels == 2)
-    return BoundaryProblem(PoincareSteklov(blocks, rho, symmetric), forces, fixed, contact=mesh.labels == 0)
-
-
 def echoes(t: np.ndarray, integral) -> np.ndarray:
     """Displacement of the top: the load's integral and its echoes from the fixed base."""
     return integral(t) + 2.0 * sum((-1) ** j * integral(t - 2.0 * j) for j in range(1, int(t.max() / 2) + 1))
-
-
-def smooth_load(t: float) -> float:
-    return float(np.sin(0.5 * np.pi * t) ** 2) if t < 2.0 else 0.0
-
-
-def smooth_integral(t: np.ndarray) -> np.ndarray:
-    return np.where(t <= 0.0, 0.0, np.where(t < 2.0, 0.5 * t - np.sin(np.pi * t) / (2.0 * np.pi), 1.0))
 
 
 @pytest.mark.parametrize("symmetric", [True, False])

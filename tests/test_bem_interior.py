@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from bem_rod import rod, smooth_integral, smooth_load
 from plane_waves import MATERIAL, SQUARE, pulse
-from test_bem_energetic import rod, smooth_integral, smooth_load
 
 from vi_contact.bem import BoundaryProblem, PoincareSteklov, circle, energetic_blocks, polygon, traction_forces
 from vi_contact.bem.interior import interior_displacement

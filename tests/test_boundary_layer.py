@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from layer_numbers import DEEPEST, DURATION, RESTITUTION, C, K
 from scipy.integrate import quad
 
 from vi_contact.boundary_layer.layer import Layer
@@ -11,25 +12,6 @@ from vi_contact.boundary_layer.particle import ParticleImpact, damping_ratio, la
 from vi_contact.core.errors import InputError
 
 pytestmark = pytest.mark.serial
-K, C = (0.5, 1.0, 2.0, 5.0, 10.0), (0.0, 0.5, 1.0, 2.0, 5.0)
-RESTITUTION = (  # V5.1, rows k, columns c; a = b = V = m = 1
-    (1.0, 0.593624, 0.410720, 0.241279, 0.099982),
-    (1.0, 0.748435, 0.593624, 0.410720, 0.196980),
-    (1.0, 0.856851, 0.748435, 0.593624, 0.352379),
-    (1.0, 0.937476, 0.882190, 0.788539, 0.593624),
-    (1.0, 0.967739, 0.937476, 0.882190, 0.748435),
-)
-DURATION = (
-    (4.0, 3.187249, 2.821439, 2.482557, 2.199963),
-    (2.0, 1.748435, 1.593624, 1.410720, 1.196980),
-    (1.0, 0.928426, 0.874217, 0.796812, 0.676189),
-    (0.4, 0.387495, 0.376438, 0.357708, 0.318725),
-    (0.2, 0.196774, 0.193748, 0.188219, 0.174843),
-)
-DEEPEST = {
-    (0.5, 0.0): 0.367879, (1.0, 0.0): 0.606531, (2.0, 0.0): 0.778801, (5.0, 0.0): 0.904837, (10.0, 0.0): 0.951229,
-    (1.0, 0.5): 0.685135, (1.0, 1.0): 0.735759, (1.0, 2.0): 0.798239, (1.0, 5.0): 0.879563,
-}
 
 
 def unit(k: float, c: float) -> ParticleImpact:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from layer_numbers import DEEPEST, DURATION, RESTITUTION, C, K
 from scipy.special import ellipk
-from test_boundary_layer import DEEPEST, DURATION, RESTITUTION, C, K
 
 from vi_contact.boundary_layer import trajectory
 from vi_contact.boundary_layer.bilateral import bilateral_motion

@@ -7,7 +7,7 @@ from typing import Any
 
 import h5py
 import pytest
-from test_demos import demo
+from demo_runs import demo
 
 from demos.pictures import deformed
 from demos.pictures.boundary import SHEAR, plot_panels

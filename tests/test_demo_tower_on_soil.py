@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 import pytest
-from test_demos import demo
+from demo_runs import demo
 
 
 @pytest.mark.slow

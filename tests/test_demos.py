@@ -7,33 +7,23 @@ import json
 import os
 import subprocess
 import sys
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
 import pytest
+from demo_runs import ROOT, demo
 
 from vi_contact.cli.main import main
 from vi_contact.ground_motion import Record, pga, read_record
 
-ROOT = Path(__file__).resolve().parents[1]
 SHARED = Path(os.environ.get("VI_CONTACT_GROUND_MOTIONS", ROOT.parent / "shared" / "ground_motions"))
 FIGURES = ("excitation.png", "displacements.png", "energy.png", "certificate.png", "contact.png")
 SUMMARY = (
     "versions", "ranks", "unknowns", "contact_points", "steps", "iterations_per_step", "worst_certificate",
     "cross_check", "energy", "energy_defect", "seconds_per_step", "seconds_per_linear_step",
 )
-
-
-def demo(name: str) -> Any:
-    """The module demos/<name>.py."""
-    spec = spec_from_file_location(f"demo_{name}", ROOT / "demos" / f"{name}.py")
-    assert spec is not None and spec.loader is not None
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def column(folder: Path, name: str) -> np.ndarray:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from test_demos import demo
+from demo_runs import demo
 
 from demos.pictures.layer import plot_thin_limit
 from vi_contact.cli.main import main

@@ -7,8 +7,8 @@ from collections import deque
 import numpy as np
 import pytest
 from fem_problems import linear
+from layered import SHAKE, STIFF, middles
 from soil import SOIL, history, strip
-from test_fem_ties import SHAKE, STIFF, middles
 
 import vi_contact as vc
 from vi_contact import fem, soil

@@ -11,7 +11,7 @@ import scipy.linalg
 from chain import chain_problem
 from fem_problems import CONCRETE, block, dense, held_by, linear, max_over_ranks, orders
 from mpi4py import MPI
-from test_static import COLUMN, G, standing
+from standing import COLUMN, G, standing
 
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from fem_problems import block, field, linear
+from layered import SHAKE, STIFF, middles
 from soil import SOIL, history, strip
 
 import vi_contact as vc
@@ -12,9 +13,6 @@ from vi_contact import fem
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.soil.soil_column import SoilColumn
-
-SHAKE = (vc.Ricker(2.0, 4.0), vc.Ricker(1.0, 6.0, direction=(0.0, 1.0)))
-STIFF = vc.LinearElastic.from_wave_speeds(900.0, 500.0, 2200.0)
 
 
 @pytest.mark.parametrize("simplices", [False, True])
@@ -37,13 +35,6 @@ def test_tied_layers_are_a_column(comm, simplices):
     for x in range(3):
         assert np.abs(found[:, x::3][:, 1:] - exact).max() < 1e-11 * np.abs(exact).max()
     assert not found[:, :3].any()
-
-
-def middles(mesh):
-    """Middles of the local cells."""
-    from vi_contact.fem.compat import geometry_dofmap
-
-    return mesh.geometry.x[geometry_dofmap(mesh)].mean(axis=1)
 
 
 def test_forces_on_one_side_act_on_the_pair(comm):

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from column import column
-from test_friction_methods import small
+from small_steps import small
 
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.protocols import Frictionless

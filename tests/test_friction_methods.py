@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from small_steps import small
 
 from vi_contact.core.algebra import Array, Mask
 from vi_contact.core.errors import InputError, StepFailure
@@ -25,15 +26,6 @@ METHODS = [
     FixedPoint(extrapolation=Anderson()), GivenForces(), GivenForces(extrapolation=Anderson()), Uzawa(),
 ]
 NAMES = ["newton", "nsgs", "fixed", "fixed nsgs", "aitken", "anderson", "given", "given anderson", "uzawa"]
-
-
-def small(seed: int, m: int, d: int) -> tuple[Array, Array, Mask]:
-    """(G, q, bilateral): strongly coupled, with rows of very different sizes and some held ones."""
-    rng = np.random.default_rng(seed)
-    root = rng.normal(size=(m * d, m * d + 3))
-    size = np.repeat(10.0 ** rng.uniform(-2.0, 2.0, m), d)
-    G = size[:, None] * (root @ root.T / (m * d) + 0.1 * np.eye(m * d)) * size
-    return G, size.reshape(m, d) * rng.normal(size=(m, d)), rng.random(m) < 0.2
 
 
 def enumerated(G: Array, q: Array, bilateral: Mask, cohesion: Array, slope: Array) -> list[Array]:

@@ -19,7 +19,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from test_checkpoint import chain, difference, run
+from marched_chain import chain, difference, run
 
 from vi_contact.core.errors import InputError
 from vi_contact.core.step import State

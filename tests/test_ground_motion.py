@@ -2,11 +2,10 @@
 
 import hashlib
 import math
-import os
-from pathlib import Path
 
 import numpy as np
 import pytest
+from shared_records import EL_CENTRO, LOMA, shared
 
 from vi_contact.core.errors import InputError
 from vi_contact.ground_motion import (
@@ -28,11 +27,8 @@ from vi_contact.ground_motion import (
 
 pytestmark = pytest.mark.serial
 
-SHARED = Path(os.environ.get("VI_CONTACT_GROUND_MOTIONS",
-                             Path(__file__).resolve().parents[2] / "shared" / "ground_motions"))
 """Development records; they are not part of the project, so the tests on them are skipped where they are absent."""
 
-EL_CENTRO, LOMA = "elcentro_1940_ns_peknold.at2", "lomaprieta_1989_sf_1295shafter_0111"
 # file, samples, dt, PGA [m/s²] and its time, PGV, PGD, Arias, D5-95, final displacement; with half a last digit each
 TABLE = [
     (EL_CENTRO, 1559, 0.02, (0.3188 * 9.80665, 5e-4), 2.020,
@@ -44,12 +40,6 @@ TABLE = [
     (LOMA + "c.smc", 6004, 0.005, (0.7044, 5e-5), 10.385,
      (0.113, 5e-4), None, (0.063, 5e-4), (9.7, 5e-2), -0.225),
 ]
-
-
-def shared(name):
-    if not (SHARED / name).is_file():
-        pytest.skip(f"development record {name} is not beside the checkout")
-    return SHARED / name
 
 
 @pytest.mark.parametrize("name, n, dt, peak, at, velocity, displacement, intensity, duration, final", TABLE,

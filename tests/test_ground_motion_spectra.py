@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from scipy.linalg import expm
-from test_ground_motion import EL_CENTRO, shared
+from shared_records import EL_CENTRO, shared
 
 from vi_contact.core.errors import InputError
 from vi_contact.ground_motion import (

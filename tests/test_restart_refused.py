@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from test_checkpoint import chain, equal_files, rubbing_box, run, run_wall, wall
+from marched_chain import chain, equal_files, rubbing_box, run, run_wall, wall
 
 from vi_contact.core.errors import InputError
 from vi_contact.core.problem import ContactProblem

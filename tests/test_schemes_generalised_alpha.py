@@ -6,34 +6,19 @@ from typing import Any
 
 import numpy as np
 import pytest
+from amplification import amplification
 from bar import energy, period_three, run
 from oscillator import SHAKEN, dense, observed_order, oscillators
 
 from vi_contact.core.errors import InputError
-from vi_contact.core.step import initial_state
 from vi_contact.laws.mass import ConsistentMass, Redistributed
-from vi_contact.schemes.generalised_alpha import AlphaStep, GeneralisedAlpha
+from vi_contact.schemes.generalised_alpha import GeneralisedAlpha
 from vi_contact.schemes.hht import HHT
 from vi_contact.schemes.newmark import Newmark
 
 pytestmark = pytest.mark.serial
 RADII = (0.0, 0.3, 0.5, 0.8, 1.0)
 of = GeneralisedAlpha.spectral_radius
-
-
-def amplification(scheme: AlphaStep, frequency: float, damping: float = 0.0) -> np.ndarray:
-    """3 x 3 amplification of (u, v, a) of u'' + 2 xi w u' + w² u = 0, dt = 1: one step from each unit vector."""
-    problem = oscillators(1, mass=1.0, stiffness=frequency**2, damping=2.0 * damping / frequency)
-    columns = []
-    for u, v, a in np.eye(3):
-        state = initial_state(problem)
-        zero = np.zeros(1)
-        state = type(state)(0.0, 0, np.array([u]), np.array([v]), zero, state.active)
-        memory = dict(scheme.start(problem, state, 1.0).memory) | {"a": np.array([a]), "reaction": zero}
-        state = type(state)(0.0, 0, state.u, state.v, zero, state.active, memory)
-        new = next(run(problem, scheme, dt=1.0, steps=1, state=state)).new
-        columns.append([new.u[0], new.v[0], new.memory["a"][0]])
-    return np.array(columns).T
 
 
 @pytest.mark.parametrize(

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from amplification import amplification
 from bar import energy, period_three, run, thrown
 from oscillator import observed_order
-from test_schemes_generalised_alpha import amplification
 
 from vi_contact.core.errors import InputError
 from vi_contact.laws.mass import ConsistentMass, Redistributed

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from bar import bar, before_impact, bouncing, energy, period_three, run, thrown
 from column import column
+from kane import kane
 from oscillator import SHAKEN, observed_order
 from shaken import shaken
-from test_schemes_zienkiewicz_wood_taylor import kane
 
 from vi_contact.core.errors import InputError
 from vi_contact.core.verify import energies, energy_balance

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from bar import bar, before_impact, bouncing, energy, period_three, run, thrown
 from chain import chain_problem
-from oscillator import SHAKEN, amplification, dense, exact, last_state, observed_order, oscillators
+from kane import kane
+from oscillator import SHAKEN, amplification, exact, last_state, observed_order, oscillators
 
 from vi_contact.core.errors import InputError
 from vi_contact.core.step import initial_state
@@ -46,20 +47,6 @@ def test_exact_motion_is_what_it_converges_to():
     u, v = exact(problem, 1.0, SHAKEN)
     np.testing.assert_allclose(state.u, u, atol=2e-7 * np.abs(u).max())
     np.testing.assert_allclose(state.v, v, atol=2e-6 * np.abs(v).max())
-
-
-def kane(problem, u, v, dt: float):
-    """(u, v, r) after a step of Kane's rule: trapezoidal elastic forces, contact force at the new time; one contact on
-    the last unknown."""
-    M, _, K = dense(problem)
-    gap, f = problem.surface.gap0[0], problem.system.load.constant
-    A = np.linalg.inv(M + dt**2 / 4.0 * K)
-    free = A @ (M @ (u + dt * v) + dt**2 / 4.0 * (2.0 * f - K @ u))
-    r = max((free[-1] - gap) / (0.5 * dt**2 * A[-1, -1]), 0.0)
-    new = free - 0.5 * dt**2 * r * A[:, -1]
-    force = f - 0.5 * K @ (u + new)
-    force[-1] -= r
-    return new, v + dt * np.linalg.solve(M, force), r
 
 
 def test_V41_half_is_kanes_implicit_contact_rule():

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from chain import chain_problem
+from summaries import summary_of
 
 from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.core.problem import ContactProblem
@@ -54,16 +55,6 @@ def same(one: State, other: State) -> bool:
         and set(one.memory) == set(other.memory)
         and all(np.array_equal(one.memory[name], other.memory[name]) for name in arrays[1])
     )
-
-
-def summary_of(folder: Path) -> dict[str, Any]:
-    """summary.json; NaN or Infinity in it is an error."""
-
-    def refuse(text: str) -> None:
-        raise ValueError(text)
-
-    found: dict[str, Any] = json.loads((folder / "summary.json").read_text(), parse_constant=refuse)
-    return found
 
 
 class StopsAt:

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from test_checkpoint import equal_files, run, run_wall
-from test_simulate import summary_of
+from marched_chain import equal_files, run, run_wall
+from summaries import summary_of
 
 from vi_contact.cli.main import main
 from vi_contact.core.algebra import SerialComm
@@ -180,7 +180,7 @@ def test_one_rank_gets_the_signal(comm: Any, shared_tmp: Path) -> None:
 FIRST = """
 import sys
 sys.path.insert(0, {tests!r})
-from test_checkpoint import run
+from marched_chain import run
 from pathlib import Path
 run(Path({out!r}), 10**6, checkpoint_every=10)
 """

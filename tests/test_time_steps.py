@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from bar import run, thrown
 from chain import chain_problem
+from marched_chain import chain, difference, equal_files, round_off, run_wall, wall
+from marched_chain import run as run_chain
 from shaken import changes, shaken
-from test_checkpoint import chain, difference, equal_files, round_off, run_wall, wall
-from test_checkpoint import run as run_chain
 
 from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.core.problem import ContactProblem

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from inertia import inertia
 from mpi4py import MPI
-from test_mass import inertia
 
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError

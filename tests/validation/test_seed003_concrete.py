@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from demo_runs import demo
 from mpi4py import MPI
-from test_demos import demo
 
 import vi_contact as vc
 from vi_contact.core.algebra import Array

@@ -11,9 +11,9 @@ import pytest
 
 pytest.importorskip("dolfinx")
 
+from demo_runs import demo
 from fem_problems import field, linear, run
 from mpi4py import MPI
-from test_demos import demo
 from two_bodies import relative
 
 import vi_contact as vc
