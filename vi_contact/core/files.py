@@ -8,15 +8,12 @@ import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 from .algebra import Comm
 from .errors import ViContactError
-
-if TYPE_CHECKING:
-    import h5py
 
 T = TypeVar("T")
 
@@ -110,7 +107,7 @@ def _whole_or_not_at_all(path: Path) -> Iterator[Any]:
         raise OSError(error.errno, error.strerror or str(error), str(path)) from error
 
 
-def hdf5_atomically(path: Path, fill: Callable[[h5py.File], None]) -> None:
+def hdf5_atomically(path: Path, fill: Callable[[Any], None]) -> None:
     """The same for an HDF5 file, which need not fit the memory."""
     import h5py  # late: the package is imported without it
 

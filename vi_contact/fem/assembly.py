@@ -56,9 +56,8 @@ def assemble(
         material: one material, or (cells, material) pairs that cover the mesh.
         section: PlaneStrain() by default in 2D (Solid() in 3D); PlaneStress(thickness) for panels.
         clamped: facets with u = 0; prescribed: facets that move (eq. 3) or are held in some components.
-        tied: boundaries whose opposite nodes move together.
-        dashpots: absorbing boundaries: Dashpots, CompliantBase, FreeField. Their loss counts as damping.
-        loads: tractions (eqs. 4, 6) and body forces.
+        dashpots: absorbing boundaries: Dashpots, CompliantBase, soil.FreeField. Their loss counts as damping.
+        tied: boundaries whose opposite nodes move together; loads: tractions (eqs. 4, 6) and body forces.
         damping: NoDamping() by default, MassProportional(c) (eq. 7) or Rayleigh.
         base_inertia: whether a ground motion's inertia load counts the mass that elements share with prescribed nodes,
             as it must to be the motion seen from the ground; False is the load of the reference of V4.1.
@@ -77,10 +76,10 @@ def assemble(
     algebra = PetscAlgebra(mesh.comm)
     mass, stiffness, damper = forms.matrices()
     absorbers = [DashpotMatrix(space, forms, one) for one in boundaries]
+    acting = [one.dashpots.loads(one, forms) for one in absorbers]
     dampers = [(1.0, PetscMatrix(one)) for one in (damper, *(one.mat for one in absorbers)) if one is not None]
     damper = as_petsc(algebra.combine(dampers)).mat if dampers else None
     load = assemble_loads(space, section, as_tuple(loads), (stiffness, damper, mass))
-    acting = [one.dashpots.loads(one, forms) for one in absorbers]
 
     def reduced(full: Any) -> PetscMatrix:
         return PetscMatrix(full.PtAP(space.selection))

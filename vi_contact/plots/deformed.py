@@ -8,7 +8,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-import h5py
 import numpy as np
 
 from ..core.algebra import Array, Indices
@@ -47,6 +46,8 @@ class Frames:
 
     def at(self, t: float) -> tuple[float, Array, Array]:
         """(its time [s], u (n, 2) [m], von Mises stress (c,) [Pa]) of the frame nearest to t."""
+        import h5py
+
         row = int(np.argmin(np.abs(self.t - t)))
         with h5py.File(self.paths[row]) as file:
             return float(self.t[row]), file["u"][:, :2], file["von_mises"][:]
@@ -54,6 +55,8 @@ class Frames:
 
 def read_tractions(folder: str | Path) -> Tractions:
     """From the history of a run in the plane. InputError for a folder without one."""
+    import h5py
+
     path = Path(folder) / HISTORY_H5
     if not path.is_file():
         raise InputError(f"{path} does not exist: give the folder of a finished run with contact in it")
@@ -74,6 +77,8 @@ def _tangents(normals: Array) -> Array:
 
 def read_frames(folder: str | Path) -> Frames:
     """From the fields of a run. InputError for a folder without them."""
+    import h5py
+
     fields, history = Path(folder) / FIELDS, Path(folder) / HISTORY_H5
     paths = sorted(fields.glob("frame_*.h5"))
     if not paths or not history.is_file():

@@ -132,7 +132,7 @@ run(Path({out!r}), 10**6, checkpoint_every=10)
 @pytest.mark.serial
 def test_kill_9(tmp_path: Path) -> None:
     """kill -9 in full flight: every row written is whole, the checkpoint is, and the run goes on to the last bit."""
-    tests, package = str(Path(__file__).parent), str(Path(__file__).parents[1])
+    tests, package = str(Path(__file__).parents[1] / "support"), str(Path(__file__).parents[2])
     code = KILLED.format(tests=tests, out=str(tmp_path / "killed"))
     child = subprocess.Popen([sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": package})
     csv, deadline = tmp_path / "killed" / "history.csv", time.monotonic() + 600

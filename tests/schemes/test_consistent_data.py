@@ -270,7 +270,7 @@ def test_V15_oblique_impact_with_friction(scheme: Any) -> None:
 
 
 def problem_material() -> Any:
-    """The material of tests/column.py."""
+    """The material of tests/support/column.py."""
     return column.__kwdefaults__["material"]
 
 

@@ -27,7 +27,7 @@ from vi_contact.studies import Case, read_case, run_case
 from vi_contact.studies.cases.toml_file import with_settings
 from vi_contact.studies.cases.vocabulary import words
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 WALL = ROOT / "demos" / "cases" / "wall.toml"
 COMM = MPI.COMM_WORLD
 ROUND_OFF = ("certificate", "energy_defect", "loss_algorithmic")  # nothing but round-off in these runs

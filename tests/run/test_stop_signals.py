@@ -29,7 +29,7 @@ from vi_contact.run.recorders import Contact, Energy
 from vi_contact.run.stop_signals import SIGNALS, StopSignals
 
 serial = pytest.mark.serial
-TESTS, PACKAGE = str(Path(__file__).parent), str(Path(__file__).parents[1])
+TESTS, PACKAGE = str(Path(__file__).parents[1] / "support"), str(Path(__file__).parents[2])
 
 
 class AtStep:

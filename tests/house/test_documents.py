@@ -16,7 +16,7 @@ import vi_contact
 from vi_contact.cli.main import parser
 
 pytestmark = pytest.mark.serial
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 MODULES = ("vi_contact", "vi_contact.fem", "vi_contact.ground_motion", "vi_contact.solvers.volume.route")
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
 

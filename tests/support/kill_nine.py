@@ -1,6 +1,6 @@
 """Kills a run of several ranks at random instants, restarts it, and compares the end with the straight run.
 
-    python3 tests/kill_nine.py [KILLS] [RANKS]      # 20 on 3 ranks; needs mpirun
+    python3 tests/support/kill_nine.py [KILLS] [RANKS]      # 20 on 3 ranks; needs mpirun
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def started(folder: Path, steps: int, ranks: int) -> subprocess.Popen[bytes]:
     """The run under mpirun, from its checkpoint where there is one; in an environment without what MPI put there."""
     mpi = ("OMPI_COMM", "OMPI_UNIVERSE", "PMIX_", "PMI_", "OMPI_MCA_ess", "OMPI_MCA_orte")
     environment = {name: value for name, value in os.environ.items() if not name.startswith(mpi)}
-    environment["PYTHONPATH"] = os.pathsep.join([str(TESTS.parent), environment.get("PYTHONPATH", "")])
+    environment["PYTHONPATH"] = os.pathsep.join([str(TESTS.parents[1]), environment.get("PYTHONPATH", "")])
     code = CODE.format(tests=str(TESTS), folder=str(folder), steps=steps)
     command = ["mpirun", "-n", str(ranks), sys.executable, "-c", code]
     return subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)

@@ -94,7 +94,7 @@ def test_ball_leaves_gmsh_options_alone():
 
 
 def test_ball_script_runs_by_file(tmp_path):
-    script = Path(__file__).resolve().parents[1] / "meshes" / "ball.py"
+    script = Path(__file__).resolve().parents[2] / "meshes" / "ball.py"
     options = ["--radius", "0.01", "--size", "2e-4", "--foot", "8e-4", "--eighth", "-o", "ball.msh"]
     done = subprocess.run(
         [sys.executable, str(script), *options], cwd=tmp_path, capture_output=True, text=True, timeout=600,

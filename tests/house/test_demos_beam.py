@@ -17,7 +17,7 @@ from vi_contact.cli import main as cli
 from vi_contact.plots import histories as plotting
 
 pytestmark = pytest.mark.serial
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def demo() -> Any:

@@ -17,7 +17,7 @@ from vi_contact.core.errors import InputError
 from vi_contact.models import rocking_block as rocking
 
 COMM = MPI.COMM_WORLD
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.fixture(scope="module")

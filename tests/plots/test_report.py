@@ -25,7 +25,7 @@ from vi_contact.run.files.reading import ContactGeometry, RunFolder, read_run
 
 pytestmark = pytest.mark.serial
 pytest.importorskip("matplotlib")
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.fixture(scope="module")

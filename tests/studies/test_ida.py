@@ -27,7 +27,7 @@ from vi_contact.studies.ida.measures import demand, fractiles, intensity
 from vi_contact.studies.ida.runs import OneRun, Shaking, executed, quoted
 
 pytestmark = pytest.mark.serial
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 MOTIONS = ("motion_1.at2", "motion_2.at2")
 DEMANDS = ("contact_uplift:max", "u_x_top:min")
 

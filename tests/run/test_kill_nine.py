@@ -1,4 +1,4 @@
-"""kill -9 of one rank in full flight, twice: nothing lost. ``python3 tests/kill_nine.py`` does it twenty times."""
+"""kill -9 of one rank in full flight, twice: nothing lost. ``tests/support/kill_nine.py`` does it twenty times."""
 
 from __future__ import annotations
 

@@ -220,7 +220,7 @@ def test_two_blocks_by_itself(tmp_path):
     main([*sizes, "-o", str(target)])
     read = arrays_from_file(target)
     assert read.points.shape == (15 + 12, 2) and set(read.cell_groups) == {"lower", "upper"}
-    script = os.path.join(os.path.dirname(__file__), "..", "meshes", "two_blocks.py")
+    script = os.path.join(os.path.dirname(__file__), "..", "..", "meshes", "two_blocks.py")
     done = subprocess.run(
         [sys.executable, script, "--lower", "-1", "1", "-o", str(target)], capture_output=True, text=True, check=False,
         env=dict(os.environ),

@@ -20,7 +20,7 @@ from vi_contact.meshes.wall import WallMesh
 gmsh = pytest.importorskip("gmsh")
 pytestmark = pytest.mark.serial
 
-SOURCE_TREE = Path(__file__).resolve().parents[1]
+SOURCE_TREE = Path(__file__).resolve().parents[2]
 
 
 def nodes_of(rows):

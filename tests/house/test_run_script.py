@@ -9,10 +9,11 @@ from pathlib import Path
 import pytest
 
 pytestmark = pytest.mark.serial
-TESTS = Path(__file__).resolve().parent
+TESTS = Path(__file__).resolve().parents[1]
+INSTALL = str(TESTS / "house" / "test_install.py")
 CASES = {
-    "passes": ([str(TESTS / "test_install.py"), "-k", "interpreter"], "1", "1 passed, 0 failed, 0 skipped", 0),
-    "twice": (["-n0", str(TESTS / "test_install.py"), "-k", "interpreter"], "1 1", "2 passed, 0 failed, 0 skipped", 0),
+    "passes": ([INSTALL, "-k", "interpreter"], "1", "1 passed, 0 failed, 0 skipped", 0),
+    "twice": (["-n0", INSTALL, "-k", "interpreter"], "1 1", "2 passed, 0 failed, 0 skipped", 0),
     "is killed": (["-n0", "killed.py"], "1", "0 passed, 1 failed, 0 skipped", 1),
     "is too slow": (["-n0", "slow.py"], "1", "0 passed, 1 failed, 0 skipped", 1),
 }

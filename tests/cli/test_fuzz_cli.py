@@ -103,7 +103,7 @@ def places(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     noise = ground_motion.synthetic(ground_motion.KanaiTajimi(s0=0.01), 2.0, 0.01, seed=1)
     motion = ground_motion.scaled_to_pga(noise, 1.0)
     ground_motion.write_at2(motion, folder / "motion.at2", "g")
-    case = Path(__file__).resolve().parents[1] / "demos" / "cases" / "wall.toml"
+    case = Path(__file__).resolve().parents[2] / "demos" / "cases" / "wall.toml"
     text = '[friction]\ntype = "Coulomb"\nmu = 0.3\n[[excitation]]'
     (folder / "case.toml").write_text(case.read_text("utf-8").replace("[[excitation]]", text, 1), "utf-8")
     problem = chain_problem(3, gap=1e-3, excitation=vc.Ricker(3.0, 6.0, direction=(1.0,)), consistent=True)

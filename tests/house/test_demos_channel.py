@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 FIGURES = (
     "layout", "excitation", "openings", "rocking", "beside", "interface", "envelope", "states", "moments",
 )
