@@ -3,7 +3,7 @@
 
     python3 benchmarks/schemes.py [--elements 100] [--bounces 20] [--blocks 2e3 2e4] [--no-bars] [--json FILE]
 
-Two tables, in the form of docs/schemes.md:
+Two tables, in the form of docs/guide/schemes.md:
 
 * the bar (1D elements): largest error of the contact force in the window 0.6 < t < 1.067 of the thrown bar (V1.1),
   energy of the bar of V1.3 after 1, 4 and 20 bounces over the exact 1/8, L2 error of its contact force over four

@@ -6,7 +6,7 @@ unknowns on the boundary only and share no matrix with the finite elements: what
 
     bash demos/run.sh boundary_elements        # three figures and a table, into results/boundary_elements
 
-docs/bem.md explains the method, docs/seed003.md the examples.
+docs/theory/bem.md explains the method, docs/guide/pressed_blocks.md the examples.
 """
 
 from __future__ import annotations

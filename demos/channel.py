@@ -9,7 +9,7 @@ are solved twice, condensed to the contact points and on all unknowns, and the t
     bash demos/run.sh -n 3 channel              # the same on three ranks
     bash demos/run.sh channel --contact coulomb --mu 0.5 --motion H --vertical V     # one run of "vi-contact channel"
 
-Units are SI; the case data and what the source leaves open are explained in docs/channel.md.
+Units are SI; the case data and what the source leaves open are explained in docs/guide/channel.md.
 """
 
 from __future__ import annotations

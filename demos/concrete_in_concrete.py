@@ -7,7 +7,7 @@ leans on the walls, which with friction (Coulomb, mu = 0.75) carry a part of the
     bash demos/run.sh concrete_in_concrete              # two figures and a table, into results/concrete_in_concrete
     bash demos/run.sh -n 2 concrete_in_concrete         # the same on two ranks
 
-docs/seed003.md explains the numbers.
+docs/guide/pressed_blocks.md explains the numbers.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ follows its static solution; on steel (Coulomb, mu = 0.3) its base sticks everyw
     bash demos/run.sh concrete_on_steel                 # two figures and a table, into results/concrete_on_steel
     bash demos/run.sh -n 2 concrete_on_steel            # the same on two ranks
 
-docs/seed003.md explains the numbers.
+docs/guide/pressed_blocks.md explains the numbers.
 """
 
 from __future__ import annotations

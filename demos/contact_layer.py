@@ -8,7 +8,7 @@ the exact inequality, which is known in closed form. So does that of the wall of
     bash demos/run.sh contact_layer             # into results/contact_layer
     bash demos/run.sh -n 2 contact_layer        # the same on two ranks
 
-All quantities are SI; docs/boundary_layer.md explains them.
+All quantities are SI; docs/theory/boundary_layer.md explains them.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ by integration in time, with the force that fades in smoothly, and with the othe
 
     bash demos/run.sh particle_layer        # into results/particle_layer
 
-All quantities are SI; docs/boundary_layer.md explains them. One process is enough.
+All quantities are SI; docs/theory/boundary_layer.md explains them. One process is enough.
 """
 
 from __future__ import annotations

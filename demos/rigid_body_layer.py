@@ -7,7 +7,7 @@ that touches, and turns spin into flight and back.
 
     bash demos/run.sh rigid_body_layer      # into results/rigid_body_layer
 
-All quantities are SI; docs/boundary_layer.md explains them. One process is enough.
+All quantities are SI; docs/theory/boundary_layer.md explains them. One process is enough.
 """
 
 from __future__ import annotations

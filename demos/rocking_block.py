@@ -8,7 +8,7 @@ corner to the other, comes out here: nothing but unilateral contact with inelast
     bash demos/run.sh rocking_block         # into results/rocking_block
     bash demos/run.sh -n 2 rocking_block    # the same on two ranks
 
-Units are SI; docs/rocking_block.md explains the numbers.
+Units are SI; docs/guide/rocking_block.md explains the numbers.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ at t = 1 and comes back; the energy grows linearly until then, and friction take
     bash demos/run.sh square                # three figures and a table, into results/square
     bash demos/run.sh -n 2 square           # the same on two ranks
 
-docs/seed003.md explains the numbers.
+docs/guide/pressed_blocks.md explains the numbers.
 """
 
 from __future__ import annotations

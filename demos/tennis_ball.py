@@ -7,7 +7,7 @@ on its way down and flies up with a constant velocity and constant energy, wheth
     bash demos/run.sh tennis_ball                # three figures and a table, into results/tennis_ball
     bash demos/run.sh -n 2 tennis_ball           # the same on two ranks
 
-docs/seed003.md explains the numbers.
+docs/guide/pressed_blocks.md explains the numbers.
 """
 
 from __future__ import annotations

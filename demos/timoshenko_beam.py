@@ -8,7 +8,7 @@ and touches again.
 
     bash demos/run.sh timoshenko_beam       # into results/timoshenko_beam
 
-Units are SI with the source's dimensionless data; docs/beam.md explains the numbers. One process is enough.
+Units are SI with the source's dimensionless data; docs/theory/beam.md explains the numbers. One process is enough.
 """
 
 from __future__ import annotations
@@ -125,7 +125,7 @@ def rubbing(count: int, dt: float, out: Path, progress: bool) -> dict[str, float
 
 
 # Things to try: READING = "A"; beam.Elements(ELEMENTS) instead of published_elements, a tip that may turn (the source's
-# last rotation function holds it: docs/beam.md); eps = 2e-4 in published(); mu that falls with the rate,
+# last rotation function holds it: docs/theory/beam.md); eps = 2e-4 in published(); mu that falls with the rate,
 # vc.SlipRateCoulomb(vc.ExponentialDecay(0.4, 0.2, 0.5)), in rubbing(); scheme=vc.Midpoint() there, whose contact forces
 # ring; body_force=lambda t: 20.0 + 10.0 * np.sin(8.0 * t) for ROD.
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 
 The three stages of practice: gravity on firm supports; supports released, their reactions kept as forces; an earthquake
 that comes up from below. A compliant base takes the upgoing motion, half of what an outcrop record shows, so the record
-of the base is not the record that went in. Everything about these boundaries: docs/soil_boundaries.md.
+of the base is not the record that went in. Everything about these boundaries: docs/guide/soil.md.
 
     bash demos/run.sh tower_on_soil         # into results/tower_on_soil
     bash demos/run.sh -n 2 tower_on_soil    # the same on two ranks
@@ -119,4 +119,4 @@ if __name__ == "__main__":
 # - MU = 0.2 slides instead of rocking; a smaller amplitude keeps the foot closed and the response linear.
 # - fem.CompliantBase without ROCK: the soil goes on below, the surface moves with the outcrop record itself.
 # - tied=fem.Tied(...) in place of the free-field sides: what the tower radiates comes back in from the other side.
-# - DAMPING with alpha: see docs/faq.md.
+# - DAMPING with alpha: see docs/reference/faq.md.

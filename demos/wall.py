@@ -8,7 +8,7 @@ step is solved twice, condensed to the contact points and on all unknowns, and t
     bash demos/run.sh -n 3 wall                 # the same on three ranks
     bash demos/run.sh wall --case a --motion FILE --scale 2     # any option of "vi-contact wall" makes one such run
 
-Units are SI; the case data and what the source leaves open are explained in docs/wall.md.
+Units are SI; the case data and what the source leaves open are explained in docs/start/first_wall.md.
 """
 
 from __future__ import annotations

@@ -51,8 +51,9 @@ def test_first_example_prints_what_readme_says(first: tuple[Path, str]) -> None:
 
 
 def test_reading_examples_run_on_its_output(first: tuple[Path, str]) -> None:
-    """docs/output.md: rows of 400 steps and the initial state, the same minimum as README prints, a picture."""
-    table, arrays, picture = (run(code, first[0]) for code in blocks(ROOT / "docs" / "output.md", "python"))
+    """reference/files.md: rows of 400 steps and the initial state, the same minimum as README prints, a picture."""
+    page = ROOT / "docs" / "reference" / "files.md"
+    table, arrays, picture = (run(code, first[0]) for code in blocks(page, "python"))
     lowest = re.search(r"top of the wall: (\S+) to", first[1])
     words = re.fullmatch(r"401 rows, u_x_top in m: (\S+)\n", table)
     assert lowest and words and f"{1e6 * float(words[1]):.1f}" == lowest[1]
@@ -61,7 +62,7 @@ def test_reading_examples_run_on_its_output(first: tuple[Path, str]) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("document", ["records.md", "solvers.md"])
+@pytest.mark.parametrize("document", ["guide/records.md", "guide/solvers.md"])
 def test_other_examples_run_on_its_problem(tmp_path: Path, document: str) -> None:
     """They continue README's example where its problem is ready."""
     (code,) = blocks(ROOT / "README.md", "python")
@@ -139,13 +140,13 @@ def test_figures_are_small_and_used() -> None:
 
 @pytest.mark.parametrize("module", MODULES)
 def test_every_public_name_is_in_the_table_of_contents(module: str) -> None:
-    listed = set(re.findall(r"`([\w.]+)`", (ROOT / "docs" / "api.md").read_text(encoding="utf-8")))
+    listed = set(re.findall(r"`([\w.]+)`", (ROOT / "docs" / "reference" / "api.md").read_text(encoding="utf-8")))
     assert set(import_module(module).__all__) - listed == set()
 
 
 def test_the_table_of_contents_has_no_other_names() -> None:
     """A listed name is public in one of the four modules, or a path that can be imported."""
-    text = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "reference" / "api.md").read_text(encoding="utf-8")
     names = re.findall(r"`(\w+)`", "".join(re.findall(r"^- (.*?)(?:: |$)", text, re.MULTILINE)))
     known = {"__version__"}
     for module in MODULES:
@@ -159,7 +160,7 @@ def test_the_table_of_contents_has_no_other_names() -> None:
             assert hasattr(import_module(module), name), path
 
 
-IDS = {"verification.md": r"\bV\d+\.\d+[a-z]?\b", "petsc.md": r"\bP[1-9]\d?\b"}
+IDS = {"reference/verification.md": r"\bV\d+\.\d+[a-z]?\b", "reference/petsc.md": r"\bP[1-9]\d?\b"}
 
 
 @pytest.mark.parametrize("document", IDS)

@@ -1,4 +1,4 @@
-"""Run folders read back, the page about a run, its commands, and the example of docs/outputs_engineering.md."""
+"""Run folders read back, the page about a run, its commands, and the example of docs/guide/outputs.md."""
 
 from __future__ import annotations
 
@@ -164,7 +164,7 @@ def test_example_of_the_documentation(tmp_path: Path) -> None:
     """It continues README's problem: records everything, reads it back, and the page shows it."""
     pytest.importorskip("dolfinx")
     (code,) = re.findall(r"^```python\n(.*?)^```$", (ROOT / "README.md").read_text(), re.MULTILINE | re.DOTALL)
-    document = (ROOT / "docs" / "outputs_engineering.md").read_text(encoding="utf-8")
+    document = (ROOT / "docs" / "guide" / "outputs.md").read_text(encoding="utf-8")
     blocks = re.findall(r"^```python\n(.*?)^```$", document, re.MULTILINE | re.DOTALL)
     ready = "import numpy as np\n" + code[: code.index("solution = ")]
     (tmp_path / "example.py").write_text(ready + "\n".join(blocks), encoding="utf-8")

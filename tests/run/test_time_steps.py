@@ -374,7 +374,7 @@ def test_contact_work_of_the_thrown_bar_falls_with_halving():
 
 @serial
 def test_means_over_arrival_times_of_the_thrown_bar():
-    """The table in docs/schemes.md: delay [dt] and work lost [J] of the first closure, halvings 0, 1, 2, 3."""
+    """The table in docs/guide/schemes.md: delay [dt] and work lost [J] of the first closure, halvings 0, 1, 2, 3."""
     delay, lost = np.zeros(4), np.zeros(4)
     for halvings in range(4):
         for i in range(16):

@@ -98,7 +98,7 @@ def test_ranks_agree_and_contact_opens_and_closes(scheme: Any, law: dict[str, An
 )
 def test_friction_of_impulses_may_add_energy(scheme: MoreauJean, law: Any, gain: float) -> None:
     """V9.3 is about the normal direction: where sliding turns within a step, the mean velocity and the friction at its
-    end may have the same direction. The gains that docs/schemes.md prints; none at theta = 1."""
+    end may have the same direction. The gains that docs/guide/schemes.md prints; none at theta = 1."""
     mesh, tags = build_mesh(BlockMesh(lengths=(1.0, 1.0), divisions=(8, 8)), MPI.COMM_SELF)
     system = assemble(mesh, LinearElastic(E=1000.0, nu=0.3, rho=1.0), initial_velocity=(0.5, -1.0))
     ground = HalfSpace(point=(0.0, -0.05), normal=(0.0, 1.0))

@@ -43,7 +43,7 @@ def write(folder: Path, text: str, name: str = "case.toml") -> Path:
 
 
 def assert_same(one: Mapping[str, Any], other: Mapping[str, Any]) -> None:
-    """The same columns; to the last bit on one rank, to round-off on several (docs/output.md)."""
+    """The same columns; to the last bit on one rank, to round-off on several (docs/reference/files.md)."""
     assert set(one) == set(other)
     for name, values in one.items():
         if COMM.size == 1:

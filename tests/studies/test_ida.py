@@ -1,4 +1,4 @@
-"""Incremental dynamic analysis: the example of docs/studies.md, its table, going on after a stop, failures as rows."""
+"""Incremental dynamic analysis: the example of docs/guide/studies.md, its table, going on after a stop, failed runs."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ DEMANDS = ("contact_uplift:max", "u_x_top:min")
 
 
 def blocks(language: str) -> list[str]:
-    """The fenced blocks of docs/studies.md."""
-    text = (ROOT / "docs" / "studies.md").read_text(encoding="utf-8")
+    """The fenced blocks of docs/guide/studies.md."""
+    text = (ROOT / "docs" / "guide" / "studies.md").read_text(encoding="utf-8")
     return re.findall(rf"^```{language}\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
 
 
 @pytest.fixture(scope="module")
 def example(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
-    """The folder in which the whole example of docs/studies.md has run in a shell, and what it printed."""
+    """The folder in which the whole example of docs/guide/studies.md has run in a shell, and what it printed."""
     folder = tmp_path_factory.mktemp("ida")
     (case,), (make, read), commands = blocks("toml"), blocks("python"), blocks("sh")
     (folder / "wall.toml").write_text(case, encoding="utf-8")

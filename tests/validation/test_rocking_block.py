@@ -1,7 +1,7 @@
 """V3.1: a stiff finite element block on two corners in contact rocks as Housner's rigid block does.
 
 Two statements each time: within the tolerances of V3.1 of Housner's numbers, and much closer to the rigid limit of the
-model itself, whose small displacements make times 1 % longer at equal theta/(b/h) (see docs/rocking_block.md).
+model itself, whose small displacements make times 1 % longer at equal theta/(b/h) (see docs/guide/rocking_block.md).
 """
 
 from __future__ import annotations

@@ -123,7 +123,8 @@ def test_gentle_push_of_the_boundary_elements():
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_faster_push_gives_more_to_a_disk_that_sticks(scheme):
     """V7.3: E_with <= E_without is no law where the obstacle is driven: a foot that sticks is stiffer, and here the
-    plane does more work on it than friction takes. The excess of 0.35 % is that of finer meshes (docs/seed003.md)."""
+    plane does more work on it than friction takes. The excess of 0.35 % is that of finer meshes
+    (docs/guide/pressed_blocks.md)."""
     free, rubbed = run("none", scheme), run("coulomb", scheme)
     taken = rubbed["loss_friction"][-1]
     given = rubbed["work_input"][-1] - free["work_input"][-1]

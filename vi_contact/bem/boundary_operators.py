@@ -1,7 +1,7 @@
 """Galerkin matrices of the four boundary operators from radial kernels of either domain, density 1.
 
-With M u = d/dtau (-u_2, u_1), mu = c_S², x - y = d and normals n_x, n_y (regularised as in docs/bem.md; nothing is
-worse than a logarithm on a closed curve):
+With M u = d/dtau (-u_2, u_1), mu = c_S², x - y = d and normals n_x, n_y (regularised as in docs/theory/bem.md; nothing
+is worse than a logarithm on a closed curve):
 
     V p  = ∫ G p                                                                                  single layer
     K u  = ∫ dPhi_S/dn_y u - Phi_S M u + grad_y(Phi_P - Phi_S) (n_y.u) + 2 mu G M u              double layer

@@ -1,4 +1,4 @@
-"""Convolution quadrature: the boundary elements of the Laplace domain made into a method in time (docs/bem.md).
+"""Convolution quadrature: the boundary elements of the Laplace domain made into a method in time (docs/theory/bem.md).
 
 For u = C(d/dt) g the derivative is replaced by delta(z)/dt of a time stepping method. Here g enters by its impulses
 J = ∫ g dt at the stages, so that means over steps are what counts, as in the energetic method, and a jump at the end of

@@ -1,4 +1,4 @@
-"""Energetic space-time Galerkin method: blocks of the block Toeplitz system and marching on in time (docs/bem.md).
+"""Energetic space-time Galerkin method: blocks of a block Toeplitz system, marching on in time (docs/theory/bem.md).
 
 Tractions are constant, displacements linear in each time step; the first equation is tested with constants, which is
 collocation at the ends of the steps, the second with the rates of displacements, which is the mean over a step. With

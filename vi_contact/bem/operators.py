@@ -36,7 +36,7 @@ class Operators:
         return self.with_density(self.galerkin.assemble(LaplaceKernels(s, self.c_p, self.c_s)))
 
     def in_time(self, t: float, *, hyper: bool = True) -> OperatorMatrices:
-        """A = V integrated once in time, B = K twice, C = D three times, up to t > 0 [s] (docs/bem.md)."""
+        """A = V integrated once in time, B = K twice, C = D three times, up to t > 0 [s] (docs/theory/bem.md)."""
         return self.with_density(self.unit_in_time(t, hyper=hyper))
 
     def unit_in_time(self, t: float, *, hyper: bool = True) -> OperatorMatrices:

@@ -13,7 +13,7 @@ def add_case_commands(commands: Any) -> None:
     """Adds ``run`` to the commands of the top parser."""
     sentence = "run a case file: a contact problem in TOML, table by table the calls of the Python interface"
     run = commands.add_parser("run", help=sentence, description=sentence[0].upper() + sentence[1:] + ".")
-    run.add_argument("case", help="the case file (docs/studies.md)")
+    run.add_argument("case", help="the case file (docs/guide/studies.md)")
     run.add_argument("--out", metavar="DIR", help="output folder (default: out of [run], or results/NAME of the file)")
     add_restart(run, "the output folder")
     run.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",

@@ -15,7 +15,7 @@ def add_ida_commands(commands: Any) -> None:
     """Adds ``ida`` to the commands of the top parser."""
     sentence = "incremental dynamic analysis: a case file under many records, each at many intensities"
     one = commands.add_parser("ida", help=sentence, description=sentence[0].upper() + sentence[1:] + ".")
-    one.add_argument("case", help="case file shaken by GroundMotions (docs/studies.md)")
+    one.add_argument("case", help="case file shaken by GroundMotions (docs/guide/studies.md)")
     one.add_argument("--motions", nargs="+", required=True, metavar="FILE",
                      help="record files; H.at2,V.at2 where the case has two ground motions")
     values = one.add_mutually_exclusive_group(required=True)

@@ -53,7 +53,7 @@ class Redistributed:
     total mass is kept.
 
     ``lumping`` 0.4 balances the dispersion of mesh and time step: consistent mass sends high frequencies ahead of
-    the wave, lumped mass leaves them behind (table in docs/schemes.md). InputError for lumping outside [0, 1], a
+    the wave, lumped mass leaves them behind (table in docs/guide/schemes.md). InputError for lumping outside [0, 1], a
     contact node with no material behind it, or a mesh too coarse to hold the inertia.
     """
 

@@ -1,6 +1,6 @@
 """Seed 000's first example: a wall clamped at its base, whose right side may touch the ground beside it (Figs. 2-5).
 
-What the source leaves open is marked CHOSEN and explained in the documentation (docs/wall.md).
+What the source leaves open is marked CHOSEN and explained in the documentation (docs/start/first_wall.md).
 """
 
 from __future__ import annotations

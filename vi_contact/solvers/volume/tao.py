@@ -34,8 +34,8 @@ def tao_options(ranks: int) -> Options:
 
 
 def check_tao(tao: Any, layers: OptionLayers) -> None:
-    """Refuse other types and preconditioners that give wrong answers, also when they come from options (docs/petsc.md:
-    many types ignore bounds, and bqpip reports garbage as converged)."""
+    """Refuse other types and preconditioners that give wrong answers, also when they come from options
+    (docs/reference/petsc.md: many types ignore bounds, and bqpip reports garbage as converged)."""
     if tao.getType() != "tron":
         refuse(f"TAO type {tao.getType()}", "other types ignore bounds, or stop short or wrong", "leave it out")
     pc = layers.chosen("pc_type")

@@ -13,7 +13,7 @@ from ...core.checks import shown
 from ...core.errors import InputError
 
 BYTES, DEPTH = 10_000_000, 20  # of a case file; of tables and lists in each other
-_TOO_DEEP = "is nested too deep: give tables and lists as docs/studies.md has them"
+_TOO_DEEP = "is nested too deep: give tables and lists as docs/guide/studies.md has them"
 _TOO_LONG = "holds a whole number beyond 64 bits: write it with a point, as 1.0e30"
 _PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+"""
 _CHAIN = re.compile(rf"(?<![\w-])(?:{_PART}){{{DEPTH}}}")  # a key of many parts
