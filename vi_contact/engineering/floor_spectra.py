@@ -1,4 +1,4 @@
-"""Floor and soil response spectra and transfer functions of the motions that probes recorded.
+"""Compute floor and soil response spectra and transfer functions of the motions that probes recorded.
 
 Which motion: a column a_x_<label> of ``Probe(..., acceleration=True)`` is the absolute acceleration, that of the
 equations, relative to the ground, plus that of the ground. Equipment on a floor and a layer on rock feel the absolute
@@ -23,7 +23,7 @@ BANDWIDTH = 40.0
 
 
 def recorded_motion(history: Mapping[str, Array], column: str, *, relative: bool = False) -> Record:
-    """The acceleration of a column as a record with even steps: the spectra, intensities and writers take it.
+    """Return the acceleration of a column as a record with even steps: the spectra, intensities and writers take it.
 
     Uneven steps (halved at impacts) are interpolated linearly to the most frequent one. Columns a_<axis>_<label> are
     means over the step that ends at t, so their instants are half a step before t; spectra and ratios of columns of the
@@ -60,27 +60,27 @@ def recorded_motion(history: Mapping[str, Array], column: str, *, relative: bool
 
 
 def _mean_of_steps(values: Array) -> Array:
-    """Of end values the means over the steps, as probes have them; row 0 is the state at the start."""
+    """Return the means of end values over the steps, as probes have them; row 0 is the state at the start."""
     return np.append(values[:1], 0.5 * (values[1:] + values[:-1]))
 
 
 def floor_spectrum(
     history: Mapping[str, Array], column: str, periods: Array, *, damping: float = 0.05, relative: bool = False
 ) -> ResponseSpectrum:
-    """Response spectrum of an oscillator of each period [s] standing where the column was recorded."""
+    """Return the response spectrum of an oscillator of each period [s] standing where the column was recorded."""
     return response_spectrum(recorded_motion(history, column, relative=relative), periods, damping=damping)
 
 
 @dataclass(frozen=True)
 class TransferFunction:
-    """frequencies [Hz] and |surface/base| [-], (m,); nan where the base has no motion to divide by."""
+    """Hold frequencies [Hz] and |surface/base| [-], (m,); nan where the base has no motion to divide by."""
 
     frequencies: Array
     amplitude: Array
 
     @property
     def peak(self) -> tuple[float, float]:
-        """(frequency [Hz], amplitude) of the largest value."""
+        """Return (frequency [Hz], amplitude) of the largest value."""
         k = int(np.nanargmax(self.amplitude))
         return float(self.frequencies[k]), float(self.amplitude[k])
 
@@ -89,7 +89,7 @@ def transfer_function(
     history: Mapping[str, Array], surface: str, base: str = "a_g_x", *, frequencies: Array | None = None,
     bandwidth: float | None = BANDWIDTH, floor: float = 1e-3,
 ) -> TransferFunction:
-    """|A_surface(f)| / |A_base(f)| of absolute accelerations, from the Fourier amplitudes of two columns.
+    """Return |A_surface(f)| / |A_base(f)| of absolute accelerations, from the Fourier amplitudes of two columns.
 
     Amplitudes are smoothed with Konno and Ohmachi's window (1998), both alike, before they are divided; it widens
     peaks, ``bandwidth=None`` takes the raw ones. The motion has to die away before the run ends (or be a periodic one),
@@ -122,7 +122,7 @@ def transfer_function(
 
 
 def konno_ohmachi(frequencies: Array, amplitudes: Array, centres: Array, *, bandwidth: float = BANDWIDTH) -> Array:
-    """Amplitudes smoothed at the centres with the weights (sin x / x)⁴, x = b log10(f / f_c) (Konno, Ohmachi 1998)."""
+    """Smooth amplitudes at the centres with the weights (sin x / x)⁴, x = b log10(f / f_c) (Konno, Ohmachi 1998)."""
     smooth = np.empty(len(centres))
     for k, centre in enumerate(centres):
         weights = np.sinc(bandwidth * np.log10(frequencies / centre) / np.pi) ** 4

@@ -1,4 +1,4 @@
-"""The lowest natural frequency of a system, for choosing excitations and time steps."""
+"""Find the lowest natural frequency of a system, for choosing excitations and time steps."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ..core.system import SemiDiscreteSystem
 
 
 def lowest_frequency(system: SemiDiscreteSystem, *, max_iterations: int = 2000) -> float:
-    """f1 [Hz] of K phi = (2 pi f)² M phi without contact, by inverse iteration with one factorisation of K.
+    """Return f1 [Hz] of K phi = (2 pi f)² M phi without contact, by inverse iteration with one factorisation of K.
 
     The start vector is the static answer to a uniform acceleration in all directions: deterministic, and not
     orthogonal to the first mode of structures that a base motion can excite.

@@ -1,4 +1,4 @@
-"""Peak values of histories as a tidy table, and loops of a force over a deformation with the work in them."""
+"""List peak values of histories as a tidy table, and follow loops of a force over a deformation with their work."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _NOT_PEAKS = ("t", "k", "iterations", "escalated")
 
 @dataclass(frozen=True)
 class Peak:
-    """Largest and smallest value of a column and when they came first [s]; nan for a column that is nan throughout."""
+    """Hold the largest and smallest value of a column and when they came first [s]; nan where the column is all nan."""
 
     name: str
     quantity: str
@@ -35,7 +35,7 @@ class Peak:
 
 
 def peaks(history: Mapping[str, Array], columns: Columns, names: Sequence[str] | None = None) -> list[Peak]:
-    """The peaks of these columns, of all columns of numbers but the counters when None. nan values are left out.
+    """Return the peaks of these columns, of all columns of numbers but the counters when None. nan values are left out.
 
     The peak of an acceleration is that of the time step where contact closes, and is marked so: it grows as dt falls,
     while displacements and forces converge. InputError for a column that the history does not have, or one of arrays.
@@ -58,12 +58,12 @@ def peaks(history: Mapping[str, Array], columns: Columns, names: Sequence[str] |
 
 
 def _depends_on_dt(name: str) -> bool:
-    """Whether the peaks of a column grow without bound as the time step falls: accelerations of a body that strikes."""
+    """Tell whether the peaks of a column grow without bound as dt falls: accelerations of a body that strikes."""
     return name.startswith(("a_x_", "a_y_", "a_z_"))
 
 
 def write_peaks(path: str | Path, rows: Sequence[Peak]) -> Path:
-    """``peaks.csv``: name, quantity (the meaning), unit, max, t_max [s], min, t_min [s], numbers to the last bit."""
+    """Write ``peaks.csv``: name, quantity (its meaning), unit, max, t_max [s], min, t_min [s], to the last bit."""
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(HEADER)
@@ -79,8 +79,10 @@ def write_peaks(path: str | Path, rows: Sequence[Peak]) -> Path:
 
 @dataclass(frozen=True)
 class Loop:
-    """deformation and force (rows,); work: of the force on the deformation since the start, ∫ F dx by the trapezoidal
-    rule, (rows,): of a closed loop run through clockwise its area, what the structure took up."""
+    """Hold deformation, force and work, (rows,) each: work is ∫ F dx since the start by the trapezoidal rule.
+
+    For a closed loop run through clockwise it is the area, the work that the structure took up.
+    """
 
     deformation: Array
     force: Array
@@ -88,14 +90,14 @@ class Loop:
 
     @property
     def stiffness(self) -> float:
-        """Secant stiffness between the largest and the smallest deformation; nan where nothing moved."""
+        """Return the secant stiffness between the largest and the smallest deformation; nan where nothing moved."""
         high, low = int(np.argmax(self.deformation)), int(np.argmin(self.deformation))
         way = self.deformation[high] - self.deformation[low]
         return float((self.force[high] - self.force[low]) / way) if way > 0.0 else float("nan")
 
 
 def hysteresis(history: Mapping[str, Array], deformation: str, force: str, *, sign: float = 1.0) -> Loop:
-    """The loop of two columns: base shear over top displacement, shear over racking, M over theta.
+    """Return the loop of two columns: base shear over top displacement, shear over racking, M over theta.
 
     ``sign`` = -1 turns the force: reactions on the body push against its deformation. InputError for missing columns.
     """
@@ -106,7 +108,7 @@ def hysteresis(history: Mapping[str, Array], deformation: str, force: str, *, si
 
 
 def column_of(history: Mapping[str, Array], name: str) -> Array:
-    """A column of numbers; InputError that names what there is."""
+    """Return a column of numbers; InputError names the columns there are."""
     instance("history", "the name of a column", name, str, "give a text, such as 'u_x_top'")
     instance("history", "it", history, Mapping, "give the history of a solution")
     if name not in history:

@@ -1,4 +1,4 @@
-"""Racking of a frame: the shear of four corner points, which no rigid rotation changes."""
+"""Measure the racking of a frame: the shear of four corner points, which no rigid rotation changes."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from ..core.step import Columns, Report, Row, State
 
 
 def racking(corners: Array, displacements: Array) -> tuple[Array, Array]:
-    """(racking, rotation) of four corners (4, 2) [m] with displacements (..., 4, 2) [m]; each (...,), in radians.
+    """Return (racking, rotation) of four corners (4, 2) [m] moved by (..., 4, 2) [m]; each (...,), in radians.
 
     The displacement gradient G that fits the corners best, u = a + G X, gives racking = du_x/dy + du_y/dx and rotation
-    = (du_y/dx - du_x/dy)/2, anticlockwise. Of a rectangle du_x/dy is the mean over its two sides and du_y/dx that over
+    = (du_y/dx - du_x/dy)/2, anticlockwise. For a rectangle du_x/dy is the mean over its two sides and du_y/dx that over
     bottom and top (Wang 1993: the racking ratio is this over the free field's shear strain).
     InputError for corners on one line.
     """
@@ -35,7 +35,7 @@ def racking(corners: Array, displacements: Array) -> tuple[Array, Array]:
 
 @dataclass
 class Racking:
-    """Recorder of racking: label -> four corner points (x, y) [m], at the nodes nearest to them.
+    """Record racking: label -> four corner points (x, y) [m], at the nodes nearest to them.
 
     Columns racking_<label>, rotation_<label> [rad]: see ``racking``. A rigid motion of the frame, and of the ground,
     leaves racking alone. InputError for corners that are not four, on one line, or outside the body.
@@ -52,7 +52,7 @@ class Racking:
             racking(array("Racking", f"the corners of '{label}'", corners, (None, None)), np.zeros((4, 2)))
 
     def columns(self) -> Columns:
-        """racking_<label>, rotation_<label>."""
+        """Name the columns racking_<label>, rotation_<label>."""
         found = {}
         for label in self.frames:
             found[f"racking_{label}"] = ("rad", f"racking du_x/dy + du_y/dx of frame {label}")
@@ -60,7 +60,7 @@ class Racking:
         return found
 
     def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
-        """Finds the nodes."""
+        """Find the nodes."""
         self._problem, space = problem, problem.system.space
         if space.dimension != 2:
             raise InputError(f"racking is of plane frames, the body has {space.dimension} dimensions")

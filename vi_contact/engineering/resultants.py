@@ -1,4 +1,4 @@
-"""What a contact surface does to its body, for a named part of it: uplift, opening, slip, thrust, N, T, M and theta.
+"""Sum up what a part of a contact surface does to its body: uplift, opening, slip, thrust, N, T, M and theta.
 
 With the contact direction n of a point (from the body to its obstacle), its tangent t and the reactions of the body on
 the support, the force on the body at a point X is f = -r_n n - r_t t. Over the points of a part, about its centre c:
@@ -30,7 +30,7 @@ Where = Callable[[Array, Array], Mask]
 
 
 class Geometry(Protocol):
-    """Where the contact points are: a ContactSurface, or the contact of a ``run_folder.RunFolder``."""
+    """Describe where contact points are: a ContactSurface, or the contact of a ``run_folder.RunFolder``."""
 
     @property
     def points(self) -> Array: ...
@@ -41,7 +41,7 @@ class Geometry(Protocol):
 
 
 def check_part(name: str, centre: Any, where: Any, normal: Any) -> None:
-    """InputError for a centre or direction of other things than numbers, or a mask that is no function."""
+    """Raise InputError unless centre and direction are numbers and the mask is a function."""
     array(f"part '{name}'", "the centre", centre, (None,), unit="metres")
     if where is not None:
         function(f"part '{name}'", "where", where, "give a function of points and normals, or None")
@@ -50,7 +50,7 @@ def check_part(name: str, centre: Any, where: Any, normal: Any) -> None:
 
 
 class Part:
-    """The points of a contact surface that a mask picks, with the directions of its resultants.
+    """Hold the points of a contact surface that a mask picks, with the directions of its resultants.
 
     ``where``: points (m, d), normals (m, d) -> mask (m,); all points when None. InputError for a part without points,
     a centre of other dimension, or directions that cancel (a closed ring), unless ``normal`` says which N is meant.
@@ -87,7 +87,7 @@ class Part:
         return np.asarray(direction / size)
 
     def resultants(self, r_n: Array, r_t: Array | None) -> dict[str, Array]:
-        """Force, N, T, M, e and height for reactions (rows, m) and (rows, m, d - 1); nan where N or r_n is zero."""
+        """Return force, N, T, M, e and height of reactions (rows, m), (rows, m, d - 1); nan where N or r_n is zero."""
         r_n = r_n[:, self.mask]
         at_points = -r_n[:, :, None] * self.normals
         if r_t is not None:
@@ -105,7 +105,7 @@ class Part:
         return found | self._about_centre(at_points, force) | {"height": raised}
 
     def _about_centre(self, at_points: Array, force: Array) -> dict[str, Array]:
-        """N, T, M, e: with signs in two dimensions; T and e are sizes and M a vector in three, M is zero in one."""
+        """Return N, T, M, e: with signs in the plane; in 3D T, e are sizes and M a vector; no M in one."""
         compression = 0.0 - force @ self.normal
         if self.dimension == 2:
             tangent = np.array([-self.normal[1], self.normal[0]])
@@ -123,7 +123,7 @@ class Part:
         return {"N": compression, "T": along} | moments | {"e": away}
 
     def opening(self, active: Mask, gap: Array, slip: Array | None) -> dict[str, Array]:
-        """Uplift ratio, largest gap and, with slips, the largest slip of every row."""
+        """Return uplift ratio, largest gap and, with slips, the largest slip of every row."""
         found = {
             "uplift": (~active[:, self.mask]) @ self.weights / self.weights.sum(),
             "opening": gap[:, self.mask].max(axis=1),
@@ -133,7 +133,7 @@ class Part:
         return found
 
     def rotation(self, u_n: Array) -> dict[str, float]:
-        """Rocking angle and settlement: the rigid motion (of least size) that fits u_n best by weight, plane only."""
+        """Return rocking angle and settlement of the smallest rigid motion that fits u_n best by weight; plane only."""
         size = float(np.max(np.abs(self.arms), initial=0.0)) or 1.0
         turn = (self.normals[:, 1] * self.arms[:, 0] - self.normals[:, 0] * self.arms[:, 1]) / size
         root = np.sqrt(self.weights)
@@ -143,7 +143,7 @@ class Part:
 
 
 def tangent_vectors(normals: Array) -> Array:
-    """(m, d, d - 1) tangents in which surfaces of finite elements have slip and r_t, for contact directions (m, d).
+    """Return the tangents (m, d, d - 1) of contact directions (m, d), in which surfaces have slip and r_t.
 
     A direction along an axis has the other axes; another one has the tangents of ``nodal_frames``, in three dimensions
     in the order of the axes that they are nearest to (``fem.frames``). Points with several directions are not covered:
@@ -176,7 +176,7 @@ _MEANING = {
 
 
 def meaning(quantity: str, name: str) -> tuple[str, str]:
-    """(unit, meaning) of a quantity of a part."""
+    """Return (unit, meaning) of a quantity of a part."""
     kind, _, axis = quantity.partition("_")
     if kind == "force":
         return "N", f"contact force on the body along {axis}, part {name}"
@@ -186,7 +186,7 @@ def meaning(quantity: str, name: str) -> tuple[str, str]:
 
 @dataclass
 class Resultants:
-    """Recorder of a named part of the contact surface: columns <quantity>_<name>, for quantities see the module's head.
+    """Record columns <quantity>_<name> of a named part of the contact surface; the module's head lists the quantities.
 
     uplift, opening, slip, force_x, force_y (force_z), N, T, M (M_x, M_y, M_z in 3D), e, height and, in the plane, theta
     and settlement: the rigid motion of the part relative to its support that fits the normal displacements best.
@@ -213,7 +213,7 @@ class Resultants:
         return {f"{quantity}_{self.name}": meaning(quantity, self.name) for quantity in self._quantities}
 
     def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
-        """The part is found once; the row of the state, as good for a static state as for a start."""
+        """Find the part once, and return the row of the state, a static one or the start of a run."""
         self._surface = problem.surface
         self._part = Part(self.name, problem.surface, self.centre, self.where, self.normal)
         return self._row(state)
@@ -240,7 +240,7 @@ def contact_summary(
     history: Mapping[str, Array], geometry: Geometry, *, centre: Sequence[float], name: str = "contact",
     where: Where | None = None, normal: Sequence[float] | None = None,
 ) -> dict[str, Array]:
-    """The same from the histories of a run that recorded ``Contact()``: quantity -> (rows,), without theta.
+    """Return the resultants of a run that recorded ``Contact()``: quantity -> (rows,), without theta.
 
     ``geometry``: the surface of the problem, or ``read_run(folder).contact``. Slip and friction count where they were
     recorded, with friction. InputError without arrays of the contact points.
