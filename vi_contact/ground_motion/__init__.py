@@ -2,10 +2,9 @@
 
 from ..core.units import STANDARD_GRAVITY
 from .baseline import baseline_corrected
-from .chain import Processing
+from .chain import Processing, scaled_to_arias, scaled_to_psa
 from .ec8 import EC8Spectrum
 from .excitation import GroundMotion
-from .filters import filtered, tapered, without_mean
 from .formats.reader import read_record
 from .formats.writer import write_at2, write_columns, write_path_series
 from .info import motion_info, record_info
@@ -14,21 +13,22 @@ from .intensity import (
     bracketed_duration,
     cav,
     d5_95,
+    housner_intensity,
     husid,
+    mean_period,
     pga,
     pga_time,
     pgd,
     pgv,
+    predominant_period,
+    psa,
     rms,
     significant_duration,
 )
 from .kanai_tajimi import Envelope, KanaiTajimi, synthetic
-from .processing import integrated, resampled, scaled, scaled_to_pga
+from .processing import filtered, integrated, padded, resampled, scaled, scaled_to_pga, tapered, trimmed, without_mean
 from .record import UNITS, Record
-from .scaling import scaled_to_arias, scaled_to_psa
 from .spectra import ResponseSpectrum, fourier_spectrum, response_spectrum
-from .spectral_intensity import housner_intensity, mean_period, predominant_period, psa
-from .window import padded, trimmed
 
 __all__ = [
     "STANDARD_GRAVITY", "UNITS", "EC8Spectrum", "Envelope", "GroundMotion",

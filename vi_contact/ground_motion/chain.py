@@ -1,16 +1,15 @@
-"""The usual steps of preparing a record, in the usual order."""
+"""Prepare records by the usual steps in the usual order, the last of which scales them to a measure."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from ..core.errors import InputError
 from .baseline import baseline_corrected
-from .filters import filtered, tapered, without_mean
-from .processing import resampled, scaled, scaled_to_pga
+from .intensity import arias, psa
+from .processing import filtered, padded, resampled, scaled, scaled_to_pga, tapered, trimmed, without_mean
 from .record import Record
-from .scaling import scaled_to_arias, scaled_to_psa
-from .window import padded, trimmed
 
 
 @dataclass(frozen=True)
@@ -70,3 +69,28 @@ class Processing:
         if self.arias is not None:
             return scaled_to_arias(record, self.arias)
         return record if self.psa is None else scaled_to_psa(record, *self.psa)
+
+
+def scaled_to_psa(record: Record, target: float, period: float, *, damping: float = 0.05) -> Record:
+    """Scaled so that the pseudo-acceleration at `period` [s] is `target` [m/s²]; the sign of the motion is kept.
+
+    Raises InputError unless target > 0 and the record is not all zero.
+    """
+    return scaled(record, factor=_ratio(record, "scaled_to_psa", target, psa(record, period, damping=damping)))
+
+
+def scaled_to_arias(record: Record, target: float) -> Record:
+    """Scaled so that the Arias intensity is `target` [m/s]; the sign of the motion is kept.
+
+    Raises InputError unless target > 0 and the record is not all zero.
+    """
+    return scaled(record, factor=math.sqrt(_ratio(record, "scaled_to_arias", target, arias(record))))
+
+
+def _ratio(record: Record, name: str, target: float, value: float) -> float:
+    """target / value."""
+    if not math.isfinite(target) or target <= 0.0:
+        raise InputError(f"{name}: target is {target!r}; give a positive number")
+    if value == 0.0:
+        raise InputError(f"{record.source or 'Record'}: every sample is zero and scaling stays so; use another record")
+    return target / value

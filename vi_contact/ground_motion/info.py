@@ -7,10 +7,21 @@ import os
 from ..core.units import STANDARD_GRAVITY
 from .chain import Processing
 from .formats.reader import LARGEST_PEAK, read_record
-from .intensity import arias, cav, d5_95, pga, pga_time, pgd, pgv, rms
+from .intensity import (
+    arias,
+    cav,
+    d5_95,
+    housner_intensity,
+    mean_period,
+    pga,
+    pga_time,
+    pgd,
+    pgv,
+    predominant_period,
+    rms,
+)
 from .processing import integrated
 from .record import UNITS, Record
-from .spectral_intensity import housner_intensity, mean_period, predominant_period
 
 
 def motion_info(path: str | os.PathLike[str], units: str | None = None, *, dt: float | None = None,
