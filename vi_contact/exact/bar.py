@@ -29,23 +29,13 @@ _PERIOD_THREE = 0.5 * np.array([
 
 
 @dataclass(frozen=True)
-class ThrownBar:
-    """A bar thrown at the wall with `speed` v0, no gravity (St-Venant, V1.1); as defaults the data of V1.1.
-
-        u = -height - v0 min(x/c, T - |s - T|),   s = t - height/v0,   p = rho c v0 for 0 < s < 2T,
-
-    which contains the rigid motions with -v0 before the contact and +v0 after it. length, height [m]; speed [m/s];
-    E [Pa]; rho [kg/m³]. Raises InputError unless all are finite and positive (height may be 0).
-    """
+class UprightBar:
+    """Hold what upright bars have in common: length, height above the wall [m], E [Pa], rho [kg/m³]."""
 
     length: float = 10.0
     E: float = 900.0
     rho: float = 1.0
     height: float = 5.0
-    speed: float = 10.0
-
-    def __post_init__(self) -> None:
-        attributes(self, positive=("length", "E", "rho", "speed"), not_negative=("height",))
 
     @property
     def wave_speed(self) -> float:
@@ -56,6 +46,22 @@ class ThrownBar:
     def crossing(self) -> float:
         """T = length/c [s]."""
         return self.length / self.wave_speed
+
+
+@dataclass(frozen=True)
+class ThrownBar(UprightBar):
+    """A bar thrown at the wall with `speed` v0, no gravity (St-Venant, V1.1); as defaults the data of V1.1.
+
+        u = -height - v0 min(x/c, T - |s - T|),   s = t - height/v0,   p = rho c v0 for 0 < s < 2T,
+
+    which contains the rigid motions with -v0 before the contact and +v0 after it. length, height [m]; speed [m/s];
+    E [Pa]; rho [kg/m³]. Raises InputError unless all are finite and positive (height may be 0).
+    """
+
+    speed: float = 10.0
+
+    def __post_init__(self) -> None:
+        attributes(self, positive=("length", "E", "rho", "speed"), not_negative=("height",))
 
     @property
     def contact_start(self) -> float:

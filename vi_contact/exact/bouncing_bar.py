@@ -25,12 +25,13 @@ from numpy.typing import ArrayLike
 from ..core.algebra import Array
 from ..core.checks import attributes
 from ..core.errors import InputError
+from .bar import UprightBar
 
 SAME = 1e-12  # events and piece ends closer than this, relative to the problem's own scales, are the same
 
 
 @dataclass(frozen=True)
-class BouncingBar:
+class BouncingBar(UprightBar):
     """The bar of V1.2, by default with its data; released at rest `height` above the wall.
 
     The fall takes t_f = sqrt(2 height/g). For integer t_f/T >= 3 the motion is periodic, 4T + 4t_f, and the first
@@ -39,24 +40,10 @@ class BouncingBar:
     (height may be 0). Methods take t >= 0; where velocity and pressure jump they return the later value.
     """
 
-    length: float = 10.0
-    E: float = 900.0
-    rho: float = 1.0
-    height: float = 5.0
     gravity: float = 10.0
 
     def __post_init__(self) -> None:
         attributes(self, positive=("length", "E", "rho", "gravity"), not_negative=("height",))
-
-    @property
-    def wave_speed(self) -> float:
-        """c = sqrt(E/rho) [m/s]."""
-        return math.sqrt(self.E / self.rho)
-
-    @property
-    def crossing(self) -> float:
-        """T = length/c [s]."""
-        return self.length / self.wave_speed
 
     @property
     def fall_time(self) -> float:
