@@ -33,7 +33,7 @@ from test_bem_energetic import echoes, smooth_integral, smooth_load  # noqa: E40
 
 from vi_contact import Tresca, bem  # noqa: E402
 from vi_contact.bem.contact import BoundaryContact  # noqa: E402
-from vi_contact.bem.contact_march import march_contact  # noqa: E402
+from vi_contact.bem.contact_run import march_contact  # noqa: E402
 from vi_contact.bem.uzawa_space_time import SpaceTimeUzawa  # noqa: E402
 from vi_contact.core.errors import StepFailure  # noqa: E402
 

@@ -20,8 +20,7 @@ from vi_contact.bem import (
     polygon,
 )
 from vi_contact.bem.contact import BoundaryContact, conditions_on
-from vi_contact.bem.contact_march import march_contact
-from vi_contact.bem.contact_run import ContactRun, ledger
+from vi_contact.bem.contact_run import ContactRun, ledger, march_contact
 from vi_contact.bem.two_bodies import TwoBodies
 from vi_contact.bem.uzawa_space_time import SpaceTimeUzawa
 from vi_contact.core.errors import InputError, StepFailure

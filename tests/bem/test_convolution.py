@@ -27,8 +27,7 @@ from vi_contact.bem import (
     traction_forces,
 )
 from vi_contact.bem.contact import BoundaryContact
-from vi_contact.bem.contact_march import march_contact
-from vi_contact.bem.contact_run import ledger
+from vi_contact.bem.contact_run import ledger, march_contact
 from vi_contact.bem.radial_table import RadialTable
 from vi_contact.bem.uzawa_space_time import SpaceTimeUzawa
 from vi_contact.core.errors import InputError

@@ -23,8 +23,7 @@ from vi_contact.core.surfaces import empty_surface
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import Prescribed
-from vi_contact.fem.output.fields import XDMF
-from vi_contact.fem.output.stress import VonMises
+from vi_contact.fem.output.fields import XDMF, VonMises
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.materials import LinearElastic, PlaneStrain, PlaneStress, Section
 from vi_contact.run.march import march

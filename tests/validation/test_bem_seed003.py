@@ -13,8 +13,7 @@ import pytest
 import vi_contact as vc
 from vi_contact.bem import BoundaryProblem
 from vi_contact.bem.contact import BoundaryContact
-from vi_contact.bem.contact_march import march_contact
-from vi_contact.bem.contact_run import ContactLedger, ContactRun, ledger
+from vi_contact.bem.contact_run import ContactLedger, ContactRun, ledger, march_contact
 from vi_contact.bem.uzawa_space_time import SpaceTimeUzawa
 from vi_contact.core.algebra import Array
 from vi_contact.models.boundary_elements import disk_contact, disk_problem, embedded_problem, square_problem

@@ -3,8 +3,7 @@
 from .boundary_mesh import BoundaryMesh, circle, from_segments, polygon, smooth_curve
 from .boundary_operators import Galerkin, OperatorMatrices
 from .contact import BoundaryContact, Conditions, conditions_on
-from .contact_march import march_contact
-from .contact_run import ContactLedger, ContactRun, ledger
+from .contact_run import ContactLedger, ContactRun, ledger, march_contact
 from .convolution_operator import ConvolutionOperator, ConvolutionProblem, convolution_operator
 from .convolution_quadrature import ConvolutionQuadrature, Frequencies
 from .energetic import EnergeticBlocks, Marching, energetic_blocks
