@@ -139,7 +139,7 @@ def describe(material: vc.LinearElastic) -> str:
 # a real earthquake with --motion and --vertical; mpirun -n 3.
 if __name__ == "__main__":
     if len(sys.argv) > 1:
-        from vi_contact.cli.main import main as command
+        from vi_contact.cli.entry import main as command
 
         sys.exit(command(["channel", *sys.argv[1:]]))
     main()

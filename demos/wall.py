@@ -104,7 +104,7 @@ def compare_schemes(model: wall_model.WallModel, case: str, steps: int, refined:
 # Wall(divisions=(32, 48)); triangles; a real earthquake with --motion; mpirun -n 3.
 if __name__ == "__main__":
     if len(sys.argv) > 1:
-        from vi_contact.cli.main import main as command
+        from vi_contact.cli.entry import main as command
 
         raise SystemExit(command(["wall", "--cross-check", *sys.argv[1:]]))
     main()

@@ -14,6 +14,7 @@ from vi_contact import LinearElastic
 from vi_contact.bem import (
     BoundaryMesh,
     BoundaryProblem,
+    EnergeticBlocks,
     Marching,
     PoincareSteklov,
     circle,
@@ -28,6 +29,12 @@ from vi_contact.bem import (
 from vi_contact.core.errors import InputError
 
 pytestmark = pytest.mark.serial
+
+
+@pytest.fixture(scope="module")
+def blocks() -> dict[int, EnergeticBlocks]:
+    """Squares of 5 and 10 elements a side, c_P dt = h, six crossings of the square."""
+    return {k: energetic_blocks(polygon(SQUARE, 1.0 / k), MATERIAL, dt=1.0 / k, steps=6 * k) for k in (5, 10)}
 
 
 @pytest.mark.parametrize("symmetric", [True, False])

@@ -18,8 +18,8 @@ pytest.importorskip("matplotlib")
 
 import vi_contact as vc
 from vi_contact import ground_motion
+from vi_contact.cli.entry import main
 from vi_contact.cli.errors import printable
-from vi_contact.cli.main import main
 
 pytestmark = pytest.mark.serial
 COUNT = 300

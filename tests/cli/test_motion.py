@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from vi_contact.cli.main import main
+from vi_contact.cli.entry import main
 from vi_contact.cli.motion import acceleration
 from vi_contact.ground_motion import (
     EC8Spectrum,

@@ -21,7 +21,6 @@ import vi_contact as vc
 from vi_contact import fem, soil
 from vi_contact.core.algebra import Array, SerialMatrix
 from vi_contact.core.errors import InputError, StepFailure
-from vi_contact.run.checks import check_pace
 
 COMM = MPI.COMM_WORLD
 STEEL = vc.LinearElastic(E=2.0e9, nu=0.3, rho=2000.0)
@@ -106,30 +105,32 @@ def test_a_start_inside_the_obstacle() -> None:
     vc.march(sprung, dt=1e-2, steps=1, state=metre, scheme=vc.Midpoint())
 
 
-def test_motions_belong_to_runs_with_their_scheme_and_steps() -> None:
-    """base_motion, as prescribed motion and as an obstacle that goes along, and FreeField, also behind other loads."""
+def test_motions_beside_a_run_are_marched_with_its_scheme_and_steps() -> None:
+    """base_motion, as prescribed motion and as an obstacle that goes along, and FreeField, also behind other loads: two
+    runs of one problem with other schemes or steps, at once, are those of two problems, to the last bit."""
     mesh, tags = body()
-    ground = soil.base_motion(SHAKE, DT, vc.HHT())
-    moved = fem.Prescribed(tags["bottom"], ground.displacement, ground.velocity, ground.acceleration)
-    sides = [fem.FreeField(tags[side], base=ground, dt=DT, scheme=vc.HHT()) for side in ("left", "right")]
-    system = fem.assemble(mesh, STEEL, prescribed=moved, dashpots=sides)
-    system = vc.with_weight(system).with_load((np.zeros_like(system.u0), np.sin))
-    problem = vc.ContactProblem(system, fem.contact_surface(system, tags["top"]))
-    alone = fem.assemble(mesh, STEEL, clamped=tags["bottom"])
-    carried = ground.carrying(fem.contact_surface(alone, tags["top"]), alone)
-    for one in (problem, vc.ContactProblem(alone, fem.together(carried))):
-        for wrong in (2 * DT, vc.HalvedAtImpact(DT), vc.Schedule(((DT, 1.0), (2 * DT, inf)))):
-            with pytest.raises(InputError, match=r"base_motion was computed with dt = 0.002 s and the run has dt = "):
-                vc.march(one, scheme=vc.HHT(), dt=wrong, steps=1)
-        with pytest.raises(InputError, match=r"computed with HHT\(alpha=-0.1\) and the run has HHT\(alpha=-0.2\)"):
-            vc.simulate(one, scheme=vc.HHT(-0.2), dt=DT, steps=1, progress=False)
-        for right in (DT, vc.Schedule(((DT, inf),)), DT * (1.0 + 1e-15)):
-            check_pace(one, vc.HHT(), right)
-    quiet = fem.assemble(mesh, STEEL, clamped=tags["bottom"], dashpots=fem.FreeField(tags["left"], base=SHAKE, dt=DT))
-    rest = vc.ContactProblem(quiet, fem.contact_surface(quiet, tags["top"]), excitation=SHAKE)
-    with pytest.raises(InputError, match="FreeField on 'left' was computed with Trapezoidal"):
-        vc.march(rest, scheme=vc.HHT(), dt=DT, steps=1)
-    check_pace(rest, vc.Trapezoidal(vc.ConsistentMass()), DT)  # the mass is not of the rule
+
+    def problems() -> list[vc.ContactProblem]:
+        ground = soil.base_motion(SHAKE)
+        moved = fem.Prescribed(tags["bottom"], ground.displacement, ground.velocity, ground.acceleration)
+        sides = [soil.FreeField(tags[side], base=ground) for side in ("left", "right")]
+        system = fem.assemble(mesh, STEEL, prescribed=moved, dashpots=sides)
+        system = vc.with_weight(system).with_load((np.zeros_like(system.u0), np.sin))
+        alone = fem.assemble(mesh, STEEL, clamped=tags["bottom"])
+        carried = ground.carrying(fem.contact_surface(alone, tags["top"]), alone)
+        return [vc.ContactProblem(system, fem.contact_surface(system, tags["top"])),
+                vc.ContactProblem(alone, fem.together(carried))]
+
+    def runs(one: vc.ContactProblem, other: vc.ContactProblem) -> list[Array]:
+        marches = (vc.march(one, scheme=vc.HHT(), dt=DT, steps=6),
+                   vc.march(other, scheme=vc.Newmark(), dt=2 * DT, steps=6))
+        return [np.array([state.u for state, _ in pair]) for pair in zip(*marches, strict=True)]
+
+    for one, other in zip(problems(), problems(), strict=True):
+        assert {beside.name for beside in (*one.system.companions, *one.surface.companions)} >= {"base_motion"}
+        np.testing.assert_array_equal(runs(one, one), runs(one, other))
+        with pytest.raises(InputError, match="needs its time steps beforehand"):
+            vc.march(one, scheme=vc.HHT(), dt=vc.HalvedAtImpact(DT), steps=1)
 
 
 def test_outputs_say_when_the_matrices_are_not_of_their_materials(

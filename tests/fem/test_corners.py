@@ -386,7 +386,7 @@ def test_one_direction_is_one_condition():
 def test_a_wall_moved_with_its_ground():
     """Oblique corners on an obstacle that moves with the base: the same as in the frame of the ground."""
     shake = (vc.Harmonic(8.0, 6.0, direction=(1.0, 0.0)), vc.Harmonic(5.0, 9.0, direction=(0.0, 1.0)))
-    motion = base_motion(shake, 2e-3)
+    motion = base_motion(shake)
     near = vc.AnalyticGap(lambda x: np.full(len(x), 2e-4))
     answers = []
     for moved in (False, True):

@@ -120,7 +120,7 @@ def test_nan_and_shapes_are_refused_on_all_ranks():
         ("BodyForce contains NaN or infinite values at t = 0 s", {"loads": BodyForce((0.0, float("inf")))}),
         ("initial displacement contains NaN", {"initial_displacement": lambda x: only_there(x, 0.0)}),
         ("initial velocity contains NaN", {"initial_velocity": (nan, 0.0)}),
-        (r"Traction at t = 0 s ended in ZeroDivisionError: no such place \(test_fem_loads.py, line \d+\): correct",
+        (r"Traction at t = 0 s ended in ZeroDivisionError: no such place \(test_loads.py, line \d+\): correct",
          {"loads": Traction(tags["top"], fails_there, history=sin)}),
         ("initial velocity at t = 0 s ended in Zero", {"initial_velocity": lambda x: fails_there(x, 0.0)}),
         (r"BodyForce returned shape \(\d+, 3\) .* return 2 components", {"loads": BodyForce((0.0, 0.0, 1.0))}),

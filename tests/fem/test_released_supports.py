@@ -24,7 +24,7 @@ def stages(comm: Any, *, motion: Any = None, friction: Any = None, **other: Any)
     rollers = fem.Prescribed(tags["left"], components=(0,))
     before = fem.assemble(mesh, SOIL, clamped=tags["bottom"], prescribed=rollers, loads=WEIGHT)
     base = fem.CompliantBase(tags["bottom"], motion=motion or (lambda t: np.zeros(2)))
-    sides = fem.FreeField(tags["left"], base=base, dt=DT)
+    sides = soil.FreeField(tags["left"], base=base)
     after = fem.assemble(mesh, SOIL, dashpots=[base, sides], **({"loads": WEIGHT} | other))
     settings = {} if friction is None else {"friction": friction}
     wall = [(6.0, y) for y in (1.0, 2.0, 3.0, 4.0)]

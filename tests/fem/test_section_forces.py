@@ -133,7 +133,7 @@ DT, STEPS, SCHEME = 1.0 / 360.0, 40, vc.Newmark()
 def shaken(comm: Any, moving: bool) -> tuple[vc.ContactProblem, Any]:
     """A wall between nothing and a stop on its right, shaken in the relative frame or by its foot."""
     mesh, tags = block(comm, lengths=(2.0, 6.0), divisions=(2, 6))
-    ground = base_motion(SHAKE, DT, SCHEME)
+    ground = base_motion(SHAKE)
     foot = fem.Prescribed(tags["bottom"], ground.displacement, ground.velocity, ground.acceleration)
     data: dict[str, Any] = {"prescribed": foot} if moving else {"clamped": tags["bottom"]}
     system = fem.assemble(mesh, CONCRETE, damping=vc.Rayleigh(0.0, 1e-4), **data)

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from demo_runs import ROOT, demo
 
-from vi_contact.cli.main import main
+from vi_contact.cli.entry import main
 from vi_contact.ground_motion import Record, pga, read_record
 
 SHARED = Path(os.environ.get("VI_CONTACT_GROUND_MOTIONS", ROOT.parent / "shared" / "ground_motions"))

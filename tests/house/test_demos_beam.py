@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vi_contact import beam
-from vi_contact.cli import main as cli
+from vi_contact import beam, cli
 from vi_contact.plots import histories as plotting
 
 pytestmark = pytest.mark.serial

@@ -10,7 +10,7 @@ import pytest
 from demo_runs import demo
 
 from demos.pictures.layer import plot_thin_limit
-from vi_contact.cli.main import main
+from vi_contact.cli.entry import main
 
 serial = pytest.mark.serial
 

@@ -11,7 +11,7 @@ from channel_runs import CHANNEL, DT, FRICTION, follow, model
 from mpi4py import MPI
 
 import vi_contact as vc
-from vi_contact.cli.main import main
+from vi_contact.cli.entry import main
 from vi_contact.core.errors import InputError
 from vi_contact.core.units import STANDARD_GRAVITY
 from vi_contact.meshes.channel import ChannelMesh

@@ -18,7 +18,7 @@ from chain import chain_problem
 
 import vi_contact as vc
 from vi_contact import engineering
-from vi_contact.cli.main import main
+from vi_contact.cli.entry import main
 from vi_contact.core.errors import InputError
 from vi_contact.plots.report import header_facts, plot_report, table_rows
 from vi_contact.run.files.reading import ContactGeometry, RunFolder, read_run

@@ -149,7 +149,7 @@ def test_unwritable_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     def refuse(*_: Any) -> None:
         raise PermissionError(errno.EACCES, "Permission denied")
 
-    monkeypatch.setattr("vi_contact.run.files.folder.write_all", refuse)
+    monkeypatch.setattr("vi_contact.core.files.write_all", refuse)
     with pytest.raises(InputError, match=r"cannot be written \(Permission denied\)"):
         run(tmp_path / "closed")
     assert asked == []
@@ -232,7 +232,7 @@ def test_whole_files_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
     """An atomic write that fails leaves the old content and no litter."""
     path = tmp_path / "checkpoint.npz"
     write_atomically(path, b"old")
-    monkeypatch.setattr("vi_contact.run.files.folder.write_all", Disk(2))
+    monkeypatch.setattr("vi_contact.core.files.write_all", Disk(2))
     with pytest.raises(OSError, match="No space left") as caught:
         write_atomically(path, b"new content")
     assert caught.value.filename == str(path)
@@ -382,7 +382,7 @@ def test_hdf5_on_a_full_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     hdf5_atomically(path, lambda file: file.create_dataset("x", data=np.arange(1000.0)))
     before = path.read_bytes()
     for room in (0, 100, 2000, 5000):
-        monkeypatch.setattr("vi_contact.run.files.folder.write_all", Disk(room))
+        monkeypatch.setattr("vi_contact.core.files.write_all", Disk(room))
         with pytest.raises(OSError, match="No space left") as caught:
             hdf5_atomically(path, lambda file: file.create_dataset("x", data=np.arange(2000.0)))
         assert caught.value.filename == str(path)

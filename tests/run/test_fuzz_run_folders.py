@@ -17,7 +17,7 @@ from chain import chain_problem
 
 import vi_contact as vc
 from vi_contact import ground_motion
-from vi_contact.cli.main import main
+from vi_contact.cli.entry import main
 from vi_contact.core.errors import InputError
 from vi_contact.engineering.peak_values import peaks
 from vi_contact.plots.report import header_facts, shown_periods, table_rows

@@ -18,7 +18,7 @@ import pytest
 from marched_chain import equal_files, run, run_wall
 from summaries import summary_of
 
-from vi_contact.cli.main import main
+from vi_contact.cli.entry import main
 from vi_contact.core.algebra import SerialComm
 from vi_contact.core.errors import InputError, Interrupted
 from vi_contact.core.problem import ContactProblem
@@ -140,13 +140,13 @@ def test_exit_status_of_the_command_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """One sentence on standard error, 128 + n."""
-    monkeypatch.setattr("vi_contact.cli.main.rank", lambda: 0)
+    monkeypatch.setattr("vi_contact.cli.entry.rank", lambda: 0)
     for error, status in ((Interrupted("SIGTERM ended the run", signal.SIGTERM), 143), (KeyboardInterrupt(), 130)):
 
         def stop(*_: Any, error: BaseException = error, **__: Any) -> None:
             raise error
 
-        monkeypatch.setattr("vi_contact.cli.main.parser", lambda stop=stop: Parser(stop))
+        monkeypatch.setattr("vi_contact.cli.entry.parser", lambda stop=stop: Parser(stop))
         assert main(["anything"]) == status
         said = capsys.readouterr()
         assert said.out == "" and said.err.count("\n") == 1 and said.err.startswith("vi-contact: ")

@@ -432,8 +432,8 @@ def test_restart_with_a_plan_to_the_last_bit(tmp_path: Path, scheme: Any, plan: 
     """From checkpoints here and there, also right after halved steps: state and files of the straight run."""
     straight = run_chain(tmp_path / "straight", 200, scheme=scheme, dt=plan)
     loop = March(
-        chain(), scheme=scheme, solvers=[Condensed()], course=course(plan, 199, None), state=initial_state(chain()),
-        tolerance=1e-9,
+        chain(), scheme=scheme, solvers=[Condensed()], course=course(plan, 199, None), dt=plan,
+        state=initial_state(chain()), tolerance=1e-9,
     )
     halved = [loop.base for _ in loop if loop.ended and loop.dt < course(plan, 199, None).dt(loop.base - 1)]
     assert bool(halved) == isinstance(plan, HalvedAtImpact)

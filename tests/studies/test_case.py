@@ -16,13 +16,13 @@ from mpi4py import MPI
 
 import vi_contact as vc
 from vi_contact import engineering, fem, ground_motion
-from vi_contact.cli.main import main
+from vi_contact.cli.entry import main
 from vi_contact.core.errors import InputError
 from vi_contact.core.surfaces import empty_surface
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import TwoBlocks
 from vi_contact.models.wall import Wall, build
-from vi_contact.soil import upgoing
+from vi_contact.soil import FreeField, upgoing
 from vi_contact.studies import Case, read_case, run_case
 from vi_contact.studies.cases.toml_file import with_settings
 from vi_contact.studies.cases.vocabulary import words
@@ -255,12 +255,12 @@ frequency = 4.0
 
 
 def test_soil_boundaries(shared_tmp: Path) -> None:
-    """A compliant base and free-field sides, which learn time step and scheme from the case; on a rigid base they take
+    """A compliant base and free-field sides; on a rigid base they take
     its excitations."""
     found = run_case(write(shared_tmp, COMPLIANT), COMM, progress=False)
     mesh, tags = fem.build_mesh(BlockMesh(lengths=(6.0, 8.0), divisions=(4, 8)), COMM)
     base = fem.CompliantBase(tags["bottom"], motion=upgoing(vc.Ricker(2.0, 4.0), dt=0.004))
-    sides = [fem.FreeField(tags[side], base=base, dt=0.004) for side in ("left", "right")]
+    sides = [FreeField(tags[side], base=base) for side in ("left", "right")]
     soil = vc.LinearElastic.from_wave_speeds(400.0, 200.0, 2000.0)
     system = fem.assemble(mesh, soil, dashpots=[base, *sides])
     problem = vc.ContactProblem(system, empty_surface(system.algebra.comm, 2))
@@ -270,7 +270,7 @@ def test_soil_boundaries(shared_tmp: Path) -> None:
     assert_same(found.history, expected.history)
     rigid = run_case(write(shared_tmp, RIGID, "rigid.toml"), COMM, progress=False)
     shaking = vc.Ricker(2.0, 4.0)
-    sides = [fem.FreeField(tags[side], base=(shaking,), dt=0.004) for side in ("left", "right")]
+    sides = [FreeField(tags[side], base=(shaking,)) for side in ("left", "right")]
     system = fem.assemble(mesh, soil, dashpots=sides, clamped=tags["bottom"])
     problem = vc.ContactProblem(system, empty_surface(system.algebra.comm, 2), excitation=shaking)
     assert_same(rigid.history, vc.simulate(problem, dt=0.004, steps=20, record=[probe], progress=False).history)

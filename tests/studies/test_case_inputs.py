@@ -13,7 +13,7 @@ pytest.importorskip("dolfinx")
 from mpi4py import MPI
 
 from vi_contact import ground_motion
-from vi_contact.cli.main import main
+from vi_contact.cli.entry import main
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.gmsh_session import session, write

@@ -18,7 +18,7 @@ import pytest
 
 pytest.importorskip("dolfinx")
 
-from vi_contact.cli.main import main
+from vi_contact.cli.entry import main
 from vi_contact.core.errors import InputError
 from vi_contact.ground_motion import Record, arias, pga, psa, read_record, scaled, tapered
 from vi_contact.plots.ida import Panel, plot_ida

@@ -3,23 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
-from plane_waves import MATERIAL, SQUARE
 
 from vi_contact.bem import (
     BoundaryProblem,
     EnergeticBlocks,
     PoincareSteklov,
-    energetic_blocks,
-    polygon,
     traction_forces,
 )
-
-
-@pytest.fixture(scope="module")
-def blocks() -> dict[int, EnergeticBlocks]:
-    """Squares of 5 and 10 elements a side, c_P dt = h, six crossings of the square."""
-    return {k: energetic_blocks(polygon(SQUARE, 1.0 / k), MATERIAL, dt=1.0 / k, steps=6 * k) for k in (5, 10)}
 
 
 def rod(blocks: EnergeticBlocks, load, *, symmetric: bool = True, rho: float = 1.0) -> BoundaryProblem:

@@ -46,5 +46,5 @@ def shaken(contact: str, *, steps: int = 400, amplitude: float = 2.0) -> Solutio
 
 def moved(excitation: Any, steps: int, *, friction: Any = None) -> Solution:
     """With a moved bedrock, in the frame of an observer at rest."""
-    one = build(CHANNEL, MPI.COMM_WORLD, base=base_motion(excitation, DT, SCHEME))
+    one = build(CHANNEL, MPI.COMM_WORLD, base=base_motion(excitation))
     return follow(one, one.problem(friction=friction, excitation=()), steps)

@@ -22,6 +22,7 @@ from mpi4py import MPI
 import vi_contact as vc
 from vi_contact import core, engineering, fem, ground_motion, soil, solvers
 from vi_contact.meshes.block import BlockMesh
+from vi_contact.models.boundary_curve import boundary_curve
 from vi_contact.solvers.volume.route import OneFactorisation, Volume
 
 Wrong = Mapping[str, Any]
@@ -197,9 +198,7 @@ def values() -> Table:
         (fem.NodeToNode, {}, {"tolerance": POSITIVE}),
         (soil.upgoing, {"motion": vc.Ricker(1.0, 1.0), "dt": 0.1},
          {"motion": NEEDED, "dt": POSITIVE, "outcrop": FLAG}),
-        (soil.base_motion, {"excitation": vc.Ricker(1.0, 1.0), "dt": 0.1},
-         {"excitation": NEEDED, "dt": STEP | {"halved": vc.HalvedAtImpact(0.1)},
-          "scheme": THING | {"class itself": vc.HHT}}),
+        (soil.base_motion, {"excitation": vc.Ricker(1.0, 1.0)}, {"excitation": NEEDED}),
     ]
 
 
@@ -232,8 +231,7 @@ def of_the_mesh() -> Table:
         (fem.Dashpots, {"facets": right}, {"facets": but(groups(), "another mesh"), "material": THING,
                                            "normal": NOT_NEGATIVE, "tangential": NOT_NEGATIVE}),
         (fem.CompliantBase, {"facets": right, "motion": np.sin}, {"motion": FUNCTION | {"none": None}}),
-        (fem.FreeField, {"facets": right, "base": vc.Ricker(1.0, 1.0), "dt": 0.1},
-         {"base": NEEDED, "dt": STEP | {"halved": vc.HalvedAtImpact(0.1)}, "scheme": THING}),
+        (soil.FreeField, {"facets": right, "base": vc.Ricker(1.0, 1.0)}, {"base": NEEDED}),
         (fem.XDMF, {}, {"every": COUNT | {"none": None}}),
         (fem.Reactions, {"name": "base", "facets": right, "centre": (0.0, 0.0)},
          {"name": {"spaces": "a b", "none": None}, "facets": but(groups(), "another mesh"), "centre": VECTOR,
@@ -321,13 +319,10 @@ def runs() -> Table:
     inside = replace(state, u=state.u + 1.0, k=0)
     other = fem.contact_surface(b.held_left, b.tags["right"])
     far = replace(chain_surface(3), owned=np.array([7]))
-    again = soil.base_motion(vc.Ricker(1.0, 1.0), 1e-3)
-    moving = again.carrying(b.surface, b.system)
-    paced = {"base_motion": vc.ContactProblem(b.system, moving)}
     excitation = {"record": ground_motion.Record(np.ones(9), 0.01), "text": "elcentro", "number": 3.0,
                   "class": vc.Harmonic, "in space": vc.Harmonic(1.0, 1.0, direction=(1.0, 0.0, 0.0)), "list": [None]}
     march = {
-        "problem": NEEDED | {"system": b.system} | paced, "scheme": THING | {"class itself": vc.HHT,
+        "problem": NEEDED | {"system": b.system}, "scheme": THING | {"class itself": vc.HHT,
         "solver": vc.Condensed()},
         "solver": THING | {"class itself": vc.Condensed, "scheme": vc.HHT(), "method": solvers.ActiveSet(),
         "name": "condensed"},
@@ -408,9 +403,9 @@ def rights(table: Table) -> Iterator[tuple[str, Callable[[], object]]]:
 
 
 EXTRA: dict[str, Callable[[], object]] = {
-    "boundary_curve: another mesh": lambda: fem.boundary_curve(body().facets, body().theirs["left"]),
-    "boundary_curve: cells": lambda: fem.boundary_curve(body().cells),
-    "boundary_curve: text": lambda: fem.boundary_curve("right"),  # type: ignore[arg-type]
+    "boundary_curve: another mesh": lambda: boundary_curve(body().facets, body().theirs["left"]),
+    "boundary_curve: cells": lambda: boundary_curve(body().cells),
+    "boundary_curve: text": lambda: boundary_curve("right"),  # type: ignore[arg-type]
     "together: systems": lambda: fem.together(body().surface, chain_surface(3)),
     "together: texts": lambda: fem.together("a"),  # type: ignore[arg-type]
 }

@@ -1,5 +1,5 @@
 """Answer the command line ``vi-contact``: parse, call, print."""
 
-from .main import main
+from .entry import main
 
 __all__ = ["main"]

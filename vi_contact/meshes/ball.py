@@ -23,9 +23,9 @@ import numpy as np
 if not __package__:  # run as a file of the source tree, maybe not installed
     sys.path[0] = str(Path(__file__).resolve().parents[2])
 
-from ..core.checks import MOST_CELLS, counted
-from ..core.errors import InputError
-from .gmsh_session import write
+from vi_contact.core.checks import MOST_CELLS, counted
+from vi_contact.core.errors import InputError
+from vi_contact.meshes.gmsh_session import write
 
 _TRIANGLE = 2  # Gmsh's number
 _SIZES = {  # the size field alone decides

@@ -20,10 +20,10 @@ import numpy as np
 if not __package__:  # run as a file of the source tree, maybe not installed
     sys.path[0] = str(Path(__file__).resolve().parents[2])
 
-from ..core.checks import MOST_CELLS, counted
-from ..core.errors import InputError
-from .gmsh_session import write
-from .grid import Array, add_grid, lattice
+from vi_contact.core.checks import MOST_CELLS, counted
+from vi_contact.core.errors import InputError
+from vi_contact.meshes.gmsh_session import write
+from vi_contact.meshes.grid import Array, add_grid, lattice
 
 SIDES = (("left", "right"), ("bottom", "top"), ("back", "front"))
 

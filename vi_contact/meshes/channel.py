@@ -21,11 +21,11 @@ from typing import Any
 if not __package__:  # run as a file of the source tree, maybe not installed
     sys.path[0] = str(Path(__file__).resolve().parents[2])
 
-from ..core.checks import MOST_CELLS, counted
-from ..core.errors import InputError
-from .channel_grid import channel_grid
-from .from_arrays import add_arrays
-from .gmsh_session import write
+from vi_contact.core.checks import MOST_CELLS, counted
+from vi_contact.core.errors import InputError
+from vi_contact.meshes.channel_grid import channel_grid
+from vi_contact.meshes.from_arrays import add_arrays
+from vi_contact.meshes.gmsh_session import write
 
 Outline = list[tuple[float, float]]
 

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from .extract import MeshArrays
-from .grid import Array
-from .rows import Rows
+from vi_contact.meshes.extract import MeshArrays
+from vi_contact.meshes.grid import Array
+from vi_contact.meshes.rows import Rows
 
 Mask = npt.NDArray[np.bool_]
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from ..core.errors import InputError
-from .rows import Rows, cell_sides, found_in, number_alike
+from vi_contact.core.errors import InputError
+from vi_contact.meshes.rows import Rows, cell_sides, found_in, number_alike
 
 Array = npt.NDArray[np.float64]
 _ROUND_OFF = 1024 * np.finfo(float).eps

@@ -17,10 +17,10 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from ..core.errors import InputError
-from .extract import MeshArrays
-from .from_arrays import Source, add_arrays, arrays_of
-from .rows import Rows, cell_sides, number_alike
+from vi_contact.core.errors import InputError
+from vi_contact.meshes.extract import MeshArrays
+from vi_contact.meshes.from_arrays import Source, add_arrays, arrays_of
+from vi_contact.meshes.rows import Rows, cell_sides, number_alike
 
 Mask = npt.NDArray[np.bool_]
 

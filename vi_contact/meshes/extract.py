@@ -16,11 +16,11 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
-from ..core.errors import InputError
-from .checks import Array, check_cells, check_folds, check_sides
-from .gmsh_session import MeshScript, session
-from .mesh_file import copied
-from .rows import Rows, number_alike
+from vi_contact.core.errors import InputError
+from vi_contact.meshes.checks import Array, check_cells, check_folds, check_sides
+from vi_contact.meshes.gmsh_session import MeshScript, session
+from vi_contact.meshes.mesh_file import copied
+from vi_contact.meshes.rows import Rows, number_alike
 
 Mask = npt.NDArray[np.bool_]
 

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .extract import MeshArrays, arrays_from_file, arrays_from_script
-from .gmsh_session import MeshScript
-from .rows import Rows, number_alike
+from vi_contact.meshes.extract import MeshArrays, arrays_from_file, arrays_from_script
+from vi_contact.meshes.gmsh_session import MeshScript
+from vi_contact.meshes.rows import Rows, number_alike
 
 Source = MeshScript | str | Path
 

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Protocol
 
-from ..core.errors import InputError
+from vi_contact.core.errors import InputError
 
 M_PERTURB = -6  # of malloc.h
 _OPTIONS = {

@@ -13,8 +13,8 @@ import shutil
 import struct
 from pathlib import Path
 
-from ..core.checks import shown
-from ..core.errors import InputError
+from vi_contact.core.checks import shown
+from vi_contact.core.errors import InputError
 
 MAGIC = b"$MeshFormat"
 _SCRIPTS = (".geo", ".geo_unrolled", ".opt", ".pos", ".script")

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from .rows import Rows, cell_sides, number_alike
+from vi_contact.meshes.rows import Rows, cell_sides, number_alike
 
 Array = npt.NDArray[np.float64]
 Ranks = npt.NDArray[np.int32]

@@ -19,10 +19,10 @@ import numpy as np
 if not __package__:  # run as a file of the source tree, maybe not installed
     sys.path[0] = str(Path(__file__).resolve().parents[2])
 
-from ..core.errors import InputError
-from .block import SIDES, BlockMesh
-from .gmsh_session import write
-from .grid import add_grid
+from vi_contact.core.errors import InputError
+from vi_contact.meshes.block import SIDES, BlockMesh
+from vi_contact.meshes.gmsh_session import write
+from vi_contact.meshes.grid import add_grid
 
 
 @dataclass(frozen=True)

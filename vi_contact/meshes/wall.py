@@ -18,11 +18,11 @@ from typing import Any
 if not __package__:  # run as a file of the source tree, maybe not installed
     sys.path[0] = str(Path(__file__).resolve().parents[2])
 
-from ..core.checks import MOST_CELLS, counted
-from ..core.errors import InputError
-from .block import check_box
-from .gmsh_session import write
-from .grid import add_grid, lattice
+from vi_contact.core.checks import MOST_CELLS, counted
+from vi_contact.core.errors import InputError
+from vi_contact.meshes.block import check_box
+from vi_contact.meshes.gmsh_session import write
+from vi_contact.meshes.grid import add_grid, lattice
 
 _PUBLISHED = (8, 12)
 

@@ -14,7 +14,7 @@ import pytest
 
 import vi_contact
 from vi_contact.cli import ranks as cli_ranks
-from vi_contact.cli.main import main, parser, split_petsc
+from vi_contact.cli.entry import main, parser, split_petsc
 from vi_contact.cli.options import impact_law
 from vi_contact.core.errors import InputError
 from vi_contact.laws.impact import ComponentReset, Inelastic, MassProjection, Newton, NoImpact
@@ -151,7 +151,7 @@ def test_a_rank_that_fails_alone_ends_the_others(monkeypatch, capsys, error, oth
 
     monkeypatch.setitem(sys.modules, "mpi4py.MPI", SimpleNamespace(COMM_WORLD=World))
     monkeypatch.setattr(cli_ranks, "PATIENCE", 0.0)
-    monkeypatch.setattr("vi_contact.cli.main.parser", lambda: SimpleNamespace(
+    monkeypatch.setattr("vi_contact.cli.entry.parser", lambda: SimpleNamespace(
         parse_args=lambda words: SimpleNamespace(run=fails)))
     if others == "wait":
         with pytest.raises(SystemExit, match="1"):
