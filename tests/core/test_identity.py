@@ -119,7 +119,7 @@ def test_motions_beside_a_run_are_marched_with_its_scheme_and_steps() -> None:
         alone = fem.assemble(mesh, STEEL, clamped=tags["bottom"])
         carried = ground.carrying(fem.contact_surface(alone, tags["top"]), alone)
         return [vc.ContactProblem(system, fem.contact_surface(system, tags["top"])),
-                vc.ContactProblem(alone, fem.together(carried))]
+                vc.ContactProblem(alone, fem.joined_surfaces(carried))]
 
     def runs(one: vc.ContactProblem, other: vc.ContactProblem) -> list[Array]:
         marches = (vc.march(one, scheme=vc.HHT(), dt=DT, steps=6),

@@ -97,7 +97,7 @@ def test_one_group_is_a_group_for_each_face(name):
     system, tags = body(name)
     sides = sides_of(name)
     one = fem.contact_surface(system, group(tags, *sides))
-    several = fem.together(*(fem.contact_surface(system, tags[side]) for side in sides))
+    several = fem.joined_surfaces(*(fem.contact_surface(system, tags[side]) for side in sides))
     same(one, several)
     d = one.points.shape[1]
     assert sorted({len(corner) for corner in one.corners}) == list(range(2, d + 1))
@@ -129,7 +129,7 @@ def test_both_move_alike(name):
     )
     other, r_n_, active_, u_ = thrown(
         name,
-        lambda system, tags, near: fem.together(
+        lambda system, tags, near: fem.joined_surfaces(
             *(fem.contact_surface(system, tags[side], obstacle=near) for side in sides)
         ),
     )
@@ -531,7 +531,8 @@ def test_a_pair_that_bends_round_corners(matching):
     system, tags = notch(upper=2 if isinstance(matching, fem.NodeToNode) else 3)
     sides = [group(tags, *names) for names in zip(*PAIRS, strict=True)]
     one = fem.contact_pair(system, *sides, matching=matching)
-    several = fem.together(*(fem.contact_pair(system, *(tags[name] for name in p), matching=matching) for p in PAIRS))
+    pairs = [fem.contact_pair(system, *(tags[name] for name in p), matching=matching) for p in PAIRS]
+    several = fem.joined_surfaces(*pairs)
     same(one, several)
     assert [len(corner) for corner in one.corners] == [2, 2]
     problems = [ContactProblem(system, surface) for surface in (one, several)]

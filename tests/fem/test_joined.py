@@ -19,7 +19,7 @@ from vi_contact.core.problem import ContactProblem
 from vi_contact.core.protocols import Frictionless
 from vi_contact.core.surfaces import AnalyticGap, ContactSurface, HalfSpace, empty_surface
 from vi_contact.fem.assembly import assemble
-from vi_contact.fem.contact.joined import together
+from vi_contact.fem.contact.joined import joined_surfaces
 from vi_contact.fem.contact.pairs import contact_pair
 from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import BodyForce
@@ -67,7 +67,7 @@ def test_two_pairs_and_an_obstacle(d):
     up[:2] = turned((0.0, 1.0), 0.4)
     ground = contact_surface(system, tags["a_bottom"], obstacle=HalfSpace(point=(0.0,) * d, normal=tuple(up)))
     parts = [ground, *(contact_pair(system, tags[f"{one}_bottom"], tags[f"{two}_top"]) for one, two in ("ba", "cb"))]
-    surface = together(*parts)
+    surface = joined_surfaces(*parts)
     problem = ContactProblem(system, surface)
     m = parts[0].count
     assert surface.count == 3 * m
@@ -104,7 +104,7 @@ def test_corners(d, shape):
     sides = ["left", "back"][: d - 1]
     walls = [contact_surface(system, tags[f"{body}_{side}"]) for side in sides for body in ("upper", "lower")]
     pair = contact_pair(system, *(tags[side] for side in mesh.interface))
-    surface = together(pair, *walls)
+    surface = joined_surfaces(pair, *walls)
     problem = ContactProblem(system, surface)
     u = per_body(system, wavy, linear)
     x = relative(problem, u)
@@ -142,7 +142,7 @@ def corner_run(angle: float, **how: Any) -> tuple[ContactSurface, Array, Array]:
     near = AnalyticGap(lambda x: np.full(len(x), 1e-3))
     walls = [contact_surface(system, tags[f"{name}_left"], obstacle=near) for name in ("upper", "lower")]
     ground = contact_surface(system, tags["lower_bottom"])
-    surface = together(contact_pair(system, *(tags[side] for side in mesh.interface)), *walls, ground)
+    surface = joined_surfaces(contact_pair(system, *(tags[side] for side in mesh.interface)), *walls, ground)
     problem = ContactProblem(system, surface.with_frictionless_corners(), friction=Coulomb(0.3))
     reports = [report for _, report in march(problem, dt=1e-3, steps=60, **how)]
     assert max(report.certificate.worst for report in reports) <= 1e-9
@@ -173,7 +173,7 @@ def test_what_surfaces_know_is_kept():
     pair = contact_pair(system, *(tags[side] for side in mesh.interface)).held()
     ground = contact_surface(system, tags["lower_bottom"]).on_springs(1e6).moving(towards=lambda t: 2.0 * t)
     wall = contact_surface(system, tags["upper_right"])
-    once, twice = together(pair, ground, wall), together(together(pair, ground), wall)
+    once, twice = joined_surfaces(pair, ground, wall), joined_surfaces(joined_surfaces(pair, ground), wall)
     for surface in (once, twice):
         assert surface.bilateral.tolist() == [True] * 5 + [False] * (5 + 4)
         assert surface.gap(0.5).tolist() == [0.125] * 5 + [-1.0] * 5 + [0.0] * 4
@@ -188,7 +188,7 @@ def test_redistributed_mass_at_corners():
     system, tags = two_blocks(COMM, mesh)
     sides = [tags[f"{body}_{side}"] for side in ("left", "back") for body in ("upper", "lower")]
     walls = [contact_surface(system, side) for side in sides]
-    surface = together(contact_pair(system, *(tags[side] for side in mesh.interface)), *walls)
+    surface = joined_surfaces(contact_pair(system, *(tags[side] for side in mesh.interface)), *walls)
     surface = surface.with_frictionless_corners()
     for friction in (Frictionless(), Coulomb(0.3)):
         problem = ContactProblem(system, surface, friction=friction, mass=Redistributed())
@@ -208,7 +208,7 @@ def test_sliding_obstacles_at_corners():
     system, tags = two_blocks(COMM, blocks(3, angle=0.0))
     floor = contact_surface(system, tags["lower_bottom"]).moving(along=lambda t: np.array([2.0 * t, 3.0 * t]))
     wall = contact_surface(system, tags["lower_left"])
-    surface = together(floor, wall)
+    surface = joined_surfaces(floor, wall)
     x = system.influence @ np.array([0.0, 0.0, 1.0])  # the edge runs along z
     along = surface.tangential_values(x)
     edge = np.flatnonzero(np.isclose(surface.points[:, 0], 0.0) & np.isclose(surface.points[:, 1], 0.0))
@@ -241,14 +241,14 @@ def test_refusals():
         ((wall, wall), "list every boundary and every pair once"),
         ((pair, nearly), r"contact node \(0, 1\) has 2 contact directions, not independent in its 2 dimensions: take"),
         ((pair, wall, slope), r"contact node \(0, 1\) has 3 contact directions, more than its 2 dimensions: take"),
-        ((pair, contact_surface(other, names["lower_bottom"])), "together needs surfaces of .* of the same system"),
-        ((), "together needs surfaces of"),
-        ((pair, empty_surface(system.space.comm, 2)), "together needs surfaces of"),
+        ((pair, contact_surface(other, names["lower_bottom"])), "joined_surfaces needs surfaces of .* of one system"),
+        ((), "joined_surfaces needs surfaces of"),
+        ((pair, empty_surface(system.space.comm, 2)), "joined_surfaces needs surfaces of"),
     ):
         with pytest.raises(InputError, match=sentence):
-            together(*surfaces)
-    assert together(pair, slope).dual is not None  # directions at any angle
-    assert together(pair, chain).count == 10  # side 2 may touch an obstacle
+            joined_surfaces(*surfaces)
+    assert joined_surfaces(pair, slope).dual is not None  # directions at any angle
+    assert joined_surfaces(pair, chain).count == 10  # side 2 may touch an obstacle
 
 
 def test_a_node_on_both_sides():
@@ -262,7 +262,7 @@ def test_a_node_on_both_sides():
     system = assemble(mesh, SOFT)
     first = contact_pair(system, tags["sw_right"], tags["se_left"])
     sentence = r"node \(1, 1\) is on side 1 of one contact pair and on side 2 of another: exchange the sides of one"
-    good = together(first, contact_pair(system, tags["ne_bottom"], tags["se_top"]))
+    good = joined_surfaces(first, contact_pair(system, tags["ne_bottom"], tags["se_top"]))
     assert good.count == 6
     with pytest.raises(InputError, match=sentence):
-        together(first, contact_pair(system, tags["se_top"], tags["ne_bottom"]))
+        joined_surfaces(first, contact_pair(system, tags["se_top"], tags["ne_bottom"]))

@@ -406,8 +406,8 @@ EXTRA: dict[str, Callable[[], object]] = {
     "boundary_curve: another mesh": lambda: boundary_curve(body().facets, body().theirs["left"]),
     "boundary_curve: cells": lambda: boundary_curve(body().cells),
     "boundary_curve: text": lambda: boundary_curve("right"),  # type: ignore[arg-type]
-    "together: systems": lambda: fem.together(body().surface, chain_surface(3)),
-    "together: texts": lambda: fem.together("a"),  # type: ignore[arg-type]
+    "joined_surfaces: systems": lambda: fem.joined_surfaces(body().surface, chain_surface(3)),
+    "joined_surfaces: texts": lambda: fem.joined_surfaces("a"),  # type: ignore[arg-type]
 }
 TABLES = [values(), of_the_mesh(), runs()]
 MISUSES = dict(one for table in TABLES for one in calls(table)) | EXTRA

@@ -52,7 +52,7 @@ def wall(n: int = 4) -> tuple[Any, dict[str, Facets]]:
 def surface(system: Any, sides: dict[str, Facets], kind: str) -> Any:
     """Ground and backfill that fit the wall, rigid: contact on all four sides."""
     if kind == "four groups":
-        made = fem.together(*(fem.contact_surface(system, side) for side in sides.values()))
+        made = fem.joined_surfaces(*(fem.contact_surface(system, side) for side in sides.values()))
     else:
         mesh = sides["base"].mesh
         one = Facets("wall", np.unique(np.concatenate([side.indices for side in sides.values()])), mesh)

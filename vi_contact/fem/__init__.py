@@ -6,7 +6,7 @@ from ..core.lazy import lazy
 
 _CONTENTS = {
     "assembly": ("assemble",),
-    "contact.joined": ("together",),
+    "contact.joined": ("joined_surfaces",),
     "contact.matching": ("NodeToNode",),
     "contact.mortar": ("DualMortar",),
     "contact.pairs": ("contact_pair",),

@@ -18,7 +18,7 @@ from ..core.protocols import FrictionLaw, Frictionless, MassLaw
 from ..core.surfaces import ContactSurface
 from ..core.system import SemiDiscreteSystem
 from ..fem.assembly import assemble
-from ..fem.contact.joined import together
+from ..fem.contact.joined import joined_surfaces
 from ..fem.contact.pairs import contact_pair
 from ..fem.loads import Traction
 from ..fem.mesh import build_mesh
@@ -111,4 +111,4 @@ def build(embedded: Embedded, comm: Any, *, mesh: Callable[[], Any] | None = Non
         clamped=[tags[f"{name}_bottom"] for name in GROUND],
     )  # fmt: skip
     pairs = [contact_pair(system, tags[one], tags[two]) for one, two in CONTACT]
-    return EmbeddedModel(embedded, system, together(*pairs).with_frictionless_corners())
+    return EmbeddedModel(embedded, system, joined_surfaces(*pairs).with_frictionless_corners())

@@ -15,7 +15,7 @@ from .frames import FemSurface, Frames, surface_of
 Motion = Callable[[float], Array]
 
 
-def together(*surfaces: ContactSurface) -> ContactSurface:
+def joined_surfaces(*surfaces: ContactSurface) -> ContactSurface:
     """One surface with the conditions of all, in the order given.
 
     A node that is on several of them, at the edge of a channel, has a condition for each, at any angle between them.
@@ -29,7 +29,7 @@ def together(*surfaces: ContactSurface) -> ContactSurface:
     """
     made = [surface for surface in surfaces if isinstance(surface, FemSurface)]
     if not made or len(made) < len(surfaces) or any(surface.space is not made[0].space for surface in made):
-        raise InputError("together needs surfaces of fem.contact_surface and fem.contact_pair, all of the same system")
+        raise InputError("joined_surfaces needs surfaces of fem.contact_surface and fem.contact_pair, all of one system")
     names = ("gap0", "weights", "bilateral", "compliance")
     data: dict[str, Any] = {name: np.concatenate([getattr(surface, name) for surface in made]) for name in names}
     parts = [part for surface in made for part in surface.parts]

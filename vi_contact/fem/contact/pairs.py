@@ -53,7 +53,7 @@ def contact_pair(
     clamped on both sides. Prescribed nodes of side 2 move as they are told: a moving obstacle.
 
     Where side 1 turns by more than the feature angle its faces are matched one by one, and a node on several of them
-    has one condition for each, as if every face were a pair of its own, joined by ``together``.
+    has one condition for each, as if every face were a pair of its own, joined by ``joined_surfaces``.
 
     Args:
         matching: NodeToNode() by default, for sides meshed alike; DualMortar() for others, in 2D.
@@ -118,8 +118,8 @@ def _faces(space: FemSpace, one: Side, around: Boundary, angle: float) -> list[t
         if len(own.numbers) > len(used):
             again = own.points[1:][np.diff(own.numbers) == 0][0]
             raise InputError(
-                f"'{one.name}' turns round and meets itself at {at(again)}: give it as two boundaries (together), or "
-                "take the corner for smooth (a larger feature_angle=)"
+                f"'{one.name}' turns round and meets itself at {at(again)}: give it as two boundaries "
+                "(fem.joined_surfaces), or take the corner for smooth (a larger feature_angle=)"
             )
         found.append((Side(one.name, own, np.searchsorted(used, facets)), one.nodes.normals[used]))
     return found

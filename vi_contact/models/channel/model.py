@@ -21,7 +21,7 @@ from ...core.step import Recorder
 from ...core.surfaces import ContactSurface
 from ...core.system import SemiDiscreteSystem
 from ...fem.assembly import assemble
-from ...fem.contact.joined import together
+from ...fem.contact.joined import joined_surfaces
 from ...fem.contact.pairs import contact_pair
 from ...fem.loads import Prescribed, as_tuple
 from ...fem.mesh import build_mesh
@@ -187,7 +187,7 @@ def build(
     )
     system = weighted(system, weighing)
     pairs = [contact_pair(system, tags[f"channel_{side}"], tags[f"soil_{side}"]) for side in SIDES]
-    return ChannelModel(channel, mesh, tags, system, together(*pairs).with_frictionless_corners())
+    return ChannelModel(channel, mesh, tags, system, joined_surfaces(*pairs).with_frictionless_corners())
 
 
 def weighted(system: SemiDiscreteSystem, weighing: Sequence[str]) -> SemiDiscreteSystem:

@@ -25,7 +25,7 @@ from ...core.protocols import Excitation, FrictionLaw, Frictionless, ImpactLaw, 
 from ...core.step import Recorder, Scheme, Solver, initial_state
 from ...core.surfaces import ContactSurface, empty_surface
 from ...fem.assembly import assemble
-from ...fem.contact.joined import together
+from ...fem.contact.joined import joined_surfaces
 from ...fem.mesh import Tags, build_mesh, read_mesh
 from ...laws.materials import LinearElastic
 from ...laws.weight import with_weight
@@ -187,7 +187,7 @@ class Case:
         system = self._made("system", mesh=mesh, tags=tags, excitations=self.excitations())
         system = self._made("gravity", system=system) if "gravity" in self.nodes else system
         surfaces = self._several("contact", system=system, tags=tags)
-        surface = together(*surfaces) if len(surfaces) > 1 else (*surfaces, None)[0]
+        surface = joined_surfaces(*surfaces) if len(surfaces) > 1 else (*surfaces, None)[0]
         if surface is None:
             surface = empty_surface(system.algebra.comm, system.space.dimension)
         return Parts(system, surface, tags, "gravity" in self.nodes)
