@@ -107,7 +107,7 @@ def draw(model: ChannelModel, runs: Mapping[str, History], out: Path, quick: boo
     points = {str(number): CHANNEL.point(number) for number in range(1, 20)}
     plot_layout(
         folder(out, sliding), points, out / "layout.png", title="The channel in its layer (compare Fig. 6)",
-        soil=f"soil\n{describe(CHANNEL.soil)}", concrete=f"concrete\n{describe(CHANNEL.concrete)}",
+        soil=f"soil\n{summary(CHANNEL.soil)}", concrete=f"concrete\n{summary(CHANNEL.concrete)}",
         ends="ends of the layer\n$u_y$ = 0, $u_x$ free",
     )
     plot_excitation(runs[sliding], out / "excitation.png", title="Acceleration of the bedrock")
@@ -129,7 +129,7 @@ def draw(model: ChannelModel, runs: Mapping[str, History], out: Path, quick: boo
         plot_energy(history, folder(out, name) / "energy.png", title=f"Energy ledger, {name}")
 
 
-def describe(material: vc.LinearElastic) -> str:
+def summary(material: vc.LinearElastic) -> str:
     """Its numbers on two lines."""
     size, unit = (1e9, "GPa") if material.E >= 1e9 else (1e6, "MPa")
     return f"$E$ = {material.E / size:g} {unit}, $\\nu$ = {material.nu:g}\n$\\rho$ = {material.rho:g} kg/m³"

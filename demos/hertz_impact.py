@@ -21,7 +21,7 @@ from mpi4py import MPI
 
 import vi_contact as vc
 from demos.pictures.impact import ImpactCurves, plot_impact
-from vi_contact.models.ball import SHARE, Ball, BallModel, build, quasi_static
+from vi_contact.models.ball import QUARTERS, Ball, BallModel, build, hertz_motion
 
 # Parameters ----------------------------------------------------------------------------------------------------------
 BALL = Ball(radius=0.01, speed=0.1, material=vc.LinearElastic(E=2.1e11, nu=0.3, rho=7800.0))
@@ -53,7 +53,7 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
         )
         numbers |= {f"{name}: {what}": float(value) for what, value in zip(COLUMNS, values, strict=True)}
     if comm.rank == 0:
-        plot_impact(curves, model.exact, lambda t: quasi_static(model.exact, t), out / "hertz_impact.png")
+        plot_impact(curves, model.exact, lambda t: hertz_motion(model.exact, t), out / "hertz_impact.png")
         print(table(numbers))
         print(f"\nFigure and histories are in {out}.")
     comm.Barrier()
@@ -63,7 +63,7 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
 def curves_of(model: BallModel, problem: vc.ContactProblem, solution: vc.Solution) -> ImpactCurves:
     """Histories of the whole ball; time and approach count from the first touch."""
     history, points = solution.history, problem.surface.points
-    force = SHARE * history["contact_resultant"]
+    force = QUARTERS * history["contact_resultant"]
     return ImpactCurves(
         t=history["t"] - model.ball.height / model.ball.speed,
         force=force,

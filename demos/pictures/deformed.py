@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from vi_contact.core.algebra import Array
-from vi_contact.plots.deformed import Frames, Tractions, read_frames, read_tractions
+from vi_contact.plots.deformed import StoredFrames, Tractions, read_frames, read_tractions
 from vi_contact.plots.histories import STYLE, save, scaled
 
 ARROW = 0.3  # length of the longest arrow over the size of the body
@@ -83,7 +83,7 @@ def _draw_body(axis: Any, cells: Array, stress: Array) -> Any:
     return drawn
 
 
-def _draw_tractions(axis: Any, frames: Frames, tractions: Tractions, u: Array, t: float, scale: float) -> None:
+def _draw_tractions(axis: Any, frames: StoredFrames, tractions: Tractions, u: Array, t: float, scale: float) -> None:
     """Arrows that end at the contact points; nothing at open ones. scale: Pa per metre of arrow."""
     pressure, shear = tractions.at(t)
     acts = np.hypot(pressure, shear) > 0.0

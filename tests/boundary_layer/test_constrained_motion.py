@@ -14,7 +14,7 @@ from vi_contact.boundary_layer.metric import Metric, b_affinities, normal_mass
 from vi_contact.boundary_layer.motion import ConstrainedSystem, Evaluations
 from vi_contact.boundary_layer.particle import ParticleImpact, damping_ratio, layer_for, restitution
 from vi_contact.boundary_layer.rigid_body import Ellipsoid, RigidBody, rotation
-from vi_contact.boundary_layer.trajectory import Contact, Trajectory, layer_motion
+from vi_contact.boundary_layer.trajectory import LayerContact, Trajectory, layer_motion
 from vi_contact.core.errors import InputError, StepFailure
 
 pytestmark = pytest.mark.serial
@@ -26,7 +26,7 @@ def b_metric(M: np.ndarray, A: np.ndarray, rho: float, width: float) -> np.ndarr
     return np.asarray(M + normal_mass(M, A) * (width / rho) ** 2 * np.outer(A, A))
 
 
-def collide(layer: Layer, **more) -> Contact:
+def collide(layer: Layer, **more) -> LayerContact:
     """A unit mass that enters with (-1, 0.3)."""
     settings = {"q0": [layer.width, 0.0], "v0": [-1.0, 0.3], "t_end": 20.0, "contacts": 1} | more
     return layer_motion(PLANE, layer, **settings).contacts[0]

@@ -213,7 +213,7 @@ def test_starts_outside_the_admissible_set():
 
 @serial
 def test_a_step_that_does_not_converge_is_named(monkeypatch):
-    monkeypatch.setattr(layered, "ITERATIONS", 1)
+    monkeypatch.setattr(layered, "NEWTON_STEPS", 1)
     law = law_of(0.5)
     problem = bar(1, E=1e9, gap=0.2, v0=lambda x: np.full_like(x, -10.0))
     with pytest.raises(StepFailure, match=r"reactions of step 2 at t = 0\.02 s were not found in 1 Newton steps"):

@@ -21,7 +21,7 @@ pytest.importorskip("dolfinx")
 from vi_contact.cli.entry import main
 from vi_contact.core.errors import InputError
 from vi_contact.ground_motion import Record, arias, pga, psa, read_record, scaled, tapered
-from vi_contact.plots.ida import Panel, plot_ida
+from vi_contact.plots.ida import DemandPanel, plot_ida
 from vi_contact.studies import IDA, read_case, run_ida
 from vi_contact.studies.ida.measures import demand, fractiles, intensity
 from vi_contact.studies.ida.runs import OneRun, Shaking, executed, quoted
@@ -259,8 +259,8 @@ def test_fractiles_of_straight_curves() -> None:
 def test_the_picture_of_many_records(tmp_path: Path) -> None:
     """Without names where records are many, with crosses for failed runs, also when there is nothing to scale."""
     curves = {str(k): (np.arange(3.0), k * np.arange(3.0)) for k in range(8)}
-    panels = [Panel("a", "m", curves, *fractiles(curves, (0.16, 0.5, 0.84)), (1.5,)),
-              Panel("b", "-", {"0": (np.ones(1), np.zeros(1))}, np.zeros(0), np.zeros((0, 3)))]
+    panels = [DemandPanel("a", "m", curves, *fractiles(curves, (0.16, 0.5, 0.84)), (1.5,)),
+              DemandPanel("b", "-", {"0": (np.ones(1), np.zeros(1))}, np.zeros(0), np.zeros((0, 3)))]
     assert plot_ida(panels, tmp_path / "ida.png", intensity="PGA [m/s²]").stat().st_size > 20_000
 
 

@@ -27,7 +27,7 @@ from vi_contact.fem.mesh import build_mesh
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.mass import Redistributed
 from vi_contact.meshes.ball import BallMesh
-from vi_contact.models.ball import SHARE, Ball, BallModel, build, quasi_static
+from vi_contact.models.ball import QUARTERS, Ball, BallModel, build, hertz_motion
 from vi_contact.run.march import march
 
 COMM = MPI.COMM_WORLD
@@ -56,7 +56,7 @@ class Impact:
         deepest, peak = exact.deepest, self.force.argmax()
         touch = self.model.ball.height / exact.speed
         inside = (self.t > touch) & (self.t < touch + exact.duration)
-        missing = (self.force - quasi_static(exact, self.t - touch)[1])[inside] / deepest.force
+        missing = (self.force - hertz_motion(exact, self.t - touch)[1])[inside] / deepest.force
         hertz = HertzPoint(force=self.force[peak], modulus=deepest.modulus, radius=deepest.radius)
         return {
             "approach": -self.height.min() / exact.approach - 1.0,
@@ -77,14 +77,14 @@ def follow(ball: Ball, steps: int) -> Impact:
         assert report.certificate.worst <= 1e-9
         system = report.problem.equations
         defect += abs(energy_balance(report.problem, report.old, report.new, report.balance).defect)
-        up = system.M @ system.influence[:, 1] * SHARE / model.mass
+        up = system.M @ system.influence[:, 1] * QUARTERS / model.mass
         force = state.r_n.sum()
         rows.append((
-            state.t, system.algebra.dot(up, state.u) + ball.height, system.algebra.dot(up, state.v), SHARE * force,
-            SHARE * report.balance.r_n.sum(), np.sqrt(2.5 * (state.r_n @ r2) / force) if force > 0.0 else 0.0,
-            SHARE * (system.kinetic_energy(state.v) + system.strain_energy(state.u)),
+            state.t, system.algebra.dot(up, state.u) + ball.height, system.algebra.dot(up, state.v), QUARTERS * force,
+            QUARTERS * report.balance.r_n.sum(), np.sqrt(2.5 * (state.r_n @ r2) / force) if force > 0.0 else 0.0,
+            QUARTERS * (system.kinetic_energy(state.v) + system.strain_energy(state.u)),
         ))
-    return Impact(model, dt, *np.array(rows).T, SHARE * defect)
+    return Impact(model, dt, *np.array(rows).T, QUARTERS * defect)
 
 
 @pytest.fixture(scope="module")
@@ -161,10 +161,10 @@ def test_v3_3_course_of_the_theory() -> None:
         v = half - 0.5 * dt * stiffness * d**1.5 / exact.mass
         ways.append(d)
     t = dt * np.arange(20_001)
-    approach, force = quasi_static(exact, t)
+    approach, force = hertz_motion(exact, t)
     assert np.abs(approach - ways).max() <= 1e-7 * exact.approach
     assert np.allclose(force, stiffness * approach**1.5, rtol=0.0, atol=1e-12 * exact.deepest.force)
-    assert not np.any(quasi_static(exact, [-1.0, 2.0 * exact.duration])[1])
+    assert not np.any(hertz_motion(exact, [-1.0, 2.0 * exact.duration])[1])
 
 
 @pytest.mark.parametrize("friction", [None, Coulomb(0.3)])

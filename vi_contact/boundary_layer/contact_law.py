@@ -38,9 +38,9 @@ from .motion import ConstrainedSystem
 from .particle import damping_ratio
 from .trajectory import layer_motion
 
-LEAST = 1e-3  # least restitution: below it the search takes minutes
+LEAST_RESTITUTION = 1e-3  # below it the search takes minutes
 DOUBLINGS = 60  # of the damping ratio in search of a rebound
-NEAR = 1e-5  # |rho_1 - rho_0| over rho below which the quotient is the derivative in the middle
+SHORT_STEP = 1e-5  # |rho_1 - rho_0| over rho below which the quotient is the derivative in the middle
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ class ContactLayer:
     def _quotient(self, rho: Array, old: Array) -> tuple[Array, Array]:
         """((Y_1 - Y_0)/(rho_1 - rho_0), its derivative with respect to rho_1)."""
         step, middle = rho - old, 0.5 * (rho + old)
-        near = np.abs(step) < NEAR * middle
+        near = np.abs(step) < SHORT_STEP * middle
         step = np.where(near, middle, step)
         cut = self.layer.cut_off
         quotient = np.where(near, cut(middle) / middle, (self.potential(rho) - self.potential(old)) / step)
@@ -134,8 +134,9 @@ def contact_layer(
     for name, value, unit in (("mass per area", mass, "kg/m²"), ("speed", speed, "m/s"), ("layer width", width, "m"),
                               ("strength k b²/(mass V²)", strength, "units of one")):
         sized("contact_layer", f"the {name}", value, unit)
-    if not LEAST <= number("contact_layer", "the restitution coefficient e", e) <= 1.0:
-        raise InputError(f"contact_layer: the restitution coefficient e is {e}; give a number from {LEAST:g} to 1")
+    if not LEAST_RESTITUTION <= number("contact_layer", "the restitution coefficient e", e) <= 1.0:
+        raise InputError(f"contact_layer: the restitution coefficient e is {e}; give a number from "
+                         f"{LEAST_RESTITUTION:g} to 1")
     if metric not in (Metric.BLENDED, Metric.FLAT):
         raise InputError(f"contact_layer: a law cannot have {shown(metric)}; give Metric.BLENDED or Metric.FLAT")
     a = 0.5 * width if start is None else sized("contact_layer", "start", start, "m")

@@ -25,7 +25,7 @@ from ..core.errors import InputError, StepFailure
 from .layer import sized
 
 EVALUATIONS = 100_000  # of the acceleration in one motion
-STEP = 6e-6  # of a central difference over the size of its argument: eps to the power 1/3
+DIFFERENCE_STEP = 6e-6  # of a central difference over the size of its argument: eps to the power 1/3
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ class ConstrainedSystem:
 
     def difference(self, q: Array) -> float:
         """The way over which to take a central difference at q."""
-        return STEP * max(self.scale, float(np.max(np.abs(q))))
+        return DIFFERENCE_STEP * max(self.scale, float(np.max(np.abs(q))))
 
     def accelerations(self, t: float, q: Array, v: Array) -> tuple[Array, Array, float, float]:
         """(v̇ without layer, M⁻¹Aᵀ, g_11, ρ̈ without layer)."""

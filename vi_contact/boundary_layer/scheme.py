@@ -29,9 +29,9 @@ from ..schemes.midpoint import Midpoint
 from ..solvers.condensed import Condensed
 from .contact_law import ContactLayer
 
-ITERATIONS, HALVINGS = 60, 30
+NEWTON_STEPS, HALVINGS = 60, 30
 RATE = "layer_rate"  # in a state's memory: d ln(gap)/dt of the contact points [1/s]
-CLOSE, ROUNDING = 1e-11, 1e-15  # change of the gaps relative to the gaps, and to what they are a difference of
+GAP_TOLERANCE, ROUNDING = 1e-11, 1e-15  # change of the gaps relative to the gaps, and to what they are a difference of
 
 
 @dataclass(frozen=True)
@@ -112,9 +112,9 @@ class BoundaryLayer(Midpoint):
         rho = old * np.maximum(1.0 + dt * rate, 0.2)
         p, slope = law.mean_pressure(rho, old, rate, dt)
         residual = rho - free - G @ p
-        for _ in range(ITERATIONS):
+        for _ in range(NEWTON_STEPS):
             change = -np.linalg.solve(np.eye(len(rho)) - G * slope, residual)
-            if np.all(np.abs(change) <= CLOSE * rho + ROUNDING * np.abs(free)):
+            if np.all(np.abs(change) <= GAP_TOLERANCE * rho + ROUNDING * np.abs(free)):
                 return p
             share = 1.0 / max(1.0, float(np.max(-change / (0.9 * rho))))
             size = float(np.linalg.norm(residual))
@@ -126,7 +126,7 @@ class BoundaryLayer(Midpoint):
                 share *= 0.5
             rho = rho + share * change
         raise StepFailure(
-            f"the layer's reactions of step {step.k} at t = {step.t:.6g} s were not found in {ITERATIONS} Newton "
+            f"the layer's reactions of step {step.k} at t = {step.t:.6g} s were not found in {NEWTON_STEPS} Newton "
             "steps: reduce the time step, or make the layer wider"
         )
 

@@ -20,7 +20,7 @@ METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")  # of scipy.integr
 
 
 @dataclass(frozen=True)
-class Contact:
+class LayerContact:
     """One passage through the layer: times [s], normal rates [m/s], the least distance [m] and its time [s]."""
 
     start: float
@@ -51,7 +51,7 @@ class Trajectory:
     v: Array
     rho: Array
     reaction: Array
-    contacts: Sequence[Contact]
+    contacts: Sequence[LayerContact]
 
 
 def layer_motion(
@@ -125,7 +125,7 @@ class _Passages:
         self._options, self._refine = options | {"dense_output": refine > 1}, refine
         self._parts: list[tuple[Array, Array, Array, Array, Array]] = []
         self._evaluations = Evaluations()
-        self.contacts: list[Contact] = []
+        self.contacts: list[LayerContact] = []
 
     def run(
         self, start: float, t_end: float, q: Array, v: Array, inside: bool
@@ -175,7 +175,7 @@ class _Passages:
             rate = system.normal_rate(q, v), system.normal_rate(places[-1], speeds[-1])
             turns = zip(found.y_events[1], found.t_events[1], strict=True)
             deepest, when = min(((float(system.rho(q + y[:n])), float(t)) for y, t in turns), default=(width, 0.0))
-            self.contacts.append(Contact(start, start + float(found.t[-1]), *rate, deepest, start + when))
+            self.contacts.append(LayerContact(start, start + float(found.t[-1]), *rate, deepest, start + when))
         return start + float(found.t[-1]), places[-1], speeds[-1], crossed
 
     def _pace(self, t: float, q: Array, v: Array, layer: Layer, inside: bool) -> float:

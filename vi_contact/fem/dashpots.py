@@ -35,7 +35,7 @@ from .petsc_algebra import PetscMatrix
 from .space import FemSpace
 
 log = logging.getLogger(__name__)
-HELD = 1e-12  # of all: a share of the dashpots' resistance that is none
+NO_RESISTANCE = 1e-12  # of the resistance of all dashpots: a smaller share is none
 
 
 @dataclass(frozen=True)
@@ -145,7 +145,7 @@ class DashpotMatrix:
                              "factor")
         for condition in self.space.prescribed:
             both = np.intersect1d(self.dashpots.facets.indices, condition.facets.indices)
-            resisted = self._resistance(self._matrix(both)) > HELD * total
+            resisted = self._resistance(self._matrix(both)) > NO_RESISTANCE * total
             held = range(self.space.dimension) if condition.components is None else condition.components
             if any(resisted[c] for c in held):
                 raise InputError(

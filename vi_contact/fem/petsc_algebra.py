@@ -23,7 +23,7 @@ OWN_FACTOR = {
 FULL_ROW = 40.0  # entries of a row: 2D meshes have fewer, 3D meshes more
 FEW_ROWS = 10_000  # with full rows: beyond, MUMPS' dense blocks pay
 COPIED_ROWS = 300_000  # with sparse rows: a copy of the factor on every rank takes about 0.5 GB here
-CHUNK = 64  # right-hand sides per block solve: bounds the memory of the dense blocks
+RIGHT_SIDES = 64  # right-hand sides per block solve: bounds the memory of the dense blocks
 
 
 class MpiComm:
@@ -135,8 +135,8 @@ class PetscFactor:
 
     def solve_units(self, owned: Indices, slots: Indices, m: int) -> Array:
         columns = np.zeros((self._x.getLocalSize(), m))
-        for first in range(0, m, CHUNK):
-            width = min(CHUNK, m - first)
+        for first in range(0, m, RIGHT_SIDES):
+            width = min(RIGHT_SIDES, m - first)
             units = np.zeros((len(columns), width))
             mine = (slots >= first) & (slots < first + width)
             units[owned[mine], slots[mine] - first] = 1.0

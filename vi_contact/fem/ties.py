@@ -22,7 +22,7 @@ from ..core.errors import InputError
 from .groups import components_given, facets_of
 from .mesh import Facets
 
-CLOSE = 1e-6  # of the body's size: nodes farther from the place of their partner have none
+PLACE_TOLERANCE = 1e-6  # of the body's size: nodes farther from the place of their partner have none
 
 
 class BodyNodes(Protocol):
@@ -87,7 +87,7 @@ def _pairs(space: BodyNodes, tie: Tied) -> Pairs:
     distance = np.linalg.norm(first[1][:, None] + apart - second[1][None, :], axis=2)
     partner = distance.argmin(axis=1)
     worst = int(distance.min(axis=1).argmax())
-    if distance[worst, partner[worst]] > CLOSE * space.size or len(set(partner)) < len(partner):
+    if distance[worst, partner[worst]] > PLACE_TOLERANCE * space.size or len(set(partner)) < len(partner):
         where = ", ".join(f"{x:g}" for x in first[1][worst])
         raise InputError(f"node ({where}) of tied boundaries {names} has no partner at the same height on the other: "
                          "mesh both sides alike")

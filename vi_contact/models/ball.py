@@ -1,7 +1,7 @@
 """The ball that is thrown on a rigid plane, as a quarter of tetrahedra with two planes of symmetry (V3.3).
 
 It flies down along -y without gravity and strikes the plane with its lowest point. Forces, masses and energies of the
-model are a quarter of the ball's: times ``SHARE`` they compare with those of ``vi_contact.exact.hertz``.
+model are a quarter of the ball's: times ``QUARTERS`` they compare with those of ``vi_contact.exact.hertz``.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ from ..fem.mesh import build_mesh
 from ..laws.materials import LinearElastic
 from ..meshes.ball import BallMesh
 
-SHARE = 4.0
+QUARTERS = 4.0
 FOOT = 1.3  # contact side over the largest contact radius
-GROWTH = 1.2
+CELL_GROWTH = 1.2
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Ball:
         sphere = 4.0 / 3.0 * math.pi * self.radius**3
         a = self.impact(self.material.rho * sphere).deepest.contact_radius
         return BallMesh(
-            radius=self.radius, size=a / self.cells, foot=FOOT * a, growth=GROWTH / self.cells,
+            radius=self.radius, size=a / self.cells, foot=FOOT * a, growth=CELL_GROWTH / self.cells,
             coarsest=self.radius / self.cells,
         )
 
@@ -109,10 +109,10 @@ def build(ball: Ball, comm: Any) -> BallModel:
         initial_velocity=(0.0, -ball.speed, 0.0),
     )
     up = system.influence[:, 1]
-    return BallModel(ball, system, tags["foot"], SHARE * system.algebra.dot(up, system.M @ up))
+    return BallModel(ball, system, tags["foot"], QUARTERS * system.algebra.dot(up, system.M @ up))
 
 
-def quasi_static(exact: HertzImpact, t: ArrayLike) -> tuple[Array, Array]:
+def hertz_motion(exact: HertzImpact, t: ArrayLike) -> tuple[Array, Array]:
     """(approach d [m], force F [N]) at the times t [s] after the first touch, zero before it and after the contact:
 
         m d'' = -F(d),  energy: d' = v sqrt(1 - x),  x = (d/d_max)^(5/2)   =>   t/duration = ½ I_x(2/5, 1/2) until d_max

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..core.algebra import Array, Mask
 from ..core.errors import InputError
-from .histories import STYLE, History, _edges, panels, save, scaled
+from .histories import STYLE, History, cell_edges, panels, save, scaled
 from .maps import thinned
 
 SHOWN = {  # panels of plot_openings: point -> outward normal of the channel there
@@ -152,7 +152,7 @@ def plot_interface(runs: Mapping[str, History], outline: Outline, path: str | Pa
     figure, axes = panels(len(maps), (10.0, 2.9 * len(maps) + 1.0))
     for axis, (name, (t, pressure, gap)) in zip(axes, maps.items(), strict=True):
         axis.grid(False)
-        edges = _edges(t), np.clip(_edges(arc), arc.min(), arc.max())
+        edges = cell_edges(t), np.clip(cell_edges(arc), arc.min(), arc.max())
         values = np.where(gap > 0.0, gap / metres, np.nan), np.where(gap > 0.0, np.nan, pressure * kilo[0] / most[0])
         images = [
             axis.pcolormesh(*edges, one.T, cmap=matplotlib.colormaps[colours], norm=norm, rasterized=True)

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..core.algebra import Array, Indices, Mask
 from ..core.errors import InputError
-from .deformed import Frames, Tractions, read_frames, read_tractions
+from .deformed import StoredFrames, Tractions, read_frames, read_tractions
 from .histories import STYLE, History, scaled
 
 SOIL, CONCRETE, CONTACT = "#efe3c8", "#9aa3ab", "tab:red"
@@ -26,7 +26,7 @@ class Bodies:
     ``nodes`` (m,), and where from there a condition is drawn ``inwards`` (m, 2) [m]: at corners those of both sides
     apart, each towards the middle of its side. ``low``, ``high`` (2,): corners of the channel's outline [m]."""
 
-    frames: Frames
+    frames: StoredFrames
     tractions: Tractions
     cells: Mask
     nodes: Indices

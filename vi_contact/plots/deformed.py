@@ -36,7 +36,7 @@ class Tractions:
 
 
 @dataclass(frozen=True)
-class Frames:
+class StoredFrames:
     """The fields of a run: ``points`` (n, 2) [m], ``cells`` (c, corners), times (f,) [s] and a reader of each frame."""
 
     points: Array
@@ -75,7 +75,7 @@ def _tangents(normals: Array) -> Array:
     return np.where(axis[:, None], np.abs(turned), turned)
 
 
-def read_frames(folder: str | Path) -> Frames:
+def read_frames(folder: str | Path) -> StoredFrames:
     """From the fields of a run. InputError for a folder without them."""
     import h5py
 
@@ -87,4 +87,4 @@ def read_frames(folder: str | Path) -> Frames:
         times = dict(zip(file["k"][:].astype(int), file["t"][:], strict=True))
     with h5py.File(fields / "mesh.h5") as file:
         t = np.array([times[int(path.stem.removeprefix("frame_"))] for path in paths])
-        return Frames(file["points"][:, :2], file["cells"][:], t, tuple(paths))
+        return StoredFrames(file["points"][:, :2], file["cells"][:], t, tuple(paths))

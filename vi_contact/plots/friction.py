@@ -8,7 +8,7 @@ import numpy as np
 
 from ..core.algebra import Array
 from ..core.errors import InputError
-from .histories import STYLE, History, _edges, length_unit, panels, save, scaled
+from .histories import STYLE, History, cell_edges, length_unit, panels, save, scaled
 
 OPEN, STICK, SLIP = 1, 2, 3  # as contact_status in fields.xdmf
 _COLOURS = {OPEN: ("open", "white"), STICK: ("stick", "tab:blue"), SLIP: ("slip", "tab:orange")}
@@ -64,7 +64,7 @@ def plot_states(
     panel.grid(False)
     colours = ListedColormap([colour for _, colour in _COLOURS.values()])
     panel.pcolormesh(
-        _edges(t), _edges(np.asarray(position)[order]), states.T, cmap=colours,
+        cell_edges(t), cell_edges(np.asarray(position)[order]), states.T, cmap=colours,
         norm=BoundaryNorm([0.5, 1.5, 2.5, 3.5], 3), rasterized=True,
     )
     patches = [Patch(facecolor=colour, edgecolor="0.5", label=label) for label, colour in _COLOURS.values()]

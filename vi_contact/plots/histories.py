@@ -106,7 +106,7 @@ def plot_excitation(history: History, path: str | Path, *, title: str = "Ground 
     return save(figure, path)
 
 
-_LEDGER = (
+LEDGER = (
     ("work_input", "input work", "black", "-"),
     ("energy_kinetic", "kinetic", "tab:blue", "-"),
     ("energy_strain", "strain", "tab:orange", "-"),
@@ -121,7 +121,7 @@ _LEDGER = (
 def plot_energy(history: History, path: str | Path, *, title: str = "Energy ledger") -> Path:
     """The ledger's terms, and its defect relative to the largest of them."""
     figure, (top, bottom) = panels(2, (9.0, 6.0), height_ratios=(3, 1))
-    present = [entry for entry in _LEDGER if entry[0] in history and np.any(history[entry[0]])]
+    present = [entry for entry in LEDGER if entry[0] in history and np.any(history[entry[0]])]
     size = np.array([max((float(np.max(np.abs(history[name]))) for name, *_ in present), default=0.0)])
     shown, unit = scaled(size, "J")
     factor = shown[0] / size[0] if size[0] else 1.0
@@ -130,7 +130,7 @@ def plot_energy(history: History, path: str | Path, *, title: str = "Energy ledg
     if present:
         top.legend(fontsize=8, ncol=2)
     top.set(ylabel=f"energy, cumulative work [{unit}]", title=title)
-    _log(bottom, history["t"], np.abs(history["energy_defect"]) / (size[0] or 1.0))
+    log_axis(bottom, history["t"], np.abs(history["energy_defect"]) / (size[0] or 1.0))
     bottom.axhline(1e-10, color="tab:red", ls="--", lw=0.8)
     bottom.set(ylabel="relative defect [-]")
     return save(figure, path)
@@ -140,7 +140,7 @@ def plot_certificate(history: History, path: str | Path, *, tolerance: float = 1
     """Certificate of every step, and iterations of the solver."""
     figure, (top, bottom) = panels(2, (9.0, 5.0))
     t = history["t"][1:]
-    _log(top, t, history["certificate"][1:])
+    log_axis(top, t, history["certificate"][1:])
     top.axhline(tolerance, color="tab:red", ls="--", lw=0.8, label=f"tolerance {tolerance:g}")
     top.legend(fontsize=8)
     top.set(ylabel="worst residual [-]", title="Certificate of every step")
@@ -150,7 +150,7 @@ def plot_certificate(history: History, path: str | Path, *, tolerance: float = 1
     return save(figure, path)
 
 
-def _log(axis: Any, t: Array, values: Array) -> None:
+def log_axis(axis: Any, t: Array, values: Array) -> None:
     """Semilogarithmic points; exact zeros are drawn at the bottom, at 1e-18."""
     axis.semilogy(t, np.maximum(values, 1e-18), ".", ms=2, color="black")
 
@@ -184,7 +184,7 @@ def plot_contact(history: History, path: str | Path, *, position: Array, axis_la
     colours, low, high = _pressure_scale(pressure)
     top.grid(False)
     image = top.pcolormesh(
-        _edges(t), _edges(position[order]), pressure.T, cmap=colours, vmin=low, vmax=high, rasterized=True
+        cell_edges(t), cell_edges(position[order]), pressure.T, cmap=colours, vmin=low, vmax=high, rasterized=True
     )
     meaning = "white: open" if low > 0.0 else "negative: pull"
     figure.colorbar(image, ax=top, label=f"contact pressure [{unit}] ({meaning})")
@@ -204,7 +204,7 @@ def _pressure_scale(pressure: Array) -> tuple[Any, float, float]:
     return matplotlib.colormaps["magma_r"].with_extremes(under="white"), 1e-9 * size, size
 
 
-def _edges(centres: Array) -> Array:
+def cell_edges(centres: Array) -> Array:
     """Borders of the cells around the centres; a single cell is as wide as its distance from zero, or one."""
     if len(centres) == 1:
         half = 0.5 * (abs(float(centres[0])) or 1.0)

@@ -16,7 +16,7 @@ _FRACTILES = (("16 %", "tab:blue", "--"), ("50 %", "black", "-"), ("84 %", "tab:
 
 
 @dataclass(frozen=True)
-class Panel:
+class DemandPanel:
     """One demand in its SI unit: curves record -> (intensities, demands); fractiles (n, 3) of 16, 50 and 84 % at the
     levels (n,); intensities of runs that failed, marked at the right edge."""
 
@@ -28,7 +28,7 @@ class Panel:
     failed: Sequence[float] = ()
 
 
-def plot_ida(panels: Sequence[Panel], path: str | Path, *, intensity: str) -> Path:
+def plot_ida(panels: Sequence[DemandPanel], path: str | Path, *, intensity: str) -> Path:
     """A panel for every demand, side by side: a grey curve per record, named when they are few, and the fractiles."""
     import matplotlib
     from matplotlib.figure import Figure
@@ -48,7 +48,7 @@ def plot_ida(panels: Sequence[Panel], path: str | Path, *, intensity: str) -> Pa
     return Path(path)
 
 
-def _draw(axis: Any, panel: Panel) -> None:
+def _draw(axis: Any, panel: DemandPanel) -> None:
     size = np.array([max(float(np.max(np.abs(demand), initial=0.0)) for _, demand in panel.curves.values())])
     shown, unit = scaled(size, panel.unit) if panel.unit != "-" else (size, "-")
     factor = shown[0] / size[0] if size[0] else 1.0

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..core.algebra import Array, Indices
-from .histories import _edges, scaled
+from .histories import cell_edges, scaled
 
 STRAIGHT = 1e-6  # of its length: what a line of points may deviate
 ROWS = 1200  # of a map: more instants than a page has dots are gathered
@@ -78,7 +78,7 @@ def draw_map(
     low = -size if pulling else 1e-9 * size
     axis.grid(False)
     image = axis.pcolormesh(
-        _edges(t), _edges(position[order]), shown.T, cmap=palette, vmin=low, vmax=size, rasterized=True
+        cell_edges(t), cell_edges(position[order]), shown.T, cmap=palette, vmin=low, vmax=size, rasterized=True
     )
     axis.figure.colorbar(image, ax=axis, pad=0.02, fraction=0.06)
     axis.set(xlabel="time [s]", ylabel=axis_label)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from textwrap import shorten
 from typing import Any
@@ -16,7 +16,7 @@ from ..engineering.floor_spectra import recorded_motion
 from ..engineering.peak_values import Peak, peaks
 from ..ground_motion import STANDARD_GRAVITY, Record, response_spectrum
 from ..run.files.reading import RunFolder
-from .histories import _LEDGER, STYLE, _log, scaled
+from .histories import LEDGER, STYLE, log_axis, scaled
 from .maps import arc_position, draw_map, thinned
 
 PAGE = (8.27, 11.69)  # inches, A4
@@ -44,13 +44,7 @@ _PEAKS = (
     "N_", "V_", "M_", "racking_", "theta_", "opening_", "slip_", "contact_max_slip", "uplift_", "height_", "T_", "a_y_",
     "reaction_y_",
 )
-
-
-@dataclass(frozen=True)
-class Panel:
-    """A drawing of half the page's width."""
-
-    draw: Callable[[Any], None]
+Drawing = Callable[[Any], None]  # draws on one axis, half of the page's width
 
 
 def plot_report(
@@ -84,41 +78,41 @@ def plot_report(
         _header(figure, run, title or f"Run {run.folder.resolve().name}")
         for i, panel in enumerate(panels):
             last_alone = i == len(panels) - 1 and i % 2 == 0
-            panel.draw(figure.add_subplot(grid[i // 2, :] if last_alone else grid[i // 2, i % 2]))
+            panel(figure.add_subplot(grid[i // 2, :] if last_alone else grid[i // 2, i % 2]))
         if rows:
             _table(figure.add_axes((SIDES[0], 0.015, SIDES[1] - SIDES[0], table)), rows)
         figure.savefig(path, dpi=150)
     return path
 
 
-def _panels_of(run: RunFolder, columns: Sequence[Sequence[str]] | None) -> list[Panel]:
+def _panels_of(run: RunFolder, columns: Sequence[Sequence[str]] | None) -> list[Drawing]:
     shaken = [f"a_g_{axis}" for axis in "xyz" if np.any(run.history.get(f"a_g_{axis}", 0.0))]
-    panels = []
+    panels: list[Drawing] = []
     if shaken:
-        panels.append(Panel(lambda axis: _lines(axis, run, shaken, "ground acceleration")))
+        panels.append(partial(_lines, run=run, names=shaken, title="ground acceleration"))
     if shaken and len(run.history["t"]) > 2:
-        panels.append(Panel(lambda axis: _spectrum(axis, run, shaken)))
+        panels.append(partial(_spectrum, run=run, names=shaken))
     maps = _maps(run)
     mapped = ("contact pressure",) if maps else ()
     groups = _given(run, columns) if columns is not None else _moving(run, without=mapped)
     for name, found in groups:
-        panels.append(Panel(lambda axis, name=name, found=found: _lines(axis, run, found, name)))  # type: ignore[misc]
+        panels.append(partial(_lines, run=run, names=found, title=name))
     panels += maps
     if "energy_defect" in run.history and np.any(run.history["energy_kinetic"] + run.history["energy_strain"]):
-        panels.append(Panel(lambda axis: _energies(axis, run)))
-    panels.append(Panel(lambda axis: _certificate(axis, run)))
+        panels.append(partial(_energies, run=run))
+    panels.append(partial(_certificate, run=run))
     return panels
 
 
-def _maps(run: RunFolder) -> list[Panel]:
+def _maps(run: RunFolder) -> list[Drawing]:
     """Of contact lines: pressure, and opening where there is one."""
     contact, history = run.contact, run.history
     if contact is None or "pressure" not in history or contact.points.shape[1] != 2 or len(contact.points) < 3:
         return []
-    found = [Panel(lambda axis: _map(axis, run, "pressure", "Pa"))] if np.any(history["pressure"]) else []
+    found: list[Drawing] = [partial(_map, run=run, column="pressure", unit="Pa")] if np.any(history["pressure"]) else []
     size = float(np.ptp(contact.points, axis=0).max())
     if float(np.max(history["gap"])) > NO_GAP * size:
-        found.append(Panel(lambda axis: _map(axis, run, "gap", "m")))
+        found.append(partial(_map, run=run, column="gap", unit="m"))
     return found
 
 
@@ -214,8 +208,8 @@ def _map(axis: Any, run: RunFolder, column: str, unit: str) -> None:
 
 
 def _energies(axis: Any, run: RunFolder) -> None:
-    sizes = {name: float(np.max(np.abs(run.history[name]))) for name, *_ in _LEDGER if name in run.history}
-    present = [entry for entry in _LEDGER if sizes.get(entry[0], 0.0) > NOTHING * max(sizes.values())]
+    sizes = {name: float(np.max(np.abs(run.history[name]))) for name, *_ in LEDGER if name in run.history}
+    present = [entry for entry in LEDGER if sizes.get(entry[0], 0.0) > NOTHING * max(sizes.values())]
     values, unit = scaled(np.array([run.history[name] for name, *_ in present]), "J")
     for one, (_, label, colour, style) in zip(values, present, strict=True):
         axis.plot(run.history["t"], one, color=colour, ls=style, lw=0.8, label=label)
@@ -225,7 +219,7 @@ def _energies(axis: Any, run: RunFolder) -> None:
 
 
 def _certificate(axis: Any, run: RunFolder) -> None:
-    _log(axis, run.history["t"][1:], run.history["certificate"][1:])
+    log_axis(axis, run.history["t"][1:], run.history["certificate"][1:])
     tolerance = run.facts.get("tolerance")
     if tolerance:
         axis.axhline(tolerance, color="tab:red", ls="--", lw=0.8, label=f"tolerance {tolerance:g}")

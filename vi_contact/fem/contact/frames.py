@@ -58,7 +58,7 @@ class Facing:
 
 
 @dataclass(frozen=True, eq=False)
-class Conditions:
+class NodalConditions:
     """Conditions u·direction <= gap at nodes, u being relative to what they are ``facing`` if that deforms too."""
 
     nodes: Nodes
@@ -71,10 +71,10 @@ class FemSurface(ContactSurface):
     """A contact surface that remembers what it was made of, so that it can be joined with others."""
 
     space: FemSpace = field(repr=False)
-    parts: tuple[Conditions, ...] = field(repr=False)
+    parts: tuple[NodalConditions, ...] = field(repr=False)
 
 
-class Frames:
+class NodalFrames:
     """One frame of unit vectors per node of the conditions, orthonormal unless the node has oblique directions.
 
     Attributes:
@@ -87,7 +87,7 @@ class Frames:
         InputError: a contact direction that is partly prescribed; directions of one node that depend on one another.
     """
 
-    def __init__(self, parts: Sequence[Conditions]) -> None:
+    def __init__(self, parts: Sequence[NodalConditions]) -> None:
         numbers = np.concatenate([part.nodes.numbers for part in parts])
         self.points = np.concatenate([part.nodes.points for part in parts])
         self.directions = np.concatenate([part.directions for part in parts])
@@ -190,9 +190,9 @@ def at(point: Array) -> str:
     return f"({', '.join(f'{x:g}' for x in point)})"
 
 
-def surface_of(space: FemSpace, parts: Sequence[Conditions], **data: Any) -> FemSurface:
+def surface_of(space: FemSpace, parts: Sequence[NodalConditions], **data: Any) -> FemSurface:
     """The surface of these conditions; ``data``: gap0, weights and what else a surface holds for each. Collective."""
-    frames = Frames(parts)
+    frames = NodalFrames(parts)
     d, count = space.dimension, len(frames.place)
     where = space._where(frames.numbers)
     index = np.full((len(where), d), -1, dtype=np.int64)
@@ -240,7 +240,7 @@ def _turn(space: FemSpace, blocks: Array, mine: Mask, index: Indices) -> PetscMa
 
 
 def _coupling(
-    space: FemSpace, parts: Sequence[Conditions], frames: Frames, index: Indices
+    space: FemSpace, parts: Sequence[NodalConditions], frames: NodalFrames, index: Indices
 ) -> PetscMatrix | None:
     """R with û = R ǔ: to the unknowns of a node that faces others, q_c·u = ǔ_c + q_c·sum_j P_sj u_j.
 
@@ -268,7 +268,7 @@ def _coupling(
     return as_petsc(algebra.replaced_rows(len(space.ids), rows))
 
 
-def _turns(frames: Frames, nodes: Nodes) -> Array:
+def _turns(frames: NodalFrames, nodes: Nodes) -> Array:
     """T (k, d, d) of nodes that are faced; the axes where they are in contact with nothing else."""
     turns = np.tile(np.eye(nodes.points.shape[1]), (len(nodes.numbers), 1, 1))
     place = np.minimum(np.searchsorted(frames.numbers, nodes.numbers), len(frames.numbers) - 1)
@@ -287,7 +287,7 @@ def _faced(facing: Facing, row: int, turns: Array, direction: Array) -> tuple[In
     return unknowns[used], values[used]
 
 
-def _refuse_chains(parts: Sequence[Conditions]) -> None:
+def _refuse_chains(parts: Sequence[NodalConditions]) -> None:
     """InputError for a node on side 1 of one pair and side 2 of another: R⁻¹ = 2 - R needs them apart."""
     coupled = [(part.nodes, part.facing) for part in parts if part.facing is not None]
     first = np.concatenate([nodes.numbers for nodes, _ in coupled])

@@ -10,7 +10,7 @@ import numpy as np
 from ...core.algebra import Array
 from ...core.errors import InputError
 from ...core.surfaces import ContactSurface
-from .frames import FemSurface, Frames, surface_of
+from .frames import FemSurface, NodalFrames, surface_of
 
 Motion = Callable[[float], Array]
 
@@ -29,7 +29,7 @@ def joined_surfaces(*surfaces: ContactSurface) -> ContactSurface:
     """
     made = [surface for surface in surfaces if isinstance(surface, FemSurface)]
     if not made or len(made) < len(surfaces) or any(surface.space is not made[0].space for surface in made):
-        raise InputError("joined_surfaces needs surfaces of fem.contact_surface and fem.contact_pair, all of one system")
+        raise InputError("joined_surfaces needs surfaces of fem.contact_surface and contact_pair, all of one system")
     names = ("gap0", "weights", "bilateral", "compliance")
     data: dict[str, Any] = {name: np.concatenate([getattr(surface, name) for surface in made]) for name in names}
     parts = [part for surface in made for part in surface.parts]
@@ -37,7 +37,7 @@ def joined_surfaces(*surfaces: ContactSurface) -> ContactSurface:
         made[0].space,
         parts,
         motion=_joined([(surface.motion, (surface.count,)) for surface in made]),
-        slide=_slide(made, Frames(parts)),
+        slide=_slide(made, NodalFrames(parts)),
         companions=tuple(one for surface in made for one in surface.companions),
         **data,
     )
@@ -51,13 +51,13 @@ def _joined(motions: Sequence[tuple[Motion | None, tuple[int, ...]]]) -> Motion 
     return lambda t: np.concatenate([np.zeros(shape) if motion is None else motion(t) for motion, shape in motions])
 
 
-def _slide(made: Sequence[FemSurface], frames: Frames) -> Motion | None:
+def _slide(made: Sequence[FemSurface], frames: NodalFrames) -> Motion | None:
     """The slides of all conditions, those of nodes with several along the vectors that are left to them."""
     joined = _joined([(surface.slide, (surface.count, surface.tangents.shape[1])) for surface in made])
     corners = np.flatnonzero(frames.double[frames.place])
     if joined is None or not len(corners):
         return joined
-    before = np.concatenate([Frames(surface.parts).tangents for surface in made])[corners]
+    before = np.concatenate([NodalFrames(surface.parts).tangents for surface in made])[corners]
     after = frames.tangents[corners] * frames.rubs[corners, None, :]
     turn = np.einsum("kic,kie->kce", after, before)
 

@@ -17,7 +17,7 @@ from ...core.checks import attributes
 from ...core.errors import InputError
 from .frames import Nodes, at
 
-CHUNK = 256  # rows of the tables of distances
+DISTANCE_ROWS = 256  # rows of the tables of distances
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,8 +91,8 @@ class NodeToNode:
         x, normals, reach = one.nodes.points, one.nodes.normals, self.tolerance * _spacing(one.nodes.points, size)
         partner = np.full(len(x), -1, dtype=np.int64)
         facing = np.zeros(len(x), dtype=bool)
-        for first in range(0, len(x), CHUNK):
-            rows = slice(first, first + CHUNK)
+        for first in range(0, len(x), DISTANCE_ROWS):
+            rows = slice(first, first + DISTANCE_ROWS)
             offset = two.nodes.points[None, :, :] - x[rows, None, :]
             along = np.einsum("ijk,ik->ij", offset, normals[rows])
             beside = np.linalg.norm(offset - along[:, :, None] * normals[rows, None, :], axis=2)

@@ -28,7 +28,7 @@ from ...core.algebra import Array
 from ...core.errors import InputError
 from .matching import Matched, Side, refuse_same_way
 
-COVERED = 1e-3  # of a segment: less of it in front of side 2 is no contact
+LEAST_COVERED = 1e-3  # of a segment: less of it in front of side 2 is no contact
 POINTS = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0)  # of Gauss, on [0, 1], weights ½
 CURVED = 0.05  # of a segment: what polygons of one curve may overlap
 
@@ -55,7 +55,7 @@ class DualMortar:
         D, M, longest = np.zeros(m), sp.lil_matrix((m, n)), np.zeros(m)
         for facet, ends, normal in zip(one.facets, ends1, normals1, strict=True):
             pieces = list(_pieces(ends, normal, ends2, normals2))
-            if sum(high - low for low, high, *_ in pieces) <= COVERED:
+            if sum(high - low for low, high, *_ in pieces) <= LEAST_COVERED:
                 continue
             length = float(np.linalg.norm(ends[1] - ends[0]))
             own, mixed = _integrals(pieces, length)

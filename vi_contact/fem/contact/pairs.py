@@ -29,7 +29,7 @@ from .. import compat
 from ..mesh import Facets, node_numbers
 from ..space import FemSpace
 from .faces import Boundary, boundary, checked_angle, split, tell_corners
-from .frames import Conditions, Facing, Frames, Nodes, at, joined_nodes, surface_of
+from .frames import Facing, NodalConditions, NodalFrames, Nodes, at, joined_nodes, surface_of
 from .matching import Matched, Matching, NodeToNode, Side
 from .surface import contact_space, listed, nodes_on, snapped
 
@@ -87,7 +87,7 @@ def contact_pair(
     tell_corners(space, one.name, nodes, angle)
     directions = snapped(nodes.normals)
     gap = _gap(space, one.name, two, nodes, directions, matched)
-    conditions = Conditions(nodes, directions, Facing(two.nodes, matched.P))
+    conditions = NodalConditions(nodes, directions, Facing(two.nodes, matched.P))
     moving = _prescribed_motion(space, conditions)
     return surface_of(
         space, [conditions], gap0=gap, weights=matched.weights * space.forms.section.thickness, **moving
@@ -201,9 +201,9 @@ def _gap(space: FemSpace, name: str, two: Side, nodes: Nodes, directions: Array,
     return np.maximum(gap, 0.0)
 
 
-def _prescribed_motion(space: FemSpace, conditions: Conditions) -> dict[str, Callable[[float], Array]]:
+def _prescribed_motion(space: FemSpace, conditions: NodalConditions) -> dict[str, Callable[[float], Array]]:
     """``motion`` and ``slide`` of a surface whose side 2 has prescribed nodes that move: none when none does."""
-    frames, facing = Frames([conditions]), conditions.facing
+    frames, facing = NodalFrames([conditions]), conditions.facing
     moves = any(condition.moves for condition in space.prescribed)
     if facing is None or not moves or not facing.nodes.held[np.unique(facing.P.indices)].any():
         return {}

@@ -20,7 +20,7 @@ from ..groups import facets_of
 from ..mesh import Facets
 from ..space import FemSpace, space_of
 from .faces import boundary, checked_angle, in_symmetry_planes, integrals, split, tell_corners
-from .frames import Conditions, Nodes, at, surface_of
+from .frames import NodalConditions, Nodes, at, surface_of
 
 log = logging.getLogger(__name__)
 
@@ -64,7 +64,7 @@ def contact_surface(
     weights = nodes.weights * space.forms.section.thickness
     _refuse_tied(space, nodes, facets.name)
     tell_corners(space, facets.name, nodes, angle)
-    return surface_of(space, [Conditions(nodes, directions)], gap0=gap, weights=weights)
+    return surface_of(space, [NodalConditions(nodes, directions)], gap0=gap, weights=weights)
 
 
 def one_per_direction(whole: Nodes, nodes: Nodes, directions: Array, gap: Array) -> tuple[Nodes, Array, Array]:

@@ -14,7 +14,7 @@ from ..mesh import Cells
 from ..space import FemSpace
 
 ON_LINE = 1e-6  # of the length of the cut: what counts as lying on it
-COVERED = 1e-3  # of its length: what the element sides on it may miss
+UNCOVERED = 1e-3  # of the length of a cut: what the element sides on it may miss
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ def find_cut(space: FemSpace, name: str, ends: Array, group: Cells | None) -> Cu
     span = np.where(on, sides.s, -np.inf).max(axis=1) - np.where(on, sides.s, np.inf).min(axis=1)
     covered = space.comm.sum(np.array([span[owned & side].sum() for side in (left, right)]))
     use_left = covered[0] >= covered[1]
-    if abs(max(covered) - length) > COVERED * length:
+    if abs(max(covered) - length) > UNCOVERED * length:
         raise InputError(
             f"section '{name}': sides of elements cover {max(covered):.4g} m of its {length:.4g} m: lay it along lines "
             "of the mesh, from one surface of the group of cells to the other"

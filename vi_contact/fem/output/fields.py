@@ -87,14 +87,14 @@ class XDMF:
         if not 1.0 <= real(self.every) < np.inf or self.every != int(self.every):
             raise InputError(f"XDMF every is {shown(self.every)}: give a number of steps >= 1")
 
-    def open(self, problem: ContactProblem, folder: Path, kept: Mapping[int, float]) -> Frames:
+    def open(self, problem: ContactProblem, folder: Path, kept: Mapping[int, float]) -> FrameWriter:
         """Writes the mesh; goes on after the frames of ``kept`` (step -> time) that are in the folder. Collective."""
         space_of("XDMF", problem.system)
         known_matrices("XDMF, von_mises", problem.system, "K")
-        return Frames(problem, folder, kept)
+        return FrameWriter(problem, folder, kept)
 
 
-class Frames:
+class FrameWriter:
     """The open field output of a run."""
 
     def __init__(self, problem: ContactProblem, folder: Path, kept: Mapping[int, float]) -> None:

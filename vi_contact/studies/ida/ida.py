@@ -25,7 +25,7 @@ from ...core.algebra import Array
 from ...core.errors import InputError
 from ...core.files import to_json, write_atomically
 from ...fem.mesh import alone
-from ...plots.ida import Panel, plot_ida
+from ...plots.ida import DemandPanel, plot_ida
 from ..cases.case import Case
 from ..cases.parsing import nearest
 from .measures import Demand, Intensity, demand, fractiles, intensity
@@ -188,7 +188,7 @@ def _tell(study: IDA, out: Path, *, draw: bool = False) -> list[Row]:
     return rows
 
 
-def _panel(rows: Sequence[Row], level: str, name: str, column: tuple[str, str]) -> Panel:
+def _panel(rows: Sequence[Row], level: str, name: str, column: tuple[str, str]) -> DemandPanel:
     """What one demand shows."""
     curves: dict[str, tuple[Array, Array]] = {}
     failed: list[float] = []
@@ -199,4 +199,4 @@ def _panel(rows: Sequence[Row], level: str, name: str, column: tuple[str, str]) 
         failed += [row[level] for row in own if row["status"] != "finished"]
         levels, values = np.array(good).reshape(-1, 2).T
         curves[record] = levels, values
-    return Panel(column[1].partition(":")[0], column[0], curves, *fractiles(curves, SHARES), tuple(failed))
+    return DemandPanel(column[1].partition(":")[0], column[0], curves, *fractiles(curves, SHARES), tuple(failed))
