@@ -10,7 +10,7 @@ from petsc4py import PETSc
 
 from vi_contact.core.algebra import Array, SerialAlgebra, SerialMatrix
 from vi_contact.core.errors import InputError
-from vi_contact.fem.petsc_algebra import CHUNK, MpiComm, PetscAlgebra, PetscMatrix
+from vi_contact.fem.petsc_algebra import RIGHT_SIDES, MpiComm, PetscAlgebra, PetscMatrix
 
 COMM = MPI.COMM_WORLD
 N = 200
@@ -117,7 +117,7 @@ def test_factor_solves(empty_rank):
 
 
 @BOTH
-@pytest.mark.parametrize("m", [0, 1, 5, CHUNK, 2 * CHUNK + 7])
+@pytest.mark.parametrize("m", [0, 1, 5, RIGHT_SIDES, 2 * RIGHT_SIDES + 7])
 def test_columns_of_the_inverse(empty_rank, m):
     """A^-1 e_j in the order of the slots, across several blocks of right-hand sides, wherever the rows live."""
     matrix = spd(4, 3)
