@@ -8,6 +8,7 @@ Everything else has a room: ``vi_contact.fem`` (meshes, assembly, contact surfac
 
 from __future__ import annotations
 
+from . import schemes
 from .core.lazy import lazy
 from .core.version import __version__
 
@@ -27,10 +28,7 @@ _CONTENTS = {
     "core.surfaces": ("AnalyticGap", "ContactSurface", "HalfSpace", "Touching"),
     "core.problem": ("ContactProblem",),
     "core.step": ("Certificate", "Report", "State", "StepProblem", "StepResult"),
-    "schemes": (
-        "ContactStabilisedNewmark", "GeneralisedAlpha", "HHT", "Houbolt", "LinearMultistep", "Midpoint", "MoreauJean",
-        "Newmark", "SS22", "Trapezoidal", "ZienkiewiczWoodTaylor",
-    ),
+    "schemes": schemes.__all__,
     "solvers.condensed": ("Condensed",),
     "solvers.volume": ("Volume",),
     "run.simulate": ("simulate",),

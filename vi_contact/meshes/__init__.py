@@ -5,3 +5,19 @@ current model. `write(mesh, path)` of `gmsh_session` makes a file of it, `fem.bu
 mesh without a file. Each script also runs by itself: `python3 meshes/wall.py --help`. Lengths in metres, angles in
 radians.
 """
+
+from __future__ import annotations
+
+from ..core.lazy import lazy
+
+_CONTENTS = {
+    "ball": ("BallMesh",),
+    "block": ("BlockMesh",),
+    "channel": ("ChannelMesh",),
+    "cut": ("CutOpen", "Welded"),
+    "disk": ("DiskMesh",),
+    "two_blocks": ("Blocks", "TwoBlocks"),
+    "wall": ("WallMesh",),
+}
+__all__ = sorted(name for names in _CONTENTS.values() for name in names)
+__getattr__, __dir__ = lazy(__name__, _CONTENTS)

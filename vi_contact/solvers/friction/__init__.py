@@ -1,1 +1,17 @@
 """Solve for normal and tangential reactions on the contact points, Tresca or Coulomb."""
+
+from __future__ import annotations
+
+from ...core.lazy import lazy
+
+_CONTENTS = {
+    "extrapolation": ("Aitken", "Anderson", "Plain"),
+    "fixed_point": ("FixedPoint",),
+    "given_forces": ("GivenForces",),
+    "newton": ("FrictionNewton",),
+    "nsgs": ("NSGS",),
+    "slip_rate": ("RateIteration",),
+    "uzawa": ("Uzawa",),
+}
+__all__ = sorted(name for names in _CONTENTS.values() for name in names)
+__getattr__, __dir__ = lazy(__name__, _CONTENTS)

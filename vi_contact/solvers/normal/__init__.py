@@ -1,1 +1,13 @@
 """Solve for normal reactions on the contact points: the linear complementarity problem."""
+
+from __future__ import annotations
+
+from ...core.lazy import lazy
+
+_CONTENTS = {
+    "active_set": ("ActiveSet",),
+    "hildreth": ("Hildreth",),
+    "projected_cg": ("ProjectedCG",),
+}
+__all__ = sorted(name for names in _CONTENTS.values() for name in names)
+__getattr__, __dir__ = lazy(__name__, _CONTENTS)

@@ -1,5 +1,14 @@
 """Solve the step in the volume, with PETSc's variational-inequality solvers: the whole u, no condensation."""
 
-from .route import Volume
+from __future__ import annotations
 
-__all__ = ["Volume"]
+from ...core.lazy import lazy
+
+_CONTENTS = {
+    "one_factorisation": ("OneFactorisation",),
+    "route": ("Volume",),
+    "snes": ("ReducedNewton", "SemismoothNewton"),
+    "tao": ("TaoTron",),
+}
+__all__ = sorted(name for names in _CONTENTS.values() for name in names)
+__getattr__, __dir__ = lazy(__name__, _CONTENTS)
