@@ -102,17 +102,26 @@ def homes(where: Module) -> dict[str, str]:
             above = where.folder.split(".") if where.folder else []
             base = above[: len(above) - node.level + 1] + (node.module.split(".") if node.module else [])
             found.update({one.asname or one.name: ".".join(base) for one in node.names})
-    contents = assigned(where, "_CONTENTS")
-    if contents is not None:
-        for part, names in ast.literal_eval(contents).items():
-            found.update(dict.fromkeys(names, f"{where.path}.{part}" if where.path else part))
+    for part, names in contents(where).items():
+        found.update(dict.fromkeys(names, f"{where.path}.{part}".lstrip(".")))
+    return found
+
+
+def contents(where: Module) -> dict[str, list[str]]:
+    """Return module -> names of the ``_CONTENTS`` of a package; ``part.__all__`` stands for those of the part."""
+    listed = assigned(where, "_CONTENTS")
+    found = {}
+    for key, names in zip(listed.keys, listed.values, strict=True) if isinstance(listed, ast.Dict) else ():
+        part = ast.literal_eval(key)
+        inner = isinstance(names, ast.Attribute)
+        found[part] = public(module(f"{where.path}.{part}".lstrip("."))) if inner else ast.literal_eval(names)
     return found
 
 
 def public(where: Module) -> list[str]:
     """Return the public names of a package, or of a module without ``__all__``: what it defines and documents."""
     if assigned(where, "_CONTENTS") is not None:
-        names = {name for part in ast.literal_eval(assigned(where, "_CONTENTS")).values() for name in part}
+        names = {name for part in contents(where).values() for name in part}
     elif (listed := assigned(where, "__all__")) is not None:
         names = set(ast.literal_eval(listed))
     else:
