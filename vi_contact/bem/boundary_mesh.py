@@ -16,11 +16,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..core.algebra import Array
 from ..core.checks import array, counted, flag, function, integers, mask, number, shape_of, whole
 from ..core.errors import InputError
 from .loops import check_orientation, check_simple, check_size, ordered_loops
 
-Array = NDArray[np.float64]
 MOST = 3000  # elements: the matrices of one time step take 2 GB
 P1_MASS = np.array([[2.0, 1.0], [1.0, 2.0]]) / 6.0
 

@@ -21,13 +21,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.algebra import Array
 from ..core.checks import instance, number
 from .boundary_mesh import BoundaryMesh
 from .element_pairs import ElementPairs
 from .fundamental_solution import KernelSet
 from .quadrature import Orders, point_sets
 
-Array = NDArray[np.float64]
 TURN = np.array([[0.0, -1.0], [1.0, 0.0]])  # M u = TURN du/dtau
 SLOPE = np.array([-1.0, 1.0])  # derivative of the two shape functions times the length
 N_SINGLE, N_DOUBLE, N_HYPER = 3, 8, 10

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..core.algebra import Array
 from ..core.checks import array, counted, flag, instance, mask, shape_of
 from ..core.errors import InputError
 from ..laws.materials import LinearElastic
@@ -25,7 +26,6 @@ from .poincare_steklov import BoundaryMotion, CondensedCompliance
 from .quadrature import Orders
 from .radial_table import RadialTable
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 # |s| h/c_S reaches 100 with small steps; points cost nothing per frequency
 ORDERS = Orders(far=6, near=8, touching=32, close=16)

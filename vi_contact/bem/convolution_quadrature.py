@@ -19,11 +19,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..core.algebra import Array
 from ..core.checks import attributes, function, instance, number, shape_of, whole
 from ..core.errors import InputError
 from .time_methods import BDF2, Contour, RadauIIA, TimeMethod, Trapezoid
 
-Array = NDArray[np.float64]
 METHODS = (BDF2, Trapezoid, RadauIIA)
 
 

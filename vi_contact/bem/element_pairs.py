@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.algebra import Array
 from ..core.checks import instance
 from ..core.errors import InputError
 from .boundary_mesh import BoundaryMesh
 from .loops import place
 
-Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 NEAR = 3.0  # pairs closer than this many element lengths get the finer rule
 CLOSE = 0.9  # pairs whose elements are this share of the longer one's length apart are integrated with their feet

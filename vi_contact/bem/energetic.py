@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, lu_factor, lu_solve
 
+from ..core.algebra import Array
 from ..core.checks import array, attributes, counted, flag, instance, mask, number, shape_of, whole
 from ..core.errors import InputError
 from ..laws.materials import LinearElastic
@@ -28,7 +29,6 @@ from .boundary_mesh import BoundaryMesh
 from .operators import Operators, check_body
 from .quadrature import Orders
 
-Array = NDArray[np.float64]
 NUMBERS = 4_000_000_000  # in the blocks of a body: 32 GB
 SMALLEST, GREATEST = 0.05, 8.0  # limits of c_P dt / h
 

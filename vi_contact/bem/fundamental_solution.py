@@ -23,10 +23,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import kv
 
+from ..core.algebra import Array
 from ..core.checks import attributes, shown
 from ..core.errors import InputError
 
-Array = NDArray[np.float64]
 TWO_PI = 2.0 * np.pi
 EULER = float(np.euler_gamma)
 SMALL = 0.7  # below this the Bessel function minus its pole is summed as a power series

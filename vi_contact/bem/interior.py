@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.sparse import csc_matrix
 
+from ..core.algebra import Array
 from ..core.checks import array, instance, integers, shape_of
 from ..core.errors import InputError
 from .boundary_mesh import BoundaryMesh
@@ -16,7 +17,6 @@ from .fundamental_solution import TimeKernels
 from .poincare_steklov import BoundaryMotion, PoincareSteklov
 from .rules import pieces, roots, smoothed, stretched
 
-Array = NDArray[np.float64]
 ORDER, CLOSEST = 8, 1e-3  # points a piece; least distance from the boundary in element lengths
 
 

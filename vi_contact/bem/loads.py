@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..core.algebra import Array
 from ..core.checks import array, counted, function, instance, mask, number, whole
 from .boundary_mesh import BoundaryMesh
 from .quadrature import MOST
 from .rules import gauss
-
-Array = NDArray[np.float64]
 
 
 def traction_forces(

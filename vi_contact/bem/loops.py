@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.algebra import Array
 from ..core.errors import InputError
 
-Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 TOUCHING = 1e-12  # of the size of the boundary: nearer is the same place
 

@@ -12,12 +12,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..core.algebra import Array
 from ..core.checks import array, flag, instance, integers, mask, number
 from ..core.errors import InputError
 from .boundary_mesh import BoundaryMesh
 from .energetic import EnergeticBlocks, Marching, Motion, summed
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 

@@ -21,11 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_matrix
 
+from ..core.algebra import Array
 from ..core.checks import whole
 from .element_pairs import ElementPairs
 from .rules import gauss, graded, linear, pieces, roots, smoothed, stretched
 
-Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Rule = tuple[Array, Array]
 MOST = 200  # Gauss points a rule may have

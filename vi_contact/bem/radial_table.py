@@ -19,13 +19,13 @@ from numpy.polynomial.chebyshev import chebvander
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix, vstack
 
+from ..core.algebra import Array
 from ..core.checks import counted, number
 from .boundary_mesh import BoundaryMesh
 from .boundary_operators import Galerkin
 from .fundamental_solution import TWO_PI, KernelSet
 from .quadrature import Orders, PointSet, point_sets
 
-Array = NDArray[np.float64]
 POINTS = 16  # Chebyshev points of a panel
 PANELS = 100_000  # of equal width
 SMALLEST = 1e-9  # end of the dyadic panels, relative to the shortest element

@@ -7,7 +7,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from ..core.algebra import Array
+
 Index = NDArray[np.int64]
 FLAT = 1e-6  # least height of a singularity over a piece, over the length of the piece
 

@@ -23,7 +23,7 @@ Indices = NDArray[np.int64]
 
 def max_abs(x: Array) -> float:
     """max |x| over the entries given, 0 for none; NaN stays NaN. Half the time of forming |x|."""
-    return max(float(x.max()), -float(x.min())) if len(x) else 0.0
+    return max(float(x.max()), -float(x.min())) if x.size else 0.0
 
 
 class Comm(Protocol):

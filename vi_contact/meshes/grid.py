@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from ..core.algebra import Array
 
 _SIMPLEX_TYPE = (15, 1, 2, 4)  # Gmsh's numbers of point, line, triangle, tetrahedron
 _BOX_TYPE = (15, 1, 3, 5)  # point, line, quadrangle, hexahedron
