@@ -6,7 +6,8 @@ from itertools import product
 
 import numpy as np
 
-from vi_contact.solvers.normal.lcp import LCP, Array, Mask
+from vi_contact.core.algebra import Array, Mask
+from vi_contact.solvers.normal.lcp import LCP
 
 
 def enumerate_lcp(G: Array, q: Array, bilateral: Mask) -> Array:

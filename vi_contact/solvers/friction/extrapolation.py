@@ -18,9 +18,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from ...core.algebra import Array
 from ...core.checks import provides, real, shown, whole
 from ...core.errors import InputError
-from ..normal.lcp import Array
 
 
 class Sequence(Protocol):

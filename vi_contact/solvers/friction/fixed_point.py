@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ...core.algebra import Array, Mask, max_abs
 from ...core.checks import attributes
-from ..normal.lcp import Array, Mask, largest
 from .extrapolation import Extrapolation, Plain, accelerated
 from .newton import FrictionNewton
 from .problem import Blocks, FrictionMethod, FrictionResult, inner_method, observed_contraction
@@ -63,7 +63,7 @@ class PreparedFixedPoint:
         found = self._tresca.solve(q, limit, constant, start)
         while len(history) < self.method.max_iterations:
             new = cohesion + slope * np.maximum(found.r[:, 0], 0.0)
-            change, size = largest((new - limit) / unit), max(largest(new / unit), largest(limit / unit))
+            change, size = max_abs((new - limit) / unit), max(max_abs(new / unit), max_abs(limit / unit))
             if change <= max(self.method.tolerance * size, step.rounding(found.r / self.blocks.scale)):
                 break
             history.append(change / size)

@@ -17,9 +17,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ...core.algebra import Array, Mask, max_abs
 from ...core.checks import attributes
 from ..normal.active_set import ActiveSet
-from ..normal.lcp import Array, Mask, largest
 from .extrapolation import Extrapolation, Plain, accelerated
 from .newton import FrictionNewton
 from .problem import Blocks, FrictionMethod, FrictionResult, inner_method
@@ -74,8 +74,8 @@ class PreparedGivenForces:
             w = step.w(r)
             w[:, 0] = np.inf
             r[:, 1:] = self._tangential.solve(w, step.limit(r[:, 0]), none).r[:, 1:]
-            size = max(largest(r[:, 1:]), largest(given))
-            history.append(largest(r[:, 1:] - given) / size if size else 0.0)
+            size = max(max_abs(r[:, 1:]), max_abs(given))
+            history.append(max_abs(r[:, 1:] - given) / size if size else 0.0)
             if history[-1] > self.method.tolerance:
                 r[:, 1:] = sequence.next(given.ravel(), r[:, 1:].ravel()).reshape(given.shape)
         return step.result(

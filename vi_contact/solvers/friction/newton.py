@@ -21,8 +21,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...core.algebra import Array, Mask
 from ...core.checks import attributes
-from ..normal.lcp import Array, Mask
 from .linear import Factors, LinearProblems
 from .nsgs import sweeps
 from .problem import Blocks, FrictionResult, Step

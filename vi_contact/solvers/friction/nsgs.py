@@ -19,8 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
+from ...core.algebra import Array, Mask
 from ...core.checks import attributes
-from ..normal.lcp import Array, Mask
 from .problem import Blocks, FrictionResult, Step
 
 

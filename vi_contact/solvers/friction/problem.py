@@ -25,10 +25,11 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from ...core.algebra import Array, Mask, max_abs
 from ...core.checks import provides
 from ...core.errors import InputError, StepFailure
 from ...laws.friction import project
-from ..normal.lcp import EPS, Array, Mask, check_gap, energy_scale, largest
+from ..normal.lcp import EPS, check_gap, energy_scale
 
 
 @dataclass(frozen=True)
@@ -105,7 +106,7 @@ class Step:
         y = r - w
         normal = np.where(self.blocks.bilateral, w[:, 0], r[:, 0] - np.maximum(y[:, 0], 0.0))
         tangential = r[:, 1:] - project(y[:, 1:], self.limit(r[:, 0]))
-        return max(largest(normal), largest(tangential))
+        return max(max_abs(normal), max_abs(tangential))
 
     @cached_property
     def unit(self) -> float:
@@ -114,7 +115,7 @@ class Step:
 
     def rounding(self, r: Array) -> float:
         """Residuals below this are rounding errors of q + G r."""
-        return 16.0 * EPS * self.blocks.norm * largest(r)
+        return 16.0 * EPS * self.blocks.norm * max_abs(r)
 
     def admissible(self, r: Array) -> Array:
         """r with r_n >= 0 and r_t within its disk: removes rounding errors, and whatever else is outside."""
@@ -179,7 +180,7 @@ class Blocks:
             scale[:, 1:] = np.mean(scale[:, 1:] ** -2.0, axis=1)[:, None] ** -0.5
         self.scale, self.bilateral, self.count, self.dimension = scale, bilateral.copy(), m, d
         matrix = scale.ravel()[:, None] * G * scale.ravel()
-        if largest(matrix - matrix.T) > 1e-8:
+        if max_abs(matrix - matrix.T) > 1e-8:
             raise InputError("The Delassus operator is not symmetric: use a symmetric effective matrix A.")
         self.matrix = np.ascontiguousarray(0.5 * (matrix + matrix.T))
         self.norm = float(np.abs(self.matrix).sum(axis=1).max(initial=0.0))

@@ -18,9 +18,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ...core.algebra import Array, max_abs
 from ...core.checks import attributes
 from ...core.errors import StepFailure
-from ..normal.lcp import Array, largest
 from .extrapolation import Anderson, Extrapolation, accelerated
 from .problem import FrictionResult
 
@@ -55,8 +55,8 @@ class RateIteration:
             found = solved(mu, found)
             spent += found.iterations
             new = image(found)
-            size = max(largest(new), largest(mu))
-            history.append(largest(new - mu) / size if size else 0.0)
+            size = max(max_abs(new), max_abs(mu))
+            history.append(max_abs(new - mu) / size if size else 0.0)
             if history[-1] <= self.tolerance:
                 return replace(found, iterations=spent, history=tuple(history))
             mu = np.maximum(sequence.next(mu, new), 0.0)

@@ -16,9 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...core.algebra import Array, Mask
 from ...core.checks import attributes, real, shown
 from ...core.errors import InputError
-from ..normal.lcp import Array, Mask
 from .problem import Blocks, FrictionResult
 
 

@@ -20,8 +20,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import lapack
 
+from ...core.algebra import Array, Mask
 from ...core.checks import attributes
-from .lcp import LCP, Array, LCPResult, Mask, check_guess, cholesky, failure, scaled_dense
+from .lcp import LCP, LCPResult, check_guess, cholesky, failure, scaled_dense
 
 PATIENCE = 10  # Júdice and Pires, Comput. Oper. Res. 21, 1994
 

@@ -16,8 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import lapack
 
+from ...core.algebra import Array, Mask, max_abs
 from ...core.checks import attributes
-from .lcp import EPS, LCP, Array, LCPResult, Mask, cholesky, failure, largest, scaled_dense
+from .lcp import EPS, LCP, LCPResult, cholesky, failure, scaled_dense
 
 
 @dataclass(frozen=True)
@@ -123,8 +124,8 @@ class PreparedHildreth:
         """Gaps that the form in use cannot tell from zero: w = q + G D s has passed through both G and D."""
         if not self.method.primal:
             return self._scaled.rounding(r)
-        product = np.abs(self._H).sum(axis=1) * largest(np.array(x)) / self._unit
-        return 4.0 * EPS * self._scaled.norm * largest(product)
+        product = np.abs(self._H).sum(axis=1) * max_abs(np.array(x)) / self._unit
+        return 4.0 * EPS * self._scaled.norm * max_abs(product)
 
 
 def sweep(rows: list[tuple[int, Array]], x: list[float], lower: list[float], gradient: Array) -> float:

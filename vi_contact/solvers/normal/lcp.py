@@ -20,13 +20,10 @@ from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import lapack
 
-from ...core.algebra import Array
+from ...core.algebra import Array, Mask, max_abs
 from ...core.errors import InputError, StepFailure
-
-Mask = NDArray[np.bool_]
 
 EPS = float(np.finfo(float).eps)
 
@@ -68,7 +65,7 @@ class LCP:
         d = self._scale
         q, bilateral = self.q * d, self.bilateral
         reaction = r / d
-        unit = violation(q, bilateral) or largest(q[np.isfinite(q)]) or largest(reaction) or 1.0
+        unit = violation(q, bilateral) or max_abs(q[np.isfinite(q)]) or max_abs(reaction) or 1.0
         return complementarity(reaction, self.w(r) * d, bilateral) / unit
 
     @cached_property
@@ -123,11 +120,11 @@ class Scaled:
 
     def rounding(self, r: Array) -> float:
         """Gaps below this are rounding errors of q + G r."""
-        return 4.0 * EPS * self.norm * largest(r)
+        return 4.0 * EPS * self.norm * max_abs(r)
 
     def complementarity(self, r: Array, w: Array) -> float:
         """See the function of the same name."""
-        return complementarity(r, w, self.bilateral) if self.any_bilateral else largest(np.minimum(r, w))
+        return complementarity(r, w, self.bilateral) if self.any_bilateral else max_abs(np.minimum(r, w))
 
     def violation(self, q: Array) -> float:
         """See the function of the same name."""
@@ -147,17 +144,12 @@ class Scaled:
 
 def complementarity(r: Array, w: Array, bilateral: Mask) -> float:
     """max |min(r, w)| over unilateral rows, max |w| over bilateral ones."""
-    return largest(np.where(bilateral, w, np.minimum(r, w)))
+    return max_abs(np.where(bilateral, w, np.minimum(r, w)))
 
 
 def violation(q: Array, bilateral: Mask) -> float:
     """complementarity() of r = 0."""
     return max(0.0, float(np.where(bilateral, np.abs(q), -q).max(initial=0.0)))
-
-
-def largest(x: Array) -> float:
-    """max |x|, 0 for an empty array."""
-    return float(np.abs(x).max(initial=0.0))
 
 
 def scaled_dense(G: Array, bilateral: Mask) -> Scaled:
@@ -169,7 +161,7 @@ def scaled_dense(G: Array, bilateral: Mask) -> Scaled:
         raise InputError("The Delassus operator contains NaN or infinity: check the factorisation it came from.")
     d = energy_scale(G)
     matrix = np.ascontiguousarray(d[:, None] * G * d)
-    if largest(matrix - matrix.T) > 1e-8:
+    if max_abs(matrix - matrix.T) > 1e-8:
         raise InputError("The Delassus operator is not symmetric: use a symmetric effective matrix A.")
     matrix = 0.5 * (matrix + matrix.T)
     return Scaled(matrix, d, bilateral.copy(), float(np.abs(matrix).sum(axis=1).max(initial=0.0)))

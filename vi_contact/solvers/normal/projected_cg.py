@@ -14,20 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...core.algebra import Array, Mask
 from ...core.checks import attributes
 from ...core.errors import InputError
-from .lcp import (
-    LCP,
-    Array,
-    LCPResult,
-    Mask,
-    Operator,
-    Scaled,
-    failure,
-    largest_eigenvalue,
-    scaled_dense,
-    scaled_operator,
-)
+from .lcp import LCP, LCPResult, Operator, Scaled, failure, largest_eigenvalue, scaled_dense, scaled_operator
 
 PROPORTION = 1.0  # Gamma; any positive number works, 1 is Dostál's choice
 STEP = 1.5  # of the expansion, in units of 1/‖G‖: less than 2 converges; the rest is for the error of the estimate

@@ -17,13 +17,12 @@ from typing import Any
 
 import numpy as np
 
-from ...core.algebra import Array, Mask
+from ...core.algebra import Array, Mask, max_abs
 from ...core.errors import StepFailure
 from ...core.step import StepProblem, StepResult
 from ...laws.friction import project
 from ..friction.extrapolation import Anderson
 from ..friction.slip_rate import RateIteration
-from ..normal.lcp import largest
 from .bounded_system import BoundedSystem
 from .failures import stopped
 from .friction_step import Rubbing, ScaledRubbing
@@ -87,8 +86,8 @@ class VolumeFriction:
             found = self._tresca(step, limit, start)
             spent += found.iterations
             new = cohesion + slope * np.maximum(found.r_n, 0.0)
-            size = max(largest(new), largest(limit))
-            change = largest(new - limit) / size if size else 0.0
+            size = max(max_abs(new), max_abs(limit))
+            change = max_abs(new - limit) / size if size else 0.0
             if change <= TOLERANCE or (change <= NOISE and history and change >= history[-1]):
                 return Found(found.state, found.r_n, found.active, found.slip, spent, tuple(history))
             history.append(change)
