@@ -12,7 +12,7 @@ from fem_problems import max_over_ranks, shaken_wall
 from mpi4py import MPI
 from two_bodies import two_blocks
 
-from vi_contact.core.algebra import Array, SerialAlgebra
+from vi_contact.core.algebra import Array, SerialAlgebra, total
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.step import EffectiveMatrix, State, StepProblem
 from vi_contact.fem.contact.pairs import contact_pair
@@ -38,7 +38,7 @@ def factorised(monkeypatch: pytest.MonkeyPatch) -> Iterator[Rows]:
 
     def watched(make: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
         def factor(algebra: Any, A: Any) -> Any:
-            found.append(float(algebra.comm.sum(np.array([float(A.rows)]))[0]))
+            found.append(total(algebra.comm, A.rows))
             return make(algebra, A)
 
         return factor

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from bar import before_impact, energy, run
 
+from vi_contact.core.algebra import total
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.step import State, initial_state
 from vi_contact.core.verify import energies, energy_balance
@@ -58,4 +59,4 @@ def rounded(problem: ContactProblem, way: float) -> float:
     """
     system = problem.equations
     diagonal = np.abs(system.K.diagonal())
-    return float(np.finfo(float).eps * system.algebra.comm.sum(np.array([diagonal.sum()]))[0] * way**2)
+    return float(np.finfo(float).eps * total(system.algebra.comm, diagonal.sum()) * way**2)

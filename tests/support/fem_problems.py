@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from vi_contact.core.algebra import Array, Mask
+from vi_contact.core.algebra import Array, Mask, total
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.step import Scheme, Solver, State
 from vi_contact.core.surfaces import HalfSpace, empty_surface
@@ -90,7 +90,7 @@ def dense(comm: Any, system: SemiDiscreteSystem, matrix: Any) -> Array:
 def field(system: SemiDiscreteSystem, u: Array, t: float = 0.0, derivative: int = 0) -> tuple[Array, Array]:
     """(points, values), each (nodes, d), of a Cartesian vector of free unknowns, all nodes in input numbering."""
     space = system.space
-    count = int(space.comm.sum(np.array([float(len(space.nodes))]))[0])
+    count = int(total(space.comm, len(space.nodes)))
     points, values = np.zeros((count, space.dimension)), np.zeros((count, space.dimension))
     points[space.nodes] = space.points
     values[space.nodes] = space.expand(u, t, derivative)

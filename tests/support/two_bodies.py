@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from fem_problems import field
 
-from vi_contact.core.algebra import Array
+from vi_contact.core.algebra import Array, largest
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.system import SemiDiscreteSystem
 from vi_contact.fem.assembly import assemble
@@ -62,7 +62,7 @@ def momenta(problem: ContactProblem, v: Array) -> Array:
     system, bodies = problem.system, problem.system.space.bodies
     momentum = problem.equations.M @ v  # on the unknowns of the equations: forces, hence back with the transpose
     rows = []
-    for body in range(int(system.algebra.comm.max(np.array([float(bodies.max(initial=0))]))[0]) + 1):
+    for body in range(int(largest(system.algebra.comm, bodies.max(initial=0))) + 1):
         rigid = np.column_stack([relative(problem, column * (bodies == body)) for column in system.influence.T])
         rows.append(system.algebra.comm.sum(rigid.T @ momentum))
     return np.array(rows)

@@ -9,7 +9,7 @@ returned by ``dot`` and by ``Comm`` are the same number on every rank.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any, Protocol, SupportsFloat
 
 import numpy as np
 import scipy.sparse as sp
@@ -36,6 +36,16 @@ class Comm(Protocol):
     def max(self, x: Array) -> Array: ...
     def bcast(self, value: Any) -> Any: ...
     def gather(self, value: Any) -> list[Any] | None: ...
+
+
+def largest(comm: Comm, value: SupportsFloat) -> float:
+    """Return the largest of the ranks' values, the same on every rank; of truth values: 1 where one rank says True."""
+    return float(comm.max(np.array([float(value)]))[0])
+
+
+def total(comm: Comm, value: SupportsFloat) -> float:
+    """Return the sum of the ranks' values, the same on every rank."""
+    return float(comm.sum(np.array([float(value)]))[0])
 
 
 class Matrix(Protocol):

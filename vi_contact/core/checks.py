@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from .algebra import Array, Comm, Indices, Mask
+from .algebra import Array, Comm, Indices, Mask, largest
 from .errors import InputError
 
 SHOWN = 60  # characters of a value in a sentence
@@ -204,6 +204,6 @@ def real(value: Any) -> float:
 def refuse(defects: Iterable[str], comm: Comm) -> None:
     """InputError on all ranks with the first text that is not empty, whichever rank found it; collective."""
     mine = next((text for text in defects if text), "")
-    if comm.max(np.array([float(bool(mine))]))[0]:
+    if largest(comm, bool(mine)):
         found = comm.bcast(comm.gather(mine))
         raise InputError(next(text for text in found if text))

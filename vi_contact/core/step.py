@@ -20,7 +20,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from .algebra import Algebra, Array, Factor, Mask, Matrix
+from .algebra import Algebra, Array, Factor, Mask, Matrix, largest, max_abs
 from .errors import InputError
 from .problem import ContactProblem
 from .protocols import FrictionLaw, Frictionless, MassLaw
@@ -65,8 +65,7 @@ class EffectiveMatrix:
     @cached_property
     def largest(self) -> float:
         """The largest diagonal entry on any rank, a measure of |A|."""
-        largest = float(np.max(np.abs(self.matrix.diagonal()), initial=0.0))
-        return float(self.algebra.comm.max(np.array([largest]))[0])
+        return largest(self.algebra.comm, max_abs(self.matrix.diagonal()))
 
     def __matmul__(self, x: Array) -> Array:
         return self.matrix @ x
@@ -256,7 +255,7 @@ def initial_state(problem: ContactProblem, t: float = 0.0) -> State:
     """u0, v0 of the system, in the rotated basis, no reaction; InputError when u0 penetrates the obstacle."""
     system, surface = problem.equations, problem.surface
     gap = surface.gap(t) - surface.normal_values(system.u0)
-    u_max = float(surface.comm.max(np.array([np.max(np.abs(system.u0), initial=0.0)]))[0])
+    u_max = largest(surface.comm, max_abs(system.u0))
     size = max(u_max, float(np.max(surface.gap0, initial=0.0)))
     if len(gap) and gap.min() < -1e-9 * size:
         raise InputError(

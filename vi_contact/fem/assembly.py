@@ -16,7 +16,7 @@ from weakref import WeakSet
 import numpy as np
 import ufl
 
-from ..core.algebra import Array, Mask
+from ..core.algebra import Array, Mask, largest
 from ..core.errors import InputError
 from ..core.system import Load, SemiDiscreteSystem
 from ..laws.materials import Damping, LinearElastic, Section
@@ -275,7 +275,7 @@ def floats(space: FemSpace) -> bool:
     """
     d = space.dimension
     numbers = space.body_of_node
-    count = 1 + int(space.comm.max(np.array([float(np.max(numbers, initial=0))]))[0])
+    count = 1 + int(largest(space.comm, np.max(numbers, initial=0)))
     return any(_floats(space, np.repeat(numbers == body, d)) for body in range(count))
 
 

@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from ..core.algebra import Array, Factor, Indices, Mask, Matrix, identity_with
+from ..core.algebra import Array, Factor, Indices, Mask, Matrix, identity_with, total
 from ..core.errors import InputError
 
 PREFIX = "vi_contact_factor_"
@@ -246,7 +246,7 @@ class PetscAlgebra:
         return PetscFactor(as_petsc(A))
 
     def dot(self, x: Array, y: Array) -> float:
-        return float(self.comm.sum(np.array([x @ y]))[0])
+        return total(self.comm, x @ y)
 
 
 def as_petsc(matrix: Matrix) -> PetscMatrix:

@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from petsc4py import PETSc
 from scipy.sparse.csgraph import connected_components
 
-from ..core.algebra import Array, Indices, Mask
+from ..core.algebra import Array, Indices, Mask, largest, total
 from ..core.checks import instance, refuse
 from ..core.errors import InputError
 from ..core.system import SemiDiscreteSystem
@@ -118,7 +118,7 @@ class FemSpace:
         self.free: Mask = ~(self.held | self.tied).ravel()
         ids = self.nodes[:, None] * self.dimension + np.arange(self.dimension)
         self.ids: Indices = ids.ravel()[self.free]
-        self.unknowns = int(self.comm.sum(np.array([float(self.free.sum())]))[0])
+        self.unknowns = int(total(self.comm, self.free.sum()))
         self.free_index: Indices = np.where(self.free, np.cumsum(self.free) - 1, -1)
         self.selection = self._selection(pairs)
         self._P = PetscMatrix(self.selection) if pairs else None
@@ -255,14 +255,14 @@ class FemSpace:
             if point.shape != (self.dimension,):
                 raise InputError(f"point {tuple(point)} has {len(point)} coordinates: give {self.dimension}")
             distance = np.linalg.norm(self.points - point, axis=1)
-            nearest = -float(self.comm.max(np.array([-np.min(distance, initial=np.inf)]))[0])
+            nearest = -largest(self.comm, -np.min(distance, initial=np.inf))
             if nearest > 0.05 * self.size:
                 raise InputError(
                     f"point ({', '.join(f'{x:g}' for x in point)}) is {nearest:.3g} m away from the nearest node: "
                     "give a point of the body"
                 )
             close = self.nodes[distance <= nearest + 1e-9 * self.size]
-            found[i] = -int(self.comm.max(np.array([-float(np.min(close, initial=np.iinfo(np.int64).max))]))[0])
+            found[i] = -int(largest(self.comm, -float(np.min(close, initial=np.iinfo(np.int64).max))))
         return found
 
     def sample(self, u: Array, nodes: Indices, t: float, derivative: int = 0) -> Array:

@@ -21,7 +21,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ..core.algebra import Array, Factor, Indices
+from ..core.algebra import Array, Factor, Indices, total
 from ..core.checks import function, real, shown
 from ..core.corners import with_open_faces
 from ..core.errors import InputError
@@ -78,7 +78,7 @@ class MassProjection:
         rows = np.zeros((surface.count, surface.count))
         rows[surface.slots] = columns[surface.owned]
         self._delassus = comm.sum(rows)
-        entries = float(comm.sum(np.array([float(columns.size)]))[0])
+        entries = total(comm, columns.size)
         self._columns = columns if entries <= STORED_ENTRIES else None
         self._system = system
 

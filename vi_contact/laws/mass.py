@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.algebra import Array, Comm, Indices, Mask, Matrix, max_abs
+from ..core.algebra import Array, Comm, Indices, Mask, Matrix, largest, max_abs, total
 from ..core.checks import provides, real, shown
 from ..core.corners import lumped_entries
 from ..core.errors import InputError
@@ -88,10 +88,10 @@ class Redistributed:
 def _bodies(system: SemiDiscreteSystem, inner: Mask) -> Iterator[Mask]:
     """The unknowns of every body that has inner ones. Collective."""
     comm, numbers = system.algebra.comm, np.asarray(system.space.bodies)
-    last = int(comm.max(np.array([float(np.max(numbers, initial=0))]))[0])
+    last = int(largest(comm, np.max(numbers, initial=0)))
     for number in range(last + 1):
         body = numbers == number
-        if comm.max(np.array([float((body & inner).any())]))[0]:
+        if largest(comm, (body & inner).any()):
             yield body
 
 
@@ -126,7 +126,7 @@ def _row_sums(system: SemiDiscreteSystem) -> Array:
 def _refuse_negative(system: SemiDiscreteSystem, nodal: Array) -> None:
     """InputError for nodal masses that are no masses, as row sums of elements of higher order are. Collective."""
     own = system.M.diagonal()
-    wrong = int(system.algebra.comm.sum(np.array([float(np.sum((own > 0.0) & (nodal <= LIGHT * own)))]))[0])
+    wrong = int(total(system.algebra.comm, np.sum((own > 0.0) & (nodal <= LIGHT * own))))
     if wrong:
         raise InputError(
             f"redistributed mass needs positive row sums of M and {wrong} unknowns have none: give the problem "
@@ -156,7 +156,7 @@ def _inertia_correction(system: SemiDiscreteSystem, moved: Matrix, inner: Mask, 
     low = -comm.max(np.max(-points[body], axis=0, initial=-np.inf))
     x = (points - 0.5 * (low + high)) / max(float(np.max(high - low)), 1e-300)
     R = _motions(system, x) * body[:, None]
-    if system.tied is not None and comm.max(np.array([float((body & system.tied).any())]))[0]:
+    if system.tied is not None and largest(comm, (body & system.tied).any()):
         R = R[:, :d]
     upper = np.triu_indices(R.shape[1])
     wanted = R.T @ np.column_stack([system.M @ mode - moved @ mode for mode in R.T])
@@ -175,7 +175,7 @@ def _inertia_correction(system: SemiDiscreteSystem, moved: Matrix, inner: Mask, 
     ends = np.cumsum([shape.shape[1] for shape in shapes])[:-1]
     shares = [shape @ c for shape, c in zip(shapes, np.split(coefficients, ends), strict=True)]
     entries = [share if i is j else 0.5 * share for share, (i, j) in zip(shares, pairs, strict=True)]
-    _refuse_coarse(float(comm.max(np.array([max_abs(np.concatenate(entries))]))[0]))
+    _refuse_coarse(largest(comm, max_abs(np.concatenate(entries))))
     i, j = (np.concatenate([pair[side] for pair in pairs]) for side in (0, 1))
     value = 0.5 * np.concatenate(shares) * nodal[i]
     both = np.concatenate([i, j]), np.concatenate([j, i])

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core.algebra import Array, Indices, Mask, Matrix
+from ..core.algebra import Array, Indices, Mask, Matrix, largest
 from ..core.errors import InputError
 from ..core.system import SemiDiscreteSystem
 
@@ -35,9 +35,9 @@ def from_neighbours(system: SemiDiscreteSystem, massless: Mask, contact: Mask, n
     left, donors, exact = massless.copy(), ~contact, True
     if system.tied is not None:
         donors &= ~system.tied
-    while comm.max(np.array([float(left.any())]))[0]:
+    while largest(comm, left.any()):
         rows = _rows(system, left, donors, nodal, exact=exact)
-        if comm.max(np.array([float(len(rows))]))[0]:
+        if largest(comm, len(rows)):
             levels.append(algebra.replaced_rows(system.rows, rows))
             ready = np.fromiter(rows, dtype=np.int64, count=len(rows))
             left[ready] = False

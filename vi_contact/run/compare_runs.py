@@ -11,7 +11,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ..core.algebra import Array, max_abs
+from ..core.algebra import Array, largest, max_abs
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.step import Report
@@ -80,7 +80,7 @@ class WholeRun:
         self.times.append(report.new.t)
         self.impulse.append(self.impulse[-1] + (report.new.t - report.old.t) * force)
         self.towards.append(self._mean(problem, report.new.u))
-        self.largest = max(self.largest, float(surface.comm.max(np.array([max_abs(report.new.u)]))[0]))
+        self.largest = max(self.largest, largest(surface.comm, max_abs(report.new.u)))
 
     @staticmethod
     def _mean(problem: ContactProblem, u: Array) -> float:

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..core.algebra import Array, Mask, max_abs
+from ..core.algebra import Array, Mask, largest, max_abs
 from ..core.errors import InputError, StepFailure
 from ..core.problem import ContactProblem
 from ..core.step import Certificate, EffectiveMatrix, Solver, StepProblem, StepResult
@@ -165,8 +165,8 @@ class Proximal:
 
     def _closes(self, motion: _Motion) -> Mask:
         """Contact points that come nearer to their obstacle."""
-        largest = self.step.surface.comm.max(np.array([max_abs(motion.d)]))[0]
-        return np.asarray((motion.closing > STOPPED * largest) & np.isfinite(self.step.bound))
+        size = largest(self.step.surface.comm, max_abs(motion.d))
+        return np.asarray((motion.closing > STOPPED * size) & np.isfinite(self.step.bound))
 
     def _refuse_flight(self, motion: _Motion) -> None:
         """InputError for a driven rigid motion without end."""

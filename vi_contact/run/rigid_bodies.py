@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core.algebra import Array, Comm, Indices, Matrix
+from ..core.algebra import Array, Comm, Indices, Matrix, largest
 from ..core.problem import ContactProblem
 from ..core.system import SemiDiscreteSystem
 from ..laws.mass_transfer import rigid_motions
@@ -68,15 +68,15 @@ def _free(system: SemiDiscreteSystem) -> Iterator[FreeMotions]:
     stiffness = np.abs(system.K.diagonal())
     for number in range(_count(comm, numbers)):
         rows = np.flatnonzero(numbers == number)
-        largest = float(comm.max(np.array([np.max(stiffness[rows], initial=0.0)]))[0])
-        if largest == 0.0:
+        stiffest = largest(comm, np.max(stiffness[rows], initial=0.0))
+        if stiffest == 0.0:
             continue  # every node of it is held
         high = comm.max(np.max(points[rows], axis=0, initial=-np.inf))
         low = -comm.max(np.max(-points[rows], axis=0, initial=-np.inf))
         x = (points[rows] - 0.5 * (low + high)) / max(float(np.max(high - low)), 1e-300)
         w = rigid_motions(system.influence[rows], x)
         bending = _form(system, system.K, rows, w)[1]
-        w = w @ _kernel(bending, FREE * largest)
+        w = w @ _kernel(bending, FREE * stiffest)
         momenta, inertia = _form(system, system.M, rows, w)
         basis = _orthonormal(inertia)
         size = comm.max(np.max(np.abs(w @ basis), axis=0, initial=0.0))
@@ -145,4 +145,4 @@ def body_springs(problem: ContactProblem) -> Matrix:
 
 
 def _count(comm: Comm, numbers: Indices) -> int:
-    return 1 + int(comm.max(np.array([float(np.max(numbers, initial=0))]))[0])
+    return 1 + int(largest(comm, np.max(numbers, initial=0)))

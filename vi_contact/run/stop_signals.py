@@ -12,9 +12,7 @@ import threading
 from types import FrameType, TracebackType
 from typing import Any
 
-import numpy as np
-
-from ..core.algebra import Comm
+from ..core.algebra import Comm, largest
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
@@ -48,7 +46,7 @@ class StopSignals:
 
     def asked(self, comm: Comm) -> int:
         """The number of a signal that some rank has got, the same on all ranks; 0 for none. Collective."""
-        number = int(comm.max(np.array([float(self._found)]))[0])
+        number = int(largest(comm, self._found))
         self._found = 0 if number else self._found
         return number
 

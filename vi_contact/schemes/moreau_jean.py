@@ -32,7 +32,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..core.algebra import Array, Mask, max_abs
+from ..core.algebra import Array, Mask, largest, max_abs
 from ..core.checks import flag, real, shown
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
@@ -158,5 +158,5 @@ def _closed(problem: ContactProblem, state: State, dt: float) -> Mask:
     """Points whose gap is closed in the middle of the step if nothing stops them, and bilateral ones."""
     surface = problem.surface
     gap = surface.gap(state.t + 0.5 * dt) - surface.normal_values(state.u + 0.5 * dt * state.v)
-    size = surface.comm.max(np.array([max(max_abs(state.u), dt * max_abs(state.v))]))[0]
+    size = largest(surface.comm, max(max_abs(state.u), dt * max_abs(state.v)))
     return np.asarray((gap <= ROUND_OFF * size) | surface.bilateral)

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.algebra import Array
+from ..core.algebra import Array, total
 from ..core.checks import provides
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
@@ -88,8 +88,7 @@ class FreeFieldSide:
         self._check_foot()
 
     def _check_foot(self) -> None:
-        held = self.space.held[self._blocks[self._rows == 0]].astype(float).sum()
-        held = float(self.space.comm.sum(np.array([held]))[0])
+        held = total(self.space.comm, self.space.held[self._blocks[self._rows == 0]].sum())
         name, compliant = self.given.facets.name, isinstance(self.given.base, CompliantBase)
         if not compliant and held < 2:
             raise InputError(f"the lowest node of free-field side '{name}' is not held: clamp or prescribe the base, "

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..core.algebra import largest
 from ..core.errors import StepFailure
 from ..core.problem import ContactProblem
 from ..core.step import Certificate, EffectiveMatrix, PreparedSolver, Solver, StepProblem, StepResult
@@ -76,8 +77,7 @@ class CertifiedSolver:
 
 def refuse_nan(step: StepProblem) -> None:
     """A NaN would spread silently through every solver; asked of all ranks, so that all stop."""
-    bad = float(not np.isfinite(np.sum(step.b)))
-    if step.surface.comm.max(np.array([bad]))[0]:
+    if largest(step.surface.comm, not np.isfinite(np.sum(step.b))):
         raise StepFailure(
             f"the load of step {step.k} at t = {step.t:.6g} s contains NaN or infinite values: "
             "check the excitation, the tractions and the initial data"

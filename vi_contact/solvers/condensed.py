@@ -19,7 +19,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..core.algebra import Array, Mask
+from ..core.algebra import Array, Mask, total
 from ..core.checks import instance, provides
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
@@ -115,7 +115,7 @@ class PreparedCondensed:
         rows = np.zeros((m, m))
         rows[surface.slots] = columns[surface.owned]
         G = surface.comm.sum(rows)
-        entries = float(surface.comm.sum(np.array([float(columns.size)]))[0])
+        entries = total(surface.comm, columns.size)
         self._columns = columns if entries <= STORED_ENTRIES else None
         return np.asarray(0.5 * (G + G.T) + np.diag(extra))
 

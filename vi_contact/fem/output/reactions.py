@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...core.algebra import largest
 from ...core.checks import array, column_name
 from ...core.errors import InputError
 from ...core.problem import ContactProblem
@@ -81,7 +82,7 @@ class Reactions:
         facets_of(f"reactions '{self.name}'", "facets", self.facets, space.mesh)
         blocks = space.facet_blocks(self.facets.indices)
         held[blocks] = space.held[blocks]
-        if not space.comm.max(np.array([float(held.any())]))[0]:
+        if not largest(space.comm, held.any()):
             raise InputError(f"nothing is prescribed on boundary group '{self.facets.name}': it has no reactions")
         fields, self._parts = rigid_fields(space.points, self.centre)
         for field in fields:

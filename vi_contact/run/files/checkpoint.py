@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from ...core.algebra import largest
 from ...core.checks import array, number, shown, whole
 from ...core.errors import InputError
 from ...core.files import on_root, write_atomically
@@ -115,8 +116,7 @@ def _split(problem: ContactProblem, state: State) -> tuple[Arrays, Arrays]:
     same: Arrays = {"r_n": state.r_n, "active": state.active} | ({} if state.r_t is None else {"r_t": state.r_t})
     for name in sorted(state.memory):
         array = np.asarray(state.memory[name])
-        foreign = float(array.shape != state.u.shape)
-        kind = same if comm.max(np.array([foreign]))[0] else vectors
+        kind = same if largest(comm, array.shape != state.u.shape) else vectors
         kind[f"{MEMORY}{name}"] = array
     return vectors, same
 

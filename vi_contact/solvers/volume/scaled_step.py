@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from ...core.algebra import Array, Mask, max_abs
+from ...core.algebra import Array, Mask, max_abs, total
 from ...core.step import StepProblem
 from .bounded_system import BoundedSystem
 from .failures import NOT_A_NUMBER
@@ -69,7 +69,7 @@ class ScaledStep:
         F = self.residual(values)
         G.array[:] = F
         energy = 0.5 * ((values - self._zero[0]) @ (F + self._zero[1]))
-        return float(self.system.surface.comm.sum(np.array([energy]))[0])
+        return total(self.system.surface.comm, energy)
 
     def measure_from(self, y: Array) -> None:
         """Take y as the origin of the objective."""
