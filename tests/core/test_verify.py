@@ -11,8 +11,8 @@ from bar import before_impact, bouncing, period_three, run, thrown
 from chain import chain_problem
 from shaken import changes, shaken
 
-from vi_contact.core.algebra import SerialMatrix
-from vi_contact.core.step import EffectiveMatrix, Report, StepProblem, StepResult, initial_state
+from vi_contact.core.algebra import EffectiveMatrix, SerialMatrix
+from vi_contact.core.step import Report, StepProblem, StepResult, initial_state
 from vi_contact.core.verify import energies, energy_balance, kkt_residual
 from vi_contact.laws.impact import ComponentReset, Elastic, Inelastic, MassProjection, Newton
 from vi_contact.schemes.linear_multistep import LinearMultistep

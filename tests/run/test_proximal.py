@@ -10,9 +10,10 @@ import pytest
 from fem_problems import CONCRETE, block, linear
 from mpi4py import MPI
 
+from vi_contact.core.algebra import EffectiveMatrix
 from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.core.problem import ContactProblem
-from vi_contact.core.step import Certificate, EffectiveMatrix, State, StepProblem, StepResult, initial_state
+from vi_contact.core.step import Certificate, State, StepProblem, StepResult, initial_state
 from vi_contact.core.surfaces import HalfSpace
 from vi_contact.core.verify import kkt_residual
 from vi_contact.fem.assembly import assemble

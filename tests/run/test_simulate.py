@@ -13,9 +13,10 @@ import pytest
 from chain import chain_problem
 from summaries import summary_of
 
+from vi_contact.core.algebra import EffectiveMatrix
 from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.core.problem import ContactProblem
-from vi_contact.core.step import EffectiveMatrix, Report, State, StepProblem, StepResult
+from vi_contact.core.step import Report, State, StepProblem, StepResult
 from vi_contact.core.surfaces import ContactSurface
 from vi_contact.laws.excitation import Harmonic
 from vi_contact.laws.impact import Inelastic

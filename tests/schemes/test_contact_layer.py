@@ -12,9 +12,9 @@ from fem_problems import max_over_ranks, shaken_wall
 from mpi4py import MPI
 from two_bodies import two_blocks
 
-from vi_contact.core.algebra import Array, SerialAlgebra, total
+from vi_contact.core.algebra import Array, EffectiveMatrix, SerialAlgebra, total
 from vi_contact.core.problem import ContactProblem
-from vi_contact.core.step import EffectiveMatrix, State, StepProblem
+from vi_contact.core.step import State, StepProblem
 from vi_contact.fem.contact.pairs import contact_pair
 from vi_contact.fem.loads import BodyForce, Traction
 from vi_contact.fem.petsc_algebra import PetscAlgebra

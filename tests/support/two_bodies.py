@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -54,7 +53,7 @@ def per_body(system: SemiDiscreteSystem, *functions: Callable[[Array], Array]) -
 
 def thrown(system: SemiDiscreteSystem, *functions: Callable[[Array], Array]) -> SemiDiscreteSystem:
     """The system with an initial velocity for each body."""
-    return replace(system, v0=per_body(system, *functions), _cache={})
+    return system.changed(v0=per_body(system, *functions))
 
 
 def momenta(problem: ContactProblem, v: Array) -> Array:

@@ -13,8 +13,8 @@ import numpy as np
 import scipy.sparse as sp
 from reference_lcp import enumerate_lcp
 
-from vi_contact.core.algebra import Array, SerialAlgebra, SerialComm, SerialMatrix
-from vi_contact.core.step import EffectiveMatrix, StepProblem, StepResult
+from vi_contact.core.algebra import Array, EffectiveMatrix, SerialAlgebra, SerialComm, SerialMatrix
+from vi_contact.core.step import StepProblem, StepResult
 from vi_contact.core.surfaces import ContactSurface
 
 

@@ -14,9 +14,8 @@ from fem_problems import dense, spread
 from mpi4py import MPI
 from wall_runs import POINTS, SCHEME, follow, history, model, problem
 
-from vi_contact.core.algebra import Array
+from vi_contact.core.algebra import Array, EffectiveMatrix
 from vi_contact.core.problem import ContactProblem
-from vi_contact.core.step import EffectiveMatrix
 from vi_contact.engineering.modal import lowest_frequency
 from vi_contact.laws.impact import MassProjection
 from vi_contact.laws.materials import LinearElastic

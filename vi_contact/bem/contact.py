@@ -20,13 +20,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..core.algebra import Array, Indices, Mask, SerialAlgebra, SerialComm, SerialMatrix
+from ..core.algebra import Array, EffectiveMatrix, Indices, Mask, SerialAlgebra, SerialComm, SerialMatrix
 from ..core.checks import array, flag, function, instance, integers, provides
 from ..core.corners import FEATURE_ANGLE
 from ..core.errors import InputError
 from ..core.initial_gap import admissible_gap
 from ..core.protocols import FrictionLaw, Frictionless
-from ..core.step import EffectiveMatrix, StepProblem
+from ..core.step import StepProblem
 from ..core.surfaces import ContactSurface, Obstacle, Touching, nodal_frames
 from .boundary_mesh import BoundaryMesh
 from .energetic import summed

@@ -19,11 +19,11 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from ..core.algebra import Array
+from ..core.algebra import Array, EffectiveMatrix
 from ..core.checks import instance
 from ..core.errors import InputError, StepFailure
 from ..core.problem import ContactProblem
-from ..core.step import EffectiveMatrix, State, StepProblem, StepResult
+from ..core.step import State, StepProblem, StepResult
 from ..laws.impact import NoImpact
 from ..schemes.midpoint import Midpoint
 from ..solvers.condensed import Condensed

@@ -9,6 +9,7 @@ returned by ``dot`` and by ``Comm`` are the same number on every rank.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import Any, Protocol, SupportsFloat
 
 import numpy as np
@@ -108,6 +109,32 @@ class Algebra(Protocol):
 
     def factor(self, A: Matrix) -> Factor: ...
     def dot(self, x: Array, y: Array) -> float: ...
+
+
+class EffectiveMatrix:
+    """Hold the matrix A of a step and its factor. A prepared solver belongs to one of these; it lives as long as dt."""
+
+    def __init__(self, matrix: Matrix, algebra: Algebra) -> None:
+        self.matrix = matrix
+        self.algebra = algebra
+
+    @cached_property
+    def factor(self) -> Factor:
+        """The one factorisation of A."""
+        return self.algebra.factor(self.matrix)
+
+    @property
+    def factorised(self) -> bool:
+        """Whether a factor has been made."""
+        return "factor" in self.__dict__
+
+    @cached_property
+    def largest(self) -> float:
+        """The largest diagonal entry on any rank, a measure of |A|."""
+        return largest(self.algebra.comm, max_abs(self.matrix.diagonal()))
+
+    def __matmul__(self, x: Array) -> Array:
+        return self.matrix @ x
 
 
 class SerialComm:

@@ -20,7 +20,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from .algebra import Algebra, Array, Factor, Mask, Matrix, largest, max_abs
+from .algebra import Array, EffectiveMatrix, Mask, largest, max_abs
 from .errors import InputError
 from .problem import ContactProblem
 from .protocols import FrictionLaw, Frictionless, MassLaw
@@ -43,32 +43,6 @@ class State:
     active: Mask
     memory: Mapping[str, Array] = field(default_factory=dict)
     r_t: Array | None = None
-
-
-class EffectiveMatrix:
-    """A and its factor. Identity matters: a prepared solver belongs to one of these, and it lives as long as dt."""
-
-    def __init__(self, matrix: Matrix, algebra: Algebra) -> None:
-        self.matrix = matrix
-        self.algebra = algebra
-
-    @cached_property
-    def factor(self) -> Factor:
-        """The one factorisation of A."""
-        return self.algebra.factor(self.matrix)
-
-    @property
-    def factorised(self) -> bool:
-        """Whether a factor has been made."""
-        return "factor" in self.__dict__
-
-    @cached_property
-    def largest(self) -> float:
-        """The largest diagonal entry on any rank, a measure of |A|."""
-        return largest(self.algebra.comm, max_abs(self.matrix.diagonal()))
-
-    def __matmul__(self, x: Array) -> Array:
-        return self.matrix @ x
 
 
 @dataclass(frozen=True)

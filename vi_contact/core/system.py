@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from .algebra import Algebra, Array, Mask, Matrix
+from .algebra import Algebra, Array, EffectiveMatrix, Mask, Matrix
 from .checks import array, function, instance, provides, several, shown
 from .errors import InputError
 
@@ -182,10 +182,21 @@ class SemiDiscreteSystem:
             self._cache[name] = make()
         return self._cache[name]
 
+    def changed(self, **values: Any) -> SemiDiscreteSystem:
+        """Return the same system with other values of the attributes that are named, and no factor of the old one."""
+        return replace(self, **values, _cache={})
+
+    def effective(self, *, m: float, c: float, k: float) -> EffectiveMatrix:
+        """Return A = m M + c C + k K for all steps of one size; its factor is made when it is first needed."""
+        terms = [(m, self.M), (k, self.K)]
+        if self.C is not None:
+            terms.append((c, self.C))
+        return EffectiveMatrix(self.algebra.combine(terms), self.algebra)
+
     def with_load(self, *terms: tuple[Array, Callable[[float], float]]) -> SemiDiscreteSystem:
         """The same system with separable loads vector * history(t) added."""
         load = replace(self.load, separable=self.load.separable + terms)
-        return replace(self, load=load, _cache={})
+        return self.changed(load=load)
 
     def inertia(self, direction: Array) -> Array:
         """M r: the force [N] that accelerates body and prescribed nodes together by one in this direction (d,)."""
@@ -199,8 +210,7 @@ class SemiDiscreteSystem:
         """
         turn, inverse = self.algebra.congruence, (T if dual is None else dual).transpose_apply
         influence = np.column_stack([inverse(column) for column in self.influence.T])
-        return replace(
-            self,
+        return self.changed(
             M=turn(T, self.M),
             C=None if self.C is None else turn(T, self.C),
             K=turn(T, self.K),
@@ -209,7 +219,6 @@ class SemiDiscreteSystem:
             base_mass=_columns(self.base_mass, T.transpose_apply),
             u0=inverse(self.u0),
             v0=inverse(self.v0),
-            _cache={},
         )
 
     def in_relative(self, R: Matrix) -> SemiDiscreteSystem:
@@ -222,8 +231,7 @@ class SemiDiscreteSystem:
         def inverse(x: Array) -> Array:
             return 2.0 * x - R @ x
 
-        return replace(
-            self,
+        return self.changed(
             M=turn(R, self.M),
             C=None if self.C is None else turn(R, self.C),
             K=turn(R, self.K),
@@ -232,7 +240,6 @@ class SemiDiscreteSystem:
             base_mass=_columns(self.base_mass, R.transpose_apply),
             u0=inverse(self.u0),
             v0=inverse(self.v0),
-            _cache={},
         )
 
 

@@ -54,7 +54,7 @@ def geometric_stiffness(problem: ContactProblem, state: State) -> SemiDiscreteSy
     if any(condition.moves for condition in space.prescribed):
         load = _with_prescribed(space, PetscMatrix(full), load, state.t)
     K = system.algebra.combine([(1.0, system.K), (1.0, reduced)])
-    stiffer = replace(system, K=K, load=load, _cache={})
+    stiffer = system.changed(K=K, load=load)
     if not space.forms.foreign(system, "K"):
         space.forms.own(stiffer)
     return stiffer

@@ -45,7 +45,7 @@ def release(static: ContactProblem, state: State, problem: ContactProblem) -> tu
     nodal = before.expand(static.cartesian(state.u), state.t)
     u0 = after.restrict(nodal)
     _refuse_moved(after, nodal, u0)
-    system = replace(problem.system, u0=u0, v0=np.zeros_like(u0), _cache={})
+    system = problem.system.changed(u0=u0, v0=np.zeros_like(u0))
     still = system.load.at_rest(0.0)
     force = system.K @ u0 - still + _contact_force(problem, state)
     was_held = (before.held | before.tied).ravel()[after.free]

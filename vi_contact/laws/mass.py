@@ -9,7 +9,7 @@ contact forces are those of the waves alone.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -82,7 +82,7 @@ class Redistributed:
             _inertia_correction(system, moved, body & ~contact, body, nodal) for body in _bodies(system, ~contact)
         ]
         M = algebra.combine([(1.0, moved), *((1.0, correction) for correction in corrections)])
-        return replace(system, M=M, C=C, load=load, massless=massless, _cache={})
+        return system.changed(M=M, C=C, load=load, massless=massless)
 
 
 def _bodies(system: SemiDiscreteSystem, inner: Mask) -> Iterator[Mask]:

@@ -23,7 +23,7 @@ def with_weight(
     """
     weight = own_weight(system, acceleration, direction)
     load = replace(system.load, constant=system.load.constant + weight)
-    return replace(system, load=load, _cache={})
+    return system.changed(load=load)
 
 
 def own_weight(

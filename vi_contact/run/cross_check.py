@@ -11,11 +11,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..core.algebra import max_abs
+from ..core.algebra import EffectiveMatrix, max_abs
 from ..core.checks import number, provides, several
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
-from ..core.step import EffectiveMatrix, PreparedSolver, Scheme, Solver, State, StepProblem, StepResult
+from ..core.step import PreparedSolver, Scheme, Solver, State, StepProblem, StepResult
 from ..core.surfaces import ContactSurface
 from .checks import check_solver
 from .compare_runs import Opinion, Overall, WholeRun

@@ -15,9 +15,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core.algebra import Array, Mask, Matrix
+from ..core.algebra import Array, EffectiveMatrix, Mask, Matrix
 from ..core.problem import ContactProblem
-from ..core.step import EffectiveMatrix, PreparedSolver, State, StepProblem
+from ..core.step import PreparedSolver, State, StepProblem
 from ..core.surfaces import ContactSurface
 from ..solvers.condensed import Condensed
 

@@ -13,9 +13,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core.algebra import Mask
+from ..core.algebra import EffectiveMatrix, Mask
 from ..core.problem import ContactProblem
-from ..core.step import EffectiveMatrix, State, StepProblem
+from ..core.step import State, StepProblem
 from ..core.surfaces import ContactSurface
 from ..solvers.certified import TOLERANCE, CertifiedSolver
 from ..solvers.condensed import Condensed

@@ -26,10 +26,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..core.algebra import Array, Mask
+from ..core.algebra import Array, EffectiveMatrix, Mask
 from ..core.checks import flag
 from ..core.problem import ContactProblem
-from ..core.step import Balance, EffectiveMatrix, State, StepProblem, StepResult
+from ..core.step import Balance, State, StepProblem, StepResult
 from .admissible_predictor import admissible
 from .position_step import position_step
 from .single_step import SingleStep, stepped
@@ -49,11 +49,7 @@ class ContactStabilisedNewmark(SingleStep):
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
         """A = 4/dt² M + 2/dt C + K."""
-        system = problem.equations
-        terms = [(4.0 / dt**2, system.M), (1.0, system.K)]
-        if system.C is not None:
-            terms.append((2.0 / dt, system.C))
-        return EffectiveMatrix(system.algebra.combine(terms), system.algebra)
+        return problem.equations.effective(m=4.0 / dt**2, c=2.0 / dt, k=1.0)
 
     def _predictor(self, problem: ContactProblem, state: State, dt: float) -> tuple[Array, Mask]:
         """(u_p, the contact set expected at the end of the step)."""

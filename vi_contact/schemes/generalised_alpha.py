@@ -32,11 +32,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..core.algebra import Array
+from ..core.algebra import Array, EffectiveMatrix
 from ..core.checks import real, shown
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
-from ..core.step import Balance, EffectiveMatrix, State, StepProblem, StepResult
+from ..core.step import Balance, State, StepProblem, StepResult
 from .balance_step import BalanceStep
 from .consistent_data import consistent_acceleration, without_inertia
 from .contact_layer import at_rest_between, relaxed
@@ -95,12 +95,9 @@ class AlphaStep(BalanceStep, ABC):
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
         """A of the module's equations."""
-        system, w = problem.equations, self.weights
+        w = self.weights
         inertia = (1.0 - w.alpha_m) / ((1.0 - w.alpha_f) * w.beta * dt**2)
-        terms = [(inertia, system.M), (1.0, system.K)]
-        if system.C is not None:
-            terms.append((w.gamma / (w.beta * dt), system.C))
-        return EffectiveMatrix(system.algebra.combine(terms), system.algebra)
+        return problem.equations.effective(m=inertia, c=w.gamma / (w.beta * dt), k=1.0)
 
     def _known(self, state: State, dt: float) -> tuple[Array, Array]:
         """(v1, a1) for u1 = 0."""

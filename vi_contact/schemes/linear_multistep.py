@@ -24,11 +24,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..core.algebra import Array
+from ..core.algebra import Array, EffectiveMatrix
 from ..core.checks import array, number
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
-from ..core.step import Balance, EffectiveMatrix, State, StepProblem, StepResult
+from ..core.step import Balance, State, StepProblem, StepResult
 from .balance_step import BalanceStep
 from .consistent_data import consistent_acceleration, without_inertia
 from .contact_layer import at_rest_between, relaxed
@@ -136,11 +136,7 @@ class LinearMultistep(BalanceStep):
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
         """A of the module's equations."""
-        system = problem.equations
-        terms = [(self._acceleration_factor(dt), system.M), (1.0, system.K)]
-        if system.C is not None:
-            terms.append((self._velocity_factor(dt), system.C))
-        return EffectiveMatrix(system.algebra.combine(terms), system.algebra)
+        return problem.equations.effective(m=self._acceleration_factor(dt), c=self._velocity_factor(dt), k=1.0)
 
     def _levels(self, state: State) -> dict[str, Array]:
         """u, v, a at the q levels before the step, 1 = newest."""

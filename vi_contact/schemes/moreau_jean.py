@@ -32,11 +32,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..core.algebra import Array, Mask, largest, max_abs
+from ..core.algebra import Array, EffectiveMatrix, Mask, largest, max_abs
 from ..core.checks import flag, real, shown
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
-from ..core.step import Balance, EffectiveMatrix, State, StepProblem, StepResult
+from ..core.step import Balance, State, StepProblem, StepResult
 from ..laws.impact import NoImpact
 from .single_step import SingleStep, stepped
 
@@ -95,11 +95,7 @@ class MoreauJean(SingleStep):
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
         """A = M + theta dt C + theta² dt² K."""
-        system = problem.equations
-        terms = [(1.0, system.M), ((self.theta * dt) ** 2, system.K)]
-        if system.C is not None:
-            terms.append((self.theta * dt, system.C))
-        return EffectiveMatrix(system.algebra.combine(terms), system.algebra)
+        return problem.equations.effective(m=1.0, c=self.theta * dt, k=(self.theta * dt) ** 2)
 
     def _load(self, problem: ContactProblem, t: float, dt: float) -> Array:
         load = problem.equations.load

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from ..core.algebra import Array, Mask
+from ..core.algebra import Array, EffectiveMatrix, Mask
 from ..core.problem import ContactProblem
-from ..core.step import EffectiveMatrix, State, StepProblem
+from ..core.step import State, StepProblem
 
 
 def position_step(

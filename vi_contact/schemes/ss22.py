@@ -16,10 +16,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..core.algebra import EffectiveMatrix
 from ..core.checks import real, shown
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
-from ..core.step import Balance, EffectiveMatrix, State, StepProblem, StepResult
+from ..core.step import Balance, State, StepProblem, StepResult
 from .position_step import position_step
 from .single_step import SingleStep, stepped
 
@@ -40,11 +41,8 @@ class SS22(SingleStep):
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
         """A = 2/(theta2 dt²) M + 2 theta1/(theta2 dt) C + K."""
-        system = problem.equations
-        terms = [(2.0 / (self.theta2 * dt**2), system.M), (1.0, system.K)]
-        if system.C is not None:
-            terms.append((2.0 * self.theta1 / (self.theta2 * dt), system.C))
-        return EffectiveMatrix(system.algebra.combine(terms), system.algebra)
+        theta1, theta2 = self.theta1, self.theta2
+        return problem.equations.effective(m=2.0 / (theta2 * dt**2), c=2.0 * theta1 / (theta2 * dt), k=1.0)
 
     def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem:
         """b = A (u0 + dt v0) + (f - C v0 - K (u0 + theta1 dt v0))/theta2."""

@@ -18,9 +18,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+from ..core.algebra import EffectiveMatrix
 from ..core.problem import ContactProblem
 from ..core.protocols import MassLaw
-from ..core.step import Balance, EffectiveMatrix, State, StepProblem, StepResult
+from ..core.step import Balance, State, StepProblem, StepResult
 from ..laws.mass import Redistributed, mass_law
 from .contact_layer import at_rest_between, relaxed
 from .guard import contact_in_the_balance, needs_no_impact_law
@@ -60,11 +61,7 @@ class Trapezoidal:
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
         """A = 4/dt² M + 2/dt C + K."""
-        system = problem.equations
-        terms = [(4.0 / dt**2, system.M), (1.0, system.K)]
-        if system.C is not None:
-            terms.append((2.0 / dt, system.C))
-        return EffectiveMatrix(system.algebra.combine(terms), system.algebra)
+        return problem.equations.effective(m=4.0 / dt**2, c=2.0 / dt, k=1.0)
 
     def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem:
         """b of the module's equations."""

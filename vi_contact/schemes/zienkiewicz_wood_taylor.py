@@ -16,11 +16,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..core.algebra import Array
+from ..core.algebra import Array, EffectiveMatrix
 from ..core.checks import real, shown
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
-from ..core.step import Balance, EffectiveMatrix, State, StepProblem, StepResult
+from ..core.step import Balance, State, StepProblem, StepResult
 from .position_step import position_step
 from .single_step import SingleStep, stepped
 
@@ -38,11 +38,7 @@ class ZienkiewiczWoodTaylor(SingleStep):
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
         """A = M/(phi dt)² + C/(phi dt) + K."""
-        system = problem.equations
-        terms = [(1.0 / (self.phi * dt) ** 2, system.M), (1.0, system.K)]
-        if system.C is not None:
-            terms.append((1.0 / (self.phi * dt), system.C))
-        return EffectiveMatrix(system.algebra.combine(terms), system.algebra)
+        return problem.equations.effective(m=1.0 / (self.phi * dt) ** 2, c=1.0 / (self.phi * dt), k=1.0)
 
     def _load(self, problem: ContactProblem, state: State, dt: float) -> Array:
         return problem.equations.load(state.t + self.phi * dt)

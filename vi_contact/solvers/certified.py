@@ -10,10 +10,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..core.algebra import largest
+from ..core.algebra import EffectiveMatrix, largest
 from ..core.errors import StepFailure
 from ..core.problem import ContactProblem
-from ..core.step import Certificate, EffectiveMatrix, PreparedSolver, Solver, StepProblem, StepResult
+from ..core.step import Certificate, PreparedSolver, Solver, StepProblem, StepResult
 from ..core.surfaces import ContactSurface
 from ..core.verify import kkt_residual
 from .correction import corrected

@@ -19,11 +19,11 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..core.algebra import Array, Mask, total
+from ..core.algebra import Array, EffectiveMatrix, Mask, total
 from ..core.checks import instance, provides
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
-from ..core.step import EffectiveMatrix, StepProblem, StepResult
+from ..core.step import StepProblem, StepResult
 from ..core.surfaces import ContactSurface
 from .friction.condensed import CondensedFriction
 from .friction.newton import FrictionNewton

@@ -197,4 +197,4 @@ def weighted(system: SemiDiscreteSystem, weighing: Sequence[str]) -> SemiDiscret
             raise InputError(f"unknown body '{name}': {' and '.join(BODIES)} may have weight")
     heavy = np.isin(system.space.bodies, [BODIES.index(name) for name in weighing])
     load = replace(system.load, constant=system.load.constant + np.where(heavy, own_weight(system), 0.0))
-    return replace(system, load=load, _cache={})
+    return system.changed(load=load)

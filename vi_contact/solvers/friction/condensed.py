@@ -15,8 +15,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...core.algebra import Array, Indices, Mask
-from ...core.step import EffectiveMatrix, StepProblem
+from ...core.algebra import Array, EffectiveMatrix, Indices, Mask
+from ...core.step import StepProblem
 from ...core.surfaces import ContactSurface
 from .problem import FrictionMethod, FrictionResult
 from .slip_rate import RateIteration

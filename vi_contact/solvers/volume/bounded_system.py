@@ -19,9 +19,9 @@ import numpy as np
 import scipy.sparse as sp
 from petsc4py import PETSc
 
-from ...core.algebra import Array, Comm, Indices, Mask, SerialMatrix
+from ...core.algebra import Array, Comm, EffectiveMatrix, Indices, Mask, SerialMatrix
 from ...core.errors import InputError
-from ...core.step import EffectiveMatrix, StepProblem
+from ...core.step import StepProblem
 from ...core.surfaces import ContactSurface
 
 

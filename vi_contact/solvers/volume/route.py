@@ -16,11 +16,11 @@ from typing import Any, Protocol, cast
 import numpy as np
 from petsc4py import PETSc
 
-from ...core.algebra import Array
+from ...core.algebra import Array, EffectiveMatrix
 from ...core.checks import instance, provides, real, shown
 from ...core.errors import InputError, StepFailure
 from ...core.problem import ContactProblem
-from ...core.step import EffectiveMatrix, StepProblem, StepResult
+from ...core.step import StepProblem, StepResult
 from ...core.surfaces import ContactSurface
 from .bounded_system import BoundedSystem
 from .failures import raised, stopped
