@@ -10,10 +10,10 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.rows import Rows, cell_sides, found_in, number_alike
 
-Array = npt.NDArray[np.float64]
 _ROUND_OFF = 1024 * np.finfo(float).eps
 
 _CORNERS: dict[str, list[tuple[int, ...]]] = {  # a vertex and its d neighbours, right-handed in an unturned cell

@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from vi_contact.core.algebra import Array
 from vi_contact.meshes.rows import Rows, cell_sides, number_alike
 
-Array = npt.NDArray[np.float64]
 Ranks = npt.NDArray[np.int32]
 
 
