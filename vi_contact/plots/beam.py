@@ -1,4 +1,4 @@
-"""Pictures of rod and beam: energies, motion of the tip, shapes of the beam, contact and friction at the tip."""
+"""Draw rod and beam as Figs. 8.1 to 8.9 of Ahn (2012): energies, motion of the tip, shapes of the beam."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _QUANTITIES = ("(A) rotation [-]", "(B) angular speed [1/s]", "(C) displacement 
 
 
 def plot_beam_energies(runs: Mapping[str, BeamRun], path: str | Path, *, title: str) -> Path:
-    """Energy of several runs against time, above; losses by friction, below (Fig. 8.1). Dashed: no losses at all."""
+    """Draw energies of several runs over time, above; losses by friction, below (Fig. 8.1). Dashed: no losses."""
     figure, (top, bottom) = panels(2, (9.0, 7.0), height_ratios=(3, 2))
     for label, run in runs.items():
         (line,) = top.plot(run.history["t"], run.energy, lw=1.1, label=label)
@@ -28,7 +28,7 @@ def plot_beam_energies(runs: Mapping[str, BeamRun], path: str | Path, *, title: 
 
 
 def plot_tips(runs: Mapping[str, BeamRun], path: str | Path, *, title: str) -> Path:
-    """Displacement of the tip against time, a panel per run (Figs. 8.2, 8.3)."""
+    """Draw the displacement of the tip against time, a panel per run (Figs. 8.2, 8.3)."""
     figure, axes = panels(len(runs), (9.0, 2.4 * len(runs) + 1.0))
     for axis, (label, run) in zip(axes, runs.items(), strict=True):
         axis.plot(run.history["t"], run.history["u_tip"], color="black", lw=1.1)
@@ -41,8 +41,8 @@ def plot_tips(runs: Mapping[str, BeamRun], path: str | Path, *, title: str) -> P
 def plot_shapes(
     run: BeamRun, path: str | Path, *, span: tuple[float, float], title: str, count: int = 7, near: float = 0.2
 ) -> Path:
-    """Rotation, angular speed, displacement and velocity along the beam at ``count`` times of a span [s] (Figs. 8.4 to
-    8.9): the last part ``near`` of the beam above, the whole below. The run needs snapshots in the span."""
+    """Draw rotation, angular speed, displacement and velocity along the beam at ``count`` times of a span [s] (Figs.
+    8.4 to 8.9): the last part ``near`` of the beam above, the whole below. The run needs snapshots in the span."""
     import matplotlib
     from matplotlib.figure import Figure
 

@@ -1,4 +1,4 @@
-"""Pictures of the buried channel from recorded histories: as Figs. 7, 8 and 9 of seed 000, and along its outline."""
+"""Draw the buried channel from recorded histories: as Figs. 7 to 9 of the boundary method, and along its outline."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ LEGEND: dict[str, Any] = {"fontsize": 8, "loc": "lower right", "bbox_to_anchor":
 
 @dataclass(frozen=True)
 class Outline:
-    """Where the contact conditions are on the channel: ``arc`` (m,) [m] along its outline, down the left wall, along
-    the base, up the right wall; ``sides``: name -> mask (m,). Corners have a condition on both sides."""
+    """Describe where the contact conditions are on the channel: ``arc`` (m,) [m] along its outline, down the left wall,
+    along the base, up the right wall; ``sides``: name -> mask (m,). Corners have a condition on both sides."""
 
     arc: Array
     sides: Mapping[str, Mask]
 
     @classmethod
     def of(cls, points: Array, normals: Array) -> Outline:
-        """Left wall, base and right wall of contact at ``points`` (m, 2) [m] with outward ``normals`` (m, 2)."""
+        """Make the outline from contact ``points`` (m, 2) [m] with outward ``normals`` (m, 2)."""
         low, high = points.min(axis=0), points.max(axis=0)
         left, right = normals[:, 0] < -0.5, normals[:, 0] > 0.5
         height = high[1] - low[1]
@@ -46,32 +46,32 @@ class Outline:
         return cls(arc, {"left wall": left, "base": ~(left | right), "right wall": right})
 
     def along(self) -> list[tuple[str, Array]]:
-        """(name, its conditions in the order of the arc) of the sides in the order of the arc."""
+        """Return (name, its conditions in the order of the arc) of the sides in the order of the arc."""
         order = np.argsort(self.arc)
         parts = [(name, order[mask[order]]) for name, mask in self.sides.items()]
         return sorted(parts, key=lambda part: float(np.mean(self.arc[part[1]])))
 
     def places(self) -> Array:
-        """(m,) the arc lengths with a corner's two conditions a micrometre apart, in the order of their sides [m]."""
+        """Return the arc lengths (m,) [m], a corner's two conditions a micrometre apart in the order of sides."""
         apart = np.zeros(len(self.arc))
         for rank, (_, conditions) in enumerate(self.along()):
             apart[conditions] = 1e-6 * rank
         return self.arc + apart
 
     def corners(self) -> list[float]:
-        """Arc lengths at which one side ends and the next one starts [m]."""
+        """Return the arc lengths at which one side ends and the next one starts [m]."""
         return [float(self.arc[one].max()) for _, one in self.along()[:-1]]
 
 
 def unit_of(size: float) -> tuple[float, str]:
-    """(metres per unit, name): millimetres from 0.1 mm on, as engineers draw soil and concrete."""
+    """Return (metres per unit, name): millimetres from 0.1 mm on, as engineers draw soil and concrete."""
     if size >= 1.0:
         return 1.0, "m"
     return (1e-3, "mm") if size >= 1e-4 or size == 0.0 else (1e-6, "µm")
 
 
 def opening(history: History, label: str, normal: Sequence[float]) -> Array:
-    """(u_soil - u_channel)·n (rows,) [m] at a point that the probes <label> and <label>_soil record.
+    """Return (u_soil - u_channel)·n (rows,) [m] at a point that the probes <label> and <label>_soil record.
 
     ``normal``: outward normal of the channel; never negative in unilateral contact.
     """
@@ -83,7 +83,7 @@ def opening(history: History, label: str, normal: Sequence[float]) -> Array:
 
 
 def plot_openings(history: History, path: str | Path, *, title: str) -> Path:
-    """Fig. 7: bedrock acceleration, and the openings between channel and soil at its points, left blue, right red."""
+    """Draw Fig. 7: acceleration of the bedrock, and openings between channel and soil, left blue and right red."""
     found = {
         name: [(label, opening(history, label, normal), normal) for label, normal in points.items()]
         for name, points in SHOWN.items()
@@ -112,7 +112,7 @@ def plot_openings(history: History, path: str | Path, *, title: str) -> Path:
 
 
 def plot_rocking(history: History, path: str | Path, *, title: str, corners: Sequence[str] = ("1", "7")) -> Path:
-    """Fig. 8: u_y of the bottom corners with their static settlement; what of it is rocking and what is common."""
+    """Draw Fig. 8: u_y of the bottom corners with their static settlement; what of it is rocking and what is common."""
     left, right = (np.asarray(history[f"u_y_{label}"]) for label in corners)
     t = history["t"]
     metres, unit = unit_of(float(max(np.abs(left).max(), np.abs(right).max())))
@@ -133,7 +133,7 @@ def plot_rocking(history: History, path: str | Path, *, title: str, corners: Seq
 
 
 def plot_interface(runs: Mapping[str, History], outline: Outline, path: str | Path, *, title: str) -> Path:
-    """Map over time and arc length, a panel per run: pressure where closed (root scale), opening where open."""
+    """Draw a map over time and arc length, a panel per run: pressure where closed (root scale), opening where open."""
     import matplotlib
     from matplotlib.colors import Normalize, PowerNorm
 
@@ -186,7 +186,7 @@ def _mark_sides(axis: Any, outline: Outline) -> None:
 
 
 def plot_envelope(runs: Mapping[str, History], outline: Outline, path: str | Path, *, title: str) -> Path:
-    """Along the arc: largest pressure and that of the static stage (dotted), largest opening, share of time open."""
+    """Draw along the arc largest pressure and static pressure (dotted), largest opening, and share of time open."""
     import matplotlib
     from matplotlib.figure import Figure
 

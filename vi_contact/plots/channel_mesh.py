@@ -1,4 +1,4 @@
-"""Pictures of the buried channel's mesh: Fig. 6 of seed 000, the deformed bodies with their contact, an animation."""
+"""Draw the buried channel's mesh: Fig. 6 of the boundary method, the deformed bodies with their contact, a film."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ AROUND = 0.8  # heights of the channel that are shown beside and below it
 
 @dataclass(frozen=True)
 class Bodies:
-    """Frames of a run with what belongs to the channel: mask of ``cells`` (c,), its node of every contact condition
-    ``nodes`` (m,), and where from there a condition is drawn ``inwards`` (m, 2) [m]: at corners those of both sides
-    apart, each towards the middle of its side. ``low``, ``high`` (2,): corners of the channel's outline [m]."""
+    """Hold the frames of a run and what belongs to the channel: mask of ``cells`` (c,), its node of every contact
+    condition ``nodes`` (m,), and where from there a condition is drawn ``inwards`` (m, 2) [m]: at corners those of both
+    sides apart, each towards the middle of its side. ``low``, ``high`` (2,): corners of the channel's outline [m]."""
 
     frames: StoredFrames
     tractions: Tractions
@@ -36,12 +36,12 @@ class Bodies:
 
     @property
     def height(self) -> float:
-        """Of the channel [m]."""
+        """Return the height of the channel [m]."""
         return float(self.high[1] - self.low[1])
 
 
 def read_bodies(folder: str | Path) -> Bodies:
-    """From the folder of a run of the channel with fields and the recorder Contact(). InputError without them."""
+    """Read the folder of a run of the channel with fields and the recorder Contact(). InputError for another folder."""
     frames, tractions = read_frames(folder), read_tractions(folder)
     low, high = tractions.points.min(axis=0), tractions.points.max(axis=0)
     centres = frames.points[frames.cells].mean(axis=1)
@@ -58,7 +58,7 @@ def read_bodies(folder: str | Path) -> Bodies:
 
 @dataclass(frozen=True)
 class Colours:
-    """Of contact pressures: pressure times ``factor`` is in ``unit``, and ``norm`` a root scale of it."""
+    """Hold the colours of contact pressures: pressure times ``factor`` is in ``unit``; ``norm`` is a root scale."""
 
     factor: float
     unit: str
@@ -66,7 +66,7 @@ class Colours:
 
     @classmethod
     def of(cls, pressures: Array) -> Colours:
-        """For all pressures [Pa] that are drawn."""
+        """Make the colours for all pressures [Pa] that are drawn."""
         from matplotlib.colors import PowerNorm
 
         most = np.array([float(pressures.max(initial=0.0)) or 1.0])
@@ -74,7 +74,7 @@ class Colours:
         return cls(float(shown[0] / most[0]), unit, PowerNorm(0.5, 0.0, float(shown[0])))
 
     def bar(self, figure: Any, axes: Any, shrink: float = 1.0) -> None:
-        """The colour bar beside axes."""
+        """Draw the colour bar beside axes."""
         from matplotlib.cm import ScalarMappable
 
         label = f"contact pressure [{self.unit}], open points white"
@@ -85,7 +85,7 @@ class Colours:
 def draw_bodies(
     axis: Any, bodies: Bodies, t: float, *, magnified: float, colours: Colours, follow: bool = False
 ) -> float:
-    """Draws the frame next to t; returns its time [s]. ``follow``: displacements less the mean of the channel's."""
+    """Draw the frame next to t; returns its time [s]. ``follow``: displacements less the mean of the channel's."""
     frames, tractions = bodies.frames, bodies.tractions
     shown, u, _ = frames.at(t)
     own = np.unique(frames.cells[bodies.cells])
@@ -106,7 +106,7 @@ def animate(
     title: str, history: History, openings: Mapping[str, Array], times: Sequence[float], magnified: float,
     fps: int = 10,
 ) -> Path:
-    """Writes a GIF of the frames at ``times`` [s]: bodies, displaced relative to the bedrock, and contact; below the
+    """Write a GIF of the frames at ``times`` [s]: bodies, displaced relative to the bedrock, and contact; below the
     bedrock's acceleration and ``openings`` (name -> values (rows,) [m] of ``history``) with the moment marked.
 
     InputError for another kind of file.
@@ -151,7 +151,7 @@ def _traces(axis: Any, history: History, openings: Mapping[str, Array], span: tu
 
 
 def plane(size: tuple[float, float], heights: Sequence[float] = (1.0,)) -> tuple[Any, Any]:
-    """(figure, axes above each other); the first one without distortion."""
+    """Return (figure, axes above each other); the first axis has one scale for both directions."""
     import matplotlib
     from matplotlib.figure import Figure
 
@@ -170,7 +170,7 @@ def filled(axis: Any, cells: Array, colour: str, lw: float = 0.4) -> None:
 
 
 def bedrock(axis: Any, bodies: Bodies) -> None:
-    """The bedrock's line, hatched below."""
+    """Draw the bedrock's line, hatched below."""
     width, depth = bodies.frames.points.max(axis=0)
     axis.axhline(0.0, color="black", lw=1.5, zorder=3)
     axis.fill_between([-1.0, width + 1.0], -0.05 * depth, 0.0, facecolor="none", edgecolor="0.4", hatch="////", lw=0.0)

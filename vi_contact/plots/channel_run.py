@@ -1,4 +1,4 @@
-"""All pictures of one run of the buried channel, from its folder alone."""
+"""Draw all pictures of one run of the buried channel, from its folder alone."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ DRAWN = 0.15  # of the channel's height: how large its largest displacement is d
 
 
 def illustrate(folder: str | Path, *, title: str = "Buried channel") -> list[Path]:
-    """Draws openings.png, rocking.png, interface.png and envelope.png into the folder of a finished run of
+    """Draw openings.png, rocking.png, interface.png and envelope.png into the folder of a finished run of
     ``vi-contact channel`` or of its model's recorders, and with fields channel.gif, around the widest opening.
 
     Returns what was drawn. InputError for the folder of another run.
@@ -47,7 +47,7 @@ def illustrate(folder: str | Path, *, title: str = "Buried channel") -> list[Pat
 
 
 def film(folder: Path, around: float) -> tuple[Array, float]:
-    """(times of the frames next to a moment [s], a round factor that makes their displacements visible)."""
+    """Return (times of the frames next to a moment [s], a round factor that makes their displacements visible)."""
     bodies = read_bodies(folder)
     frames = bodies.frames
     first = int(np.argmin(np.abs(frames.t - around))) - FILM_FRAMES // 2

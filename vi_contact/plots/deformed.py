@@ -1,4 +1,4 @@
-"""Deformed bodies in the plane with their contact tractions, read from the folder of a run for pictures of them.
+"""Read deformed bodies in the plane and their contact tractions from the folder of a run, to draw them.
 
 A run that writes fields (``fields=fem.XDMF(every=...)``) and records ``Contact()`` leaves all that is needed there.
 """
@@ -18,8 +18,8 @@ from ..run.files.folder import HISTORY_H5
 
 @dataclass(frozen=True)
 class Tractions:
-    """Contact tractions on the body: ``points`` (m, 2) [m]; ``normals``, ``tangents`` (m, 2), the normals towards the
-    support; times ``t`` (k,) [s]; pressures ``normal`` (k, m) [Pa] and shear tractions ``shear`` (k, m) [Pa] of the
+    """Hold contact tractions on the body: ``points`` (m, 2) [m]; ``normals``, ``tangents`` (m, 2), the normals towards
+    the support; times ``t`` (k,) [s]; pressures ``normal`` (k, m) [Pa] and shear tractions ``shear`` (k, m) [Pa] of the
     support on the body along the tangents."""
 
     points: Array
@@ -30,14 +30,14 @@ class Tractions:
     shear: Array
 
     def at(self, t: float) -> tuple[Array, Array]:
-        """(pressure, shear) of the step that ends next to t."""
+        """Return (pressure, shear) of the step that ends next to t."""
         row = int(np.argmin(np.abs(self.t - t)))
         return self.normal[row], self.shear[row]
 
 
 @dataclass(frozen=True)
 class StoredFrames:
-    """The fields of a run: ``points`` (n, 2) [m], ``cells`` (c, corners), times (f,) [s] and a reader of each frame."""
+    """Hold the fields of a run: ``points`` (n, 2) [m], ``cells`` (c, corners), times ``t`` (f,) [s], their files."""
 
     points: Array
     cells: Indices
@@ -45,7 +45,7 @@ class StoredFrames:
     paths: tuple[Path, ...]
 
     def at(self, t: float) -> tuple[float, Array, Array]:
-        """(its time [s], u (n, 2) [m], von Mises stress (c,) [Pa]) of the frame nearest to t."""
+        """Return (its time [s], u (n, 2) [m], von Mises stress (c,) [Pa]) of the frame nearest to t."""
         import h5py
 
         row = int(np.argmin(np.abs(self.t - t)))
@@ -54,7 +54,7 @@ class StoredFrames:
 
 
 def read_tractions(folder: str | Path) -> Tractions:
-    """From the history of a run in the plane. InputError for a folder without one."""
+    """Read tractions from the history of a run in the plane. InputError for a folder without one."""
     import h5py
 
     path = Path(folder) / HISTORY_H5
@@ -69,14 +69,14 @@ def read_tractions(folder: str | Path) -> Tractions:
 
 
 def _tangents(normals: Array) -> Array:
-    """Those of the nodal frames: the axis at right angles to a normal along the other one, else (-n_y, n_x)."""
+    """Return the tangents of nodal frames: along an axis where the normal is along the other one, else (-n_y, n_x)."""
     turned = np.column_stack([-normals[:, 1], normals[:, 0]])
     axis = np.count_nonzero(normals, axis=1) == 1
     return np.where(axis[:, None], np.abs(turned), turned)
 
 
 def read_frames(folder: str | Path) -> StoredFrames:
-    """From the fields of a run. InputError for a folder without them."""
+    """Read the frames from the fields of a run. InputError for a folder without them."""
     import h5py
 
     fields, history = Path(folder) / FIELDS, Path(folder) / HISTORY_H5

@@ -1,4 +1,4 @@
-"""Pictures of friction from recorded histories: force against slip, and where and when points stick or slip."""
+"""Draw friction from recorded histories: force against slip, and where and when points stick or slip."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def plot_hysteresis(
     history: History, path: str | Path, *, axis: str | None = None, tangent: int = 0,
     title: str = "Friction force and slip",
 ) -> Path:
-    """Tangential force of the body on its support along an axis, against the mean slip of all contact points.
+    """Draw the tangential force of the body on its support along an axis, against the mean slip of all contact points.
 
     ``axis``: x, y or z, where the force varies most when None; ``tangent``: which component of the slip. The slip's
     sign is that of the axis for work that is done on the support, so that the loop runs clockwise and its area is the
@@ -75,7 +75,7 @@ def plot_states(
 
 
 def contact_states(history: History) -> Array:
-    """(rows, m) 1 open, 2 stick, 3 slip: closed points slip when their slip changed since the row before.
+    """Return 1 open, 2 stick, 3 slip, (rows, m): closed points slip when their slip changed since the row before.
 
     Changes below 1e-9 of the largest one are rounding. In the first row closed points stick. InputError without records
     of friction.

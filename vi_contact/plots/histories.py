@@ -1,4 +1,4 @@
-"""Pictures of recorded histories, saved as PNG on rank 0.
+"""Draw recorded histories and save them as PNG on rank 0.
 
 matplotlib is imported late, and its state is left alone: neither the user's backend nor his settings change.
 """
@@ -19,7 +19,7 @@ STYLE = {"axes.grid": True, "grid.alpha": 0.3, "axes.spines.top": False, "axes.s
 
 
 def panels(rows: int, size: tuple[float, float], **more: Any) -> tuple[Any, Any]:
-    """(figure, array of axes above each other with one time axis)."""
+    """Make (figure, array of axes above each other with one time axis)."""
     import matplotlib
     from matplotlib.figure import Figure
 
@@ -31,12 +31,12 @@ def panels(rows: int, size: tuple[float, float], **more: Any) -> tuple[Any, Any]
 
 
 def plain(text: str) -> str:
-    """A text of a file or a user as it is drawn: a dollar begins no formula."""
+    """Return a text of a file or a user as it is to be drawn: a dollar begins no formula."""
     return text.replace("$", r"\$")
 
 
 def length_unit(size: float) -> tuple[float, str]:
-    """(metres per unit, name) so that a length of this size has one to three digits before the point."""
+    """Return (metres per unit, name) so that a length of this size has one to three digits before the point."""
     for metres, name in _UNITS:
         if size >= metres:
             return metres, name
@@ -44,7 +44,7 @@ def length_unit(size: float) -> tuple[float, str]:
 
 
 def scaled(values: Array, unit: str) -> tuple[Array, str]:
-    """Values over the power of 1000 that fits their size, and the unit with its prefix."""
+    """Return the values over the power of 1000 that fits their size, and the unit with its prefix."""
     size = float(np.nanmax(np.abs(values), initial=0.0))
     for factor, prefix in ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n")):
         if size >= factor:
@@ -68,7 +68,7 @@ def plot_points(
     unilateral: Sequence[str] | None = (),
     reference: History | None = None,
 ) -> Path:
-    """One panel per point: displacement against time, as Figs. 4 and 5 of seed 000.
+    """Draw the displacement against time, a panel for each point, as Figs. 4 and 5 of the boundary method.
 
     unilateral: labels of contact points on a support at rest, drawn with their bound at zero; None for points of bodies
     that touch each other. reference: another run, drawn in grey.
@@ -94,7 +94,7 @@ def plot_points(
 
 
 def plot_excitation(history: History, path: str | Path, *, title: str = "Ground acceleration") -> Path:
-    """The ground acceleration components that the run used (Fig. 3)."""
+    """Draw the ground acceleration components that the run used (Fig. 3)."""
     figure, (axis,) = panels(1, (9.0, 3.0))
     for component in "xyz":
         values = history.get(f"a_g_{component}")
@@ -119,7 +119,7 @@ LEDGER = (
 
 
 def plot_energy(history: History, path: str | Path, *, title: str = "Energy ledger") -> Path:
-    """The ledger's terms, and its defect relative to the largest of them."""
+    """Draw the ledger's terms, and its defect relative to the largest of them."""
     figure, (top, bottom) = panels(2, (9.0, 6.0), height_ratios=(3, 1))
     present = [entry for entry in LEDGER if entry[0] in history and np.any(history[entry[0]])]
     size = np.array([max((float(np.max(np.abs(history[name]))) for name, *_ in present), default=0.0)])
@@ -137,7 +137,7 @@ def plot_energy(history: History, path: str | Path, *, title: str = "Energy ledg
 
 
 def plot_certificate(history: History, path: str | Path, *, tolerance: float = 1e-9) -> Path:
-    """Certificate of every step, and iterations of the solver."""
+    """Draw the certificate of every step and the iterations of the solver."""
     figure, (top, bottom) = panels(2, (9.0, 5.0))
     t = history["t"][1:]
     log_axis(top, t, history["certificate"][1:])
@@ -151,14 +151,14 @@ def plot_certificate(history: History, path: str | Path, *, tolerance: float = 1
 
 
 def log_axis(axis: Any, t: Array, values: Array) -> None:
-    """Semilogarithmic points; exact zeros are drawn at the bottom, at 1e-18."""
+    """Draw semilogarithmic points; exact zeros are drawn at the bottom, at 1e-18."""
     axis.semilogy(t, np.maximum(values, 1e-18), ".", ms=2, color="black")
 
 
 def plot_runs(
     runs: Mapping[str, History], quantities: Sequence[tuple[str, str, str]], path: str | Path, *, title: str
 ) -> Path:
-    """The same quantities of several runs, a panel per quantity. quantities: (column, label, SI unit)."""
+    """Draw the same quantities of several runs, a panel per quantity. quantities: (column, label, SI unit)."""
     figure, axes = panels(len(quantities), (9.0, 2.1 * len(quantities) + 1.2))
     for axis, (column, label, unit) in zip(axes, quantities, strict=True):
         size = np.array([max(float(np.max(np.abs(run[column]), initial=0.0)) for run in runs.values())])
@@ -205,7 +205,7 @@ def _pressure_scale(pressure: Array) -> tuple[Any, float, float]:
 
 
 def cell_edges(centres: Array) -> Array:
-    """Borders of the cells around the centres; a single cell is as wide as its distance from zero, or one."""
+    """Return the borders of cells around their centres; a single cell is as wide as its distance from zero, or one."""
     if len(centres) == 1:
         half = 0.5 * (abs(float(centres[0])) or 1.0)
         return np.array([centres[0] - half, centres[0] + half])

@@ -1,4 +1,4 @@
-"""Picture of an incremental dynamic analysis: intensity over demand."""
+"""Draw an incremental dynamic analysis: intensity over demand."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ _FRACTILES = (("16 %", "tab:blue", "--"), ("50 %", "black", "-"), ("84 %", "tab:
 
 @dataclass(frozen=True)
 class DemandPanel:
-    """One demand in its SI unit: curves record -> (intensities, demands); fractiles (n, 3) of 16, 50 and 84 % at the
-    levels (n,); intensities of runs that failed, marked at the right edge."""
+    """Describe one demand in its SI unit: curves record -> (intensities, demands); fractiles (n, 3) of 16, 50 and 84 %
+    at the levels (n,); intensities of runs that failed, marked at the right edge."""
 
     label: str
     unit: str
@@ -29,7 +29,7 @@ class DemandPanel:
 
 
 def plot_ida(panels: Sequence[DemandPanel], path: str | Path, *, intensity: str) -> Path:
-    """A panel for every demand, side by side: a grey curve per record, named when they are few, and the fractiles."""
+    """Draw a panel for every demand, side by side: a grey curve for each record, and the fractiles."""
     import matplotlib
     from matplotlib.figure import Figure
 

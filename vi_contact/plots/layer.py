@@ -1,4 +1,4 @@
-"""Pictures of contact in a boundary layer: Figs. 1 to 3 of seed 001, rigid bodies, the limit of a thin layer."""
+"""Draw the impact of a particle on a boundary layer: Fig. 1 of the paper on b-geometry (ENOC 2017)."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def grid(rows: int, columns: int, size: tuple[float, float], **more: Any) -> tup
 
 
 def plot_particle(impacts: Mapping[str, Sequence[tuple[str, ParticleImpact]]], path: str | Path) -> Path:
-    """Fig. 1: distance and velocity against t/t_f, a row of panels for each group; group -> (label, impact)."""
+    """Draw Fig. 1: distance and velocity against t/t_f, a row of panels for each group; group -> (label, impact)."""
     figure, axes = grid(len(impacts), 2, (10.0, 3.3 * len(impacts) + 0.3))
     for (place, speed), (title, group) in zip(axes, impacts.items(), strict=True):
         for (label, impact), colour in zip(group, COLOURS, strict=False):

@@ -1,4 +1,4 @@
-"""Maps of contact quantities over position and time, for surfaces that are lines: straight, bent or U-shaped."""
+"""Draw maps of contact quantities over position and time, for surfaces that are lines: straight, bent or U-shaped."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ ROWS = 1200  # of a map: more instants than a page has dots are gathered
 
 
 def arc_position(points: Array, normals: Array | None = None) -> tuple[Array, str]:
-    """(place (m,) along the line of points (m, 2) [m], name of the axis).
+    """Return (place (m,) along the line of points (m, 2) [m], name of the axis).
 
     With ``normals`` (m, 2) the conditions of a corner follow each other as its sides do, by nothing that can be seen.
 
@@ -56,7 +56,7 @@ def chain(points: Array) -> Indices:
 
 
 def thinned(t: Array, values: Array, rows: int = ROWS) -> tuple[Array, Array]:
-    """At most so many instants: of neighbours the value of every point that is largest in size, so that peaks stay."""
+    """Return at most ``rows`` instants: of neighbours the value of every point that is largest in size: peaks stay."""
     if len(t) <= rows:
         return t, values
     starts = np.linspace(0, len(t), rows, endpoint=False).astype(int)
@@ -67,7 +67,7 @@ def thinned(t: Array, values: Array, rows: int = ROWS) -> tuple[Array, Array]:
 def draw_map(
     axis: Any, t: Array, position: Array, values: Array, unit: str, *, title: str, axis_label: str, colours: str
 ) -> None:
-    """values (rows, m) as colours, zero white; points at the same place (corners) side by side in their order."""
+    """Draw values (rows, m) as colours, zero white; points at the same place (corners) side by side in their order."""
     import matplotlib
 
     order = np.argsort(position, kind="stable")

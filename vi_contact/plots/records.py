@@ -1,4 +1,4 @@
-"""Pictures of ground motions: acceleration, velocity, displacement and Husid's curve; response spectra and a target."""
+"""Draw ground motions: acceleration, velocity, displacement and Husid's curve; response spectra and a target."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SAMPLES_A_PERIOD = 10
 
 
 def plot_motion(record: Record, path: str | Path, *, title: str | None = None, units: str = "m/s2") -> Path:
-    """Acceleration in `units`, velocity, displacement and the Husid curve above each other; peaks marked, D5-95 shaded.
+    """Draw acceleration in `units`, velocity, displacement and the Husid curve, with peaks marked and D5-95 shaded.
 
     title: default the record's. Nothing is corrected: a drift of the record shows.
     """
@@ -55,7 +55,7 @@ def plot_spectra(
     title: str = "Response spectra",
     units: str = "g",
 ) -> Path:
-    """Pseudo-acceleration in `units` and displacement over the period, one line for each label, the target dashed.
+    """Draw pseudo-acceleration in `units` and displacement over the period, one line for each label, the target dashed.
 
     steps: time step [s] of the record behind each label; below ten of them its line is pale.
     """

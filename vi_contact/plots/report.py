@@ -1,4 +1,4 @@
-"""One page about a run, from the files in its folder: facts, input motion, histories, contact, energies, peaks."""
+"""Draw one page about a run, from the files in its folder: facts, input motion, histories, contact, energies, peaks."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ Drawing = Callable[[Any], None]  # draws on one axis, half of the page's width
 def plot_report(
     run: RunFolder, path: str | Path, *, title: str | None = None, columns: Sequence[Sequence[str]] | None = None
 ) -> Path:
-    """The page as PNG, PDF or SVG, by the name of the file. Panels that would be empty are left out.
+    """Draw the page as PNG, PDF or SVG, by the name of the file. Panels that would be empty are left out.
 
     ``columns``: groups of columns of one unit, a panel each, in place of those the page chooses. InputError for columns
     that do not exist, a run of one row, or another kind of file.
@@ -105,7 +105,7 @@ def _panels_of(run: RunFolder, columns: Sequence[Sequence[str]] | None) -> list[
 
 
 def _maps(run: RunFolder) -> list[Drawing]:
-    """Of contact lines: pressure, and opening where there is one."""
+    """Return the maps of a contact line: of its pressure, and of its opening where there is one."""
     contact, history = run.contact, run.history
     if contact is None or "pressure" not in history or contact.points.shape[1] != 2 or len(contact.points) < 3:
         return []
@@ -189,7 +189,7 @@ def _spectrum(axis: Any, run: RunFolder, names: Sequence[str]) -> None:
 
 
 def shown_periods(record: Record) -> Array:
-    """Periods [s] of the page's spectrum: from four steps of the run to twice its duration, at most 10 s in long runs.
+    """Return the periods [s] of the page's spectrum: from four steps of the run to twice its duration, or 10 s.
 
     What is short is what structures with contact feel, so the first period follows from the step, not the duration.
     """
@@ -240,7 +240,7 @@ def _header(figure: Any, run: RunFolder, title: str) -> None:
 
 
 def header_facts(run: RunFolder) -> list[tuple[str, str]]:
-    """(name, value) of what the page says first: six of the method, six of the outcome; a dash for what is unknown."""
+    """Return (name, value) of what the page says first: six of the method, six of the outcome; a dash for unknown."""
     facts, t = run.facts, run.history["t"]
 
     def fact(name: str, form: str = "{}") -> str:
@@ -266,7 +266,7 @@ def header_facts(run: RunFolder) -> list[tuple[str, str]]:
 
 
 def table_rows(run: RunFolder) -> list[Peak]:
-    """The peaks on the page: of what engineers ask for, those of each kind that vary most; peaks.csv has all."""
+    """Return the peaks on the page: of each kind that engineers ask for those that vary most; peaks.csv has all."""
     kinds: list[list[str]] = []
     for prefix in _PEAKS:
         names = [name for name in run.columns if name.startswith(prefix) and _range(run, name) > 0.0]

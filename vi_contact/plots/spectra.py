@@ -1,4 +1,4 @@
-"""Pictures of engineering quantities: loops of force and deformation, transfer functions."""
+"""Draw engineering quantities: loops of force and deformation, transfer functions."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def _panel(size: tuple[float, float]) -> tuple[Any, Any]:
 def plot_loop(
     loop: Loop, path: str | Path, *, x: tuple[str, str], y: tuple[str, str], title: str | None = None
 ) -> Path:
-    """Force over deformation; ``x``, ``y``: (name, SI unit) of the two. The title says the work at the end."""
+    """Draw force over deformation; ``x``, ``y``: (name, SI unit) of the two. The title says the work at the end."""
     figure, axis = _panel((6.4, 4.8))
     across, x_unit = scaled(loop.deformation, x[1])
     up, y_unit = scaled(loop.force, y[1])
@@ -43,7 +43,7 @@ def plot_loop(
 def plot_transfer(
     found: TransferFunction, path: str | Path, *, title: str, theory: TransferFunction | None = None
 ) -> Path:
-    """Amplitude over frequency, both logarithmic; a theory dashed."""
+    """Draw the amplitude over frequency, both logarithmic; a theory dashed."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     figure, axis = _panel((7.5, 4.5))
