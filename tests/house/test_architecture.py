@@ -207,7 +207,7 @@ def test_core_runs_without_finite_elements():
 
 
 def test_table_of_contents_is_complete_and_true():
-    """Every public name can be imported from vi_contact, and nothing else pretends to be there."""
+    """Every public name can be imported (``vi_contact.core.lazy``), and nothing else pretends to be there."""
     assert len(vi_contact.__all__) == len(set(vi_contact.__all__)) > 40
     assert set(dir(vi_contact)) == set(vi_contact.__all__)
     for public in vi_contact.__all__:

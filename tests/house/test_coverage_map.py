@@ -1,0 +1,187 @@
+"""Every module has its test file, ``tests/<room>/test_<module>.py``, or stands here under one that covers it."""
+
+from __future__ import annotations
+
+import ast
+import re
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+import vi_contact
+
+pytestmark = pytest.mark.serial
+PACKAGE = Path(vi_contact.__file__).parent
+TESTS = Path(__file__).parents[1]
+
+COVERS = {  # test file -> modules without a test file of their own; tests reach some of them through their users
+    "beam/test_algorithm.py": "beam.source_data beam.tip beam.values",
+    "beam/test_contract.py": "beam.coupling beam.space",
+    "bem/test_boundary_operators.py": "bem.loops bem.operators",
+    "bem/test_contact.py": "bem.contact_march bem.contact_run bem.two_bodies bem.uzawa_space_time",
+    "bem/test_convolution.py": "bem.convolution_operator bem.convolution_quadrature bem.radial_table bem.time_methods",
+    "bem/test_energetic.py": "bem.loads bem.poincare_steklov bem.storage",
+    "bem/test_fundamental_solution.py": "bem.rules",
+    "bem/test_thin_bodies.py": "bem.element_pairs bem.quadrature",
+    "boundary_layer/test_constrained_motion.py":
+        "boundary_layer.bilateral boundary_layer.metric boundary_layer.motion boundary_layer.rigid_body "
+        "boundary_layer.trajectory",
+    "boundary_layer/test_contact_law.py": "boundary_layer.layer boundary_layer.scheme",
+    "cli/test_fuzz_cli.py": "cli.errors",
+    "cli/test_main.py": "cli.beam cli.layer cli.options cli.ranks plots.layer",
+    "cli/test_motion.py": "plots.records",
+    "core/test_friction_certificate.py": "core.protocols",
+    "core/test_identity.py": "run.checks",
+    "core/test_step.py": "core.errors core.problem",
+    "core/test_surfaces.py": "core.initial_gap",
+    "engineering/test_resultants.py":
+        "engineering.floor_spectra engineering.peak_values engineering.racking plots.maps",
+    "exact/test_bar.py": "exact.waves",
+    "exact/test_columns.py": "exact.two_bars",
+    "exact/test_exact_hertz.py": "exact.hertz exact.punch",
+    "exact/test_lining.py": "exact.racking exact.rigid_wall",
+    "exact/test_surface_waves.py": "exact.site_response",
+    "fem/test_assembly.py": "fem.assembly_checks",
+    "fem/test_corners.py": "core.corners laws.mass_transfer",
+    "fem/test_dashpots.py": "exact.packet",
+    "fem/test_fields.py": "fem.output.stress",
+    "fem/test_pairs.py": "fem.contact.matching",
+    "fem/test_section_forces.py":
+        "fem.contact.frames fem.output.cuts fem.output.nodal_work fem.output.reactions laws.weight",
+    "fem/test_space.py": "fem.bodies",
+    "fem/test_surface.py": "fem.contact.faces fem.groups",
+    "fem/test_ties.py": "soil.soil_column",
+    "ground_motion/test_formats.py": "ground_motion.formats.at2 ground_motion.formats.writer",
+    "ground_motion/test_processing.py":
+        "ground_motion.baseline ground_motion.chain ground_motion.filters ground_motion.scaling "
+        "ground_motion.window",
+    "ground_motion/test_readers.py":
+        "ground_motion.formats.afad ground_motion.formats.columns ground_motion.formats.commas "
+        "ground_motion.formats.cosmos ground_motion.formats.esm ground_motion.formats.knet "
+        "ground_motion.formats.reader ground_motion.formats.simcenter ground_motion.formats.smc "
+        "ground_motion.formats.text",
+    "ground_motion/test_record.py": "ground_motion.info",
+    "ground_motion/test_spectra.py": "ground_motion.intensity ground_motion.spectral_intensity",
+    "ground_motion/test_synthetic.py": "ground_motion.ec8 ground_motion.kanai_tajimi",
+    "house/test_architecture.py": "core.lazy",
+    "house/test_demos_beam.py": "plots.beam",
+    "laws/test_excitation.py": "core.excitation_values ground_motion.excitation",
+    "meshes/test_ball.py": "meshes.checks meshes.extract meshes.mesh_file",
+    "meshes/test_mesh_files.py": "meshes.channel meshes.channel_grid meshes.disk",
+    "meshes/test_meshes.py": "meshes.gmsh_session meshes.grid meshes.wall",
+    "meshes/test_partition.py": "meshes.rows",
+    "meshes/test_two_body_meshes.py": "meshes.block meshes.cut meshes.from_arrays meshes.two_blocks",
+    "models/test_channel.py":
+        "cli.channel models.channel.model models.channel.points models.channel.run models.channel.sides "
+        "models.channel.stages models.choices models.run_options",
+    "models/test_wall.py": "core.units models.wall_run",
+    "plots/test_plots_channel.py": "plots.channel plots.channel_mesh plots.channel_run",
+    "plots/test_plots_friction.py": "plots.friction",
+    "plots/test_report.py": "cli.report plots.spectra run.files.reading",
+    "run/test_cross_check.py": "run.compare_runs",
+    "run/test_folder.py": "core.files run.files.history run.files.stored_rows run.files.table run.files.tally",
+    "run/test_fuzz_folders.py": "run.files.writer run.session run.solution",
+    "run/test_march.py": "core.state_checks",
+    "run/test_proximal.py": "run.rigid_bodies",
+    "run/test_restart_refused.py": "run.files.identity",
+    "run/test_simulate.py": "core.version run.files.log",
+    "run/test_stop_signals.py": "run.files.lock",
+    "schemes/test_contact_stabilised.py": "schemes.admissible_predictor schemes.position_step",
+    "schemes/test_generalised_alpha.py": "schemes.balance_step",
+    "schemes/test_ss22.py": "schemes.single_step",
+    "schemes/test_trapezoidal.py": "schemes.guard",
+    "soil/test_free_field.py": "core.problem_checks soil.companion soil.upgoing_wave",
+    "solvers/test_friction_condensed.py": "solvers.certified solvers.friction.newton",
+    "solvers/test_friction_methods.py":
+        "solvers.friction.fixed_point solvers.friction.given_forces solvers.friction.linear "
+        "solvers.friction.uzawa",
+    "solvers/test_friction_on_finite_elements.py": "solvers.friction.problem",
+    "solvers/test_volume.py": "solvers.volume.snes solvers.volume.tao",
+    "solvers/test_volume_friction.py": "solvers.friction.nsgs solvers.volume.friction solvers.volume.route",
+    "solvers/test_volume_held_points.py":
+        "solvers.volume.bounded_system solvers.volume.held_points solvers.volume.scaled_step",
+    "solvers/test_volume_options.py":
+        "solvers.volume.failures solvers.volume.friction_jacobian solvers.volume.friction_step "
+        "solvers.volume.friction_system solvers.volume.one_factorisation solvers.volume.options",
+    "studies/test_case.py":
+        "cli.case run.defaults studies.cases.model_tables studies.cases.parsing studies.cases.table_functions "
+        "studies.cases.toml_file studies.cases.vocabulary",
+    "studies/test_case_inputs.py": "studies.cases.table_calls",
+    "studies/test_ida.py": "cli.ida plots.ida studies.ida.measures studies.ida.runs studies.ida.table",
+    "validation/test_bem_seed003.py": "models.boundary_elements",
+    "validation/test_hertz_impact.py": "models.ball",
+    "validation/test_impact_bars.py": "models.bar",
+    "validation/test_rocking_block.py": "models.rocking_block",
+    "validation/test_seed003_ball.py": "models.disk",
+    "validation/test_seed003_embedded.py": "models.embedded",
+    "validation/test_seed003_square.py": "models.square plots.deformed",
+    "validation/test_sliding_block.py": "models.sliding_block",
+}
+BY = {module: test for test, modules in COVERS.items() for module in modules.split()}
+
+
+@cache
+def modules() -> dict[str, ast.Module]:
+    """Modules as "solvers.normal.lcp", without packages, which hand names on, and ``__main__``, which calls cli."""
+    paths = {p.relative_to(PACKAGE).with_suffix("").as_posix(): p for p in sorted(PACKAGE.rglob("*.py"))}
+    return {
+        name.replace("/", "."): ast.parse(path.read_text(encoding="utf-8"))
+        for name, path in paths.items() if path.name not in ("__init__.py", "__main__.py")
+    }
+
+
+@cache
+def users() -> dict[str, list[str]]:
+    """Module -> the modules that import it."""
+    found: dict[str, list[str]] = {}
+    for user, tree in modules().items():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ImportFrom) and node.level:
+                base = ".".join([*user.split(".")[: -node.level], *([node.module] if node.module else [])])
+                for target in {base, *(f"{base}.{alias.name}".lstrip(".") for alias in node.names)}:
+                    found.setdefault(target, []).append(user)
+    return found
+
+
+def own_test(module: str) -> str:
+    return f"{module.split('.')[0]}/test_{module.split('.')[-1]}.py"
+
+
+def names_of(module: str) -> list[str]:
+    """The module's path and its public functions and classes."""
+    public = [one for one in modules()[module].body if not getattr(one, "name", "_").startswith("_")]
+    names = [one.name for one in public if isinstance(one, ast.ClassDef | ast.FunctionDef)]
+    room, _, name = f"vi_contact.{module}".rpartition(".")
+    return [f"{room}.{name}", f"{room} import {name}", *names]
+
+
+def mentions(test: str, module: str) -> bool:
+    """Whether a test file speaks of the module, or of one that uses it, directly or by one more."""
+    direct = users().get(module, [])
+    near = {module, *direct, *(two for one in direct for two in users().get(one, []))}
+    text = (TESTS / test).read_text(encoding="utf-8")
+    names = "|".join(re.escape(name) for one in near for name in names_of(one))
+    return test in map(own_test, near) or re.search(rf"(?<!\w)({names})\b", text) is not None
+
+
+def test_every_module_has_a_test():
+    missing = [one for one in modules() if not (TESTS / own_test(one)).exists() and one not in BY]
+    assert not missing, f"without a test file, and not in COVERS: {', '.join(missing)}"
+
+
+def test_the_table_is_true():
+    wrong = [f"{one} stands twice in COVERS" for one in BY if " ".join(COVERS.values()).split().count(one) > 1]
+    for module, test in BY.items():
+        if module not in modules():
+            wrong.append(f"{module} is no module")
+        elif (TESTS / own_test(module)).exists():
+            wrong.append(f"{module} has its own test file")
+        elif not (TESTS / test).exists() or not mentions(test, module):
+            wrong.append(f"{test} does not exist or does not speak of {module}")
+    assert not wrong, "\n".join(wrong)
+
+
+def test_a_false_row_is_found():
+    assert not mentions("core/test_algebra.py", "exact.housner")
+    assert mentions("exact/test_housner.py", "exact.housner")
