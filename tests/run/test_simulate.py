@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from at_step import AtStep, failing
 from chain import chain_problem
 from summaries import summary_of
 
@@ -56,24 +57,6 @@ def same(one: State, other: State) -> bool:
         and set(one.memory) == set(other.memory)
         and all(np.array_equal(one.memory[name], other.memory[name]) for name in arrays[1])
     )
-
-
-class StopsAt:
-    """A recorder that raises at a step: the user's Ctrl-C, or a defect in the user's own recorder."""
-
-    def __init__(self, k: int, error: BaseException) -> None:
-        self._k, self._error = k, error
-
-    def columns(self) -> dict[str, tuple[str, str]]:
-        return {"one": ("-", "always one")}
-
-    def start(self, problem: ContactProblem, state: State, resumed: Any = None) -> dict[str, float]:
-        return {"one": 1.0}
-
-    def row(self, report: Report) -> dict[str, float]:
-        if report.new.k == self._k:
-            raise self._error
-        return {"one": 1.0}
 
 
 @dataclass(frozen=True)
@@ -182,11 +165,11 @@ def test_failed_step_keeps_what_was_computed(tmp_path: Path) -> None:
 def test_interrupted_run_goes_on(tmp_path: Path, error: BaseException) -> None:
     """Ctrl-C or a defect in a recorder at step 57: all files are complete, and the restart equals the straight run."""
     with pytest.raises(type(error)):
-        run(out=tmp_path, record=[Energy(), Contact(), StopsAt(57, error)])
+        run(out=tmp_path, record=[Energy(), Contact(), AtStep(57, failing(error))])
     found = summary_of(tmp_path)
     assert found["status"] == ("interrupted" if isinstance(error, KeyboardInterrupt) else "failed")
     assert found["steps"] == 56 and not (tmp_path / "history.journal").exists()
-    harmless = StopsAt(-1, error)
+    harmless = AtStep(-1, failing(error))
     solution = run(out=tmp_path, record=[Energy(), Contact(), harmless], restart=True)
     straight = run(record=[Energy(), Contact(), harmless])
     assert same(solution.state, straight.state)

@@ -15,14 +15,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from at_step import AtStep
 from marched_chain import equal_files, run, run_wall
 from summaries import summary_of
 
 from vi_contact.cli.entry import main
 from vi_contact.core.algebra import SerialComm
 from vi_contact.core.errors import InputError, Interrupted
-from vi_contact.core.problem import ContactProblem
-from vi_contact.core.step import Report, State
 from vi_contact.run.files import lock as folder_lock
 from vi_contact.run.files.lock import locked
 from vi_contact.run.recorders import Contact, Energy
@@ -30,24 +29,6 @@ from vi_contact.run.stop_signals import SIGNALS, StopSignals
 
 serial = pytest.mark.serial
 TESTS, PACKAGE = str(Path(__file__).parents[1] / "support"), str(Path(__file__).parents[2])
-
-
-class AtStep:
-    """A recorder that does something at a step."""
-
-    def __init__(self, k: int, action: Callable[[], Any]) -> None:
-        self._k, self._action = k, action
-
-    def columns(self) -> dict[str, tuple[str, str]]:
-        return {"one": ("-", "always one")}
-
-    def start(self, problem: ContactProblem, state: State, resumed: Any = None) -> dict[str, float]:
-        return {"one": 1.0}
-
-    def row(self, report: Report) -> dict[str, float]:
-        if report.new.k == self._k:
-            self._action()
-        return {"one": 1.0}
 
 
 @pytest.fixture(autouse=True)

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from at_step import AtStep, failing
 from bar import run, thrown
 from chain import chain_problem
 from marched_chain import chain, difference, equal_files, round_off, run_wall, wall
@@ -451,24 +452,6 @@ class Stop(Exception):
     """The end of a run by force."""
 
 
-@dataclass
-class StopsAt:
-    """A recorder that raises at row k."""
-
-    k: int
-
-    def columns(self) -> dict[str, tuple[str, str]]:
-        return {"one": ("-", "always one")}
-
-    def start(self, problem: Any, state: Any, resumed: Any = None) -> dict[str, float]:
-        return {"one": 1.0}
-
-    def row(self, report: Report) -> dict[str, float]:
-        if report.new.k == self.k:
-            raise Stop
-        return {"one": 1.0}
-
-
 @serial
 @pytest.mark.parametrize("scheme", [HALF, DISSIPATIVE], ids=repr)
 def test_a_run_that_stops_inside_a_halved_step_goes_on_from_the_base_step_before(tmp_path: Path, scheme: Any):
@@ -476,7 +459,7 @@ def test_a_run_that_stops_inside_a_halved_step_goes_on_from_the_base_step_before
     plan = HalvedAtImpact(5e-3, 3)
 
     def go(folder: str, k: int, **more: Any) -> Any:
-        return run_chain(tmp_path / folder, 150, scheme=scheme, dt=plan, record=[Energy(), StopsAt(k)], **more)
+        return run_chain(tmp_path / folder, 150, scheme=scheme, dt=plan, record=[Energy(), AtStep(k, failing(Stop()))], **more)
 
     straight = go("straight", -1)
     sizes = np.diff(straight.history["t"])
