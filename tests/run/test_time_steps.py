@@ -459,7 +459,8 @@ def test_a_run_that_stops_inside_a_halved_step_goes_on_from_the_base_step_before
     plan = HalvedAtImpact(5e-3, 3)
 
     def go(folder: str, k: int, **more: Any) -> Any:
-        return run_chain(tmp_path / folder, 150, scheme=scheme, dt=plan, record=[Energy(), AtStep(k, failing(Stop()))], **more)
+        record = [Energy(), AtStep(k, failing(Stop()))]
+        return run_chain(tmp_path / folder, 150, scheme=scheme, dt=plan, record=record, **more)
 
     straight = go("straight", -1)
     sizes = np.diff(straight.history["t"])
