@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..core.algebra import Array
+from vi_contact.core.algebra import Array
 
 _SIMPLEX_TYPE = (15, 1, 2, 4)  # Gmsh's numbers of point, line, triangle, tetrahedron
 _BOX_TYPE = (15, 1, 3, 5)  # point, line, quadrangle, hexahedron
