@@ -1,16 +1,91 @@
-"""What schemes refuse, and what they warn of, when the mass at the contact nodes does not suit them."""
+"""Hold what schemes share: two families of them, the step in displacements, and what does not suit their contact."""
 
 from __future__ import annotations
 
 import logging
+from dataclasses import replace
 
 import numpy as np
 
+from ..core.algebra import Array, EffectiveMatrix, Mask
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
+from ..core.protocols import MassLaw
+from ..core.step import State, StepProblem, StepResult
 from ..laws.impact import NoImpact
+from ..laws.mass import ConsistentMass, Redistributed
 
 log = logging.getLogger(__name__)
+
+
+class SingleStep:
+    """Self-starting, and not disturbed by velocity jumps: that is why seed 000 chose such a scheme."""
+
+    @property
+    def mass(self) -> MassLaw:
+        """Contact here is an impulse within the step: the contact nodes need their mass."""
+        return ConsistentMass()
+
+    def check(self, problem: ContactProblem) -> None:
+        """InputError for massless contact nodes."""
+        needs_mass(type(self).__name__, problem)
+
+    def start(self, problem: ContactProblem, state: State, dt: float) -> State:
+        """Nothing to prepare."""
+        return state
+
+    def jump(self, problem: ContactProblem, state: State, v: Array, dt: float) -> State:
+        """The new velocity, and nothing to restart."""
+        return replace(state, v=v)
+
+
+class BalanceStep:
+    """Safe without mass at the contact nodes only."""
+
+    @property
+    def mass(self) -> MassLaw:
+        """Contact stands in the balance of forces: without mass at the contact nodes it cannot create energy."""
+        return Redistributed()
+
+    def check(self, problem: ContactProblem) -> None:
+        """InputError for an impact law on massless contact nodes; warns when they have mass."""
+        needs_no_impact_law(problem)
+        contact_in_the_balance(repr(self), problem)
+
+
+def position_step(
+    problem: ContactProblem,
+    state: State,
+    A: EffectiveMatrix,
+    dt: float,
+    *,
+    b: Array,
+    scale: float,
+    guess: Array | None = None,
+    active: Mask | None = None,
+) -> StepProblem:
+    """A x = b - …, x = u1: gap and slip of the end of the step; by default free flight as the guess."""
+    end = state.t + dt
+    return StepProblem(
+        A=A,
+        b=b,
+        bound=problem.surface.gap(end),
+        surface=problem.surface,
+        scale=scale,
+        guess=state.u + dt * state.v if guess is None else guess,
+        active=state.active if active is None else active,
+        t=end,
+        k=state.k + 1,
+        friction=problem.friction,
+        slip0=problem.slip_origin(state.u, state.t, end),
+        rate_factor=1.0 / dt,
+    )
+
+
+def stepped(step: StepProblem, result: StepResult, u: Array, v: Array) -> State:
+    """The state after the step, with the mean reactions r/scale; what another scheme remembered is forgotten."""
+    r_t = None if result.r_t is None else result.r_t / step.scale
+    return State(step.t, step.k, u, v, result.r_n / step.scale, result.active, r_t=r_t)
 
 
 def has_massless_contact(problem: ContactProblem) -> bool:

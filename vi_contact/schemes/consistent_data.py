@@ -1,5 +1,6 @@
-"""The acceleration that fits a displacement and a velocity: what schemes with accelerations start from, also after an
-impact.
+"""Make initial data consistent: the acceleration that fits them, and equilibrium of unknowns without inertia.
+
+What schemes with accelerations start from, also after an impact, fits a displacement and a velocity:
 
     M a + C v + K u = f(t) - B_nᵀ r_n - B_tᵀ r_t,    0 <= r_n  ⊥  -a_n >= 0    on resting points (gap and v_n zero)
     |r_t| <= limit(r_n),    r_t along the slip rate v_t + dt a_t
@@ -7,6 +8,14 @@ impact.
 Points that are open, or that move towards or off the obstacle, carry no normal reaction: the one a collision made in
 the step before is spent. Springs carry theirs, (u_n - gap0)/compliance. The same small problem as a step, with M in
 place of A. Unknowns without inertia have no acceleration, and the reaction that keeps them in equilibrium.
+
+Contact unknowns without inertia are in equilibrium with the body at every time:
+
+    (K u)_c + r = f_c(t),    0 <= r_n  ⊥  gap0 - u_n >= 0    with the inner unknowns as they are
+
+Initial data rarely know that. Kept as they are, what is missing in this equation would swing on at the contact nodes
+from step to step for ever, so schemes put it right once, at the start; the energy this takes is of the order of the
+mesh size, and the history starts after it.
 """
 
 from __future__ import annotations
@@ -15,17 +24,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core.algebra import Array, EffectiveMatrix, Mask, Matrix
+from ..core.algebra import Array, EffectiveMatrix, Mask, Matrix, max_abs
 from ..core.problem import ContactProblem
 from ..core.step import PreparedSolver, State, StepProblem
 from ..core.surfaces import ContactSurface
+from ..solvers.certified import TOLERANCE, CertifiedSolver
 from ..solvers.condensed import Condensed
 
 ROUND_OFF = 1e-12  # of the largest displacement or velocity: smaller gaps and velocities are zero
 
 
 def consistent_acceleration(problem: ContactProblem, state: State, dt: float) -> tuple[Array, Array]:
-    """(a [m/s²], B_nᵀ r_n + B_tᵀ r_t [N]) of the state's u and v, owned unknowns of the rotated basis."""
+    """Return (a [m/s²], B_nᵀ r_n + B_tᵀ r_t [N]) of the state's u and v, owned unknowns of the rotated basis."""
     system = problem.equations
     force = system.load(state.t) - system.K @ state.u
     if system.C is not None:
@@ -37,7 +47,7 @@ def consistent_acceleration(problem: ContactProblem, state: State, dt: float) ->
 
 
 def _with_contact(problem: ContactProblem, state: State, force: Array, dt: float) -> tuple[Array, Array]:
-    """The small problem of points that rest on their support."""
+    """Solve the small problem of points that rest on their support."""
     surface = problem.surface
     compression = surface.normal_values(state.u) - surface.gap(state.t)
     springs = surface.reaction_load(_spring_reactions(surface, compression), len(force))
@@ -65,7 +75,7 @@ def _with_contact(problem: ContactProblem, state: State, force: Array, dt: float
 
 
 def _slip_rate(problem: ContactProblem, state: State, dt: float) -> Array | None:
-    """Tangential velocity relative to the obstacle [m/s]; None without friction."""
+    """Return the tangential velocity relative to the obstacle [m/s]; None without friction."""
     if not problem.frictional:
         return None
     rate, sliding = problem.surface.tangential_values(state.v), problem.surface.sliding(state.t, state.t + dt)
@@ -73,13 +83,13 @@ def _slip_rate(problem: ContactProblem, state: State, dt: float) -> Array | None
 
 
 def without_inertia(problem: ContactProblem, a: Array) -> Array:
-    """a, with zero on massless unknowns."""
+    """Return a, with zero on massless unknowns."""
     massless = problem.equations.massless
     return a if massless is None else np.where(massless, 0.0, a)
 
 
 def mass_matrix(problem: ContactProblem) -> EffectiveMatrix:
-    """M, with ones in place of the empty rows of massless unknowns."""
+    """Return M, with ones in place of the empty rows of massless unknowns."""
     system = problem.equations
 
     def make() -> EffectiveMatrix:
@@ -91,22 +101,65 @@ def mass_matrix(problem: ContactProblem) -> EffectiveMatrix:
 
 
 def rigid_part(surface: ContactSurface) -> ContactSurface:
-    """Springs are loads here, not bounds."""
+    """Return the surface without springs: they are loads here, not bounds."""
     rigid = surface.compliance == 0.0
     return replace(surface, compliance=np.zeros(surface.count), bilateral=surface.bilateral & rigid)
 
 
 def _spring_reactions(surface: ContactSurface, compression: Array) -> Array:
-    """Of compliant points; only bilateral ones pull."""
+    """Return the reactions of compliant points; only bilateral ones pull."""
     soft = surface.compliance > 0.0
     r_n = np.divide(compression, surface.compliance, out=np.zeros(surface.count), where=soft)
     return np.where(surface.bilateral, r_n, np.maximum(r_n, 0.0))
 
 
 def _resting(surface: ContactSurface, compression: Array, state: State) -> Mask:
-    """Rigid points that touch and do not move, and all rigid bilateral ones."""
+    """Mark rigid points that touch and do not move, and all rigid bilateral ones."""
     rigid = surface.compliance == 0.0
-    local = np.array([np.max(np.abs(state.u), initial=0.0), np.max(np.abs(state.v), initial=0.0)])
+    local = np.array([max_abs(state.u), max_abs(state.v)])
     u_max, v_max = ROUND_OFF * surface.comm.max(local)
     still = (compression >= -u_max) & (np.abs(surface.normal_values(state.v)) <= v_max)
     return np.asarray((still | surface.bilateral) & rigid)
+
+
+def equilibrated(problem: ContactProblem, state: State) -> State:
+    """Return the state with its massless unknowns, if any, in equilibrium, and with the reactions that belong to it.
+
+    Only their own block of K is factorised, however large the body is.
+    """
+    system, layer = problem.equations, problem.equations.massless
+    if layer is None:
+        return state
+    load = system.load(state.t) - system.K @ np.where(layer, 0.0, state.u)
+    A = system.kept("contact layer", lambda: EffectiveMatrix(system.algebra.block(system.K, layer), system.algebra))
+    surface = _within(problem.surface, layer)
+    step = StepProblem(
+        A=A,
+        b=load[layer],
+        bound=surface.gap(state.t),
+        surface=surface,
+        scale=1.0,
+        guess=state.u[layer],
+        active=state.active,
+        t=state.t,
+        k=state.k,
+        friction=problem.friction,
+        slip0=problem.slip_origin(state.u, state.t, state.t),
+    )
+    result, _, _ = CertifiedSolver(problem, A, 1.0, [Condensed()], TOLERANCE, surface=surface).solve(step)
+    u = state.u.copy()
+    u[layer] = result.x
+    return replace(state, u=u, r_n=result.r_n, r_t=result.r_t, active=result.active)
+
+
+def _within(surface: ContactSurface, layer: Mask) -> ContactSurface:
+    """Return the surface on the massless unknowns alone, among which all normal ones are."""
+    place = np.where(layer, np.cumsum(layer) - 1, -1)
+    tangents = np.where(surface.tangents >= 0, place[surface.tangents], -1)
+    return replace(surface, owned=place[surface.owned], tangents=tangents, basis=None, coupling=None, dual=None)
+
+
+def at_rest_between(problem: ContactProblem, old: State, u: Array, v: Array, dt: float) -> Array:
+    """Return v, with the mean velocity of the step on massless unknowns: they have no momentum to carry on."""
+    massless = problem.equations.massless
+    return v if massless is None else np.where(massless, (u - old.u) / dt, v)

@@ -1,6 +1,6 @@
 """Contact-stabilised Newmark: the predictor is made admissible first, so that contact forces do not ring.
 
-    u_p = argmin ½ (u - u0 - dt v0)ᵀ M (u - u0 - dt v0)  over  gap(u) >= 0           (schemes.mass_projection)
+    u_p = argmin ½ (u - u0 - dt v0)ᵀ M (u - u0 - dt v0)  over  gap(u) >= 0           (schemes.admissible_predictor)
     M (u1 - u_p) = -½ dt² [K ½(u0 + u1) + C (u1 - u0)/dt - f(t0 + ½ dt) + B_nᵀ r̄_n + B_tᵀ r̄_t],    gap(u1) >= 0
     v1 = v0 + 2/dt (u1 - u_p),    0 <= r̄_n  ⊥  gap(u1),    |r̄_t| <= limit(r̄_n) along the slip B_t (u1 - u0)
 
@@ -31,8 +31,7 @@ from ..core.checks import flag
 from ..core.problem import ContactProblem
 from ..core.step import Balance, State, StepProblem, StepResult
 from .admissible_predictor import admissible
-from .position_step import position_step
-from .single_step import SingleStep, stepped
+from .base import SingleStep, position_step, stepped
 
 
 @dataclass(frozen=True)

@@ -37,10 +37,8 @@ from ..core.checks import real, shown
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.step import Balance, State, StepProblem, StepResult
-from .balance_step import BalanceStep
-from .consistent_data import consistent_acceleration, without_inertia
-from .contact_layer import at_rest_between, relaxed
-from .position_step import position_step
+from .base import BalanceStep, position_step
+from .consistent_data import at_rest_between, consistent_acceleration, equilibrated, without_inertia
 
 SLACK = 1e-12  # round-off in the conditions of stability
 
@@ -82,7 +80,7 @@ class AlphaStep(BalanceStep, ABC):
         """The contact layer in equilibrium and the acceleration; once, not on restarts and changes of dt."""
         if np.array_equal(state.memory.get("of", ()), self._mark(state.t)):
             return state
-        state = relaxed(problem, state)
+        state = equilibrated(problem, state)
         return self._restarted(problem, state, dt)
 
     def jump(self, problem: ContactProblem, state: State, v: Array, dt: float) -> State:

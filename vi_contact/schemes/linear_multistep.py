@@ -29,10 +29,8 @@ from ..core.checks import array, number
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.step import Balance, State, StepProblem, StepResult
-from .balance_step import BalanceStep
-from .consistent_data import consistent_acceleration, without_inertia
-from .contact_layer import at_rest_between, relaxed
-from .position_step import position_step
+from .base import BalanceStep, position_step
+from .consistent_data import at_rest_between, consistent_acceleration, equilibrated, without_inertia
 
 FREQUENCIES = np.logspace(-2.0, 3.0, 61)  # natural frequency times dt, for the stability check
 DAMPING = (0.0, 0.1, 1.0)  # damping ratios, for the stability check
@@ -106,7 +104,7 @@ class LinearMultistep(BalanceStep):
         """The past, unless the state brings one for this dt; the contact layer in equilibrium, once."""
         memory = state.memory
         if not np.array_equal(memory.get("t", ()), [state.t]):
-            state = relaxed(problem, state)
+            state = equilibrated(problem, state)
             return self._restarted(problem, state, dt)
         if np.array_equal(memory["dt"], [dt]) and f"a_{len(self.a) - 2}" in memory:
             return state

@@ -38,7 +38,7 @@ from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.step import Balance, State, StepProblem, StepResult
 from ..laws.impact import NoImpact
-from .single_step import SingleStep, stepped
+from .base import SingleStep, stepped
 
 ROUND_OFF = 1e-12  # of the largest displacement: smaller gaps are closed
 

@@ -23,9 +23,8 @@ from ..core.problem import ContactProblem
 from ..core.protocols import MassLaw
 from ..core.step import Balance, State, StepProblem, StepResult
 from ..laws.mass import Redistributed, mass_law
-from .contact_layer import at_rest_between, relaxed
-from .guard import contact_in_the_balance, needs_no_impact_law
-from .position_step import position_step
+from .base import contact_in_the_balance, needs_no_impact_law, position_step
+from .consistent_data import at_rest_between, equilibrated
 
 
 @dataclass(frozen=True)
@@ -46,7 +45,7 @@ class Trapezoidal:
         """The contact layer in equilibrium; once, not on restarts and changes of dt."""
         if "force" in state.memory:
             return state
-        state = relaxed(problem, state)
+        state = equilibrated(problem, state)
         return self._with_force(problem, state)
 
     def _with_force(self, problem: ContactProblem, state: State) -> State:

@@ -21,8 +21,7 @@ from ..core.checks import real, shown
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.step import Balance, State, StepProblem, StepResult
-from .position_step import position_step
-from .single_step import SingleStep, stepped
+from .base import SingleStep, position_step, stepped
 
 
 @dataclass(frozen=True)

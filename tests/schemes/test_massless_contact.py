@@ -23,7 +23,7 @@ from vi_contact.laws.mass import Redistributed
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import TwoBlocks
 from vi_contact.run.simulate import simulate
-from vi_contact.schemes.contact_layer import relaxed
+from vi_contact.schemes.consistent_data import equilibrated
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.volume.route import ReducedNewton, Volume
 
@@ -105,7 +105,7 @@ def test_only_contact_rows_are_factorised(name: str, factorised: Rows) -> None:
     state = disturbed(problem)
     u, r_n = with_the_whole_matrix(problem, state)
     factorised.clear()
-    found = relaxed(problem, state)
+    found = equilibrated(problem, state)
     massless = problem.equations.massless
     assert massless is not None
     assert factorised == [COMM.allreduce(float(massless.sum()))] and factorised[0] < problem.system.space.unknowns / 2
