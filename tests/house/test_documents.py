@@ -152,6 +152,17 @@ def test_import_needs_numpy_and_scipy_only(package: str) -> None:
     assert done.returncode == 0, done.stderr
 
 
+CIPHERS = r"\b[Ss]eed 00\d|\bV\d+\.\d|\bP(?:[3-9]|[12]\d)\b|\b[Dd]esign idea|\b[Ss]olver notes|\bseismic\.md"
+REGISTERS = {"verification.md", "sources.md", "petsc.md", "api.md"}  # these explain the names, or quote docstrings
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_nothing_is_cited_by_a_private_name(document: Path) -> None:
+    """Author, year and title instead."""
+    if document.name not in REGISTERS:
+        assert not re.findall(f".*(?:{CIPHERS}).*", document.read_text(encoding="utf-8"))
+
+
 IDS = {"reference/verification.md": r"\bV\d+\.\d+[a-z]?\b", "reference/petsc.md": r"\bP[1-9]\d?\b"}
 
 
