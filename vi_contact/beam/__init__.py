@@ -1,4 +1,4 @@
-"""Rod and Timoshenko beam of seed 002: contact and friction at the tip of a beam, with numpy and scipy only."""
+"""Compute rod and Timoshenko beam of Ahn (2012): contact and friction at the tip, with numpy and scipy only."""
 
 from .algorithm import BeamRun, BeamStep, BeamStepper, Snapshot, run_beam
 from .contract import beam_problem, rod_problem, rubbing_problem

@@ -1,4 +1,4 @@
-"""Algorithm 10 of seed 002: the beam with friction at its tip under a given normal force, by block elimination.
+"""March the beam with friction at its tip under a given normal force, by Algorithm 10 of Ahn (2012), block elimination.
 
 Midpoint rule (5.4), (5.5) for y = (theta, u), w = y', with the stiffness S and C = a2 S:
 
@@ -39,7 +39,7 @@ from .values import Start, TimoshenkoBeam
 
 @dataclass(frozen=True)
 class Snapshot:
-    """The beam at a time: rows theta, omega, u, v at all nodes, the clamped one included, shape (4, m + 1)."""
+    """Hold the beam at a time: rows theta, omega, u, v at all nodes, the clamped one included, shape (4, m + 1)."""
 
     t: float
     values: Array
@@ -47,7 +47,7 @@ class Snapshot:
 
 @dataclass(frozen=True)
 class BeamRun:
-    """What a run recorded: columns of shape (steps + 1,) and, when asked for, snapshots.
+    """Hold what a run recorded: columns of shape (steps + 1,) and, when asked for, snapshots.
 
     history: t [s]; u_tip [m], v_tip [m/s]; friction_force [N] and slip [m] of the step that led there; normal_force [N]
     and mu [-] of that step; newton: updates; energy_kinetic, energy_strain, work_input, loss_damping, loss_friction and
@@ -60,16 +60,16 @@ class BeamRun:
 
     @property
     def energy(self) -> Array:
-        """½ wᵀMw + ½ yᵀSy [J], (7.12)."""
+        """Return the energy ½ wᵀMw + ½ yᵀSy [J], (7.12)."""
         return np.asarray(self.history["energy_kinetic"] + self.history["energy_strain"])
 
     @property
     def mean_updates(self) -> float:
-        """Newton updates per step."""
+        """Return the mean number of Newton updates per step."""
         return float(np.mean(self.history["newton"][1:]))
 
     def save(self, path: str | Path) -> Path:
-        """The history as CSV, a line per time."""
+        """Write the history as CSV, a line per time."""
         file = checks.path("BeamRun.save", "the path", path)
         if not file.parent.is_dir():
             raise InputError(f"BeamRun.save: there is no folder {shown(str(file.parent))}; make it first")
@@ -79,7 +79,7 @@ class BeamRun:
         return file
 
     def summary(self) -> str:
-        """Energies, losses, tip and iterations in a few lines."""
+        """Return the energies, losses, tip and iterations in a few lines."""
         history, energy = self.history, self.energy
         defect = float(np.max(np.abs(history["energy_defect"])))
         return "\n".join([
@@ -97,7 +97,8 @@ class BeamRun:
 
 @dataclass(frozen=True)
 class BeamStep:
-    """What a step led to: time t [s], y and w there, increment of y, slip of the tip; |r_N| [N], mu and load [N/m]."""
+    """Hold the end of a step: time t [s], y and w there, increment of y, slip of the tip; |r_N| [N], mu and load
+    [N/m]."""
 
     t: float
     y: Array
@@ -111,7 +112,7 @@ class BeamStep:
 
 @dataclass(frozen=True)
 class BeamStepper:
-    """The condensed step. ``normal_force``: t -> |r_N| >= 0 [N]; ``mu``: (t, slip rate [m/s] >= 0) -> coefficient;
+    """Make condensed steps. ``normal_force``: t -> |r_N| >= 0 [N]; ``mu``: (t, slip rate [m/s] >= 0) -> coefficient;
     ``load``: t -> uniform force along the beam [N/m], or None. InputError for dt <= 0."""
 
     beam: TimoshenkoBeam
@@ -136,12 +137,12 @@ class BeamStepper:
 
     @cached_property
     def matrices(self) -> BeamMatrices:
-        """M, S and the unit load."""
+        """Return M, S and the unit load."""
         return beam_matrices(self.beam, self.elements)
 
     def steps(self, y: Array, w: Array) -> Iterator[BeamStep]:
-        """Endless, from y, w at t = 0. InputError for a bad force or coefficient; StepFailure with the number of the
-        step and its time."""
+        """Yield steps without end, from y, w at t = 0. InputError for a bad force or coefficient; StepFailure with the
+        number of the step and its time."""
         unknowns = (2 * self.elements.count,)
         y, w = array("BeamStepper", "y", y, unknowns), array("BeamStepper", "w", w, unknowns)
         M, S, dt = self.matrices.M, self.matrices.S, self.dt
@@ -176,7 +177,7 @@ class BeamStepper:
 
 
 def run_beam(stepper: BeamStepper, start: Start, *, steps: int, every: int = 0) -> BeamRun:
-    """Marches ``steps`` steps from ``start`` and keeps the ledger; ``every``: steps between snapshots, 0 for none.
+    """March ``steps`` steps from ``start`` and keep the ledger; ``every``: steps between snapshots, 0 for none.
 
     Raises InputError for bad numbers and StepFailure, with step and time, where the tip's equation is not solved.
     """

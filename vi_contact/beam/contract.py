@@ -1,13 +1,13 @@
 """Make contact problems of rod and beam, with the exact inequalities, for ``march`` and ``simulate``.
 
 The tip is one contact point: its normal unknown is the displacement along the axis, v_n <= gap, its tangential one the
-deflection u_m. With ``Midpoint()`` the rod's step is (5.1)-(5.3) of seed 002, midpoint rule in the bulk and the
+deflection u_m. With ``Midpoint()`` the rod's step is (5.1)-(5.3) of Ahn (2012), midpoint rule in the bulk and the
 complementarity at the end of the step, and the beam's is (5.4), (5.5) with the inequality (2.8), (2.9) itself:
 
     Algorithm 10 -> this    for eps -> 0, with |r_N| of the same step
 
 Three problems: the rod alone; the beam under a given normal force, which presses a point mass against the wall; the
-beam that rubs with the contact force of its own rod, the coupling that the seed leaves out. Along the axis and across
+beam that rubs with the contact force of its own rod, the coupling that the paper leaves out. Along the axis and across
 nothing else is coupled (small displacements): the rod moves as it would alone.
 
 Problems with a beam are solved with its consistent mass: the redistribution of mass away from contact points knows no
@@ -49,7 +49,7 @@ class BeamSpace:
 
     @property
     def ids(self) -> Indices:
-        """0, 1, …: one process owns all."""
+        """Return 0, 1, …: one process owns all."""
         return np.arange(self.unknowns)
 
     @property
@@ -61,18 +61,19 @@ class BeamSpace:
 
     @property
     def coordinates(self) -> Array:
-        """(unknowns, d) [m]."""
+        """Return the coordinates (unknowns, d) [m]."""
         places = np.zeros((self.unknowns, self.dimension))
         places[:, 0] = self.x[self._nodes]
         return places
 
     @property
     def bodies(self) -> Indices:
-        """One body."""
+        """Return the number of the body of every unknown: there is one."""
         return np.zeros(self.unknowns, dtype=np.int64)
 
     def find_nodes(self, points: Array) -> Indices:
-        """The nearest nodes; InputError for points off the axis, beyond the tip or at the clamp, which has none."""
+        """Return the nearest nodes; InputError for points off the axis, beyond the tip or at the clamp (it has
+        none)."""
         points = np.asarray(points, dtype=float)
         start, end = 0.5 * float(self.x[0]), float(self.x[-1])
         off = points[:, 0] < start, points[:, 0] > end * (1.0 + 1e-12), np.any(points[:, 1:] != 0.0, axis=1)
@@ -84,7 +85,7 @@ class BeamSpace:
         return np.abs(points[:, :1] - self.x).argmin(axis=1)
 
     def sample(self, u: Array, nodes: Indices, t: float, derivative: int = 0) -> Array:
-        """(k, d): displacement along the axis, zero where the rod has no unknowns, and across."""
+        """Return (k, d): displacement along the axis, zero where the rod has no unknowns, and across."""
         values, m = np.zeros((len(nodes), self.dimension)), len(self.x)
         rod = np.zeros(m)
         rod[m - self.along :] = u[: self.along]
@@ -98,7 +99,7 @@ History = Callable[[float], float]
 
 
 def rod_problem(rod: Rod, elements: Elements, start: Start | None = None) -> ContactProblem:
-    """The rod before its wall (2.1)-(2.5). ``start``: u and v along the axis; at rest when None."""
+    """Set up the rod before its wall (2.1)-(2.5). ``start``: u and v along the axis; at rest when None."""
     _check("rod_problem", elements, start, rod=rod)
     x = elements.nodes(rod.length)
     start = start or Start()
@@ -109,7 +110,7 @@ def beam_problem(
     beam: TimoshenkoBeam, elements: Elements, *, normal_force: History, friction: FrictionLaw,
     start: Start | None = None, load: History | None = None,
 ) -> ContactProblem:
-    """The beam pressed on the wall with normal_force(t) >= 0 [N], the load of a mass rho A l held by the wall.
+    """Set up the beam pressed on the wall with normal_force(t) >= 0 [N], the load of a mass rho A l held by the wall.
 
     ``friction``: Coulomb or SlipRateCoulomb. Schemes take the force where they take loads: ``Midpoint`` at t + dt/2,
     Algorithm 10 at t. ``load``: uniform, across [N/m].
@@ -128,7 +129,7 @@ def rubbing_problem(
     rod: Rod, beam: TimoshenkoBeam, elements: Elements, *, friction: FrictionLaw, rod_start: Start | None = None,
     start: Start | None = None, load: History | None = None,
 ) -> ContactProblem:
-    """Rod and beam of the same length: the beam rubs with the rod's contact force. InputError for other lengths."""
+    """Set up rod and beam of one length: the beam rubs with the rod's contact force. InputError for two lengths."""
     for one in (start, rod_start):
         _check("rubbing_problem", elements, one, rod=rod, beam=beam, friction=friction)
     _check_load("rubbing_problem", load)

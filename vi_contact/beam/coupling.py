@@ -1,4 +1,4 @@
-"""The rod's computed contact force as the normal force of Algorithm 10: the coupling that seed 002 leaves out.
+"""Take the rod's computed contact force as the normal force of Algorithm 10: the coupling that Ahn (2012) leaves out.
 
 The force r_N^k of (5.1) acts in the step from t_k to t_k+1, and (7.1) of the same step rubs with it. The rod does not
 feel the beam, so that rod first, beam second is no approximation: with ``ExactFriction`` it gives ``rubbing_problem``.
@@ -21,8 +21,8 @@ from .values import Rod, Start
 
 @dataclass(frozen=True)
 class StepForces:
-    """Forces [N], one per step of dt [s], as a function of the time: that of the step in progress or about to begin.
-    InputError for a time that no step covers."""
+    """Hold forces [N], one per step of dt [s], as a function of the time: that of the step in progress or about to
+    begin. InputError for a time that no step covers."""
 
     dt: float
     forces: tuple[float, ...]
@@ -43,7 +43,7 @@ class StepForces:
 def rod_forces(
     rod: Rod, elements: Elements, *, dt: float, steps: int, start: Start | None = None, scheme: Scheme | None = None
 ) -> StepForces:
-    """|r_N| of every step of the rod [N]. ``scheme``: Midpoint(), the source's, when None."""
+    """Return |r_N| of every step of the rod [N]. ``scheme``: Midpoint(), the source's, when None."""
     dt = number("rod_forces", "dt", dt, positive=True, unit="s")
     steps = whole("rod_forces", "steps", steps, least=1)
     problem = rod_problem(rod, elements, start)

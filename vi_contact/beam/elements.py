@@ -1,4 +1,4 @@
-"""Piecewise linear elements for rod and beam, and the last rotation function of seed 002 (section 7).
+"""Assemble piecewise linear elements for rod and beam, with the last rotation function of Ahn (2012, section 7).
 
 On an element s = (x - x_left)/h runs from 0 to 1. Deflection and rotation are linear; the shear energy is
 
@@ -6,7 +6,7 @@ On an element s = (x - x_left)/h runs from 0 to 1. Deflection and rotation are l
 
 Exact integration locks: a slender beam bends too little until h is small beside its *depth*. One point removes that.
 
-``published_end``: on the last element the seed multiplies the tip's rotation by -s³ + s² + s, whose slope is zero at
+``published_end``: on the last element Ahn multiplies the tip's rotation by -s³ + s² + s, whose slope is zero at
 the tip, in order to satisfy theta_x(l) = 0. But its neighbour 1 - s keeps the slope -1/h, and both together do not
 reproduce a constant: equal rotations at both nodes cost energy. With the tip's rotation eliminated the last element is
 a spring 2 E I/(17 h) on the rotation of its left node, so that h -> 0 clamps the rotation: theta(l) = 0 instead of
@@ -33,7 +33,8 @@ S, W = 0.5 * (_POINTS + 1.0), 0.5 * _WEIGHTS
 
 @dataclass(frozen=True)
 class Elements:
-    """``count`` equal elements. ``reduced_shear``: one point for the shear energy; ``published_end``: see the module.
+    """Describe ``count`` equal elements. ``reduced_shear``: shear energy by one point; ``published_end``: see the
+    module.
 
     The source has Elements(1000, reduced_shear=False, published_end=True). InputError for fewer than two elements, and
     for a published end with reduced shear, which the source does not have.
@@ -51,13 +52,13 @@ class Elements:
             raise InputError("Elements: the published end function goes with reduced_shear=False, as in the source")
 
     def nodes(self, length: float) -> Array:
-        """Positions of the unknowns: all nodes but the clamped one, shape (count,) [m]."""
+        """Return the positions of the unknowns: all nodes but the clamped one, shape (count,) [m]."""
         return np.linspace(0.0, number("Elements.nodes", "length", length, positive=True, unit="m"), self.count + 1)[1:]
 
 
 @dataclass(frozen=True)
 class BeamMatrices:
-    """Mass and stiffness of y = (theta_1 … theta_m, u_1 … u_m): ½ wᵀMw and ½ yᵀSy are energies [J]. C = a2 S.
+    """Hold mass and stiffness of y = (theta_1 … theta_m, u_1 … u_m): ½ wᵀMw and ½ yᵀSy are energies [J]. C = a2 S.
 
     ``load``: a unit of distributed force [N/m] on the unknowns.
     """
@@ -68,7 +69,7 @@ class BeamMatrices:
 
 
 def beam_matrices(beam: TimoshenkoBeam, elements: Elements) -> BeamMatrices:
-    """M1, M2, K1, K2, L1 of section 7 with their coefficients, sparse."""
+    """Assemble M1, M2, K1, K2, L1 of section 7 with their coefficients, sparse."""
     m, h = elements.count, beam.length / elements.count
     lines, slopes = _lines(S), _line_slopes(S) / h
     turn, bend = lines, slopes
@@ -98,7 +99,7 @@ def beam_matrices(beam: TimoshenkoBeam, elements: Elements) -> BeamMatrices:
 
 
 def rod_matrices(rod: Rod, count: int) -> tuple[Any, Any, Array]:
-    """(M, K, unit of distributed force [N/m]) of v_1 … v_n, sparse; C = viscosity K."""
+    """Assemble (M, K, unit of distributed force [N/m]) of v_1 … v_n, sparse; C = viscosity K."""
     h = rod.length / count
     lines, slopes = _lines(S), _line_slopes(S) / h
     M, K = (h * (a * W) @ a.T for a in (lines, slopes))

@@ -1,4 +1,4 @@
-"""Data of seed 002, section 8, with the readings of what its text leaves open (verification 6.1).
+"""Give the data of Ahn (2012), section 8, with the readings of what the text leaves open.
 
 The normal force is printed as r_N(0) = 100,000 and r_N(t) = 100,000/100t. Three readings, as |r_N| >= 0:
 
@@ -23,51 +23,51 @@ DT, STEPS = 0.002, 1000
 
 
 def reading_a(t: float) -> float:
-    """10⁵/(100 t) [N], and 10⁵ at t = 0."""
+    """Return 10⁵/(100 t) [N], and 10⁵ at t = 0."""
     return FORCE / (100.0 * t) if t > 0.0 else FORCE
 
 
 def reading_b(t: float) -> float:
-    """10⁵/100^t [N], t in seconds."""
+    """Return 10⁵/100^t [N], t in seconds."""
     return float(FORCE * 100.0**-t)
 
 
 def reading_c(dt: float = DT) -> Force:
-    """The function 10⁵/100^(t/dt) [N]: a hundredth in every step of dt [s]. InputError unless dt > 0."""
+    """Return the function 10⁵/100^(t/dt) [N]: a hundredth in every step of dt [s]. InputError unless dt > 0."""
     number("reading_c", "dt", dt, positive=True, unit="s")
     return lambda t: float(FORCE * 100.0 ** -(t / dt))
 
 
 def no_force(t: float) -> float:
-    """Zero: the tip is free."""
+    """Return zero: the tip is free."""
     return 0.0
 
 
 def published_mu(t: float, rate: float) -> float:
-    """mu = |slip rate|/100 [-], rate in m/s."""
+    """Return mu = |slip rate|/100 [-], rate in m/s."""
     return abs(rate) / 100.0
 
 
 def published_beam(viscosity: float) -> TimoshenkoBeam:
-    """l = 5, rho A = rho I = 1, EI = KAG = 100; viscosity 0.001 or 2 in the source [s]."""
+    """Return the beam with l = 5, rho A = rho I = 1, EI = KAG = 100; viscosity 0.001 or 2 in the source [s]."""
     return TimoshenkoBeam(viscosity=viscosity)
 
 
 def published_start() -> Start:
-    """u = -x/200, v = -x; theta = omega = 0, which the source does not state."""
+    """Return the start u = -x/200, v = -x; theta = omega = 0, which the source does not state."""
     return Start(u=lambda x: -x / 200.0, v=lambda x: -x)
 
 
 def published_elements(count: int = 1000) -> Elements:
-    """m = 1000: linear functions, exact integration, the cubic last rotation function."""
+    """Return m = 1000 elements: linear functions, exact integration, the cubic last rotation function."""
     return Elements(count, reduced_shear=False, published_end=True)
 
 
 def published_friction(eps: float = 0.002) -> RegularisedFriction:
-    """eps = 0.002 m, Newton's method without safeguard until |F| <= 1e-10."""
+    """Return friction with eps = 0.002 m, Newton's method without safeguard until |F| <= 1e-10."""
     return RegularisedFriction(eps, absolute=1e-10, safeguard=False)
 
 
 def readings(dt: float = DT) -> dict[str, Force]:
-    """All of them by their letters, and "none"."""
+    """Return all readings by their letters, and "none"."""
     return {"none": no_force, "A": reading_a, "B": reading_b, "C": reading_c(dt)}

@@ -1,4 +1,4 @@
-"""Friction at the tip: one scalar equation per step for the slip s = u_m^{k+1} - u_m^k (seed 002, section 7).
+"""Solve friction at the tip: one scalar equation per step for the slip s = u_m^{k+1} - u_m^k (Ahn 2012, section 7).
 
 Condensed to the tip, the step says  c s - g + R = 0  with the friction R that the wall takes from the beam [N]:
 c > 0 [N/m] is the stiffness of the step, g [N] the force that would hold the tip. With limit = mu |r_N| >= 0:
@@ -21,7 +21,7 @@ from ..core.errors import StepFailure
 
 @dataclass(frozen=True)
 class Slip:
-    """The slip s of a step [m], the friction force R [N] and the Newton updates it took."""
+    """Hold the slip s of a step [m], the friction force R [N] and the Newton updates it took."""
 
     s: float
     force: float
@@ -29,24 +29,24 @@ class Slip:
 
 
 class TipFriction(Protocol):
-    """Solves the scalar equation."""
+    """Solve the scalar equation: what every friction at the tip offers."""
 
     def solve(self, c: float, g: float, limit: float) -> Slip: ...
 
 
 @dataclass(frozen=True)
 class ExactFriction:
-    """The inequality itself: the tip sticks while |g| <= limit, else R = ± limit. Closed form, no iteration."""
+    """Solve the inequality itself: the tip sticks while |g| <= limit, else R = ± limit. Closed form, no iteration."""
 
     def solve(self, c: float, g: float, limit: float) -> Slip:
-        """s = (g - R)/c with R the point of [-limit, limit] nearest to g."""
+        """Return s = (g - R)/c with R the point of [-limit, limit] nearest to g."""
         force = min(max(g, -limit), limit)
         return Slip((g - force) / c, force, 0)
 
 
 @dataclass(frozen=True)
 class RegularisedFriction:
-    """Newton's method from s = 0 for (7.9), the equation multiplied by the root:
+    """Solve (7.9) by Newton's method from s = 0, the equation multiplied by the root:
 
         F(s) = sqrt(s² + eps²) (c s - g) + limit s = 0
 
@@ -70,7 +70,7 @@ class RegularisedFriction:
         flag("RegularisedFriction", "safeguard", self.safeguard)
 
     def solve(self, c: float, g: float, limit: float) -> Slip:
-        """The zero of F. StepFailure when max_iterations updates do not reach the tolerance."""
+        """Return the zero of F. StepFailure when max_iterations updates do not reach the tolerance."""
         s, low, high = 0.0, *sorted((0.0, g / c * (1.0 + 1e-9)))  # a little wider: the zero may be its end
         for updates in range(self.max_iterations + 1):
             root = math.hypot(s, self.eps)

@@ -1,4 +1,4 @@
-"""Timoshenko beam and Kelvin-Voigt rod: their coefficients and the state they start from (seed 002, section 2)."""
+"""Describe Timoshenko beam and Kelvin-Voigt rod: coefficients and the state they start from (Ahn 2012, section 2)."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ Profile = Callable[[Array], Array]
 
 @dataclass(frozen=True)
 class TimoshenkoBeam:
-    """A beam clamped at x = 0 with a free tip at x = length, u up, theta the rotation of the section (2.6), (2.7):
+    """Describe a beam clamped at x = 0, its tip at x = length free, u up, theta the rotation of sections (2.6), (2.7):
 
         rho I theta'' = E I theta_xx + K A G (u_x - theta) + viscosity (same terms of the rates)
         rho A u''     = K A G (u_xx - theta_x) + viscosity (same terms of the rates) + f(t)
 
     length [m]; rho [kg/m³]; area A [m²]; inertia I [m⁴]; E, G [Pa]; shear_factor K [-]; viscosity a2 [s] >= 0. The
-    defaults are seed 002's, with EI = KAG = 100. InputError for numbers out of range.
+    defaults are Ahn's, with EI = KAG = 100. InputError for numbers out of range.
     """
 
     length: float = 5.0
@@ -39,23 +39,23 @@ class TimoshenkoBeam:
 
     @property
     def bending_stiffness(self) -> float:
-        """E I [N m²]."""
+        """Return E I [N m²]."""
         return self.E * self.inertia
 
     @property
     def shear_stiffness(self) -> float:
-        """K A G [N]."""
+        """Return K A G [N]."""
         return self.shear_factor * self.area * self.G
 
 
 @dataclass(frozen=True)
 class Rod:
-    """A rod along x, clamped at x = 0, whose end x = length may touch a wall at the distance gap (2.1)-(2.4):
+    """Describe a rod along x, clamped at x = 0, whose end x = length may touch a wall at the distance gap (2.1)-(2.4):
 
         rho A v'' = E A (v_xx + viscosity v'_xx) + body_force(t),    v(length) <= gap
 
     length [m]; rho [kg/m³]; area [m²]; E [Pa]; viscosity a1/c1 [s] >= 0; gap [m] >= 0; body_force [N/m] (f_h of the
-    seed, uniform) and end_force [N] pull towards the wall for positive values. InputError for numbers out of range.
+    paper, uniform) and end_force [N] pull towards the wall for positive values. InputError for numbers out of range.
     """
 
     length: float = 5.0
@@ -80,7 +80,8 @@ def _zero(x: Array) -> Array:
 
 @dataclass(frozen=True)
 class Start:
-    """Initial values as functions of x: displacement u [m], velocity v [m/s], rotation theta, its rate omega [1/s]."""
+    """Give initial values as functions of x: displacement u [m], velocity v [m/s], rotation theta, its rate omega
+    [1/s]."""
 
     u: Profile = field(default=_zero)
     v: Profile = field(default=_zero)
@@ -92,7 +93,8 @@ class Start:
             function("Start", name, getattr(self, name), "give a function of the positions x")
 
     def at(self, name: str, x: Array) -> Array:
-        """One of the four at the nodes; InputError unless it gives finite numbers, one per node or one for all."""
+        """Return one of the four fields at the nodes; InputError unless it gives finite numbers, one each or one for
+        all."""
         values = getattr(self, name)(x)
         shape = () if shape_of(values) == () else x.shape
         return np.broadcast_to(array("Start", f"what {name}(x) returns", values, shape), x.shape).copy()

@@ -1,4 +1,4 @@
-"""Equality constraints in the same geometry, for comparison with the layer (seed 001, equations 29 to 34).
+"""Compute motions under equality constraints, to compare with the layer (b-geometry, ENOC 2017, equations 29 to 34).
 
 Every constraint phi^R(q) = 0 with a^R = d phi^R brings one coordinate lambda^R of a manifold of its own:
 
@@ -28,7 +28,7 @@ from .motion import ConstrainedSystem, Evaluations, one_sentence
 
 @dataclass(frozen=True)
 class BilateralMotion:
-    """Times (m,); q, v (m, n); constraint values phi, coordinates lambda and reactions (m, k)."""
+    """Hold times t (m,); q, v (m, n); constraint values phi, coordinates lambda and reactions (m, k)."""
 
     t: Array
     q: Array
@@ -41,7 +41,7 @@ class BilateralMotion:
 def bilateral_motion(
     systems: Sequence[ConstrainedSystem], *, q0: Array, v0: Array, times: Array, rtol: float = 1e-11
 ) -> BilateralMotion:
-    """The motion with phi^R = 0 held, at the given times (the first is the start).
+    """Compute the motion with phi^R = 0 held, at the given times (the first is the start).
 
     systems: one for each constraint, its ``rho`` and ``gradient`` being phi and a; mass and forces are those of the
     first. lambda starts from 0, at rest. v must be the rates of q.

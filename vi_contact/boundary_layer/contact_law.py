@@ -1,6 +1,6 @@
-"""The boundary layer as a contact law of finite elements: the reaction of a node over one time step.
+"""Give the boundary layer as a contact law of finite elements: the reaction of a node over one time step.
 
-Per unit area of the contact boundary, rho = gap > 0, y = ln rho (seed 001 with the blended metric, see ``Metric``):
+Per unit area of the contact boundary, rho = gap > 0, y = ln rho (b-geometry with the blended metric, see ``Metric``):
 
     p = delta(rho)/rho · b² [k - (c/V) ẏ - gamma ÿ],        ÿ = ρ̈/rho - ρ̇²/rho²
 
@@ -45,7 +45,7 @@ SHORT_STEP = 1e-5  # |rho_1 - rho_0| over rho below which the quotient is the de
 
 @dataclass(frozen=True)
 class ContactLayer:
-    """The law of a contact boundary.
+    """Describe the law of a contact boundary: pressure as a function of the gap and its rate.
 
     Attributes:
         layer: width b, start a < b [m]; k [N/m per m²], c [N per m²]; its speed V [m/s] must be given.
@@ -77,23 +77,23 @@ class ContactLayer:
         return CubicHermiteSpline(y, Y - Y[-1], delta)
 
     def set_back(self, surface: ContactSurface) -> ContactSurface:
-        """The surface with its obstacle moved back by b: a body that touched its face now touches the layer's edge."""
+        """Return the surface with its obstacle moved back by b: a body that touched it now touches the layer's edge."""
         instance("ContactLayer.set_back", "surface", surface, ContactSurface, "give a contact surface")
         return replace(surface, gap0=surface.gap0 + self.layer.width)
 
     def potential(self, rho: Array) -> Array:
-        """Y <= 0; -k b² Y is the energy stored per area when nothing moves [J/m²]."""
+        """Return Y <= 0: -k b² Y is the energy stored per area when nothing moves [J/m²]."""
         a, b = np.log(self.layer.a), np.log(self.layer.width)
         y = np.log(rho)
         return np.where(y < a, self._fading(a) + y - a, np.where(y < b, self._fading(np.clip(y, a, b)), 0.0))
 
     def mean_pressure(self, rho: Array, old: Array, rate: Array, dt: float) -> tuple[Array, Array]:
-        """(p̄ [Pa], d p̄/d rho_1) of a step from gap ``old`` and rate w_0 [1/s] to gap ``rho``; arrays (m,)."""
+        """Return (p̄ [Pa], d p̄/d rho_1) of a step from gap ``old`` and rate w_0 [1/s] to gap ``rho``; arrays (m,)."""
         layer, gamma = self.layer, self.mass
-        b2, damper = layer.width**2, layer.c / layer.v / dt + 2.0 * gamma / dt**2
-        bracket = b2 * (layer.k - damper * np.log(rho / old) + 2.0 * gamma / dt * rate)
+        squared, damper = layer.width**2, layer.c / layer.v / dt + 2.0 * gamma / dt**2
+        bracket = squared * (layer.k - damper * np.log(rho / old) + 2.0 * gamma / dt * rate)
         quotient, slope = self._quotient(rho, old)
-        return quotient * bracket, slope * bracket - quotient * b2 * damper / rho
+        return quotient * bracket, slope * bracket - quotient * squared * damper / rho
 
     def _quotient(self, rho: Array, old: Array) -> tuple[Array, Array]:
         """((Y_1 - Y_0)/(rho_1 - rho_0), its derivative with respect to rho_1)."""
@@ -107,8 +107,8 @@ class ContactLayer:
         return quotient, np.where(near, bend, (cut(rho) / rho - quotient) / step)
 
     def rebound(self, mass: float, speed: float) -> float:
-        """e of a rigid body that enters with this speed: one equation in time. mass: of the body [kg/m²]; a law with
-        metric knows one, its own, and InputError for another."""
+        """Return e of a rigid body that enters with this speed, by one equation in time. mass: of the body [kg/m²]; a
+        law with metric knows one, its own, and InputError for another."""
         sized("ContactLayer.rebound", "mass", mass, "kg/m²")
         sized("ContactLayer.rebound", "speed", speed, "m/s")
         if self.mass not in (0.0, mass):
@@ -126,7 +126,7 @@ def contact_layer(
     strength: float = 1.0,
     metric: Metric = Metric.BLENDED,
 ) -> ContactLayer:
-    """The law from which a rigid body of ``mass`` [kg/m²] returns with e times its ``speed`` [m/s], 0.001 <= e <= 1.
+    """Find the law that returns a rigid body of ``mass`` [kg/m²] with e times its ``speed`` [m/s], 0.001 <= e <= 1.
 
     strength: k b²/(mass V²), how soon the body is turned back. start: a [m], half the width when None. metric: BLENDED,
     gamma = mass, or FLAT, gamma = 0. InputError for another and for values outside their range.

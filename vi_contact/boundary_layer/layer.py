@@ -1,4 +1,4 @@
-"""The boundary layer before an obstacle: its width, its cut-off and the force in it (seed 001, equation 25).
+"""Describe the layer before an obstacle: its width, cut-off and force (b-geometry, ENOC 2017, equation 25).
 
     f̂_1 = [k̂/x - ĉ ẋ/x²] delta(x; a, b),    k̂ = k b²,    ĉ = c b²/V,    x = rho(q) > 0 the distance function
     delta = 1 - s(z),  z = (x - a)/(b - a),  s = f(z)/(f(z) + f(1 - z)),  f(z) = exp(-1/z) for z > 0, else 0
@@ -24,7 +24,7 @@ LARGEST, LARGEST_FORCE = 1e60, 1e150  # of lengths, speeds and masses; of k and 
 
 @dataclass(frozen=True)
 class Layer:
-    """Parameters of the law; the distance x is in metres here (k, c have other units for other rho).
+    """Describe the law by its parameters; the distance x is in metres here (k, c have other units for other rho).
 
     Attributes:
         width: b [m], where the layer begins.
@@ -56,26 +56,26 @@ class Layer:
 
     @property
     def a(self) -> float:
-        """Where the force is complete [m]."""
+        """Return the distance at which the force is complete [m]."""
         return self.width if self.start is None else self.start
 
     @property
     def v(self) -> float:
-        """V [m/s]; InputError while it is not known."""
+        """Return V [m/s]; InputError while it is not known."""
         if self.speed is None:
             raise InputError("the layer's speed V is not given: give speed, or enter the layer first")
         return self.speed
 
     def at(self, speed: float) -> Layer:
-        """The layer as a body that enters with this speed [m/s] meets it."""
+        """Return the layer as a body that enters with this speed [m/s] meets it."""
         return self if self.speed is not None else replace(self, speed=speed)
 
     def times(self, factor: float) -> Layer:
-        """k and c times a factor: the same motion of a mass that many times as large."""
+        """Return the layer with k and c times a factor: the same motion of a mass that many times as large."""
         return replace(self, k=factor * self.k, c=factor * self.c)
 
     def cut_off(self, x: Array | float) -> Array:
-        """delta(x; a, b): 1 up to a, 0 from b on, infinitely smooth between."""
+        """Return delta(x; a, b): 1 up to a, 0 from b on, infinitely smooth between."""
         x, a, b = np.asarray(x, dtype=float), self.a, self.width
         between = (x > a) & (x < b)
         z = np.where(between, (x - a) / (b - a if b > a else 1.0), 0.5)
@@ -83,7 +83,7 @@ class Layer:
         return np.where(between, expit(1.0 / z - 1.0 / (1.0 - z)), np.where(x <= a, 1.0, 0.0))
 
     def force(self, x: Array | float, rate: Array | float) -> Array:
-        """f̂_1 of (25) [N] at distance x > 0 and rate ẋ."""
+        """Return f̂_1 of (25) [N] at distance x > 0 and rate ẋ."""
         x = np.asarray(x, dtype=float)
         return np.asarray(self.width**2 * (self.k - self.c / self.v * rate / x) / x * self.cut_off(x))
 

@@ -1,4 +1,4 @@
-"""Metric and affinities of a configuration manifold near its boundary (seed 001, equations 8 to 21).
+"""Compute metric and affinities of a configuration manifold near its boundary (b-geometry, ENOC 2017, 8 to 21).
 
 With the covector A = d rho in the coordinates of the velocities and M = [g_IJ]:
 
@@ -23,7 +23,7 @@ from .layer import Layer
 
 
 class Metric(Enum):
-    """Which terms of the normal equation act in the layer; n = g_11 times the normal acceleration without layer.
+    """Name the terms of the normal equation act in the layer; n = g_11 times the normal acceleration without layer.
 
     DOMINANT: ĝ_11 (ρ̈ - ρ̇²/ρ) = f̂_1 + n. The terms of order (b/rho)² alone, as (26) says and (35), (36) and Figs. 1
         to 3 use; the default. The restitution depends on c/(a k) only.
@@ -40,7 +40,7 @@ class Metric(Enum):
     FLAT = "flat"
 
     def reaction(self, layer: Layer, g: float, rho: float, rate: float, free: float) -> float:
-        """lambda [N] with g ρ̈ = g ``free`` + lambda; g = g_11 [kg], ``free`` the acceleration [m/s²] without layer."""
+        """Return lambda [N], g ρ̈ = g ``free`` + lambda; g = g_11 [kg]; ``free``: acceleration [m/s²] without layer."""
         force, ratio = float(layer.force(rho, rate)), (layer.width / rho) ** 2
         if self is Metric.DOMINANT:
             return g * (rate**2 / rho + force / (g * ratio) + free / ratio - free)
@@ -49,11 +49,11 @@ class Metric(Enum):
 
 
 def normal_mass(M: Array, A: Array) -> float:
-    """g_11 = 1/(A M⁻¹ Aᵀ): the mass that the boundary feels. M (n, n), A (n,)."""
+    """Return g_11 = 1/(A M⁻¹ Aᵀ): the mass that the boundary feels. M (n, n), A (n,)."""
     return float(1.0 / (A @ np.linalg.solve(M, A)))
 
 
 def b_affinities(M: Array, A: Array, rho: float) -> Array:
-    """Λ̂^K_IJ of (21), (n, n, n) in the order K, I, J."""
+    """Return Λ̂^K_IJ of (21), (n, n, n) in the order K, I, J."""
     B = normal_mass(M, A) * np.linalg.solve(M, A)
     return np.asarray(-np.einsum("k,i,j->kij", B, A, A) / rho)

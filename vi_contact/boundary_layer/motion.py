@@ -1,4 +1,4 @@
-"""Motion of any system with one frictionless contact, as ordinary differential equations (seed 001, 26 to 28).
+"""Describe systems with one frictionless contact by ordinary differential equations (b-geometry, ENOC 2017, 26 to 28).
 
 In velocities v (of coordinates q, or quasi-velocities) with M = [g_IJ(q)] and A = d rho:
 
@@ -30,7 +30,7 @@ DIFFERENCE_STEP = 6e-6  # of a central difference over the size of its argument:
 
 @dataclass(frozen=True)
 class ConstrainedSystem:
-    """A configuration manifold with boundary, and the forces on it.
+    """Describe a configuration manifold with boundary, and the forces on it.
 
     Attributes:
         mass: M, (n, n) [kg], constant or a function of q.
@@ -60,7 +60,7 @@ class ConstrainedSystem:
                 function(owner, name, getattr(self, name), "give a function, see its docstring")
 
     def check(self, q: Array, v: Array, t: float = 0.0) -> None:
-        """InputError for functions that return, at this state, other shapes, texts, NaN or infinity."""
+        """Raise InputError for functions that return, at this state, other shapes, texts, NaN or infinity."""
         owner, n = "ConstrainedSystem", len(v)
         if self.rates is None and len(q) != n:
             raise InputError(f"{owner}: {len(q)} coordinates and {n} velocities; give as many, or rates(q, v)")
@@ -79,19 +79,19 @@ class ConstrainedSystem:
             number(owner, "gradient_rate(q, v) at the start", self.gradient_rate(q, v))
 
     def matrix(self, q: Array) -> Array:
-        """M(q)."""
+        """Return the mass matrix M(q), (n, n)."""
         return np.asarray(self.mass(q) if callable(self.mass) else self.mass, dtype=float)
 
     def velocity(self, q: Array, v: Array) -> Array:
-        """q̇."""
+        """Return q̇, the rates of the coordinates."""
         return v if self.rates is None else np.asarray(self.rates(q, v))
 
     def normal_rate(self, q: Array, v: Array) -> float:
-        """ρ̇ = A v."""
+        """Return ρ̇ = A v, the rate of the distance."""
         return float(np.dot(self.gradient(q), v))
 
     def turning(self, q: Array, v: Array) -> float:
-        """Ȧ v, the part of ρ̈ that is there without acceleration."""
+        """Return Ȧ v, the part of ρ̈ that is there without acceleration."""
         if self.gradient_rate is not None:
             return float(self.gradient_rate(q, v))
         rate = self.velocity(q, v)
@@ -103,16 +103,16 @@ class ConstrainedSystem:
         return float(change @ v) / (2.0 * h)
 
     def generalised_force(self, t: float, q: Array, v: Array) -> Array:
-        """f - Γ(v, v), (n,)."""
+        """Return f - Γ(v, v), (n,)."""
         f = np.zeros_like(v) if self.force is None else np.asarray(self.force(t, q, v), dtype=float)
         return f - _inertia(self.mass, q, v, self.difference(q)) if callable(self.mass) else f
 
     def difference(self, q: Array) -> float:
-        """The way over which to take a central difference at q."""
+        """Return the way over which to take a central difference at q."""
         return DIFFERENCE_STEP * max(self.scale, float(np.max(np.abs(q))))
 
     def accelerations(self, t: float, q: Array, v: Array) -> tuple[Array, Array, float, float]:
-        """(v̇ without layer, M⁻¹Aᵀ, g_11, ρ̈ without layer)."""
+        """Return (v̇ without layer, M⁻¹Aᵀ, g_11, ρ̈ without layer)."""
         A = np.asarray(self.gradient(q), dtype=float)
         both = np.linalg.solve(self.matrix(q), np.column_stack([self.generalised_force(t, q, v), A]))
         free, along = both[:, 0], both[:, 1]
@@ -120,13 +120,13 @@ class ConstrainedSystem:
 
 
 class Evaluations:
-    """Counts what an integration in time spends, so that no motion goes on for ever; t: the time it has come to [s]."""
+    """Count what an integration in time spends, so that no motion goes on for ever; t: the time it has come to [s]."""
 
     def __init__(self, most: int = EVALUATIONS) -> None:
         self.most, self.spent, self.t = most, 0, 0.0
 
     def spend(self, t: float) -> None:
-        """StepFailure, naming the time, when everything is spent."""
+        """Count one evaluation; StepFailure, naming the time, when everything is spent."""
         self.spent, self.t = self.spent + 1, t
         if self.spent > self.most:
             raise StepFailure(f"the motion did not get beyond t = {t:.6g} s in {self.most} evaluations of its "
@@ -135,7 +135,7 @@ class Evaluations:
 
 @contextmanager
 def one_sentence() -> Iterator[None]:
-    """StepFailure for numbers that leave their range and matrices that become singular on the way."""
+    """Raise StepFailure for numbers that leave their range and matrices that become singular on the way."""
     try:
         yield
     except (ArithmeticError, np.linalg.LinAlgError) as error:

@@ -1,4 +1,4 @@
-"""A particle that hits a wall, in closed form (seed 001, equations 35 to 38).
+"""Solve the impact of a particle on a wall in closed form (b-geometry, ENOC 2017, equations 35 to 38).
 
 With y = ln x the normal equation (35) is linear, m y'' = k - (c/V) y', and b cancels. From x = a, ẋ = -V:
 
@@ -34,7 +34,7 @@ LEAST = 1e-9  # least restitution that is asked for
 
 @dataclass(frozen=True)
 class ParticleImpact:
-    """A particle of ``mass`` m [kg] that reaches x = a of the layer with ``speed`` [m/s].
+    """Describe a particle of ``mass`` m [kg] that reaches x = a of the layer with ``speed`` [m/s].
 
     k must be positive: without it no particle leaves the layer. InputError for values outside their range.
     """
@@ -52,7 +52,7 @@ class ParticleImpact:
 
     @property
     def damping_ratio(self) -> float:
-        """s = c/(a k), times the particle's speed over the law's."""
+        """Return s = c/(a k), times the particle's speed over the law's."""
         layer = self.layer.at(self.speed)
         return layer.c / (layer.a * layer.k) * (self.speed / layer.v)
 
@@ -67,47 +67,47 @@ class ParticleImpact:
 
     @property
     def restitution(self) -> float:
-        """e_v = V'/V, Newton's coefficient (37)."""
+        """Return e_v = V'/V, Newton's coefficient (37)."""
         return restitution(self.damping_ratio)
 
     @property
     def compression_time(self) -> float:
-        """t_c [s]: the velocity is zero."""
+        """Return t_c [s], when the velocity is zero."""
         return self._time / float(exprel(np.log1p(self.damping_ratio)))
 
     @property
     def duration(self) -> float:
-        """t_f [s]: back at x = a."""
+        """Return t_f [s], when the particle is back at x = a."""
         return self._time * (1.0 + self.restitution)
 
     @property
     def deepest(self) -> float:
-        """x_min [m]."""
+        """Return x_min [m], the least distance."""
         return float(self.layer.a * np.exp(-self._kappa * _h(self.damping_ratio)))
 
     def position(self, t: Array | float) -> Array:
-        """x [m] at times 0 <= t <= t_f."""
+        """Return x [m] at times 0 <= t <= t_f."""
         T, s = np.asarray(t, dtype=float) / self._time, self.damping_ratio
         return np.asarray(self.layer.a * np.exp(self._kappa * ((1.0 + s) * T**2 * _phi(s * T) - T)))
 
     def velocity(self, t: Array | float) -> Array:
-        """ẋ [m/s] at times 0 <= t <= t_f."""
+        """Return ẋ [m/s] at times 0 <= t <= t_f."""
         T, s = np.asarray(t, dtype=float) / self._time, self.damping_ratio
         return np.asarray(self.speed / self.layer.a * self.position(t) * ((1.0 + s) * T * exprel(-s * T) - 1.0))
 
     def boundary_force(self, t: Array | float) -> Array:
-        """f̂_1 of (25) [N] along the motion, without cut-off: x does not exceed a."""
+        """Return f̂_1 of (25) [N] along the motion, without cut-off: x does not exceed a."""
         x, layer = self.position(t), self.layer.at(self.speed)
         return np.asarray(layer.width**2 * (layer.k - layer.c / layer.v * self.velocity(t) / x) / x)
 
     @property
     def poisson(self) -> float:
-        """e_p = p_r/p_c of (37), (38) with f = m dv/dt, the force on the particle: equal to Newton's e_v."""
+        """Return e_p = p_r/p_c of (37), (38) with f = m dv/dt, the force on the particle: equal to Newton's e_v."""
         return float(self.velocity(self.duration) / self.speed)
 
     @property
     def poisson_covector(self) -> float:
-        """e_p with f = f̂_1 in (38), the force in the covector space of the boundary: a little above e_v."""
+        """Return e_p with f = f̂_1 in (38), the force in the covector space of the boundary: a little above e_v."""
         t_c, t_f = self.compression_time, self.duration
         pushed = quad(self.boundary_force, 0.0, t_c, epsabs=0.0, epsrel=1e-12)[0]
         returned = quad(self.boundary_force, t_c, t_f, epsabs=1e-12 * abs(pushed), epsrel=1e-12)[0]
@@ -115,7 +115,7 @@ class ParticleImpact:
 
 
 def restitution(s: float) -> float:
-    """e of s = c/(a k) >= 0."""
+    """Return e of s = c/(a k) >= 0."""
     number("restitution", "the damping ratio s = c/(a k)", s, not_negative=True)
     if s > 1.0:
         return (1.0 + float(lambertw(-(1.0 + s) * np.exp(-(1.0 + s))).real)) / s
@@ -126,7 +126,7 @@ def restitution(s: float) -> float:
 
 
 def damping_ratio(e: float) -> float:
-    """s = c/(a k) that gives the restitution 0 < e <= 1: the inverse of ``restitution``."""
+    """Return s = c/(a k) that gives the restitution 0 < e <= 1: the inverse of ``restitution``."""
     if not LEAST <= number("damping_ratio", "the restitution coefficient e", e) <= 1.0:
         raise InputError(f"damping_ratio: the restitution coefficient e is {e}; give a number from {LEAST:g} to 1")
     if e == 1.0:
@@ -138,7 +138,7 @@ def damping_ratio(e: float) -> float:
 def layer_for(
     e: float, *, mass: float, speed: float, width: float, start: float | None = None, deepest: float = 0.5
 ) -> Layer:
-    """The layer from which this mass [kg] with this speed [m/s] returns with e times its speed (dominant terms).
+    """Return the layer from which this mass [kg] with this speed [m/s] returns with e times its speed (dominant terms).
 
     ``deepest``: x_min/a, the part of the distance a that is left at the greatest compression. InputError unless
     0 < e <= 1 and 0 < deepest < 1.

@@ -1,4 +1,4 @@
-"""A rigid body that hits a plane without friction (seed 001, section "Spatial collision of a rigid body", 39 to 53).
+"""Model a rigid body that hits a plane without friction (b-geometry, ENOC 2017, "Spatial collision", 39 to 53).
 
 Coordinates q = (r_c, p): mass centre and unit quaternion p = (p_0, p_1, p_2, p_3), R(p) from body to space.
 Velocities v = (ṙ_c, Omega), Omega in the body frame (39); M = diag(m 1, J) (40) is constant. The plane is n·x = d, the
@@ -29,7 +29,7 @@ from .motion import ConstrainedSystem
 
 @dataclass(frozen=True)
 class Ellipsoid:
-    """The point of an ellipsoid with semi-axes ``axes`` [m] (along the body axes, about the mass centre) next to a
+    """Find the point of an ellipsoid with semi-axes ``axes`` [m] (along the body axes, about the mass centre) next to a
     plane: l = -D² nu/|D nu|, D = diag(axes), nu the plane's normal in the body frame."""
 
     axes: tuple[float, float, float]
@@ -45,7 +45,7 @@ class Ellipsoid:
 
 @dataclass(frozen=True)
 class RigidBody:
-    """A body before a plane.
+    """Describe a rigid body before a plane.
 
     Attributes:
         mass: [kg]. inertia: (3, 3) or its diagonal (3,), about the mass centre in the body frame [kg m²].
@@ -80,49 +80,49 @@ class RigidBody:
 
     @property
     def J(self) -> Array:
-        """Inertia (3, 3)."""
+        """Return the inertia (3, 3)."""
         J = np.asarray(self.inertia, dtype=float)
         return np.diag(J) if J.ndim == 1 else J
 
     @property
     def n(self) -> Array:
-        """Unit normal (3,)."""
+        """Return the unit normal (3,)."""
         return np.asarray(self.normal, dtype=float) / np.linalg.norm(self.normal)
 
     @property
     def matrix(self) -> Array:
-        """M = diag(m 1, J) (40), (6, 6)."""
+        """Return M = diag(m 1, J) (40), (6, 6)."""
         return np.block([[self.mass * np.eye(3), np.zeros((3, 3))], [np.zeros((3, 3)), self.J]])
 
     def nearest(self, q: Array) -> tuple[Array, Array]:
-        """(l_P, n) in the body frame."""
+        """Return the nearest point and the normal, (l_P, n), in the body frame."""
         nu = rotation(q[3:]).T @ self.n
         return np.asarray(self.point(nu) if callable(self.point) else self.point, dtype=float), nu
 
     def rho(self, q: Array) -> float:
-        """Distance of P from the plane [m] (44)."""
+        """Return the distance of P from the plane [m] (44)."""
         l_P, nu = self.nearest(q)
         return float(self.n @ q[:3] + nu @ l_P) - self.offset
 
     def gradient(self, q: Array) -> Array:
-        """A (6,) of (45), (46)."""
+        """Return A (6,) of (45), (46)."""
         l_P, nu = self.nearest(q)
         return np.concatenate([self.n, np.cross(l_P, nu)])
 
     def kinetic_energy(self, v: Array) -> float:
-        """½ vᵀMv [J]."""
+        """Return ½ vᵀMv [J]."""
         return float(0.5 * v @ self.matrix @ v)
 
     def energy(self, q: Array, v: Array) -> float:
-        """Kinetic energy less the work of gravity [J]."""
+        """Return the kinetic energy less the work of gravity [J]."""
         return self.kinetic_energy(v) - self.mass * float(np.dot(self.gravity, q[:3]))
 
     def normal_mass(self, q: Array) -> float:
-        """g_11 of (50) [kg]."""
+        """Return g_11 of (50) [kg]."""
         return normal_mass(self.matrix, self.gradient(q))
 
     def after_impact(self, q: Array, v: Array, e: float) -> Array:
-        """The impact map: v⁺ (6,)."""
+        """Return v⁺ (6,) of the impact map."""
         owner = "RigidBody.after_impact"
         q, v = array(owner, "q", q, (7,)), array(owner, "v", v, (6,))
         number(owner, "e", e, not_negative=True)
@@ -131,7 +131,7 @@ class RigidBody:
         return np.asarray(v - along * (1.0 + e) * (A @ v) / (A @ along))
 
     def system(self) -> ConstrainedSystem:
-        """For ``layer_motion``: coordinates (7,), velocities (6,)."""
+        """Return the system for ``layer_motion``: coordinates (7,), velocities (6,)."""
         turning: Callable[[Array, Array], float] | None = None
         if not callable(self.point):
             turning = self._turning
@@ -150,7 +150,7 @@ class RigidBody:
 
 
 def rotation(p: Array) -> Array:
-    """R (3, 3) of the quaternion p (4,), which need not have length one."""
+    """Return R (3, 3) of the quaternion p (4,), which need not have length one."""
     w, x, y, z = p / np.linalg.norm(p)
     return np.array([
         [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],

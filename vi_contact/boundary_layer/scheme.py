@@ -1,4 +1,4 @@
-"""The midpoint rule with the boundary layer in the place of the exact inequality.
+"""Step by the midpoint rule with the boundary layer in the place of the exact inequality.
 
     u1 - u0 = ½ dt (v0 + v1)
     M (v1 - v0)/dt + ½ C (v0 + v1) + ½ K (u0 + u1) = f(t0 + ½ dt) - B_nᵀ r̄_n,    r̄_n = weight · p̄(gap1; gap0, rate0)
@@ -36,14 +36,14 @@ GAP_TOLERANCE, ROUNDING = 1e-11, 1e-15  # change of the gaps relative to the gap
 
 @dataclass(frozen=True)
 class LayeredStep(StepProblem):
-    """A step whose loads contain the layer's mean reactions (m,) [N]."""
+    """Hold a step whose loads contain the layer's mean reactions (m,) [N]."""
 
     layer: Array | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class BoundaryLayer(Midpoint):
-    """See the module's equations. Without friction, on rigid supports at rest, with mass at the contact nodes.
+    """Step without friction, on rigid supports at rest, with mass at the contact nodes: the module's equations.
 
     InputError for anything else, and for a start that is not inside the admissible set; StepFailure, naming the step,
     when Newton's method does not converge.
@@ -55,7 +55,7 @@ class BoundaryLayer(Midpoint):
         instance("BoundaryLayer", "law", self.law, ContactLayer, "give contact_layer(...)")
 
     def check(self, problem: ContactProblem) -> None:
-        """InputError for what the law does not cover."""
+        """Raise InputError for what the law does not cover."""
         super().check(problem)
         surface = problem.surface
         if problem.frictional:
@@ -68,7 +68,7 @@ class BoundaryLayer(Midpoint):
             raise InputError("BoundaryLayer needs an obstacle at rest: move the body's support instead")
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
-        """InputError where the layer would have to begin behind the obstacle."""
+        """Return the state as it is; InputError where the layer would have to begin behind the obstacle."""
         surface = problem.surface
         gap = surface.gap(state.t) - surface.normal_values(state.u)
         if surface.count and not gap.min() > 0.0:
@@ -80,7 +80,7 @@ class BoundaryLayer(Midpoint):
         return state
 
     def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem:
-        """The midpoint step with the layer's reactions among the loads."""
+        """Prepare the midpoint step with the layer's reactions among the loads."""
         step = super().step(problem, state, A, dt)
         surface = problem.surface
         if surface.count == 0:
@@ -131,7 +131,7 @@ class BoundaryLayer(Midpoint):
         )
 
     def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
-        """The midpoint's state; its reactions are the layer's, its active points those inside the layer."""
+        """Return the midpoint's state; its reactions are the layer's, its active points those inside the layer."""
         new = super().finish(problem, state, step, result, dt)
         reaction = step.layer if isinstance(step, LayeredStep) else None
         if reaction is None:

@@ -1,4 +1,4 @@
-"""Integration in time from flight to layer and back, with an event at every crossing of the layer's edge rho = b."""
+"""Integrate in time from flight to layer and back, with an event at every crossing of the layer's edge rho = b."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")  # of scipy.integr
 
 @dataclass(frozen=True)
 class LayerContact:
-    """One passage through the layer: times [s], normal rates [m/s], the least distance [m] and its time [s]."""
+    """Describe a passage through the layer: times [s], normal rates [m/s], the least distance [m] and its time [s]."""
 
     start: float
     end: float
@@ -32,19 +32,19 @@ class LayerContact:
 
     @property
     def duration(self) -> float:
-        """[s]"""
+        """Return the time between entry and exit [s]."""
         return self.end - self.start
 
     @property
     def restitution(self) -> float:
-        """-ρ̇⁺/ρ̇⁻, Newton's coefficient (37)."""
+        """Return -ρ̇⁺/ρ̇⁻, Newton's coefficient (37)."""
         return -self.rate_out / self.rate_in
 
 
 @dataclass(frozen=True)
 class Trajectory:
-    """Times (m,), coordinates (m, n_q), velocities (m, n), distances and reactions lambda (m,) [N]; the contacts that
-    were completed."""
+    """Hold times (m,), coordinates (m, n_q), velocities (m, n), distances and reactions lambda (m,) [N]; the contacts
+    that were completed."""
 
     t: Array
     q: Array
@@ -67,7 +67,7 @@ def layer_motion(
     method: str = "DOP853",
     refine: int = 1,
 ) -> Trajectory:
-    """The motion from (q0, v0) at t = 0 to t_end, or to the end of so many contacts.
+    """Compute the motion from (q0, v0) at t = 0 to t_end, or to the end of so many contacts.
 
     ``metric``: the reading of the law. ``rtol``: relative tolerance of scipy's solve_ivp; ``refine``: rows of the
     trajectory for each of its steps, which are large, by its own interpolation.
@@ -130,7 +130,7 @@ class _Passages:
     def run(
         self, start: float, t_end: float, q: Array, v: Array, inside: bool
     ) -> tuple[float, Array, Array, bool]:
-        """Integrates to the next crossing of the edge; (t, q, v, whether there was one)."""
+        """Integrate to the next crossing of the edge; (t, q, v, whether there was one)."""
         system, n = self._system, len(q)
         layer = self._layer.at(abs(system.normal_rate(q, v))) if inside and self._layer.speed is None else self._layer
         width, rtol = layer.width, self._options["rtol"]

@@ -24,7 +24,7 @@ from ..run.time_steps import LARGEST, HalvedAtImpact, Schedule, TimeSteps
 
 
 class CompanionRun:
-    """u(t) and v(t) of a serial system without contact, marched as far as somebody asks, from rest at t = 0.
+    """March a serial system without contact from rest at t = 0, as far as somebody asks for its u(t) and v(t).
 
     ``name`` is for messages; ``problem`` makes the system when it is first needed. A run *binds* it: it hands over its
     scheme and its plan of time steps, and the motion is then the one that this scheme integrates with these steps.

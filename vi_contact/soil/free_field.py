@@ -1,4 +1,4 @@
-"""Sides behind which level ground goes on: dashpots on the difference to the free field, and the free field's stress.
+"""Continue level ground behind a body's sides: dashpots on the difference to the free field, and its stress.
 
 On a vertical side with outward normal n, v_ff(y, t) and sigma_ff the motion and stress of the ground far away,
 
@@ -38,7 +38,7 @@ Base = Excitation | Sequence[Excitation] | BaseMotion | CompliantBase
 
 @dataclass(frozen=True, kw_only=True)
 class FreeField(Dashpots):
-    """One vertical side of a body in the plane, its lowest node at the base.
+    """Describe one vertical side of a body in the plane, its lowest node at the base.
 
     ``base``: the run's excitations (rigid base, frame of the ground), its ``BaseMotion`` (prescribed base) or its
     ``CompliantBase``. The column behind the side is marched with the scheme and the time steps of the run, from t = 0.
@@ -68,7 +68,7 @@ class FreeField(Dashpots):
 
 
 class FreeFieldSide:
-    """The column beside one side, and the forces it puts on the body.
+    """March the column beside one side, and give the forces it puts on the body.
 
     InputError for a body that is not in the plane, a side that is not vertical, or a lowest node that is not held on a
     rigid base, or held on a compliant one.
@@ -109,7 +109,7 @@ class FreeFieldSide:
         return column.on_rigid_base(lambda t: np.sum([one(t) for one in shaken], axis=0))
 
     def motion(self, t: float) -> tuple[Array, Array]:
-        """(u_ff, v_ff) at the heights of the column, (n+1, 2), in the frame of the run."""
+        """Return (u_ff, v_ff) at the heights of the column, (n+1, 2), in the frame of the run."""
         base, foot = self.given.base, np.zeros((1, 2))
         u, v = (x.reshape(-1, 2) for x in self.run.at(t))
         if isinstance(base, CompliantBase):
@@ -121,11 +121,11 @@ class FreeFieldSide:
         return u, v
 
     def elastic(self, t: float) -> Array:
-        """Pᵀ of the nodal forces of sigma_ff·n."""
+        """Return Pᵀ times the nodal forces of sigma_ff·n."""
         return self._nodal(self.column.stress(self.motion(t)[0]))
 
     def viscous(self, t: float) -> Array:
-        """Pᵀ D v_ff, and the nodal forces of the damping stresses."""
+        """Return Pᵀ D v_ff, and the nodal forces of the damping stresses."""
         v = self.motion(t)[1]
         far = np.zeros((len(self.space.nodes), 2))
         far[self._blocks] = v[self._rows]

@@ -1,4 +1,4 @@
-"""The motion (u, v, a) of a base that an acceleration shakes, as the time scheme itself integrates it.
+"""Integrate the motion (u, v, a) of a base that an acceleration shakes, by the time scheme of the run.
 
 A run in the frame of the ground, -M r a_g (``ContactProblem(excitation=...)``), and one whose base is moved
 (``fem.Prescribed``) are the same problem in two frames, u = u_relative + r u_g. They are the same discrete problem if
@@ -32,7 +32,7 @@ from .companion import CompanionRun
 
 
 class PointSpace:
-    """One point that moves in every direction."""
+    """Describe one point that moves in every direction."""
 
     def __init__(self, dimension: int) -> None:
         self.dimension = self.unknowns = dimension
@@ -58,7 +58,7 @@ class PointSpace:
 
 @dataclass(frozen=True)
 class BaseMotion:
-    """Displacement [m], velocity [m/s] and acceleration [m/s²] of the ground, starting from rest at t = 0.
+    """Hold displacement [m], velocity [m/s] and acceleration [m/s²] of the ground, starting from rest at t = 0.
 
     ``displacement``, ``velocity`` and ``acceleration`` take points (k, d) and t and return (k, d), as
     ``fem.Prescribed`` wants them; ``at(t)`` gives the three vectors.
@@ -68,29 +68,29 @@ class BaseMotion:
     path: CompanionRun = field(repr=False)
 
     def at(self, t: float) -> tuple[Array, Array, Array]:
-        """(u_g, v_g, a_g) at time t, each (d,)."""
+        """Return (u_g, v_g, a_g) at time t, each (d,)."""
         u, v = self.path.at(t)
         return u, v, np.sum([excitation(t) for excitation in self.excitations], axis=0)
 
     @property
     def companions(self) -> tuple[CompanionRun, ...]:
-        """What a run binds to its scheme and time steps."""
+        """Return what a run binds to its scheme and time steps."""
         return (self.path,)
 
     def displacement(self, points: Array, t: float) -> Array:
-        """u_g at every point."""
+        """Return u_g at every point."""
         return np.tile(self.at(t)[0], (len(points), 1))
 
     def velocity(self, points: Array, t: float) -> Array:
-        """v_g at every point."""
+        """Return v_g at every point."""
         return np.tile(self.at(t)[1], (len(points), 1))
 
     def acceleration(self, points: Array, t: float) -> Array:
-        """a_g at every point."""
+        """Return a_g at every point."""
         return np.tile(self.at(t)[2], (len(points), 1))
 
     def carrying(self, surface: ContactSurface, system: SemiDiscreteSystem) -> ContactSurface:
-        """The contact surface of ``system`` on an obstacle that moves with the ground.
+        """Return the contact surface of ``system`` on an obstacle that moves with the ground.
 
         Between two deformable bodies nothing changes: both are moved by the ground.
         """

@@ -1,4 +1,4 @@
-"""A column of soil layers: the motion of level ground under vertical waves, per metre width.
+"""Model a column of soil layers: the motion of level ground under vertical waves, per metre width.
 
 Linear elements between given heights, two displacement components at every node: shear waves move x, pressure waves y,
 
@@ -27,7 +27,7 @@ from .moving_base import PointSpace
 
 @dataclass(frozen=True)
 class SoilColumn:
-    """Elements between ``heights`` (n+1,) [m], upwards; lame, shear [Pa], rho [kg/m³], alpha [1/s], beta [s]: (n,)."""
+    """Describe elements between ``heights`` (n+1,) [m]; lame, shear [Pa], rho [kg/m³], alpha [1/s], beta [s]: (n,)."""
 
     heights: Array
     lame: Array
@@ -44,7 +44,7 @@ class SoilColumn:
             array("SoilColumn", name, getattr(self, name), (n,))
 
     def matrices(self) -> tuple[sp.csr_matrix, sp.csr_matrix, sp.csr_matrix]:
-        """(M, C, K) of all nodes; unknown 2 i + c is component c of node i."""
+        """Return (M, C, K) of all nodes; unknown 2 i + c is component c of node i."""
         mass, damping, stiffness = [], [], []
         for e, length in enumerate(np.diff(self.heights)):
             m = self.rho[e] * length / 6.0 * np.kron([[2.0, 1.0], [1.0, 2.0]], np.eye(2))
@@ -65,7 +65,7 @@ class SoilColumn:
     def on_rigid_base(
         self, acceleration: Callable[[float], Array], velocity: Callable[[float], Array] | None = None
     ) -> ContactProblem:
-        """Node 0 held, in the frame of a base with this acceleration (2,); the unknowns are those of nodes 1 to n.
+        """Return the system of nodes 1 to n, node 0 held, in the frame of a base with this acceleration (2,).
 
         velocity: of the base, where mass damping acts on absolute velocities; None where it acts on relative ones.
         """
@@ -79,7 +79,8 @@ class SoilColumn:
         return _linear(M[2:, 2:], C[2:, 2:], K[2:, 2:], load)
 
     def on_dashpots(self, shear: float, normal: float, upgoing: Callable[[float], Array]) -> ContactProblem:
-        """Node 0 on dashpots of these impedances [Pa s/m], with the upgoing wave (2,) [m/s]; unknowns of all nodes."""
+        """Return the system with node 0 on dashpots of these impedances [Pa s/m] and the upgoing wave (2,) [m/s]; all
+        nodes."""
         M, C, K = self.matrices()
         impedance = np.array([shear, normal])
         foot = sp.csr_matrix((impedance, ([0, 1], [0, 1])), shape=C.shape)
@@ -92,13 +93,13 @@ class SoilColumn:
         return _linear(M, C + foot, K, load)
 
     def stress(self, u: Array) -> Array:
-        """(sigma_xx, sigma_xy) [Pa] of every element, (n, 2), of nodal displacements (n+1, 2)."""
+        """Return (sigma_xx, sigma_xy) [Pa] of every element, (n, 2), of nodal displacements (n+1, 2)."""
         strain = np.diff(u, axis=0) / np.diff(self.heights)[:, None]
         return np.column_stack([self.lame * strain[:, 1], self.shear * strain[:, 0]])
 
 
 class ColumnSpace(PointSpace):
-    """Two unknowns per node; there are no contact points to ask for."""
+    """Give the column two unknowns per node; there are no contact points to ask for."""
 
     def __init__(self, unknowns: int) -> None:
         super().__init__(2)

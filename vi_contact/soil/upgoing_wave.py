@@ -1,4 +1,4 @@
-"""Upgoing waves out of recorded motions: what a compliant base expects.
+"""Make upgoing waves out of recorded motions: what a compliant base expects.
 
 A record from an outcrop, where up- and downgoing waves are equal, is twice the upgoing wave; a record from within a
 profile holds what came back down and is of no use here without deconvolution. Wording as in PLAXIS: a fixed base
@@ -21,7 +21,7 @@ from ..ground_motion.excitation import GroundMotion
 
 
 class UpgoingVelocity:
-    """v_up(t) [m/s], (d,): a share of the velocity of an excitation that is at rest before t = 0.
+    """Give v_up(t) [m/s], (d,): a share of the velocity of an excitation that is at rest before t = 0.
 
     Exact where the acceleration is a straight line between multiples of dt, with k dt + s between them:
     v = v_k + a_k s + (a_{k+1} - a_k) s²/(2 dt).
@@ -53,7 +53,7 @@ def upgoing(
     dt: float | None = None,
     outcrop: bool = True,
 ) -> UpgoingVelocity:
-    """The upgoing velocity of a motion: half its velocity, or all of it when ``outcrop`` is False (already upgoing).
+    """Return the upgoing velocity of a motion: half its velocity, or all when ``outcrop`` is False (already upgoing).
 
     motion: a record, along ``direction``, or an excitation, which has its own. dt: step of the integration [s], of the
     record when None. A record keeps its drift: correct its baseline first (``baseline_corrected``).
