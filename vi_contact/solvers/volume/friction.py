@@ -25,8 +25,7 @@ from ..friction.extrapolation import Anderson
 from ..friction.slip_rate import RateIteration
 from .bounded_system import BoundedSystem
 from .failures import stopped
-from .friction_step import Rubbing, ScaledRubbing
-from .friction_system import RubbingSystem
+from .friction_system import Rubbing, RubbingSystem, ScaledRubbing
 
 TOLERANCE = 1e-11  # change of the thresholds relative to the largest: the error of the friction cone
 NOISE = 1e-10  # below this, changes that do not shrink are those of round-off

@@ -11,8 +11,7 @@ from petsc4py import PETSc
 
 from ...core.algebra import Array, Indices
 from .bounded_system import renumbered
-from .friction_step import ScaledRubbing
-from .friction_system import RubbingSystem
+from .friction_system import RubbingSystem, ScaledRubbing
 
 Entries = tuple[Any, Any, Array]  # rows of this rank, columns of all, values
 

@@ -1,6 +1,6 @@
-"""The step with Tresca's thresholds s given, as a mixed complementarity problem in simple bounds (solver notes 3f).
+"""Write a step with Tresca's thresholds s given as a mixed complementarity problem in simple bounds.
 
-The tangential reactions lambda = r_t are unknowns beside the z of volume_system.py. A point that has one free tangent
+The tangential reactions lambda = r_t are unknowns beside the z of ``bounded_system``. A point that has one free tangent
 (2D) carries
 
     F_lambda = slip0 - B_t x,     -s <= lambda <= s:     0 where lambda is inside, <= 0 where lambda = s, >= 0 at -s
@@ -24,13 +24,16 @@ whose signs after a projection say how far the unknown had gone beyond: the rule
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from ...core.algebra import Array, Mask
+from ...core.algebra import Array, Mask, max_abs
 from ...core.step import StepProblem
+from ...laws.friction import project
 from .bounded_system import BoundedSystem
+from .scaled_step import ScaledStep, fraction
 
 
 class RubbingSystem:
@@ -80,3 +83,131 @@ class RubbingSystem:
         table = np.zeros((self.surface.count, self.surface.tangents.shape[1]))
         table[self.surface.slots] = self.by_point(values)
         return self.surface.comm.sum(table)
+
+
+@dataclass(frozen=True)
+class Rubbing:
+    """Owned values of the unknowns: z, lambda (L,) [as r_t] and gamma (D,) of a rank."""
+
+    z: Array
+    reaction: Array
+    gamma: Array
+
+
+class ScaledRubbing(ScaledStep):
+    """F(y), y = (z/x_ref, lambda/r_ref, gamma r_ref/x_ref), with bounds on y, for the step and thresholds set last."""
+
+    def __init__(self, rubbing: RubbingSystem, tolerance: float) -> None:
+        super().__init__(rubbing.body, tolerance)
+        self.rubbing = rubbing
+        self.limit = np.zeros(len(rubbing.disk))
+
+    def rub(self, step: StepProblem, limit: Array, start: Rubbing) -> None:
+        """Take a step with thresholds (m,) [as r_t]."""
+        rubbing = self.rubbing
+        self.set(step, start.z)
+        self.limit = limit[rubbing.surface.slots] / self.r_ref
+        self._origin = rubbing.origin(step) / self.x_ref
+        s = self.limit[rubbing.point]
+        s = np.where(rubbing.line | (s == 0.0), s, np.inf)
+        disks = self.disk_limits
+        self.lower = np.concatenate([self.lower, -s, np.zeros_like(disks)])
+        self.upper = np.concatenate([self.upper, s, np.where(disks > 0.0, np.inf, 0.0)])
+        factors = start.gamma * (self.r_ref / self.x_ref)
+        self.start = np.concatenate([self.start, start.reaction / self.r_ref, factors])
+
+    @property
+    def disk_limits(self) -> Array:
+        """(D,) scaled thresholds of the points with disks."""
+        return self.limit[self.rubbing.disk]
+
+    @property
+    def disk_inverse(self) -> Array:
+        """(D,) 1/s, zero where s = 0."""
+        s = self.disk_limits
+        return np.divide(1.0, s, out=np.zeros_like(s), where=s > 0.0)
+
+    @property
+    def disk_stiffness(self) -> Array:
+        """(D,) scaled stiffness of the points with disks."""
+        return np.asarray(self.rubbing.stiffness[self.rubbing.pairs].mean(axis=1) * (self.x_ref / self.r_ref))
+
+    def _parts(self, y: Array) -> tuple[Array, Array, Array]:
+        """E, F_lambda and F_gamma."""
+        rubbing = self.rubbing
+        z, reaction, gamma = rubbing.split(y)
+        body = super().residual(z)
+        body[rubbing.tangent] += reaction
+        pairs = reaction[rubbing.pairs]
+        still = self._origin - z[rubbing.tangent]
+        still[rubbing.pairs] += gamma[:, None] * pairs
+        return body, still, self.disk_limits - np.sum(pairs**2, axis=1) * self.disk_inverse
+
+    def disks(self, y: Array) -> tuple[Array, Array, Array]:
+        """(D, 2) lambda, (D, 2) F_lambda and (D,) gamma of the points with disks."""
+        rubbing = self.rubbing
+        z, reaction, gamma = rubbing.split(y)
+        pairs = reaction[rubbing.pairs]
+        return pairs, (self._origin - z[rubbing.tangent])[rubbing.pairs] + gamma[:, None] * pairs, gamma
+
+    def residual(self, y: Array) -> Array:
+        """F(y) as SNES sees it."""
+        rubbing = self.rubbing
+        body, still, room = self._parts(y)
+        pairs, moved, _ = self.disks(y)
+        room += self.disk_stiffness * self.disk_inverse * np.sum(pairs * moved, axis=1)
+        line = rubbing.line
+        still[line] += body[rubbing.tangent[line]] * (self.r_ref / self.x_ref) / rubbing.stiffness[line]
+        held = self.limit == 0.0  # lambda and gamma on both their bounds, where any F but zero keeps them
+        still[held[rubbing.point]], room[held[rubbing.disk]] = 1.0, 1.0
+        return np.concatenate([body, still, room])
+
+    def errors(self, y: Array, F: Array) -> tuple[float, float, float]:
+        """As without friction; the second counts what is wrong in slips and disks too."""
+        rubbing, s = self.rubbing, self.disk_limits
+        _, reaction, gamma = rubbing.split(y)
+        body, still, room = self._parts(y)
+        force, gap, backward = super().errors(y[: self.system.size], body)
+        low, high = (rubbing.split(bound)[1] for bound in (self.lower, self.upper))
+        wrong = np.where(reaction >= high, np.maximum(still, 0.0), still)
+        wrong = np.where(reaction <= low, np.minimum(still, 0.0), wrong)
+        wrong[low == high] = 0.0
+        slip, y_max = self.system.max(max_abs(wrong), max_abs(y[: self.system.rows]))
+        edge = np.minimum(gamma * s / y_max if y_max > 0.0 else gamma, room * self.disk_inverse)
+        disk = float(self.system.max(max_abs(edge))[0])
+        return force, max(gap, fraction(slip, y_max), disk), backward
+
+    def sliding(self, y: Array) -> Mask:
+        """(local) points on the edge of their disk."""
+        rubbing = self.rubbing
+        _, reaction, gamma = rubbing.split(y)
+        at_edge = np.abs(reaction) >= self.limit[rubbing.point]
+        found = np.zeros(len(self.limit), dtype=bool)
+        found[rubbing.point[rubbing.line]] = at_edge[rubbing.line]
+        found[rubbing.disk] = gamma > 0.0
+        return found | (self.limit == 0.0)
+
+    def physical(self, y: Array) -> Rubbing:
+        """y in the units of the step."""
+        z, reaction, gamma = self.rubbing.split(y)
+        return Rubbing(z * self.x_ref, reaction * self.r_ref, gamma * (self.x_ref / self.r_ref))
+
+    def slip(self, z: Array, sliding: Mask) -> Array:
+        """(L,) B_t x - slip0 of the owned points, zero where they stick."""
+        rubbing = self.rubbing
+        moved = z[rubbing.tangent] - self._origin * self.x_ref
+        return np.where(sliding[rubbing.point], moved, 0.0)
+
+    def moved(self, state: Rubbing, slip: Array, limit: Array) -> Rubbing:
+        """The state with reactions in new disks (m,): sliding points on their edge, along their slip (L,)."""
+        rubbing = self.rubbing
+        s = limit[rubbing.surface.slots]
+        way = rubbing.by_point(slip)
+        speed = np.linalg.norm(way, axis=1)
+        edge = np.zeros_like(way)
+        np.divide(way * s[:, None], speed[:, None], out=edge, where=speed[:, None] > 0.0)
+        inside = project(rubbing.by_point(state.reaction), s)
+        table = np.where(speed[:, None] > 0.0, edge, inside)
+        gamma = np.zeros_like(s)
+        np.divide(speed, s, out=gamma, where=s > 0.0)
+        return Rubbing(state.z, table[rubbing.point, rubbing.component], gamma[rubbing.disk])

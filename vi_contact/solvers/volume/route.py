@@ -25,7 +25,7 @@ from ...core.surfaces import ContactSurface
 from .bounded_system import BoundedSystem
 from .failures import raised, stopped
 from .friction import VolumeFriction
-from .friction_step import ScaledRubbing
+from .friction_system import ScaledRubbing
 from .one_factorisation import OneFactorisation
 from .options import OptionLayers, Options
 from .scaled_step import ScaledStep

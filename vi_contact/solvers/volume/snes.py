@@ -21,7 +21,7 @@ from ...core.algebra import Array
 from ...core.step import StepProblem
 from .bounded_system import BoundedSystem
 from .friction_jacobian import RubbingJacobian
-from .friction_step import ScaledRubbing
+from .friction_system import ScaledRubbing
 from .options import OptionLayers, Options, check_friction, check_reduced, check_semismooth
 from .scaled_step import ScaledStep
 
