@@ -23,8 +23,9 @@ from vi_contact.core.errors import InputError
 from vi_contact.ground_motion import Record, arias, pga, psa, read_record, scaled, tapered
 from vi_contact.plots.ida import DemandPanel, plot_ida
 from vi_contact.studies import IDA, read_case, run_ida
+from vi_contact.studies.cases.toml_file import toml_value
 from vi_contact.studies.ida.measures import demand, fractiles, intensity
-from vi_contact.studies.ida.runs import OneRun, Shaking, executed, quoted
+from vi_contact.studies.ida.runs import OneRun, Shaking, executed
 
 pytestmark = pytest.mark.serial
 ROOT = Path(__file__).resolve().parents[2]
@@ -266,4 +267,4 @@ def test_the_picture_of_many_records(tmp_path: Path) -> None:
 
 def test_paths_are_quoted_for_toml() -> None:
     for text in ('a "b" \\ c', "ä ☃ 😀", "tab\tline\n\x7f"):
-        assert tomllib.loads(f"x = {quoted(text)}")["x"] == text
+        assert tomllib.loads(f"x = {toml_value(text)}")["x"] == text

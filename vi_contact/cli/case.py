@@ -1,4 +1,4 @@
-"""``vi-contact run CASE.toml``: options and what the command does."""
+"""``vi-contact run CASE`` and ``vi-contact cases``: options and what the commands do."""
 
 from __future__ import annotations
 
@@ -6,37 +6,74 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from ..core.errors import InputError
 from .options import add_restart
 
 
 def add_case_commands(commands: Any) -> None:
-    """Adds ``run`` to the commands of the top parser."""
-    sentence = "run a case file: a contact problem in TOML, table by table the calls of the Python interface"
-    run = commands.add_parser("run", help=sentence, description=sentence[0].upper() + sentence[1:] + ".")
-    run.add_argument("case", help="the case file (docs/guide/studies.md)")
-    run.add_argument("--out", metavar="DIR", help="output folder (default: out of [run], or results/NAME of the file)")
+    """Adds ``run`` and ``cases`` to the commands of the top parser."""
+    run = commands.add_parser(
+        "run", help="run a case: one that ships with the package, or a TOML file",
+        description="Run a case. The short options and --set change what it says; 'vi-contact cases' lists those that "
+        "ship with the package, 'vi-contact report DIR' draws what the run found.",
+    )
+    run.add_argument("case", help="name of a case that ships (wall, channel, beam, layer), or a .toml file")
+    short = run.add_argument_group("short options", "an option that the case has no use for is refused")
+    short.add_argument("--motion", metavar="FILE[,FILE]", help="shake by records, a horizontal and a vertical one")
+    short.add_argument("--scale", type=float, metavar="F", help="factor on what shakes")
+    short.add_argument("--dt", type=float, metavar="S", help="time step [s]")
+    short.add_argument("--steps", type=int, metavar="N", help="number of steps")
+    short.add_argument("--solver", metavar="NAME", help="Condensed, Volume, or a method of them, as Hildreth")
+    short.add_argument("--scheme", metavar="NAME", help="ZienkiewiczWoodTaylor, Trapezoidal, Newmark, HHT, ...")
+    short.add_argument("--cross-check", action="store_true", help="solve every step by the other route too and compare")
+    run.add_argument("--out", metavar="DIR", help="output folder (default: out of [run], or results/NAME of the case)")
     add_restart(run, "the output folder")
     run.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
-                     help="replace a value of the file, such as friction.mu=0.5 or excitation.1.scale=2; repeatable")
-    run.add_argument("--check", action="store_true", help="read the file and stop: nothing is computed")
+                     help="replace a value of the case, such as friction.mu=0.5 or excitation.1.scale=2, or take it "
+                     "away (KEY=); repeatable")
+    run.add_argument("--check", action="store_true", help="read the case and stop: nothing is computed")
     run.add_argument("--quiet", action="store_true", help="no progress line")
     run.set_defaults(run=_run)
+    cases = commands.add_parser("cases", help="list the cases that ship with the package",
+                                description="List the cases that ship with the package, and their folder.")
+    cases.set_defaults(run=_cases)
+
+
+def _cases(options: argparse.Namespace) -> str:
+    from ..studies.cases.library import FOLDER, builtin_cases
+
+    lines = [f"{name:<10} {title}" for name, title in builtin_cases().items()]
+    return "\n".join([*lines, f"the files: {FOLDER}"])
 
 
 def _run(options: argparse.Namespace) -> str:
     from mpi4py import MPI
 
-    from ..studies.cases.case import read_case
+    from ..studies.cases.library import located
+    from ..studies.cases.own_case import OwnCase, open_case
+    from ..studies.cases.short_settings import ShortOptions
+    from ..studies.cases.toml_file import read_toml, with_settings
 
-    comm = MPI.COMM_WORLD
-    case = read_case(options.case, options.settings)
-    name = case.tables.get("title") or Path(options.case).stem
+    comm, path = MPI.COMM_WORLD, located(options.case)
+    if options.steps is not None and options.steps < 1:
+        raise InputError(f"--steps {options.steps}: give at least one step")
+    short = ShortOptions(**{name: getattr(options, name) for name in ShortOptions.__dataclass_fields__})
+    case = open_case(path, short.settings(with_settings(read_toml(path), ()), options.settings))
+    name = case.tables.get("title") or path.stem
+    restart = options.restart or options.changed
+    if isinstance(case, OwnCase):
+        if restart:
+            raise InputError(f"{path}: this case keeps no checkpoint: leave --restart away, it takes seconds")
+        if options.check:
+            case.study()
+            return f"{options.case}: {name}: the file is in order" if comm.rank == 0 else ""
+        out = options.out or Path("results") / path.stem
+        found = case.run(comm, out)
+        return f"{name}\n{found}\noutput: {out}" if comm.rank == 0 else ""
     if options.check:
         case.check()
         case.check_mesh(comm)
         return f"{options.case}: {name}: the file is in order" if comm.rank == 0 else ""
-    out = options.out or case.out or Path("results") / Path(options.case).stem
-    solution = case.run(
-        comm, out=out, restart=options.restart or options.changed, progress=not options.quiet, changed=options.changed
-    )
+    out = options.out or case.out or Path("results") / path.stem
+    solution = case.run(comm, out=out, restart=restart, progress=not options.quiet, changed=options.changed)
     return f"{name}\n{solution.summary()}\noutput: {out}" if comm.rank == 0 else ""

@@ -44,6 +44,12 @@ def whole(owner: str, meaning: str, value: Any, *, least: int = 0, most: int | N
     return int(value)
 
 
+def check_word(name: str, given: object, known: Sequence[str]) -> None:
+    """Raise InputError for a word that is not among those known."""
+    if given not in known:
+        raise InputError(f"unknown {name} {shown(given)}: choose one of {', '.join(known)}")
+
+
 def counted(owner: str, asked: str, value: Any, things: str = "samples", *, most: int = LARGEST) -> int:
     """Return how many things an input asks for, before memory is taken for them; InputError above ``most``, and NaN."""
     found = real(value)

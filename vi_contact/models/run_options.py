@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from ..core.checks import check_word
 from ..core.errors import InputError
 from ..core.protocols import Excitation, ImpactLaw
 from ..core.step import Solver
@@ -48,12 +49,6 @@ def check_options(run: RunOptions) -> None:
                 raise InputError(f"{name} speaks of a record: give a motion file too, or leave {name} out")
     if run.fields_every < 0:
         raise InputError(f"fields_every is {run.fields_every}: give a number of steps, or 0 for no fields")
-
-
-def check_word(name: str, given: str, known: Sequence[str]) -> None:
-    """InputError for a word that is not among those known."""
-    if given not in known:
-        raise InputError(f"unknown {name} '{given}': choose one of {', '.join(known)}")
 
 
 def records(run: RunOptions) -> list[Record | None]:

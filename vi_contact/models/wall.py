@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from ..core.checks import check_word
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.protocols import Excitation, ImpactLaw, MassLaw
@@ -26,7 +27,6 @@ from ..laws.impact import Inelastic
 from ..laws.mass import ConsistentMass
 from ..laws.materials import Damping, LinearElastic, NoDamping, PlaneStress
 from ..meshes.wall import WallMesh
-from .run_options import check_word
 
 CASES = {
     "a": (4, 7, 10),  # the three labelled points of Fig. 2

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..core.algebra import Array
+from ..core.checks import check_word
 from ..core.problem import ContactProblem
 from ..core.step import State
 from ..core.surfaces import ContactSurface
@@ -17,7 +18,7 @@ from ..run.recorders import Contact, Energy, Probe
 from ..run.simulate import Solution, simulate
 from ..run.static import static_equilibrium
 from .choices import SCHEMES, SOLVERS
-from .run_options import RunOptions, check_options, check_word, excitations, number_of_steps, records, solvers
+from .run_options import RunOptions, check_options, excitations, number_of_steps, records, solvers
 from .wall import BASE_INERTIA, CASES, Wall, build
 
 TITLES = {

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...core.algebra import Array
+from ...core.checks import check_word
 from ...core.errors import InputError
 from ...core.protocols import Excitation
 from ...fem.output.fields import XDMF
@@ -23,7 +24,7 @@ from ...soil.upgoing_wave import upgoing
 from ...solvers.volume.route import Volume
 from ...solvers.volume.snes import ReducedNewton
 from ..choices import SCHEMES, SOLVERS
-from ..run_options import RunOptions, check_options, check_word, excitations, number_of_steps, records, solvers
+from ..run_options import RunOptions, check_options, excitations, number_of_steps, records, solvers
 from .model import Channel, ChannelModel
 from .sides import DashpotSides, Fixed, FreeFieldSides, RockBelow, Rollers, Sides, TiedSides
 from .stages import AtRest, at_rest

@@ -6,14 +6,19 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Protocol
 
+import numpy as np
+
 from ...core.algebra import Array
+from ...core.checks import check_word
+from ...core.errors import InputError
 from ...core.protocols import Excitation
 from ...fem.dashpots import CompliantBase, Dashpots
 from ...fem.loads import Prescribed
 from ...fem.ties import Tied
 from ...laws.materials import LinearElastic
 from ...soil.free_field import FreeField
-from ...soil.moving_base import BaseMotion
+from ...soil.moving_base import BaseMotion, base_motion
+from ...soil.upgoing_wave import upgoing
 
 ENDS = ("left_side", "right_side")
 
@@ -29,6 +34,32 @@ class RockBelow:
     def absorber(self, tags: Any) -> CompliantBase:
         """The boundary condition on the bedrock of a ChannelMesh."""
         return CompliantBase(tags["bedrock"], self.rock, motion=self.motion)
+
+
+BASES = ("relative", "prescribed", "compliant")
+
+
+def bedrock(
+    base: str, excitations: Sequence[Excitation], *, dt: float | None, rock: LinearElastic | None = None
+) -> BaseMotion | RockBelow | None:
+    """Return what moves the bottom of the layer, None where the motion is an inertia load.
+
+    base: "relative", that load, in the frame of the bedrock; "prescribed", a moved bedrock: the same contact forces,
+    and both expect the motion under the layer; "compliant", with ``rock`` (the soil's own material when None): takes
+    the motion as that of an outcrop, and half its velocity comes up. dt: step of the run [s]; what is no record is
+    integrated with a tenth of it.
+    InputError for another word, and for rock without a compliant base.
+    """
+    check_word("base", base, BASES)
+    if rock is not None and base != "compliant":
+        raise InputError("rock is what is under a compliant base: give base = 'compliant' too, or leave rock out")
+    if base == "relative":
+        return None
+    if base == "prescribed":
+        return base_motion(excitations)
+    step = None if dt is None else 0.1 * dt
+    waves = [upgoing(one, dt=getattr(getattr(one, "record", None), "dt", step)) for one in excitations]
+    return RockBelow(lambda t: np.asarray(sum(wave(t) for wave in waves)), rock)
 
 
 class Sides(Protocol):

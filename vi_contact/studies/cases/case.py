@@ -19,14 +19,14 @@ import numpy as np
 
 from ...core.checks import shown
 from ...core.errors import InputError
-from ...core.files import on_root, write_atomically
 from ...core.problem import ContactProblem
 from ...core.protocols import Excitation, FrictionLaw, Frictionless, ImpactLaw, MassLaw
-from ...core.step import Recorder, Scheme, Solver, initial_state
+from ...core.step import Recorder, Scheme, Solver, State, initial_state
 from ...core.surfaces import ContactSurface, empty_surface
 from ...fem.assembly import assemble
 from ...fem.contact.joined import joined_surfaces
 from ...fem.mesh import Tags, build_mesh, read_mesh
+from ...fem.released_supports import release
 from ...laws.materials import LinearElastic
 from ...laws.weight import with_weight
 from ...meshes.gmsh_session import MeshScript
@@ -40,14 +40,14 @@ from ...run.simulate import Solution, simulate
 from ...run.static import static_equilibrium
 from ...run.time_steps import course
 from ...solvers.condensed import Condensed
+from .library import base_folder, keep_copy
 from .model_tables import Parts
 from .parsing import Words, arguments, nearest, read
-from .table_calls import Callee, Named, Node, Spot, callee, groups, needs_mesh
+from .table_calls import Call, Callee, Named, Node, Spot, Value, callee, groups, needs_body
 from .table_functions import MeshFile
 from .toml_file import read_toml, with_settings
 from .vocabulary import words
 
-COPY = "case.toml"
 _HINTS: dict[str, Any] = {
     "title": str,
     "model": Parts,
@@ -93,21 +93,30 @@ class Case:
     @property
     def out(self) -> Path | None:
         """The run folder of [run], if it names one."""
-        folder: Path | None = self._made("run").get("out")
-        return folder
+        node = self._run.get("out")
+        return node.build({}) if node is not None else None
 
-    def excitations(self) -> tuple[Excitation, ...]:
+    @property
+    def _run(self) -> Mapping[str, Node]:
+        """Return the entries of [run]."""
+        node = self.nodes["run"]
+        assert isinstance(node, Call)
+        return node.arguments
+
+    def excitations(self, **context: Any) -> tuple[Excitation, ...]:
         """What shakes the body; record files are read here."""
-        return self._several("excitation")
+        return self._several("excitation", **context)
 
     def check(self) -> None:
         """Makes everything that needs no mesh, so that a wrong value or record file is told at once; InputError."""
         for table in ("material", *TABLES[TABLES.index("friction") :]):
-            if table in self.nodes and not needs_mesh(self.nodes[table]):
+            if table in self.nodes and not needs_body(self.nodes[table]):
                 self._made(table)
         self._check_steps()
 
     def _check_steps(self) -> None:
+        if needs_body(self.nodes["run"]):
+            return
         own = self._made("run")
         steps = own.get("steps") if "steps" in own or "t_end" in own else 1  # else as long as the excitation
         try:
@@ -151,18 +160,18 @@ class Case:
         """
         self.check()
         folder = self.out if out is None else Path(out)
-        own = {name: value for name, value in self._made("run").items() if name != "out"}
         parts = self._parts(comm)
         problem = self._problem(parts)
+        own = {name: value for name, value in self._made("run", system=parts.system).items() if name != "out"}
         own |= {"changed": True} if changed else {}
         if "steps" not in own and "t_end" not in own:
-            own["t_end"] = self._duration(problem)
+            own["t_end"] = self._duration(parts)
         solver = self._made("solver")
-        state = static_equilibrium(problem, solver=solver or Condensed()) if parts.weighted else None
+        problem, state = self._at_rest(parts, problem, solver)
         ranks = problem.system.algebra.comm
         with locked(ranks, None if folder is None else run_folder(ranks, folder)):
             if folder is not None:
-                self._keep(folder, ranks)
+                keep_copy(self.path, self.settings, folder, ranks)
             return simulate(
                 problem, scheme=self._made("scheme"), solver=solver, state=state, out=folder, restart=restart,
                 record=self._recorders(parts),
@@ -181,7 +190,10 @@ class Case:
 
     def _parts(self, comm: Any) -> Parts:
         if "model" in self.nodes:
-            parts: Parts = self._made("model", comm=comm)
+            first = self._run.get("dt")
+            dt = first.value if isinstance(first, Value) else None
+            shaking = () if needs_body(self.nodes.get("excitation", Value(()))) else self.excitations()
+            parts: Parts = self._made("model", comm=comm, excitations=shaking, run_dt=dt)
             return parts
         mesh, tags = self._mesh(comm)
         system = self._made("system", mesh=mesh, tags=tags, excitations=self.excitations())
@@ -204,26 +216,27 @@ class Case:
     def _problem(self, parts: Parts) -> ContactProblem:
         return ContactProblem(
             parts.system, parts.surface, friction=self._made("friction") or Frictionless(), impact=self._made("impact"),
-            excitation=self.excitations(), mass=self._made("mass"),
+            excitation=() if parts.moved else self.excitations(system=parts.system), mass=self._made("mass"),
         )
 
-    def _duration(self, problem: ContactProblem) -> float:
+    def _at_rest(
+        self, parts: Parts, problem: ContactProblem, solver: Solver | None
+    ) -> tuple[ContactProblem, State | None]:
+        """Return the problem and its equilibrium under its weight, supports that hold no static load released there."""
+        own = (solver.primary if isinstance(solver, CrossChecked) else solver) or Condensed()
+        if not parts.weighted:
+            return problem, None
+        if parts.firm is None:
+            return problem, static_equilibrium(problem, solver=own)
+        static = replace(self._problem(parts.firm), excitation=())
+        return release(static, static_equilibrium(static, solver=own), problem)
+
+    def _duration(self, parts: Parts) -> float:
         """Until the last excitation ends [s]."""
-        longest = max((one.duration for one in problem.excitations), default=math.inf)
+        longest = max((one.duration for one in self.excitations(system=parts.system)), default=math.inf)
         if not math.isfinite(longest):
             raise InputError(f"{self.path}: [run] has neither steps nor t_end, and the excitation has no end: give one")
         return longest
-
-    def _keep(self, folder: Path, comm: Any) -> None:
-        """A copy of the file, with the settings as comments."""
-        made = "".join(f"# set {setting}\n" for setting in self.settings)
-
-        def copy() -> None:
-            text = self.path.read_bytes()
-            if (folder / COPY).resolve() != self.path.resolve():
-                write_atomically(folder / COPY, made.encode() + text)
-
-        on_root(comm, copy)
 
 
 def read_case(path: str | Path, settings: Sequence[str] = ()) -> Case:
@@ -235,12 +248,9 @@ def read_case(path: str | Path, settings: Sequence[str] = ()) -> Case:
     """
     path = Path(path)
     tables = with_settings(read_toml(path), settings)
-    known = words(path.parent)
+    known = words(base_folder(path))
     file = str(path)
-    found = tables.get("format", FORMAT)
-    if found != FORMAT or isinstance(found, bool):
-        raise InputError(f"{file}: format is {shown(found)}, and this version of vi_contact reads format {FORMAT}: "
-                         "take the version it was written for, or correct the number")
+    check_format(path, tables)
     for name in tables:
         if name not in TABLES:
             raise InputError(f"{file}: unknown table [{name}]: {nearest(name, dict.fromkeys(TABLES))}")
@@ -254,6 +264,14 @@ def read_case(path: str | Path, settings: Sequence[str] = ()) -> Case:
     order = sorted(given.keys() - {"format"}, key=TABLES.index)  # materials are known before the system names them
     nodes = {name: _node(name, given, Spot(file, "", name), known) for name in order}
     return Case(path, tables, tuple(settings), nodes)
+
+
+def check_format(path: Path, tables: Mapping[str, Any]) -> None:
+    """Raise InputError for the format of another version."""
+    found = tables.get("format", FORMAT)
+    if found != FORMAT or isinstance(found, bool):
+        raise InputError(f"{path}: format is {shown(found)}, and this version of vi_contact reads format {FORMAT}: "
+                         "take the version it was written for, or correct the number")
 
 
 def _node(name: str, tables: Mapping[str, Any], spot: Spot, known: Words) -> Node:

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from inspect import signature
 from typing import Any, get_type_hints
 
+from ...core.protocols import Excitation
 from ...core.step import Recorder
 from ...core.surfaces import ContactSurface
 from ...core.system import SemiDiscreteSystem
+from ...laws.materials import LinearElastic
 from ...models import wall
 from ...models.channel import model as channel
-from ...models.channel.sides import Sides
+from ...models.channel.sides import FreeFieldSides, RockBelow, Rollers, Sides, bedrock
 from ...run.recorders import Contact, Energy, Probe
-from .table_calls import Callee
+from .table_calls import GIVEN, Callee
 
 
 @dataclass(frozen=True)
@@ -22,7 +24,8 @@ class Parts:
     """What a problem is made of.
 
     tags: groups of the mesh; weighted: it carries its weight, and starts from its equilibrium; recorders: of a case
-    that names none.
+    that names none; firm: the same body on supports that hold static loads, for the gravity stage, where its own do
+    not; moved: the excitations move its boundary, and are no inertia load.
     """
 
     system: SemiDiscreteSystem
@@ -30,6 +33,8 @@ class Parts:
     tags: Any
     weighted: bool = False
     recorders: tuple[Recorder, ...] | None = None
+    firm: Parts | None = None
+    moved: bool = False
 
 
 def _wall(
@@ -40,27 +45,50 @@ def _wall(
 
 
 def _channel(
-    shape: channel.Channel, comm: Any, *, sides: Sides | None = None, weighing: Sequence[str] = ("channel",),
-    held: bool = False,
+    shape: channel.Channel, comm: Any, *, excitations: tuple[Excitation, ...], run_dt: float | None,
+    sides: Sides | None = None, weighing: Sequence[str] = ("channel",), held: bool = False, base: str = "relative",
+    rock: LinearElastic | None = None,
 ) -> Parts:
-    model = channel.build(shape, comm, sides=sides, weighing=weighing)
-    surface = model.surface.held() if held else model.surface
-    return Parts(model.system, surface, model.tags, bool(weighing), tuple(model.recorders()))
+    bottom = bedrock(base, excitations, dt=run_dt, rock=rock)
+    ends = replace(sides, base=bottom or excitations) if isinstance(sides, FreeFieldSides) else sides or Rollers()
+
+    def parts(model: channel.ChannelModel, firm: Parts | None = None) -> Parts:
+        surface = model.surface.held() if held else model.surface
+        return Parts(model.system, surface, model.tags, bool(weighing), model.recorders(), firm, bottom is not None)
+
+    if ends.firm and not isinstance(bottom, RockBelow):
+        return parts(channel.build(shape, comm, sides=ends, weighing=weighing, base=bottom))
+    still = channel.build(shape, comm, sides=ends if ends.firm else None, weighing=weighing)
+    meshed = (still.mesh, still.tags)
+    return parts(channel.build(shape, comm, sides=ends, weighing=weighing, base=bottom, meshed=meshed), parts(still))
 
 
-def model(shape: type, build: Callable[..., Parts]) -> Callee:
-    """The call of a model: keys are the fields of its shape and the keyword arguments of ``build(shape, comm, …)``."""
-    own = {one.name for one in fields(shape)}
+def model(shape: type, build: Callable[..., Parts], inner: str = "") -> Callee:
+    """Return the call of a model: its keys are the fields of its shape, and what ``build`` takes by keyword.
+
+    inner: a field of the shape whose own fields are keys, too.
+    """
+    of_shape = _fields(shape)
+    of_inner = _fields(of_shape[inner]) if inner else {}
     parameters = signature(build).parameters.values()
-    extra = {one.name for one in parameters if one.kind is one.KEYWORD_ONLY}
-    hints = {key: hint for key, hint in get_type_hints(shape).items() if key in own}
-    hints |= {key: hint for key, hint in get_type_hints(build).items() if key in extra}
+    given = tuple(one.name for one in parameters if one.name in GIVEN)
+    extra = {one.name: get_type_hints(build)[one.name] for one in parameters
+             if one.kind is one.KEYWORD_ONLY and one.name not in GIVEN}
 
-    def made(comm: Any, **given: Any) -> Parts:
-        of_shape = {key: value for key, value in given.items() if key in own}
-        return build(shape(**of_shape), comm, **{key: value for key, value in given.items() if key in extra})
+    def made(comm: Any, **values: Any) -> Parts:
+        own, parts, more = ({key: values[key] for key in names if key in values}
+                            for names in (of_shape, of_inner, (*extra, *given)))
+        if parts:
+            own[inner] = replace(own[inner], **parts) if inner in own else of_shape[inner](**parts)
+        return build(shape(**own), comm, **more)
 
-    return Callee(shape.__name__, made, hints, given=("comm",))
+    return Callee(shape.__name__, made, of_inner | of_shape | extra, given=given)
 
 
-MODELS = {"Wall": model(wall.Wall, _wall), "Channel": model(channel.Channel, _channel)}
+def _fields(shape: type) -> dict[str, Any]:
+    """Return the fields of a dataclass: name -> type."""
+    hints = get_type_hints(shape)
+    return {one.name: hints[one.name] for one in fields(shape)}
+
+
+MODELS = {"Wall": model(wall.Wall, _wall), "Channel": model(channel.Channel, _channel, inner="shape")}

@@ -20,7 +20,7 @@ from typing import Any, Protocol, get_type_hints
 from ...core.errors import InputError
 
 Context = Mapping[str, Any]
-GIVEN = ("comm", "mesh", "system", "excitations")  # parameters that the context supplies
+GIVEN = ("comm", "mesh", "system", "excitations", "run_dt")  # parameters that the context supplies
 
 
 class Node(Protocol):
@@ -155,6 +155,9 @@ class Call:
     spot: Spot = field(compare=False)
 
     def build(self, context: Context) -> Any:
+        lacking = [name for name in self.callee.given if name not in context]
+        if lacking:
+            raise self.spot.inside(f"{self.callee.name} asks for the {lacking[0]}, which is made later: give a number")
         supplied = {name: context[name] for name in self.callee.given}
         arguments = {name: node.build(context) for name, node in self.arguments.items()}
         try:
@@ -164,9 +167,19 @@ class Call:
 
 
 def groups(node: Node) -> Iterator[Group]:
-    """The groups of the mesh that are named in it."""
-    if isinstance(node, Group):
-        yield node
+    """Yield the groups of the mesh that are named in it."""
+    yield from (one for one in _nodes(node) if isinstance(one, Group))
+
+
+def needs_body(node: Node) -> bool:
+    """Return whether groups of the mesh are named in it, or the assembled system is asked for."""
+    return any(isinstance(one, Group) or (isinstance(one, Call) and "system" in one.callee.given)
+               for one in _nodes(node))
+
+
+def _nodes(node: Node) -> Iterator[Node]:
+    """Yield the node and all nodes in it."""
+    yield node
     inside: Iterable[Node] = ()
     if isinstance(node, Call):
         inside = node.arguments.values()
@@ -175,9 +188,4 @@ def groups(node: Node) -> Iterator[Group]:
     elif isinstance(node, Named):
         inside = node.items.values()
     for one in inside:
-        yield from groups(one)
-
-
-def needs_mesh(node: Node) -> bool:
-    """Whether groups of the mesh are named in it."""
-    return any(True for _ in groups(node))
+        yield from _nodes(one)

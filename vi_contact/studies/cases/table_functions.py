@@ -7,9 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from ...core import surfaces
+from ...core.checks import number
 from ...core.corners import FEATURE_ANGLE
 from ...core.surfaces import ContactSurface
 from ...core.system import SemiDiscreteSystem
+from ...engineering.modal import lowest_frequency
 from ...fem.contact.matching import Matching
 from ...fem.contact.pairs import contact_pair
 from ...fem.contact.surface import contact_surface
@@ -18,6 +20,8 @@ from ...fem.mesh import Facets
 from ...ground_motion import Processing, Record, read_record
 from ...ground_motion.formats.reader import LARGEST_PEAK
 from ...laws import friction, materials
+from ...laws.excitation import Harmonic
+from ...models.channel.sides import FreeFieldSides
 from ...soil.free_field import FreeField
 from ...soil.upgoing_wave import UpgoingVelocity
 
@@ -60,6 +64,23 @@ def pair(
     found = contact_pair(system, facets1, facets2, matching=matching, points=points, feature_angle=feature_angle)
     found = found.with_frictionless_corners() if frictionless_corners else found
     return found.held() if held else found
+
+
+def first_mode_harmonic(
+    system: SemiDiscreteSystem, *, amplitude: float, ratio: float = 0.5, direction: tuple[float, ...] = (1.0, 0.0)
+) -> Harmonic:
+    """Return the harmonic with ``ratio`` times the lowest frequency of the body without contact."""
+    return Harmonic(amplitude, ratio * lowest_frequency(system), direction=direction)
+
+
+def first_mode_period(system: SemiDiscreteSystem, *, parts: float) -> float:
+    """Return the time step that divides the body's longest period into so many parts [s]."""
+    return 1.0 / (number("the period", "parts", parts, positive=True) * lowest_frequency(system))
+
+
+def free_field_sides() -> FreeFieldSides:
+    """Return free-field ends of the channel's layer, on the base that the model has."""
+    return FreeFieldSides(base=())
 
 
 def compliant_base(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 import tomllib
@@ -91,7 +92,8 @@ def with_settings(tables: dict[str, Any], settings: Sequence[str]) -> dict[str, 
     """A copy of the tables with KEY=VALUE settings made; what is missing on the way to a key is added.
 
     KEY: names joined by dots; entries of lists are counted from 1 ("excitation.1.scale"). VALUE: as in TOML; what is no
-    TOML is text. Raises InputError for a setting without "=", an entry that is not there, a way through a plain value.
+    TOML is text; none at all takes the key away. Raises InputError for a setting without "=", an entry that is not
+    there, a way through a plain value.
     """
     result = _copied(tables)
     for setting in settings:
@@ -100,7 +102,8 @@ def with_settings(tables: dict[str, Any], settings: Sequence[str]) -> dict[str, 
             raise InputError(f"setting {shown(setting)} {_TOO_DEEP}")
         if not equals or not key.strip():
             raise InputError(f"setting '{setting}': give KEY=VALUE, such as friction.mu=0.5")
-        _set(result, key.strip().split("."), _value(value.strip()), setting)
+        new = _value(value.strip()) if value.strip() else None
+        _set(result, key.strip().split("."), new, setting)
     return checked(result, "settings")
 
 
@@ -121,12 +124,33 @@ def _value(text: str) -> Any:
 
 
 def _set(there: Any, way: list[str], value: Any, setting: str) -> None:
+    """Set the value at the end of the way, or take it away when there is none."""
     for name in way[:-1]:
         place = _place(there, name, setting)
         if isinstance(there, dict):
             there.setdefault(place, {})
         there = there[place]
-    there[_place(there, way[-1], setting)] = value
+    last = _place(there, way[-1], setting)
+    if value is not None:
+        there[last] = value
+    elif not isinstance(there, dict) or last in there:
+        del there[last]
+
+
+def toml_value(value: Any) -> str:
+    """Return a value as TOML writes it on one line."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{_quoted(key)} = {toml_value(one)}" for key, one in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(toml_value, value)) + "]"
+    if isinstance(value, bool):
+        return str(value).lower()
+    return repr(value) if isinstance(value, int | float) else _quoted(str(value))
+
+
+def _quoted(text: str) -> str:
+    """Return a basic string of TOML."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def _place(there: Any, name: str, setting: str) -> Any:

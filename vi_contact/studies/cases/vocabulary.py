@@ -54,10 +54,15 @@ _FUNCTIONS: Mapping[Any, Mapping[str, Callable[..., Any]]] = {  # kind -> word -
     CompliantBase: {"CompliantBase": plain.compliant_base},
     UpgoingVelocity: {"upgoing": upgoing},
     ContactSurface: {"contact_surface": plain.surface, "contact_pair": plain.pair},
-    sides.Sides: {"Rollers": sides.Rollers, "Fixed": sides.Fixed, "TiedSides": sides.TiedSides},
+    sides.Sides: {
+        "Rollers": sides.Rollers, "Fixed": sides.Fixed, "TiedSides": sides.TiedSides,
+        "DashpotSides": sides.DashpotSides, "FreeFieldSides": plain.free_field_sides,
+    },
     FrictionLaw: {"SlipRateCoulomb": plain.slip_rate},
     ImpactLaw: {"Elastic": laws.Elastic},
     Record: {"read_record": plain.record, "synthetic": synthetic},
+    Excitation: {"FirstModeHarmonic": plain.first_mode_harmonic},
+    Schedule: {"FirstModePeriod": plain.first_mode_period},
 }
 
 

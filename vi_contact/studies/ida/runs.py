@@ -23,6 +23,7 @@ from ...ground_motion import Record, scaled
 from ...ground_motion.excitation import GroundMotion
 from ...run.files.folder import CHECKPOINT, SUMMARY
 from ..cases.case import Case, read_case
+from ..cases.toml_file import toml_value
 
 ROW = "row.json"
 SAID = "failure.txt"
@@ -44,7 +45,7 @@ class Shaking:
         for (place, table), path in zip(ground_motions(case), self.files, strict=True):
             record = table.get("record")
             key = f"{place}.record.path" if isinstance(record, dict) else f"{place}.record"
-            found += [f"{key}={quoted(str(path))}", f"{place}.scale={float(table.get('scale', 1.0)) * factor!r}"]
+            found += [f"{key}={toml_value(str(path))}", f"{place}.scale={float(table.get('scale', 1.0)) * factor!r}"]
         return tuple(found)
 
     def record(self, case: Case) -> Record:
@@ -57,11 +58,6 @@ def _record(path: Path, settings: tuple[str, ...]) -> Record:
     motion = read_case(path, settings).excitations()[0]
     assert isinstance(motion, GroundMotion)
     return scaled(motion.record, factor=motion.scale)
-
-
-def quoted(text: str) -> str:
-    """A basic string of TOML."""
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def ground_motions(case: Case) -> list[tuple[str, Mapping[str, Any]]]:

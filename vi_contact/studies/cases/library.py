@@ -1,0 +1,62 @@
+"""Find the case files that ship with the package, and keep in a run folder the copy of the case that made it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from ...core.algebra import Comm
+from ...core.checks import shown
+from ...core.errors import InputError
+from ...core.files import on_root, write_atomically
+from .parsing import nearest
+from .toml_file import read_toml, with_settings
+
+FOLDER = Path(__file__).parent / "builtin"
+COPY = "case.toml"
+_SET = "# set "  # before a setting, in the copy
+
+
+def builtin_cases() -> dict[str, str]:
+    """Return the names and titles of the case files that ship with the package."""
+    return {path.stem: str(read_toml(path)["title"]) for path in sorted(FOLDER.glob("*.toml"))}
+
+
+def located(case: str) -> Path:
+    """Return the file of a case: what ends in ".toml" is a file, all else the name of one that ships."""
+    if case.endswith(".toml"):
+        return Path(case)
+    names = [path.stem for path in sorted(FOLDER.glob("*.toml"))]
+    if case not in names:
+        raise InputError(f"there is no built-in case {shown(case)}: {nearest(case, names)}; a file ends "
+                         "in .toml")
+    return FOLDER / f"{case}.toml"
+
+
+def base_folder(path: Path) -> Path:
+    """Return the folder to which relative paths of a case belong: its own, or where one is, for those that ship."""
+    return Path() if path.parent == FOLDER else path.parent
+
+
+def keep_copy(path: Path, settings: Sequence[str], folder: Path, comm: Comm) -> None:
+    """Write a copy of the case file into the run folder, with the settings as comments. Collective."""
+    made = "".join(f"{_SET}{' '.join(setting.split(chr(10)))}\n" for setting in settings)
+
+    def copy() -> None:
+        text = re.sub(rb"(?m)^# set ", b"# once set ", path.read_bytes())  # of the run that this is a copy of
+        if (folder / COPY).resolve() != path.resolve():
+            write_atomically(folder / COPY, made.encode() + text)
+
+    on_root(comm, copy)
+
+
+def read_copy(folder: Path) -> dict[str, Any]:
+    """Return the tables of the case that made a run folder, settings included; empty where no case file did."""
+    path = folder / COPY
+    if not path.is_file():
+        return {}
+    tables = read_toml(path)
+    lines = path.read_text(encoding="utf-8").splitlines()
+    return with_settings(tables, [line.removeprefix(_SET) for line in lines if line.startswith(_SET)])

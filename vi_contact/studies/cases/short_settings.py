@@ -1,0 +1,143 @@
+"""Turn the short options of ``vi-contact run`` into settings KEY=VALUE of a case; refuse those it has no use for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from ...core.checks import shown
+from ...core.errors import InputError
+from ...core.step import Scheme
+from ...solvers.condensed import SmallMethod
+from ...solvers.volume.route import Method
+from .parsing import nearest
+from .toml_file import toml_value, with_settings
+from .vocabulary import names_of
+
+OF_MOTION = {  # settings of a model that come with records: with any, with a vertical one
+    "Wall": ({"model.base_inertia": "whole"}, {}),
+    "Channel": ({}, {"model.sides": {"type": "TiedSides"}}),
+}
+REFERENCE = {"type": "Volume", "method": {"type": "ReducedNewton"}}
+IMPULSIVE = ("ZienkiewiczWoodTaylor", "SS22")  # whose contact points have mass: they take an impact law
+OWNERS = ("Condensed", "Volume")  # solvers by name; others by that of their method
+OF_OWN: dict[str, dict[str, str]] = {"beam": {"dt": "beam.dt"}, "layer": {}}  # table -> short options it has a use for
+
+
+@dataclass(frozen=True)
+class ShortOptions:
+    """What people change most. motion: record files joined by commas, the first one horizontal, the last one of two
+    vertical; scale: a factor on what shakes; solver, scheme: names of case files; None: as the case says."""
+
+    motion: str | None = None
+    scale: float | None = None
+    dt: float | None = None
+    steps: int | None = None
+    solver: str | None = None
+    scheme: str | None = None
+    cross_check: bool = False
+
+    def settings(self, tables: Mapping[str, Any], given: Sequence[str] = ()) -> list[str]:
+        """Return all settings of a case: those that replace, then those ``given``, then those that change the result.
+
+        InputError for an option that the case has no use for.
+        """
+        own = [name for name in tables if name in OF_OWN]
+        if own:
+            return [*self._of_own(own[0]), *given]
+        first = [*self._motion(tables), *self._step(), *self._methods(tables)]
+        after = with_settings(dict(tables), [*first, *given])
+        return [*first, *given, *self._scale(after), *self._cross_check(after)]
+
+    def _of_own(self, name: str) -> list[str]:
+        keys = OF_OWN[name]
+        for one in fields(self):
+            if one.name not in keys and getattr(self, one.name) not in (None, False):
+                raise InputError(f"a case with [{name}] has no use for --{one.name.replace('_', '-')}: leave it out, "
+                                 f"or change a key, as --set {name}.KEY=VALUE")
+        return [f"{key}={getattr(self, one)!r}" for one, key in keys.items() if getattr(self, one) is not None]
+
+    def _motion(self, tables: Mapping[str, Any]) -> list[str]:
+        """Replace what shakes by records; the run lasts as long as they do."""
+        if self.motion is None:
+            return []
+        files = self.motion.split(",")
+        before = _tables(tables.get("excitation"))
+        axes = len(before[0].get("direction", (0.0, 0.0))) if before else 2
+        if not all(files) or len(files) > 2:
+            raise InputError(f"--motion {shown(self.motion)}: give FILE, or FILE,FILE for a vertical one too")
+        motions: list[dict[str, Any]] = []
+        for number, file in enumerate(files):
+            old = before[number] if number < len(before) and before[number].get("type") == "GroundMotion" else {}
+            record = old.get("record")
+            axis = 0 if number == 0 else axes - 1
+            motions.append({"type": "GroundMotion", "direction": [float(k == axis) for k in range(axes)]} | old | {
+                "record": (record if isinstance(record, dict) else {}) | {"path": str(Path(file).absolute())}})
+        with_any, vertical = OF_MOTION.get(str(_tables(tables.get("model"))[0].get("type")), ({}, {})) \
+            if "model" in tables else ({}, {})
+        settings = {"excitation": motions} | with_any | (vertical if len(files) == 2 else {})
+        return [*(f"{key}={toml_value(value)}" for key, value in settings.items()), "run.steps=", "run.t_end="]
+
+    def _step(self) -> list[str]:
+        found = [] if self.dt is None else [f"run.dt={self.dt!r}"]
+        return found if self.steps is None else [*found, f"run.steps={self.steps}", "run.t_end="]
+
+    def _methods(self, tables: Mapping[str, Any]) -> list[str]:
+        """Replace scheme and solver; schemes that need no impact law run without the one of the case."""
+        found = []
+        if self.scheme is not None:
+            found.append(f"scheme={toml_value({'type': _known(Scheme, self.scheme, 'scheme')})}")
+            if "impact" in tables and self.scheme not in IMPULSIVE:
+                found.append("impact=")
+        return found if self.solver is None else [*found, f"solver={toml_value(_solver(self.solver))}"]
+
+    def _scale(self, tables: Mapping[str, Any]) -> list[str]:
+        if self.scale is None:
+            return []
+        shaking = tables.get("excitation")
+        found = []
+        for number, one in enumerate(_tables(shaking), start=1):
+            key = "scale" if one.get("type") == "GroundMotion" else "amplitude"
+            value = one.get(key, 1.0 if key == "scale" else None)
+            if not isinstance(value, int | float) or isinstance(value, bool):
+                raise InputError(f"--scale: [excitation] {number} has no amplitude to scale: change its own numbers")
+            place = f"excitation.{number}" if isinstance(shaking, list) else "excitation"
+            found.append(f"{place}.{key}={value * self.scale!r}")
+        if not found:
+            raise InputError("the case has no use for --scale, nothing shakes it: leave it out, or give --motion")
+        return found
+
+    def _cross_check(self, tables: Mapping[str, Any]) -> list[str]:
+        """Let the other route accompany every step: the one to which the case escalates first, or the condensed one."""
+        if not self.cross_check:
+            return []
+        solver = tables.get("solver", {"type": "Condensed"})
+        if solver.get("type") == "CrossChecked":
+            return []
+        routes = [one for one in _tables(tables.get("escalation")) if one.get("type") == "Volume"] or [REFERENCE]
+        other = routes[0] if solver.get("type") == "Condensed" else {"type": "Condensed"}
+        return [f"solver={toml_value({'type': 'CrossChecked', 'primary': solver, 'others': [other]})}"]
+
+
+def _tables(value: Any) -> list[dict[str, Any]]:
+    """Return a table, or the tables of a list."""
+    return [one for one in (value if isinstance(value, list) else [value]) if isinstance(one, dict)]
+
+
+def _known(kind: Any, name: str, what: str) -> str:
+    if name not in names_of(kind):
+        raise InputError(f"unknown {what} {shown(name)}: {nearest(name, names_of(kind))}")
+    return name
+
+
+def _solver(name: str) -> dict[str, Any]:
+    """Return the table of a solver, or of the solver that a method belongs to."""
+    for kind, owner in ((SmallMethod, "Condensed"), (Method, "Volume")):
+        if name in names_of(kind):
+            return {"type": owner, "method": {"type": name}}
+    if name not in OWNERS:
+        names = [*OWNERS, *names_of(SmallMethod), *names_of(Method)]
+        raise InputError(f"unknown solver {shown(name)}: {nearest(name, names)}")
+    return {"type": name}
