@@ -121,7 +121,7 @@ class RockingModel:
 
     @property
     def onset_acceleration(self) -> float:
-        """Return the horizontal acceleration [m/s²] that, growing slowly, lifts the block, g b/h: m g b over turn·M
+        """Return the horizontal acceleration [m/s²] that lifts the block when it grows slowly, g b/h: m g b / turn·M
         r."""
         system = self.problem.equations
         overturning = float(system.algebra.dot(self._turn, system.inertia(np.array([1.0, 0.0]))))

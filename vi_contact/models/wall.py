@@ -146,8 +146,8 @@ class WallModel:
 def build(wall: Wall, comm: Any, *, weight: bool = False, base_inertia: str = "whole") -> WallModel:
     """Mesh and assemble the wall; ``weight`` adds its own weight, for a gravity stage.
 
-    base_inertia: a word of BASE_INERTIA. "catalogue" reproduces the reference numbers (docs/start/first_wall.md), whose inertia load is 1.4 % short
-    on 8 x 12 elements.
+    base_inertia: a word of BASE_INERTIA. "catalogue" reproduces the numbers of docs/start/first_wall.md, whose
+    inertia load is 1.4 % short on 8 x 12 elements.
     """
     check_word("base_inertia", base_inertia, list(BASE_INERTIA))
     mesh, tags = build_mesh(wall.mesh(), comm)
