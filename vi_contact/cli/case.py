@@ -31,6 +31,7 @@ def add_case_commands(commands: Any) -> None:
     run.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
                      help="replace a value of the case, such as friction.mu=0.5 or excitation.1.scale=2, or take it "
                      "away (KEY=); repeatable")
+    add_allow(run)
     run.add_argument("--check", action="store_true", help="read the case and stop: nothing is computed")
     run.add_argument("--quiet", action="store_true", help="no progress line")
     run.set_defaults(run=_run)
@@ -46,6 +47,13 @@ def _cases(options: argparse.Namespace) -> str:
     return "\n".join([*lines, f"the files: {FOLDER}"])
 
 
+def add_allow(command: argparse.ArgumentParser) -> None:
+    """Adds ``--allow``."""
+    command.add_argument("--allow", action="append", default=[], metavar="PACKAGE",
+                         help="the case may name classes of this Python package, as package.module:Name, and so run "
+                         "its code; repeatable (docs/guide/extend.md)")
+
+
 def _run(options: argparse.Namespace) -> str:
     from mpi4py import MPI
 
@@ -58,7 +66,7 @@ def _run(options: argparse.Namespace) -> str:
     if options.steps is not None and options.steps < 1:
         raise InputError(f"--steps {options.steps}: give at least one step")
     short = ShortOptions(**{name: getattr(options, name) for name in ShortOptions.__dataclass_fields__})
-    case = open_case(path, short.settings(with_settings(read_toml(path), ()), options.settings))
+    case = open_case(path, short.settings(with_settings(read_toml(path), ()), options.settings), options.allow)
     name = case.tables.get("title") or path.stem
     restart = options.restart or options.changed
     if isinstance(case, OwnCase):

@@ -9,6 +9,7 @@ from typing import Any
 
 from ..core.checks import shown
 from ..core.errors import InputError, ViContactError
+from .case import add_allow
 
 
 def add_ida_commands(commands: Any) -> None:
@@ -32,6 +33,7 @@ def add_ida_commands(commands: Any) -> None:
     one.add_argument("--launch", default="", metavar="WORDS", help="in front of every run, such as 'mpirun -n 4'")
     one.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
                      help="replace a value of the case, as for run; repeatable")
+    add_allow(one)
     one.set_defaults(run=_ida)
 
 
@@ -58,7 +60,8 @@ def _ida(options: argparse.Namespace) -> str:
     except ValueError as error:
         raise InputError(f"--launch {shown(options.launch)}: {error}; close the quotation mark") from None
     study = IDA(
-        read_case(options.case, options.settings), [_files(motion) for motion in options.motions], options.edp,
+        read_case(options.case, options.settings, allow=options.allow),
+        [_files(motion) for motion in options.motions], options.edp,
         scales=options.scales or (), levels=options.levels or (), intensity=options.im,
     )
     for signum in (signal.SIGINT, signal.SIGTERM):  # a scheduler's end of time is as Ctrl-C, also in the background

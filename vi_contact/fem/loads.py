@@ -1,4 +1,4 @@
-"""Describe what acts on a body: prescribed displacements, tractions and body forces (boundary method, eqs. 3, 4, 6).
+"""What acts on a body: prescribed displacements (seed 000 eq. 3), tractions (eqs. 4, 6) and body forces.
 
 Fields are given at points: a callable takes points (k, d) [m] and the time [s] and returns values (k, d). They are
 interpolated at the nodes and then integrated exactly, so a load costs one sparse product a step.
@@ -24,15 +24,14 @@ Value = tuple[float, ...] | Field
 
 
 def evaluate(name: str, value: Value, points: Array, t: float, comm: Comm) -> Array:
-    """Evaluate the value at this rank's points, (k, d); collective. InputError, on all ranks, for NaN or a wrong
-    shape."""
+    """The value at this rank's points, shape (k, d); collective. InputError, on all ranks, for NaN or a wrong shape."""
     result, defect = evaluate_here(name, value, points, t)
     refuse([defect], comm)
     return result
 
 
 def evaluate_here(name: str, value: Value, points: Array, t: float) -> tuple[Array, str]:
-    """Return (values at the points, what is wrong with them or an empty text); zeros where something is wrong."""
+    """(values at the points, what is wrong with them or an empty text); zeros where something is wrong."""
     if len(points) == 0:
         return np.zeros_like(points), ""  # users' functions need not cope with no points
     try:
@@ -59,7 +58,7 @@ def _zero(points: Array, t: float) -> Array:
 
 @dataclass(frozen=True)
 class Prescribed:
-    """Prescribe u_i = U_i(x, t) on facets (eq. 3), with the velocity and acceleration of the same motion.
+    """u_i = U_i(x, t) on facets (eq. 3), with the velocity and acceleration of the same motion.
 
     ``components``: which displacement components are prescribed (all when None); the others stay free (rollers).
     The mass and damping of the boundary nodes enter the equations, so all three time functions are needed;
@@ -80,23 +79,22 @@ class Prescribed:
 
     @property
     def motions(self) -> tuple[Value, Value, Value]:
-        """Return the motion and its rates (U, U', U'')."""
+        """(U, U', U'')."""
         return self.displacement, self.velocity, self.acceleration
 
     @property
     def moves(self) -> bool:
-        """Return whether it moves: False for a clamped part."""
+        """False for a clamped part."""
         return any(value is not _zero for value in self.motions)
 
     @property
     def companions(self) -> tuple[Any, ...]:
-        """Return the motions that are marched beside the run: objects whose methods are given, such as
-        ``BaseMotion``."""
+        """Motions that are marched beside the run: of objects whose methods are given, such as ``BaseMotion``."""
         owners = {id(owner): owner for owner in (getattr(value, "__self__", None) for value in self.motions)}
         return tuple(one for owner in owners.values() for one in getattr(owner, "companions", ()))
 
     def same_motion(self, other: Prescribed) -> bool:
-        """Return whether both say the same of the components that both prescribe."""
+        """Whether both say the same of the components that both prescribe."""
         mine, theirs = self.components, other.components
         apart = mine is not None and theirs is not None and not set(mine) & set(theirs)
         return apart or all(_same(one, two) for one, two in zip(self.motions, other.motions, strict=True))
@@ -115,7 +113,7 @@ def _at_rest(value: Value) -> bool:
 
 @dataclass(frozen=True)
 class Traction:
-    """Apply S_i = F_i(x, t) [Pa] on facets (eq. 4). ``history``: a factor f(t) of a value that is constant in time.
+    """S_i = F_i(x, t) [Pa] on facets (eq. 4). ``history``: a factor f(t) of a value that is constant in time.
 
     With a history, or with a tuple, the load is assembled once; a callable without history is evaluated every step.
     """
@@ -131,13 +129,13 @@ class Traction:
 
 @dataclass(frozen=True)
 class TangentialTraction(Traction):
-    """Apply the tangential traction S_T = C_T(x, t) of eq. 6 on the contact boundary: the part of ``value`` along the
+    """The given tangential traction S_T = C_T(x, t) of eq. 6 on the contact boundary: the part of ``value`` along the
     facet, its normal component is removed."""
 
 
 @dataclass(frozen=True)
 class BodyForce:
-    """Apply a volume force f_i(x, t) [N/m³] (eq. 7). Weight of a material is BodyForce((0, -rho * 9.80665))."""
+    """Volume force f_i(x, t) [N/m³] (eq. 7). Weight of a material is BodyForce((0, -rho * 9.80665))."""
 
     value: Value
     history: Callable[[float], float] | None = None
@@ -155,12 +153,12 @@ def _check_load(load: Traction | BodyForce) -> None:
 
 
 def is_constant(load: Traction | BodyForce) -> bool:
-    """Return whether one assembly serves all times."""
+    """Whether one assembly serves all times."""
     return load.history is not None or not callable(load.value)
 
 
 def as_tuple(items: Any) -> tuple[Any, ...]:
-    """Return one item or a sequence of items, as a tuple; None is none."""
+    """One item or a sequence of items, as a tuple; None is none."""
     if items is None:
         return ()
     return tuple(items) if isinstance(items, list | tuple) else (items,)

@@ -1,4 +1,4 @@
-"""Model a stiff block that slides on a shaken ground with Coulomb friction; its rigid limit is Newmark's block (1965).
+"""A stiff block that slides on a shaken ground with Coulomb friction; its rigid limit is Newmark's block (V3.2).
 
 The whole base is in possible contact and free to lift and slide; the run starts from the gravity stage.
 """
@@ -28,7 +28,7 @@ from ..solvers.condensed import Condensed
 
 @dataclass(frozen=True)
 class SlidingBody:
-    """Describe the block. ``law``: friction and gravity of the rigid block; width and height [m]; stiff material; mesh.
+    """``law``: friction and gravity of the rigid block; width and height [m]; stiff material; mesh.
 
     InputError for a block so slender, width/height <= mu, that it rocks before it slides.
     """
@@ -47,8 +47,7 @@ class SlidingBody:
 
 @dataclass(frozen=True)
 class SlidingModel:
-    """Hold the model. ``problem``: the block on moving ground; ``rest``: standing still; ``centre``: middle, for
-    probes."""
+    """``problem``: the block on its moving ground; ``rest``: standing still; ``centre``: its middle, for probes."""
 
     body: SlidingBody
     problem: ContactProblem
@@ -56,7 +55,7 @@ class SlidingModel:
 
     @property
     def centre(self) -> tuple[float, float]:
-        """Return the centre of mass [m]."""
+        """Centre of mass [m]."""
         return 0.5 * self.body.lengths[0], 0.5 * self.body.lengths[1]
 
 

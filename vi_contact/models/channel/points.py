@@ -1,4 +1,4 @@
-"""Record the interface between channel and soil besides the channel's own points (Fig. 7)."""
+"""What is recorded of the interface between channel and soil besides the channel's own points (Fig. 7)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ...run.recorders import Probe
 
 @dataclass
 class SoilProbe(Probe):
-    """Record, as `Probe` does, at the nodes of the soil that touch these points of the channel in the undeformed mesh.
+    """As `Probe`, at the nodes of the soil that touch the given points of the channel in the undeformed mesh.
 
     InputError for a point that is not at the interface.
     """
@@ -31,8 +31,7 @@ class SoilProbe(Probe):
 
 
 def touched_nodes(surface: ContactSurface, nodes: Indices) -> Indices:
-    """Return the numbers of the nodes of side 2 that face nodes of side 1 (the nearest where sides are divided
-    differently)."""
+    """Numbers of the nodes of side 2 that face nodes of side 1 (the nearest one where sides are not divided alike)."""
     faced: dict[int, int] = {}
     for part in surface.parts if isinstance(surface, FemSurface) else ():
         if part.facing is not None:
@@ -46,7 +45,7 @@ def touched_nodes(surface: ContactSurface, nodes: Indices) -> Indices:
 
 @dataclass(frozen=True)
 class Openings:
-    """Record the largest gap of each side of the contact: columns opening_<side> [m]. ``sides``: name -> mask (m,)."""
+    """The largest gap of each side of the contact: columns opening_<side> [m]. ``sides``: name -> mask (m,)."""
 
     sides: Mapping[str, Mask]
 

@@ -42,6 +42,7 @@ from ...run.time_steps import course
 from ...solvers.condensed import Condensed
 from .library import base_folder, keep_copy
 from .model_tables import Parts
+from .own_classes import packages
 from .parsing import Words, arguments, nearest, read
 from .table_calls import Call, Callee, Named, Node, Spot, Value, callee, groups, needs_body
 from .table_functions import MeshFile
@@ -82,13 +83,14 @@ class Case:
     """A case file that has been read and checked; nothing is computed yet.
 
     path: of the file; tables: its content, with the settings; settings: the KEY=VALUE made after reading; nodes: the
-    calls that its tables are.
+    calls that its tables are; allowed: the packages whose classes it may name.
     """
 
     path: Path
     tables: Mapping[str, Any]
     settings: tuple[str, ...]
     nodes: Mapping[str, Node] = field(repr=False)
+    allowed: tuple[str, ...] = ()
 
     @property
     def out(self) -> Path | None:
@@ -239,8 +241,9 @@ class Case:
         return longest
 
 
-def read_case(path: str | Path, settings: Sequence[str] = ()) -> Case:
-    """Reads and checks a case file; ``settings``: texts KEY=VALUE that replace values of it (``with_settings``).
+def read_case(path: str | Path, settings: Sequence[str] = (), *, allow: Sequence[str] = ()) -> Case:
+    """Reads and checks a case file; ``settings``: texts KEY=VALUE that replace values of it (``with_settings``);
+    ``allow``: packages whose classes it may name as "package.module:Name", which runs them: those you trust.
 
     Raises InputError, one sentence with file, table, key and remedy: no TOML (with the line), a table, type or key that
     nobody knows (with the nearest known), a missing key, a value of the wrong kind. Groups of the mesh are looked up
@@ -248,7 +251,8 @@ def read_case(path: str | Path, settings: Sequence[str] = ()) -> Case:
     """
     path = Path(path)
     tables = with_settings(read_toml(path), settings)
-    known = words(base_folder(path))
+    allowed = packages(allow)
+    known = words(base_folder(path), allowed)
     file = str(path)
     check_format(path, tables)
     for name in tables:
@@ -263,7 +267,7 @@ def read_case(path: str | Path, settings: Sequence[str] = ()) -> Case:
     given = {"run": {}} | given
     order = sorted(given.keys() - {"format"}, key=TABLES.index)  # materials are known before the system names them
     nodes = {name: _node(name, given, Spot(file, "", name), known) for name in order}
-    return Case(path, tables, tuple(settings), nodes)
+    return Case(path, tables, tuple(settings), nodes, allowed)
 
 
 def check_format(path: Path, tables: Mapping[str, Any]) -> None:
@@ -297,8 +301,8 @@ def _with_materials(system: Mapping[str, Any], materials: Mapping[str, Any]) -> 
 
 
 def run_case(
-    path: str | Path, comm: Any, *, settings: Sequence[str] = (), out: str | Path | None = None,
-    restart: bool | str | Path = False, progress: bool = True,
+    path: str | Path, comm: Any, *, settings: Sequence[str] = (), allow: Sequence[str] = (),
+    out: str | Path | None = None, restart: bool | str | Path = False, progress: bool = True,
 ) -> Solution:
-    """``read_case(path, settings).run(comm, …)``."""
-    return read_case(path, settings).run(comm, out=out, restart=restart, progress=progress)
+    """``read_case(path, settings, allow=allow).run(comm, …)``."""
+    return read_case(path, settings, allow=allow).run(comm, out=out, restart=restart, progress=progress)

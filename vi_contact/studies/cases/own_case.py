@@ -60,12 +60,12 @@ class OwnCase:
         return study.run(folder)
 
 
-def open_case(path: str | Path, settings: Sequence[str] = ()) -> Case | OwnCase:
-    """Return the case of a file, whatever its tables; InputError as ``read_case``."""
+def open_case(path: str | Path, settings: Sequence[str] = (), allow: Sequence[str] = ()) -> Case | OwnCase:
+    """Return the case of a file, whatever its tables; arguments and InputError as of ``read_case``."""
     path = Path(path)
     tables = with_settings(read_toml(path), settings)
     own = [name for name in tables if name in STUDIES]
-    return _own(path, tables, settings) if own else read_case(path, settings)
+    return _own(path, tables, settings) if own else read_case(path, settings, allow=allow)
 
 
 def drawn_study(folder: Path) -> list[Path] | None:

@@ -12,6 +12,7 @@ from typing import Any, Union, get_args, get_origin
 
 from ...core.checks import SHOWN, shown
 from ...core.errors import InputError
+from .own_classes import own_class
 from .table_calls import GROUP, Call, Callee, Group, Items, Named, Node, Spot, Value, callee
 
 
@@ -19,13 +20,14 @@ from .table_calls import GROUP, Call, Callee, Group, Items, Named, Node, Spot, V
 class Words:
     """What names mean: the ``choices`` of every type that tables can make, by the word after ``type``; the ``default``
     where it may be left out; ``groups``: types that are named groups of the mesh; ``short``: the one key that a plain
-    text stands for; ``named``: nodes by type and name."""
+    text stands for; ``allowed``: the packages whose classes may be named; ``named``: nodes by type and name."""
 
     folder: Path
     choices: Mapping[Any, Mapping[str, Callee]]
     default: Mapping[Any, str]
     groups: tuple[type, ...]
     short: Mapping[Any, str]
+    allowed: Sequence[str] = ()
     named: dict[Any, dict[str, Node]] = field(default_factory=dict)
 
 
@@ -46,10 +48,13 @@ def read(value: Any, hint: Any, spot: Spot, words: Words) -> Node:
 
 
 def call(
-    table: Mapping[str, Any], choices: Mapping[str, Callee], default: str | None, spot: Spot, words: Words
+    table: Mapping[str, Any], choices: Mapping[str, Callee], default: str | None, kinds: Sequence[Any], spot: Spot,
+    words: Words,
 ) -> Call:
-    """The call of a table, whose ``type`` is one of the choices."""
+    """The call of a table, whose ``type`` is one of the choices, or names a class of others of one of these kinds."""
     chosen = table.get("type", default)
+    if isinstance(chosen, str) and ":" in chosen:
+        return arguments(table, own_class(chosen, kinds, words.allowed, spot), spot, words)
     if chosen is None:
         raise spot.inside(f"has no type: give type = one of {', '.join(choices)}")
     if not isinstance(chosen, str) or chosen not in choices:
@@ -156,7 +161,8 @@ def _table(value: dict[str, Any], members: list[Any], spot: Spot, words: Words) 
         choices |= found
         default = default or words.default.get(member)
     if choices:
-        return call(value, choices, default or (next(iter(choices)) if len(choices) == 1 else None), spot, words)
+        default = default or (next(iter(choices)) if len(choices) == 1 else None)
+        return call(value, choices, default, members, spot, words)
     for member in members:
         if get_origin(member) in (Mapping, dict):
             kind = get_args(member)[1]

@@ -89,7 +89,7 @@ class ShortOptions:
         found = []
         if self.scheme is not None:
             found.append(f"scheme={toml_value({'type': _known(Scheme, self.scheme, 'scheme')})}")
-            if "impact" in tables and self.scheme not in IMPULSIVE:
+            if "impact" in tables and self.scheme not in IMPULSIVE and ":" not in self.scheme:
                 found.append("impact=")
         return found if self.solver is None else [*found, f"solver={toml_value(_solver(self.solver))}"]
 
@@ -127,7 +127,7 @@ def _tables(value: Any) -> list[dict[str, Any]]:
 
 
 def _known(kind: Any, name: str, what: str) -> str:
-    if name not in names_of(kind):
+    if name not in names_of(kind) and ":" not in name:  # package.module:Name
         raise InputError(f"unknown {what} {shown(name)}: {nearest(name, names_of(kind))}")
     return name
 
@@ -137,7 +137,7 @@ def _solver(name: str) -> dict[str, Any]:
     for kind, owner in ((SmallMethod, "Condensed"), (Method, "Volume")):
         if name in names_of(kind):
             return {"type": owner, "method": {"type": name}}
-    if name not in OWNERS:
+    if name not in OWNERS and ":" not in name:  # package.module:Name
         names = [*OWNERS, *names_of(SmallMethod), *names_of(Method)]
         raise InputError(f"unknown solver {shown(name)}: {nearest(name, names)}")
     return {"type": name}

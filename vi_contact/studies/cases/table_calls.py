@@ -131,18 +131,21 @@ class Callee:
     given: tuple[str, ...] = ()
 
 
-def callee(function: Callable[..., Any], *, name: str = "", only: Sequence[str] = ()) -> Callee:
-    """How to call a function or a class; ``only``: the parameters a file may give."""
+def callee(
+    function: Callable[..., Any], *, name: str = "", only: Sequence[str] = (), given: Sequence[str] = GIVEN
+) -> Callee:
+    """How to call a function or a class; ``only``: the parameters a file may give; those ``given`` are supplied."""
     plain_class = isinstance(function, type) and not is_dataclass(function)
-    hints = get_type_hints(vars(function).get("__init__", object.__init__) if plain_class else function)
-    parameters = signature(function).parameters
-    settable = [one for one in parameters if one not in GIVEN and (not only or one in only)]
+    hints = get_type_hints(function.__init__ if plain_class else function)  # type: ignore[misc]
+    found = signature(function).parameters
+    parameters = {key: one for key, one in found.items() if one.kind not in (one.VAR_POSITIONAL, one.VAR_KEYWORD)}
+    settable = [one for one in parameters if one not in given and (not only or one in only)]
     return Callee(
         name or getattr(function, "__name__", ""),
         function,
-        {one: hints[one] for one in settable},
+        {one: hints.get(one, Any) for one in settable},
         frozenset(one for one in settable if parameters[one].default is Parameter.empty),
-        tuple(one for one in parameters if one in GIVEN),
+        tuple(one for one in parameters if one in given),
     )
 
 

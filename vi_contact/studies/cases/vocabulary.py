@@ -7,7 +7,7 @@ for, and so are its named constructors ("GeneralisedAlpha.spectral_radius"). Wha
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType, ModuleType
@@ -101,10 +101,10 @@ def _constructors(cls: type) -> Iterator[Any]:
             yield getattr(cls, name)
 
 
-def words(folder: Path) -> Words:
-    """The words of a case file in this folder, to which its relative paths belong."""
+def words(folder: Path, allowed: Sequence[str] = ()) -> Words:
+    """The words of a case file in this folder, to which its relative paths belong; ``allowed``: packages of others."""
     default = {
         LinearElastic: "LinearElastic", Record: "read_record", ContactSurface: "contact_surface", Traction: "Traction",
         Dashpots: "Dashpots",
     }
-    return Words(folder, _choices(), default, (Facets, Cells), short={Record: "path"})
+    return Words(folder, _choices(), default, (Facets, Cells), short={Record: "path"}, allowed=allowed)

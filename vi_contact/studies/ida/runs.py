@@ -50,12 +50,12 @@ class Shaking:
 
     def record(self, case: Case) -> Record:
         """The first motion as the case prepares it, factor 1; InputError when a file is wrong."""
-        return _record(case.path, (*case.settings, *self.settings(case)))
+        return _record(case.path, (*case.settings, *self.settings(case)), case.allowed)
 
 
 @cache
-def _record(path: Path, settings: tuple[str, ...]) -> Record:
-    motion = read_case(path, settings).excitations()[0]
+def _record(path: Path, settings: tuple[str, ...], allowed: tuple[str, ...]) -> Record:
+    motion = read_case(path, settings, allow=allowed).excitations()[0]
     assert isinstance(motion, GroundMotion)
     return scaled(motion.record, factor=motion.scale)
 
@@ -125,6 +125,7 @@ class OneRun:
         """What runs it, from its checkpoint where there is one."""
         own = [sys.executable, "-m", "vi_contact", "run", str(self.case.path), "--out", str(self.folder), "--quiet"]
         made = [word for setting in self.settings() for word in ("--set", setting)]
+        made += [word for package in self.case.allowed for word in ("--allow", package)]
         return [*launch, *own, *made, *(["--restart"] if (self.folder / CHECKPOINT).is_file() else [])]
 
     def keep(self, said: str, code: int) -> dict[str, Any]:
