@@ -102,13 +102,13 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
         "studies.cases.toml_file studies.cases.vocabulary",
     "studies/test_case_inputs.py": "studies.cases.table_calls",
     "studies/test_ida.py": "cli.ida plots.ida studies.ida.measures studies.ida.runs studies.ida.table",
-    "validation/test_bem_seed003.py": "models.boundary_elements",
+    "validation/test_boundary_element_examples.py": "models.boundary_elements",
     "validation/test_hertz_impact.py": "models.ball",
     "validation/test_impact_bars.py": "models.bar",
     "validation/test_rocking_block.py": "models.rocking_block",
-    "validation/test_seed003_ball.py": "models.disk",
-    "validation/test_seed003_embedded.py": "models.embedded",
-    "validation/test_seed003_square.py": "models.square plots.deformed",
+    "validation/test_tennis_ball.py": "models.disk",
+    "validation/test_concrete_in_concrete.py": "models.embedded",
+    "validation/test_pressed_square.py": "models.square plots.deformed",
     "validation/test_sliding_block.py": "models.sliding_block",
 }
 BY = {module: test for test, modules in COVERS.items() for module in modules.split()}

@@ -43,7 +43,7 @@ def test_plate_wave_is_slower_than_the_solid_and_faster_than_the_bar():
     assert STEEL.c_bar < STEEL.c_p_plane_stress < STEEL.c_p
 
 
-def test_concrete_of_seed_003_from_its_wave_speeds():
+def test_concrete_on_steel_from_its_wave_speeds():
     """verification.md section 7: c_p = 3253, c_s = 1992 m/s, rho = 2400 give nu = 0.2000, E = 22.857 GPa.
 
     The exact E = rho c_s² (3 c_p² - 4 c_s²) / (c_p² - c_s²) is 22.8565 GPa: one unit of the last digit is allowed.
@@ -54,7 +54,7 @@ def test_concrete_of_seed_003_from_its_wave_speeds():
     assert close(concrete.c_p, 3253.0) and close(concrete.c_s, 1992.0)
 
 
-def test_square_of_seed_003_has_nu_one_third():
+def test_pressed_square_has_nu_one_third():
     material = LinearElastic.from_wave_speeds(1.0, 0.5, 1.0)
     assert close(material.nu, 1.0 / 3.0) and close(material.shear_modulus, 0.25)
 

@@ -39,7 +39,7 @@ def polygon_areas(points, cells):
 # The wall of seed 000, Fig. 2 (verification 4.2) ----------------------------------------------------------------------
 
 
-def test_wall_of_seed_000_has_its_nodes_at_exact_multiples_of_three_quarters():
+def test_shaken_wall_has_its_nodes_at_exact_multiples_of_three_quarters():
     wall = arrays_from_script(WallMesh())
     assert wall.cell == "quadrilateral"
     assert wall.cells.shape == (8 * 12, 4)

@@ -1,4 +1,4 @@
-"""The buried channel: mesh, points, contact conditions, records, runs (numbers: validation/test_seed000_channel.py)."""
+"""The buried channel: mesh, points, contact conditions, records, runs (numbers: validation/test_buried_channel.py)."""
 
 from __future__ import annotations
 

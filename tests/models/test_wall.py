@@ -1,4 +1,4 @@
-"""The wall model: numbering of its points, its cases, its meshes (numbers: validation/test_seed000_wall.py)."""
+"""The wall model: numbering of its points, its cases, its meshes (numbers: validation/test_shaken_wall.py)."""
 
 from __future__ import annotations
 
