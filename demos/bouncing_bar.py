@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""An elastic bar bounces on a rigid wall: every time scheme against the exact solution, in one figure.
+"""Let an elastic bar bounce on a rigid wall: every time scheme against the exact solution, in one figure.
 
-The bar of V1.3 is clamped at its top and released from a stretched state; its foot strikes the wall at t = 1, 4, 7, ...
+The bar is clamped at its top and released from a stretched state; its foot strikes the wall at t = 1, 4, 7, ...
 for one unit of time each, under a constant force. Its energy is constant. Schemes differ in how the contact force rings
 and whether energy grows, stays or fades.
 
@@ -46,7 +46,7 @@ OUT = Path("results/bouncing_bar")
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """Runs all schemes (``quick``: one bounce, 40 elements); returns energies and forces over the exact ones."""
+    """Run all schemes (``quick``: one bounce, 40 elements); return energies and forces over the exact ones."""
     comm = MPI.COMM_WORLD
     bar = replace(BAR, elements=40) if quick else BAR
     model = build(bar, comm)
@@ -76,7 +76,7 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
 
 
 def table(numbers: dict[str, float]) -> str:
-    """Energies and forces over their exact values."""
+    """Return the energies and forces over their exact values."""
     lines = [f"{'scheme':<44} {'energy at the end':>18} {'largest':>9} {'largest force':>14}"]
     for name in SCHEMES:
         row = [numbers[f"{name}: {what}"] for what in ("energy at the end", "largest energy", "largest force")]

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The four examples of seed 003 by its own method, space-time boundary elements, each beside finite elements.
+"""Solve the examples of Aimi, Di Credico and Gimperlein (2024) by space-time boundary elements, beside finite elements.
 
 A pressed square, concrete on steel, concrete in concrete and a tennis ball on a moving plane. Boundary elements have
 unknowns on the boundary only and share no matrix with the finite elements: what agrees is the mechanics.
@@ -55,7 +55,7 @@ OUT = Path("results/boundary_elements")
 
 
 class Answer(NamedTuple):
-    """One law of one example by boundary elements and by finite elements (``fem``: its history)."""
+    """Hold one law of one example by boundary elements and by finite elements (``fem``: its history)."""
 
     run: bem.ContactRun
     bodies: tuple[tuple[bem.BoundaryProblem, bem.BoundaryMotion], ...]
@@ -71,14 +71,14 @@ class Answer(NamedTuple):
         return self.fem["energy_kinetic"] + self.fem["energy_strain"]
 
     def fem_mean(self, name: str, t: float) -> np.ndarray:
-        """Pressure or shear of the finite elements, mean over the boundary element step that ends at t."""
+        """Return pressure or shear of the finite elements, mean over the boundary element step that ends at t."""
         times, values = self.fem["t"], self.fem[name].reshape(len(self.fem["t"]), -1)
         inside = (times[1:] > t - self.run.contact.compliance.dt * (1 + 1e-9)) & (times[1:] <= t * (1 + 1e-9))
         return 0.5 * (values[1:] + values[:-1])[inside].mean(axis=0)
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """All examples and laws; returns energies and impulses of both methods, iterations of Uzawa, certificates."""
+    """Run all examples and laws; return energies and impulses of both methods, iterations of Uzawa, certificates."""
     comm = MPI.COMM_WORLD
     sizes, cells = (QUICK, QUICK_CELLS) if quick else (ELEMENTS, CELLS)
     answers, numbers = {}, {}
@@ -100,7 +100,7 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
 
 
 def example(name: str, size: int, cells: float, comm: Any) -> dict[str, Answer]:
-    """All laws of an example by both methods."""
+    """Run all laws of an example by both methods."""
     contact, solve, dt = boundary_elements(name, size)
     problem, fem_dt = finite_elements(name, cells, comm)
     answers = {}
@@ -115,7 +115,7 @@ def example(name: str, size: int, cells: float, comm: Any) -> dict[str, Answer]:
 
 
 def boundary_elements(name: str, size: int) -> tuple[bem.BoundaryContact, Any, float]:
-    """(contact, its motion from the contact forces, dt): c_P dt = h, 4 h for the slow loads, h for the ball."""
+    """Return (contact, its motion from the contact forces, dt): c_P dt = h, 4 h for the slow loads, h for the ball."""
     box = square.concrete()
     data = {"steel": box, "concrete": box}.get(name, square.Square(pressure=1.0))
     pressure = partial(pressure_of, data)
@@ -134,12 +134,12 @@ def boundary_elements(name: str, size: int) -> tuple[bem.BoundaryContact, Any, f
 
 
 def pressure_of(data: square.Square, t: float) -> float:
-    """Of the load [Pa]."""
+    """Return the pressure of the load [Pa]."""
     return data.pressure * (data.history(t) if data.history else 1.0)
 
 
 def finite_elements(name: str, cells: float, comm: Any) -> tuple[Any, float]:
-    """(problem(friction=...), dt) of the same example."""
+    """Return (problem(friction=...), dt) of the same example."""
     if name == "ball":
         model = disk.build(disk.Disk(size=cells, push=PUSH), comm)
         return model.problem, model.disk.time_step
@@ -150,7 +150,7 @@ def finite_elements(name: str, cells: float, comm: Any) -> tuple[Any, float]:
 
 
 def results(answer: Answer) -> dict[str, float]:
-    """A line of the table."""
+    """Return a line of the table."""
     run, history = answer.run, answer.fem
     end = min(run.times[-1], history["t"][-1])
     fine = np.interp(run.times, history["t"], answer.fem_energy)
@@ -167,7 +167,7 @@ def results(answer: Answer) -> dict[str, float]:
 
 
 def uzawa(run: bem.ContactRun, window: int | None) -> dict[str, float]:
-    """The source's iteration on a window of steps at once, all by default: how often, and how far from the march."""
+    """Run the source's iteration on a window of steps at once (all by default): how often, how far from the march."""
     settings = bem.SpaceTimeUzawa(tolerance=1e-9 if window else 1e-8, window=window)
     found = settings.solve(run.contact)
     off = np.abs(found.forces - run.forces).max() / np.abs(run.forces).max()
@@ -175,7 +175,7 @@ def uzawa(run: bem.ContactRun, window: int | None) -> dict[str, float]:
 
 
 def draw(answers: dict[str, dict[str, Answer]], out: Path, chosen_shots: slice) -> None:
-    """Snapshots with friction, tractions of both methods, energies with and without friction."""
+    """Draw snapshots with friction, tractions of both methods, energies with and without friction."""
     rows = {TITLES[name]: shots(name, list(laws.values())[-1], SHOTS[name][chosen_shots])
             for name, laws in answers.items()}
     plot_boundary_snapshots(rows, out / "snapshots.png", title="Boundary elements, Coulomb friction: deformed bodies "
@@ -191,7 +191,7 @@ def draw(answers: dict[str, dict[str, Answer]], out: Path, chosen_shots: slice) 
 
 
 def shots(name: str, answer: Answer, times: Sequence[float]) -> list[Shot]:
-    """The deformed bodies at some times."""
+    """Return the deformed bodies at some times."""
     run, contact, scale = answer.run, answer.run.contact, MAGNIFIED[name]
     steps = [int(np.argmin(np.abs(run.times - t))) for t in times]
     inside = [points_inside(problem.operator.mesh) for problem, _ in answer.bodies]
@@ -214,7 +214,7 @@ def shots(name: str, answer: Answer, times: Sequence[float]) -> list[Shot]:
 
 
 def points_inside(mesh: bem.BoundaryMesh, spacing: float = 0.2) -> np.ndarray:
-    """A lattice of points in the body, half a spacing from its sides at least."""
+    """Return a lattice of points in the body, half a spacing from its sides at least."""
     low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
     x, y = (np.arange(a + 0.5 * spacing, b, spacing) for a, b in zip(low, high, strict=True))
     lattice = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
@@ -224,7 +224,8 @@ def points_inside(mesh: bem.BoundaryMesh, spacing: float = 0.2) -> np.ndarray:
 
 
 def tractions(name: str, law: str, answer: Answer, times: Sequence[float]) -> tuple[Panel, Panel]:
-    """Pressure, and shear of the support on the body along +x, over x at some times: reactions turned round."""
+    """Return panels of pressure and of shear (support on body, along +x) over x at some times: reactions turned
+    round."""
     run, order = answer.run, np.argsort(answer.x)
     here = np.argsort(run.contact.compliance.points[:, 0])
     x = run.contact.compliance.points[here, 0]
@@ -243,7 +244,7 @@ def tractions(name: str, law: str, answer: Answer, times: Sequence[float]) -> tu
 
 
 def energies(name: str, laws: dict[str, Answer]) -> Panel:
-    """Energy over time of all laws."""
+    """Return the panel of the energy over time of all laws."""
     curves = []
     factor, unit = (1e3, "ms") if T_END[name] < 1.0 else (1.0, "s")
     for (law, answer), colour in zip(laws.items(), COLOURS, strict=False):
@@ -254,7 +255,7 @@ def energies(name: str, laws: dict[str, Answer]) -> Panel:
 
 
 def table(numbers: dict[str, float]) -> str:
-    """A line per example and law."""
+    """Return a line per example and law."""
     columns = ("energy", "fem energy", "energy off", "impulse", "fem impulse", "friction", "fem friction", "uzawa",
                "uzawa off", "certificate")
     lines = [f"{'':<24}" + "".join(f"{name:>13}" for name in columns)]

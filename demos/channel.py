@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A channel buried in soil on bedrock under a harmonic earthquake: Figs. 6 to 9 of the boundary method.
+"""Shake a channel buried in soil on bedrock by a harmonic earthquake: Figs. 6 to 9 of the boundary method.
 
 The soil may let go of both walls and of the base of the channel, but not enter it. After a gravity stage the same
 motion is run three times: sliding freely, with Coulomb friction, and bilateral, the linear comparison. The first steps
@@ -49,7 +49,7 @@ RUNS = {"sliding freely": {}, f"Coulomb, mu = {MU:g}": {"friction": vc.Coulomb(M
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """All runs (``quick``: 40 steps, 4 of them by both routes); returns the key numbers in SI units."""
+    """Make all runs (``quick``: 40 steps, 4 of them by both routes); return the key numbers in SI units."""
     comm = MPI.COMM_WORLD
     model = build(CHANNEL, comm)
     dt, histories, numbers = CHANNEL.time_step(), {}, {}
@@ -81,12 +81,12 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
 
 
 def folder(out: Path, name: str) -> Path:
-    """Of one run."""
+    """Return the folder of one run."""
     return out / name.split()[0].strip(",").lower()
 
 
 def key_numbers(history: History) -> dict[str, float]:
-    """Openings of the walls' tops and feet, how often both walls' are open, rocking, largest pressure."""
+    """Return openings of the walls' tops and feet, how often both walls' are open, rocking, largest pressure."""
     left, right = pictures.opening(history, "19", (-1.0, 0.0)), pictures.opening(history, "13", (1.0, 0.0))
     u_1, u_7 = history["u_y_1"], history["u_y_7"]
     tiny = 1e-9 * max(left.max(), right.max())
@@ -100,7 +100,7 @@ def key_numbers(history: History) -> dict[str, float]:
 
 
 def draw(model: ChannelModel, runs: Mapping[str, History], out: Path, quick: bool) -> None:
-    """All figures and the film."""
+    """Draw all figures and the film."""
     sliding, coulomb, bilateral = runs
     unilateral = {name: runs[name] for name in (sliding, coulomb)}
     outline = pictures.Outline.of(model.surface.points, model.surface.normals)
@@ -130,7 +130,7 @@ def draw(model: ChannelModel, runs: Mapping[str, History], out: Path, quick: boo
 
 
 def summary(material: vc.LinearElastic) -> str:
-    """Its numbers on two lines."""
+    """Return the numbers of a material on two lines."""
     size, unit = (1e9, "GPa") if material.E >= 1e9 else (1e6, "MPa")
     return f"$E$ = {material.E / size:g} {unit}, $\\nu$ = {material.nu:g}\n$\\rho$ = {material.rho:g} kg/m³"
 

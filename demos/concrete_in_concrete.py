@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A box of concrete in the notch of a concrete block is pressed down: two elastic bodies in frictional contact.
+"""Press down a box of concrete in the notch of a concrete block: two elastic bodies in frictional contact.
 
 4 MPa tanh((t/15 ms)²) act on the top of the 1 m box; its lower half is in the notch. It widens as it is pressed and
 leans on the walls, which with friction (Coulomb, mu = 0.75) carry a part of the load.
@@ -38,7 +38,7 @@ OUT = Path("results/concrete_in_concrete")
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """Runs both, with the default scheme (``quick``: 8 cells, steps of 0.25 ms); returns energies [J], work of friction
+    """Run both, with the default scheme (``quick``: 8 cells, steps of 0.25 ms); return energies [J], work of friction
     [J], shares of the load that floor and walls carry at the end, certificates and defects."""
     comm = MPI.COMM_WORLD
     model = build(Embedded(concrete(8 if quick else CELLS)), comm)
@@ -75,7 +75,7 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
 
 
 def draw(histories: Mapping[str, History], out: Path, ground: float) -> None:
-    """Snapshots and histories."""
+    """Draw snapshots and histories."""
     plot_snapshots(
         {name: out / name for name in FRICTION}, TIMES[1:], out / "snapshots.png", support=lambda t: ground,
         magnified=MAGNIFIED, title="Concrete in concrete, with the tractions on the box",
@@ -88,7 +88,7 @@ def draw(histories: Mapping[str, History], out: Path, ground: float) -> None:
 
 
 def table(numbers: Mapping[str, float]) -> str:
-    """Energies over time; at the end the work of friction and the shares of the load."""
+    """Return a table of energies over time; at the end the work of friction and the shares of the load."""
     energies = [f"E({1e3 * t:g} ms)" for t in TIMES]
     columns = (*energies, "friction", "floor", "walls")
     lines = [f"{'energies [J], shares of load':<30}" + "".join(f"{name:>11}" for name in columns)]

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A box of concrete is pressed on steel, slowly: the second example of the space-time boundary elements.
+"""Press a box of concrete on steel, slowly: the second example of the space-time boundary elements.
 
 4 MPa tanh((t/15 ms)²) act on the top of 1 m of concrete. A pressure wave crosses it 65 times in the 20 ms, so the box
 follows its static solution; on steel (Coulomb, mu = 0.3) its base sticks everywhere.
@@ -37,7 +37,7 @@ OUT = Path("results/concrete_on_steel")
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """Runs both, with the default scheme (``quick``: steps of 0.25 ms); returns energies [J], the last ones of energy,
+    """Run both, with the default scheme (``quick``: steps of 0.25 ms); return energies [J], the last ones of energy,
     corner and force over their static values without friction, certificates and defects."""
     comm = MPI.COMM_WORLD
     model = build(BOX, comm)
@@ -71,13 +71,13 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
 
 
 def folder(out: Path, name: str) -> Path:
-    """Of one run."""
+    """Return the folder of one run."""
     return out / name.replace(" ", "_")
 
 
 def static(box: Square, t: float) -> tuple[float, float, float]:
-    """(energy f²a²/(2E') [J/m], displacement of the corner ½ nu (1 + nu) f a/E [m], force f a [N/m]) of the box in
-    equilibrium without friction, E' = E/(1 - nu²)."""
+    """Return (energy f²a²/(2E') [J/m], displacement of the corner ½ nu (1 + nu) f a/E [m], force f a [N/m]) of the box
+    in equilibrium without friction, E' = E/(1 - nu²)."""
     material, side = box.material, box.side
     f = box.pressure * (box.history(t) if box.history else 1.0)
     plane = material.E / (1.0 - material.nu**2)
@@ -86,7 +86,7 @@ def static(box: Square, t: float) -> tuple[float, float, float]:
 
 
 def draw(histories: Mapping[str, History], out: Path, times: Sequence[float]) -> None:
-    """Snapshots, tractions and histories."""
+    """Draw snapshots, tractions and histories."""
     runs = {name: folder(out, name) for name in FRICTION}
     support = -0.5 * BOX.side
     plot_snapshots(
@@ -102,7 +102,7 @@ def draw(histories: Mapping[str, History], out: Path, times: Sequence[float]) ->
 
 
 def table(numbers: Mapping[str, float]) -> str:
-    """Energies over time, and the end over the static solution without friction."""
+    """Return a table of energies over time, and the end over the static solution without friction."""
     columns = [f"E({1e3 * t:g} ms)" for t in TIMES]
     ends = ("energy", "corner", "force")
     lines = [f"{'energies [J], ends / static':<28}" + "".join(f"{name:>12}" for name in (*columns, *ends))]

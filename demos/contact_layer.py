@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""The boundary layer in the place of the exact inequality: a stiff block, an elastic bar and the shaken wall.
+"""Put the boundary layer in the place of the exact inequality: a stiff block, an elastic bar and the shaken wall.
 
 The block is stiff: it rebounds with the restitution that its layer was made for. The bar is thrown at a rigid wall with
-10 m/s (V1.1), then it falls and bounces under gravity (V1.2): in thinner and thinner layers its motion tends to that of
-the exact inequality, which is known in closed form. So does that of the wall of seed 000 beside the ground.
+10 m/s, then it falls and bounces under gravity: in thinner and thinner layers its motion tends to that of
+the exact inequality, which is known in closed form. So does that of the shaken wall.
 
     bash demos/run.sh contact_layer             # into results/contact_layer
     bash demos/run.sh -n 2 contact_layer        # the same on two ranks
@@ -43,7 +43,8 @@ OUT = Path("results/contact_layer")
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """Block, bar and wall (``quick``: one restitution, two wide layers, one metric, a period); the key numbers."""
+    """Run block, bar, wall (``quick``: one restitution, two wide layers, one metric, a period); return the key
+    numbers."""
     comm = MPI.COMM_WORLD
     if comm.rank == 0:
         out.mkdir(parents=True, exist_ok=True)
@@ -63,7 +64,7 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
 
 
 def rebounds(wanted: tuple[float, ...], metrics: tuple[boundary_layer.Metric, ...]) -> dict[str, float]:
-    """The block's velocity after the impact over the one before."""
+    """Return the block's velocity after the impact over the one before."""
     model, numbers, width = build(BLOCK, MPI.COMM_WORLD), {}, 0.01
     problem = model.problem(mass=vc.ConsistentMass())
     case, system = BLOCK.case, model.system
@@ -85,7 +86,7 @@ def rebounds(wanted: tuple[float, ...], metrics: tuple[boundary_layer.Metric, ..
 def thin_limit(
     bar: Bar, widths: tuple[float, ...], metrics: tuple[boundary_layer.Metric, ...], out: Path
 ) -> dict[str, float]:
-    """The bar's foot for every width, and beside it the exact inequality on the same mesh."""
+    """Compute the bar's foot for every width, and beside it the exact inequality on the same mesh."""
     model, numbers, case = build(bar, MPI.COMM_WORLD), {}, bar.case
     name, t_end = type(case).__name__, T_END[type(case)]
     speed = case.speed if isinstance(case, ThrownBar) else float(np.sqrt(2.0 * case.gravity * case.height))
@@ -120,7 +121,7 @@ def thin_limit(
 
 
 def shaken_wall(widths: tuple[float, ...], steps: int, periods: float, out: Path) -> dict[str, float]:
-    """Case b of the wall: distance of its contact points from those of the midpoint rule with gap >= 0."""
+    """Run case b of the wall: how far its contact points are from those of the midpoint rule with gap >= 0."""
     model = wall.build(wall.Wall(), MPI.COMM_WORLD, base_inertia="catalogue")
     exact = model.problem("b", impact=vc.NoImpact(), mass=vc.ConsistentMass())
     concrete, dt = model.wall.material, 1.0 / (model.harmonic().frequency * steps)
@@ -153,7 +154,7 @@ def shaken_wall(widths: tuple[float, ...], steps: int, periods: float, out: Path
 def marched(
     problem: vc.ContactProblem, scheme, dt: float, t_end: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-    """Times, gap of the foot, pressure; the energy lost, the weight's included."""
+    """Return times, gap of the foot, pressure; the energy lost, the weight's included."""
     system, rows = problem.equations, []
     weight = system.load.constant
 

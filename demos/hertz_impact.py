@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A steel ball strikes a rigid plane: elastic finite elements against Hertz' quasi-static theory.
+"""Throw a steel ball on a rigid plane: elastic finite elements against Hertz' quasi-static theory.
 
 A ball of 10 mm is thrown down with 0.1 m/s. It touches the plane for 83 microseconds, with up to 145 N on a spot of a
 third of a millimetre, and rebounds with its full speed. A quarter of it is computed, with the default scheme.
@@ -32,7 +32,7 @@ COLUMNS = ("approach", "duration", "force", "rebound", "certificate", "ledger de
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """Runs all meshes (``quick``: the first, half the steps); returns approach, duration, force and rebound over those
+    """Run all meshes (``quick``: the first, half the steps); return approach, duration, force and rebound over those
     of the theory, certificate and ledger defect, by mesh."""
     comm = MPI.COMM_WORLD
     curves, numbers = {}, {}
@@ -61,7 +61,7 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
 
 
 def curves_of(model: BallModel, problem: vc.ContactProblem, solution: vc.Solution) -> ImpactCurves:
-    """Histories of the whole ball; time and approach count from the first touch."""
+    """Return the histories of the whole ball; time and approach count from the first touch."""
     history, points = solution.history, problem.surface.points
     force = QUARTERS * history["contact_resultant"]
     return ImpactCurves(
@@ -74,7 +74,7 @@ def curves_of(model: BallModel, problem: vc.ContactProblem, solution: vc.Solutio
 
 
 def table(numbers: dict[str, float]) -> str:
-    """A line per mesh; the theory is 1."""
+    """Return a line per mesh; the theory is 1."""
     lines = [f"{'over the quasi-static theory':<30}" + "".join(f"{what:>14}" for what in COLUMNS)]
     for name in dict.fromkeys(key.split(":")[0] for key in numbers):
         values = [numbers[f"{name}: {what}"] for what in COLUMNS]

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A particle hits a wall through a boundary layer: Figs. 1, 2 and 3 of seed 001.
+"""Throw a particle on a wall with a boundary layer: Figs. 1, 2 and 3 of the paper on b-geometry (ENOC 2017).
 
 Nothing here is an impact law. The particle slows down in a thin layer before the wall, by Newton's law in a metric that
 grows without bound there, and comes back: restitution and duration are results, in closed form. Beside them the motion
@@ -33,7 +33,7 @@ OUT = Path("results/particle_layer")
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """Table and figures (``quick``: one k in the table, one a/b below 1); returns the key numbers."""
+    """Make table and figures (``quick``: one k in the table, one a/b below 1); return the key numbers."""
     out.mkdir(parents=True, exist_ok=True)
     numbers = table(STIFFNESSES[2:3] if quick else STIFFNESSES)
     plot_particle(
@@ -51,12 +51,12 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
 
 
 def impact(k: float, c: float) -> boundary_layer.ParticleImpact:
-    """The particle against this layer, a = b."""
+    """Return the particle against this layer, a = b."""
     return boundary_layer.ParticleImpact(boundary_layer.Layer(WIDTH, k=k, c=c), MASS, SPEED)
 
 
 def table(stiffnesses: tuple[float, ...]) -> dict[str, float]:
-    """Restitution, duration and greatest compression of all pairs: closed form, and its distance from integration."""
+    """Print restitution, duration and compression of all pairs: closed form, and its distance from integration."""
     numbers, worst = {}, 0.0
     print("     k      c        e      e_p(f̂)   t_c [s]    t_f [s]  x_min [m]")
     for k in stiffnesses:
@@ -72,7 +72,7 @@ def table(stiffnesses: tuple[float, ...]) -> dict[str, float]:
 
 
 def motion(layer: boundary_layer.Layer, metric: boundary_layer.Metric = boundary_layer.Metric.DOMINANT):
-    """A particle that enters the layer, until it has left it."""
+    """Follow a particle that enters the layer, until it has left it."""
     wall = boundary_layer.ConstrainedSystem(np.array([[MASS]]), lambda q: q[0], lambda q: np.ones(1))
     return boundary_layer.layer_motion(
         wall, layer, q0=[layer.width], v0=[-SPEED], t_end=50.0, contacts=1, metric=metric, refine=8
@@ -80,12 +80,12 @@ def motion(layer: boundary_layer.Layer, metric: boundary_layer.Metric = boundary
 
 
 def collide(layer: boundary_layer.Layer, metric: boundary_layer.Metric = boundary_layer.Metric.DOMINANT):
-    """What its contact was."""
+    """Return the contact of such a particle."""
     return motion(layer, metric).contacts[0]
 
 
 def readings(ratios: tuple[float, ...], out: Path) -> dict[str, float]:
-    """Fig. 3, and what the cut-off and the readings of the metric change; k = c = 1."""
+    """Draw Fig. 3, and what the cut-off and the readings of the metric change; k = c = 1."""
     numbers = {}
     print("\n reading      a/b         e    t_f [s]  x_min [m]   (k = c = 1)")
     for metric in boundary_layer.Metric:

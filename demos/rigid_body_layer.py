@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A rigid body with spin hits a plane through a boundary layer: the second example of seed 001.
+"""Throw a spinning rigid body on a plane with a boundary layer: second example of the paper on b-geometry (ENOC 2017).
 
 First a body with one contact point, whose motion through thinner and thinner layers tends to the impact map of rigid
 body dynamics. Then an ellipsoid that tumbles down on the plane: every bounce has the wanted restitution at the point
@@ -23,7 +23,7 @@ from demos.pictures.layer import plot_bounces_of_body, plot_thin_limit
 from vi_contact import boundary_layer
 
 # Parameters ----------------------------------------------------------------------------------------------------------
-BODY = boundary_layer.RigidBody(mass=2.0, inertia=(0.2, 0.3, 0.4), point=(0.3, -0.2, -0.5))  # V5.2
+BODY = boundary_layer.RigidBody(mass=2.0, inertia=(0.2, 0.3, 0.4), point=(0.3, -0.2, -0.5))
 BEFORE = np.array([0.3, 0.0, -1.0, 0.5, -0.4, 0.2])  # velocity of the mass centre, spin in the body
 RESTITUTION = 0.593624
 WIDTHS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)  # b [m]
@@ -37,7 +37,7 @@ OUT = Path("results/rigid_body_layer")
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """Both bodies (``quick``: two widths, one bounce); returns the key numbers."""
+    """Run both bodies (``quick``: two widths, one bounce); return the key numbers."""
     out.mkdir(parents=True, exist_ok=True)
     numbers = thin_limit(WIDTHS[1:4:2] if quick else WIDTHS, out)
     numbers |= tumbling(0.8 if quick else T_END, out)
@@ -47,7 +47,7 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
 
 
 def thin_limit(widths: tuple[float, ...], out: Path) -> dict[str, float]:
-    """Velocities behind the layer against the impact map with the layer's e."""
+    """Compare velocities behind the layer with the impact map with the layer's e."""
     at_plane = np.array([0.0, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0])
     rate = BODY.gradient(at_plane) @ BEFORE
     exact = BODY.after_impact(at_plane, BEFORE, RESTITUTION)
@@ -71,7 +71,7 @@ def thin_limit(widths: tuple[float, ...], out: Path) -> dict[str, float]:
 
 
 def tumbling(t_end: float, out: Path) -> dict[str, float]:
-    """The ellipsoid: contacts, and its energy against the losses of the impact map."""
+    """Follow the ellipsoid: contacts, and its energy beside the losses of the impact map."""
     wanted = boundary_layer.layer_for(EGG_E, mass=1.0, speed=5.0, width=EGG_WIDTH)
     # V is the speed of each impact: e is the same in all
     layer = boundary_layer.Layer(EGG_WIDTH, k=wanted.k, c=wanted.c)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A block that rocks on its corners: Housner's rigid block (1963) as the stiff limit of a finite element body.
+"""Rock a block on its corners: Housner's rigid block (1963) as the stiff limit of a finite element body.
 
 A concrete block, 0.4 m wide and 2 m high, is tilted and let go; then it stands on a ground that moves. Its contact is
 two points, the corners of its base. What Housner had to put in, the loss of energy when the block changes from one
@@ -41,7 +41,7 @@ OUT = Path("results/rocking_block")
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """Free rocking and ground pulses (``quick``: two impacts, steps of 4 ms); returns the key numbers."""
+    """Run free rocking and ground pulses (``quick``: two impacts, steps of 4 ms); return the key numbers."""
     comm = MPI.COMM_WORLD
     model = rocking.build(BLOCK, comm)
     dt = model.time_steps(dt=4e-3) if quick else model.time_steps()  # steps halved where a corner lands
@@ -56,7 +56,7 @@ def run(
     problem: vc.ContactProblem, model: rocking.RockingModel, state: vc.State, dt: vc.HalvedAtImpact, t_end: float,
     out: Path, progress: bool,
 ) -> vc.Solution:
-    """One run: impacts are inelastic impulses on the corners."""
+    """Make one run: impacts are inelastic impulses on the corners."""
     corners = {"left": (0.0, 0.0), "right": (SHAPE.width, 0.0), "top": (0.0, SHAPE.height)}
     return vc.simulate(
         problem, scheme=vc.MoreauJean(theta=0.5, e=0.0), solver=vc.Condensed(), dt=dt, t_end=t_end,
@@ -68,7 +68,8 @@ def run(
 def free_rocking(
     model: rocking.RockingModel, dt: vc.HalvedAtImpact, t_end: float, out: Path, progress: bool
 ) -> dict[str, float]:
-    """Released from RELEASE alpha; beside the rigid block, in Housner's kinematics and in small displacements."""
+    """Release the block from RELEASE alpha: beside the rigid one, in Housner's kinematics and in small
+    displacements."""
     theta0 = RELEASE * SHAPE.alpha
     solution = run(model.problem, model, model.tilted(theta0), dt, t_end, out / "free", progress)
     history = solution.history
@@ -102,7 +103,7 @@ def free_rocking(
 
 
 def pulses(model: rocking.RockingModel, dt: vc.HalvedAtImpact, out: Path, progress: bool) -> dict[str, float]:
-    """Slow pulses around g b/h and rectangular ones around the shortest that overturns."""
+    """Return the shake by slow pulses around g b/h and rectangular ones around the shortest that overturns."""
     unit = SHAPE.onset_acceleration
     shortest = SHAPE.overturning_time(STRENGTH * SHAPE.gravity * SHAPE.alpha)
     lifted, turned, numbers = {}, {}, {"onset": model.onset_acceleration}

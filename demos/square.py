@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A square is pressed on a rigid support, without friction, with Tresca's and with Coulomb's: space-time boundary
+"""Press a square on a rigid support, without friction, with Tresca's and with Coulomb's: space-time boundary
 elements' first example by finite elements.
 
 A pressure of 0.1 acts on the top of the unit square from t = 0 on (c_P = 1, c_S = 1/2). Its wave arrives at the support
@@ -41,7 +41,7 @@ OUT = Path("results/square")
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """Runs every friction law with every scheme (``quick``: 10 cells, default scheme); returns energies, work of
+    """Run every friction law with every scheme (``quick``: 10 cells, default scheme); return energies, work of
     friction, certificates and defects."""
     comm = MPI.COMM_WORLD
     model = build(replace(SQUARE, cells=10) if quick else SQUARE, comm)
@@ -71,12 +71,12 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
 
 
 def folder(out: Path, run: str) -> Path:
-    """Of one run."""
+    """Return the folder of one run."""
     return out / run.replace(", ", "_").replace(" ", "_")
 
 
 def draw(histories: Mapping[str, History], out: Path, times: Sequence[float]) -> None:
-    """Snapshots, tractions and energies of the default scheme."""
+    """Draw snapshots, tractions and energies of the default scheme."""
     runs = {name: folder(out, f"{name}, default scheme") for name in FRICTION}
     support = -0.5 * SQUARE.side
     plot_snapshots(
@@ -95,7 +95,7 @@ def draw(histories: Mapping[str, History], out: Path, times: Sequence[float]) ->
 
 
 def table(numbers: dict[str, float], runs: list[str]) -> str:
-    """Energies over time, and what friction took."""
+    """Return a table of energies over time, and what friction took."""
     columns = [f"E({t:g})" for t in TABLE] + ["friction"]
     lines = [f"{'':<30}" + "".join(f"{name:>10}" for name in columns)]
     for run in runs:

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A plane pushes a disk up, gently, and lets it fly: the tennis ball of the space-time boundary elements.
+"""Push a disk up with a plane, gently, and let it fly: the tennis ball of the space-time boundary elements.
 
 The plane rises by 0.05 within one second and goes down again; the disk (R = 1/2, c_P = 2, c_S = 1, no weight) leaves it
 on its way down and flies up with a constant velocity and constant energy, whether it rubs on the plane or not.
@@ -40,7 +40,7 @@ COLUMNS = ("release", "velocity", "energy", "work", "friction", "change of energ
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """Runs all friction laws with the default scheme (``quick``: cells of 0.1); returns the columns of the table."""
+    """Run all friction laws with the default scheme (``quick``: cells of 0.1); return the columns of the table."""
     comm = MPI.COMM_WORLD
     model = build(replace(DISK, size=0.1) if quick else DISK, comm)
     dt = model.disk.time_step
@@ -63,18 +63,18 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
 
 
 def folder(out: Path, name: str) -> Path:
-    """Of one run."""
+    """Return the folder of one run."""
     return out / name.replace(" ", "_")
 
 
 def derived(history: History, mass: float) -> dict[str, Any]:
-    """The history with the energy and the velocity of the centre of mass."""
+    """Return the history with the energy and the velocity of the centre of mass."""
     energy = history["energy_kinetic"] + history["energy_strain"]
     return {**history, "energy": energy, "velocity": history["momentum_y"] / mass}
 
 
 def results(history: History, facts: Mapping[str, float]) -> dict[str, float]:
-    """A line of the table; flight begins two steps after the last contact."""
+    """Return a line of the table; flight begins two steps after the last contact."""
     last = int(np.flatnonzero(history["contact_active"])[-1])
     energy = history["energy"]
     values = (
@@ -86,7 +86,7 @@ def results(history: History, facts: Mapping[str, float]) -> dict[str, float]:
 
 
 def draw(histories: Mapping[str, History], out: Path, times: Sequence[float]) -> None:
-    """Snapshots, tractions and histories."""
+    """Draw snapshots, tractions and histories."""
     runs = {name: folder(out, name) for name in FRICTION}
     plot_snapshots(
         runs, times, out / "snapshots.png", support=DISK.push,
@@ -101,7 +101,7 @@ def draw(histories: Mapping[str, History], out: Path, times: Sequence[float]) ->
 
 
 def table(numbers: Mapping[str, float]) -> str:
-    """A line per friction law."""
+    """Return a line per friction law."""
     lines = [f"{'':<14}" + "".join(f"{what:>18}" for what in COLUMNS)]
     for name in FRICTION:
         values = [numbers[f"{name}: {what}"] for what in COLUMNS]

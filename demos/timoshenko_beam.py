@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A viscoelastic Timoshenko beam rubs on a wall with its tip: seed 002, and what its scheme leaves out.
+"""Rub a viscoelastic Timoshenko beam on a wall with its tip: Ahn (2012), and what that scheme leaves out.
 
 First the source's own runs with their figures 8.1 to 8.9: the normal force is given, friction is regularised, a scalar
 equation per step is solved by Newton's method. Then the friction inequality itself beside it. Last, the beam is also a
@@ -37,7 +37,7 @@ OUT = Path("results/timoshenko_beam")
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """All three parts (``quick``: 50 elements, steps of 10 ms); returns the key numbers."""
+    """Run all three parts (``quick``: 50 elements, steps of 10 ms); return the key numbers."""
     out.mkdir(parents=True, exist_ok=True)
     count, dt = (50, 0.01) if quick else (ELEMENTS, DT)
     numbers = published(count, dt, out)
@@ -48,7 +48,7 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
 
 
 def published(count: int, dt: float, out: Path) -> dict[str, float]:
-    """The source's beam under every reading of its normal force; Figs. 8.1 to 8.9 with READING."""
+    """Run the source's beam under every reading of its normal force; Figs. 8.1 to 8.9 with READING."""
     steps, forces = round(T_END / dt), beam.readings(dt)
     numbers, drawn = {}, {}
     print(f"\nThe source's beam, m = {count}, dt = {dt:g} s, E(0) and what is left of it at t = {T_END:g} s [J]")
@@ -81,7 +81,7 @@ def published(count: int, dt: float, out: Path) -> dict[str, float]:
 
 
 def exact(count: int, dt: float, out: Path) -> dict[str, float]:
-    """Constant force and coefficient: the inequality, through Algorithm 10 and through the contract, and eps -> 0."""
+    """Run constant force and coefficient: the inequality, by Algorithm 10 and by the contract, and eps -> 0."""
     body, elements, start = beam.published_beam(VISCOSITIES[0]), beam.Elements(count), beam.published_start()
     steps = round(T_END / dt)
 
@@ -107,7 +107,7 @@ def exact(count: int, dt: float, out: Path) -> dict[str, float]:
 
 
 def rubbing(count: int, dt: float, out: Path, progress: bool) -> dict[str, float]:
-    """Rod and beam as one contact problem, with impulses on velocities: their forces do not ring."""
+    """Run rod and beam as one contact problem, with impulses on velocities: their forces do not ring."""
     problem = beam.rubbing_problem(
         ROD, beam.published_beam(VISCOSITIES[0]), beam.Elements(count), friction=vc.Coulomb(MU),
         start=beam.published_start(),

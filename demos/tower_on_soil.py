@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A tower that stands on soil, lifts off and slides, above a compliant base and between free-field sides.
+"""Shake a tower that stands on soil, lifts off and slides, above a compliant base and between free-field sides.
 
 The three stages of practice: gravity on firm supports; supports released, their reactions kept as forces; an earthquake
 that comes up from below. A compliant base takes the upgoing motion, half of what an outcrop record shows, so the record
@@ -39,7 +39,7 @@ OUT = Path("results/tower_on_soil")
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """All three stages (``quick``: cells of 2 m, 110 steps of 10 ms); returns the key numbers."""
+    """Run all three stages (``quick``: cells of 2 m, 110 steps of 10 ms); return the key numbers."""
     comm = MPI.COMM_WORLD
     h, dt, t_end = (2.0, 1e-2, 1.1) if quick else (1.0, DT, T_END)
     lower, upper = (BlockMesh(lengths=size, divisions=tuple(round(x / h) for x in size)) for size in (LAYER, HOUSE))
@@ -73,7 +73,7 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
 
 
 def stages(mesh: Any, tags: Any, dt: float) -> tuple[vc.ContactProblem, vc.State, vc.ContactProblem]:
-    """(gravity stage, its state, dynamic problem before the release)."""
+    """Return (gravity stage, its state, dynamic problem before the release)."""
     cells = [(tags["lower"], SOIL), (tags["upper"], TOWER)]
     sides = [tags["lower_left"], tags["lower_right"]]
     rollers = [fem.Prescribed(side, components=(0,)) for side in sides]
@@ -92,7 +92,7 @@ def stages(mesh: Any, tags: Any, dt: float) -> tuple[vc.ContactProblem, vc.State
 
 
 def draw(history: Any, path: Path) -> None:
-    """Input and response."""
+    """Draw input and response."""
     from matplotlib.figure import Figure
 
     t = history["t"]

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A wall beside the ground under a harmonic earthquake: Figs. 3, 4 and 5 of the boundary method for dynamic contact.
+"""Shake a wall beside the ground by a harmonic earthquake: Figs. 3, 4 and 5 of the boundary method for dynamic contact.
 
 A concrete wall, 9 m high, is clamped at its base; on its right side it may lift off the ground but not enter it. Every
 step is solved twice, condensed to the contact points and on all unknowns, and the two must agree to round-off.
@@ -39,7 +39,7 @@ OUT = Path("results/wall")
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """Runs all cases (``quick``: 40 steps); returns the key numbers, displacements in metres."""
+    """Run all cases (``quick``: 40 steps); return the key numbers, displacements in metres."""
     comm = MPI.COMM_WORLD
     model = wall_model.build(WALL, comm, base_inertia="catalogue")  # as the reference numbers of the figures
     shaking = model.harmonic(AMPLITUDE)
@@ -79,7 +79,7 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
 
 
 def compare_schemes(model: wall_model.WallModel, case: str, steps: int, refined: int, figure: Path) -> None:
-    """The source's scheme and impact rule beside the default scheme, which needs no rule and does not ring."""
+    """Run the source's scheme and impact rule beside the default scheme, which needs no rule and does not ring."""
     runs = {}
     for name, impact, finer in (
         ("source's rule, its dt", vc.Inelastic(), 1),

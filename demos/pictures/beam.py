@@ -13,7 +13,7 @@ from vi_contact.plots.histories import STYLE, History, panels, save
 
 
 def plot_rubbing(history: History, path: str | Path, *, mu: float, gap: float, title: str) -> Path:
-    """Gap, contact force with the friction it allows, and motion of the tip across, from a run of ``rubbing_problem``.
+    """Draw gap, contact force with the friction it allows, and motion of the tip across, of ``rubbing_problem``.
 
     history: with the columns of ``Contact`` and of a ``Probe`` labelled "tip". gap: of the rod at rest [m].
     """
@@ -45,7 +45,7 @@ def _shade(axis: Any, t: Array, where: Array, label: str) -> None:
 def plot_regularisation(
     eps: Sequence[float], errors: Mapping[str, Array], tips: Mapping[str, tuple[Array, Array]], path: str | Path
 ) -> Path:
-    """Largest difference of the tip from the exact law over eps, left; tips (t, u) of some runs, right."""
+    """Draw the largest difference of the tip from the exact law over eps, left; tips (t, u) of some runs, right."""
     import matplotlib
     from matplotlib.figure import Figure
 

@@ -1,4 +1,4 @@
-"""Pictures of boundary element answers, with those of finite elements beside them."""
+"""Draw boundary element answers, with those of finite elements beside them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ARROW = 0.3  # length of the longest arrow of a row over the size of its bodies
 
 @dataclass(frozen=True)
 class Shot:
-    """Bodies at one time, as they are drawn: ``outlines`` closed curves (n, 2), ``inside`` points (m, 2), contact
+    """Hold bodies at one time, as they are drawn: ``outlines`` closed curves (n, 2), ``inside`` points (m, 2), contact
     tractions ``arrows`` (c, 2) [Pa] on points ``feet`` (c, 2), a rigid support below the height ``support`` [m]."""
 
     title: str
@@ -30,7 +30,7 @@ class Shot:
 
 @dataclass(frozen=True)
 class Curve:
-    """Values over an abscissa: a line, or markers only."""
+    """Describe values over an abscissa: a line, or markers only."""
 
     label: str
     x: Array
@@ -44,7 +44,7 @@ SHEAR = "shear on the body, along +x"  # the sign of all pictures of contact tra
 
 @dataclass(frozen=True)
 class Panel:
-    """Curves of one quantity with its unit; x: label of the abscissa."""
+    """Hold curves of one quantity with its unit; x: label of the abscissa."""
 
     title: str
     quantity: str
@@ -54,7 +54,7 @@ class Panel:
 
 
 def plot_boundary_snapshots(rows: Mapping[str, Sequence[Shot]], path: str | Path, *, title: str) -> Path:
-    """A row per example, a column per time: deformed outlines, points inside, contact tractions (one scale a row)."""
+    """Draw a row per example, a column per time: deformed outlines, points inside, contact tractions (row's scale)."""
     import matplotlib
     from matplotlib.figure import Figure
 
@@ -93,7 +93,7 @@ def _draw(axis: Any, shot: Shot, scale: float, size: float) -> None:
 
 
 def plot_panels(rows: Sequence[Sequence[Panel]], path: str | Path, *, title: str) -> Path:
-    """Panels in rows and columns, each with its own scale and one legend for its curves."""
+    """Draw panels in rows and columns, each with its own scale and one legend for its curves."""
     import matplotlib
     from matplotlib.figure import Figure
 

@@ -29,7 +29,7 @@ def plot_layout(
     folder: str | Path, points: Mapping[str, Sequence[float]], path: str | Path, *,
     title: str, soil: str, concrete: str, ends: str,
 ) -> Path:
-    """Fig. 6: the mesh of a run with bodies, numbered points, bedrock and ends of the layer.
+    """Draw Fig. 6: the mesh of a run with bodies, numbered points, bedrock and ends of the layer.
 
     ``soil``, ``concrete``, ``ends``: what is written about the materials and the ends of the layer.
     """
@@ -75,8 +75,8 @@ def _number(axis: Any, bodies: Bodies, points: Mapping[str, Sequence[float]]) ->
 def plot_moments(
     folders: Mapping[str, str | Path], times: Sequence[float], path: str | Path, *, title: str, magnified: float
 ) -> Path:
-    """A row per run (name -> folder), a column per time [s]: the bodies around the channel, their displacements less
-    the channel's mean drawn ``magnified`` times; contact points coloured by their pressure, open ones white."""
+    """Draw a row per run (name -> folder), a column per time [s]: the bodies around the channel, their displacements
+    less the channel's mean drawn ``magnified`` times; contact points coloured by their pressure, open ones white."""
     import matplotlib
     from matplotlib.figure import Figure
 
@@ -101,7 +101,7 @@ def plot_moments(
 def plot_beside(
     runs: Mapping[str, History], reference: str, path: str | Path, *, title: str, points: Sequence[str] = ("1", "19")
 ) -> Path:
-    """Fig. 9: u_x and u_y of the channel's points in several runs, the one named ``reference`` grey and thick."""
+    """Draw Fig. 9: u_x and u_y of the channel's points in several runs, the one named ``reference`` grey and thick."""
     columns = [(f"u_{axis}_{label}", f"$u_{axis}$, point {label}") for label in points for axis in "xy"]
     figure, axes = panels(len(columns), (9.0, 2.1 * len(columns) + 1.0))
     for axis, (column, label) in zip(axes, columns, strict=True):

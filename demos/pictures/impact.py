@@ -1,4 +1,4 @@
-"""One figure of a ball that strikes a plane, beside the quasi-static theory."""
+"""Draw one figure of a ball that strikes a plane, beside the quasi-static theory."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from vi_contact.plots.histories import STYLE, save
 
 @dataclass(frozen=True)
 class ImpactCurves:
-    """Times [s] from the first touch on, force [N] and approach [m] of the whole ball; contact pressures [Pa] and
+    """Hold times [s] from the first touch on, force [N] and approach [m] of the whole ball; contact pressures [Pa] and
     their distances from the axis [m] at the largest force."""
 
     t: Array
@@ -29,7 +29,7 @@ def plot_impact(
     runs: Mapping[str, ImpactCurves], exact: HertzImpact, course: Callable[[Array], tuple[Array, Array]],
     path: str | Path,
 ) -> Path:
-    """Force and approach against time, pressure against the distance from the axis; the theory in grey behind them.
+    """Draw force and approach over time, pressure over the distance from the axis; the theory in grey behind them.
 
     course: t -> (approach, force) of the theory, also before and after the contact.
     """

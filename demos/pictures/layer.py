@@ -16,7 +16,7 @@ from vi_contact.plots.layer import COLOURS, grid
 
 
 def plot_parameters(values: Sequence[float], dampers: Sequence[float], path: str | Path) -> Path:
-    """Fig. 2: duration and restitution against k for several c, in units where a = b = V = m = 1."""
+    """Draw Fig. 2: duration and restitution against k for several c, in units where a = b = V = m = 1."""
     figure, axes = grid(1, 2, (10.0, 3.8))
     duration, rebound = axes[0]
     for c, colour in zip(dampers, COLOURS, strict=False):
@@ -32,7 +32,7 @@ def plot_parameters(values: Sequence[float], dampers: Sequence[float], path: str
 
 
 def plot_cut_off(motions: Mapping[str, Trajectory], exact: ParticleImpact, path: str | Path) -> Path:
-    """Fig. 3: distance and velocity against time for several a/b, the closed form behind them; label -> motion."""
+    """Draw Fig. 3: distance and velocity against time for several a/b, the closed form behind them; label -> motion."""
     figure, axes = grid(1, 2, (10.0, 3.8))
     place, speed = axes[0]
     t = np.linspace(0.0, exact.duration, 400)
@@ -50,7 +50,7 @@ def plot_cut_off(motions: Mapping[str, Trajectory], exact: ParticleImpact, path:
 def plot_bounces_of_body(
     motion: Trajectory, energy: Array, path: str | Path, *, title: str, still: Array | None = None
 ) -> Path:
-    """A rigid body before a plane z = 0: height of its mass centre and of its lowest point, energy, spin.
+    """Draw a rigid body before a plane z = 0: height of its mass centre and of its lowest point, energy, spin.
 
     energy: (m,) [J]; still: (m,) what the energy would be with the impact map's losses.
     """
@@ -75,7 +75,7 @@ def plot_bounces_of_body(
 def plot_thin_limit(
     errors: Mapping[str, tuple[Array, Array]], path: str | Path, *, quantity: str, slope: str = "order 1"
 ) -> Path:
-    """An error against the width of the layer; label -> (widths [m], errors). A line of order 1 beside them."""
+    """Draw an error over the width of the layer; label -> (widths [m], errors). A line of order 1 beside them."""
     figure, axes = grid(1, 1, (6.5, 4.2))
     axis = axes[0, 0]
     for (label, (width, error)), colour in zip(errors.items(), COLOURS, strict=False):
@@ -90,7 +90,7 @@ def plot_thin_limit(
 def plot_layered_bar(
     runs: Mapping[str, tuple[Array, Array, Array]], exact: tuple[Array, Array, Array], path: str | Path
 ) -> Path:
-    """Height of a bar's foot [m] and contact pressure [Pa] against time; label -> (t, height, pressure)."""
+    """Draw the height of a bar's foot [m] and contact pressure [Pa] against time; label -> (t, height, pressure)."""
     figure, axes = grid(1, 2, (11.0, 4.0))
     height, force = axes[0]
     height.plot(exact[0], exact[1], color="0.75", lw=4.0, label="exact inequality, closed form")

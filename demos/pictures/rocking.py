@@ -1,4 +1,4 @@
-"""Pictures of a rocking block: free rocking beside the rigid limit, and what ground pulses do to it."""
+"""Draw a rocking block: free rocking beside the rigid limit, and what ground pulses do to it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from vi_contact.plots.histories import History, panels, save
 def plot_rocking(
     history: History, path: str | Path, *, angle: float, exact: Array, energy: Array, impacts: Array, title: str
 ) -> Path:
-    """Rotation, corner reactions and mechanical energy of a released block against time.
+    """Draw rotation, corner reactions and mechanical energy of a released block against time.
 
     history: with the columns of the recorders ``Rocking`` and ``Energy``. angle: unit of the rotation [rad], the angle
     of overturning. exact: rotation of the rigid limit at history["t"] [rad]. energy: of the rigid limit at release and
@@ -44,7 +44,7 @@ def plot_rocking(
 def plot_pulses(
     onset: Mapping[str, History], overturning: Mapping[str, History], path: str | Path, *, angle: float, unit: float
 ) -> Path:
-    """Slow pulses around the onset of rocking above, rectangular ones around overturning below; label -> history.
+    """Draw slow pulses around the onset of rocking above, rectangular ones around overturning below; label -> history.
 
     Each pair: base acceleration over ``unit``, g b/h [m/s²]; what the block does. angle: of overturning [rad].
     """

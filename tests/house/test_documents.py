@@ -7,6 +7,7 @@ import os
 import re
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -150,6 +151,24 @@ def test_import_needs_numpy_and_scipy_only(package: str) -> None:
     code = f"import sys; sys.modules[{package!r}] = None; import vi_contact as vc; {names}"
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, encoding="utf-8", timeout=120)
     assert done.returncode == 0, done.stderr
+
+
+ROOMS = ["core", "fem", "solvers", "schemes", "soil", "engineering", "ground_motion", "exact", "bem", "beam",
+         "boundary_layer", "studies"]
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_names_are_public(document: Path) -> None:
+    """Every ``vc.name`` and ``room.name`` that a document writes."""
+    if document.name == "CHANGELOG.md":  # it has the old names too
+        return
+    text = document.read_text(encoding="utf-8")
+    unknown = set(re.findall(r"\bvc\.(\w+)", text)) - set(vi_contact.__all__)
+    for room in ROOMS:
+        written = set(re.findall(rf"(?<![\w./]){room}\.([A-Za-z]\w*)", text))
+        inside = {path.stem for path in (ROOT / "vi_contact" / room).iterdir()} | {"md", "py", "csv"}
+        unknown |= {f"{room}.{name}" for name in written - inside - set(import_module(f"vi_contact.{room}").__all__)}
+    assert not unknown
 
 
 CIPHERS = r"\b[Ss]eed 00\d|\bV\d+\.\d|\bP(?:[3-9]|[12]\d)\b|\b[Dd]esign idea|\b[Ss]olver notes|\bseismic\.md"

@@ -17,6 +17,7 @@ CLEAN = (  # rooms that keep the rules; one a line
     "beam",
     "boundary_layer",
     "engineering",
+    "fem",
     "plots",
     "soil",
 )
@@ -31,7 +32,7 @@ Connect Constrain Continue Convert Copy Correct Count Create Cut Damp Decide Def
 Differentiate Discretise Distribute Divide Draw Drop Eliminate Embed End Estimate Evaluate Exchange Expand Explain
 Extend Extract Extrapolate Factor Factorise Fill Filter Find Finish Fit Follow Format Gather Generate Give Go Group
 Guess Halve Hand Handle Hold Identify Ignore Integrate Interpolate Interpret Invert Iterate Join Judge Keep Let Limit
-List Listen Load Locate Look Make Map March Mark Mask Match Measure Mesh Minimise Mirror Model Move Multiply Name
+List Listen Load Locate Log Look Make Map March Mark Mask Match Measure Mesh Minimise Mirror Model Move Multiply Name
 Normalise Note Number Obtain Offer Open Order Pad Pair Parse Partition Pass Pick Place Plot Point Post Predict Prepare
 Prescribe Press Print Process Produce Project Propose Prove Provide Pull Push Put Raise Ramp Read Rebuild Recognise
 Record Reduce Refer Refine Refuse Register Relax Release Remember Remove Rename Replace Report Represent Resample

@@ -270,7 +270,7 @@ def test_uzawa_step_size() -> None:
     G, q, bilateral = small(7, 8, 2)
     cohesion = 0.2 * G[1::2, 1::2].diagonal() ** -0.5
     prepared = Uzawa().prepare(G, bilateral)
-    values = np.linalg.eigvalsh(prepared.blocks.matrix)
+    values = np.linalg.eigvalsh(prepared.delassus.matrix)
     assert prepared.rho == pytest.approx(2.0 / (values[0] + values[-1]), rel=1e-12)
     best = prepared.solve(q, cohesion, np.zeros(8))
     errors = np.array(best.history)

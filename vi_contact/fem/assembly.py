@@ -1,4 +1,4 @@
-"""Assembles the semi-discrete system of a linear elastic body: M u'' + C u' + K u = f(t) (seed 000 eqs. 7-10a).
+"""Assemble the semi-discrete system of a linear elastic body: M u'' + C u' + K u = f(t) (boundary method, eqs. 7-10a).
 
     sigma = lambda_eff tr(eps) I + 2 mu eps,   M = ∫ rho u·v,   K = ∫ sigma(u):eps(v),   C = alpha M + beta K
 
@@ -49,7 +49,7 @@ def assemble(
     initial_velocity: Initial = None,
     base_inertia: bool = True,
 ) -> SemiDiscreteSystem:
-    """The system of a body, on the free unknowns.
+    """Assemble the system of a body, on the free unknowns.
 
     Args:
         mesh: DOLFINx mesh (``read_mesh``), first-order cells; unknowns are P1 or Q1.
@@ -60,7 +60,7 @@ def assemble(
         tied: boundaries whose opposite nodes move together; loads: tractions (eqs. 4, 6) and body forces.
         damping: NoDamping() by default, MassProportional(c) (eq. 7) or Rayleigh.
         base_inertia: whether a ground motion's inertia load counts the mass that elements share with prescribed nodes,
-            as it must to be the motion seen from the ground; False is the load of the reference of V4.1.
+            as it must to be the motion seen from the ground; False is the load of docs/start/first_wall.md.
         initial_displacement, initial_velocity: constant or points (k, d) -> (k, d) (eqs. 10, 10a), or (cells, value)
             pairs for several bodies; the later pair counts where cells meet, zero where there are none.
     Raises:
@@ -125,7 +125,7 @@ def _base_mass(space: FemSpace, full: PetscMatrix, M: PetscMatrix, rigid: Array)
 
 
 class ElasticForms:
-    """The variational forms of one body; material constants are cellwise, so one compiled form serves all materials."""
+    """Hold the variational forms of one body; constants are cellwise: one compiled form serves all materials."""
 
     def __init__(self, space: FemSpace, materials: list[tuple[Any, LinearElastic]], section: Section, damping: Damping):
         self.space, self.section = space, section
@@ -144,23 +144,23 @@ class ElasticForms:
         self._matrices: dict[str, WeakSet[Any]] = {name: WeakSet() for name in ("M", "C", "K")}
 
     def own(self, system: SemiDiscreteSystem) -> None:
-        """Remembers the matrices of a system as made of these materials; the forms are then those of its space."""
+        """Remember the matrices of a system as made of these materials; the forms are then those of its space."""
         self.space.forms = self
         for name, known in self._matrices.items():
             if getattr(system, name) is not None:
                 known.add(getattr(system, name))
 
     def foreign(self, system: SemiDiscreteSystem, names: str) -> str:
-        """Which of these matrices of a system were not made of these materials: letters of ``names``."""
+        """Return the letters of ``names`` whose matrices in a system were not made of these materials."""
         return "".join(name for name in names if getattr(system, name) not in (None, *self._matrices[name]))
 
     def stress(self, u: Any) -> Any:
-        """sigma(u) times the thickness."""
+        """Return sigma(u) times the thickness."""
         eps = ufl.sym(ufl.grad(u))
         return self.fields["lame"] * ufl.tr(eps) * ufl.Identity(self.space.dimension) + 2 * self.fields["shear"] * eps
 
     def matrices(self) -> tuple[Any, Any, Any | None]:
-        """Full mass, stiffness and damping matrices (PETSc), before elimination."""
+        """Assemble the full mass, stiffness and damping matrices (PETSc), before elimination."""
         u, v = ufl.TrialFunction(self.space.V), ufl.TestFunction(self.space.V)
         mass = self.fields["rho"] * ufl.inner(u, v) * ufl.dx
         stiffness = ufl.inner(self.stress(u), ufl.sym(ufl.grad(v))) * ufl.dx
@@ -174,7 +174,7 @@ class ElasticForms:
 
 
 def cell_materials(mesh: Any, material: Materials) -> list[tuple[Any, LinearElastic]]:
-    """(local cells, material) pairs that cover every local cell once; InputError for cells with none or two."""
+    """Return (local cells, material) pairs that cover every local cell once; InputError for cells with none or two."""
     cell_map = mesh.topology.index_map(mesh.topology.dim)
     count = cell_map.size_local + cell_map.num_ghosts
     if isinstance(material, LinearElastic):
@@ -194,7 +194,7 @@ def cell_materials(mesh: Any, material: Materials) -> list[tuple[Any, LinearElas
 
 
 def assemble_loads(space: FemSpace, section: Section, loads: tuple[Any, ...], full: tuple[Any, Any, Any]) -> Load:
-    """f(t) on the free unknowns: tractions, body forces and the pull of prescribed motions."""
+    """Assemble f(t) on the free unknowns: tractions, body forces and the pull of prescribed motions."""
     constant = np.zeros(len(space.ids))
     separable: list[tuple[Array, Callable[[float], float]]] = []
     general: list[Callable[[float], Array]] = []
@@ -269,7 +269,7 @@ def _nodal(space: FemSpace, name: str, value: Any) -> Array:
 
 
 def floats(space: FemSpace) -> bool:
-    """Whether a rigid motion of some body of the mesh leaves every prescribed component of it at rest.
+    """Return whether a rigid motion of some body of the mesh leaves every prescribed component of it at rest.
 
     The Gram matrix of its rigid modes on its prescribed components is singular exactly then (scaled by its size).
     """
@@ -280,7 +280,7 @@ def floats(space: FemSpace) -> bool:
 
 
 def _floats(space: FemSpace, body: Mask) -> bool:
-    """The same for the body with these components (owned full mask)."""
+    """Return the answer of ``floats`` for the body with these components (owned full mask)."""
     d = space.dimension
     own = body[::d]
     middle = space.comm.sum(np.append(space.points[own].sum(axis=0), own.sum()))

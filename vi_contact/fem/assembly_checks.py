@@ -1,4 +1,4 @@
-"""Checks of what a body is assembled of: kinds of objects, groups of this mesh, conditions that do not contradict."""
+"""Check what a body is assembled of: kinds of objects, groups of this mesh, conditions that do not contradict."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ LOCKING = 0.495  # Poisson's ratio; CHOSEN: 0.49 is common for wet soil, 0.499 i
 
 
 def check_body(mesh: Any, material: Any, section: Any, damping: Any, base_inertia: Any) -> tuple[Section, Damping]:
-    """(section, damping), the usual ones for None; InputError for a mesh, material, section or damping of another kind,
-    or cells of another mesh."""
+    """Return (section, damping), the usual ones for None; InputError for a mesh, material, section or damping of
+    another kind, or cells of another mesh."""
     instance(OWNER, "mesh", mesh, Mesh, "give a DOLFINx mesh, such as fem.read_mesh(path, comm)[0]")
     if mesh.topology.dim != mesh.geometry.dim:
         raise InputError(f"assemble: the mesh has cells of dimension {mesh.topology.dim} at points of "
@@ -60,7 +60,7 @@ def _tell_locking(materials: Sequence[LinearElastic]) -> None:
 
 
 def check_boundaries(mesh: Mesh, clamped: Any, prescribed: Any, tied: Any, dashpots: Any, loads: Any) -> None:
-    """InputError, on all ranks, for conditions and loads of another kind or on groups of another mesh, and for
+    """Raise InputError, on all ranks, for conditions and loads of another kind or on groups of another mesh, and for
     prescribed displacements that contradict each other on the same facets. Collective. All are tuples."""
     for group in clamped:
         facets_of(OWNER, "clamped", group, mesh)
@@ -88,7 +88,7 @@ def _contradictions(conditions: Sequence[Prescribed]) -> Iterator[str]:
 
 
 def check_initial(mesh: Mesh, **values: Any) -> None:
-    """InputError unless each is None, a field, or (cells, field) pairs of this mesh."""
+    """Raise InputError unless each is None, a field, or (cells, field) pairs of this mesh."""
     for name, value in values.items():
         if value is not None:
             _check_initial(mesh, f"initial_{name}", value)

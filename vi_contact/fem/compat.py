@@ -1,4 +1,4 @@
-"""DOLFINx differs from version to version; every difference this package meets is settled here and nowhere else.
+"""Settle the differences between versions of DOLFINx, every one that this package meets, here and nowhere else.
 
 Supported: 0.5 (Debian 12), 0.9 (Debian 13) and 0.11. Nothing else in `fem` asks for the version. What changed:
 dofmaps became two-dimensional arrays and the ghost mode went to the partitioner (0.6), UFL elements became Basix
@@ -46,7 +46,7 @@ def create_mesh(
     x: npt.NDArray[np.float64],
     destinations: tuple[Indices, Indices],
 ) -> Mesh:
-    """A first-order mesh, distributed as told.
+    """Create a first-order mesh, distributed as told.
 
     `cell` is a UFL name ("interval", "triangle", "quadrilateral", "tetrahedron", "hexahedron"). `cells`
     (n_cells, n_vertices) holds rows of `x` in DOLFINx's (tensor-product) vertex order, `x` (n_points, gdim) the points
@@ -68,14 +68,14 @@ def create_mesh(
 
 
 def geometry_dofmap(mesh: Mesh) -> Indices:
-    """Local geometry nodes of each local cell (owned, then ghosts), (n_cells, n_vertices)."""
+    """Return the local geometry nodes of each local cell (owned, then ghosts), (n_cells, n_vertices)."""
     if _DOFMAP_PER_CELL_TYPE:
         return mesh.geometry.dofmaps[0]
     return _as_table(mesh.geometry.dofmap, mesh)
 
 
 def entities_to_geometry(mesh: Mesh, dim: int, entities: Indices) -> Indices:
-    """Local geometry nodes of each given entity, (n_entities, n_vertices). Builds connectivity: collective."""
+    """Return local geometry nodes of each given entity, (n_entities, n_vertices). Builds connectivity: collective."""
     tdim, cell = mesh.topology.dim, mesh.topology.cell_type
     mesh.topology.create_entities(dim)
     mesh.topology.create_connectivity(dim, tdim)
@@ -89,7 +89,7 @@ def entities_to_geometry(mesh: Mesh, dim: int, entities: Indices) -> Indices:
 
 
 def measure(mesh: Mesh, dim: int, indices: Indices) -> ufl.Measure:
-    """dx (dim = topological dimension) or ds (one less) on some local entities, ascending; ds skips inner facets."""
+    """Return dx (dim = topological dimension) or ds (one less) on these local entities; ds skips inner facets."""
     kind = "dx" if dim == mesh.topology.dim else "ds"
     tags = meshtags(mesh, dim, np.asarray(indices, dtype=np.int32), np.ones(len(indices), dtype=np.int32))
     return ufl.Measure(kind, domain=mesh, subdomain_data=tags)(1)
@@ -99,21 +99,21 @@ def measure(mesh: Mesh, dim: int, indices: Indices) -> ufl.Measure:
 
 
 def scalar_space(mesh: Mesh) -> Any:
-    """Continuous P1 or Q1 functions on the mesh."""
+    """Make the space of continuous P1 or Q1 functions on the mesh."""
     return fem.functionspace(mesh, ("Lagrange", 1)) if _BASIX_ELEMENTS else fem.FunctionSpace(mesh, ("Lagrange", 1))
 
 
 def vector_space(mesh: Mesh) -> Any:
-    """Continuous P1 or Q1 vector fields with as many components as the mesh has coordinates; the block size is gdim."""
+    """Make the space of P1 or Q1 vector fields with as many components as coordinates; the block size is gdim."""
     if _BASIX_ELEMENTS:
         return fem.functionspace(mesh, ("Lagrange", 1, (mesh.geometry.dim,)))
     return fem.VectorFunctionSpace(mesh, ("Lagrange", 1))
 
 
 def dof_to_node(space: Any) -> Indices:
-    """Local geometry node of each local block of unknowns (owned, then ghosts) of a P1/Q1 space, (n_blocks,).
+    """Return the local geometry node of each block of unknowns (owned, then ghosts) of a P1/Q1 space, (n_blocks,).
 
-    Unknown c of block i (index bs*i + c, P16) is component c at the point `mesh.geometry.x[dof_to_node(space)[i]]`.
+    Unknown c of block i (index bs*i + c) is component c at the point `mesh.geometry.x[dof_to_node(space)[i]]`.
     """
     index_map = space.dofmap.index_map
     nodes = np.full(index_map.size_local + index_map.num_ghosts, -1, dtype=np.int32)
@@ -122,7 +122,8 @@ def dof_to_node(space: Any) -> Indices:
 
 
 def cell_blocks(space: Any) -> Indices:
-    """Local blocks of unknowns of each local cell of a P1/Q1 space (owned, then ghosts), (n_cells, n_vertices)."""
+    """Return the local blocks of unknowns of each local cell of a P1/Q1 space (owned, ghosts), (n_cells,
+    n_vertices)."""
     return _as_table(space.dofmap.list, space.mesh)
 
 
@@ -142,36 +143,36 @@ def compile_form(ufl_form: ufl.Form) -> Any:
 
 
 def assemble_scalar(form: Any, comm: MPI.Comm) -> float:
-    """Value of a compiled functional, summed over all ranks of `comm`."""
+    """Assemble the value of a compiled functional, summed over all ranks of `comm`."""
     return float(comm.allreduce(fem.assemble_scalar(form), op=MPI.SUM))
 
 
 def assemble_matrix(form: Any) -> PETSc.Mat:
-    """Matrix of a compiled bilinear form, without boundary conditions, ready to use."""
+    """Assemble the matrix of a compiled bilinear form, without boundary conditions, ready to use."""
     matrix = fem_petsc.assemble_matrix(form)
     matrix.assemble()
     return matrix
 
 
 def assemble_vector(form: Any) -> PETSc.Vec:
-    """Vector of a compiled linear form, contributions of all ranks added on the owner; ghost entries are left stale."""
+    """Assemble a compiled linear form, contributions of all ranks added on the owner; ghost entries are left stale."""
     vector = fem_petsc.assemble_vector(form)
     vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
     return vector
 
 
 def cell_space(mesh: Mesh) -> Any:
-    """Functions that are constant on every cell."""
+    """Make the space of functions that are constant on every cell."""
     return fem.functionspace(mesh, ("DG", 0)) if _BASIX_ELEMENTS else fem.FunctionSpace(mesh, ("DG", 0))
 
 
 def function(space: Any) -> Any:
-    """A zero finite element function."""
+    """Make a zero finite element function."""
     return fem.Function(space)
 
 
 def facet_dofs(space: Any, facets: Indices) -> Indices:
-    """Local blocks of unknowns on the facets, found on every rank that owns or ghosts them; collective."""
+    """Return the local blocks of unknowns on the facets, found on every rank that owns or ghosts them; collective."""
     mesh = space.mesh
     tdim = mesh.topology.dim
     mesh.topology.create_connectivity(tdim - 1, tdim)

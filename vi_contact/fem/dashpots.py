@@ -1,6 +1,6 @@
-"""Boundaries behind which the ground goes on: dashpots that absorb waves, and a base that lets waves in from below.
+"""Let the ground go on behind boundaries: dashpots that absorb waves, and a base that lets waves in from below.
 
-Lysmer and Kuhlemeyer (1969), J. Eng. Mech. Div. ASCE 95, 859-877 (verification V8.1): on facets with outward normal n
+Lysmer and Kuhlemeyer (1969), J. Eng. Mech. Div. ASCE 95, 859-877: on facets with outward normal n
 
     sigma_n = -normal rho c_P v_n,    tau = -tangential rho c_S v_t
 
@@ -40,7 +40,7 @@ NO_RESISTANCE = 1e-12  # of the resistance of all dashpots: a smaller share is n
 
 @dataclass(frozen=True)
 class BoundaryLoads:
-    """What a boundary puts on the body: functions t [s] -> (n,) [N] on the free unknowns.
+    """Hold what a boundary puts on the body: functions t [s] -> (n,) [N] on the free unknowns.
 
     ``elastic`` and ``viscous`` enter the load as its general and viscous parts; ``companions`` are the motions behind
     them that are marched beside the run.
@@ -53,7 +53,7 @@ class BoundaryLoads:
 
 @dataclass(frozen=True)
 class Dashpots:
-    """Absorbing dashpots on facets. ``material``: that of the adjacent cells when None, or the half-space's behind it.
+    """Put absorbing dashpots on facets. ``material``: of the adjacent cells when None, or of the half-space behind.
 
     ``normal``, ``tangential``: factors of rho c_P and rho c_S, to mistune or leave one out. InputError when negative.
     """
@@ -75,7 +75,7 @@ class Dashpots:
 
     @property
     def lets_waves_in(self) -> bool:
-        """Whether the motion of the run comes in here, so that displacements are those of space."""
+        """Return whether the motion of the run comes in here, so that displacements are those of space."""
         return False
 
     def loads(self, matrix: DashpotMatrix, forms: Any) -> BoundaryLoads:
@@ -84,13 +84,13 @@ class Dashpots:
 
     @property
     def expects(self) -> str:
-        """Which motion this boundary expects, for the log."""
+        """Return the words for the log that say which motion this boundary expects."""
         return "takes no motion: waves leave, nothing comes in"
 
 
 @dataclass(frozen=True, kw_only=True)
 class CompliantBase(Dashpots):
-    """Dashpots and the upgoing wave ``motion``: t [s] -> v_up (d,) [m/s], half the outcrop velocity (``upgoing``)."""
+    """Put dashpots and an upgoing wave ``motion``: t [s] -> v_up (d,) [m/s], half the outcrop's (``upgoing``)."""
 
     motion: Callable[[float], Array] = field(repr=False)
 
@@ -112,7 +112,7 @@ class CompliantBase(Dashpots):
 
 
 class DashpotMatrix:
-    """The full matrix D of some dashpots (PETSc), with n·D v the force that resists them.
+    """Assemble the full matrix D of some dashpots (PETSc), with n·D v the force that resists them.
 
     InputError for facets that are not on the outer boundary, or prescribed in a direction that the dashpots resist.
     """
@@ -154,7 +154,7 @@ class DashpotMatrix:
                 )
 
     def moved_by(self, motion: Callable[[float], Array], factor: float) -> Callable[[float], Array]:
-        """factor Pᵀ D v(t), v the same at all nodes."""
+        """Return the load factor Pᵀ D v(t), v the same at all nodes."""
         count, whole = len(self.space.nodes), PetscMatrix(self.mat)
         rows = [self.space.pull(whole @ np.tile(e, count)) for e in np.eye(self.space.dimension)]
         columns, name = factor * np.column_stack(rows), type(self.dashpots).__name__

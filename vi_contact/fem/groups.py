@@ -1,4 +1,4 @@
-"""Groups of facets and cells where they are given: the right kind, of the mesh they are used on.
+"""Check groups of facets and cells where they are given: the right kind, of the mesh they are used on.
 
 Their numbers are local ones of one mesh. On another mesh, or taken for those of cells, they would name other places.
 """
@@ -17,13 +17,13 @@ Group = Facets | Cells
 
 
 def facets_of(owner: str, meaning: str, group: Any, mesh: Mesh | None = None) -> Facets:
-    """The boundary group, of this mesh if one is given; InputError, with the remedy, for anything else."""
+    """Return the boundary group, of this mesh if one is given; InputError, with the remedy, for anything else."""
     found: Facets = _group(owner, meaning, group, mesh, Facets, Cells)
     return found
 
 
 def cells_of(owner: str, meaning: str, group: Any, mesh: Mesh | None = None) -> Cells:
-    """The cell group, of this mesh if one is given; InputError, with the remedy, for anything else."""
+    """Return the cell group, of this mesh if one is given; InputError, with the remedy, for anything else."""
     found: Cells = _group(owner, meaning, group, mesh, Cells, Facets)
     return found
 
@@ -45,7 +45,7 @@ def _group(owner: str, meaning: str, group: Any, mesh: Mesh | None, wanted: type
 
 
 def field_given(owner: str, meaning: str, value: Any) -> None:
-    """InputError unless it is a function, or a vector of numbers (whose size and NaN are told where it is used)."""
+    """Raise InputError unless it is a function or a vector of numbers (size and NaN are told where it is used)."""
     if callable(value):
         function(owner, meaning, value, "give numbers, one per dimension, or a function")
         return
@@ -55,6 +55,6 @@ def field_given(owner: str, meaning: str, value: Any) -> None:
 
 
 def components_given(owner: str, value: Any) -> None:
-    """InputError unless it is None or a tuple of whole numbers (whose range is told where they are used)."""
+    """Raise InputError unless it is None or a tuple of whole numbers (whose range is told where they are used)."""
     for one in () if value is None else several(owner, "components", value, "give a tuple, such as (0,), or None"):
         whole(owner, "a component", one)

@@ -1,4 +1,4 @@
-"""Second-order effect of a static load: the geometric stiffness of its stresses (P-Delta, restoring moment of gravity).
+"""Add the second-order effect of a static load: geometric stiffness of its stresses (P-Delta, gravity's moment).
 
 In first-order statics a block that has tilted about its corner by theta still has its weight at the lever arm b. The
 arm b - h theta of the tilted block, hence uplift that ends in overturning, needs the work of the initial stresses
@@ -30,7 +30,7 @@ from .space import FemSpace, known_matrices, space_of
 
 
 def geometric_stiffness(problem: ContactProblem, state: State) -> SemiDiscreteSystem:
-    """The problem's system linearised about a static state: K + K_G instead of K, f + K_G u0 instead of f.
+    """Return the linearise the problem's system about a static state: K + K_G instead of K, f + K_G u0 instead of f.
 
     The state stays an equilibrium with the same reactions, and motions about it feel the geometric stiffness of its
     stresses: (K + K_G) u = f + K_G u0 - B_nᵀ r_n - B_tᵀ r_t. Use it as ``dataclasses.replace(problem, system=...)`` and
@@ -61,7 +61,7 @@ def geometric_stiffness(problem: ContactProblem, state: State) -> SemiDiscreteSy
 
 
 def initial_stress_matrix(space: FemSpace, nodal: Array) -> Any:
-    """K_G (PETSc, all unknowns) [N/m] of the stresses of nodal displacements (owned nodes, d) [m].
+    """Assemble K_G (PETSc, all unknowns) [N/m] of the stresses of nodal displacements (owned nodes, d) [m].
 
     Of a rotation the integrand is tr sigma0, a polynomial once multiplied by the Jacobian: exact on all cells.
     """

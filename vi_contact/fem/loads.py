@@ -1,4 +1,4 @@
-"""What acts on a body: prescribed displacements (seed 000 eq. 3), tractions (eqs. 4, 6) and body forces.
+"""Describe what acts on a body: prescribed displacements, tractions and body forces (boundary method, eqs. 3, 4, 6).
 
 Fields are given at points: a callable takes points (k, d) [m] and the time [s] and returns values (k, d). They are
 interpolated at the nodes and then integrated exactly, so a load costs one sparse product a step.
@@ -24,14 +24,15 @@ Value = tuple[float, ...] | Field
 
 
 def evaluate(name: str, value: Value, points: Array, t: float, comm: Comm) -> Array:
-    """The value at this rank's points, shape (k, d); collective. InputError, on all ranks, for NaN or a wrong shape."""
+    """Evaluate the value at this rank's points, (k, d); collective. InputError, on all ranks, for NaN or a wrong
+    shape."""
     result, defect = evaluate_here(name, value, points, t)
     refuse([defect], comm)
     return result
 
 
 def evaluate_here(name: str, value: Value, points: Array, t: float) -> tuple[Array, str]:
-    """(values at the points, what is wrong with them or an empty text); zeros where something is wrong."""
+    """Return (values at the points, what is wrong with them or an empty text); zeros where something is wrong."""
     if len(points) == 0:
         return np.zeros_like(points), ""  # users' functions need not cope with no points
     try:
@@ -58,7 +59,7 @@ def _zero(points: Array, t: float) -> Array:
 
 @dataclass(frozen=True)
 class Prescribed:
-    """u_i = U_i(x, t) on facets (eq. 3), with the velocity and acceleration of the same motion.
+    """Prescribe u_i = U_i(x, t) on facets (eq. 3), with the velocity and acceleration of the same motion.
 
     ``components``: which displacement components are prescribed (all when None); the others stay free (rollers).
     The mass and damping of the boundary nodes enter the equations, so all three time functions are needed;
@@ -79,22 +80,23 @@ class Prescribed:
 
     @property
     def motions(self) -> tuple[Value, Value, Value]:
-        """(U, U', U'')."""
+        """Return the motion and its rates (U, U', U'')."""
         return self.displacement, self.velocity, self.acceleration
 
     @property
     def moves(self) -> bool:
-        """False for a clamped part."""
+        """Return whether it moves: False for a clamped part."""
         return any(value is not _zero for value in self.motions)
 
     @property
     def companions(self) -> tuple[Any, ...]:
-        """Motions that are marched beside the run: of objects whose methods are given, such as ``BaseMotion``."""
+        """Return the motions that are marched beside the run: objects whose methods are given, such as
+        ``BaseMotion``."""
         owners = {id(owner): owner for owner in (getattr(value, "__self__", None) for value in self.motions)}
         return tuple(one for owner in owners.values() for one in getattr(owner, "companions", ()))
 
     def same_motion(self, other: Prescribed) -> bool:
-        """Whether both say the same of the components that both prescribe."""
+        """Return whether both say the same of the components that both prescribe."""
         mine, theirs = self.components, other.components
         apart = mine is not None and theirs is not None and not set(mine) & set(theirs)
         return apart or all(_same(one, two) for one, two in zip(self.motions, other.motions, strict=True))
@@ -113,7 +115,7 @@ def _at_rest(value: Value) -> bool:
 
 @dataclass(frozen=True)
 class Traction:
-    """S_i = F_i(x, t) [Pa] on facets (eq. 4). ``history``: a factor f(t) of a value that is constant in time.
+    """Apply S_i = F_i(x, t) [Pa] on facets (eq. 4). ``history``: a factor f(t) of a value that is constant in time.
 
     With a history, or with a tuple, the load is assembled once; a callable without history is evaluated every step.
     """
@@ -129,13 +131,13 @@ class Traction:
 
 @dataclass(frozen=True)
 class TangentialTraction(Traction):
-    """The given tangential traction S_T = C_T(x, t) of eq. 6 on the contact boundary: the part of ``value`` along the
+    """Apply the tangential traction S_T = C_T(x, t) of eq. 6 on the contact boundary: the part of ``value`` along the
     facet, its normal component is removed."""
 
 
 @dataclass(frozen=True)
 class BodyForce:
-    """Volume force f_i(x, t) [N/m³] (eq. 7). Weight of a material is BodyForce((0, -rho * 9.80665))."""
+    """Apply a volume force f_i(x, t) [N/m³] (eq. 7). Weight of a material is BodyForce((0, -rho * 9.80665))."""
 
     value: Value
     history: Callable[[float], float] | None = None
@@ -153,12 +155,12 @@ def _check_load(load: Traction | BodyForce) -> None:
 
 
 def is_constant(load: Traction | BodyForce) -> bool:
-    """Whether one assembly serves all times."""
+    """Return whether one assembly serves all times."""
     return load.history is not None or not callable(load.value)
 
 
 def as_tuple(items: Any) -> tuple[Any, ...]:
-    """One item or a sequence of items, as a tuple; None is none."""
+    """Return one item or a sequence of items, as a tuple; None is none."""
     if items is None:
         return ()
     return tuple(items) if isinstance(items, list | tuple) else (items,)

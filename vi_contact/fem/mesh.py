@@ -1,4 +1,4 @@
-"""Distributed meshes with named groups, read from a file or built in memory by a Gmsh script.
+"""Distribute meshes with named groups, read from a file or built in memory by a Gmsh script.
 
 Rank 0 reads and checks (vi_contact.meshes.extract), all ranks get the mesh or the same InputError. Groups are
 recognised on each rank by the vertices of their members, numbered as in the input, so a facet may be in as many
@@ -36,7 +36,7 @@ _NOWHERE = (np.zeros(0, dtype=np.int32), np.zeros(1, dtype=np.int32))
 
 @dataclass(frozen=True, eq=False)
 class Facets:
-    """A named part of the boundary or of an inner surface: local facets, ghosts included; kept ascending. Collective.
+    """Name a part of the boundary or of an inner surface: local facets, ghosts included; kept ascending. Collective.
 
     InputError, on all ranks, for numbers that are no facets of this mesh.
     """
@@ -51,7 +51,7 @@ class Facets:
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """A named part of the body: local cells, ghosts included; kept ascending. Collective.
+    """Name a part of the body: local cells, ghosts included; kept ascending. Collective.
 
     InputError, on all ranks, for numbers that are no cells of this mesh.
     """
@@ -83,7 +83,7 @@ def _local_numbers(group: Facets | Cells, codimension: int) -> Indices:
 
 
 class Tags(dict[str, Any]):
-    """The groups of a mesh by name: `Cells` or `Facets`, the same names on all ranks; InputError for others."""
+    """Hold the groups of a mesh by name: `Cells` or `Facets`, the same names on all ranks; InputError for others."""
 
     def __missing__(self, name: str) -> Any:
         facets = [key for key, group in self.items() if isinstance(group, Facets)]
@@ -95,7 +95,7 @@ class Tags(dict[str, Any]):
 
 
 def alone() -> MPI.Comm:
-    """The communicator of this process by itself."""
+    """Return the communicator of this process by itself."""
     return MPI.COMM_SELF
 
 
@@ -111,7 +111,7 @@ def read_mesh(path: str | Path, comm: MPI.Comm) -> tuple[Mesh, Tags]:
 
 
 def build_mesh(mesh: MeshScript, comm: MPI.Comm) -> tuple[Mesh, Tags]:
-    """The mesh of a script of the folder meshes, or of anything with `build(gmsh)`, without a file.
+    """Build the mesh of a script of the folder meshes, or of anything with `build(gmsh)`, without a file.
 
     Raises like `read_mesh`. Collective.
     """
@@ -120,7 +120,7 @@ def build_mesh(mesh: MeshScript, comm: MPI.Comm) -> tuple[Mesh, Tags]:
 
 
 def node_numbers(mesh: Mesh) -> npt.NDArray[np.int64]:
-    """Input number, from 0, of every local geometry node (owned, then ghosts): its rank among the nodes in use."""
+    """Number local geometry nodes (owned, then ghosts) as the input does, from 0: the rank among the nodes in use."""
     return np.asarray(mesh.geometry.input_global_indices, dtype=np.int64)
 
 

@@ -1,4 +1,5 @@
-"""The algebra protocol on PETSc matrices, for any number of ranks. MUMPS factorises; vectors stay numpy arrays."""
+"""Implement the algebra protocol on PETSc matrices, on any number of ranks: MUMPS factorises, vectors are numpy
+arrays."""
 
 from __future__ import annotations
 
@@ -27,7 +28,7 @@ RIGHT_SIDES = 64  # right-hand sides per block solve: bounds the memory of the d
 
 
 class MpiComm:
-    """The collective operations on an MPI communicator."""
+    """Offer the collective operations on an MPI communicator."""
 
     def __init__(self, comm: Any) -> None:
         self.mpi = comm
@@ -56,7 +57,7 @@ class MpiComm:
 
 
 class PetscMatrix:
-    """An AIJ matrix behind the ``Matrix`` protocol; ``mat`` is the PETSc object."""
+    """Hold an AIJ matrix behind the ``Matrix`` protocol; ``mat`` is the PETSc object."""
 
     def __init__(self, mat: Any) -> None:
         self.mat = mat
@@ -81,7 +82,7 @@ class PetscMatrix:
 
 
 class PetscFactor:
-    """A Cholesky factor and its substitutions.
+    """Hold a Cholesky factor and its substitutions.
 
     PETSc's own factorisation with minimum degree ordering where it serves (``_own_serves``): its substitutions are 4 to
     15 times as fast as those of MUMPS. On several ranks each keeps a whole copy of it, so that results do
@@ -101,7 +102,7 @@ class PetscFactor:
         if self._by_blocks:
             self._pc.setType("cholesky")
             self._pc.setFactorSolverType("mumps")
-            # P12: MUMPS may crash on distributed right-hand sides, and only the options database reaches it in time
+            # MUMPS may crash on distributed right-hand sides, and only the options database reaches it in time
             _default_options({"mat_mumps_icntl_20": 0})
         elif mat.comm.size == 1:
             self._pc.setType("cholesky")
@@ -180,7 +181,7 @@ def _default_options(values: Mapping[str, object]) -> None:
 
 
 class PetscAlgebra:
-    """PETSc matrices on one communicator."""
+    """Make and combine PETSc matrices on one communicator."""
 
     def __init__(self, comm: Any) -> None:
         self.comm = MpiComm(comm)
@@ -250,7 +251,7 @@ class PetscAlgebra:
 
 
 def as_petsc(matrix: Matrix) -> PetscMatrix:
-    """The matrix as a PetscMatrix; TypeError when it belongs to another algebra."""
+    """Return the matrix as a PetscMatrix; TypeError when it belongs to another algebra."""
     if not isinstance(matrix, PetscMatrix):
         raise TypeError(f"PetscAlgebra got a {type(matrix).__name__}")
     return matrix

@@ -1,4 +1,4 @@
-"""From a static stage on firm supports to a dynamic stage on others: the reactions of the removed ones become forces.
+"""Go from a static stage on firm supports to a dynamic stage on others: reactions of removed ones become forces.
 
 Dashpots hold no static load. A gravity stage therefore stands on rollers or clamps; where the dynamic stage has
 dashpots or free sides instead, what these supports carried goes on as the constant load
@@ -28,7 +28,7 @@ BALANCED = 1e-6  # of the largest nodal force: what may be missing where nothing
 
 
 def release(static: ContactProblem, state: State, problem: ContactProblem) -> tuple[ContactProblem, State]:
-    """(the problem with the reactions of removed supports as forces, its first state at rest) after a static stage.
+    """Return (problem with the reactions of removed supports as forces, its first state at rest) after a static stage.
 
     ``state``: of ``static_equilibrium`` on ``static``; ``problem``: on the same mesh, with the same materials, loads
     and contact points, and a motion that starts from rest. t = 0.

@@ -24,7 +24,7 @@ from .ties import Pairs, Tied, paired
 
 
 def body_numbers(mesh: Any, numbers: Indices) -> Indices:
-    """The body (0, 1, ..., in the order of their smallest node number) of each local geometry node. Collective.
+    """Return the body (0, 1, ..., in the order of their smallest node number) of each local geometry node. Collective.
 
     numbers: original numbers of the local geometry nodes.
     """
@@ -59,7 +59,7 @@ log = logging.getLogger(__name__)
 
 
 def space_of(owner: str, system: Any) -> FemSpace:
-    """The space of a system that fem.assemble made; InputError for anything else."""
+    """Return the space of a system that fem.assemble made; InputError for anything else."""
     instance(owner, "system", system, SemiDiscreteSystem, "give a system, such as fem.assemble returns")
     if not isinstance(system.space, FemSpace) or system.space.forms is None:
         raise InputError(f"{owner} needs a system made by fem.assemble")
@@ -67,7 +67,7 @@ def space_of(owner: str, system: Any) -> FemSpace:
 
 
 def known_matrices(owner: str, system: SemiDiscreteSystem, names: str) -> None:
-    """Warns when M, C or K of a system is not what fem.assemble made, for outputs that go by the materials given there.
+    """Warn when M, C or K of a system is not what fem.assemble made, for outputs that go by the materials given there.
 
     Springs added to K leave the stresses of the elements as they are; another material does not.
     """
@@ -78,9 +78,9 @@ def known_matrices(owner: str, system: SemiDiscreteSystem, names: str) -> None:
 
 
 class FemSpace:
-    """Nodal unknowns of a P1/Q1 displacement space, with the prescribed and the tied ones eliminated.
+    """Number the nodal unknowns of a P1/Q1 displacement space, with the prescribed and the tied ones eliminated.
 
-    "Full" vectors hold every owned component (bs*i + c, P16); "free" vectors only those the equations solve for.
+    "Full" vectors hold every owned component (bs*i + c); "free" vectors only those the equations solve for.
 
     Attributes:
         V: the DOLFINx function space; dimension d; free: (owned full,) mask of free components.
@@ -140,7 +140,7 @@ class FemSpace:
         return list(components)
 
     def facet_blocks(self, facets: Any) -> Indices:
-        """Owned blocks (nodes) on the facets, wherever the facets are owned."""
+        """Return the owned blocks (nodes) on the facets, wherever the facets are owned."""
         blocks = compat.facet_dofs(self.V, facets)
         return np.asarray(blocks[blocks < len(self.nodes)], dtype=np.int64)
 
@@ -186,30 +186,30 @@ class FemSpace:
 
     @property
     def tied_unknowns(self) -> Mask | None:
-        """Free unknowns of nodes that move together with others; None when no boundaries are tied."""
+        """Return the free unknowns of nodes that move together with others; None when no boundaries are tied."""
         if self._P is None:
             return None
         return np.repeat(np.isin(self.nodes, self.tied_nodes), self.dimension)[self.free]
 
     @property
     def coordinates(self) -> Array:
-        """Positions (rows, d) of the nodes of the free unknowns [m]."""
+        """Return the positions (rows, d) of the nodes of the free unknowns [m]."""
         return np.asarray(np.repeat(self.points, self.dimension, axis=0)[self.free])
 
     @cached_property
     def body_of_node(self) -> Indices:
-        """The body of every owned node: parts of the mesh that share no node, in the order of their node numbers."""
+        """Return the body of every owned node: parts of the mesh that share no node, in the order of node numbers."""
         return body_numbers(self.mesh, node_numbers(self.mesh))[compat.dof_to_node(self.V)[: len(self.nodes)]]
 
     @property
     def bodies(self) -> Indices:
-        """The body of every free unknown."""
+        """Return the body of every free unknown."""
         return np.asarray(np.repeat(self.body_of_node, self.dimension)[self.free])
 
     # Vectors ---------------------------------------------------------------------------------------------------------
 
     def prescribed_values(self, t: float, derivative: int = 0) -> Array:
-        """Full owned vector of U(x, t) or its time derivative; zero on free components.
+        """Return the full owned vector of U(x, t) or its time derivative; zero on free components.
 
         Where conditions meet, the later one counts.
         """
@@ -227,7 +227,7 @@ class FemSpace:
         return values.ravel()
 
     def expand(self, u: Array, t: float, derivative: int = 0) -> Array:
-        """Free vector -> nodal values (owned nodes, d), prescribed components included."""
+        """Expand a free vector -> nodal values (owned nodes, d), prescribed components included."""
         full = self.prescribed_values(t, derivative)
         if self._P is None:
             full[self.free] = u
@@ -236,17 +236,17 @@ class FemSpace:
         return full.reshape(-1, self.dimension)
 
     def pull(self, force: Array) -> Array:
-        """Pᵀ: forces on all owned components -> on the free ones; those on tied nodes count at their partners."""
+        """Pull back by Pᵀ: forces on all owned components -> on the free ones; tied nodes count at their partners."""
         return force[self.free] if self._P is None else self._P.transpose_apply(force)
 
     def restrict(self, full: Array) -> Array:
-        """Nodal values (owned nodes, d) -> free vector."""
+        """Return the restrict nodal values (owned nodes, d) -> free vector."""
         return full.ravel()[self.free]
 
     # Points ----------------------------------------------------------------------------------------------------------
 
     def find_nodes(self, points: Array) -> Indices:
-        """Original numbers of the nodes nearest to the points (k, d), equal on all ranks.
+        """Find the original numbers of the nodes nearest to the points (k, d), equal on all ranks.
 
         InputError for a point farther from every node than the body is large (5 % of its diagonal).
         """
@@ -266,7 +266,7 @@ class FemSpace:
         return found
 
     def sample(self, u: Array, nodes: Indices, t: float, derivative: int = 0) -> Array:
-        """Nodal values (k, d) at original node numbers, equal on all ranks."""
+        """Return the nodal values (k, d) at original node numbers, equal on all ranks."""
         return self._of_nodes(nodes, self.expand(u, t, derivative))
 
     def _where(self, nodes: Indices) -> Indices:

@@ -1,4 +1,4 @@
-"""Boundaries whose opposite nodes move together: tied sides of a soil layer, one period of a periodic body.
+"""Tie boundaries whose opposite nodes move together: tied sides of a soil layer, one period of a periodic body.
 
     u(x) = u(x + a),  x on the first boundary, a the distance between the two
 
@@ -26,7 +26,7 @@ PLACE_TOLERANCE = 1e-6  # of the body's size: nodes farther from the place of th
 
 
 class BodyNodes(Protocol):
-    """The nodes of a body on this rank: ``nodes`` their original numbers, ``points`` (n, d) where they are [m]."""
+    """Hold the nodes of a body on this rank: ``nodes`` their original numbers, ``points`` (n, d) where they are [m]."""
 
     comm: MPI.Comm
     dimension: int
@@ -40,7 +40,7 @@ class BodyNodes(Protocol):
 
 @dataclass(frozen=True)
 class Tied:
-    """The nodes of ``second`` move with those of ``first`` that face them: in all components, or in those given."""
+    """Tie the nodes of ``second`` to those of ``first`` that face them: in all components, or in those given."""
 
     first: Facets
     second: Facets
@@ -54,7 +54,7 @@ class Tied:
 
 @dataclass(frozen=True, eq=False)
 class Pairs:
-    """Original numbers of nodes that move together, the same on every rank; ``components`` they share."""
+    """Hold the original numbers of nodes that move together, the same on every rank; ``components`` they share."""
 
     first: Indices
     second: Indices
@@ -62,7 +62,7 @@ class Pairs:
 
 
 def paired(space: BodyNodes, tied: Sequence[Tied]) -> list[Pairs]:
-    """The nodes of every tie. Collective.
+    """Pair the nodes of every tie. Collective.
 
     InputError when nodes have no partner, when a node is tied twice, or a component that does not exist.
     """

@@ -1,4 +1,4 @@
-"""The ball that is thrown on a rigid plane, as a quarter of tetrahedra with two planes of symmetry (V3.3).
+"""Model a ball that is thrown on a rigid plane, as a quarter of tetrahedra with two planes of symmetry.
 
 It flies down along -y without gravity and strikes the plane with its lowest point. Forces, masses and energies of the
 model are a quarter of the ball's: times ``QUARTERS`` they compare with those of ``vi_contact.exact.hertz``.
@@ -35,7 +35,7 @@ CELL_GROWTH = 1.2
 
 @dataclass(frozen=True)
 class Ball:
-    """A ball of ``radius`` [m] at ``height`` [m] above the plane, with the velocity ``speed`` [m/s] towards it.
+    """Describe a ball of ``radius`` [m] at ``height`` [m] above the plane, with ``speed`` [m/s] towards it.
 
     The mesh has ``cells`` cells in the largest contact radius and about as many in the radius of the ball; from one
     size to the other they grow by 1.2/cells of the distance: twice the number refines everything, everywhere.
@@ -54,13 +54,13 @@ class Ball:
                              "give at least 3 cells and a height >= 0")
 
     def impact(self, mass: float) -> HertzImpact:
-        """The quasi-static impact of such a ball of that mass [kg]."""
+        """Return the quasi-static impact of such a ball of that mass [kg]."""
         modulus = contact_modulus((self.material.E, self.material.nu))
         return HertzImpact(mass=mass, speed=self.speed, modulus=modulus, radius=self.radius)
 
     @property
     def mesh(self) -> BallMesh:
-        """Fine where the sphere of volume 4/3 pi R³ is going to touch."""
+        """Return the mesh, fine where the sphere of volume 4/3 pi R³ is going to touch."""
         sphere = 4.0 / 3.0 * math.pi * self.radius**3
         a = self.impact(self.material.rho * sphere).deepest.contact_radius
         return BallMesh(
@@ -71,7 +71,7 @@ class Ball:
 
 @dataclass(frozen=True)
 class BallModel:
-    """The assembled quarter. ``mass`` [kg] is that of the whole ball as the mesh has it, a little less than a sphere's.
+    """Hold the assembled quarter. ``mass`` [kg]: of the whole ball as the mesh has it, a little less than a sphere's.
 
     ``exact``: the quasi-static impact of that mass.
     """
@@ -83,20 +83,20 @@ class BallModel:
 
     @property
     def exact(self) -> HertzImpact:
-        """With the mass of the mesh: what is left is the error of the mechanics."""
+        """Return the impact of the mesh's mass, so that what differs is the error of the mechanics."""
         return self.ball.impact(self.mass)
 
     def time_step(self, steps: int = 200) -> float:
-        """That many steps in the exact contact time [s]."""
+        """Return the time step [s] that makes so many steps of the exact contact time."""
         return self.exact.duration / steps
 
     def problem(self, *, mass: MassLaw | None = None) -> ContactProblem:
-        """The ball above the plane y = -height."""
+        """Set up the ball above the plane y = -height."""
         plane = HalfSpace(point=(0.0, -self.ball.height, 0.0), normal=(0.0, 1.0, 0.0))
         return ContactProblem(self.system, contact_surface(self.system, self.foot, obstacle=plane), mass=mass)
 
     def probes(self) -> dict[str, tuple[float, ...]]:
-        """Foot, centre and top."""
+        """Return the points foot, centre and top."""
         return {name: (0.0, share * self.ball.radius, 0.0) for name, share in (("foot", 0), ("centre", 1), ("top", 2))}
 
 
@@ -113,7 +113,7 @@ def build(ball: Ball, comm: Any) -> BallModel:
 
 
 def hertz_motion(exact: HertzImpact, t: ArrayLike) -> tuple[Array, Array]:
-    """(approach d [m], force F [N]) at the times t [s] after the first touch, zero before it and after the contact:
+    """Return (approach d [m], force F [N]) at times t [s] after the first touch, zero before it and after the contact:
 
         m d'' = -F(d),  energy: d' = v sqrt(1 - x),  x = (d/d_max)^(5/2)   =>   t/duration = ½ I_x(2/5, 1/2) until d_max
 

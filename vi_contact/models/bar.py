@@ -1,4 +1,4 @@
-"""The bar that strikes a rigid wall with its foot, as a finite element body in 1, 2 or 3 dimensions (V1.1 to V1.3).
+"""Model a bar that strikes a rigid wall with its foot, as a finite element body in 1, 2 or 3 dimensions.
 
 In 2D and 3D it is a strip or a column with nu = 0 and free sides, in which the 1D solutions are exact. Forces and
 energies divided by ``section`` compare with those of ``vi_contact.exact``.
@@ -31,7 +31,7 @@ UP = {1: 0, 2: 1, 3: 1}  # component of the bar's axis
 
 @dataclass(frozen=True)
 class Bar:
-    """``case``: the exact solution with its data; ``elements`` along the bar, ``across`` it (cells are cubes)."""
+    """Describe a bar. ``case``: exact solution with its data; ``elements`` along the bar, ``across`` it (cubes)."""
 
     case: ThrownBar | BouncingBar | PeriodicBar = field(default_factory=ThrownBar)
     elements: int = 100
@@ -41,35 +41,35 @@ class Bar:
 
     @property
     def length(self) -> float:
-        """[m]"""
+        """Return the length of the bar [m]."""
         return 1.0 if isinstance(self.case, PeriodicBar) else self.case.length
 
     @property
     def material(self) -> LinearElastic:
-        """With nu = 0."""
+        """Return the material, with nu = 0."""
         if isinstance(self.case, PeriodicBar):
             return LinearElastic(E=1.0, nu=0.0, rho=1.0)
         return LinearElastic(E=self.case.E, nu=0.0, rho=self.case.rho)
 
     @property
     def cell(self) -> float:
-        """Length of an element [m]."""
+        """Return the length of an element [m]."""
         return self.length / self.elements
 
     @property
     def section(self) -> float:
-        """Area of the section per unit of whatever the dimension leaves out."""
+        """Return the area of the section per unit of whatever the dimension leaves out."""
         return float((self.across * self.cell) ** (self.dimension - 1))
 
     def time_step(self, courant: float = 1.0) -> float:
-        """courant * cell / c [s]."""
+        """Return courant * cell / c [s]."""
         c = np.sqrt(self.material.E / self.material.rho)
         return float(courant * self.cell / c)
 
 
 @dataclass(frozen=True)
 class BarModel:
-    """The assembled bar over its wall."""
+    """Hold the assembled bar over its wall."""
 
     bar: Bar
     system: SemiDiscreteSystem
@@ -77,7 +77,7 @@ class BarModel:
     gap: float
 
     def problem(self, *, mass: MassLaw | None = None, impact: ImpactLaw | None = None) -> ContactProblem:
-        """The bar in possible contact along its foot."""
+        """Set up the bar in possible contact along its foot."""
         point, normal = np.zeros(self.bar.dimension), np.zeros(self.bar.dimension)
         point[UP[self.bar.dimension]], normal[UP[self.bar.dimension]] = -self.gap, 1.0
         wall = HalfSpace(point=tuple(point), normal=tuple(normal))
@@ -86,7 +86,7 @@ class BarModel:
         )
 
     def probes(self) -> dict[str, tuple[float, ...]]:
-        """The middle of the foot and of the top."""
+        """Return the middle of the foot and of the top."""
         middle = 0.5 * self.bar.across * self.bar.cell
         ends = {}
         for name, height in (("foot", 0.0), ("top", self.bar.length)):

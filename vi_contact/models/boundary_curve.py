@@ -1,4 +1,4 @@
-"""The boundary of a plane finite element mesh as a mesh of boundary elements, the same on all ranks."""
+"""Take the boundary of a plane finite element mesh as a mesh of boundary elements, the same on all ranks."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..fem.mesh import Facets, node_numbers
 
 
 def boundary_curve(*facets: Facets) -> tuple[BoundaryMesh, npt.NDArray[np.int64]]:
-    """(boundary mesh, (n,) input number of each of its nodes) of groups that make up closed curves together.
+    """Return (boundary mesh, (n,) input number of each of its nodes) of groups that make up closed curves.
 
     Label of an element = position of its group among the arguments. Raises InputError when the mesh is not plane, the
     groups overlap or the curves are open. Collective.

@@ -1,5 +1,5 @@
-"""The four examples of seed 003 as boundary element problems: numpy and scipy only, the same data as square, disk and
-embedded have for finite elements."""
+"""Set up four examples of Aimi, Di Credico and Gimperlein (2024) with boundary elements: numpy and scipy only, data of
+square, disk and embedded have for finite elements."""
 
 from __future__ import annotations
 
@@ -28,12 +28,13 @@ BOTTOM, RIGHT, TOP, LEFT = range(4)  # sides of a box
 
 
 def steklov(mesh: BoundaryMesh, material: LinearElastic, *, dt: float, steps: int) -> PoincareSteklov:
-    """The symmetric Poincaré-Steklov operator of a homogeneous body."""
+    """Return the symmetric Poincaré-Steklov operator of a homogeneous body."""
     return PoincareSteklov(energetic_blocks(mesh, material, dt=dt, steps=steps), material.rho)
 
 
 def pressed(operator: PoincareSteklov, *, pressure: Load, top: int, contact: Mask, **more: Any) -> BoundaryProblem:
-    """Pressure [Pa] at time t on the elements labelled ``top``; contact: mask of elements; more: fixed, prescribed."""
+    """Set up a body under pressure(t) [Pa] on the elements ``top``; contact: mask of elements; more: fixed,
+    prescribed."""
     instance("pressed", "operator", operator, PoincareSteklov, "give steklov(...)")
     function("pressed", "pressure", pressure, "give a function of the time in Pa")
     blocks, mesh = operator.blocks, operator.mesh
@@ -46,7 +47,7 @@ def pressed(operator: PoincareSteklov, *, pressure: Load, top: int, contact: Mas
 
 
 def unloaded(operator: PoincareSteklov, *, contact: Mask, **more: Any) -> BoundaryProblem:
-    """A body that is moved by contact or supports only."""
+    """Set up a body that is moved by contact or supports only."""
     instance("unloaded", "operator", operator, PoincareSteklov, "give steklov(...)")
     loads = np.zeros((operator.blocks.steps, 2, len(operator.mesh)))
     return BoundaryProblem(operator, loads, contact=contact, **more)
@@ -61,7 +62,7 @@ def square_problem(
     pressure: Load = lambda t: 1.0,
     side: float = 1.0,
 ) -> BoundaryProblem:
-    """[-a/2, a/2]² of ``elements`` per side, pressed on its top; its bottom may come into contact (V7.1, V7.2)."""
+    """Set up [-a/2, a/2]² of ``elements`` per side, pressed on its top; its bottom may come into contact."""
     a, h = _halves("square_problem", side, elements)
     mesh = polygon([(-a, -a), (a, -a), (a, a), (-a, a)], h)
     operator = steklov(mesh, material, dt=dt, steps=steps)
@@ -69,7 +70,7 @@ def square_problem(
 
 
 def disk_problem(elements: int, material: LinearElastic, *, dt: float, steps: int, radius: float) -> BoundaryProblem:
-    """A disk around (0, radius) of ``elements`` chords; its foot, 60° to each side, may come into contact (V7.3)."""
+    """Set up a disk around (0, radius) of ``elements`` chords; its foot, 60° to each side, may come into contact."""
     number("disk_problem", "radius", radius, positive=True, unit="m")
     mesh = circle(radius, elements, centre=(0.0, radius))
     foot = mesh.elements_where(lambda points: points[:, 1] <= radius * (1.0 - 0.5) * (1.0 + 1e-9))
@@ -77,7 +78,7 @@ def disk_problem(elements: int, material: LinearElastic, *, dt: float, steps: in
 
 
 def disk_contact(problem: BoundaryProblem, push: Load, friction: FrictionLaw | None = None) -> BoundaryContact:
-    """The disk on the plane y = push(t)."""
+    """Set up the contact of the disk with the plane y = push(t)."""
     instance("disk_contact", "problem", problem, BoundaryProblem, "give disk_problem(...)")
     function("disk_contact", "push", push, "give a function of the time in m")
     plane = HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))
@@ -94,12 +95,12 @@ def _halves(owner: str, side: float, elements: int, *, multiple: int = 1) -> tup
 
 @dataclass(frozen=True, eq=False)
 class EmbeddedBox:
-    """A box [-a/2, a/2]² in the notch of a block [-3a/2, 3a/2] x [-2a, 0], clamped at its bottom (V7.3)."""
+    """Hold a box [-a/2, a/2]² in the notch of a block [-3a/2, 3a/2] x [-2a, 0], which is clamped at its bottom."""
 
     bodies: TwoBodies
 
     def contact(self, friction: FrictionLaw | None = None) -> BoundaryContact:
-        """Floor, left and right wall of the notch; a corner of the box has two conditions and does not rub."""
+        """Set up contact with floor and walls of the notch; a corner of the box has two conditions and does not rub."""
         condensed, mesh = self.bodies.condensed(), self.bodies.one.operator.mesh
         in_notch = np.asarray(self.bodies.one.contact)
         sides = [in_notch & (mesh.labels == side) for side in (BOTTOM, LEFT, RIGHT)]
@@ -110,7 +111,7 @@ class EmbeddedBox:
 def embedded_problem(
     elements: int, material: LinearElastic, *, dt: float, steps: int, pressure: Load, side: float = 1.0
 ) -> EmbeddedBox:
-    """``elements``, an even number, along a side of the box."""
+    """Set up box and block with ``elements``, an even number, along a side of the box."""
     a, h = _halves("embedded_problem", side, elements, multiple=2)
     box = polygon([(-a, -a), (a, -a), (a, a), (-a, a)], h)
     corners = [(-3, -4), (3, -4), (3, 0), (1, 0), (1, -1), (-1, -1), (-1, 0), (-3, 0)]

@@ -1,4 +1,4 @@
-"""The tennis ball of the space-time boundary elements: a disk on a plane that pushes it up and retracts (V7.3).
+"""Model the tennis ball of Aimi, Di Credico and Gimperlein (2024): a disk on a plane that pushes it up and retracts.
 
 No weight and no other load: once released, the disk flies up with a constant velocity and swings. The plane is rigid,
 stays horizontal and moves by s(t); the gap of a point of the disk is its height above the plane, y + u_y - s(t).
@@ -26,7 +26,7 @@ from ..meshes.disk import DiskMesh
 
 @dataclass(frozen=True)
 class Push:
-    """s(t) = ``height`` sin²(pi t / (2 ``rise``)) until it is back at zero at t = 2 ``rise``, zero from then on.
+    """Push by s(t) = ``height`` sin²(pi t / (2 ``rise``)) until it is zero again at t = 2 ``rise``, then by zero.
 
     With height 0.05 and rise 1 it is 0.05 (1 - cos pi t)/2 for t <= 1; it goes down as it came up. [m, s]
     """
@@ -44,7 +44,7 @@ class Push:
 
 @dataclass(frozen=True)
 class Disk:
-    """Of ``radius`` [m], with cells of ``size`` [m], plane strain, pushed by ``push``."""
+    """Describe a disk of ``radius`` [m], with cells of ``size`` [m], plane strain, pushed by ``push``."""
 
     radius: float = 0.5
     size: float = 0.04
@@ -58,13 +58,13 @@ class Disk:
 
     @property
     def time_step(self) -> float:
-        """In which a pressure wave crosses a cell: half the cell size in the source's units [s]."""
+        """Return the time [s] in which a pressure wave crosses a cell: half the cell size in the paper's units."""
         return self.size / self.material.c_p
 
 
 @dataclass(frozen=True)
 class DiskModel:
-    """The assembled disk; ``foot``: its contact side; ``mass``: of the disk as the mesh has it [kg/m]."""
+    """Hold the assembled disk; ``foot``: its contact side; ``mass``: of the disk as the mesh has it [kg/m]."""
 
     disk: Disk
     system: SemiDiscreteSystem
@@ -72,13 +72,13 @@ class DiskModel:
     mass: float
 
     def problem(self, *, friction: FrictionLaw | None = None, mass: MassLaw | None = None) -> ContactProblem:
-        """The disk on its moving plane."""
+        """Set up the disk on its moving plane."""
         plane = HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))
         surface = contact_surface(self.system, self.foot, obstacle=plane).moving(towards=self.disk.push)
         return ContactProblem(self.system, surface, friction=friction or Frictionless(), mass=mass)
 
     def probes(self) -> dict[str, tuple[float, float]]:
-        """Lowest and highest point."""
+        """Return the lowest and highest point."""
         return {"bottom": (0.0, 0.0), "top": (0.0, 2.0 * self.disk.radius)}
 
 
@@ -91,14 +91,14 @@ def build(disk: Disk, comm: Any) -> DiskModel:
 
 
 class Momentum:
-    """Recorder of the momentum rᵀMv of a body in the plane along x and y and about the point ``centre``, in which
+    """Record the momentum rᵀMv of a body in the plane along x and y and about the point ``centre``, in which
     contact and friction are the only forces; M is the mass matrix of the run."""
 
     def __init__(self, centre: tuple[float, float]) -> None:
         self._centre = centre
 
     def columns(self) -> Mapping[str, tuple[str, str]]:
-        """momentum_x, momentum_y, momentum_angular."""
+        """Return the columns momentum_x, momentum_y, momentum_angular."""
         return {
             "momentum_x": ("kg m/s", "momentum along x"),
             "momentum_y": ("kg m/s", "momentum along y"),
@@ -108,7 +108,7 @@ class Momentum:
     def start(
         self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
     ) -> Mapping[str, float]:
-        """Of the initial state."""
+        """Return the momentum of the initial state."""
         self._system = system = problem.equations
         x, y = (system.space.coordinates - self._centre).T
         along, up = system.influence.T

@@ -1,4 +1,4 @@
-"""Concrete in concrete: a box in the notch of a block, the two-body example of space-time boundary elements (seed 003).
+"""Model concrete in concrete, a box in the notch of a block: the two bodies of Aimi, Di Credico and Gimperlein (2024).
 
 The box [-a/2, a/2]² is pressed down on its top. Its lower half stands in a notch of the block [-3a/2, 3a/2] x [-2a, 0],
 which is clamped at its bottom: contact on floor and walls of the notch, without initial gaps. The block is five
@@ -41,8 +41,8 @@ WALLS = ("left_wall", "right_wall")
 
 @dataclass(frozen=True)
 class Embedded:
-    """``box``: the pressed one, with an even number of cells per side; ``block``: the material around it, that of the
-    box by default. InputError for an odd number of cells and for rollers."""
+    """Describe box and block. ``box``: the pressed one, with an even number of cells per side; ``block``: the material
+    around it, that of the box by default. InputError for an odd number of cells and for rollers."""
 
     box: Square = field(default_factory=lambda: concrete(cells=10))
     block: LinearElastic | None = None
@@ -58,7 +58,7 @@ class Embedded:
                              "confines it")
 
     def blocks(self) -> Blocks:
-        """Sub-meshes: "foot" and "head" of the box, "left", "right", "under" (the notch), "left_wall" and
+        """Return the sub-meshes: "foot" and "head" of the box, "left", "right", "under" (the notch), "left_wall" and
         "right_wall" of the block."""
         a, n = 0.5 * self.box.side, self.box.cells // 2
         places = {  # lowest corner, width, height in units of half a side
@@ -72,7 +72,7 @@ class Embedded:
         })  # fmt: skip
 
     def mesh(self) -> Welded:
-        """Two bodies: foot and head are one, the sub-meshes of the block are one."""
+        """Return the two bodies: foot and head are one, the sub-meshes of the block are one."""
         welded = Welded(self.blocks(), *WAIST)
         for sides in TRANSMISSION:
             welded = Welded(welded, *sides)
@@ -81,18 +81,18 @@ class Embedded:
 
 @dataclass(frozen=True)
 class EmbeddedModel:
-    """The assembled box and block; ``surface``: the contact of floor, left and right wall, in this order."""
+    """Hold the assembled box and block; ``surface``: the contact of floor, left and right wall, in this order."""
 
     embedded: Embedded
     system: SemiDiscreteSystem
     surface: ContactSurface
 
     def problem(self, *, friction: FrictionLaw | None = None, mass: MassLaw | None = None) -> ContactProblem:
-        """The box in its notch, at rest."""
+        """Set up the box in its notch, at rest."""
         return ContactProblem(self.system, self.surface, friction=friction or Frictionless(), mass=mass)
 
     def probes(self) -> dict[str, tuple[float, float]]:
-        """Middle of the top of the box, rim of the block half a side from the notch."""
+        """Return the middle of the top of the box, rim of the block half a side from the notch."""
         side = self.embedded.box.side
         return {"top": (0.0, 0.5 * side), "rim": (side, 0.0)}
 

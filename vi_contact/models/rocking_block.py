@@ -1,4 +1,4 @@
-"""A stiff block standing on the ground with its two lower corners: the rigid limit of contact (V3.1).
+"""Model a stiff block that stands on the ground with its two lower corners: the rigid limit of contact.
 
 The base may lift but not slide: in small displacements the base of a block that turns about one of its corners does not
 move sideways, so its horizontal displacement is held. The weight's lever arm b - h theta is a second-order effect,
@@ -38,15 +38,15 @@ from ..run.static import static_equilibrium
 from ..run.time_steps import HalvedAtImpact
 from ..solvers.condensed import Condensed
 
-RIGID = 200.0  # least sqrt(E/rho)/height over p (V3.1)
+RIGID = 200.0  # least sqrt(E/rho)/height over p
 
 @dataclass(frozen=True)
 class RockingBlock:
-    """Width and height of ``shape`` [m], a material stiff enough to be rigid, and the mesh.
+    """Describe width and height of ``shape`` [m], a material stiff enough to be rigid, and the mesh.
 
     ``damping``: the default is 5 % of critical in the block's lowest bending vibration and nothing in rigid rotations;
     without it the vibrations of an impact last and stir the next one. InputError unless sqrt(E/rho)/height >= 200 p
-    (V3.1: waves cross the block many times while it rocks once), and for fewer than 4 elements over the height.
+    (waves cross the block many times while it rocks once), and for fewer than 4 elements over the height.
     """
 
     shape: HousnerBlock = field(default_factory=lambda: HousnerBlock(width=0.4, height=2.0))
@@ -64,29 +64,29 @@ class RockingBlock:
 
     @property
     def overturning_angle(self) -> float:
-        """b/h [rad]: at rest there the weight has no lever arm, in small displacements."""
+        """Return b/h [rad]: at rest there the weight has no lever arm, in small displacements."""
         return self.shape.width / self.shape.height
 
     @property
     def p(self) -> float:
-        """p_eff = p sqrt(cos(alpha)) [1/s]."""
+        """Return p_eff = p sqrt(cos(alpha)) [1/s]."""
         return self.shape.p * math.sqrt(math.cos(self.shape.alpha))
 
     @property
     def mass(self) -> float:
-        """[kg] for a thickness of 1 m."""
+        """Return the mass [kg] for a thickness of 1 m."""
         return self.material.rho * self.shape.width * self.shape.height
 
     def motion(self, theta0: float, t: Array) -> Array:
-        """theta(t) [rad] of the rigid limit after release at rest: Housner's phi with p_eff for p and b/h for alpha."""
+        """Return theta(t) [rad] of the rigid limit released at rest: Housner's phi, p_eff for p and b/h for alpha."""
         return self._scaled(self.shape.free_rocking(self._twin(theta0), t * self.p / self.shape.p))
 
     def impact_times(self, theta0: float, impacts: int) -> Array:
-        """Times of the first impacts of the rigid limit [s]."""
+        """Return the times of the first impacts of the rigid limit [s]."""
         return self.shape.impact_times(self._twin(theta0), impacts) * self.shape.p / self.p
 
     def amplitudes(self, theta0: float, impacts: int) -> Array:
-        """Largest abs(theta) of the rigid limit after 0, 1, ... impacts [rad]."""
+        """Return the largest abs(theta) of the rigid limit after 0, 1, ... impacts [rad]."""
         return self._scaled(self.shape.amplitudes(self._twin(theta0), impacts))
 
     def _twin(self, theta0: float) -> float:
@@ -99,40 +99,41 @@ class RockingBlock:
 
 @dataclass(frozen=True)
 class RockingModel:
-    """``problem``: the block with geometric stiffness; ``rest``: the block standing still under its weight."""
+    """Hold the model. ``problem``: the block with geometric stiffness; ``rest``: the block still under its weight."""
 
     block: RockingBlock
     problem: ContactProblem
     rest: State
 
     def shaken(self, excitation: Excitation | Sequence[Excitation]) -> ContactProblem:
-        """The problem on a ground that moves."""
+        """Set up the problem on a ground that moves."""
         return replace(self.problem, excitation=excitation)
 
     def time_steps(self, *, dt: float | None = None, halvings: int = 4) -> HalvedAtImpact:
-        """Steps of 1/(400 p), about a millisecond, halved where a corner lands: the loss of an impact is that of the
-        rigid block only if the step resolves when it happens."""
+        """Return steps of 1/(400 p), about a millisecond, halved where a corner lands: the loss of an impact is that of
+        the rigid block only if the step resolves when it happens."""
         return HalvedAtImpact(1.0 / (400.0 * self.block.shape.p) if dt is None else dt, halvings)
 
     def tilted(self, theta: float, *, rate: float = 0.0) -> State:
-        """The block at rest, turned by theta [rad] about its lower left corner, turning at ``rate`` [rad/s]."""
+        """Return the block at rest, turned by theta [rad] about its lower left corner, turning at ``rate`` [rad/s]."""
         u, v, none = self.rest.u + theta * self._turn, rate * self._turn, np.zeros(2)
         return replace(self.rest, u=u, v=v, r_n=none, active=none.astype(bool))
 
     @property
     def onset_acceleration(self) -> float:
-        """Slowly growing horizontal acceleration [m/s²] that lifts the block, g b/h: that of m g b over turn·M r."""
+        """Return the horizontal acceleration [m/s²] that lifts the block when it grows slowly, g b/h: m g b / turn·M
+        r."""
         system = self.problem.equations
         overturning = float(system.algebra.dot(self._turn, system.inertia(np.array([1.0, 0.0]))))
         return 0.5 * self.block.mass * self.block.shape.gravity * self.block.shape.width / abs(overturning)
 
     def angle(self, state: State) -> float:
-        """Rotation [rad] by the heights of the corners, positive when the right one is up."""
+        """Return the rotation [rad] by the heights of the corners, positive when the right one is up."""
         down = self.problem.surface.normal_values(state.u - self.rest.u)
         return float(down[0] - down[1]) / self.block.shape.width
 
     def spin(self, state: State) -> float:
-        """Angular velocity [rad/s], mean by mass of vertical velocities: s·M v / s·M s with s = (x - b) e_y."""
+        """Return the angular velocity [rad/s] by vertical velocities: s·M v / s·M s with s = (x - b) e_y."""
         return float(self.problem.system.algebra.dot(self._spin, state.v))
 
     @cached_property
@@ -152,13 +153,13 @@ class RockingModel:
 
 
 class Rocking:
-    """Recorder of the block's rotation, angular velocity and corner reactions."""
+    """Record the block's rotation, angular velocity and corner reactions."""
 
     def __init__(self, model: RockingModel) -> None:
         self._model = model
 
     def columns(self) -> Mapping[str, tuple[str, str]]:
-        """theta, theta_rate, r_left, r_right."""
+        """Return the columns theta, theta_rate, r_left, r_right."""
         return {
             "theta": ("rad", "rotation, positive when the right corner is up"),
             "theta_rate": ("rad/s", "angular velocity, mean over the block by mass"),
@@ -169,7 +170,7 @@ class Rocking:
     def start(
         self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
     ) -> Mapping[str, Any]:
-        """The initial state."""
+        """Return the row of the initial state."""
         return self._row(state)
 
     def row(self, report: Report) -> Mapping[str, Any]:
@@ -204,7 +205,7 @@ def build(block: RockingBlock, comm: Any) -> RockingModel:
 
 
 def impacts(history: Mapping[str, Array]) -> tuple[Array, Array]:
-    """(times when theta passes zero [s], largest abs(theta) before each since the one before [rad]) of a free block.
+    """Return (times when theta passes zero [s], largest abs(theta) between them and before [rad]) of a free block.
 
     The other side counts once a thousandth of the largest rotation is reached there: landing corners may chatter.
     """
@@ -221,7 +222,7 @@ def impacts(history: Mapping[str, Array]) -> tuple[Array, Array]:
 
 
 def restitution(block: RockingBlock, history: Mapping[str, Array], impact: float) -> float:
-    """Ratio of angular velocities over the first impact at time ``impact`` [s].
+    """Return the ratio of angular velocities over the first impact at time ``impact`` [s].
 
     Means from 0.1/p to 0.3/p before and after it of the velocity that the rigid block has there at theta = 0,
     sqrt(theta'² + p² theta (2b/h - theta)), which is constant between impacts: vibrations have left the mean by then.

@@ -1,4 +1,4 @@
-"""A stiff block that slides on a shaken ground with Coulomb friction; its rigid limit is Newmark's block (V3.2).
+"""Model a stiff block that slides on a shaken ground with Coulomb friction; its rigid limit is Newmark's block (1965).
 
 The whole base is in possible contact and free to lift and slide; the run starts from the gravity stage.
 """
@@ -28,7 +28,7 @@ from ..solvers.condensed import Condensed
 
 @dataclass(frozen=True)
 class SlidingBody:
-    """``law``: friction and gravity of the rigid block; width and height [m]; stiff material; mesh.
+    """Describe the block. ``law``: friction and gravity of the rigid block; width and height [m]; stiff material; mesh.
 
     InputError for a block so slender, width/height <= mu, that it rocks before it slides.
     """
@@ -47,7 +47,8 @@ class SlidingBody:
 
 @dataclass(frozen=True)
 class SlidingModel:
-    """``problem``: the block on its moving ground; ``rest``: standing still; ``centre``: its middle, for probes."""
+    """Hold the model. ``problem``: the block on moving ground; ``rest``: standing still; ``centre``: middle, for
+    probes."""
 
     body: SlidingBody
     problem: ContactProblem
@@ -55,7 +56,7 @@ class SlidingModel:
 
     @property
     def centre(self) -> tuple[float, float]:
-        """Centre of mass [m]."""
+        """Return the centre of mass [m]."""
         return 0.5 * self.body.lengths[0], 0.5 * self.body.lengths[1]
 
 

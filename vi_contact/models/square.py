@@ -1,4 +1,4 @@
-"""The square that is pressed on a rigid support: the compression tests of space-time boundary elements (V7.1, V7.2).
+"""Model a square that is pressed on a rigid support: compression tests of Aimi, Di Credico and Gimperlein (2024).
 
 A uniform pressure acts on the top of [-a/2, a/2]², the bottom is in possible contact, the sides are free, plane strain;
 at rest for t <= 0. In the source's units: c_P = 1, c_S = 1/2, rho = 1, side 1, pressure 0.1 from t = 0 on.
@@ -25,7 +25,7 @@ from ..meshes.block import BlockMesh
 
 @dataclass(frozen=True)
 class Square:
-    """``cells`` bilinear cells along each ``side`` [m]; ``pressure`` [Pa] on the top times ``history``(t).
+    """Describe a square of ``cells`` bilinear cells a ``side`` [m]; ``pressure`` [Pa] on the top times ``history``(t).
 
     ``confined``: the sides move vertically only, so that plane waves run up and down. InputError for no cells.
     """
@@ -45,17 +45,17 @@ class Square:
 
     @property
     def time_step(self) -> float:
-        """In which a pressure wave crosses a cell [s]."""
+        """Return the time in which a pressure wave crosses a cell [s]."""
         return self.side / self.cells / self.material.c_p
 
     @property
     def energy_rate(self) -> float:
-        """Energy per time [W/m] that a plane wave takes in under constant pressure, p² side / (rho c_P)."""
+        """Return the power [W/m] that a plane wave takes in under constant pressure, p² side / (rho c_P)."""
         return self.pressure**2 * self.side / (self.material.rho * self.material.c_p)
 
 
 def concrete(cells: int = 20) -> Square:
-    """A box of concrete on steel, 1 m wide: c_P = 3253 m/s, c_S = 1992 m/s, 4 MPa tanh((t/15 ms)²) (V7.2)."""
+    """Describe a box of concrete on steel, 1 m wide: c_P = 3253 m/s, c_S = 1992 m/s, 4 MPa tanh((t/15 ms)²)."""
     return Square(
         cells=cells,
         material=LinearElastic.from_wave_speeds(3253.0, 1992.0, 2400.0),
@@ -66,19 +66,19 @@ def concrete(cells: int = 20) -> Square:
 
 @dataclass(frozen=True)
 class SquareModel:
-    """The assembled square; ``bottom``: its contact side."""
+    """Hold the assembled square; ``bottom``: its contact side."""
 
     square: Square
     system: SemiDiscreteSystem
     bottom: Any
 
     def problem(self, *, friction: FrictionLaw | None = None, mass: MassLaw | None = None) -> ContactProblem:
-        """The square on a support that it fits."""
+        """Set up the square on a support that it fits."""
         surface = contact_surface(self.system, self.bottom)
         return ContactProblem(self.system, surface, friction=friction or Frictionless(), mass=mass)
 
     def probes(self) -> dict[str, tuple[float, float]]:
-        """Middle of the top, corner at the right end of the contact."""
+        """Return the middle of the top and the corner at the right end of the contact."""
         half = 0.5 * self.square.side
         return {"top": (0.0, half), "corner": (half, -half)}
 

@@ -1,4 +1,4 @@
-"""Seed 000's first example: a wall clamped at its base, whose right side may touch the ground beside it (Figs. 2-5).
+"""Model the first example of the boundary method: a wall clamped at its base, beside the ground (Figs. 2 to 5).
 
 What the source leaves open is marked CHOSEN and explained in the documentation (docs/start/first_wall.md).
 """
@@ -43,10 +43,10 @@ BASE_INERTIA = {  # which mass the ground accelerates, and what log and summary 
 
 @dataclass(frozen=True)
 class Wall:
-    """Geometry and material of Fig. 2, in SI units.
+    """Describe geometry and material of Fig. 2, in SI units.
 
     width: CHOSEN 6 m (8 base intervals of the 0.75 m spacing that 12 intervals on 9 m give). thickness: d = 0.20 m.
-    rho: CHOSEN 2400 kg/m³, concrete (0.24 in the technical system). Divisions: the seed's boundary nodes, 8 x 12.
+    rho: CHOSEN 2400 kg/m³, concrete (0.24 in the technical system). Divisions: the source's boundary nodes, 8 x 12.
     """
 
     height: float = 9.0
@@ -59,14 +59,14 @@ class Wall:
     triangles: bool = False
 
     def mesh(self) -> WallMesh:
-        """The Gmsh description; a ``size`` replaces the exact divisions."""
+        """Return the Gmsh description; a ``size`` replaces the exact divisions."""
         divisions = None if self.size is not None else self.divisions
         return WallMesh(
             height=self.height, width=self.width, divisions=divisions, size=self.size, triangles=self.triangles
         )
 
     def point(self, number: int) -> tuple[float, float]:
-        """Coordinates of the seed's boundary points 1..40, anticlockwise from the right side above the base.
+        """Return the source's boundary points 1..40, anticlockwise from the right side above the base.
 
         1-12 right side upwards (12 = top right corner), 13-20 top, 21-32 left side downwards, 33-40 base.
         """
@@ -84,7 +84,7 @@ class Wall:
 
 @dataclass(frozen=True)
 class WallModel:
-    """The assembled wall: system, mesh and named boundaries."""
+    """Hold the assembled wall: system, mesh and named boundaries."""
 
     wall: Wall
     mesh: Any
@@ -93,12 +93,12 @@ class WallModel:
 
     @property
     def face(self) -> Facets:
-        """The contact side."""
+        """Return the contact side."""
         facets: Facets = self.tags["face"]
         return facets
 
     def surface(self, case: str) -> ContactSurface:
-        """The contact conditions of a case of CASES, or of the whole side for "face"."""
+        """Make the contact conditions of a case of CASES, or of the whole side for "face"."""
         ground = HalfSpace(point=(self.wall.width, 0.0), normal=(-1.0, 0.0))
         if case == "face":
             return contact_surface(self.system, self.face, obstacle=ground)
@@ -118,7 +118,7 @@ class WallModel:
         impact: ImpactLaw | None = None,
         mass: MassLaw | None = None,
     ) -> ContactProblem:
-        """The wall in a case; by default the harmonic of Fig. 3 and the seed's inelastic impact rule on its mass.
+        """Set up the wall in a case; by default the harmonic of Fig. 3 and the source's inelastic impact on its mass.
 
         Schemes with massless contact nodes take no impact law: give impact=NoImpact(), and leave mass to them.
         """
@@ -131,23 +131,23 @@ class WallModel:
         )
 
     def harmonic(self, amplitude: float = 1.0) -> Harmonic:
-        """a_g = a0 sin(2 pi f t) with f = f1/2. CHOSEN: Fig. 3 prints neither amplitude nor period; a0 = 1 m/s²."""
+        """Return a_g = a0 sin(2 pi f t), f = f1/2. CHOSEN: Fig. 3 prints neither amplitude nor period; a0 = 1 m/s²."""
         return Harmonic(amplitude, 0.5 * lowest_frequency(self.system), direction=(1.0, 0.0))
 
     def time_step(self) -> float:
-        """dt = 1/(40 f), a fortieth of the period of ``harmonic``. CHOSEN."""
+        """Return dt = 1/(40 f), a fortieth of the period of ``harmonic``. CHOSEN."""
         return 1.0 / (20.0 * lowest_frequency(self.system))
 
     def probes(self) -> dict[str, tuple[float, float]]:
-        """The seed's points that the figures show: contact points, points between them, top and far side."""
+        """Return the points that the figures show: contact points, points between them, top and far side."""
         return {str(number): self.wall.point(number) for number in (4, 6, 7, 10, 12, 26)}
 
 
 def build(wall: Wall, comm: Any, *, weight: bool = False, base_inertia: str = "whole") -> WallModel:
-    """Meshes and assembles the wall; ``weight`` adds its own weight, for a gravity stage.
+    """Mesh and assemble the wall; ``weight`` adds its own weight, for a gravity stage.
 
-    base_inertia: a word of BASE_INERTIA. "catalogue" reproduces the numbers of V4.1, whose inertia load is 1.4 % short
-    on 8 x 12 elements.
+    base_inertia: a word of BASE_INERTIA. "catalogue" reproduces the numbers of docs/start/first_wall.md, whose
+    inertia load is 1.4 % short on 8 x 12 elements.
     """
     check_word("base_inertia", base_inertia, list(BASE_INERTIA))
     mesh, tags = build_mesh(wall.mesh(), comm)

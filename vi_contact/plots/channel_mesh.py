@@ -85,7 +85,7 @@ class Colours:
 def draw_bodies(
     axis: Any, bodies: Bodies, t: float, *, magnified: float, colours: Colours, follow: bool = False
 ) -> float:
-    """Draw the frame next to t; returns its time [s]. ``follow``: displacements less the mean of the channel's."""
+    """Draw the frame next to t; return its time [s]. ``follow``: displacements less the mean of the channel's."""
     frames, tractions = bodies.frames, bodies.tractions
     shown, u, _ = frames.at(t)
     own = np.unique(frames.cells[bodies.cells])

@@ -1,4 +1,4 @@
-"""Faces of a contact boundary: where it turns by more than a feature angle, its nodes have one normal for every face.
+"""Split a contact boundary into faces: where it turns by more than a feature angle, nodes have one normal a face.
 
 Facets round a node are one face there as long as each turns by no more than the angle from another one of them. A
 smooth node has one face, a node at an edge two, at a corner in space three. Normal and weight of a face at a node are
@@ -32,7 +32,7 @@ NAMED = 4  # corners that the log names
 
 @dataclass(frozen=True, eq=False)
 class Boundary:
-    """The facets of a group, on every rank in the order of the numbers of their nodes.
+    """Hold the facets of a group, on every rank in the order of the numbers of their nodes.
 
     Attributes:
         vertices: (k, v) original numbers of their nodes, ascending; normals: (k, d) outward, of length one.
@@ -112,7 +112,7 @@ def _components(count: int, links: list[Indices]) -> Indices:
 
 
 def integrals(space: FemSpace, indices: Any) -> Array:
-    """(owned nodes, 1 + d): ∫ phi_i and ∫ phi_i n over local facets. Collective."""
+    """Integrate phi_i and phi_i n, (owned nodes, 1 + d), over local facets. Collective."""
     mesh, d = space.mesh, space.dimension
     ds = compat.measure(mesh, mesh.topology.dim - 1, indices)
     v = ufl.TestFunction(space.V)
@@ -122,7 +122,7 @@ def integrals(space: FemSpace, indices: Any) -> Array:
 
 
 def split(space: FemSpace, around: Boundary, nodes: Nodes, angle: float) -> tuple[Nodes, Indices]:
-    """(the nodes, those at corners once for each face with its normal and weight; a facet of the face, -1 elsewhere).
+    """Return (nodes, at corners one for each face with its normal and weight; a facet of the face, -1 elsewhere).
 
     The order of the nodes is kept. Collective.
     """
@@ -179,7 +179,7 @@ def _classes(vertices: Indices, labels: Indices, corners: Indices) -> Indices:
 
 
 def in_symmetry_planes(normals: Array, held: Mask) -> Array:
-    """Normals (k, d) without the prescribed components of their nodes, where that turns them by little.
+    """Return normals (k, d) without the prescribed components of their nodes, where that turns them by little.
 
     On a symmetry plane the true normal lies in the plane; that of the facets on one side of it leans to that side.
     """

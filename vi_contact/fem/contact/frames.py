@@ -1,4 +1,4 @@
-"""Nodal frames of contact nodes and what they make of conditions: the bases T and R of a `ContactSurface`.
+"""Turn contact nodes to their frames, and conditions with them: the bases T and R of a `ContactSurface`.
 
 A condition is a node, a contact direction and, between two bodies, what the node faces. Each node has one frame Q, with
 the directions of all its conditions among its vectors, and its unknowns are û = Qᵀu: every u·n is one of them. Forces
@@ -29,7 +29,7 @@ INDEPENDENT = 0.01  # least singular value of a node's directions: two that turn
 
 @dataclass(frozen=True, eq=False)
 class Nodes:
-    """Nodes of a boundary, the same on every rank: original numbers, coordinates, body normals, weights, held
+    """Hold nodes of a boundary, the same on every rank: original numbers, coordinates, body normals, weights, held
     components, and the numbers over all ranks of their free unknowns, -1 for held ones."""
 
     numbers: Indices
@@ -40,18 +40,18 @@ class Nodes:
     unknowns: Indices
 
     def pick(self, rows: Any) -> Nodes:
-        """Some of them."""
+        """Return the nodes of these rows."""
         return Nodes(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
 
 
 def joined_nodes(parts: Sequence[Nodes]) -> Nodes:
-    """One after the other."""
+    """Return the nodes of all parts, one part after the other."""
     return Nodes(*(np.concatenate([getattr(part, name) for part in parts]) for name in Nodes.__dataclass_fields__))
 
 
 @dataclass(frozen=True, eq=False)
 class Facing:
-    """What contact nodes face: opposite node s the other body moves by sum_j P_sj u_j of these nodes."""
+    """Hold what contact nodes face: opposite node s the other body moves by sum_j P_sj u_j of these nodes."""
 
     nodes: Nodes
     P: sp.csr_matrix
@@ -59,7 +59,7 @@ class Facing:
 
 @dataclass(frozen=True, eq=False)
 class NodalConditions:
-    """Conditions u·direction <= gap at nodes, u being relative to what they are ``facing`` if that deforms too."""
+    """Hold conditions u·direction <= gap at nodes, u being relative to what they are ``facing`` if that deforms too."""
 
     nodes: Nodes
     directions: Array
@@ -68,14 +68,14 @@ class NodalConditions:
 
 @dataclass(frozen=True, kw_only=True)
 class FemSurface(ContactSurface):
-    """A contact surface that remembers what it was made of, so that it can be joined with others."""
+    """Hold a contact surface that remembers what it was made of, so that it can be joined with others."""
 
     space: FemSpace = field(repr=False)
     parts: tuple[NodalConditions, ...] = field(repr=False)
 
 
 class NodalFrames:
-    """One frame of unit vectors per node of the conditions, orthonormal unless the node has oblique directions.
+    """Make one frame of unit vectors per node of the conditions, orthonormal unless the node has oblique directions.
 
     Attributes:
         numbers: (k,) nodes; blocks: (k, d, d) frames Q, vectors as columns; turns: (k, d, d) Q⁻ᵀ.
@@ -117,7 +117,7 @@ class NodalFrames:
 
     @property
     def tangents(self) -> Array:
-        """(m, d, d-1) tangential vectors of each condition, in the order of the tangential unknowns."""
+        """Return the tangential vectors (m, d, d-1) of each condition, in the order of the tangential unknowns."""
         blocks = self.blocks[self.place]
         return np.array([np.delete(block, c, axis=1) for block, c in zip(blocks, self.column, strict=True)])
 
@@ -147,7 +147,7 @@ class NodalFrames:
 
 
 def block_of(frame: Array) -> tuple[int, Array]:
-    """(c, Q): a nodal frame with the contact direction in column c, so that component c becomes the normal unknown.
+    """Return (c, Q): a nodal frame with the contact direction in column c, so that component c is the normal unknown.
 
     c is the direction's largest component. Axes at right angles to the direction keep their own columns: these are the
     components that may be prescribed.
@@ -167,7 +167,7 @@ def block_of(frame: Array) -> tuple[int, Array]:
 
 
 def corner_of(directions: Array) -> tuple[list[int], Array]:
-    """(columns, Q): the frame of a node with two or three independent contact directions (k, d)."""
+    """Return (columns, Q): the frame of a node with two or three independent contact directions (k, d)."""
     d, square = directions.shape[1], at_right_angles(directions)
     columns: list[int] = []
     for direction in directions:
@@ -186,12 +186,12 @@ def corner_of(directions: Array) -> tuple[list[int], Array]:
 
 
 def at(point: Array) -> str:
-    """A point for a sentence."""
+    """Return a point as words for a sentence."""
     return f"({', '.join(f'{x:g}' for x in point)})"
 
 
 def surface_of(space: FemSpace, parts: Sequence[NodalConditions], **data: Any) -> FemSurface:
-    """The surface of these conditions; ``data``: gap0, weights and what else a surface holds for each. Collective."""
+    """Make the surface of these conditions; ``data``: gap0, weights and what else it holds for each. Collective."""
     frames = NodalFrames(parts)
     d, count = space.dimension, len(frames.place)
     where = space._where(frames.numbers)

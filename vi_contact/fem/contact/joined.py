@@ -1,4 +1,4 @@
-"""Several contact surfaces of one system as one: more than one pair of bodies, pairs and obstacles, corners."""
+"""Join several contact surfaces of one system: more than one pair of bodies, pairs and obstacles, corners."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Motion = Callable[[float], Array]
 
 
 def joined_surfaces(*surfaces: ContactSurface) -> ContactSurface:
-    """One surface with the conditions of all, in the order given.
+    """Return one surface with the conditions of all, in the order given.
 
     A node that is on several of them, at the edge of a channel, has a condition for each, at any angle between them.
     Beside friction such nodes are refused unless they may slide freely (``with_frictionless_corners``); in space they

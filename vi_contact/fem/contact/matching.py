@@ -1,4 +1,4 @@
-"""Which nodes of side 2 a contact node of side 1 faces: u_2 at the point opposite node s is sum_j P_sj u_j.
+"""Find the nodes of side 2 that a contact node of side 1 faces: u_2 at the point opposite node s is sum_j P_sj u_j.
 
 The rows of P sum to one, so that a common translation of both bodies opens and closes nothing.
 """
@@ -22,7 +22,7 @@ DISTANCE_ROWS = 256  # rows of the tables of distances
 
 @dataclass(frozen=True, eq=False)
 class Side:
-    """A boundary that may touch another one, the same on every rank: its name, nodes, and facets as rows of places
+    """Hold a boundary that may touch another, the same on every rank: its name, nodes, and facets as rows of places
     among the nodes."""
 
     name: str
@@ -32,7 +32,7 @@ class Side:
 
 @dataclass(frozen=True, eq=False)
 class Matched:
-    """The m nodes of side 1 that face side 2: their ``rows`` among those of side 1, P (m, nodes of side 2), the weights
+    """Hold the m nodes of side 1 that face side 2: ``rows`` among those of side 1, P (m, nodes of side 2), the weights
     [m] or [m²] of their shares of the interface, and by how much the sides may overlap there [m] and count as touching.
     """
 
@@ -42,21 +42,21 @@ class Matched:
     overlap: Array
 
     def pick(self, rows: Any) -> Matched:
-        """Some of them."""
+        """Return the matched nodes of these rows."""
         return Matched(self.rows[rows], self.P[rows], self.weights[rows], self.overlap[rows])
 
 
 class Matching(Protocol):
-    """How the nodes of side 1 find what they face. InputError when they do not."""
+    """Find what the nodes of side 1 face. InputError when they do not."""
 
     def match(self, one: Side, two: Side, size: float) -> Matched:
-        """``size``: of the mesh [m]."""
+        """Return what the nodes of side ``one`` face on side ``two``; ``size``: of the mesh [m]."""
         ...
 
 
 @dataclass(frozen=True)
 class NodeToNode:
-    """Conforming sides: every node of side 1 has one node of side 2 at its place, or opposite along its normal.
+    """Match conforming sides: every node of side 1 has one node of side 2 at its place, or opposite along its normal.
 
     ``tolerance``: how far beside the normal the partner may lie, as a share of the distance to the next node of side 1.
     InputError for nodes without a partner, two nodes with the same one, and sides that do not face each other.
@@ -109,7 +109,7 @@ class NodeToNode:
 
 
 def refuse_same_way(one: str, two: str, point: Array) -> None:
-    """InputError for sides whose outward normals point the same way."""
+    """Raise InputError for sides whose outward normals point the same way."""
     raise InputError(
         f"'{two}' does not face '{one}' at {at(point)}, the outward normals of both point the same way there: choose "
         "the two boundaries between the bodies"

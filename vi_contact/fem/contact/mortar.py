@@ -1,4 +1,4 @@
-"""Sides of plane bodies that are not meshed alike: mortar coupling with dual Lagrange multipliers.
+"""Couple sides of plane bodies that are not meshed alike: mortar coupling with dual Lagrange multipliers.
 
 The gap is asked not at points but in the mean, weighted with functions psi_s on side 1, one per node,
 
@@ -35,7 +35,7 @@ CURVED = 0.05  # of a segment: what polygons of one curve may overlap
 
 @dataclass(frozen=True)
 class DualMortar:
-    """Sides of plane bodies with any meshes: dual Lagrange multipliers on side 1 (head of this file).
+    """Match sides of plane bodies with any meshes: dual Lagrange multipliers on side 1 (head of this file).
 
     Nodes of side 1 at the ends of what is in front of side 2 keep their conditions, in the mean over that part.
     Initial gaps are means too; where polygons of the same curve overlap by up to 5 % of a segment the gap is zero.

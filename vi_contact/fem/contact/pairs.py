@@ -1,7 +1,7 @@
-"""Contact between two deformable bodies: the unknowns of side 1 become displacements relative to side 2.
+"""Make contact between two deformable bodies: the unknowns of side 1 become displacements relative to side 2.
 
 Opposite node s of side 1 with frame Q_s = (n, t), the other body moves by sum_j P_sj u_j. With û_s = Q_sᵀ u_s, the
-unknowns û of the nodal frames are written in new ones ǔ (design idea 3),
+unknowns û of the nodal frames are written in new ones ǔ,
 
     û = R ǔ,   û_s = ǔ_s + Q_sᵀ sum_j P_sj u_j   at contact nodes of side 1,   û = ǔ elsewhere
 
@@ -45,7 +45,7 @@ def contact_pair(
     points: Sequence[Sequence[float]] | None = None,
     feature_angle: float = FEATURE_ANGLE,
 ) -> ContactSurface:
-    """The contact conditions between two boundaries of deformable bodies, or two faces of a crack.
+    """Make the contact conditions between two boundaries of deformable bodies, or two faces of a crack.
 
     They are those of the nodes of side 1: its normals, weights (times the section's thickness) and forces; r_n /
     weights is the pressure. Side 1 should be the smaller and finer one, or the softer body. Initial gaps are measured
@@ -95,7 +95,7 @@ def contact_pair(
 
 
 def side_of(space: FemSpace, facets: Facets) -> Side:
-    """All nodes and facets of a boundary, on every rank, in the order of the mesh's numbers. Collective."""
+    """Gather all nodes and facets of a boundary, on every rank, in the order of the mesh's numbers. Collective."""
     mesh, nodes = space.mesh, nodes_on(space, facets)
     vertices = node_numbers(mesh)[compat.entities_to_geometry(mesh, mesh.topology.dim - 1, facets.indices)]
     rows = np.concatenate(space.comm.bcast(space.comm.gather(vertices.astype(np.int64))))
@@ -168,7 +168,7 @@ def _match(side: Side, mean: Array, two: Side, matching: Matching, size: float) 
 
 
 def _unclamped(space: FemSpace, name: str, nodes: Nodes, two: Side, matched: Matched) -> Mask:
-    """Those not clamped; InputError when one that is faces a free node, or when none is left."""
+    """Return what is matched and not clamped; InputError for clamped nodes facing free ones, or with none left."""
     clamped = nodes.held.all(axis=1)
     facing = np.asarray(matched.P.argmax(axis=1)).ravel()
     lost = np.flatnonzero(clamped & ~two.nodes.held[facing].all(axis=1))

@@ -1,4 +1,4 @@
-"""From facets of a mesh to contact conditions: nodal normals, weights, gaps and the rotated basis (design idea 3)."""
+"""Make contact conditions of facets of a mesh: nodal normals, weights, gaps and the rotated basis."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def contact_surface(
     points: Sequence[Sequence[float]] | None = None,
     feature_angle: float = FEATURE_ANGLE,
 ) -> ContactSurface:
-    """The contact conditions of a boundary part, or only of the listed points of it (seed 000's case a).
+    """Make the contact conditions of a boundary part, or only of listed points of it, as in case a of the wall.
 
     Nodal weights are ∫ phi_i times the section's thickness (so that r_n / weights is in Pa), nodal normals the
     direction of ∫ phi_i n over the facets, on rollers (a symmetry plane) without the component held there. Nodes of
@@ -68,7 +68,7 @@ def contact_surface(
 
 
 def one_per_direction(whole: Nodes, nodes: Nodes, directions: Array, gap: Array) -> tuple[Nodes, Array, Array]:
-    """(nodes, directions, gaps), faces of a node with one direction as one condition: weights added, the smaller gap.
+    """Return (nodes, directions, gaps), faces of one direction at a node as one condition: weights added, smaller gap.
 
     ``whole``: the nodes with the weights of all their faces.
     """
@@ -95,7 +95,7 @@ def one_per_direction(whole: Nodes, nodes: Nodes, directions: Array, gap: Array)
 def contact_space(
     owner: str, system: SemiDiscreteSystem, groups: Mapping[str, Facets], points: Any
 ) -> FemSpace:
-    """The space of a system; InputError for another kind, for groups of another mesh, and for a list of no points."""
+    """Return the space of a system; InputError for another kind, groups of another mesh, and a list of no points."""
     space = space_of(owner, system)
     for meaning, group in groups.items():
         facets_of(owner, meaning, group, space.mesh)
@@ -106,7 +106,7 @@ def contact_space(
 
 
 def nodes_on(space: FemSpace, facets: Facets) -> Nodes:
-    """All nodes of the facets, ordered by original node number."""
+    """Gather all nodes of the facets, ordered by original node number."""
     d = space.dimension
     values = integrals(space, facets.indices)
     blocks = space.facet_blocks(facets.indices)
@@ -128,7 +128,7 @@ def nodes_on(space: FemSpace, facets: Facets) -> Nodes:
 
 
 def free_nodes(space: FemSpace, nodes: Nodes, name: str) -> Nodes:
-    """The nodes that are not clamped; InputError when none is left."""
+    """Return the nodes that are not clamped; InputError when none is left."""
     clamped = nodes.held.all(axis=1)
     if clamped.all():
         raise InputError(
@@ -141,7 +141,7 @@ def free_nodes(space: FemSpace, nodes: Nodes, name: str) -> Nodes:
 
 
 def listed(space: FemSpace, nodes: Nodes, points: Sequence[Sequence[float]], name: str) -> Nodes:
-    """The nodes nearest to the listed points, in their order."""
+    """Return the nodes nearest to the listed points, in their order."""
     rows = []
     for point in points:
         x = np.asarray(point, dtype=float)
@@ -178,6 +178,6 @@ def _refuse_tied(space: FemSpace, nodes: Nodes, name: str) -> None:
 
 
 def snapped(directions: Array) -> Array:
-    """Directions along an axis to the last bit, where they are to round-off: keeps axis-aligned walls unrotated."""
+    """Turn directions to an axis where they are along it to round-off: axis-aligned walls stay unrotated."""
     snapped = np.where(np.abs(directions) < 1e-13, 0.0, directions)
     return np.asarray(snapped / np.linalg.norm(snapped, axis=1)[:, None])

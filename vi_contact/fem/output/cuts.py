@@ -1,4 +1,4 @@
-"""Straight cuts through plane meshes along their lines: which nodes and which cells a section force is made of."""
+"""Find straight cuts through plane meshes along their lines: nodes and cells that a section force is made of."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ UNCOVERED = 1e-3  # of the length of a cut: what the element sides on it may mis
 
 @dataclass(frozen=True)
 class Cut:
-    """nodes: (owned,) mask; cells: (local,) mask of those on one side, ``left`` of the way from a to b or right;
+    """Hold nodes, an (owned,) mask; cells, a (local,) mask of one side, ``left`` of the way from a to b or right;
     along, across: unit vectors from a to b and to the left; middle: of the cut."""
 
     nodes: Mask
@@ -31,8 +31,8 @@ class Cut:
 
 
 def find_cut(space: FemSpace, name: str, ends: Array, group: Cells | None) -> Cut:
-    """The cut from a to b, rows of ``ends`` (2, 2). InputError, on all ranks, unless it runs along element sides from
-    one end of the group to the other. Collective."""
+    """Find the cut from a to b, rows of ``ends`` (2, 2). InputError, on all ranks, unless it runs along element sides
+    from one end of the group to the other. Collective."""
     way = ends[1] - ends[0]
     length = float(np.linalg.norm(way))
     if not length > 0.0:

@@ -1,4 +1,4 @@
-"""Fields for ParaView: ``fields.xdmf`` and one HDF5 file per frame, in the node and cell order of the input mesh.
+"""Write fields for ParaView: ``fields.xdmf`` and one HDF5 file per frame, in the node and cell order of the input mesh.
 
 Every file is replaced as a whole and the index names only frames that are complete, so that ParaView can open it at any
 moment, also while the run goes on or after it was killed. Nothing in the files depends on the number of ranks.
@@ -37,7 +37,7 @@ from ..space import FemSpace, known_matrices, space_of
 
 
 class VonMises:
-    """Mean von Mises stress of every owned cell [Pa]: ∫ sqrt(3/2 s:s) / ∫ 1 over the cell, s the deviator of sigma.
+    """Compute the mean von Mises stress of owned cells [Pa]: ∫ sqrt(3/2 s:s) / ∫ 1 over a cell, s = dev(sigma).
 
     Plane strain has sigma_zz = lambda tr(eps), plane stress has none; a one-dimensional body is taken for a bar in
     uniaxial stress. Viscous stresses are not included.
@@ -59,7 +59,7 @@ class VonMises:
         self._volume = np.array(compat.assemble_vector(compat.compile_form(cell * dx)).array_r)
 
     def __call__(self, nodal: Array) -> Array:
-        """Of nodal displacements (owned nodes, d); collective."""
+        """Return the stresses of nodal displacements (owned nodes, d); collective."""
         self._u.x.array[: nodal.size] = nodal.ravel()
         self._u.x.scatter_forward()
         return np.asarray(compat.assemble_vector(self._form).array_r / self._volume)
@@ -79,7 +79,7 @@ _RUBBING = ("contact_traction_t", "slip")
 
 @dataclass(frozen=True)
 class XDMF:
-    """A frame every so many steps, and one of the initial state. InputError unless ``every`` >= 1."""
+    """Write a frame every so many steps, and one of the initial state. InputError unless ``every`` >= 1."""
 
     every: int = 10
 
@@ -88,14 +88,14 @@ class XDMF:
             raise InputError(f"XDMF every is {shown(self.every)}: give a number of steps >= 1")
 
     def open(self, problem: ContactProblem, folder: Path, kept: Mapping[int, float]) -> FrameWriter:
-        """Writes the mesh; goes on after the frames of ``kept`` (step -> time) that are in the folder. Collective."""
+        """Write the mesh; go on after the frames of ``kept`` (step -> time) that are in the folder. Collective."""
         space_of("XDMF", problem.system)
         known_matrices("XDMF, von_mises", problem.system, "K")
         return FrameWriter(problem, folder, kept)
 
 
 class FrameWriter:
-    """The open field output of a run."""
+    """Write the frames of a run, one HDF5 file each."""
 
     def __init__(self, problem: ContactProblem, folder: Path, kept: Mapping[int, float]) -> None:
         space = problem.system.space
@@ -145,7 +145,8 @@ class FrameWriter:
                 path.unlink()
 
     def write(self, state: State, acceleration: Array, report: Report | None = None) -> None:
-        """A frame of the state, the acceleration of its step, both in the rotated basis, and its report. Collective."""
+        """Write a frame of the state, of the acceleration of its step, both in the rotated basis, and of its report.
+        Collective."""
         problem, space = self._problem, self._space
         moving = [
             space.expand(problem.cartesian(x), state.t, derivative)
@@ -227,7 +228,7 @@ class FrameWriter:
 
 
 def slipped(report: Report) -> Mask:
-    """(m,) points that moved along their support in a step with friction. Collective."""
+    """Return the points (m,) that moved along their support in a step with friction. Collective."""
     step, result = report.step, report.result
     return np.asarray(np.any(step.surface.tangential_values(result.x) != step.slip0, axis=1))
 

@@ -32,7 +32,7 @@ Loads = Traction | BodyForce | Sequence[Traction | BodyForce]
 
 
 def check_actions(owner: str, loads: Any, gravity: Any) -> None:
-    """InputError unless these are loads, as for ``fem.assemble``, and an acceleration."""
+    """Raise InputError unless these are loads, as for ``fem.assemble``, and an acceleration."""
     for load in as_tuple(loads):
         instance(owner, "loads", load, (Traction, BodyForce), "give the loads of fem.assemble")
     if gravity is not None:
@@ -40,7 +40,7 @@ def check_actions(owner: str, loads: Any, gravity: Any) -> None:
 
 
 class NodalWork:
-    """rᵀ(K u + C v + M a - f) for any number of pairs (r, group of cells).
+    """Compute rᵀ(K u + C v + M a - f) for any number of pairs (r, group of cells).
 
     Args:
         problem: its system is made by ``fem.assemble``; InputError otherwise.
@@ -74,7 +74,7 @@ class NodalWork:
         return inside * strain * ufl.dx, damping, inside * fields["rho"] * mass * ufl.dx
 
     def _load(self, load: Traction | BodyForce) -> Any:
-        """Its product with nodal values of the load is rᵀf."""
+        """Return the vector whose product with nodal values of the load is rᵀf."""
         g, mesh, thickness = ufl.TestFunction(self.space.V), self.space.mesh, self.space.forms.section.thickness
         if isinstance(load, BodyForce):
             return thickness * self._inside * ufl.inner(self._r, g) * ufl.dx
@@ -84,7 +84,7 @@ class NodalWork:
         return thickness * self._inside * ufl.inner(self._r, acting) * ds
 
     def known(self, name: str) -> None:
-        """Warns when the system has constant loads and none were given: who forgets the weight measures reactions that
+        """Warn when the system has constant loads and none were given: who forgets the weight measures reactions that
         do not carry it. Collective."""
         system, space = self._problem.system, self.space
         theirs = space.comm.sum(system.influence.T @ system.load.constant)
@@ -94,7 +94,7 @@ class NodalWork:
                         "elements give the loads of fem.assemble, or the gravity of with_weight", name, text)
 
     def add(self, r: Array, cells: Mask | None = None) -> None:
-        """A field r (owned nodes, d) and the group (mask of the local cells, ghosts too; all when None). Collective."""
+        """Add a field r (owned nodes, d) and its group (mask of local cells, ghosts too; all when None). Collective."""
         self._virtual(r, cells)
         for rows, form in zip(self._rows, [*self._forms, *self._load_forms], strict=True):
             if form is not None:
@@ -113,13 +113,13 @@ class NodalWork:
         return self._stacked
 
     def at_rest(self, state: State) -> Array:
-        """Of a state without acceleration, (count,): a static one, or the start of a run before the ground moves."""
+        """Return the work of a state without acceleration, (count,): a static one, or the start of a run."""
         problem, space, t = self._problem, self.space, state.t
         motion = [space.expand(problem.cartesian(x), t, k) for k, x in enumerate((state.u, state.v))]
         return self._sum([*motion, np.zeros_like(motion[0]) - self._gravity], lambda one: one(t))
 
     def of_step(self, report: Report) -> Array:
-        """Of the equation of motion of a step (``Report.balance``), with absolute accelerations, (count,).
+        """Return the work in a step's equation of motion (``Report.balance``), with absolute accelerations, (count,).
 
         Loads, prescribed and ground motion are taken between the ends of the step where the balance has its u.
         """
@@ -155,7 +155,7 @@ class NodalWork:
         return self.space.comm.sum(total)
 
     def _of_load(self, k: int, load: Traction | BodyForce, at: Callable[[Callable[[float], Any]], Any]) -> Array:
-        """Its rᵀf on this rank, (count,); what does not change with time is evaluated once."""
+        """Return rᵀf on this rank, (count,); what does not change with time is evaluated once."""
         matrix = self._matrices()[len(self._forms) + k]
 
         def work(t: float) -> Array:
@@ -174,8 +174,8 @@ def _expanded(space: FemSpace, free: Array, derivative: int, t: float) -> Array:
 
 
 def rigid_fields(points: Array, centre: Sequence[float]) -> tuple[list[Array], list[str]]:
-    """Nodal fields (k, d) of unit translations and of the unit rotations about the centre, and names of their work:
-    axes, then M, in three dimensions M_x, M_y, M_z, in one none."""
+    """Return the nodal fields (k, d) of unit translations and of the unit rotations about the centre, and names of
+    their work: axes, then M, in three dimensions M_x, M_y, M_z, in one none."""
     d = points.shape[1]
     arms = points - np.asarray(centre, dtype=float)
     fields = [np.tile(axis, (len(points), 1)) for axis in np.eye(d)]
@@ -190,7 +190,7 @@ def rigid_fields(points: Array, centre: Sequence[float]) -> tuple[list[Array], l
 
 
 def check_labels(kind: str, points: Mapping[str, Sequence[float]], dimension: int) -> None:
-    """InputError for a point with a wrong number of coordinates."""
+    """Raise InputError for a point with a wrong number of coordinates."""
     for label, point in points.items():
         if len(point) != dimension:
             raise InputError(f"{kind} '{label}': a point has {len(point)} coordinates, give {dimension}")

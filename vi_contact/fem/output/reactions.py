@@ -1,4 +1,4 @@
-"""Reactions of prescribed boundaries: base shear and overturning moment."""
+"""Record reactions of prescribed boundaries: base shear and overturning moment."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from .nodal_work import Loads, NodalWork, check_actions, rigid_fields
 
 @dataclass
 class Reactions:
-    """Recorder of what a clamped or prescribed boundary does to its body: force [N] and moment about a centre [N m].
+    """Record what a clamped or prescribed boundary does to its body: force [N] and moment about a centre [N m].
 
     On the held components c of the nodes of the facets, with the loads f on them and the absolute acceleration a + a_g:
 
@@ -71,7 +71,7 @@ class Reactions:
         return found
 
     def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
-        """Prepares the work of rigid motions of the held nodes; the row of the state at rest. Collective."""
+        """Prepare the work of rigid motions of the held nodes; return the row of the state at rest. Collective."""
         self._work = NodalWork(problem, self.loads, self.gravity)
         self._work.known(f"reactions '{self.name}'")
         space: FemSpace = self._work.space

@@ -1,4 +1,4 @@
-"""Section forces N, V, M of straight cuts through the elements of walls and slabs."""
+"""Record section forces N, V, M of straight cuts through the elements of walls and slabs."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _QUANTITIES = {
 
 @dataclass
 class SectionForces:
-    """Recorder of the resultants of straight cuts a -> b along element sides of a plane mesh: label -> (a, b) [m].
+    """Record the resultants of straight cuts a -> b along element sides of a plane mesh: label -> (a, b) [m].
 
     With e the unit vector from a to b and n the one to its left, F the force that the part on the left exerts through
     the cut on the part on the right, and c the middle of the cut:
@@ -63,7 +63,7 @@ class SectionForces:
         check_actions("SectionForces", self.loads, self.gravity)
 
     def columns(self) -> Columns:
-        """N_<label>, V_<label>, M_<label>."""
+        """Return the columns N_<label>, V_<label>, M_<label>."""
         return {
             f"{quantity}_{label}": (unit, f"{text.rstrip(',')}, section {label}")
             for label in self.cuts
@@ -71,7 +71,7 @@ class SectionForces:
         }
 
     def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
-        """Finds the cuts; the row of the state at rest, of a static stage for example. Collective."""
+        """Find the cuts; return the row of the state at rest, of a static stage for example. Collective."""
         work = self._work = NodalWork(problem, self.loads, self.gravity)
         space, signs = work.space, []
         if space.dimension != 2:

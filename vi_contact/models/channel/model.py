@@ -1,4 +1,4 @@
-"""Seed 000's second example: a channel buried in a soil layer on bedrock, shaken (Figs. 6-9).
+"""Model the second example of the boundary method: a channel buried in soil on bedrock, shaken (Figs. 6 to 9).
 
 The figures' data are not in the text: what is assumed is marked CHOSEN. Between channel and soil: contact on left wall,
 base and right wall; the two bottom corners touch with both their sides.
@@ -43,7 +43,7 @@ POINTS = 19
 
 @dataclass(frozen=True)
 class Channel:
-    """Geometry and materials, in SI units. CHOSEN throughout; the text says neither.
+    """Describe geometry and materials, in SI units. CHOSEN throughout; the text says neither.
 
     shape: a layer of 24 x 8 m and a channel of 4 x 3 m, walls and slab 0.5 m thick, cells of 0.5 m.
     soil: 100 MPa, 1800 kg/m³, shear waves at 146 m/s. concrete: 20 GPa, 2400 kg/m³. Plane strain, per metre.
@@ -55,7 +55,7 @@ class Channel:
     damping: Damping = field(default_factory=NoDamping)
 
     def point(self, number: int) -> tuple[float, float]:
-        """Coordinates of the boundary points 1..19 of the channel, CHOSEN so that 1 and 7 are its bottom corners.
+        """Return the boundary points 1..19 of the channel, CHOSEN so that 1 and 7 are its bottom corners.
 
         1-7 base from left to right, 8-13 right wall upwards (13 at the surface), 14-19 left wall upwards (19 at the
         surface), evenly spaced.
@@ -71,23 +71,23 @@ class Channel:
         return left, bottom + (number - 13) / 6.0 * height
 
     def harmonic(self, amplitude: float = 2.0) -> Harmonic:
-        """a_g = 2 sin(2 pi 2 t) m/s². CHOSEN: "a sinusoidal strong acceleration"."""
+        """Return a_g = 2 sin(2 pi 2 t) m/s². CHOSEN: "a sinusoidal strong acceleration"."""
         return Harmonic(amplitude, 2.0, direction=(1.0, 0.0))
 
     def time_step(self) -> float:
-        """dt = 1/80 s, a fortieth of the period. CHOSEN."""
+        """Return dt = 1/80 s, a fortieth of the period. CHOSEN."""
         return 1.0 / 80.0
 
     def probes(self) -> dict[str, tuple[float, float]]:
-        """Bottom corners and middle (1, 7, 4), middle of the walls (10, 16), their tops (13, 19): always nodes but for
-        the middles of irregular meshes."""
+        """Return bottom corners and middle (1, 7, 4), middle of the walls (10, 16), their tops (13, 19): always nodes
+        but for the middles of irregular meshes."""
         return {str(number): self.point(number) for number in (1, 4, 7, 10, 13, 16, 19)}
 
 
 @dataclass(frozen=True)
 class ChannelModel:
-    """The assembled channel and soil; ``surface``: the contact of base, left and right wall, in this order, normals
-    and forces those of the channel."""
+    """Hold the assembled channel and soil; ``surface``: the contact of base, left and right wall, in this order,
+    normals and forces those of the channel."""
 
     channel: Channel
     mesh: Any
@@ -104,8 +104,8 @@ class ChannelModel:
         impact: ImpactLaw | None = None,
         mass: MassLaw | None = None,
     ) -> ContactProblem:
-        """Channel and soil under the harmonic motion, sliding freely; with the inelastic impact rule, as an impulse,
-        on consistent mass.
+        """Set up channel and soil under the harmonic motion, sliding freely; with the inelastic impact rule, as an
+        impulse, on consistent mass.
 
         Args:
             friction: Coulomb(mu) for instance.
@@ -123,21 +123,22 @@ class ChannelModel:
         )
 
     def recorders(self) -> tuple[Recorder, ...]:
-        """Energy, contact, the probes on channel (u_x_1, ...) and soil (u_x_1_soil, ...), openings of the sides."""
+        """Return recorders: energy, contact, probes on channel (u_x_1, ...) and soil (u_x_1_soil, ...), openings of
+        sides."""
         probes = self.channel.probes()
         soil = SoilProbe({f"{label}_soil": point for label, point in probes.items()})
         return Energy(), Contact(), Probe(probes), soil, Openings(self.sides)
 
     @cached_property
     def sides(self) -> dict[str, Mask]:
-        """Masks (m,) of the contact conditions of each of SIDES."""
+        """Return masks (m,) of the contact conditions of each of SIDES."""
         normals = {"base": (0.0, -1.0), "left": (-1.0, 0.0), "right": (1.0, 0.0)}
         return {side: self.surface.normals @ normals[side] > 0.5 for side in SIDES}
 
     @cached_property
     def arc(self) -> Array:
-        """(m,) place of the contact conditions along the channel's outline, from the surface down the left wall, along
-        the base and up the right wall [m]. The corners' two conditions are at one place."""
+        """Return the places (m,) of the contact conditions along the channel's outline, from the surface down the left
+        wall, along the base and up the right wall [m]. The corners' two conditions are at one place."""
         shape, points = self.channel.shape, self.surface.points
         down, along, up = shape.y[3] - points[:, 1], points[:, 0] - shape.x[1], points[:, 1] - shape.y[1]
         return np.select(
@@ -156,7 +157,7 @@ def build(
     base: BaseMotion | RockBelow | None = None,
     meshed: tuple[Any, Any] | None = None,
 ) -> ChannelModel:
-    """Meshes and assembles channel and soil; collective.
+    """Mesh and assemble channel and soil; collective.
 
     Args:
         sides: the ends of the soil layer; by default Rollers(), which hold them vertically (CHOSEN).
@@ -191,7 +192,7 @@ def build(
 
 
 def weighted(system: SemiDiscreteSystem, weighing: Sequence[str]) -> SemiDiscreteSystem:
-    """The system with the weight of some of BODIES, ∫ rho g v of their own mass matrix."""
+    """Return the system with the weight of some of BODIES, ∫ rho g v of their own mass matrix."""
     for name in weighing:
         if name not in BODIES:
             raise InputError(f"unknown body '{name}': {' and '.join(BODIES)} may have weight")

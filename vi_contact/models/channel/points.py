@@ -1,4 +1,4 @@
-"""What is recorded of the interface between channel and soil besides the channel's own points (Fig. 7)."""
+"""Record the interface between channel and soil besides the channel's own points (Fig. 7)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ...run.recorders import Probe
 
 @dataclass
 class SoilProbe(Probe):
-    """As `Probe`, at the nodes of the soil that touch the given points of the channel in the undeformed mesh.
+    """Record, as `Probe` does, at the nodes of the soil that touch these points of the channel in the undeformed mesh.
 
     InputError for a point that is not at the interface.
     """
@@ -31,7 +31,8 @@ class SoilProbe(Probe):
 
 
 def touched_nodes(surface: ContactSurface, nodes: Indices) -> Indices:
-    """Numbers of the nodes of side 2 that face nodes of side 1 (the nearest one where sides are not divided alike)."""
+    """Return the numbers of the nodes of side 2 that face nodes of side 1 (the nearest where sides are divided
+    differently)."""
     faced: dict[int, int] = {}
     for part in surface.parts if isinstance(surface, FemSurface) else ():
         if part.facing is not None:
@@ -45,7 +46,7 @@ def touched_nodes(surface: ContactSurface, nodes: Indices) -> Indices:
 
 @dataclass(frozen=True)
 class Openings:
-    """The largest gap of each side of the contact: columns opening_<side> [m]. ``sides``: name -> mask (m,)."""
+    """Record the largest gap of each side of the contact: columns opening_<side> [m]. ``sides``: name -> mask (m,)."""
 
     sides: Mapping[str, Mask]
 

@@ -1,4 +1,4 @@
-"""What stands at the two ends and at the bottom of the soil layer around a channel."""
+"""Describe what stands at the two ends and at the bottom of the soil layer around a channel."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ ENDS = ("left_side", "right_side")
 
 @dataclass(frozen=True)
 class RockBelow:
-    """Rock under the layer that lets waves through: ``motion``, t [s] -> upgoing velocity (2,) [m/s] (``upgoing``), and
-    its ``rock``, the soil above when None."""
+    """Describe rock under the layer that lets waves through: ``motion``, t [s] -> upgoing velocity (2,) [m/s]
+    (``upgoing``), and its ``rock``, the soil above when None."""
 
     motion: Callable[[float], Array] = field(repr=False)
     rock: LinearElastic | None = None
 
     def absorber(self, tags: Any) -> CompliantBase:
-        """The boundary condition on the bedrock of a ChannelMesh."""
+        """Return the boundary condition on the bedrock of a ChannelMesh."""
         return CompliantBase(tags["bedrock"], self.rock, motion=self.motion)
 
 
@@ -63,14 +63,14 @@ def bedrock(
 
 
 class Sides(Protocol):
-    """Conditions at the ends of the layer. ``firm``: whether they hold static loads; others need a gravity stage on
-    firm ones (``channel_stages.staged``)."""
+    """Give the conditions at the ends of the layer. ``firm``: whether they hold static loads; others need a gravity
+    stage on firm ones (``channel_stages.staged``)."""
 
     @property
     def firm(self) -> bool: ...
 
     def conditions(self, tags: Any, motion: Mapping[str, Any]) -> dict[str, Any]:
-        """Arguments of fem.assemble, for the groups of a ChannelMesh.
+        """Return the arguments of fem.assemble, for the groups of a ChannelMesh.
 
         ``motion``: displacement, velocity and acceleration of the bedrock as `Prescribed` takes them; empty in the
         frame of the bedrock.
@@ -80,9 +80,9 @@ class Sides(Protocol):
 
 @dataclass(frozen=True)
 class Rollers:
-    """Held along one component, free along the other. Under horizontal shaking of a horizontal layer ends that move
-    horizontally only (component 1 held) follow the free field exactly; under vertical shaking those with component 0
-    held do."""
+    """Hold the ends along one component, free along the other. Under horizontal shaking of a horizontal layer ends that
+    move horizontally only (component 1 held) follow the free field exactly; under vertical shaking those with component
+    0 held do."""
 
     firm: ClassVar[bool] = True
     component: int = 1
@@ -93,7 +93,7 @@ class Rollers:
 
 @dataclass(frozen=True)
 class Fixed:
-    """The ends move with the bedrock: a box."""
+    """Move the ends with the bedrock: a box."""
 
     firm: ClassVar[bool] = True
 
@@ -103,7 +103,7 @@ class Fixed:
 
 @dataclass(frozen=True)
 class TiedSides:
-    """Both ends move together in both directions: the exact free field of horizontal layers under horizontal and
+    """Tie the ends to each other in both directions: the exact free field of horizontal layers under horizontal and
     vertical shaking; what leaves at one end comes back at the other."""
 
     firm: ClassVar[bool] = True
@@ -114,7 +114,7 @@ class TiedSides:
 
 @dataclass(frozen=True)
 class DashpotSides:
-    """Lysmer and Kuhlemeyer's dashpots only: waves leave, but the ends do not follow the free field (Kontoe 2007)."""
+    """Put Lysmer and Kuhlemeyer's dashpots only: waves leave, but the ends follow no free field (Kontoe 2007)."""
 
     firm: ClassVar[bool] = False
 
@@ -124,8 +124,8 @@ class DashpotSides:
 
 @dataclass(frozen=True)
 class FreeFieldSides:
-    """Dashpots on the difference to the free field, and its stresses: exact for level ground, waves from the channel
-    leave. ``base`` is that of the run, as ``soil.FreeField`` wants it."""
+    """Put dashpots on the difference to the free field, and its stresses: exact for level ground, waves from the
+    channel leave. ``base`` is that of the run, as ``soil.FreeField`` wants it."""
 
     firm: ClassVar[bool] = False
     base: Excitation | Sequence[Excitation] | BaseMotion | RockBelow = field(repr=False)

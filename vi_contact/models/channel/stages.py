@@ -1,4 +1,4 @@
-"""The buried channel at rest under its weight, whatever its boundaries: a gravity stage, then those of the shaking."""
+"""Bring the buried channel to rest under its weight, whatever its boundaries, and go on to the shaking."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .sides import RockBelow, Rollers, Sides
 
 @dataclass(frozen=True)
 class AtRest:
-    """The model, its problem and the state from which to shake it; None where nothing weighs: from zero."""
+    """Hold the model, its problem and the state from which to shake it; None where nothing weighs: from zero."""
 
     model: ChannelModel
     problem: ContactProblem
@@ -35,7 +35,7 @@ def at_rest(
     solver: Solver | None = None,
     **contact: Any,
 ) -> AtRest:
-    """Builds the channel and brings it to rest with contact active; collective.
+    """Build the channel and bring it to rest with contact active; collective.
 
     Ends or a bottom that hold no static load come after the gravity stage, which has rollers and a firm bedrock in
     their places: what these carried goes on as forces (``fem.release``).

@@ -15,7 +15,7 @@ from ...core.algebra import Array, Mask, max_abs
 from ...core.checks import attributes
 from .extrapolation import Extrapolation, Plain, accelerated
 from .newton import FrictionNewton
-from .problem import Blocks, FrictionMethod, FrictionResult, inner_method, observed_contraction
+from .problem import FrictionMethod, FrictionResult, ScaledDelassus, inner_method, observed_contraction
 
 
 @dataclass(frozen=True)
@@ -49,28 +49,28 @@ class PreparedFixedPoint:
 
     def __init__(self, method: FixedPoint, G: Array, bilateral: Mask) -> None:
         self.method = method
-        self.blocks = Blocks(G, bilateral)
+        self.delassus = ScaledDelassus(G, bilateral)
         self._tresca = method.tresca.prepare(G, bilateral)
 
     def solve(self, q: Array, cohesion: Array, slope: Array, guess: Array | Mask | None = None) -> FrictionResult:
         """See PreparedFriction."""
-        step = self.blocks.step(q, cohesion, slope)
+        step = self.delassus.problem(q, cohesion, slope)
         constant = np.zeros_like(slope)
-        start = step.start(guess) * self.blocks.scale
-        limit, unit = cohesion + slope * np.maximum(start[:, 0], 0.0), self.blocks.scale[:, -1]
+        start = step.start(guess) * self.delassus.scale
+        limit, unit = cohesion + slope * np.maximum(start[:, 0], 0.0), self.delassus.scale[:, -1]
         sequence = self.method.extrapolation.start()
         history: list[float] = []
         found = self._tresca.solve(q, limit, constant, start)
         while len(history) < self.method.max_iterations:
             new = cohesion + slope * np.maximum(found.r[:, 0], 0.0)
             change, size = max_abs((new - limit) / unit), max(max_abs(new / unit), max_abs(limit / unit))
-            if change <= max(self.method.tolerance * size, step.rounding(found.r / self.blocks.scale)):
+            if change <= max(self.method.tolerance * size, step.rounding(found.r / self.delassus.scale)):
                 break
             history.append(change / size)
             limit = np.maximum(unit * sequence.next(limit / unit, new / unit), 0.0)
             found = self._tresca.solve(q, limit, constant, found.r)
         return step.result(
-            found.r / self.blocks.scale,
+            found.r / self.delassus.scale,
             iterations=len(history) + 1,
             method=self.method,
             tolerance=100.0 * self.method.tolerance,

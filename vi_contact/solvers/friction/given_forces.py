@@ -22,7 +22,7 @@ from ...core.checks import attributes
 from ..normal.active_set import ActiveSet
 from .extrapolation import Extrapolation, Plain, accelerated
 from .newton import FrictionNewton
-from .problem import Blocks, FrictionMethod, FrictionResult, inner_method
+from .problem import FrictionMethod, FrictionResult, ScaledDelassus, inner_method
 
 
 @dataclass(frozen=True)
@@ -53,8 +53,8 @@ class PreparedGivenForces:
 
     def __init__(self, method: GivenForces, G: Array, bilateral: Mask) -> None:
         self.method = method
-        self.blocks = Blocks(G, bilateral)
-        d, matrix = self.blocks.dimension, self.blocks.matrix
+        self.delassus = ScaledDelassus(G, bilateral)
+        d, matrix = self.delassus.dimension, self.delassus.matrix
         self._normal = ActiveSet().prepare(matrix[::d, ::d].copy(), bilateral)
         apart = matrix.copy()  # normal unknowns out of reach of the tangential problem
         apart[::d], apart[:, ::d] = 0.0, 0.0
@@ -63,7 +63,7 @@ class PreparedGivenForces:
 
     def solve(self, q: Array, cohesion: Array, slope: Array, guess: Array | Mask | None = None) -> FrictionResult:
         """See PreparedFriction."""
-        step = self.blocks.step(q, cohesion, slope)
+        step = self.delassus.problem(q, cohesion, slope)
         r = step.start(guess)
         sequence, history, none = self.method.extrapolation.start(), [1.0], np.zeros(step.count)
         while step.unit > 0.0 and self.method.tolerance < history[-1] and len(history) <= self.method.max_iterations:

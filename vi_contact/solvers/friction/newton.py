@@ -25,7 +25,7 @@ from ...core.algebra import Array, Mask
 from ...core.checks import attributes
 from .linear import Factors, LinearProblems
 from .nsgs import sweeps
-from .problem import Blocks, FrictionResult, Step
+from .problem import FrictionResult, ScaledDelassus, ScaledProblem
 
 ATTEMPTS = 10  # of Newton, with twice the sweeps before each
 FIRST_SWEEPS = 2
@@ -55,12 +55,12 @@ class PreparedNewton:
 
     def __init__(self, method: FrictionNewton, G: Array, bilateral: Mask) -> None:
         self.method = method
-        self.blocks = Blocks(G, bilateral)
-        self._factors = Factors(self.blocks.matrix)
+        self.delassus = ScaledDelassus(G, bilateral)
+        self._factors = Factors(self.delassus.matrix)
 
     def solve(self, q: Array, cohesion: Array, slope: Array, guess: Array | Mask | None = None) -> FrictionResult:
         """See PreparedFriction."""
-        step = self.blocks.step(q, cohesion, slope)
+        step = self.delassus.problem(q, cohesion, slope)
         history: list[float] = []
         r, swept = step.start(guess if step.unit > 0.0 else None), 0
         w = step.w(r)
@@ -80,7 +80,7 @@ class PreparedNewton:
             history=tuple(history),
         )
 
-    def _newton(self, step: Step, y: Array, history: list[float]) -> tuple[Array, Array, bool]:
+    def _newton(self, step: ScaledProblem, y: Array, history: list[float]) -> tuple[Array, Array, bool]:
         """The best iterate r with its w, and whether it solves the problem to rounding or to the tolerance."""
         best, smallest = (np.zeros_like(y), step.q), step.unit
         linear = LinearProblems(self._factors)
@@ -107,11 +107,11 @@ class _States:
     See NodeStates for the attributes.
     """
 
-    def __init__(self, step: Step, y: Array, before: _States | None) -> None:
+    def __init__(self, step: ScaledProblem, y: Array, before: _States | None) -> None:
         m, d = y.shape
         limit = step.limit(y[:, 0])
         size = np.linalg.norm(y[:, 1:], axis=1)
-        self.closed: Mask = (y[:, 0] > 0.0) | step.blocks.bilateral
+        self.closed: Mask = (y[:, 0] > 0.0) | step.delassus.bilateral
         back = np.zeros(m, dtype=bool) if before is None else np.sum(before.direction * y[:, 1:], axis=1) < 0.0
         self.stick: Mask = ((size <= limit) | back) & (limit > 0.0)
         slip = ~self.stick & (limit > 0.0)

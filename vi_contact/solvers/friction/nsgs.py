@@ -21,7 +21,7 @@ from scipy.optimize import brentq
 
 from ...core.algebra import Array, Mask
 from ...core.checks import attributes
-from .problem import Blocks, FrictionResult, Step
+from .problem import FrictionResult, ScaledDelassus, ScaledProblem
 
 
 @dataclass(frozen=True)
@@ -47,11 +47,11 @@ class PreparedNSGS:
 
     def __init__(self, method: NSGS, G: Array, bilateral: Mask) -> None:
         self.method = method
-        self.blocks = Blocks(G, bilateral)
+        self.delassus = ScaledDelassus(G, bilateral)
 
     def solve(self, q: Array, cohesion: Array, slope: Array, guess: Array | Mask | None = None) -> FrictionResult:
         """See PreparedFriction."""
-        step = self.blocks.step(q, cohesion, slope)
+        step = self.delassus.problem(q, cohesion, slope)
         r = step.start(guess if step.unit > 0.0 else None)
         history: list[float] = []
         nodes = _nodes(step) if step.unit > 0.0 else []
@@ -70,7 +70,7 @@ class PreparedNSGS:
         )
 
 
-def sweeps(step: Step, r: Array, number: int) -> Array:
+def sweeps(step: ScaledProblem, r: Array, number: int) -> Array:
     """r after so many sweeps."""
     nodes = _nodes(step)
     for _ in range(number):
@@ -78,13 +78,13 @@ def sweeps(step: Step, r: Array, number: int) -> Array:
     return r
 
 
-def _nodes(step: Step) -> list[_Node]:
+def _nodes(step: ScaledProblem) -> list[_Node]:
     return [_Node(step, i) for i in range(step.count)]
 
 
-def _sweep(step: Step, nodes: list[_Node], r: Array) -> Array:
-    d = step.blocks.dimension
-    matrix, flat = step.blocks.matrix, r.copy().ravel()
+def _sweep(step: ScaledProblem, nodes: list[_Node], r: Array) -> Array:
+    d = step.delassus.dimension
+    matrix, flat = step.delassus.matrix, r.copy().ravel()
     for i, node in enumerate(nodes):
         rows = slice(i * d, (i + 1) * d)
         here = flat[rows].copy()
@@ -96,13 +96,13 @@ def _sweep(step: Step, nodes: list[_Node], r: Array) -> Array:
 class _Node:
     """The problem of one node."""
 
-    def __init__(self, step: Step, i: int) -> None:
-        d = step.blocks.dimension
-        block = step.blocks.matrix[i * d : (i + 1) * d, i * d : (i + 1) * d]
+    def __init__(self, step: ScaledProblem, i: int) -> None:
+        d = step.delassus.dimension
+        block = step.delassus.matrix[i * d : (i + 1) * d, i * d : (i + 1) * d]
         self.normal, self.coupling, self.tangential = float(block[0, 0]), block[0, 1:], block[1:, 1:]
         self.condensed = self.tangential - np.outer(self.coupling, self.coupling) / self.normal
         self.cohesion, self.slope = float(step.cohesion[i]), float(step.slope[i])
-        self.bilateral = bool(step.blocks.bilateral[i])
+        self.bilateral = bool(step.delassus.bilateral[i])
 
     def solve(self, q: Array, old: Array) -> Array:
         """The reactions of the node when all others give it q."""

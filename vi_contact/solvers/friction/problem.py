@@ -73,10 +73,10 @@ def inner_method(owner: str, meaning: str, value: Any) -> None:
 
 
 @dataclass(frozen=True)
-class Step:
+class ScaledProblem:
     """(1) in scaled numbers: q (m, d), cohesion and slope (m,)."""
 
-    blocks: Blocks
+    delassus: ScaledDelassus
     q: Array
     cohesion: Array
     slope: Array
@@ -89,7 +89,7 @@ class Step:
     def moved(self, r: Array) -> Array:
         """G r (m, d), from the rows that carry something when they are few."""
         carried = np.flatnonzero(r)
-        matrix = self.blocks.matrix
+        matrix = self.delassus.matrix
         product = matrix @ r.ravel() if len(carried) > 0.25 * r.size else r.ravel()[carried] @ matrix[carried]
         return np.asarray(product.reshape(r.shape))
 
@@ -104,7 +104,7 @@ class Step:
     def residual(self, r: Array, w: Array) -> float:
         """max |F| of (2)."""
         y = r - w
-        normal = np.where(self.blocks.bilateral, w[:, 0], r[:, 0] - np.maximum(y[:, 0], 0.0))
+        normal = np.where(self.delassus.bilateral, w[:, 0], r[:, 0] - np.maximum(y[:, 0], 0.0))
         tangential = r[:, 1:] - project(y[:, 1:], self.limit(r[:, 0]))
         return max(max_abs(normal), max_abs(tangential))
 
@@ -115,11 +115,11 @@ class Step:
 
     def rounding(self, r: Array) -> float:
         """Residuals below this are rounding errors of q + G r."""
-        return 16.0 * EPS * self.blocks.norm * max_abs(r)
+        return 16.0 * EPS * self.delassus.norm * max_abs(r)
 
     def admissible(self, r: Array) -> Array:
         """r with r_n >= 0 and r_t within its disk: removes rounding errors, and whatever else is outside."""
-        r_n = np.where(self.blocks.bilateral, r[:, 0], np.maximum(r[:, 0], 0.0))
+        r_n = np.where(self.delassus.bilateral, r[:, 0], np.maximum(r[:, 0], 0.0))
         return np.column_stack([r_n, project(r[:, 1:], self.limit(r_n))])
 
     def start(self, guess: Array | Mask | None) -> Array:
@@ -128,7 +128,7 @@ class Step:
         if guess is None:
             return np.zeros_like(self.q)
         if guess.dtype != bool:
-            return self.admissible(guess / self.blocks.scale)
+            return self.admissible(guess / self.delassus.scale)
         held = guess & np.isfinite(self.q[:, 0])
         r = self.admissible(np.where(held[:, None], -self.q, 0.0))
         carried = r != 0.0
@@ -160,12 +160,12 @@ class Step:
                 "friction method (FrictionNewton, NSGS, FixedPoint), or a smaller step of time or load"
             )
         still = np.linalg.norm(w[:, 1:], axis=1) <= 4.0 * max(residual, rounding)
-        active = (r[:, 0] > 0.0) | self.blocks.bilateral
+        active = (r[:, 0] > 0.0) | self.delassus.bilateral
         stick = still & (self.limit(r[:, 0]) > 0.0)
-        return FrictionResult(r * self.blocks.scale, active, stick, iterations, residual / unit, method, history)
+        return FrictionResult(r * self.delassus.scale, active, stick, iterations, residual / unit, method, history)
 
 
-class Blocks:
+class ScaledDelassus:
     """d G d with its scale (m, d): what the methods work on."""
 
     def __init__(self, G: Array, bilateral: Mask) -> None:
@@ -185,13 +185,13 @@ class Blocks:
         self.matrix = np.ascontiguousarray(0.5 * (matrix + matrix.T))
         self.norm = float(np.abs(self.matrix).sum(axis=1).max(initial=0.0))
 
-    def step(self, q: Array, cohesion: Array, slope: Array) -> Step:
+    def problem(self, q: Array, cohesion: Array, slope: Array) -> ScaledProblem:
         """Problem (1) in scaled numbers."""
         check_gap(q[:, 0], self.bilateral)
         if not np.isfinite(q[:, 1:]).all():
             raise InputError("The slip without reactions contains NaN or infinity: check the loads of this step.")
         normal, tangential = self.scale[:, 0], self.scale[:, -1]
-        return Step(self, q * self.scale, cohesion / tangential, slope * (normal / tangential))
+        return ScaledProblem(self, q * self.scale, cohesion / tangential, slope * (normal / tangential))
 
 
 def observed_contraction(history: Any) -> float:

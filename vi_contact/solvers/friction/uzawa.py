@@ -19,7 +19,7 @@ import numpy as np
 from ...core.algebra import Array, Mask
 from ...core.checks import attributes, real, shown
 from ...core.errors import InputError
-from .problem import Blocks, FrictionResult
+from .problem import FrictionResult, ScaledDelassus
 
 
 @dataclass(frozen=True)
@@ -48,19 +48,19 @@ class PreparedUzawa:
 
     def __init__(self, method: Uzawa, G: Array, bilateral: Mask) -> None:
         self.method = method
-        self.blocks = Blocks(G, bilateral)
+        self.delassus = ScaledDelassus(G, bilateral)
         self.rho = method.rho or self._best()
 
     def _best(self) -> float:
         """2/(lambda_min + lambda_max)."""
-        if not self.blocks.count:
+        if not self.delassus.count:
             return 1.0
-        values = np.linalg.eigvalsh(self.blocks.matrix)
+        values = np.linalg.eigvalsh(self.delassus.matrix)
         return float(2.0 / (values[0] + values[-1]))
 
     def solve(self, q: Array, cohesion: Array, slope: Array, guess: Array | Mask | None = None) -> FrictionResult:
         """See PreparedFriction."""
-        step = self.blocks.step(q, cohesion, slope)
+        step = self.delassus.problem(q, cohesion, slope)
         r, history = step.start(guess if step.unit > 0.0 else None), [1.0]
         w = step.w(r)
         while step.unit > 0.0 and len(history) <= self.method.max_iterations:

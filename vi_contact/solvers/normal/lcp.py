@@ -91,7 +91,7 @@ class LCPResult:
 
 
 @dataclass(frozen=True)
-class Scaled:
+class ScaledLCP:
     """d G d with its scale d: what the methods work on. Everything here is in sqrt(J) or dimensionless."""
 
     matrix: Any
@@ -152,7 +152,7 @@ def violation(q: Array, bilateral: Mask) -> float:
     return max(0.0, float(np.where(bilateral, np.abs(q), -q).max(initial=0.0)))
 
 
-def scaled_dense(G: Array, bilateral: Mask) -> Scaled:
+def scaled_dense(G: Array, bilateral: Mask) -> ScaledLCP:
     """Check and scale a dense G. InputError when it is not finite, symmetric (to 1e-8), of positive diagonal."""
     check_operator(G, bilateral)
     if not isinstance(G, np.ndarray):
@@ -164,16 +164,16 @@ def scaled_dense(G: Array, bilateral: Mask) -> Scaled:
     if max_abs(matrix - matrix.T) > 1e-8:
         raise InputError("The Delassus operator is not symmetric: use a symmetric effective matrix A.")
     matrix = 0.5 * (matrix + matrix.T)
-    return Scaled(matrix, d, bilateral.copy(), float(np.abs(matrix).sum(axis=1).max(initial=0.0)))
+    return ScaledLCP(matrix, d, bilateral.copy(), float(np.abs(matrix).sum(axis=1).max(initial=0.0)))
 
 
-def scaled_operator(G: Operator, bilateral: Mask) -> Scaled:
+def scaled_operator(G: Operator, bilateral: Mask) -> ScaledLCP:
     """Scale a G that is only applied: symmetry and definiteness are taken on trust."""
     check_operator(G, bilateral)
     d = energy_scale(G)
     matrix = _Applied(G, d)
     norm = largest_eigenvalue(matrix, d.size) if hasattr(G, "diagonal") else 1.0  # by the choice of d
-    return Scaled(matrix, d, bilateral.copy(), norm)
+    return ScaledLCP(matrix, d, bilateral.copy(), norm)
 
 
 class _Applied:

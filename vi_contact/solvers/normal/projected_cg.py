@@ -17,7 +17,7 @@ import numpy as np
 from ...core.algebra import Array, Mask
 from ...core.checks import attributes
 from ...core.errors import InputError
-from .lcp import LCP, LCPResult, Operator, Scaled, failure, largest_eigenvalue, scaled_dense, scaled_operator
+from .lcp import LCP, LCPResult, Operator, ScaledLCP, failure, largest_eigenvalue, scaled_dense, scaled_operator
 
 PROPORTION = 1.0  # Gamma; any positive number works, 1 is Dostál's choice
 STEP = 1.5  # of the expansion, in units of 1/‖G‖: less than 2 converges; the rest is for the error of the estimate
@@ -93,7 +93,7 @@ class PreparedCG:
 class _Face:
     """The iterate: r, its gradient split into phi and beta, and the conjugate direction on the present face."""
 
-    def __init__(self, scaled: Scaled, gap: Array, step: float) -> None:
+    def __init__(self, scaled: ScaledLCP, gap: Array, step: float) -> None:
         self._scaled, self._step = scaled, step
         self._reach = np.isfinite(gap)
         self._gap = np.where(self._reach, gap, 0.0)

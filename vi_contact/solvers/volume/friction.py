@@ -25,7 +25,7 @@ from ..friction.extrapolation import Anderson
 from ..friction.slip_rate import RateIteration
 from .bounded_system import BoundedSystem
 from .failures import stopped
-from .friction_system import Rubbing, RubbingSystem, ScaledRubbing
+from .friction_system import FrictionSystem, FrictionUnknowns, ScaledFrictionStep
 
 TOLERANCE = 1e-11  # change of the thresholds relative to the largest: the error of the friction cone
 NOISE = 1e-10  # below this, changes that do not shrink are those of round-off
@@ -37,7 +37,7 @@ EXTRAPOLATION = Anderson(depth=5, after=3)
 class Found:
     """The solution of a sequence, or of one problem: r_n (m,), slip (L,), zero where points stick, SNES iterations."""
 
-    state: Rubbing
+    state: FrictionUnknowns
     r_n: Array
     active: Mask
     slip: Array
@@ -48,10 +48,12 @@ class Found:
 class VolumeFriction:
     """The step with friction of one A; ``driver`` is the PETSc solver, made by ``make`` from the scaled step."""
 
-    def __init__(self, body: BoundedSystem, tolerance: float, make: Callable[[ScaledRubbing], Any], name: str) -> None:
+    def __init__(
+        self, body: BoundedSystem, tolerance: float, make: Callable[[ScaledFrictionStep], Any], name: str
+    ) -> None:
         self._body, self._name = body, name
-        self._rubbing = RubbingSystem(body)
-        self._scaled = ScaledRubbing(self._rubbing, tolerance)
+        self._friction = FrictionSystem(body)
+        self._scaled = ScaledFrictionStep(self._friction, tolerance)
         self.driver = make(self._scaled)
 
     def solve(self, step: StepProblem) -> StepResult:
@@ -67,7 +69,7 @@ class VolumeFriction:
             return self._sequence(step, cohesion, mu, before)
 
         def coefficients(found: Any) -> Array:
-            return step.friction_at(self._rubbing.shared(found.slip)).slope(surface.weights)
+            return step.friction_at(self._friction.shared(found.slip)).slope(surface.weights)
 
         found: Any = RateIteration().solve(slope, solved, coefficients)
         return self._result(step, found)
@@ -97,20 +99,20 @@ class VolumeFriction:
             "thresholds: take a smaller step of time or load, or use Condensed()"
         )
 
-    def _first(self, step: StepProblem, limit: Array) -> tuple[Rubbing, int]:
+    def _first(self, step: StepProblem, limit: Array) -> tuple[FrictionUnknowns, int]:
         """The guess, sliding as predicted, and no iterations; with disks the solution without friction, whose slip
         gives the directions that Newton's method needs."""
-        rubbing, scaled = self._rubbing, self._scaled
-        state = Rubbing(self._body.start(step), np.zeros(len(rubbing.tangent)), np.zeros(len(rubbing.pairs)))
-        if not (rubbing.any_disk and limit.any()):
-            return scaled.moved(state, state.z[rubbing.tangent] - rubbing.origin(step), limit), 0
+        friction, scaled = self._friction, self._scaled
+        state = FrictionUnknowns(self._body.start(step), np.zeros(len(friction.tangent)), np.zeros(len(friction.pairs)))
+        if not (friction.any_disk and limit.any()):
+            return scaled.moved(state, state.z[friction.tangent] - friction.origin(step), limit), 0
         free = self._tresca(step, np.zeros_like(limit), state)
         return scaled.moved(free.state, free.slip, limit), free.iterations
 
-    def _tresca(self, step: StepProblem, limit: Array, start: Rubbing) -> Found:
+    def _tresca(self, step: StepProblem, limit: Array, start: FrictionUnknowns) -> Found:
         """The problem with thresholds (m,)."""
         body, scaled, driver = self._body, self._scaled, self.driver
-        scaled.rub(step, limit, start)
+        scaled.set_friction(step, limit, start)
         y, F, reason, iterations = driver.run()
         if reason <= 0 and not scaled.accepts(y, F):
             raise stopped(self._name, driver.reasons, reason, iterations, scaled.worst)
@@ -122,11 +124,11 @@ class VolumeFriction:
 
     def _result(self, step: StepProblem, found: Found) -> StepResult:
         """x, with sticking points put exactly where they were, and r_t within the last digit of its disk."""
-        surface, rubbing = self._body.surface, self._rubbing
-        law = step.friction_at(rubbing.shared(found.slip))
+        surface, friction = self._body.surface, self._friction
+        law = step.friction_at(friction.shared(found.slip))
         limit = law.limit(found.r_n, surface.weights, step.scale)
         x = found.state.z[: self._body.rows]
-        stick = (found.slip == 0.0) & (limit > 0.0)[surface.slots][rubbing.point]
-        x[rubbing.tangent[stick]] = rubbing.origin(step)[stick]
-        r_t = project(rubbing.shared(found.state.reaction), limit)
+        stick = (found.slip == 0.0) & (limit > 0.0)[surface.slots][friction.point]
+        x[friction.tangent[stick]] = friction.origin(step)[stick]
+        r_t = project(friction.shared(found.state.reaction), limit)
         return StepResult(x, found.r_n, found.active, found.iterations, self._name, r_t=r_t, history=found.history)

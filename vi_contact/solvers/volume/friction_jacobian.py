@@ -11,16 +11,16 @@ from petsc4py import PETSc
 
 from ...core.algebra import Array, Indices
 from .bounded_system import renumbered
-from .friction_system import RubbingSystem, ScaledRubbing
+from .friction_system import FrictionSystem, ScaledFrictionStep
 
 Entries = tuple[Any, Any, Array]  # rows of this rank, columns of all, values
 
 
-class RubbingJacobian:
-    """The derivatives of ``ScaledRubbing.residual`` as an AIJ matrix; see there for the names."""
+class FrictionJacobian:
+    """The derivatives of ``ScaledFrictionStep.residual`` as an AIJ matrix; see there for the names."""
 
-    def __init__(self, scaled: ScaledRubbing) -> None:
-        self._system: RubbingSystem = scaled.rubbing
+    def __init__(self, scaled: ScaledFrictionStep) -> None:
+        self._system: FrictionSystem = scaled.friction
         self._scaled = weakref.proxy(scaled)  # PETSc holds the matrix: see weakly()
         self._ratio = np.nan
         first, total, parts = self._entries()

@@ -36,7 +36,7 @@ from .bounded_system import BoundedSystem
 from .scaled_step import ScaledStep, fraction
 
 
-class RubbingSystem:
+class FrictionSystem:
     """Unknowns of a rank: z of ``body``, then lambda of the free tangents, point by point, then gamma.
 
     Attributes:
@@ -86,7 +86,7 @@ class RubbingSystem:
 
 
 @dataclass(frozen=True)
-class Rubbing:
+class FrictionUnknowns:
     """Owned values of the unknowns: z, lambda (L,) [as r_t] and gamma (D,) of a rank."""
 
     z: Array
@@ -94,22 +94,22 @@ class Rubbing:
     gamma: Array
 
 
-class ScaledRubbing(ScaledStep):
+class ScaledFrictionStep(ScaledStep):
     """F(y), y = (z/x_ref, lambda/r_ref, gamma r_ref/x_ref), with bounds on y, for the step and thresholds set last."""
 
-    def __init__(self, rubbing: RubbingSystem, tolerance: float) -> None:
-        super().__init__(rubbing.body, tolerance)
-        self.rubbing = rubbing
-        self.limit = np.zeros(len(rubbing.disk))
+    def __init__(self, friction: FrictionSystem, tolerance: float) -> None:
+        super().__init__(friction.body, tolerance)
+        self.friction = friction
+        self.limit = np.zeros(len(friction.disk))
 
-    def rub(self, step: StepProblem, limit: Array, start: Rubbing) -> None:
+    def set_friction(self, step: StepProblem, limit: Array, start: FrictionUnknowns) -> None:
         """Take a step with thresholds (m,) [as r_t]."""
-        rubbing = self.rubbing
+        friction = self.friction
         self.set(step, start.z)
-        self.limit = limit[rubbing.surface.slots] / self.r_ref
-        self._origin = rubbing.origin(step) / self.x_ref
-        s = self.limit[rubbing.point]
-        s = np.where(rubbing.line | (s == 0.0), s, np.inf)
+        self.limit = limit[friction.surface.slots] / self.r_ref
+        self._origin = friction.origin(step) / self.x_ref
+        s = self.limit[friction.point]
+        s = np.where(friction.line | (s == 0.0), s, np.inf)
         disks = self.disk_limits
         self.lower = np.concatenate([self.lower, -s, np.zeros_like(disks)])
         self.upper = np.concatenate([self.upper, s, np.where(disks > 0.0, np.inf, 0.0)])
@@ -119,7 +119,7 @@ class ScaledRubbing(ScaledStep):
     @property
     def disk_limits(self) -> Array:
         """(D,) scaled thresholds of the points with disks."""
-        return self.limit[self.rubbing.disk]
+        return self.limit[self.friction.disk]
 
     @property
     def disk_inverse(self) -> Array:
@@ -130,45 +130,45 @@ class ScaledRubbing(ScaledStep):
     @property
     def disk_stiffness(self) -> Array:
         """(D,) scaled stiffness of the points with disks."""
-        return np.asarray(self.rubbing.stiffness[self.rubbing.pairs].mean(axis=1) * (self.x_ref / self.r_ref))
+        return np.asarray(self.friction.stiffness[self.friction.pairs].mean(axis=1) * (self.x_ref / self.r_ref))
 
     def _parts(self, y: Array) -> tuple[Array, Array, Array]:
         """E, F_lambda and F_gamma."""
-        rubbing = self.rubbing
-        z, reaction, gamma = rubbing.split(y)
+        friction = self.friction
+        z, reaction, gamma = friction.split(y)
         body = super().residual(z)
-        body[rubbing.tangent] += reaction
-        pairs = reaction[rubbing.pairs]
-        still = self._origin - z[rubbing.tangent]
-        still[rubbing.pairs] += gamma[:, None] * pairs
+        body[friction.tangent] += reaction
+        pairs = reaction[friction.pairs]
+        still = self._origin - z[friction.tangent]
+        still[friction.pairs] += gamma[:, None] * pairs
         return body, still, self.disk_limits - np.sum(pairs**2, axis=1) * self.disk_inverse
 
     def disks(self, y: Array) -> tuple[Array, Array, Array]:
         """(D, 2) lambda, (D, 2) F_lambda and (D,) gamma of the points with disks."""
-        rubbing = self.rubbing
-        z, reaction, gamma = rubbing.split(y)
-        pairs = reaction[rubbing.pairs]
-        return pairs, (self._origin - z[rubbing.tangent])[rubbing.pairs] + gamma[:, None] * pairs, gamma
+        friction = self.friction
+        z, reaction, gamma = friction.split(y)
+        pairs = reaction[friction.pairs]
+        return pairs, (self._origin - z[friction.tangent])[friction.pairs] + gamma[:, None] * pairs, gamma
 
     def residual(self, y: Array) -> Array:
         """F(y) as SNES sees it."""
-        rubbing = self.rubbing
+        friction = self.friction
         body, still, room = self._parts(y)
         pairs, moved, _ = self.disks(y)
         room += self.disk_stiffness * self.disk_inverse * np.sum(pairs * moved, axis=1)
-        line = rubbing.line
-        still[line] += body[rubbing.tangent[line]] * (self.r_ref / self.x_ref) / rubbing.stiffness[line]
+        line = friction.line
+        still[line] += body[friction.tangent[line]] * (self.r_ref / self.x_ref) / friction.stiffness[line]
         held = self.limit == 0.0  # lambda and gamma on both their bounds, where any F but zero keeps them
-        still[held[rubbing.point]], room[held[rubbing.disk]] = 1.0, 1.0
+        still[held[friction.point]], room[held[friction.disk]] = 1.0, 1.0
         return np.concatenate([body, still, room])
 
     def errors(self, y: Array, F: Array) -> tuple[float, float, float]:
         """As without friction; the second counts what is wrong in slips and disks too."""
-        rubbing, s = self.rubbing, self.disk_limits
-        _, reaction, gamma = rubbing.split(y)
+        friction, s = self.friction, self.disk_limits
+        _, reaction, gamma = friction.split(y)
         body, still, room = self._parts(y)
         force, gap, backward = super().errors(y[: self.system.size], body)
-        low, high = (rubbing.split(bound)[1] for bound in (self.lower, self.upper))
+        low, high = (friction.split(bound)[1] for bound in (self.lower, self.upper))
         wrong = np.where(reaction >= high, np.maximum(still, 0.0), still)
         wrong = np.where(reaction <= low, np.minimum(still, 0.0), wrong)
         wrong[low == high] = 0.0
@@ -179,35 +179,35 @@ class ScaledRubbing(ScaledStep):
 
     def sliding(self, y: Array) -> Mask:
         """(local) points on the edge of their disk."""
-        rubbing = self.rubbing
-        _, reaction, gamma = rubbing.split(y)
-        at_edge = np.abs(reaction) >= self.limit[rubbing.point]
+        friction = self.friction
+        _, reaction, gamma = friction.split(y)
+        at_edge = np.abs(reaction) >= self.limit[friction.point]
         found = np.zeros(len(self.limit), dtype=bool)
-        found[rubbing.point[rubbing.line]] = at_edge[rubbing.line]
-        found[rubbing.disk] = gamma > 0.0
+        found[friction.point[friction.line]] = at_edge[friction.line]
+        found[friction.disk] = gamma > 0.0
         return found | (self.limit == 0.0)
 
-    def physical(self, y: Array) -> Rubbing:
+    def physical(self, y: Array) -> FrictionUnknowns:
         """y in the units of the step."""
-        z, reaction, gamma = self.rubbing.split(y)
-        return Rubbing(z * self.x_ref, reaction * self.r_ref, gamma * (self.x_ref / self.r_ref))
+        z, reaction, gamma = self.friction.split(y)
+        return FrictionUnknowns(z * self.x_ref, reaction * self.r_ref, gamma * (self.x_ref / self.r_ref))
 
     def slip(self, z: Array, sliding: Mask) -> Array:
         """(L,) B_t x - slip0 of the owned points, zero where they stick."""
-        rubbing = self.rubbing
-        moved = z[rubbing.tangent] - self._origin * self.x_ref
-        return np.where(sliding[rubbing.point], moved, 0.0)
+        friction = self.friction
+        moved = z[friction.tangent] - self._origin * self.x_ref
+        return np.where(sliding[friction.point], moved, 0.0)
 
-    def moved(self, state: Rubbing, slip: Array, limit: Array) -> Rubbing:
+    def moved(self, state: FrictionUnknowns, slip: Array, limit: Array) -> FrictionUnknowns:
         """The state with reactions in new disks (m,): sliding points on their edge, along their slip (L,)."""
-        rubbing = self.rubbing
-        s = limit[rubbing.surface.slots]
-        way = rubbing.by_point(slip)
+        friction = self.friction
+        s = limit[friction.surface.slots]
+        way = friction.by_point(slip)
         speed = np.linalg.norm(way, axis=1)
         edge = np.zeros_like(way)
         np.divide(way * s[:, None], speed[:, None], out=edge, where=speed[:, None] > 0.0)
-        inside = project(rubbing.by_point(state.reaction), s)
+        inside = project(friction.by_point(state.reaction), s)
         table = np.where(speed[:, None] > 0.0, edge, inside)
         gamma = np.zeros_like(s)
         np.divide(speed, s, out=gamma, where=s > 0.0)
-        return Rubbing(state.z, table[rubbing.point, rubbing.component], gamma[rubbing.disk])
+        return FrictionUnknowns(state.z, table[friction.point, friction.component], gamma[friction.disk])

@@ -25,7 +25,7 @@ from ...core.surfaces import ContactSurface
 from .bounded_system import BoundedSystem
 from .failures import raised, stopped
 from .friction import VolumeFriction
-from .friction_system import ScaledRubbing
+from .friction_system import ScaledFrictionStep
 from .one_factorisation import OneFactorisation
 from .options import OptionLayers, Options
 from .scaled_step import ScaledStep
@@ -66,7 +66,7 @@ class FrictionMethod(Method, Protocol):
     """A method that carries friction: its settings for the larger system."""
 
     def friction_defaults(self) -> Options: ...
-    def friction_driver(self, scaled: ScaledRubbing, layers: OptionLayers) -> Any: ...
+    def friction_driver(self, scaled: ScaledFrictionStep, layers: OptionLayers) -> Any: ...
 
 
 @dataclass(frozen=True)
@@ -135,7 +135,7 @@ class PreparedVolume:
         driver: Driver = self._method.driver(self._scaled, self._layers)
         return driver
 
-    def _rubbing(self) -> VolumeFriction:
+    def _friction_method(self) -> VolumeFriction:
         """The problem with friction, made at the first step that has some, in the place of the other one."""
         if self._friction is None:
             self.close()
@@ -173,7 +173,7 @@ class PreparedVolume:
     def solve(self, step: StepProblem) -> StepResult:
         """The step; StepFailure with PETSc's reason when it does not converge."""
         try:
-            return self._solve(step) if step.slip0 is None else self._rubbing().solve(step)
+            return self._solve(step) if step.slip0 is None else self._friction_method().solve(step)
         except PETSc.Error as error:
             self.close()  # its state is unknown; the next step gets a new one
             if error.__cause__ is not None:

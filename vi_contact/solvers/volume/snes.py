@@ -20,8 +20,8 @@ from petsc4py import PETSc
 from ...core.algebra import Array
 from ...core.step import StepProblem
 from .bounded_system import BoundedSystem
-from .friction_jacobian import RubbingJacobian
-from .friction_system import ScaledRubbing
+from .friction_jacobian import FrictionJacobian
+from .friction_system import ScaledFrictionStep
 from .options import OptionLayers, Options, check_friction, check_reduced, check_semismooth
 from .scaled_step import ScaledStep
 
@@ -222,9 +222,9 @@ class ReducedNewton:
         pivots, for which MUMPS on several ranks needs room: it stops with INFOG(1) = -9 when it has only the usual."""
         return {**NEWTON_OPTIONS, **MUMPS_OPTIONS, "pc_type": "lu", "mat_mumps_icntl_14": 200}
 
-    def friction_driver(self, scaled: ScaledRubbing, layers: OptionLayers) -> SnesDriver:
+    def friction_driver(self, scaled: ScaledFrictionStep, layers: OptionLayers) -> SnesDriver:
         """The SNES object of a step with friction."""
-        jacobian = RubbingJacobian(scaled)
+        jacobian = FrictionJacobian(scaled)
         return SnesDriver(scaled, layers, jacobian, snes_type="vinewtonrsls", check=check_friction)
 
 
