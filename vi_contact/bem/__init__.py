@@ -1,4 +1,4 @@
-"""Space-time boundary elements for plane elastodynamics (seed 003), with numpy and scipy only."""
+"""Solve plane elastodynamics by space-time boundary elements (Aimi, Di Credico, Gimperlein 2024), without DOLFINx."""
 
 from .boundary_mesh import BoundaryMesh, circle, from_segments, polygon, smooth_curve
 from .boundary_operators import Galerkin, OperatorMatrices

@@ -1,4 +1,4 @@
-"""Boundary of a plane body as closed loops of straight elements, with its two spaces and their mass matrices.
+"""Describe a plane body's boundary by closed loops of straight elements, with its two spaces and mass matrices.
 
 The body lies to the left of its boundary: outer loops run counter-clockwise, holes clockwise, and the normal points out
 of the body. `exterior=True` means the unbounded outside of the loops: everything reversed. Element i starts at node i.
@@ -27,7 +27,7 @@ P1_MASS = np.array([[2.0, 1.0], [1.0, 2.0]]) / 6.0
 
 @dataclass(frozen=True, eq=False)
 class BoundaryMesh:
-    """Closed loops of straight elements.
+    """Describe closed loops of straight elements.
 
     points: (n, 2) nodes [m], loop after loop, in the direction that keeps the body on the left.
     loop_sizes: nodes of each loop. labels: (n,) integer of each element, to name parts of the boundary.
@@ -63,7 +63,7 @@ class BoundaryMesh:
 
     @cached_property
     def after(self) -> NDArray[np.int64]:
-        """(n,) the node (and element) that follows each; element i goes from node i to node after[i]."""
+        """Return (n,) the node (and element) that follows each; element i goes from node i to node after[i]."""
         after = np.arange(1, len(self.points) + 1)
         ends = np.cumsum(self.loop_sizes)
         after[ends - 1] = ends - self.loop_sizes
@@ -71,42 +71,42 @@ class BoundaryMesh:
 
     @cached_property
     def elements(self) -> NDArray[np.int64]:
-        """(n, 2) first and last node of each element."""
+        """Return (n, 2) first and last node of each element."""
         return np.stack([np.arange(len(self.points)), self.after], axis=1)
 
     @cached_property
     def lengths(self) -> Array:
-        """(n,) length of each element [m]."""
+        """Return (n,) length of each element [m]."""
         return np.hypot(*(self.points[self.after] - self.points).T)
 
     @cached_property
     def tangents(self) -> Array:
-        """(n, 2) unit tangents tau = (-n_2, n_1), in the direction of the loop."""
+        """Return (n, 2) unit tangents tau = (-n_2, n_1), in the direction of the loop."""
         return (self.points[self.after] - self.points) / self.lengths[:, None]
 
     @cached_property
     def normals(self) -> Array:
-        """(n, 2) unit normals, out of the body."""
+        """Return (n, 2) unit normals, out of the body."""
         return np.stack([self.tangents[:, 1], -self.tangents[:, 0]], axis=1)
 
     @cached_property
     def size(self) -> float:
-        """Diagonal of the box around the boundary [m]."""
+        """Return the diagonal of the box around the boundary [m]."""
         return float(np.hypot(*np.ptp(self.points, axis=0)))
 
     @cached_property
     def area(self) -> float:
-        """Area inside the loops, holes taken off [m²]; negative for an exterior body."""
+        """Return the area inside the loops, holes taken off [m²]; negative for an exterior body."""
         return float(0.5 * np.sum(self.lengths * np.sum(self.normals * self.midpoints, axis=1)))
 
     @cached_property
     def midpoints(self) -> Array:
-        """(n, 2) middles of the elements [m]."""
+        """Return (n, 2) middles of the elements [m]."""
         return 0.5 * (self.points + self.points[self.after])
 
     @cached_property
     def mass(self) -> Array:
-        """(4n, 2n) <u, psi>: continuous displacements tested with discontinuous tractions [m]."""
+        """Return (4n, 2n) <u, psi>: continuous displacements tested with discontinuous tractions [m]."""
         n = len(self)
         mass = np.zeros((2, n, 2, 2, n))
         for a in range(2):
@@ -117,36 +117,36 @@ class BoundaryMesh:
 
     @property
     def lumped(self) -> Array:
-        """(n,) length that belongs to each node, half of its two elements [m]."""
+        """Return (n,) length that belongs to each node, half of its two elements [m]."""
         return self.node_lengths(np.ones(len(self), bool))
 
     def elements_where(self, chosen: Callable[[Array], ArrayLike]) -> NDArray[np.bool_]:
-        """(n,) elements with both ends where `chosen`((m, 2) points) is true."""
+        """Return (n,) elements with both ends where `chosen`((m, 2) points) is true."""
         function("BoundaryMesh.elements_where", "chosen", chosen, "give a function of points (m, 2)")
         inside = mask("BoundaryMesh.elements_where", "what chosen(points) returns", chosen(self.points), (len(self),))
         return inside & inside[self.after]
 
     def nodes_of(self, elements: ArrayLike) -> NDArray[np.bool_]:
-        """(n,) nodes that touch one of the elements (n,) given as a boolean mask."""
+        """Return (n,) nodes that touch one of the elements (n,) given as a boolean mask."""
         chosen = self._mask(elements)
         nodes = chosen.copy()
         nodes[self.after[chosen]] = True
         return nodes
 
     def node_lengths(self, elements: ArrayLike) -> Array:
-        """(n,) half the lengths of the masked elements that meet at each node [m]."""
+        """Return (n,) half the lengths of the masked elements that meet at each node [m]."""
         half = 0.5 * self.lengths * self._mask(elements)
         return half + np.bincount(self.after, half, len(self))
 
     def node_normals(self, elements: ArrayLike) -> Array:
-        """(n, 2) unit normals at nodes, the mean over the masked elements weighted with their lengths; else zero."""
+        """Return (n, 2) unit normals at nodes, the mean of the masked elements by their lengths; else zero."""
         weighted = self.normals * (self.lengths * self._mask(elements))[:, None]
         sums = weighted + np.stack([np.bincount(self.after, w, len(self)) for w in weighted.T], axis=1)
         length = np.hypot(*sums.T)
         return sums / np.where(length > 0.0, length, 1.0)[:, None]
 
     def node_turns(self, elements: ArrayLike) -> Array:
-        """(n,) angle [rad] by which the boundary turns at each node between two masked elements; else zero."""
+        """Return (n,) angle [rad] by which the boundary turns at each node between two masked elements; else zero."""
         chosen, before = self._mask(elements), np.empty(len(self), dtype=np.int64)
         before[self.after] = np.arange(len(self))
         one, other = self.normals[before], self.normals
@@ -192,7 +192,7 @@ def smooth_curve(curve: Callable[[Array], Array], count: int, *, exterior: bool 
 
 
 def circle(radius: float, count: int, *, centre: ArrayLike = (0.0, 0.0), exterior: bool = False) -> BoundaryMesh:
-    """A disk of `count` chords, starting at its lowest point; exterior: the space around a round hole."""
+    """Return a disk of `count` chords, starting at its lowest point; exterior: the space around a round hole."""
     middle = array("circle", "centre", centre, (2,), unit="m")
     number("circle", "radius", radius, positive=True, unit="m")
     turn = -2.0 * np.pi if exterior else 2.0 * np.pi

@@ -1,4 +1,4 @@
-"""Galerkin matrices of the four boundary operators from radial kernels of either domain, density 1.
+"""Build the Galerkin matrices of the four boundary operators from radial kernels of either domain, density 1.
 
 With M u = d/dtau (-u_2, u_1), mu = c_S², x - y = d and normals n_x, n_y (regularised as in docs/theory/bem.md; nothing
 is worse than a logarithm on a closed curve):
@@ -35,7 +35,7 @@ N_SINGLE, N_DOUBLE, N_HYPER = 3, 8, 10
 
 @dataclass(frozen=True)
 class OperatorMatrices:
-    """single: (4n, 4n) <V p, psi>; double: (4n, 2n) <K u, psi>; hyper: (2n, 2n) <D u, v>; None if not asked for."""
+    """Hold single (4n, 4n) <V p, psi>, double (4n, 2n) <K u, psi>, hyper (2n, 2n) <D u, v>; None if not asked."""
 
     single: NDArray | None
     double: NDArray | None
@@ -43,12 +43,12 @@ class OperatorMatrices:
 
     @property
     def adjoint(self) -> NDArray | None:
-        """(2n, 4n) <K' p, v>, the transposed double layer."""
+        """Return (2n, 4n) <K' p, v>, the transposed double layer."""
         return None if self.double is None else self.double.T
 
 
 class Galerkin:
-    """Integrates radial kernels over all pairs of elements of one mesh.
+    """Integrate radial kernels over all pairs of elements of one mesh.
 
     kernels(r (m,)) -> KernelSet are of density 1 and speeds (c_p, c_s); fronts: distances [m] at which they have kinks,
     the greatest being where they end.
@@ -61,7 +61,7 @@ class Galerkin:
         self.pairs = ElementPairs(mesh)
 
     def assemble(self, kernels: Callable[[Array], KernelSet], fronts: Sequence[float] = ()) -> OperatorMatrices:
-        """The matrices of the operators whose kernels are not None."""
+        """Return the matrices of the operators whose kernels are not None."""
         moments, which = self._moments(kernels, fronts)
         parts: list[NDArray | None] = []
         for method, count in ((self._single, N_SINGLE), (self._double, N_DOUBLE), (self._hyper, N_HYPER)):
@@ -71,7 +71,7 @@ class Galerkin:
         return OperatorMatrices(*parts)
 
     def _moments(self, kernels: Callable, fronts: Sequence[float]) -> tuple[NDArray, tuple[bool, ...]]:
-        """(k, pairs, 2, 2) integrals [m²] of the stacked kernels against phi_a(x) phi_b(y)."""
+        """Return (k, pairs, 2, 2) integrals [m²] of the stacked kernels against phi_a(x) phi_b(y)."""
         total, which = None, (False, False, False)
         for points in point_sets(self.pairs, fronts, self.orders):
             kernel_set = kernels(points.r)
@@ -116,7 +116,7 @@ class Galerkin:
         return joined(self.mesh, columns, 1).reshape(2 * n, 2 * n)
 
     def _hyper_local(self, m: NDArray) -> NDArray:
-        """(2, 2, p, 2, 2): component of v on the first element, of u on the second, pair, shape of v, of u."""
+        """Return (2, 2, p, 2, 2): component of v on the first element, of u on the second, pair, shape of v, of u."""
         mesh, e, f = self.mesh, self.pairs.first, self.pairs.second
         n_x, n_y = mesh.normals[e].T[:, :, None, None], mesh.normals[f].T[:, :, None, None]
         t_x, t_y = mesh.tangents[e].T[:, :, None, None], mesh.tangents[f].T[:, :, None, None]
@@ -139,7 +139,7 @@ class Galerkin:
 
 
 def double_local(mesh: BoundaryMesh, shear: float, m: NDArray, y: NDArray[np.int64]) -> NDArray:
-    """(2, 2, p, a, 2): component of K u, component of u, pair, shape function of x, of y on the elements y (p,).
+    """Return (2, 2, p, a, 2): component of K u, component of u, pair, shape function of x, of y on the elements y (p,).
 
     m: (8, p, a, 2) moments of the stacked kernels of the double layer; shear: c_S².
     """
@@ -157,7 +157,7 @@ def double_local(mesh: BoundaryMesh, shear: float, m: NDArray, y: NDArray[np.int
 
 
 def joined(mesh: BoundaryMesh, local: NDArray, axis: int) -> NDArray:
-    """Shape functions (element at `axis`, end at axis + 1) added up at the nodes; the end axis goes."""
+    """Add up shape functions (element at `axis`, end at axis + 1) at the nodes; the end axis goes."""
     start, end = np.take(local, 0, axis + 1), np.take(local, 1, axis + 1)
     before = np.empty_like(mesh.after)
     before[mesh.after] = np.arange(len(before))
@@ -165,12 +165,12 @@ def joined(mesh: BoundaryMesh, local: NDArray, axis: int) -> NDArray:
 
 
 def _tensor(m: NDArray) -> NDArray:
-    """(2, 2, ...) from the components xx, xy, yy."""
+    """Return (2, 2, ...) from the components xx, xy, yy."""
     return np.stack([np.stack([m[0], m[1]]), np.stack([m[1], m[2]])])
 
 
 def stacked(kernels: KernelSet, d: Array, r: Array) -> NDArray:
-    """(k, m) integrands of the wanted operators at d = x - y, in the order their methods read them."""
+    """Return (k, m) integrands of the wanted operators at d = x - y, in the order their methods read them."""
     xx, xy, yy = d[0] ** 2 / r**2, d[0] * d[1] / r**2, d[1] ** 2 / r**2
     rows: list[NDArray] = []
     if kernels.single is not None:

@@ -1,4 +1,4 @@
-"""Contact of a body whose boundary is condensed by boundary elements: what it may touch, how it rubs, its steps.
+"""Describe contact of a body condensed by boundary elements: what it may touch, how it rubs, its steps.
 
 The condensed body is u_c[k] = sum_(l<=k) W[k-l] lam[l] + u_free[k] (CondensedCompliance). In the frames of its nodes,
 v = N u with the contact direction n and the tangent as rows of N, lam = -Nᵀ r, it is a row of the project's contract
@@ -39,7 +39,7 @@ HELD = 1e-12  # of the largest flexibility: supported unknowns
 
 @dataclass(frozen=True)
 class Conditions:
-    """One contact condition per row: the contact node (row of CondensedCompliance), its outward normal, its length.
+    """Hold one contact condition per row: the contact node (row of CondensedCompliance), outward normal, length.
 
     nodes: (c,); normals: (c, 2); lengths: (c,) [m]. A node may have two conditions: the corner of a box in a notch.
     """
@@ -59,7 +59,7 @@ class Conditions:
 
 
 def conditions_on(mesh: BoundaryMesh, compliance: CondensedCompliance, *sides: ArrayLike) -> Conditions:
-    """Conditions of several sides, each a mask of elements (n,): a node of two sides gets one for each of them.
+    """Return the conditions of several sides, masks of elements (n,): a node of two sides gets one for each.
 
     Raises InputError for a side with nodes that were not condensed, and for more than two sides at a node.
     """
@@ -81,7 +81,7 @@ def conditions_on(mesh: BoundaryMesh, compliance: CondensedCompliance, *sides: A
 
 @dataclass(frozen=True, eq=False)
 class BoundaryContact:
-    """A condensed body and its support.
+    """Describe a condensed body and its support.
 
     obstacle: its gaps and directions, a fitting rigid support by default; friction: the law; towards, along: how far
     the obstacle has moved towards the body and along its tangents at time t [m]; bilateral: every point is held on the
@@ -118,7 +118,7 @@ class BoundaryContact:
         self._refuse_corners()
 
     def _refuse_corners(self) -> None:
-        """One condition along a mean normal is none of a node at which the contact boundary turns."""
+        """Refuse one condition along a mean normal at a node at which the contact boundary turns."""
         turns, points = self.compliance.turns, self.compliance.points
         if self.conditions is not None or turns is None or turns.max(initial=0.0) <= FEATURE_ANGLE * (1.0 + 1e-9):
             return
@@ -138,7 +138,7 @@ class BoundaryContact:
 
     @property
     def frictional(self) -> bool:
-        """Whether there can be tangential reactions."""
+        """Tell whether there can be tangential reactions."""
         return not isinstance(self.friction, Frictionless)
 
     @cached_property
@@ -154,14 +154,14 @@ class BoundaryContact:
 
     @cached_property
     def _second(self) -> Mask:
-        """(c,) conditions of nodes that have one already."""
+        """Return (c,) conditions of nodes that have one already."""
         second = np.ones(len(self._rows.nodes), bool)
         second[np.unique(self._rows.nodes, return_index=True)[1]] = False
         return second
 
     @cached_property
     def frames(self) -> Array:
-        """N (2m, 2m): v = N u, first the contact directions of all nodes, then tangents or second directions."""
+        """Return N (2m, 2m): v = N u, first the contact directions of all nodes, then tangents or second directions."""
         m, rows, second = self.count, self._rows, self._second
         frames = np.tile(np.eye(2), (m, 1, 1))
         frames[rows.nodes[~second]] = nodal_frames(self._directions[~second]).swapaxes(1, 2)
@@ -172,24 +172,24 @@ class BoundaryContact:
 
     @cached_property
     def kept(self) -> Mask:
-        """(2m,) unknowns v that are not supported."""
+        """Return (2m,) unknowns v that are not supported."""
         flexibility = (self.frames @ self.compliance.W[0] @ self.frames.T).diagonal()
         return np.asarray(flexibility > HELD * flexibility.max(initial=0.0))
 
     @cached_property
     def W(self) -> Array:
-        """(steps, f, f) compliance of the f kept unknowns v."""
+        """Return (steps, f, f) compliance of the f kept unknowns v."""
         turned = np.matmul(np.matmul(self.frames, self.compliance.W), self.frames.T)
         return np.ascontiguousarray(turned[:, self.kept][:, :, self.kept])
 
     @cached_property
     def v_free(self) -> Array:
-        """(steps, f) motion of the kept unknowns without contact."""
+        """Return (steps, f) motion of the kept unknowns without contact."""
         return np.ascontiguousarray((self.compliance.u_free @ self.frames.T)[:, self.kept])
 
     @cached_property
     def surface(self) -> ContactSurface:
-        """The conditions as the contract has them; its unknowns are the kept ones."""
+        """Return the conditions as the contract has them; its unknowns are the kept ones."""
         rows, second, points = self._rows, self._second, self.compliance.points
         number = np.where(self.kept, np.cumsum(self.kept) - 1, -1)
         owned = number[rows.nodes + self.count * second]
@@ -209,7 +209,7 @@ class BoundaryContact:
 
     @cached_property
     def matrix(self) -> EffectiveMatrix:
-        """A."""
+        """Return the matrix A of the step."""
         first = self.W[0]
         if np.abs(first - first.T).max() > ASYMMETRIC * np.abs(first).max():
             raise InputError("BoundaryContact: the compliance of one step is not symmetric, so there is no small "
@@ -236,9 +236,9 @@ class BoundaryContact:
         )
 
     def load(self, r_n: Array, r_t: Array | None) -> Array:
-        """(f,) forces of the support on the kept unknowns, -B_nᵀ r_n - B_tᵀ r_t."""
+        """Return (f,) forces of the support on the kept unknowns, -B_nᵀ r_n - B_tᵀ r_t."""
         return -self.surface.reaction_load(r_n, int(self.kept.sum()), r_t)
 
     def cartesian(self, loads: Array) -> Array:
-        """(steps, 2m) nodal forces lam on the body, x of all contact nodes, then y, of loads (steps, f)."""
+        """Return (steps, 2m) nodal forces lam on the body, x of all contact nodes, then y, of loads (steps, f)."""
         return np.asarray(loads @ self.frames[self.kept])

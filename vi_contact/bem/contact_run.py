@@ -21,7 +21,7 @@ from .poincare_steklov import BoundaryMotion
 def march_contact(
     contact: BoundaryContact, *, solver: Condensed | None = None, tolerance: float = TOLERANCE
 ) -> ContactRun:
-    """Marches through all steps of the compliance; ``solver``: Condensed with any of its methods.
+    """March through all steps of the compliance; ``solver``: Condensed with any of its methods.
 
     Raises StepFailure when a step's certificate exceeds ``tolerance``, with step, time and residuals.
     """
@@ -51,7 +51,7 @@ def march_contact(
 
 @dataclass(frozen=True)
 class ContactRun:
-    """Histories of c conditions at m contact nodes over all steps.
+    """Hold the histories of c conditions at m contact nodes over all steps.
 
     times: (steps,) ends of the steps [s]; r_n: (steps, c), r_t: (steps, c) reactions [N/m] on the support during each
     step, normal and along the tangent; gap: (steps, c) at the ends [m]; slip: (steps, c) in each step [m];
@@ -75,56 +75,56 @@ class ContactRun:
 
     @property
     def worst(self) -> float:
-        """The worst residual of any step."""
+        """Return the worst residual of any step."""
         return max(certificate.worst for certificate in self.certificates)
 
     @property
     def resultant(self) -> Array:
-        """(steps, 2) force of the support on the body [N/m]."""
+        """Return (steps, 2) force of the support on the body [N/m]."""
         return np.asarray(self.forces.reshape(len(self.times), 2, -1).sum(axis=2))
 
     @property
     def impulse(self) -> Array:
-        """(steps, 2) of that force up to each time [N s/m]."""
+        """Return (steps, 2) the impulse of that force up to each time [N s/m]."""
         return np.cumsum(self.resultant, axis=0) * self.contact.compliance.dt
 
     @property
     def name(self) -> str:
-        """What ``cross_check`` calls it."""
+        """Return the name that ``cross_check`` gives it."""
         return "boundary elements"
 
     @property
     def mean_towards(self) -> Array:
-        """(steps,) displacement towards the support at the ends, mean over the contact boundary [m]."""
+        """Return (steps,) displacement towards the support at the ends, mean over the contact boundary [m]."""
         surface = self.contact.surface
         gap = np.array([surface.gap(t) for t in self.times])
         return np.asarray((gap - self.gap) @ surface.weights / surface.weights.sum())
 
     @property
     def pressure(self) -> Array:
-        """(steps, c) normal traction r_n / length [Pa]."""
+        """Return (steps, c) normal traction r_n / length [Pa]."""
         return self.r_n / self.contact.surface.weights
 
     @property
     def shear(self) -> Array:
-        """(steps, c) tangential traction r_t / length [Pa] of the body on the support."""
+        """Return (steps, c) tangential traction r_t / length [Pa] of the body on the support."""
         return self.r_t / self.contact.surface.weights
 
     @property
     def work(self) -> Array:
-        """(steps,) work of all contact forces on the body up to each time [J/m]."""
+        """Return (steps,) work of all contact forces on the body up to each time [J/m]."""
         increments = np.diff(self.displacement, axis=0, prepend=0.0)
         return np.cumsum((self.forces * increments).sum(axis=1))
 
     @property
     def friction_loss(self) -> Array:
-        """(steps,) energy that friction has taken, sum r_t slip, never negative in a step [J/m]."""
+        """Return (steps,) energy that friction has taken, sum r_t slip, never negative in a step [J/m]."""
         return np.cumsum((self.r_t * self.slip).sum(axis=1))
 
 
 @dataclass(frozen=True)
 class ContactLedger:
-    """Works up to each time (steps,) [J/m] from boundary data alone: energy = load + contact + support to round-off.
+    """Hold the works up to each time (steps,) [J/m] from boundary data: energy = load + contact + support to round-off.
 
     energy: of the body; load: of the tractions; contact: of the contact forces, friction included; support: of what
     holds prescribed unknowns; friction: what friction took (in ``contact`` already).
@@ -138,14 +138,14 @@ class ContactLedger:
 
     @property
     def defect(self) -> float:
-        """|energy - load - contact - support| over the largest of them."""
+        """Return |energy - load - contact - support| over the largest of them."""
         terms = (self.energy, self.load, self.contact, self.support)
         size = max(float(np.abs(term).max(initial=0.0)) for term in terms)
         return float(np.abs(self.energy - self.load - self.contact - self.support).max()) / (size or 1.0)
 
 
 def ledger(run: ContactRun, motion: BoundaryMotion, loads: Array, *, supported: Mask | None = None) -> ContactLedger:
-    """Works of a run with its whole boundary motion, BoundaryProblem.solve(run.forces); loads: (steps, 2, n).
+    """Return the works of a run from its boundary motion, BoundaryProblem.solve(run.forces); loads: (steps, 2, n).
 
     supported: (2, n), the ``fixed`` of the problem.
     """
@@ -174,7 +174,7 @@ def run_of(
     iterations: Array | None = None,
     history: tuple[float, ...] = (),
 ) -> ContactRun:
-    """The run of solved steps, certified."""
+    """Gather solved steps into a run, certified."""
     surface, count = contact.surface, contact.surface.count
     v = np.array([result.x for result in results])
     loads = np.array([contact.load(result.r_n, result.r_t) for result in results])

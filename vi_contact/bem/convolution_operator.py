@@ -1,4 +1,4 @@
-"""The Poincaré-Steklov operator of convolution quadrature, boundary value problems with it, and its contact compliance.
+"""Build the Poincaré-Steklov operator of convolution quadrature, its boundary value problems and contact compliance.
 
 At each frequency s the body is a matrix S(s), nodal displacements to nodal forces, in the symmetric form
 (M/2 + K)ᵀ V⁻¹ (M/2 + K) - D or the unsymmetric Mᵀ V⁻¹ (M/2 + K). Every answer is a set of small dense systems, one per
@@ -34,7 +34,7 @@ PANEL = 1.5  # width of the panels of the radial table, in c_S dt: functions the
 
 @dataclass(frozen=True, eq=False)
 class ConvolutionOperator:
-    """S of a body at the frequencies of a convolution quadrature, of the material's own density.
+    """Hold S of a body at the frequencies of a convolution quadrature, of the material's own density.
 
     steklov: (L, stages, 2n, 2n) S(s); to_traction: (L, stages, 4n, 2n) V⁻¹ (M/2 + K); L = steps/2 + 1.
     """
@@ -60,18 +60,18 @@ class ConvolutionOperator:
 
     @property
     def dt(self) -> float:
-        """Time step [s]."""
+        """Return the time step [s]."""
         return self.frequencies.dt
 
     def apply(self, displacement: ArrayLike) -> Array:
-        """(steps, 2, n) mean nodal forces [N/m] of displacements (steps, 2, n) at t_1, t_2, ...; 0 at t_0."""
+        """Return (steps, 2, n) mean nodal forces [N/m] of displacements (steps, 2, n) at t_1, t_2, ...; 0 at t_0."""
         shape = (self.steps, 2, len(self.mesh))
         u = array("ConvolutionOperator.apply", "displacement", displacement, shape, unit="m")
         everywhere = np.ones((2, len(self.mesh)), bool)
         return ConvolutionProblem(self, np.zeros_like(u), everywhere, u).solve().forces
 
     def solve(self, forces: ArrayLike) -> Array:
-        """(steps, 2, n) displacements under nodal forces (steps, 2, n): the inverse, no support anywhere."""
+        """Return (steps, 2, n) displacements under nodal forces (steps, 2, n): the inverse, no support anywhere."""
         given = array("ConvolutionOperator.solve", "forces", forces, (None, 2, len(self.mesh)), unit="N/m")
         return ConvolutionProblem(self, given).solve().displacement
 
@@ -117,7 +117,7 @@ def convolution_operator(
 
 @dataclass(frozen=True, eq=False)
 class ConvolutionProblem:
-    """What BoundaryProblem is for the energetic method: a body with supports, loads and perhaps contact.
+    """Describe what BoundaryProblem is for the energetic method: a body with supports, loads and perhaps contact.
 
     forces: nodal forces of the loads [N/m], (steps, 2, n) means over the steps, or (steps, stages, 2, n) means between
     the stages (ConvolutionQuadrature.substep_means); fixed: (2, n) mask of supported unknowns; prescribed: their
@@ -145,12 +145,12 @@ class ConvolutionProblem:
 
     @property
     def times(self) -> Array:
-        """(steps,) ends of the steps [s]."""
+        """Return (steps,) ends of the steps [s]."""
         return self.operator.dt * np.arange(1, self.operator.steps + 1)
 
     @property
     def contact_nodes(self) -> NDArray[np.int64]:
-        """(m,) numbers of the nodes of the contact boundary."""
+        """Return (m,) numbers of the nodes of the contact boundary."""
         if self.contact is None or not np.any(self.contact):
             raise InputError("ConvolutionProblem: no contact boundary; give `contact`, the mask of its elements")
         return np.flatnonzero(self.operator.mesh.nodes_of(self.contact))
@@ -161,7 +161,7 @@ class ConvolutionProblem:
         return np.ones(2 * n, bool) if self.fixed is None else ~np.asarray(self.fixed).ravel()
 
     def solve(self, contact_forces: ArrayLike | None = None) -> BoundaryMotion:
-        """Motion under the loads and nodal contact forces (steps, 2m) in the order of CondensedCompliance."""
+        """Return the motion under loads and nodal contact forces (steps, 2m), ordered as CondensedCompliance."""
         table, steps, n = self.operator.frequencies, self.operator.steps, len(self.operator.mesh)
         forces = np.asarray(self.forces, float)
         forces = forces.reshape(steps, -1, 2, n).copy()
@@ -179,7 +179,7 @@ class ConvolutionProblem:
                               total.reshape(-1, 2, n))
 
     def condensed(self) -> CondensedCompliance:
-        """Compliance of the contact unknowns, from inverses at the frequencies, and their motion without contact."""
+        """Return the compliance of the contact unknowns, by frequencies, and their motion without contact."""
         mesh, nodes, table, free = self.operator.mesh, self.contact_nodes, self.operator.frequencies, self._free
         unknowns = np.concatenate([nodes, nodes + len(mesh)])
         moving = free[unknowns]
@@ -198,7 +198,7 @@ class ConvolutionProblem:
         )
 
     def _displacement_modes(self, impulses: NDArray) -> NDArray:
-        """(L, stages, 2n) displacements at the frequencies; prescribed ones move evenly during each step."""
+        """Return (L, stages, 2n) displacements at the frequencies; prescribed ones move evenly during each step."""
         table, free = self.operator.frequencies, self._free
         u = np.zeros_like(impulses)
         load = impulses * table.s[..., None]

@@ -1,4 +1,4 @@
-"""Convolution quadrature: the boundary elements of the Laplace domain made into a method in time (docs/theory/bem.md).
+"""Turn boundary elements of the Laplace domain into a method in time: convolution quadrature (docs/theory/bem.md).
 
 For u = C(d/dt) g the derivative is replaced by delta(z)/dt of a time stepping method. Here g enters by its impulses
 J = ∫ g dt at the stages, so that means over steps are what counts, as in the energetic method, and a jump at the end of
@@ -29,7 +29,7 @@ METHODS = (BDF2, Trapezoid, RadauIIA)
 
 @dataclass(frozen=True)
 class Frequencies:
-    """What a method makes of N steps of dt [s].
+    """Describe what a method makes of N steps of dt [s].
 
     s: (N/2 + 1, stages) complex frequencies [1/s], all with Re s > 0; vectors: (N/2 + 1, stages, stages) X.
     """
@@ -45,7 +45,7 @@ class Frequencies:
 
     @cached_property
     def contour(self) -> Contour:
-        """The circle of the shifts z."""
+        """Return the circle of the shifts z."""
         return Contour(self.steps)
 
     @cached_property
@@ -55,40 +55,40 @@ class Frequencies:
 
     @property
     def s(self) -> NDArray:
-        """Frequencies."""
+        """Return the frequencies."""
         return self._eigen[0]
 
     @property
     def vectors(self) -> NDArray:
-        """X."""
+        """Return the eigenvectors X."""
         return self._eigen[1]
 
     @cached_property
     def held(self) -> NDArray:
-        """(N/2 + 1, stages) a_i: û = sum_i a_i C(s_i) ĝ at the end of the step, for g held in each step."""
+        """Return (N/2 + 1, stages) a_i: û = sum_i a_i C(s_i) ĝ at the end of the step, for g held in each step."""
         z = self.contour.z[:, None]
         impulse = self.dt * (np.array(self.method.abscissae) + z / (1.0 - z))
         return self.vectors[:, -1] * self.s * np.linalg.solve(self.vectors, impulse[..., None])[..., 0]
 
     def impulses(self, means: Array) -> NDArray:
-        """(N/2 + 1, stages, ...) X⁻¹ Ĵ of real means between the stages (N, stages, ...); (N, 1, ...) if held."""
+        """Return (N/2 + 1, stages, ...) X⁻¹ Ĵ of real means between stages (N, stages, ...); (N, 1, ...) if held."""
         widths = np.diff(self.method.abscissae, prepend=0.0) * self.dt
         pieces = means * widths.reshape(-1, *[1] * (means.ndim - 2))
         transform = self.contour.forward(np.cumsum(pieces.reshape(-1, *means.shape[2:]), axis=0).reshape(pieces.shape))
         return np.linalg.solve(self.vectors, transform.reshape(*transform.shape[:2], -1)).reshape(transform.shape)
 
     def at_ends(self, modes: NDArray) -> Array:
-        """(N, ...) values at the ends of the steps of modes (N/2 + 1, stages, ...)."""
+        """Return (N, ...) values at the ends of the steps of modes (N/2 + 1, stages, ...)."""
         return self.contour.backward(np.einsum("li,li...->l...", self.vectors[:, -1], modes))
 
     def step_means(self, impulse_modes: NDArray) -> Array:
-        """(N, ...) means over the steps of what has these impulses."""
+        """Return (N, ...) means over the steps of what has these impulses."""
         return np.diff(self.at_ends(impulse_modes), axis=0, prepend=0.0) / self.dt
 
 
 @dataclass(frozen=True)
 class ConvolutionQuadrature:
-    """The time discretisation beside the energetic one. method: BDF2(), Trapezoid() or RadauIIA()."""
+    """Describe the time discretisation beside the energetic one. method: BDF2(), Trapezoid() or RadauIIA()."""
 
     method: TimeMethod = RadauIIA()
 
@@ -96,13 +96,13 @@ class ConvolutionQuadrature:
         instance("ConvolutionQuadrature", "the method", self.method, METHODS, "give BDF2(), Trapezoid() or RadauIIA()")
 
     def frequencies(self, *, dt: float, steps: int) -> Frequencies:
-        """The frequencies for `steps` steps of dt [s]. Raises InputError unless dt > 0 and steps >= 1."""
+        """Return the frequencies for `steps` steps of dt [s]. Raises InputError unless dt > 0 and steps >= 1."""
         owner = "ConvolutionQuadrature"
         step = number(owner, "the time step dt", dt, positive=True, unit="s")
         return Frequencies(self.method, step, whole(owner, "the number of time steps", steps, least=1))
 
     def weights(self, transfer: Callable[[complex], ArrayLike], *, dt: float, steps: int) -> Array:
-        """(steps, ...) W with u(t_(k+1)) = sum_(l<=k) W[k-l] g[l], g the mean of the input over each step.
+        """Return (steps, ...) W with u(t_(k+1)) = sum_(l<=k) W[k-l] g[l], g the mean of the input over each step.
 
         transfer(s) is the transfer function C, a number or an array, analytic for Re s > 0 and real for real s.
         """
@@ -115,7 +115,7 @@ class ConvolutionQuadrature:
         return table.contour.backward(np.array(sums))
 
     def substep_means(self, forces: Callable[[float, int], Array], *, dt: float, steps: int) -> Array:
-        """(steps, stages, ...) mean loads between the stages, from forces(dt, steps) -> (steps, ...) means over steps.
+        """Return (steps, stages, ...) mean loads between stages, from forces(dt, steps) -> (steps, ...) means.
 
         forces is, for example, `lambda dt, steps: traction_forces(mesh, traction, dt=dt, steps=steps)`. With these
         instead of means over whole steps Radau keeps its order 3 in time; the other methods have one stage.

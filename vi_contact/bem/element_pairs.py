@@ -1,4 +1,4 @@
-"""Pairs of boundary elements, each once, with the distances that decide how they are integrated."""
+"""Pair boundary elements, each pair once, with the distances that decide how they are integrated."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ LEAST = 0.05  # of the longer element: nearer ones are refused, for nothing is k
 
 
 class ElementPairs:
-    """All pairs first <= second: x = point + a xi on the first, y on the second, x - y = offset + a xi - b eta.
+    """Hold all pairs first <= second: x = point + a xi on the first, y on the second, x - y = offset + a xi - b eta.
 
     offset, a, b: (2, p) [m]; r_min, r_max: least and greatest distance [m]; h: the longer element [m];
     width: what is between them over h; of two elements with a common corner, the distance of a free end from the other.

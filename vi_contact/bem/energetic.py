@@ -1,4 +1,4 @@
-"""Energetic space-time Galerkin method: blocks of a block Toeplitz system, marching on in time (docs/theory/bem.md).
+"""March the energetic space-time Galerkin method on in time: a block Toeplitz system (docs/theory/bem.md).
 
 Tractions are constant, displacements linear in each time step; the first equation is tested with constants, which is
 collocation at the ends of the steps, the second with the rates of displacements, which is the mean over a step. With
@@ -35,7 +35,7 @@ SMALLEST, GREATEST = 0.05, 8.0  # limits of c_P dt / h
 
 @dataclass(frozen=True, eq=False)
 class EnergeticBlocks:
-    """Blocks of density 1; they depend on the mesh, the wave speeds and the time step only.
+    """Hold the blocks of density 1; they depend on the mesh, the wave speeds and the time step only.
 
     single: (steps, 4n, 4n); double: (steps, 4n, 2n); hyper: (steps, 2n, 2n), None for the unsymmetric form alone.
     """
@@ -107,7 +107,7 @@ def energetic_blocks(
 
 @dataclass(frozen=True)
 class Motion:
-    """Histories on the boundary after the last axis R of right-hand sides: end of each step / mean over each step.
+    """Hold histories on the boundary, last axis R of right-hand sides: at the end of, or as a mean over, each step.
 
     displacement: (steps, 2n, R) at t_1 ... t_N; traction: (steps, 4n, R) constant in each step; forces: (steps, 2n, R)
     nodal forces F, reactions at fixed unknowns included. For density 1: divide forces by rho before, multiply after.
@@ -119,7 +119,7 @@ class Motion:
 
 
 class Marching:
-    """Solves the block Toeplitz system step by step; the first block is factored once.
+    """Solve the block Toeplitz system step by step; the first block is factored once.
 
     fixed: (2n,) unknowns whose displacement is given; symmetric: which form.
     """
@@ -143,7 +143,7 @@ class Marching:
         self.factor = lu_factor(self.s0[np.ix_(self.free, self.free)]) if self.free.any() else None
 
     def run(self, forces: Array, prescribed: Array | None = None) -> Motion:
-        """Motion under forces (steps, 2n, R); prescribed: (steps, 2n, R) displacements, read at fixed unknowns only."""
+        """Return the motion under forces (steps, 2n, R); prescribed: (steps, 2n, R), read at fixed unknowns only."""
         array("Marching", "forces", forces, (None, 2 * len(self.blocks.mesh), None), unit="N/m")
         steps, unknowns, count = forces.shape
         if prescribed is not None:
@@ -171,13 +171,13 @@ class Marching:
         return Motion(np.cumsum(u, axis=0, out=u), p, total)
 
     def _past_first(self, k: int, p: Array, u: Array) -> Array:
-        """sum over earlier steps of V p - K u."""
+        """Return the sum over earlier steps of V p - K u."""
         if k == 0:
             return np.zeros(p.shape[1:])
         return summed(self.blocks.single[k:0:-1], p[:k]) - summed(self.blocks.double[k:0:-1], u[:k])
 
     def _past_second(self, k: int, p: Array, q: Array, u: Array) -> Array:
-        """sum over earlier steps of K' p - D u; q are the jumps of p. Zero in the unsymmetric form."""
+        """Return the sum over earlier steps of K' p - D u; q are the jumps of p. Zero in the unsymmetric form."""
         if k == 0 or not self.symmetric:
             return np.zeros(u.shape[1:])
         assert self.blocks.hyper is not None
@@ -186,7 +186,7 @@ class Marching:
 
 
 def summed(blocks: Array, values: Array) -> Array:
-    """sum_l blocks[l] @ values[l], in groups so that the products stay small."""
+    """Return sum_l blocks[l] @ values[l], in groups so that the products stay small."""
     total = np.zeros((blocks.shape[1], values.shape[2]))
     for start in range(0, len(blocks), 16):
         total += np.matmul(blocks[start : start + 16], values[start : start + 16]).sum(axis=0)

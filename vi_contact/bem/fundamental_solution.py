@@ -1,4 +1,4 @@
-"""Radial functions of the fundamental solution of plane-strain elastodynamics, in both domains, for density 1.
+"""Evaluate radial functions of the fundamental solution of plane-strain elastodynamics in both domains, density 1.
 
 With (Δ - s²/c_a²) Phi_a = -delta, that is Phi_a = K0(s r/c_a) / (2 pi), a = P, S (Laplace domain),
 
@@ -33,14 +33,14 @@ SMALL = 0.7  # below this the Bessel function minus its pole is summed as a powe
 
 
 class SingleLayerKernels(NamedTuple):
-    """G = g1 I - g2 r̂ r̂ᵀ (density 1); arrays of the shape of r."""
+    """Hold G = g1 I - g2 r̂ r̂ᵀ (density 1); arrays of the shape of r."""
 
     g1: Array
     g2: Array
 
 
 class DoubleLayerKernels(NamedTuple):
-    """phi = Phi_S, dphi = Phi_S'/r, ddiff = (Phi_P - Phi_S)'/r and G; a prime is d/dr."""
+    """Hold phi = Phi_S, dphi = Phi_S'/r, ddiff = (Phi_P - Phi_S)'/r and G; a prime is d/dr."""
 
     phi: Array
     dphi: Array
@@ -50,7 +50,7 @@ class DoubleLayerKernels(NamedTuple):
 
 
 class HypersingularKernels(NamedTuple):
-    """As for the double layer, and inertia_a = s² Phi_a (in time: Phi_a integrated twice less)."""
+    """Hold those of the double layer, and inertia_a = s² Phi_a (in time: Phi_a integrated twice less)."""
 
     phi: Array
     dphi: Array
@@ -62,7 +62,7 @@ class HypersingularKernels(NamedTuple):
 
 
 class KernelSet(NamedTuple):
-    """What the Galerkin layer integrates; an operator whose kernels are None is not assembled."""
+    """Hold what the Galerkin layer integrates; an operator whose kernels are None is not assembled."""
 
     single: SingleLayerKernels | None = None
     double: DoubleLayerKernels | None = None
@@ -71,7 +71,7 @@ class KernelSet(NamedTuple):
 
 @dataclass(frozen=True)
 class LaplaceKernels:
-    """Kernels at one complex frequency s [1/s], Re s > 0; call with distances r [m] > 0."""
+    """Evaluate kernels at one complex frequency s [1/s], Re s > 0; call with distances r [m] > 0."""
 
     s: complex
     c_p: float
@@ -86,7 +86,7 @@ class LaplaceKernels:
                              "positive real part [1/s]")
 
     def __call__(self, r: Array) -> KernelSet:
-        """All three operators share the same seven functions."""
+        """Evaluate the seven functions that all three operators share."""
         s, ratio2 = self.s, (self.c_s / self.c_p) ** 2
         z_s, z_p = s * r / self.c_s, s * r / self.c_p
         k0_s, k0_p, kappa_s, kappa_p = kv(0, z_s), kv(0, z_p), kappa(z_s), kappa(z_p)
@@ -111,7 +111,7 @@ def _check_speeds(kernels: LaplaceKernels | TimeKernels) -> None:
 
 
 def kappa(z: NDArray) -> NDArray:
-    """K1(z)/z - 1/z², the part of K1(z)/z that stays logarithmic at z = 0; by its power series where |z| < 0.7."""
+    """Return K1(z)/z - 1/z², what of K1(z)/z stays logarithmic at z = 0; by its power series where |z| < 0.7."""
     z = np.asarray(z, complex)
     small = np.abs(z) < SMALL
     safe = np.where(small, 1.0, z)
@@ -133,7 +133,7 @@ def _kappa_series(z: NDArray) -> NDArray:
 
 @dataclass(frozen=True)
 class TimeKernels:
-    """Kernels at one time t [s]: G integrated once (single layer), twice (double), three times (hypersingular).
+    """Evaluate kernels at a time t [s]: G integrated once (single layer), twice (double), three times (hypersingular).
 
     That is what functions constant in time (traction) and linear in time (displacement) need.
     """
@@ -148,7 +148,7 @@ class TimeKernels:
         attributes(self, positive=("t",))
 
     def __call__(self, r: Array) -> KernelSet:
-        """Kernels at distances r [m] > 0; zero where r >= c_p t."""
+        """Return the kernels at distances r [m] > 0; zero where r >= c_p t."""
         t, slow, fast = self.t, 1.0 / self.c_s**2, 1.0 / self.c_p**2
         root_s, f1_s = front_functions(r, t, self.c_s)
         root_p, f1_p = front_functions(r, t, self.c_p)
@@ -176,12 +176,12 @@ class TimeKernels:
 
 
 def front_functions(r: Array, t: float, c: float) -> tuple[Array, Array]:
-    """(R, F_1) = (sqrt(t² - r²/c²), ln((t + R) c/r)), both zero ahead of the front."""
+    """Return (R, F_1) = (sqrt(t² - r²/c²), ln((t + R) c/r)), both zero ahead of the front."""
     q = np.minimum(r / (c * t), 1.0)
     root = np.sqrt((1.0 - q) * (1.0 + q))
     return t * root, np.log((1.0 + root) / q)
 
 
 def tensor(f_s: Array, f_p: Array, dq: Array) -> SingleLayerKernels:
-    """(g1, g2) from F_n^S/c_S², F_n^P/c_P² and dQ_(n+2)."""
+    """Return (g1, g2) from F_n^S/c_S², F_n^P/c_P² and dQ_(n+2)."""
     return SingleLayerKernels((f_s - dq) / TWO_PI, (f_s - f_p - 2.0 * dq) / TWO_PI)

@@ -1,4 +1,4 @@
-"""Displacement inside the body from the histories on its boundary: u(x) = V p - K u, in time."""
+"""Compute the displacement inside the body from the histories on its boundary: u(x) = V p - K u, in time."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ ORDER, CLOSEST = 8, 1e-3  # points a piece; least distance from the boundary in 
 def interior_displacement(
     operator: PoincareSteklov, motion: BoundaryMotion, points: ArrayLike, *, steps: Sequence[int] | None = None
 ) -> Array:
-    """(len(steps), m, 2) displacement [m] at the times motion.times[steps] (all if None) of points (m, 2) in the body.
+    """Return (len(steps), m, 2) displacement [m] at the times motion.times[steps] (None: all) of inner points (m, 2).
 
     Without quadrature in time, with the elements split at the wave fronts. Raises InputError for points on the boundary
     or outside the body.
@@ -53,7 +53,7 @@ def interior_displacement(
 
 
 def _matrices(mesh: BoundaryMesh, x: Array, t: float, c_p: float, c_s: float) -> tuple[Array, Array]:
-    """(2m, 4n) of V integrated once, (2m, 2n) of K integrated twice, both up to t; density 1."""
+    """Return (2m, 4n) of V integrated once, (2m, 2n) of K integrated twice, both up to t; density 1."""
     m, n = len(x), len(mesh)
     moments = np.concatenate(list(_moments(mesh, x, t, c_p, c_s)), axis=1)
     point, element = np.repeat(np.arange(m), n), np.tile(np.arange(n), m)
@@ -68,7 +68,7 @@ def _matrices(mesh: BoundaryMesh, x: Array, t: float, c_p: float, c_s: float) ->
 
 
 def _moments(mesh: BoundaryMesh, x: Array, t: float, c_p: float, c_s: float) -> Iterator[Array]:
-    """(k, points * n, 2) integrals over each element of the stacked kernels against its shape functions, in groups."""
+    """Return (k, points * n, 2) integrals over each element of the stacked kernels against its shape functions."""
     n, along = len(mesh), mesh.points[mesh.after] - mesh.points
     group = max(1, 4000 // n)
     kernels = TimeKernels(t, c_p, c_s, hyper=False)
@@ -95,7 +95,7 @@ def _moments(mesh: BoundaryMesh, x: Array, t: float, c_p: float, c_s: float) -> 
 
 
 def _check_inside(mesh: BoundaryMesh, x: Array) -> None:
-    """Winding number 1 (0 for an exterior body), and not on the boundary."""
+    """Raise InputError unless all points are inside: winding number 1 (0 for an exterior body), off the boundary."""
     along = mesh.points[mesh.after] - mesh.points
     offset = x[:, None] - mesh.points
     share = np.clip((offset * along).sum(2) / mesh.lengths**2, 0.0, 1.0)

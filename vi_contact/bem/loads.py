@@ -1,4 +1,4 @@
-"""Nodal forces of surface tractions, averaged over each time step."""
+"""Turn surface tractions into nodal forces, averaged over each time step."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def traction_forces(
     elements: ArrayLike | None = None,
     order: int = 4,
 ) -> Array:
-    """(steps, 2, n) nodal forces [N/m], mean over each step, of traction(points, normals, t) -> (m, 2) [Pa].
+    """Return (steps, 2, n) nodal forces [N/m], mean over each step, of traction(points, normals, t) -> (m, 2) [Pa].
 
     points, normals: (m, 2); elements: mask (n,) of the loaded elements, all if None; order: Gauss points in time and
     along an element.

@@ -1,4 +1,4 @@
-"""Closed loops of segments: put in order, turned the right way round, checked for crossings."""
+"""Put closed loops of segments in order, turn them the right way round, check them for crossings."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ TOUCHING = 1e-12  # of the size of the boundary: nearer is the same place
 
 
 def signed_area(points: Array) -> float:
-    """Area inside one loop, positive when it runs counter-clockwise [m²]."""
+    """Return the area inside one loop, positive when it runs counter-clockwise [m²]."""
     x, y = (points - points[0]).T
     return float(0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
 
 
 def inside(point: Array, loop: Array) -> bool:
-    """Whether the point lies inside the loop, by counting crossings of a ray."""
+    """Tell whether the point lies inside the loop, by counting crossings of a ray."""
     a, b = loop, np.roll(loop, -1, axis=0)
     spans = (a[:, 1] > point[1]) != (b[:, 1] > point[1])
     a, b = a[spans], b[spans]
@@ -28,7 +28,7 @@ def inside(point: Array, loop: Array) -> bool:
 
 
 def should_run_forward(loops: list[Array], *, exterior: bool) -> list[bool]:
-    """Whether each loop has to run counter-clockwise: outer loops do, holes do not; an exterior body reverses all."""
+    """Tell whether each loop has to run counter-clockwise: outer loops do, holes not; the reverse if exterior."""
     depths = [sum(inside(loop[0], other) for other in loops if other is not loop) for loop in loops]
     return [(depth % 2 == 0) != exterior for depth in depths]
 
@@ -89,12 +89,12 @@ def _check_touching(points: Array, after: Index) -> None:
 
 
 def place(point: Array) -> str:
-    """A point for a sentence."""
+    """Format a point for a sentence."""
     return f"({point[0]:.4g}, {point[1]:.4g})"
 
 
 def ordered_loops(points: Array, segments: Index, *, exterior: bool) -> tuple[Index, tuple[int, ...]]:
-    """((n, 2) start point and number of each segment, loop after loop; sizes of the loops), body on the left."""
+    """Return ((n, 2) start point and number of each segment, loop after loop; sizes of the loops), body on the left."""
     ends = np.bincount(segments.ravel(), minlength=len(points))
     if len(segments) == 0 or (ends[np.unique(segments)] != 2).any():
         bad = int(np.argmax((ends != 2) & (ends > 0)))

@@ -1,4 +1,4 @@
-"""The matrices of one body: at a complex frequency, or integrated in time up to a time t."""
+"""Build the matrices of one body: at a complex frequency, or integrated in time up to a time t."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def check_body(mesh: BoundaryMesh, material: LinearElastic, orders: Orders) -> N
 
 
 class Operators:
-    """Single layer V, double layer K and hypersingular D of a body in plane strain, per metre of thickness.
+    """Build single layer V, double layer K and hypersingular D of a body in plane strain, per metre of thickness.
 
     mesh: its boundary; material: its wave speeds and density. The radial kernels see speeds only; the density rho
     enters as V/rho, K, rho D.
@@ -32,21 +32,21 @@ class Operators:
         self.galerkin = Galerkin(mesh, self.c_s, orders)
 
     def laplace(self, s: complex) -> OperatorMatrices:
-        """V(s), K(s), D(s), Re s > 0 [1/s]; S(s) = (M/2 + K)ᵀ V⁻¹ (M/2 + K) - D maps nodal u to nodal forces."""
+        """Return V(s), K(s), D(s), Re s > 0 [1/s]; S(s) = (M/2 + K)ᵀ V⁻¹ (M/2 + K) - D maps nodal u to nodal forces."""
         return self.with_density(self.galerkin.assemble(LaplaceKernels(s, self.c_p, self.c_s)))
 
     def in_time(self, t: float, *, hyper: bool = True) -> OperatorMatrices:
-        """A = V integrated once in time, B = K twice, C = D three times, up to t > 0 [s] (docs/theory/bem.md)."""
+        """Return A = V integrated once in time, B = K twice, C = D three times, up to t > 0 [s]."""
         return self.with_density(self.unit_in_time(t, hyper=hyper))
 
     def unit_in_time(self, t: float, *, hyper: bool = True) -> OperatorMatrices:
-        """The same for density 1."""
+        """Return the matrices in time for density 1."""
         number("Operators", "the time t", t, positive=True, unit="s")
         kernels = TimeKernels(t, self.c_p, self.c_s, hyper)
         return self.galerkin.assemble(kernels, (self.c_s * t, self.c_p * t))
 
     def with_density(self, unit: OperatorMatrices) -> OperatorMatrices:
-        """Matrices of density 1 turned into those of the material."""
+        """Turn matrices of density 1 into those of the material."""
         rho = self.material.rho
         return OperatorMatrices(
             None if unit.single is None else unit.single / rho,

@@ -1,7 +1,7 @@
-"""Poincaré-Steklov operator of one body, boundary value problems with it, and what contact needs to know of them.
+"""Build the Poincaré-Steklov operator of one body, boundary value problems with it, and what contact needs of them.
 
 S maps the history of boundary displacements to nodal forces. Symmetric form S = (K' + 1/2) V⁻¹ (K + 1/2) - D (default:
-its space-time matrix is positive definite), unsymmetric form S = V⁻¹ (K + 1/2) (seed 003; positivity not guaranteed).
+its space-time matrix is positive definite), unsymmetric form S = V⁻¹ (K + 1/2) (positivity not guaranteed).
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class PoincareSteklov:
-    """S of a body of density rho [kg/m³] from blocks of density 1."""
+    """Hold S of a body of density rho [kg/m³], from blocks of density 1."""
 
     blocks: EnergeticBlocks
     rho: float
@@ -36,11 +36,11 @@ class PoincareSteklov:
 
     @property
     def mesh(self) -> BoundaryMesh:
-        """The boundary."""
+        """Return the boundary."""
         return self.blocks.mesh
 
     def apply(self, displacement: ArrayLike) -> Array:
-        """(steps, 2, n) nodal forces [N/m] of displacements (steps, 2, n) at t_1, t_2, ...; 0 at t_0."""
+        """Return (steps, 2, n) nodal forces [N/m] of displacements (steps, 2, n) at t_1, t_2, ...; 0 at t_0."""
         u = self._history("displacement", displacement)
         everything = np.ones(2 * len(self.mesh), bool)
         flat = u.reshape(len(u), -1, 1)
@@ -48,7 +48,7 @@ class PoincareSteklov:
         return self.rho * motion.forces.reshape(u.shape)
 
     def solve(self, forces: ArrayLike) -> Array:
-        """(steps, 2, n) displacements under nodal forces (steps, 2, n): the inverse, no support anywhere."""
+        """Return (steps, 2, n) displacements under nodal forces (steps, 2, n): the inverse, no support anywhere."""
         f = self._history("forces", forces)
         free = np.zeros(2 * len(self.mesh), bool)
         motion = Marching(self.blocks, free, symmetric=self.symmetric).run(f.reshape(len(f), -1, 1) / self.rho)
@@ -73,12 +73,12 @@ class BoundaryMotion:
 
     @property
     def work(self) -> Array:
-        """(steps,) work of all forces up to each time [J/m], the energy of the body (symmetric form: >= 0)."""
+        """Return (steps,) work of all forces up to each time [J/m], the energy of the body (symmetric form: >= 0)."""
         increments = np.diff(self.displacement, axis=0, prepend=0.0)
         return np.cumsum((self.forces * increments).sum(axis=(1, 2)))
 
     def work_on(self, nodes: ArrayLike) -> Array:
-        """(steps,) the part of the work done at masked nodes (n,) [J/m]."""
+        """Return (steps,) the part of the work done at masked nodes (n,) [J/m]."""
         increments = np.diff(self.displacement, axis=0, prepend=0.0)
         chosen = mask("BoundaryMotion.work_on", "nodes", nodes, self.displacement.shape[2:])
         return np.cumsum((self.forces * increments)[:, :, chosen].sum(axis=(1, 2)))
@@ -86,7 +86,7 @@ class BoundaryMotion:
 
 @dataclass(frozen=True)
 class CondensedCompliance:
-    """u_c at t_(k+1) = sum_(l<=k) W[k-l] lam[l] + u_free[k], all that contact needs to know.
+    """Hold u_c at t_(k+1) = sum_(l<=k) W[k-l] lam[l] + u_free[k], all that contact needs to know.
 
     W: (steps, 2m, 2m) [m²/N], displacement of the contact unknowns (x of all nodes, then y) at the end of step j after
     a unit nodal force [N/m] during step 0; u_free: (steps, 2m) [m] without contact forces; nodes: (m,) numbers in the
@@ -115,14 +115,14 @@ class CondensedCompliance:
         number(owner, "dt", self.dt, positive=True, unit="s")
 
     def displacement(self, forces: Array) -> Array:
-        """(steps, 2m) displacements under nodal contact forces (steps, 2m)."""
+        """Return (steps, 2m) displacements under nodal contact forces (steps, 2m)."""
         past = [summed(self.W[k::-1], forces[: k + 1, :, None])[:, 0] for k in range(len(forces))]
         return self.u_free[: len(forces)] + np.array(past)
 
 
 @dataclass(frozen=True, eq=False)
 class BoundaryProblem:
-    """A body with supports, loads and a boundary that may come into contact.
+    """Describe a body with supports, loads and a boundary that may come into contact.
 
     operator: its S; forces: (steps, 2, n) nodal forces of the loads [N/m] (loads.py); fixed: (2, n) supported unknowns;
     prescribed: (steps, 2, n) their displacement [m], zero if None; contact: (n,) mask of the elements of the contact
@@ -149,25 +149,25 @@ class BoundaryProblem:
 
     @cached_property
     def marching(self) -> Marching:
-        """The factored system."""
+        """Return the factored system."""
         n = len(self.operator.mesh)
         fixed = np.zeros(2 * n, bool) if self.fixed is None else np.asarray(self.fixed, bool).ravel()
         return Marching(self.operator.blocks, fixed, symmetric=self.operator.symmetric)
 
     @property
     def times(self) -> Array:
-        """(steps,) ends of the steps [s]."""
+        """Return (steps,) ends of the steps [s]."""
         return self.operator.blocks.dt * np.arange(1, len(self.forces) + 1)
 
     @cached_property
     def contact_nodes(self) -> NDArray[np.int64]:
-        """(m,) numbers of the nodes of the contact boundary."""
+        """Return (m,) numbers of the nodes of the contact boundary."""
         if self.contact is None or not np.any(self.contact):
             raise InputError("BoundaryProblem: no contact boundary; give `contact`, the mask of its elements")
         return np.flatnonzero(self.operator.mesh.nodes_of(self.contact))
 
     def solve(self, contact_forces: ArrayLike | None = None) -> BoundaryMotion:
-        """Motion under the loads and nodal contact forces (steps, 2m) in the order of CondensedCompliance."""
+        """Return the motion under loads and nodal contact forces (steps, 2m), ordered as CondensedCompliance."""
         n, rho = len(self.operator.mesh), self.operator.rho
         forces = np.array(self.forces, float)
         if contact_forces is not None:
@@ -182,7 +182,7 @@ class BoundaryProblem:
         )
 
     def condensed(self) -> CondensedCompliance:
-        """Compliance of the contact unknowns and their motion without contact, in one march with 2m + 1 columns."""
+        """Return the compliance of the contact unknowns and their free motion, in one march with 2m + 1 columns."""
         mesh, nodes, steps = self.operator.mesh, self.contact_nodes, len(self.forces)
         n, unknowns = len(mesh), np.concatenate([nodes, nodes + len(mesh)])
         forces = np.zeros((steps, 2 * n, len(unknowns) + 1))

@@ -1,4 +1,4 @@
-"""Points and weights for double integrals over pairs of elements, split where a wave front cuts through them.
+"""Place points and weights for double integrals over pairs of elements, split where a wave front cuts through.
 
 A kernel at time t has square-root kinks at r = c_S t and r = c_P t and a logarithm at r = 0. Pairs of elements that do
 not touch are integrated with products of Gauss rules, or, where a front crosses, with both integrals split at the
@@ -34,7 +34,9 @@ CHUNK = 40_000  # points evaluated at once: keeps the arrays in the cache
 
 @dataclass(frozen=True)
 class Orders:
-    """Gauss points: far and near pairs (each way); pieces of split pairs, outer and inner; touching pairs; pieces of
+    """Hold counts of Gauss points.
+
+    Far and near pairs (each way); pieces of split pairs, outer and inner; touching pairs; pieces of
     pairs that are close (each way)."""
 
     far: int = 4
@@ -51,7 +53,7 @@ class Orders:
 
 @dataclass(frozen=True)
 class PointSet:
-    """Points of some element pairs: x on the first element at xi, y on the second at eta, both in [0, 1].
+    """Hold points of some element pairs: x on the first element at xi, y on the second at eta, both in [0, 1].
 
     pairs: (p,) numbers of the pairs; owner: (m,) which of them a point belongs to, or None when the points come in
     equal blocks of len(weight); d: (2, m) x - y [m]; r: (m,) its length; xi, eta, weight: (m,), or one block of them.
@@ -66,7 +68,7 @@ class PointSet:
     weight: Array
 
     def integrate(self, values: NDArray) -> NDArray:
-        """(k, p, 4) integrals in (xi, eta) of (k, m) values against phi_a(xi) phi_b(eta), [2 a + b], phi = 1 - x, x."""
+        """Return (k, p, 4) integrals of (k, m) values times phi_a(xi) phi_b(eta), [2 a + b], phi = 1 - x, x."""
         shapes = np.stack(
             [(1 - self.xi) * (1 - self.eta), (1 - self.xi) * self.eta, self.xi * (1 - self.eta), self.xi * self.eta], 1
         ) * self.weight[:, None]
@@ -79,7 +81,7 @@ class PointSet:
 
 
 def point_sets(pairs: ElementPairs, fronts: Sequence[float], orders: Orders = Orders()) -> Iterator[PointSet]:
-    """All points needed for kernels with kinks at r in `fronts` [m], zero beyond the greatest of them; () is smooth."""
+    """Return all points for kernels with kinks at r in `fronts` [m], zero beyond the greatest of them; () is smooth."""
     reach = max(fronts, default=np.inf)
     crossed = np.zeros(len(pairs), bool)
     behind_soon = np.zeros(len(pairs), bool)
@@ -121,7 +123,7 @@ def _flat(pairs: ElementPairs, chosen: Index, owner: Index, xi: Array, eta: Arra
 def _split(
     pairs: ElementPairs, chosen: Index, fronts: Sequence[float], outer: Rule, inner: Rule, *, close: bool = False
 ) -> Iterator[PointSet]:
-    """Outer integral split where fronts reach the ends of the second element or graze it, inner one at the fronts.
+    """Split the outer integral where fronts reach the second element's ends or graze it, the inner one at the fronts.
 
     Where elements are close, both are split and stretched about the feet as well.
     """
@@ -135,7 +137,7 @@ def _split(
 def _outer(
     pairs: ElementPairs, part: Index, fronts: Sequence[float], rule: Rule, close: bool
 ) -> tuple[Index, Array, Array]:
-    """(pair in ``part``, xi, weight) of the points on the first elements."""
+    """Return (pair in ``part``, xi, weight) of the points on the first elements."""
     breaks = _outer_breaks(pairs, part, fronts)
     if close:
         feet, heights = _feet(pairs, part)
@@ -151,7 +153,7 @@ def _outer(
 def _inner(
     pairs: ElementPairs, pair: Index, xi: Array, scale: Array, fronts: Sequence[float], rule: Rule, close: bool
 ) -> tuple[Index, Array, Array]:
-    """(row of ``xi``, eta, weight) of the points on the second elements that the last front has reached."""
+    """Return (row of ``xi``, eta, weight) of the points on the second elements that the last front has reached."""
     d, b = pairs.offset[:, pair] + pairs.a[:, pair] * xi, pairs.b[:, pair]
     b2, projection, d2 = (b**2).sum(0), (d * b).sum(0), (d**2).sum(0)
     breaks = [roots(b2, -2.0 * projection, d2 - front**2) for front in fronts]
@@ -168,7 +170,7 @@ def _inner(
 
 
 def _feet(pairs: ElementPairs, part: Index) -> tuple[Array, Array]:
-    """(p, 2) xi of the feet of both ends of the second element on the line of the first, and their heights over it."""
+    """Return (p, 2) xi of the feet of the second element's ends on the line of the first, and their heights over it."""
     offset, a, b = pairs.offset[:, part], pairs.a[:, part], pairs.b[:, part]
     a2 = (a**2).sum(0)
     ends = (-offset, b - offset)
@@ -178,7 +180,7 @@ def _feet(pairs: ElementPairs, part: Index) -> tuple[Array, Array]:
 
 
 def _outer_breaks(pairs: ElementPairs, part: Index, fronts: Sequence[float]) -> Array:
-    """(p, 6 per front) xi where the first element is at a front's distance from an end of the second, or its line."""
+    """Return (p, 6 per front) xi where the first element is a front away from an end of the second, or its line."""
     offset, a, b = pairs.offset[:, part], pairs.a[:, part], pairs.b[:, part]
     a2 = (a**2).sum(0)
     normal = np.stack([b[1], -b[0]]) / np.hypot(*b)
@@ -194,7 +196,7 @@ def _outer_breaks(pairs: ElementPairs, part: Index, fronts: Sequence[float]) -> 
 
 
 def _on_one_element(pairs: ElementPairs, chosen: Index, fronts: Sequence[float], order: int) -> Iterator[PointSet]:
-    """r depends on z = |xi - eta| alone: one integral in z, split at the fronts; two points across are exact."""
+    """Integrate once in z = |xi - eta|, on which alone r depends, split at the fronts; two points across are exact."""
     h = np.hypot(*pairs.a[:, chosen])
     breaks = np.stack([front / h for front in fronts], axis=1) if len(fronts) else np.empty((len(h), 0))
     row, low, length = pieces(breaks)
@@ -214,7 +216,7 @@ def _on_one_element(pairs: ElementPairs, chosen: Index, fronts: Sequence[float],
 def _at_corners(
     pairs: ElementPairs, chosen: Index, fronts: Sequence[float], order: int, *, sharp: bool
 ) -> Iterator[PointSet]:
-    """Distances from the corner are (u, u w) and (u w, u): r = u R(w), inner integral in u split at fronts/R(w).
+    """Place points at (u, u w) and (u w, u) from the corner: r = u R(w), inner integral in u split at fronts/R(w).
 
     sharp: R(w) falls to a small share of its greatest value at the foot of one end on the other element.
     """

@@ -1,4 +1,4 @@
-"""Galerkin matrices for many complex frequencies: the radial functions are interpolated, the geometry integrated once.
+"""Assemble Galerkin matrices for many complex frequencies: radial functions interpolated, geometry integrated once.
 
 On each panel of distances a function f(r) is the polynomial through its values at Chebyshev points r_q, so every
 integral of the Galerkin layer is a fixed sum over the points:
@@ -32,7 +32,7 @@ SMALLEST = 1e-9  # end of the dyadic panels, relative to the shortest element
 
 
 class RadialTable(Galerkin):
-    """The Galerkin layer for kernels without fronts, interpolated on panels of distance no wider than `width` [m].
+    """Integrate kernels without fronts, interpolated on panels of distance no wider than `width` [m].
 
     `assemble(LaplaceKernels(s, c_p, c_s))` as before, with all three operators. Memory: 10 kB per pair of elements.
     """
@@ -50,7 +50,7 @@ class RadialTable(Galerkin):
         self._matrices, self._pole = self._integrated()
 
     def interpolation(self, r: Array) -> csr_matrix:
-        """(m, nodes) matrix that takes values at the nodes to values at distances r (m,)."""
+        """Return (m, nodes) matrix that takes values at the nodes to values at distances r (m,)."""
         panel = np.clip(np.searchsorted(self.edges, r) - 1, 0, len(self.edges) - 2)
         low, high = self.edges[panel], self.edges[panel + 1]
         weights = chebvander((2.0 * r - low - high) / (high - low), POINTS - 1) @ self._to_coefficients
@@ -59,7 +59,7 @@ class RadialTable(Galerkin):
         return csr_matrix((weights.ravel(), columns.ravel(), rows), shape=(len(r), len(self.nodes)))
 
     def _integrated(self) -> tuple[list[csr_matrix], Array]:
-        """(4 pairs, nodes) for each factor 1, d_x²/r², d_x d_y/r², d_y²/r², d_x, d_y; the pole's two integrals."""
+        """Return (4 pairs, nodes) for factors 1, d_x²/r², d_x d_y/r², d_y²/r², d_x, d_y; the pole's two integrals."""
         blocks: list[list[csr_matrix]] = [[] for _ in range(6)]
         poles, order = [], []
         for points in point_sets(self.pairs, (), self.orders):
@@ -90,7 +90,7 @@ class RadialTable(Galerkin):
 
 
 def _product(matrix: csr_matrix, columns: list[NDArray]) -> NDArray:
-    """(k, rows) of a real matrix times k complex columns, without a complex copy of the matrix."""
+    """Multiply a real matrix by k complex columns, without a complex copy of the matrix: (k, rows)."""
     values = np.ascontiguousarray(np.stack(columns, axis=1), complex)
     return np.asarray(matrix @ values.view(float)).view(complex).T
 
@@ -100,7 +100,7 @@ def _factors(d: Array, inverse: Array) -> tuple[Array, ...]:
 
 
 def _shapes(points: PointSet) -> csr_matrix:
-    """(4 pairs, m) weighted shape functions: their product with values at the points integrates them."""
+    """Return (4 pairs, m) weighted shape functions: their product with values at the points integrates them."""
     xi, eta, weight, owner = points.xi, points.eta, points.weight, points.owner
     if owner is None:
         repeats = len(points.pairs)

@@ -1,4 +1,4 @@
-"""Rules for one integral: Gauss points, substitutions that tame what happens at the ends or close to the interval."""
+"""Make rules for one integral: Gauss points, substitutions that tame what happens at or close to the ends."""
 
 from __future__ import annotations
 
@@ -15,27 +15,27 @@ FLAT = 1e-6  # least height of a singularity over a piece, over the length of th
 
 @lru_cache
 def gauss(n: int) -> tuple[Array, Array]:
-    """Gauss points and weights on [0, 1]."""
+    """Return the Gauss points and weights on [0, 1]."""
     x, w = np.polynomial.legendre.leggauss(n)
     return 0.5 * (x + 1.0), 0.5 * w
 
 
 @lru_cache
 def smoothed(n: int) -> tuple[Array, Array]:
-    """Gauss rule after the substitution w²(3 - 2w): exact ends for square roots and logarithms."""
+    """Return the Gauss rule after the substitution w²(3 - 2w): exact ends for square roots and logarithms."""
     x, w = gauss(n)
     return x**2 * (3.0 - 2.0 * x), 6.0 * w * x * (1.0 - x)
 
 
 @lru_cache
 def graded(n: int) -> tuple[Array, Array]:
-    """Gauss rule after the substitution w³(10 - 15w + 6w²), for the logarithm at r = 0."""
+    """Return the Gauss rule after the substitution w³(10 - 15w + 6w²), for the logarithm at r = 0."""
     x, w = gauss(n)
     return x**3 * (10.0 - 15.0 * x + 6.0 * x**2), 30.0 * w * (x * (1.0 - x)) ** 2
 
 
 def pieces(breaks: Array) -> tuple[Index, Array, Array]:
-    """(row, start, length) of the parts into which each row of breaks cuts [0, 1]; NaN is no break."""
+    """Return (row, start, length) of the parts into which each row of breaks cuts [0, 1]; NaN is no break."""
     inner = np.clip(np.nan_to_num(breaks, nan=0.0), 0.0, 1.0)
     ends = np.zeros((len(breaks), 1)), np.ones((len(breaks), 1))
     sorted_ends = np.sort(np.concatenate([ends[0], inner, ends[1]], axis=1), axis=1)
@@ -45,14 +45,14 @@ def pieces(breaks: Array) -> tuple[Index, Array, Array]:
 
 
 def roots(a: Array, b: Array, c: Array) -> Array:
-    """(..., 2) real roots of a x² + b x + c, NaN where there are none."""
+    """Return (..., 2) real roots of a x² + b x + c, NaN where there are none."""
     with np.errstate(invalid="ignore", divide="ignore"):
         q = -0.5 * (b + np.copysign(np.sqrt(b**2 - 4.0 * a * c), b))
         return np.stack([q / a, c / q], axis=-1)
 
 
 def linear(low: Array, length: Array, rule: tuple[Array, Array], scale: Array | float = 1.0) -> tuple[Array, Array]:
-    """Points and weights (p, n) of a rule on pieces from ``low`` (p,) of these lengths; scale: of the weights."""
+    """Return points and weights (p, n) of a rule on pieces from ``low`` (p,); scale: of the weights."""
     x, w = rule
     return low[:, None] + length[:, None] * x, (scale * length)[:, None] * w
 
@@ -60,7 +60,7 @@ def linear(low: Array, length: Array, rule: tuple[Array, Array], scale: Array | 
 def stretched(
     low: Array, length: Array, rule: tuple[Array, Array], centre: Array, height: Array, scale: Array | float = 1.0
 ) -> tuple[Array, Array]:
-    """The same with x = centre + height sinh(v), the rule being one in v.
+    """Return them with x = centre + height sinh(v), the rule being one in v.
 
     For functions of sqrt((x - centre)² + height²) that are singular where it is zero, however near that is: a peak
     becomes 1/cosh(v). Far from the centre the substitution is an exponential; beside a great height it is linear.

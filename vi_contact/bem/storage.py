@@ -1,4 +1,4 @@
-"""Saved boundary element blocks (HDF5): they depend on geometry, wave speeds and time step, on no load or density."""
+"""Save boundary element blocks (HDF5): they depend on geometry, wave speeds and time step, on no load or density."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def save_blocks(path: str | Path, blocks: EnergeticBlocks) -> None:
 def load_blocks(
     path: str | Path, mesh: BoundaryMesh, material: LinearElastic, *, dt: float, steps: int, hyper: bool = True
 ) -> EnergeticBlocks:
-    """The first `steps` blocks of a file written by save_blocks.
+    """Load the first `steps` blocks of a file written by save_blocks.
 
     Raises InputError, naming what differs, when the file belongs to another mesh, material or time step, holds fewer
     steps or lacks the hypersingular operator, or is no such file.
@@ -99,7 +99,7 @@ def _read(
 def stored_blocks(
     path: str | Path, mesh: BoundaryMesh, material: LinearElastic, *, dt: float, steps: int, hyper: bool = True
 ) -> EnergeticBlocks:
-    """load_blocks if the file exists, else energetic_blocks and save_blocks."""
+    """Load the blocks if the file exists, else compute and save them."""
     if checks.path("stored_blocks", "path", path).exists():
         return load_blocks(path, mesh, material, dt=dt, steps=steps, hyper=hyper)
     if not Path(path).parent.is_dir():

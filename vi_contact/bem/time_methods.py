@@ -1,4 +1,4 @@
-"""Time stepping methods of convolution quadrature, and the circle in the z-plane on which it works.
+"""Define time methods of convolution quadrature, and the circle in the z-plane on which it works.
 
 A method replaces the derivative in time by a function delta(z)/dt of the shift z (one step back): a number for the
 multistep methods, a matrix that couples the stages for Runge-Kutta methods (Lubich 1988; Banjai, Messner and Schanz
@@ -17,87 +17,87 @@ from ..core.algebra import Array
 
 
 class TimeMethod(Protocol):
-    """What convolution quadrature asks of a method."""
+    """Describe what convolution quadrature asks of a method."""
 
     @property
     def abscissae(self) -> tuple[float, ...]:
-        """Stages within a step, as shares of it; the last is 1."""
+        """Return the stages within a step, as shares of it; the last is 1."""
         ...
 
     @property
     def smallest_ratio(self) -> float:
-        """Least c_P dt/h, h the longest element, with which histories stay bounded."""
+        """Return the least c_P dt/h, h the longest element, with which histories stay bounded."""
         ...
 
     def delta(self, z: NDArray) -> NDArray:
-        """(L, stages, stages) matrices dt d/dt at shifts z (L,), |z| < 1."""
+        """Return (L, stages, stages) matrices dt d/dt at shifts z (L,), |z| < 1."""
         ...
 
 
 @dataclass(frozen=True)
 class BDF2:
-    """Backward differences of order 2: delta = 3/2 - 2 z + z²/2. Damps high frequencies."""
+    """Describe backward differences of order 2: delta = 3/2 - 2 z + z²/2. Damps high frequencies."""
 
     @property
     def abscissae(self) -> tuple[float, ...]:
-        """Stages within a step."""
+        """Return the stages within a step."""
         return (1.0,)
 
     @property
     def smallest_ratio(self) -> float:
-        """Least c_P dt/h."""
+        """Return the least c_P dt/h."""
         return 0.05
 
     def delta(self, z: NDArray) -> NDArray:
-        """(L, 1, 1)."""
+        """Return (L, 1, 1)."""
         return np.asarray(1.5 - 2.0 * z + 0.5 * z**2)[:, None, None]
 
 
 @dataclass(frozen=True)
 class Trapezoid:
-    """Trapezoidal rule, order 2: delta = 2 (1 - z)/(1 + z).
+    """Describe the trapezoidal rule, order 2: delta = 2 (1 - z)/(1 + z).
 
     No numerical damping: fronts ring, and below c_P dt/h = 0.5 the errors of integration over elements grow in time.
     """
 
     @property
     def abscissae(self) -> tuple[float, ...]:
-        """Stages within a step."""
+        """Return the stages within a step."""
         return (1.0,)
 
     @property
     def smallest_ratio(self) -> float:
-        """Least c_P dt/h."""
+        """Return the least c_P dt/h."""
         return 0.5
 
     def delta(self, z: NDArray) -> NDArray:
-        """(L, 1, 1)."""
+        """Return (L, 1, 1)."""
         return np.asarray(2.0 * (1.0 - z) / (1.0 + z))[:, None, None]
 
 
 @dataclass(frozen=True)
 class RadauIIA:
-    """Radau IIA of two stages, order 3: delta = (A + z/(1 - z) 1 bᵀ)⁻¹, b the last row of A."""
+    """Describe Radau IIA of two stages, order 3: delta = (A + z/(1 - z) 1 bᵀ)⁻¹, b the last row of A."""
 
     @property
     def abscissae(self) -> tuple[float, ...]:
-        """Stages within a step."""
+        """Return the stages within a step."""
         return (1.0 / 3.0, 1.0)
 
     @property
     def smallest_ratio(self) -> float:
-        """Least c_P dt/h."""
+        """Return the least c_P dt/h."""
         return 0.05
 
     def delta(self, z: NDArray) -> NDArray:
-        """(L, 2, 2)."""
+        """Return (L, 2, 2)."""
         a = np.array([[5.0, -1.0], [9.0, 3.0]]) / 12.0
         return np.linalg.inv(a + (z / (1.0 - z))[:, None, None] * a[-1])
 
 
 @dataclass(frozen=True)
 class Contour:
-    """The points z_l = R exp(-2 pi i l/N), l = 0 ... N/2, with which N steps are transformed; R = eps^(1/2N).
+    """Hold the points z_l = R exp(-2 pi i l/N), l = 0 ... N/2, with which N steps are transformed; R = eps^(1/2N).
 
     Real histories need the half circle only. What wraps around is R^N = 1.5e-8 of the whole.
     """
@@ -106,20 +106,20 @@ class Contour:
 
     @property
     def radius(self) -> float:
-        """R."""
+        """Return the radius R of the circle."""
         return float(np.finfo(float).eps ** (0.5 / self.steps))
 
     @property
     def z(self) -> NDArray:
-        """(N/2 + 1,) points."""
+        """Return (N/2 + 1,) points."""
         return np.asarray(self.radius * np.exp(-2j * np.pi * np.arange(self.steps // 2 + 1) / self.steps))
 
     def forward(self, history: NDArray) -> NDArray:
-        """(N/2 + 1, ...) sums over n of z^n history[n] of a real history (N, ...)."""
+        """Return (N/2 + 1, ...) sums over n of z^n history[n] of a real history (N, ...)."""
         return np.fft.rfft(history * self._powers(history.ndim), axis=0)
 
     def backward(self, transform: NDArray) -> Array:
-        """(N, ...) real history of a transform (N/2 + 1, ...)."""
+        """Return (N, ...) real history of a transform (N/2 + 1, ...)."""
         return np.asarray(np.fft.irfft(transform, n=self.steps, axis=0) / self._powers(transform.ndim))
 
     def _powers(self, dimensions: int) -> Array:

@@ -1,4 +1,4 @@
-"""Two bodies with matching boundary nodes: contact on one part of their interface, welds on another (seed 003).
+"""Join two bodies with matching boundary nodes: contact on one part of their interface, welds on another.
 
 Each body has its own mesh, material and operator; only the condensed motion of interface nodes meets. With the forces
 lam on body 1 and -lam on body 2 the relative displacement is
@@ -29,7 +29,7 @@ HELD = 1e-12  # of the largest flexibility: supported unknowns
 
 @dataclass(frozen=True, eq=False)
 class TwoBodies:
-    """Two boundary value problems whose ``contact`` elements face each other, node on node.
+    """Describe two boundary value problems whose ``contact`` elements face each other, node on node.
 
     welded: (n_1,) elements of body 1 on the transmission interface, part of its ``contact``; nodes that touch one of
     them are welded. Raises InputError for nodes without a partner, different steps, and welds outside the interface.
@@ -48,7 +48,7 @@ class TwoBodies:
 
     @cached_property
     def relative(self) -> CondensedCompliance:
-        """W_1 + W_2 on all interface nodes, in the order and with the normals of body 1."""
+        """Return W_1 + W_2 on all interface nodes, in the order and with the normals of body 1."""
         one, two = self.one.condensed(), self.two.condensed()
         if one.W.shape != two.W.shape or abs(one.dt - two.dt) > 1e-12 * one.dt:
             raise InputError(f"TwoBodies: {len(one.W)} steps of {one.dt:.6g} s and {len(one.nodes)} nodes face "
@@ -70,15 +70,15 @@ class TwoBodies:
         return weld(relative, mesh.nodes_of(elements)[relative.nodes])
 
     def condensed(self) -> CondensedCompliance:
-        """Of the contact nodes, for BoundaryContact; ``normals`` point from body 1 to body 2."""
+        """Return the compliance of the contact nodes, for BoundaryContact; ``normals`` point from body 1 to body 2."""
         return self._weld.contact
 
     def interface_forces(self, forces: Array) -> Array:
-        """(steps, 2m) forces on body 1 at all interface nodes, of contact forces (steps, 2m_c) and their welds."""
+        """Return (steps, 2m) forces on body 1 at all interface nodes from contact forces (steps, 2m_c) and welds."""
         return self._weld.forces(forces)
 
     def solve(self, forces: Array | None = None) -> tuple[BoundaryMotion, BoundaryMotion]:
-        """Motions of both bodies under their loads, contact forces (steps, 2m_c) on body 1, and the welds."""
+        """Return the motions of both bodies under loads, contact forces (steps, 2m_c) on body 1, and the welds."""
         relative = self.relative
         shape = (len(relative.W), self.condensed().W.shape[1])
         forces = np.zeros(shape) if forces is None else array("TwoBodies.solve", "forces", forces, shape, unit="N/m")
@@ -89,7 +89,7 @@ class TwoBodies:
 
 
 def matching(points: Array, others: Array) -> Indices:
-    """(m,) number of the point of ``others`` (m, 2) at each of ``points`` (m, 2); InputError where there is none."""
+    """Return (m,) number of the point of ``others`` (m, 2) at each of ``points`` (m, 2), or raise InputError."""
     distance = np.hypot(*(points[:, None] - others).transpose(2, 0, 1))
     nearest = distance.argmin(axis=1)
     away = distance.min(axis=1)
@@ -102,7 +102,7 @@ def matching(points: Array, others: Array) -> Indices:
 
 @dataclass(frozen=True, eq=False)
 class Weld:
-    """Weld forces eliminated: ``contact`` is what is left. Masks (2m,) of unknowns; held: (steps, |I|, 2m_c + 1) weld
+    """Eliminate weld forces: ``contact`` is what is left. Masks (2m,) of unknowns; held: (steps, |I|, 2m_c + 1) weld
     forces after unit contact forces in step 0, and, in the last column, without any."""
 
     contact: CondensedCompliance
@@ -111,7 +111,7 @@ class Weld:
     held: Array
 
     def forces(self, contact_forces: Array) -> Array:
-        """(steps, 2m): contact forces (steps, 2m_c) and the weld forces that go with them."""
+        """Return (steps, 2m): contact forces (steps, 2m_c) and the weld forces that go with them."""
         everything = np.zeros((len(contact_forces), len(self.welded)))
         everything[:, self.touching] = contact_forces
         if self.welded.any():
@@ -122,7 +122,7 @@ class Weld:
 
 
 def weld(compliance: CondensedCompliance, nodes: Mask) -> Weld:
-    """Holds the relative displacement of masked nodes (m,) at zero from the first step on."""
+    """Hold the relative displacement of masked nodes (m,) at zero from the first step on."""
     W, steps = compliance.W, len(compliance.W)
     flexibility = W[0].diagonal()
     welded = np.tile(nodes, 2) & (flexibility > HELD * flexibility.max())

@@ -1,4 +1,4 @@
-"""Uzawa's iteration on the whole space-time problem: the algorithm of seed 003 with convolutions by FFT.
+"""Iterate on the whole space-time problem: Uzawa's algorithm of Aimi, Di Credico, Gimperlein (2024), with FFT.
 
     solve     v = v_free + W * lam                      all steps at once
     project   r <- Pr_C(r + rho (v_n - gap, slip)),     Pr_C(w)_n = max(w_n, 0),  Pr_C(w)_t = w_t min(1, F/|w_t|)
@@ -31,7 +31,7 @@ GROWN = 1e12  # change over the first one: diverged
 
 @dataclass(frozen=True)
 class SpaceTimeUzawa:
-    """Settings. tolerance: relative change of the multiplier at which it stops (the source's 1e-n); rho > 0 [N/m²] or
+    """Hold settings. tolerance: relative change of the multiplier to stop at (the source's 1e-n); rho > 0 [N/m²] or
     None: 1/lambda_max(W[0]); window: steps that are solved at once, all of them if None. The run's ``iterations`` has
     one entry per window, ``history`` the relative changes.
 
@@ -52,7 +52,7 @@ class SpaceTimeUzawa:
             whole("SpaceTimeUzawa", "window", self.window, least=1)
 
     def solve(self, contact: BoundaryContact) -> ContactRun:
-        """The run; StepFailure when ``max_iterations`` do not reach the tolerance."""
+        """Solve the problem; StepFailure when ``max_iterations`` do not reach the tolerance."""
         instance("SpaceTimeUzawa", "contact", contact, BoundaryContact, "give a BoundaryContact")
         if contact.frictional and contact.friction.at(np.ones(contact.surface.count)) is not contact.friction:
             raise InputError(f"SpaceTimeUzawa: {contact.friction} depends on the slip rate; use march_contact")
@@ -69,7 +69,7 @@ class SpaceTimeUzawa:
         return problem.run(r, np.array(counts), tuple(history))
 
     def _window(self, problem: _SpaceTime, r: Array) -> tuple[Array, list[float]]:
-        """Multipliers (steps, 2, c) of the window that was entered, and the relative changes on the way."""
+        """Return the multipliers (steps, 2, c) of the window that was entered, and the relative changes on the way."""
         rho, unit = self.rho or problem.default_rho, float(np.linalg.norm(problem.violation(r)))
         changes: list[float] = []
         while len(changes) < self.max_iterations:
@@ -87,7 +87,7 @@ class SpaceTimeUzawa:
 
 
 class _SpaceTime:
-    """A window of the history as one problem in r (steps, 2, c): normal, tangential."""
+    """Describe a window of the history as one problem in r (steps, 2, c): normal, tangential."""
 
     def __init__(self, contact: BoundaryContact, window: int) -> None:
         self.contact, surface = contact, contact.surface
@@ -112,7 +112,7 @@ class _SpaceTime:
         self._slope = contact.friction.slope(surface.weights)
 
     def enter(self, window: slice, r: Array) -> None:
-        """Makes a window current; r (all steps, 2, c) is final before it."""
+        """Make a window current; r (all steps, 2, c) is final before it."""
         first, lam = window.start, -r.reshape(self._total, -1, 1)
         self._window, self._free = window, self._v_free[window].copy()
         self._before = np.zeros(r.shape[2])
@@ -123,7 +123,7 @@ class _SpaceTime:
             self._before = v.reshape(2, -1)[1]
 
     def violation(self, r: Array) -> Array:
-        """(steps, 2, c): v_n - gap at the ends of the steps, slip in them."""
+        """Return (steps, 2, c): v_n - gap at the ends of the steps, slip in them."""
         loads = rfft(r.reshape(len(r), -1), self._length, axis=0)
         moved = irfft(np.matmul(self._kernel, loads[:, :, None])[:, :, 0], self._length, axis=0)[: len(r)]
         v = (self._free - moved).reshape(r.shape)
@@ -131,13 +131,13 @@ class _SpaceTime:
         return np.stack([v[:, 0] - self._gap[self._window], slip * self._rubs], axis=1)
 
     def projected(self, w: Array) -> Array:
-        """Pr_C."""
+        """Project onto C."""
         normal = w[:, 0] if self.contact.bilateral else np.maximum(w[:, 0], 0.0)
         limit = (self._still + self._slope * np.maximum(normal, 0.0)) * self._rubs
         return np.stack([normal, project(w[:, 1].reshape(-1, 1), limit.ravel()).reshape(normal.shape)], axis=1)
 
     def run(self, r: Array, counts: Array, history: tuple[float, ...]) -> ContactRun:
-        """The steps of these multipliers with their certificates."""
+        """Return the steps of these multipliers with their certificates."""
         contact, steps, results = self.contact, [], []
         v, active = np.zeros(int(contact.kept.sum())), contact.surface.gap(0.0) <= 0.0
         loads = np.zeros_like(contact.v_free)

@@ -1,4 +1,4 @@
-"""Elastic bars, standing upright, whose foot x = 0 strikes a rigid wall without friction (verification V1.1 to V1.3).
+"""Solve the impact of upright elastic bars, foot x = 0, on a rigid wall without friction.
 
     rho u_tt = E u_xx - rho g,   u_x(length, t) = 0 or u(length, t) = 0,
     y = height + u(0, t) >= 0,   p = -E u_x(0, t) >= 0,   y p = 0
@@ -39,18 +39,18 @@ class UprightBar:
 
     @property
     def wave_speed(self) -> float:
-        """c = sqrt(E/rho) [m/s]."""
+        """Return c = sqrt(E/rho) [m/s]."""
         return math.sqrt(self.E / self.rho)
 
     @property
     def crossing(self) -> float:
-        """T = length/c [s]."""
+        """Return T = length/c [s]."""
         return self.length / self.wave_speed
 
 
 @dataclass(frozen=True)
 class ThrownBar(UprightBar):
-    """A bar thrown at the wall with `speed` v0, no gravity (St-Venant, V1.1); as defaults the data of V1.1.
+    """Describe a bar thrown at the wall with `speed` v0, no gravity; defaults: Doyen, Ern, Piperno (2011), first test.
 
         u = -height - v0 min(x/c, T - |s - T|),   s = t - height/v0,   p = rho c v0 for 0 < s < 2T,
 
@@ -65,41 +65,41 @@ class ThrownBar(UprightBar):
 
     @property
     def contact_start(self) -> float:
-        """height/v0 [s]."""
+        """Return height/v0 [s]."""
         return self.height / self.speed
 
     @property
     def contact_end(self) -> float:
-        """height/v0 + 2T [s]."""
+        """Return height/v0 + 2T [s]."""
         return self.contact_start + 2.0 * self.crossing
 
     @property
     def pressure(self) -> float:
-        """rho c v0 [Pa], constant during the contact."""
+        """Return rho c v0 [Pa], constant during the contact."""
         return self.rho * self.wave_speed * self.speed
 
     @property
     def energy(self) -> float:
-        """½ rho length v0² [J/m²], kinetic and strain energy at any time."""
+        """Return ½ rho length v0² [J/m²], kinetic and strain energy at any time."""
         return 0.5 * self.rho * self.length * self.speed**2
 
     def displacement(self, x: ArrayLike, t: ArrayLike) -> Array:
-        """u(x, t) [m]."""
+        """Return u(x, t) [m]."""
         delay, s = self._times(x, t)
         return -self.height - self.speed * np.minimum(delay, self.crossing - np.abs(s - self.crossing))
 
     def velocity(self, x: ArrayLike, t: ArrayLike) -> Array:
-        """u_t(x, t) [m/s]: -v0 ahead of the wave, 0 behind it, v0 behind its reflection."""
+        """Return u_t(x, t) [m/s]: -v0 ahead of the wave, 0 behind it, v0 behind its reflection."""
         delay, s = self._times(x, t)
         return self.speed * ((s > delay) * 1.0 + (s > 2.0 * self.crossing - delay) - 1.0)
 
     def strain(self, x: ArrayLike, t: ArrayLike) -> Array:
-        """u_x(x, t): -v0/c behind the wave and ahead of its reflection, else 0."""
+        """Return u_x(x, t): -v0/c behind the wave and ahead of its reflection, else 0."""
         delay, s = self._times(x, t)
         return -self.speed / self.wave_speed * ((s > delay) & (s < 2.0 * self.crossing - delay))
 
     def force(self, t: ArrayLike) -> Array:
-        """Contact pressure p(t) [Pa] >= 0."""
+        """Return the contact pressure p(t) [Pa] >= 0."""
         t = np.asarray(t, dtype=float)
         return self.pressure * ((t > self.contact_start) & (t < self.contact_end))
 
@@ -109,13 +109,13 @@ class ThrownBar(UprightBar):
         return np.minimum(times[times[:, 0] < until], until)
 
     def _times(self, x: ArrayLike, t: ArrayLike) -> tuple[Array, Array]:
-        """x/c and the time since touch-down [s]."""
+        """Return x/c and the time since touch-down [s]."""
         return np.asarray(x, dtype=float) / self.wave_speed, np.asarray(t, dtype=float) - self.contact_start
 
 
 @dataclass(frozen=True)
 class PeriodicBar:
-    """length = E = rho = 1, the top clamped, the foot released at the wall from u = (1 - x)/2 (V1.3); no gravity.
+    """Describe a bar of length = E = rho = 1, top clamped, foot released at the wall from u = (1 - x)/2; no gravity.
 
     The motion has period 3: released, in contact (p = 1/2), expanding, one unit of time each. With s = t mod 1, u is
     linear in x and s in the four zones that the lines s = x and s = 1 - x divide a phase into (Dabaghi, Petrov, Pousin,
@@ -124,29 +124,29 @@ class PeriodicBar:
 
     @property
     def period(self) -> float:
-        """3 [s]."""
+        """Return 3 [s]."""
         return 3.0
 
     @property
     def energy(self) -> float:
-        """1/8 [J/m²], kinetic and strain energy at any time."""
+        """Return 1/8 [J/m²], kinetic and strain energy at any time."""
         return 0.125
 
     def displacement(self, x: ArrayLike, t: ArrayLike) -> Array:
-        """u(x, t) [m]."""
+        """Return u(x, t) [m]."""
         x, s, table = self._zones(x, t)
         return table[..., 0] + table[..., 1] * x + table[..., 2] * s
 
     def velocity(self, x: ArrayLike, t: ArrayLike) -> Array:
-        """u_t(x, t) [m/s]: -1/2, 0 or 1/2."""
+        """Return u_t(x, t) [m/s]: -1/2, 0 or 1/2."""
         return self._zones(x, t)[2][..., 2]
 
     def strain(self, x: ArrayLike, t: ArrayLike) -> Array:
-        """u_x(x, t): -1/2, 0 or 1/2."""
+        """Return u_x(x, t): -1/2, 0 or 1/2."""
         return self._zones(x, t)[2][..., 1]
 
     def force(self, t: ArrayLike) -> Array:
-        """Contact pressure p(t) [Pa]: 1/2 in the second third of a period, else 0."""
+        """Return the contact pressure p(t) [Pa]: 1/2 in the second third of a period, else 0."""
         phase = np.floor(np.mod(np.asarray(t, dtype=float), 3.0))
         return 0.5 * (phase == 1.0)
 
@@ -157,7 +157,7 @@ class PeriodicBar:
 
     @staticmethod
     def _zones(x: ArrayLike, t: ArrayLike) -> tuple[Array, Array, Array]:
-        """x, s and the row of the table for every pair, shapes (...), (...), (..., 3)."""
+        """Return x, s and the row of the table for every pair, shapes (...), (...), (..., 3)."""
         x, t = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(t, dtype=float))
         phase = np.floor(np.mod(t, 3.0)).astype(int)
         s = np.mod(t, 1.0)

@@ -1,4 +1,4 @@
-"""An elastic bar that falls on a rigid wall under gravity and bounces (verification V1.2), by characteristics.
+"""Solve the bouncing of an elastic bar on a rigid wall under gravity, by characteristics.
 
     rho u_tt = E u_xx - rho g,   u_x(length, t) = 0,   u = u_t = 0 at t = 0,
     y = height + u(0, t) >= 0,   p = -E u_x(0, t) >= 0,   y p = 0
@@ -32,7 +32,7 @@ SAME = 1e-12  # events and piece ends closer than this, relative to the problem'
 
 @dataclass(frozen=True)
 class BouncingBar(UprightBar):
-    """The bar of V1.2, by default with its data; released at rest `height` above the wall.
+    """Describe a bar released at rest `height` above the wall; defaults: Doyen, Ern, Piperno (2011), second test.
 
     The fall takes t_f = sqrt(2 height/g). For integer t_f/T >= 3 the motion is periodic, 4T + 4t_f, and the first
     contact, of length 2T, has p = rho c g (t_f + r), r the time since touch-down; the second has it in reverse.
@@ -47,12 +47,12 @@ class BouncingBar(UprightBar):
 
     @property
     def fall_time(self) -> float:
-        """t_f = sqrt(2 height/g) [s], when the first contact starts."""
+        """Return t_f = sqrt(2 height/g) [s], when the first contact starts."""
         return math.sqrt(2.0 * self.height / self.gravity)
 
     @property
     def period(self) -> float:
-        """4T + 4t_f [s]. Raises InputError unless t_f/T is an integer >= 3: no other motion is known to be periodic."""
+        """Return 4T + 4t_f [s]. Raises InputError unless t_f/T is an integer >= 3: no other period is known."""
         ratio = self.fall_time / self.crossing
         if abs(ratio - round(ratio)) > 1e-9 * ratio or round(ratio) < 3:
             raise InputError(f"BouncingBar: fall time over crossing time is {ratio:.6g}, which gives no known period; "
@@ -61,31 +61,31 @@ class BouncingBar(UprightBar):
 
     @property
     def energy(self) -> float:
-        """rho length g height [J/m²] at any time, zero for the undeformed bar at rest on the wall."""
+        """Return rho length g height [J/m²] at any time, zero for the undeformed bar at rest on the wall."""
         return self.rho * self.length * self.gravity * self.height
 
     def displacement(self, x: ArrayLike, t: ArrayLike) -> Array:
-        """u(x, t) [m]."""
+        """Return u(x, t) [m]."""
         t, up, down = self._waves(x, t)
         return up[0] + down[0] - 0.5 * self.gravity * t**2
 
     def velocity(self, x: ArrayLike, t: ArrayLike) -> Array:
-        """u_t(x, t) [m/s]."""
+        """Return u_t(x, t) [m/s]."""
         t, up, down = self._waves(x, t)
         return up[1] + down[1] - self.gravity * t
 
     def strain(self, x: ArrayLike, t: ArrayLike) -> Array:
-        """u_x(x, t)."""
+        """Return u_x(x, t)."""
         _, up, down = self._waves(x, t)
         return (down[1] - up[1]) / self.wave_speed
 
     def force(self, t: ArrayLike) -> Array:
-        """Contact pressure p(t) [Pa] >= 0."""
+        """Return the contact pressure p(t) [Pa] >= 0."""
         _, now, before = self._waves(0.0, t)
         return np.where(now[2], self.rho * self.wave_speed * (now[1] - before[1]), 0.0)
 
     def foot(self, t: ArrayLike) -> Array:
-        """Height y(t) of the foot above the wall [m], >= 0 to round-off."""
+        """Return the height y(t) of the foot above the wall [m], >= 0 to round-off."""
         return self.height + self.displacement(0.0, t)
 
     def contacts(self, until: float) -> Array:
@@ -96,7 +96,7 @@ class BouncingBar(UprightBar):
         return np.minimum(times[times[:, 0] < until], until)
 
     def _waves(self, x: ArrayLike, t: ArrayLike) -> tuple[Array, Array, Array]:
-        """t, and (F, F', in contact) at t - x/c and at t - 2T + x/c."""
+        """Return t, and (F, F', in contact) at t - x/c and at t - 2T + x/c."""
         delay, t = np.asarray(x, dtype=float) / self.wave_speed, np.asarray(t, dtype=float)
         start, wave, closed = self._history(float(np.max(t, initial=0.0)))
 
@@ -110,13 +110,13 @@ class BouncingBar(UprightBar):
         return t, at(np.asarray(t - delay)), at(np.asarray(t - 2.0 * self.crossing + delay))
 
     def _history(self, until: float) -> tuple[Array, Array, Array]:
-        """Pieces of F: starts (m,) [s]; value, slope, curvature there (m, 3); 1.0 where the foot touches (m,)."""
+        """Return pieces of F: starts (m,) [s]; value, slope, curvature there (m, 3); 1.0 in contact (m,)."""
         return _pieces(self, 1 + math.ceil(until / (2.0 * self.crossing)))
 
 
 @lru_cache(maxsize=8)
 def _pieces(bar: BouncingBar, round_trips: int) -> tuple[Array, Array, Array]:
-    """The pieces of F from -2T to at least `round_trips` · 2T, as BouncingBar._history returns them."""
+    """Return the pieces of F from -2T to at least `round_trips` · 2T, as BouncingBar._history returns them."""
     trip, g = 2.0 * bar.crossing, bar.gravity
     near = SAME * (bar.height + g * trip**2)
     slow = SAME * g * (bar.fall_time + trip)
@@ -148,7 +148,7 @@ def _pieces(bar: BouncingBar, round_trips: int) -> tuple[Array, Array, Array]:
 
 
 def _landing(y: float, a: float, a1: float) -> float:
-    """First time s > 0 at which y + a s + a1 s²/2, not negative before, comes down to zero; infinite if it does not."""
+    """Return the first s > 0 with y + a s + a1 s²/2 = 0, not negative before; infinite if there is none."""
     disc = a * a - 2.0 * a1 * y
     if disc < 0.0 or (a1 >= 0.0 and a >= 0.0):
         return math.inf

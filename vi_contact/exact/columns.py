@@ -1,8 +1,8 @@
-"""Columns (or layers of any extent) on a rigid base with friction: motions u(y, t) that are exact plane waves.
+"""Solve columns (or layers of any extent) on a rigid base with friction: u(y, t) are exact plane waves.
 
 y in [0, height], base at y = 0, free top. Pressure waves (u_n, upwards) travel with c_P, shear waves (u_t) with c_S and
 ignore each other but for the friction of the base. Tractions, impulses and energies are per unit of base area.
-Methods take arrays y and t >= 0 whose shapes broadcast. Sources: verification V1.5, V1.6.
+Methods take arrays y and t >= 0 whose shapes broadcast.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def reflected(history: History, delay: Array, t: Array, *, crossing: float) -> A
 
 @dataclass(frozen=True)
 class ObliqueImpact:
-    """A column strikes the base at t = 0 with u_n' = -speed_n, u_t' = speed_t, Coulomb friction mu (V1.5).
+    """Describe a column that strikes the base at t = 0 with u_n' = -speed_n, u_t' = speed_t, Coulomb friction mu.
 
     It stays for 2 height/c_P under p = rho c_P speed_n. If mu c_P speed_n < c_S speed_t the base slips throughout with
     v_b = speed_t - mu (c_P/c_S) speed_n under the traction mu p, else it sticks under rho c_S speed_t: the shear wave
@@ -62,53 +62,53 @@ class ObliqueImpact:
 
     @property
     def duration(self) -> float:
-        """2 height/c_P [s]."""
+        """Return 2 height/c_P [s]."""
         return 2.0 * self.height / self.material.c_p
 
     @property
     def pressure(self) -> float:
-        """rho c_P speed_n [Pa], constant during the contact."""
+        """Return rho c_P speed_n [Pa], constant during the contact."""
         return self.material.rho * self.material.c_p * self.speed_n
 
     @property
     def traction(self) -> float:
-        """Friction on the base [Pa], against speed_t: min(mu p, rho c_S speed_t)."""
+        """Return the friction on the base [Pa], against speed_t: min(mu p, rho c_S speed_t)."""
         return min(self.mu * self.pressure, self.material.rho * self.material.c_s * self.speed_t)
 
     @property
     def slip_speed(self) -> float:
-        """v_b [m/s] >= 0, 0 when the base sticks."""
+        """Return v_b [m/s] >= 0, 0 when the base sticks."""
         return max(0.0, self.speed_t - self.mu * self.material.c_p / self.material.c_s * self.speed_n)
 
     @property
     def impulses(self) -> tuple[float, float]:
-        """Normal (upwards) and tangential (along speed_t) impulse of the base on the column [Pa s]."""
+        """Return the normal (upwards) and tangential (along speed_t) impulse of the base on the column [Pa s]."""
         return self.pressure * self.duration, -self.traction * self.duration
 
     @property
     def mean_velocity(self) -> tuple[float, float]:
-        """Mean (u_n', u_t') after the contact [m/s]: speed_n upwards, speed_t - 2 mu speed_n if it slipped."""
+        """Return the mean (u_n', u_t') after contact [m/s]: speed_n up, speed_t - 2 mu speed_n if it slipped."""
         normal, tangential = self.impulses
         mass = self.material.rho * self.height
         return -self.speed_n + normal / mass, self.speed_t + tangential / mass
 
     @property
     def friction_work(self) -> float:
-        """Energy lost to friction [J/m²]: traction · v_b · duration."""
+        """Return the energy lost to friction [J/m²]: traction · v_b · duration."""
         return self.traction * self.slip_speed * self.duration
 
     @property
     def energy(self) -> float:
-        """Kinetic and strain energy after the contact [J/m²]."""
+        """Return the kinetic and strain energy after the contact [J/m²]."""
         kinetic = 0.5 * self.material.rho * self.height * (self.speed_n**2 + self.speed_t**2)
         return kinetic - self.friction_work
 
     def displacement(self, y: ArrayLike, t: ArrayLike) -> Array:
-        """(u_n, u_t) [m], shape (..., 2)."""
+        """Return (u_n, u_t) [m], shape (..., 2)."""
         return self._motion(y, t, lambda s: s, lambda s: np.clip(s, 0.0, self.duration))
 
     def velocity(self, y: ArrayLike, t: ArrayLike) -> Array:
-        """Time derivative of `displacement` [m/s]; on a front one of its two values."""
+        """Return the time derivative of `displacement` [m/s]; on a front one of its two values."""
         return self._motion(y, t, np.ones_like, lambda s: 1.0 * ((s >= 0.0) & (s < self.duration)))
 
     def _motion(self, y: ArrayLike, t: ArrayLike, rigid: History, pulse: History) -> Array:
@@ -121,7 +121,7 @@ class ObliqueImpact:
 
 @dataclass(frozen=True)
 class ShearColumn:
-    """A column slides on its base from u_t' = speed until it sticks, friction threshold tau_y (Tresca; V1.6).
+    """Describe a column that slides on its base from u_t' = speed until it sticks, threshold tau_y (Tresca).
 
     With c = c_S, T = height/c and delta = tau_y/(rho c), in the n-th round trip, 2nT < t < 2(n+1)T, the base slips with
     speed - (2n+1) delta under the traction tau_y as long as this is positive. Then it sticks for good: the traction is
@@ -139,48 +139,48 @@ class ShearColumn:
 
     @property
     def crossing(self) -> float:
-        """T = height/c [s]."""
+        """Return T = height/c [s]."""
         return self.height / self.material.c_s
 
     @property
     def impedance(self) -> float:
-        """rho c [kg/(m² s)]."""
+        """Return rho c [kg/(m² s)]."""
         return self.material.rho * self.material.c_s
 
     @property
     def delta(self) -> float:
-        """tau_y/(rho c) [m/s]."""
+        """Return tau_y/(rho c) [m/s]."""
         return self.tau_y / self.impedance
 
     @property
     def slip_speeds(self) -> Array:
-        """Slip speed [m/s] in every round trip until the base sticks, shape (m,)."""
+        """Return the slip speed [m/s] in every round trip until the base sticks, shape (m,)."""
         trips = max(0, math.ceil(0.5 * (self.speed / self.delta - 1.0)))
         return self.speed - (2.0 * np.arange(trips) + 1.0) * self.delta
 
     @property
     def stick_time(self) -> float:
-        """When the base comes to rest [s]."""
+        """Return the time at which the base comes to rest [s]."""
         return 2.0 * self.crossing * len(self.slip_speeds)
 
     @property
     def slip(self) -> float:
-        """Total slip [m]."""
+        """Return the total slip [m]."""
         return 2.0 * self.crossing * float(self.slip_speeds.sum())
 
     @property
     def friction_work(self) -> float:
-        """Energy lost to friction [J/m²]."""
+        """Return the energy lost to friction [J/m²]."""
         return self.tau_y * self.slip
 
     @property
     def energy(self) -> float:
-        """Kinetic and strain energy left once the base sticks [J/m²]: ½ rho height (speed - 2n delta)²."""
+        """Return the kinetic and strain energy left once the base sticks [J/m²]: ½ rho height (speed - 2n delta)²."""
         left = self.speed - 2.0 * len(self.slip_speeds) * self.delta
         return 0.5 * self.material.rho * self.height * left**2
 
     def traction(self, t: ArrayLike) -> Array:
-        """Friction on the base [Pa], positive against the speed; 0 before t = 0."""
+        """Return the friction on the base [Pa], positive against the speed; 0 before t = 0."""
         t = np.asarray(t, dtype=float)
         trip = np.floor(t / (2.0 * self.crossing)).astype(int)
         slips = len(self.slip_speeds)
@@ -188,12 +188,12 @@ class ShearColumn:
         return np.where(t < 0.0, 0.0, np.where(trip < slips, self.tau_y, held))
 
     def displacement(self, y: ArrayLike, t: ArrayLike) -> Array:
-        """u_t(y, t) [m]."""
+        """Return u_t(y, t) [m]."""
         t = np.asarray(t, dtype=float)
         return self.speed * t - self._waves(self._impulse, y, t)
 
     def velocity(self, y: ArrayLike, t: ArrayLike) -> Array:
-        """Time derivative of `displacement` [m/s]; on a front one of its two values."""
+        """Return the time derivative of `displacement` [m/s]; on a front one of its two values."""
         return self.speed - self._waves(self.traction, y, np.asarray(t, dtype=float))
 
     def _waves(self, history: History, y: ArrayLike, t: Array) -> Array:
@@ -201,7 +201,7 @@ class ShearColumn:
         return reflected(history, delay, t, crossing=self.crossing) / self.impedance
 
     def _impulse(self, t: Array) -> Array:
-        """Integral of the traction from 0 to t [Pa s], 0 for t < 0."""
+        """Return the integral of the traction from 0 to t [Pa s], 0 for t < 0."""
         after = np.maximum(t - self.stick_time, 0.0)
         trip = 2.0 * self.crossing
         held = self.traction(np.asarray(self.stick_time + 0.5 * trip)) * (trip - np.abs(after % (2.0 * trip) - trip))

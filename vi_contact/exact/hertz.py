@@ -1,4 +1,4 @@
-"""Hertz contact of smooth bodies, and the quasi-static impact of a sphere (verification V2.3, V3.3).
+"""Solve Hertz contact of smooth bodies, and the quasi-static impact of a sphere (Johnson 1985, ch. 4 and 11).
 
 Bodies of moduli E_i, nu_i and radii R_i touch without friction, with E* and R from
 
@@ -21,7 +21,7 @@ from ..core.errors import InputError
 
 
 def contact_modulus(*bodies: tuple[float, float]) -> float:
-    """E* [Pa] of one or two bodies (E [Pa], nu); leave out a rigid body.
+    """Return E* [Pa] of one or two bodies (E [Pa], nu); leave out a rigid body.
 
     Raises InputError for no body, E <= 0 or nu outside (-1, 1/2].
     """
@@ -34,7 +34,7 @@ def contact_modulus(*bodies: tuple[float, float]) -> float:
 
 
 def contact_radius(*radii: float) -> float:
-    """R [m] of one or two bodies; leave out a plane, give a hollow one a negative radius.
+    """Return R [m] of one or two bodies; leave out a plane, give a hollow one a negative radius.
 
     Raises InputError unless the sum of 1/radius is finite and positive.
     """
@@ -46,7 +46,7 @@ def contact_radius(*radii: float) -> float:
 
 @dataclass(frozen=True)
 class HertzLine:
-    """Parallel cylinders pressed with `force` P per unit of length (plane strain; V2.3):
+    """Describe parallel cylinders pressed with `force` P per unit of length (plane strain):
 
         a = sqrt(4 P R/(pi E*)),   p0 = 2 P/(pi a) = sqrt(P E*/(pi R)),   p = p0 sqrt(1 - x²/a²)
 
@@ -63,22 +63,22 @@ class HertzLine:
 
     @property
     def half_width(self) -> float:
-        """a [m]: contact on |x| < a."""
+        """Return a [m]: contact on |x| < a."""
         return math.sqrt(4.0 * self.force * self.radius / (math.pi * self.modulus))
 
     @property
     def peak(self) -> float:
-        """p0 [Pa]."""
+        """Return p0 [Pa]."""
         return 2.0 * self.force / (math.pi * self.half_width)
 
     def pressure(self, x: ArrayLike) -> Array:
-        """p(x) [Pa] at the distance x from the centre line, 0 outside the contact."""
+        """Return p(x) [Pa] at the distance x from the centre line, 0 outside the contact."""
         return _ellipse(self.peak, self.half_width, x)
 
 
 @dataclass(frozen=True)
 class HertzPoint:
-    """Spheres pressed with `force` F (V2.3):
+    """Describe spheres pressed with `force` F:
 
         a = (3 F R/(4 E*))^(1/3),   p0 = 3 F/(2 pi a²),   p = p0 sqrt(1 - r²/a²),
         approach = a²/R,   F = (4/3) E* sqrt(R) approach^(3/2)
@@ -95,34 +95,34 @@ class HertzPoint:
 
     @classmethod
     def from_approach(cls, approach: float, *, modulus: float, radius: float) -> HertzPoint:
-        """The contact of spheres whose distant points have come nearer by `approach` [m]."""
+        """Return the contact of spheres whose distant points have come nearer by `approach` [m]."""
         if not approach > 0.0:
             raise InputError(f"HertzPoint: the approach is {approach!r}; give a number above zero")
         return cls(4.0 / 3.0 * modulus * math.sqrt(radius) * approach**1.5, modulus, radius)
 
     @property
     def contact_radius(self) -> float:
-        """a [m]: contact on r < a."""
+        """Return a [m]: contact on r < a."""
         return math.cbrt(0.75 * self.force * self.radius / self.modulus)
 
     @property
     def peak(self) -> float:
-        """p0 [Pa]."""
+        """Return p0 [Pa]."""
         return 1.5 * self.force / (math.pi * self.contact_radius**2)
 
     @property
     def approach(self) -> float:
-        """Approach of distant points [m]."""
+        """Return the approach of distant points [m]."""
         return self.contact_radius**2 / self.radius
 
     def pressure(self, r: ArrayLike) -> Array:
-        """p(r) [Pa] at the distance r from the axis, 0 outside the contact."""
+        """Return p(r) [Pa] at the distance r from the axis, 0 outside the contact."""
         return _ellipse(self.peak, self.contact_radius, r)
 
 
 @dataclass(frozen=True)
 class HertzImpact:
-    """A mass m with velocity v strikes through a Hertz spring, m d'' = -(4/3) E* sqrt(R) d^(3/2) (quasi-static; V3.3):
+    """Describe a mass m that strikes with v on a Hertz spring, m d'' = -(4/3) E* sqrt(R) d^(3/2) (quasi-static):
 
         d_max = (15 m v²/(16 E* sqrt(R)))^(2/5),   duration = 4 sqrt(pi) Gamma(2/5)/(5 Gamma(9/10)) d_max/v
 
@@ -140,21 +140,21 @@ class HertzImpact:
 
     @property
     def approach(self) -> float:
-        """d_max [m]."""
+        """Return d_max [m]."""
         return (15.0 * self.mass * self.speed**2 / (16.0 * self.modulus * math.sqrt(self.radius))) ** 0.4
 
     @property
     def duration(self) -> float:
-        """Length of the contact [s]."""
+        """Return the length of the contact [s]."""
         factor = 0.8 * math.sqrt(math.pi) * math.gamma(0.4) / math.gamma(0.9)
         return factor * self.approach / self.speed
 
     @property
     def deepest(self) -> HertzPoint:
-        """The contact at d_max: its force is F_max, its contact_radius a_max."""
+        """Return the contact at d_max: its force is F_max, its contact_radius a_max."""
         return HertzPoint.from_approach(self.approach, modulus=self.modulus, radius=self.radius)
 
 
 def _ellipse(peak: float, half_axis: float, x: ArrayLike) -> Array:
-    """peak · sqrt(1 - (x/half_axis)²), 0 outside."""
+    """Return peak · sqrt(1 - (x/half_axis)²), 0 outside."""
     return peak * np.sqrt(np.maximum(1.0 - (np.asarray(x, dtype=float) / half_axis) ** 2, 0.0))

@@ -1,4 +1,4 @@
-"""The rocking of a rigid block on a rigid base (Housner 1963; verification V3.1).
+"""Solve the rocking of a rigid block on a rigid base (Housner, Bull. Seism. Soc. Am. 53, 1963).
 
 Uniform block of width 2b and height 2h, no sliding, no bouncing. With R = sqrt(b² + h²), alpha = atan(b/h),
 p² = 3g/(4R) and phi = theta/alpha, rocking about the edge on the side to which the block leans obeys
@@ -27,7 +27,7 @@ REST = 1e-30  # phi below which the rest of the motion lasts less than round-off
 
 @dataclass(frozen=True)
 class HousnerBlock:
-    """A block of width 2b and height 2h [m] (the full lengths) under gravity [m/s²].
+    """Describe a block of width 2b and height 2h [m] (the full lengths) under gravity [m/s²].
 
     "Slender" is said of what uses the linearised equation. theta0 is always the angle, in (0, alpha), from which the
     block is released at rest. Raises InputError unless all are finite and positive, and for a block so wide that it
@@ -46,40 +46,40 @@ class HousnerBlock:
 
     @property
     def radius(self) -> float:
-        """R [m], from a base corner to the centre of mass."""
+        """Return R [m], from a base corner to the centre of mass."""
         return 0.5 * math.hypot(self.width, self.height)
 
     @property
     def alpha(self) -> float:
-        """atan(b/h) [rad]: beyond it the block overturns."""
+        """Return atan(b/h) [rad]: beyond it the block overturns."""
         return math.atan(self.width / self.height)
 
     @property
     def p(self) -> float:
-        """sqrt(3g/(4R)) [1/s]."""
+        """Return sqrt(3g/(4R)) [1/s]."""
         return math.sqrt(0.75 * self.gravity / self.radius)
 
     @property
     def restitution(self) -> float:
-        """e = 1 - (3/2) sin²(alpha), ratio of angular velocities over an impact."""
+        """Return e = 1 - (3/2) sin²(alpha), ratio of angular velocities over an impact."""
         return 1.0 - 1.5 * math.sin(self.alpha) ** 2
 
     @property
     def energy_ratio(self) -> float:
-        """r = e²."""
+        """Return r = e²."""
         return self.restitution**2
 
     @property
     def onset_acceleration(self) -> float:
-        """g tan(alpha) = g b/h [m/s²]: a horizontal base acceleration above it starts rocking."""
+        """Return g tan(alpha) = g b/h [m/s²]: a horizontal base acceleration above it starts rocking."""
         return self.gravity * self.width / self.height
 
     def period(self, theta0: float) -> float:
-        """(4/p) arcosh(1/(1 - phi0)), free rocking without loss, slender [s]."""
+        """Return (4/p) arcosh(1/(1 - phi0)), free rocking without loss, slender [s]."""
         return float(_period(self._phi(theta0))) / self.p
 
     def full_period(self, theta0: float) -> float:
-        """Four times the fall from theta0 to 0 in the equation with the sine [s].
+        """Return four times the fall from theta0 to 0 in the equation with the sine [s].
 
         (4/p) integral over theta of 1/sqrt(2 (cos(alpha - theta0) - cos(alpha - theta))), theta = theta0 (1 - s²).
         """
@@ -93,14 +93,14 @@ class HousnerBlock:
         return 4.0 / self.p * float(quad(rate, 0.0, 1.0, epsabs=0.0, epsrel=1e-12)[0])
 
     def amplitudes(self, theta0: float, impacts: int) -> Array:
-        """Largest |theta| after 0, 1, ... impacts, slender, shape (impacts + 1,) [rad].
+        """Return the largest |theta| after 0, 1, ... impacts, slender, shape (impacts + 1,) [rad].
 
         phi_n = 1 - sqrt(1 - r^n (1 - (1 - phi0)²)).
         """
         return self.alpha * self._amplitudes(theta0, impacts)
 
     def impact_times(self, theta0: float, impacts: int) -> Array:
-        """Times of the first impacts, slender, shape (impacts,) [s]: a quarter period, then half ones of phi_1, ..."""
+        """Return times of the first impacts (impacts,), slender [s]: a quarter period, half ones of phi_1, ..."""
         halves = 0.5 * _period(self._amplitudes(theta0, impacts)[:-1]) / self.p
         return np.cumsum(halves) - 0.5 * halves[:1]
 
@@ -109,7 +109,7 @@ class HousnerBlock:
         return float(self.impact_times(theta0, self._impacts())[-1])
 
     def free_rocking(self, theta0: float, t: ArrayLike) -> Array:
-        """theta(t) [rad] after release at t = 0, slender, with impacts; shape of t [s] >= 0.
+        """Return theta(t) [rad] after release at t = 0, slender, with impacts; shape of t [s] >= 0.
 
         phi = ±(1 - (1 - phi_n) cosh(p (t - t_n))), t_n the time of the n-th amplitude; 0 after the rest time.
         """
@@ -124,7 +124,7 @@ class HousnerBlock:
         return self.alpha * np.where(n < len(peaks), np.where(n % 2, -lean, lean), 0.0)
 
     def overturning_time(self, acceleration: float) -> float:
-        """Shortest rectangular pulse of the base acceleration [m/s²] that overturns, slender [s].
+        """Return the shortest rectangular pulse of the base acceleration [m/s²] that overturns, slender [s].
 
         ln(A/(A - 1))/p, A = acceleration/(g alpha). Raises InputError unless A > 1: below that nothing moves.
         """
@@ -144,13 +144,13 @@ class HousnerBlock:
         return math.ceil(math.log(REST) / math.log(self.energy_ratio))
 
     def _amplitudes(self, theta0: float, impacts: int) -> Array:
-        """phi_0, ..., shape (impacts + 1,)."""
+        """Return phi_0, ..., shape (impacts + 1,)."""
         phi0 = self._phi(theta0)
         lost = self.energy_ratio ** np.arange(impacts + 1.0) * phi0 * (2.0 - phi0)
         return lost / (1.0 + np.sqrt(1.0 - lost))  # 1 - sqrt(1 - lost) without cancellation
 
 
 def _period(phi: ArrayLike) -> Array:
-    """4 arcosh(1/(1 - phi)), without cancellation for small phi."""
+    """Return 4 arcosh(1/(1 - phi)), without cancellation for small phi."""
     phi = np.asarray(phi, dtype=float)
     return 8.0 * np.arcsinh(np.sqrt(0.5 * phi / (1.0 - phi)))

@@ -1,4 +1,4 @@
-"""A circular lining in an elastic full space that is sheared far away, with and without friction at its outside.
+"""Solve a circular lining in an elastic full space sheared far away, with and without friction at its outside.
 
 ``ThickLining`` is the plane-strain solution of two rings of Michell's second harmonic; theta is measured from the
 direction in which the ground is stretched, at 45° to the shear gamma:
@@ -30,7 +30,7 @@ from ..laws.materials import LinearElastic
 
 @dataclass(frozen=True)
 class ThinLining:
-    """radius R [m], thickness t [m]; lining and soil of two materials, plane strain."""
+    """Hold radius R [m], thickness t [m]; lining and soil of two materials, plane strain."""
 
     radius: float
     thickness: float
@@ -42,29 +42,29 @@ class ThinLining:
 
     @property
     def compressibility(self) -> float:
-        """C = E_m (1 - nu_l²) R/(E_l t (1 + nu)(1 - 2 nu))."""
+        """Return C = E_m (1 - nu_l²) R/(E_l t (1 + nu)(1 - 2 nu))."""
         nu = self.soil.nu
         hoop = self.lining.E * self.thickness * (1.0 + nu) * (1.0 - 2.0 * nu)
         return self.soil.E * (1.0 - self.lining.nu**2) * self.radius / hoop
 
     @property
     def flexibility(self) -> float:
-        """F = E_m (1 - nu_l²) R³/(6 E_l I (1 + nu)), I = t³/12."""
+        """Return F = E_m (1 - nu_l²) R³/(6 E_l I (1 + nu)), I = t³/12."""
         bending = 6.0 * self.lining.E * self.thickness**3 / 12.0 * (1.0 + self.soil.nu)
         return self.soil.E * (1.0 - self.lining.nu**2) * self.radius**3 / bending
 
     @property
     def full_slip(self) -> float:
-        """K1 = 12 (1 - nu)/(2 F + 5 - 6 nu)."""
+        """Return K1 = 12 (1 - nu)/(2 F + 5 - 6 nu)."""
         nu = self.soil.nu
         return 12.0 * (1.0 - nu) / (2.0 * self.flexibility + 5.0 - 6.0 * nu)
 
     def diameter_change(self, gamma: float) -> float:
-        """Full slip: K1 F gamma D/3 [m], of the diameter that is stretched most."""
+        """Return K1 F gamma D/3 [m] at full slip, of the diameter that is stretched most."""
         return self.full_slip * self.flexibility * gamma / 3.0 * 2.0 * self.radius
 
     def thrust(self, gamma: float, *, slip: bool) -> float:
-        """Largest hoop force [N/m]: full slip K1 E_m R gamma/(6 (1 + nu)), no slip K2 G R gamma."""
+        """Return the largest hoop force [N/m]: full slip K1 E_m R gamma/(6 (1 + nu)), no slip K2 G R gamma."""
         nu, F, C = self.soil.nu, self.flexibility, self.compressibility
         if slip:
             return self.full_slip * self.soil.E * self.radius * gamma / (6.0 * (1.0 + nu))
@@ -74,13 +74,13 @@ class ThinLining:
         return (1.0 + above / below) * self.soil.shear_modulus * gamma * self.radius
 
     def moment(self, gamma: float) -> float:
-        """Full slip: largest bending moment [N m/m], thrust times R."""
+        """Return the largest bending moment at full slip [N m/m], thrust times R."""
         return self.thrust(gamma, slip=True) * self.radius
 
 
 @dataclass(frozen=True)
 class ThickLining:
-    """inner and outer radius [m]; ``slip``: no friction at the outside, else nothing slides there."""
+    """Hold inner and outer radius [m]; ``slip``: no friction at the outside, else nothing slides there."""
 
     inner: float
     outer: float
@@ -95,7 +95,7 @@ class ThickLining:
 
     @cached_property
     def _constants(self) -> Array:
-        """A, B, C, D of the lining; C, D of the soil, for gamma = 1 and lengths in units of the outer radius."""
+        """Return A, B, C, D of the lining; C, D of the soil, for gamma = 1, lengths in units of the outer radius."""
         G = self.soil.shear_modulus
         lining, soil = self._rows(self.lining), self._rows(self.soil)
         inside, interface = lining(self.inner / self.outer), lining(1.0)
@@ -115,7 +115,7 @@ class ThickLining:
 
     @staticmethod
     def _rows(material: LinearElastic) -> Callable[[float], dict[str, Array]]:
-        """Amplitudes of the fields at r as products with (A, B, C, D)."""
+        """Return the amplitudes of the fields at r as products with (A, B, C, D)."""
         nu, G2 = material.nu, 2.0 * material.shear_modulus
 
         def at(r: float) -> dict[str, Array]:
@@ -130,28 +130,28 @@ class ThickLining:
         return at
 
     def field(self, name: str, r: float, gamma: float) -> float:
-        """Amplitude of "sigma_r", "sigma_theta", "tau" [Pa], "u_r" or "u_theta" [m] in the lining at r [m]."""
+        """Return the amplitude of "sigma_r", "sigma_theta", "tau" [Pa], "u_r", "u_theta" [m] in the lining at r [m]."""
         size = self.outer if name.startswith("u_") else 1.0
         return float(gamma * size * (self._rows(self.lining)(r / self.outer)[name] @ self._constants[:4]))
 
     def diameter_change(self, gamma: float) -> float:
-        """2 u_r [m] at the outside, of the diameter that is stretched most."""
+        """Return 2 u_r [m] at the outside, of the diameter that is stretched most."""
         return 2.0 * self.field("u_r", self.outer, gamma)
 
     def pressure(self, gamma: float) -> float:
-        """Amplitude of sigma_r [Pa] at the outside: contact lasts under a pressure beforehand that exceeds it."""
+        """Return the amplitude of sigma_r [Pa] at the outside: contact lasts if the pressure beforehand exceeds it."""
         return self.field("sigma_r", self.outer, gamma)
 
     def thrust(self, gamma: float) -> float:
-        """Amplitude of the hoop force N = ∫ sigma_theta dr [N/m]."""
+        """Return the amplitude of the hoop force N = ∫ sigma_theta dr [N/m]."""
         return self._integral(gamma)[0]
 
     def moment(self, gamma: float) -> float:
-        """Amplitude of the bending moment ∫ sigma_theta (r - R) dr [N m/m] about the mean radius R."""
+        """Return the amplitude of the bending moment ∫ sigma_theta (r - R) dr [N m/m] about the mean radius R."""
         return self._integral(gamma)[1]
 
     def _integral(self, gamma: float) -> tuple[float, float]:
-        """Gauss quadrature across the thickness."""
+        """Integrate across the thickness by Gauss quadrature."""
         x, w = np.polynomial.legendre.leggauss(12)
         half, mean = 0.5 * (self.outer - self.inner), 0.5 * (self.outer + self.inner)
         hoop = np.array([self.field("sigma_theta", mean + half * s, gamma) for s in x])

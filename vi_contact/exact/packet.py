@@ -1,4 +1,4 @@
-"""A packet of plane waves that travels up at an angle: initial values with a known reflection (V8.1)."""
+"""Give a packet of plane waves that travels up at an angle: initial values with a known reflection."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .surface_waves import dashpot_energy
 
 @dataclass(frozen=True)
 class WavePacket:
-    """Waves "P" or "S" around ``angle`` [rad] from the vertical, all with one wavelength along x: ``period`` [m].
+    """Describe waves "P" or "S" around ``angle`` [rad] from the vertical, of one wavelength along x: ``period`` [m].
 
         u = sum over k_y of weight(k_y) d cos(k_x x + k_y (y - centre) - w t),   k_x = 2 pi/period,   w = c |k|
 
@@ -31,23 +31,23 @@ class WavePacket:
 
     @property
     def speed(self) -> float:
-        """c_P or c_S [m/s]."""
+        """Return c_P or c_S [m/s]."""
         return self.material.c_p if self.wave == "P" else self.material.c_s
 
     @property
     def wavelength(self) -> float:
-        """In the direction of travel, of the middle of the packet [m]."""
+        """Return the wavelength of the middle of the packet in its direction of travel [m]."""
         return self.period * math.sin(self.angle)
 
     def _waves(self) -> tuple[Array, Array, Array]:
-        """(k_y, weights, angles)."""
+        """Return (k_y, weights, angles)."""
         k_x = 2.0 * math.pi / self.period
         k_y = k_x / math.tan(self.angle) + np.linspace(-4.0, 4.0, 161) / self.length
         weights = np.exp(-0.5 * np.linspace(-4.0, 4.0, 161) ** 2)
         return k_y, weights / weights.sum(), np.arctan2(k_x, k_y)
 
     def motion(self, points: Array, t: float = 0.0) -> tuple[Array, Array]:
-        """(u, v) at points (n, 2), each (n, 2)."""
+        """Return (u, v) at points (n, 2), each (n, 2)."""
         k_x = 2.0 * math.pi / self.period
         u, v = np.zeros(points.shape), np.zeros(points.shape)
         for k_y, weight, angle in zip(*self._waves(), strict=True):
@@ -60,7 +60,7 @@ class WavePacket:
         return u, v
 
     def reflected(self) -> float:
-        """Energy that dashpots on a horizontal boundary above send back, over that of the packet: its mean."""
+        """Return the mean energy that dashpots on a horizontal boundary above send back, over the packet's."""
         k_y, weights, angles = self._waves()
         shares = [
             dashpot_energy(self.material, angle, wave=self.wave) if angle < 0.5 * math.pi else 1.0 for angle in angles

@@ -1,4 +1,4 @@
-"""A flat rigid punch without friction on an elastic half-space (verification V2.5).
+"""Solve a flat rigid punch without friction on an elastic half-space (Johnson 1985, ch. 2 and 3).
 
 Pressures are positive in compression and infinite at the edge, where they grow with the power -1/2 of the distance.
 """
@@ -17,7 +17,7 @@ from ..core.checks import attributes
 
 @dataclass(frozen=True)
 class StripPunch:
-    """A long punch of width 2a under `force` P per unit of length: p = P/(pi sqrt(a² - x²)).
+    """Describe a long punch of width 2a under `force` P per unit of length: p = P/(pi sqrt(a² - x²)).
 
     half_width a [m], force [N/m]. Raises InputError unless both are finite and positive.
     """
@@ -29,13 +29,13 @@ class StripPunch:
         attributes(self, positive=("half_width", "force"))
 
     def pressure(self, x: ArrayLike) -> Array:
-        """p(x) [Pa] at the distance x from the centre line, 0 beside the punch, infinite at its edge."""
+        """Return p(x) [Pa] at the distance x from the centre line, 0 beside the punch, infinite at its edge."""
         return self.force / math.pi * _inverse_root(self.half_width, x)
 
 
 @dataclass(frozen=True)
 class RoundPunch:
-    """A round punch of radius a under `force` F: p = F/(2 pi a sqrt(a² - r²)), depth = F/(2 E* a).
+    """Describe a round punch of radius a under `force` F: p = F/(2 pi a sqrt(a² - r²)), depth = F/(2 E* a).
 
     radius a [m], force [N], modulus E* = E/(1 - nu²) [Pa]. Raises InputError unless all are finite and positive.
     """
@@ -49,16 +49,16 @@ class RoundPunch:
 
     @property
     def depth(self) -> float:
-        """Depth to which it sinks [m]."""
+        """Return the depth to which it sinks [m]."""
         return self.force / (2.0 * self.modulus * self.radius)
 
     def pressure(self, r: ArrayLike) -> Array:
-        """p(r) [Pa] at the distance r from the axis, 0 beside the punch, infinite at its edge."""
+        """Return p(r) [Pa] at the distance r from the axis, 0 beside the punch, infinite at its edge."""
         return self.force / (2.0 * math.pi * self.radius) * _inverse_root(self.radius, r)
 
 
 def _inverse_root(a: float, x: ArrayLike) -> Array:
-    """1/sqrt(a² - x²), 0 for |x| > a."""
+    """Return 1/sqrt(a² - x²), 0 for |x| > a."""
     square = a**2 - np.asarray(x, dtype=float) ** 2
     with np.errstate(divide="ignore"):
         return np.where(square < 0.0, 0.0, 1.0 / np.sqrt(np.maximum(square, 0.0)))

@@ -1,4 +1,4 @@
-"""How far the ground shears a buried rectangular frame: flexibility ratio and racking ratio (Wang 1993, Penzien 2000).
+"""Tell how far the ground shears a buried frame: flexibility and racking ratio (Wang 1993, Penzien 2000).
 
     F = G W/(S H),     R = gamma_frame/gamma_soil = 4 (1-nu) F/(3 - 4 nu + F)
 
@@ -18,7 +18,7 @@ from ..core.errors import InputError
 
 @dataclass(frozen=True)
 class BoxFrame:
-    """A closed box of one cell. width, height [m]; E I of walls, roof and invert [N m²/m]; all positive."""
+    """Describe a closed box of one cell. width, height [m]; E I of walls, roof and invert [N m²/m]; all positive."""
 
     width: float
     height: float
@@ -30,8 +30,8 @@ class BoxFrame:
         attributes(self, positive=("width", "height", "wall", "roof", "invert"))
 
     def flexibility(self, shear_modulus: float) -> float:
-        """F = G H W²/(12 E I_roof) psi, psi = [3 a2² + 2 (1 + a1) a2 + a1]/(1 + a1 + 6 a2), a1 = I_roof/I_invert,
-        a2 = I_roof H/(I_wall W)."""
+        """Return F = G H W²/(12 E I_roof) psi, psi = [3 a2² + 2 (1 + a1) a2 + a1]/(1 + a1 + 6 a2);
+        a1 = I_roof/I_invert, a2 = I_roof H/(I_wall W)."""
         a1, a2 = self.roof / self.invert, self.roof * self.height / (self.wall * self.width)
         psi = (3.0 * a2**2 + 2.0 * (1.0 + a1) * a2 + a1) / (1.0 + a1 + 6.0 * a2)
         return shear_modulus * self.height * self.width**2 / (12.0 * self.roof) * psi
@@ -39,7 +39,7 @@ class BoxFrame:
 
 @dataclass(frozen=True)
 class ChannelFrame:
-    """An open channel: two walls that stand on a slab. width, height [m]; E I of walls and slab [N m²/m]."""
+    """Describe an open channel: two walls that stand on a slab. width, height [m]; E I of walls and slab [N m²/m]."""
 
     width: float
     height: float
@@ -50,13 +50,13 @@ class ChannelFrame:
         attributes(self, positive=("width", "height", "wall", "slab"))
 
     def flexibility(self, shear_modulus: float) -> float:
-        """F = G/12 [2 H² W/(E I_wall) + H W²/(E I_slab)]."""
+        """Return F = G/12 [2 H² W/(E I_wall) + H W²/(E I_slab)]."""
         H, W = self.height, self.width
         return shear_modulus / 12.0 * (2.0 * H**2 * W / self.wall + H * W**2 / self.slab)
 
 
 def racking_ratio(flexibility: float, nu: float) -> float:
-    """R of a box in soil of Poisson's ratio nu, 0 (rigid) to 4 (1 - nu) (a hole).
+    """Return R of a box in soil of Poisson's ratio nu, 0 (rigid) to 4 (1 - nu) (a hole).
 
     InputError for a negative flexibility or nu outside [0, 1/2].
     """

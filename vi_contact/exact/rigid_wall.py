@@ -1,4 +1,4 @@
-"""An elastic soil layer on rigid rock, held by a rigid smooth wall and accelerated horizontally.
+"""Solve an elastic soil layer on rigid rock, held by a rigid smooth wall and accelerated horizontally.
 
 The one-dimensional theory of Veletsos and Younan (1994) for the layer of Wood (1973): vertical stresses are neglected
 and the horizontal displacements of all modes sin((2n-1) pi y/2H) decay from the wall into the layer:
@@ -34,7 +34,7 @@ TURNED = 8.0 * CATALAN / math.pi**2  # 0.74245
 
 @dataclass(frozen=True)
 class RigidWall:
-    """height H [m], density rho [kg/m³], Poisson's ratio nu in [0, 1/2); ``simple``: psi_e = psi_s.
+    """Hold height H [m], density rho [kg/m³], Poisson's ratio nu in [0, 1/2); ``simple``: psi_e = psi_s.
 
     ``flexibility`` d = G H²/R is that of a rotational spring R [N m/m] at the foot of the wall; 0: it cannot turn.
     Raises InputError for values out of range.
@@ -53,7 +53,7 @@ class RigidWall:
 
     @property
     def kappa(self) -> float:
-        """psi_s²/psi_e."""
+        """Return psi_s²/psi_e."""
         psi_s = 2.0 / (1.0 - self.nu)
         psi_e = psi_s if self.simple else (2.0 - self.nu) / (1.0 - self.nu)
         return psi_s / math.sqrt(psi_e)
@@ -62,25 +62,25 @@ class RigidWall:
         return self.kappa * self.rho * acceleration * self.height
 
     def pressure(self, y: ArrayLike, acceleration: float) -> Array:
-        """p [Pa] at heights y [m] (any shape) on a wall that cannot turn."""
+        """Return p [Pa] at heights y [m] (any shape) on a wall that cannot turn."""
         odd = 2.0 * np.arange(1, TERMS + 1) - 1.0
         angle = np.multiply.outer(np.asarray(y, dtype=float) / self.height, 0.5 * math.pi * odd)
         return np.asarray(self._unit(acceleration) * (np.sin(angle) @ (8.0 / (odd * math.pi) ** 2)))
 
     def thrust(self, acceleration: float) -> float:
-        """Q [N/m] for a body force rho a towards the wall; its turning takes 8 G/pi² M_1 kappa d/(1 + Q_1 kappa d)."""
+        """Return Q [N/m] under a body force rho a to the wall; turning takes 8 G/pi² M_1 kappa d/(1 + Q_1 kappa d)."""
         return self._unit(acceleration) * self.height * (THRUST - TURNED * MOMENT * self._yielding)
 
     def moment(self, acceleration: float) -> float:
-        """M [N] about the foot of the wall."""
+        """Return M [N] about the foot of the wall."""
         return self._unit(acceleration) * self.height**2 * MOMENT / (1.0 + THRUST * self.kappa * self.flexibility)
 
     def thrust_height(self, acceleration: float = 1.0) -> float:
-        """Height [m] of the thrust above the rock, M/Q; 0.5986 H for a wall that cannot turn."""
+        """Return the height [m] of the thrust above the rock, M/Q; 0.5986 H for a wall that cannot turn."""
         return self.moment(acceleration) / self.thrust(acceleration)
 
     @property
     def _yielding(self) -> float:
-        """kappa d/(1 + 0.54276 kappa d)."""
+        """Return kappa d/(1 + 0.54276 kappa d)."""
         flexibility = self.kappa * self.flexibility
         return flexibility / (1.0 + THRUST * flexibility)

@@ -1,4 +1,4 @@
-"""A rigid block on a moving base with Coulomb friction (Newmark's sliding block; verification V3.2).
+"""Solve a rigid block on a moving base with Coulomb friction (Newmark, Géotechnique 15, 1965).
 
     u'' = -a(t) - mu g sgn(u')   while it slides,   u' = 0 stays while |a| <= mu g
 
@@ -20,7 +20,7 @@ from ..core.errors import InputError
 
 @dataclass(frozen=True)
 class SlidingBlock:
-    """mu >= 0 on a level base, gravity g [m/s²]. Raises InputError for values out of range."""
+    """Hold mu >= 0 of a level base, and gravity g [m/s²]. Raises InputError for values out of range."""
 
     mu: float
     gravity: float = 9.81
@@ -30,11 +30,11 @@ class SlidingBlock:
 
     @property
     def onset_acceleration(self) -> float:
-        """mu g [m/s²]."""
+        """Return mu g [m/s²]."""
         return self.mu * self.gravity
 
     def slip(self, acceleration: float, duration: float) -> float:
-        """Final |u| [m] of a rectangular pulse a for t1: ½ a t1² (a/(mu g) - 1), 0 if |a| <= mu g.
+        """Return the final |u| [m] of a rectangular pulse a for t1: ½ a t1² (a/(mu g) - 1), 0 if |a| <= mu g.
 
         acceleration a [m/s²], duration t1 [s]. Infinite without friction.
         """
@@ -44,14 +44,14 @@ class SlidingBlock:
         return 0.5 * a * duration**2 * (a / self.onset_acceleration - 1.0) if self.mu else math.inf
 
     def stop_time(self, acceleration: float, duration: float) -> float:
-        """When the block slides no more [s]: t1 a/(mu g), 0 if |a| <= mu g."""
+        """Return the time from which the block slides no more [s]: t1 a/(mu g), 0 if |a| <= mu g."""
         a = abs(acceleration)
         if a <= self.onset_acceleration:
             return 0.0
         return duration * a / self.onset_acceleration if self.mu else math.inf
 
     def history(self, times: ArrayLike, acceleration: ArrayLike) -> tuple[Array, Array]:
-        """(u, u') at `times`, from rest, for an acceleration that is linear between them; exact to round-off.
+        """Return (u, u') at `times`, from rest, for an acceleration that is linear between them; exact to round-off.
 
         times [s], not decreasing, a time given twice is a jump; acceleration [m/s²]; all of shape (n,). Raises
         InputError when the shapes differ, a number is not finite or the times decrease.
@@ -66,7 +66,7 @@ class SlidingBlock:
         return u, v
 
     def _interval(self, u: float, v: float, a: float, a_end: float, length: float) -> tuple[float, float]:
-        """(u, u') after an interval [s] in which the acceleration goes linearly from a to a_end."""
+        """Return (u, u') after an interval [s] in which the acceleration goes linearly from a to a_end."""
         slope = (a_end - a) / length if length > 0.0 else 0.0
         while length > 0.0:
             sign = math.copysign(1.0, v) if v else self._onset(a, slope)
@@ -84,14 +84,14 @@ class SlidingBlock:
         return u, v
 
     def _onset(self, a: float, slope: float) -> float:
-        """Direction in which a block at rest starts to slide: 1, -1, or 0 if it sticks."""
+        """Return the direction in which a block at rest starts to slide: 1, -1, or 0 if it sticks."""
         side = math.copysign(1.0, a)  # of ±0 too, for a block without friction
         slides = abs(a) > self.onset_acceleration or (abs(a) == self.onset_acceleration and side * slope > 0.0)
         return -side if slides else 0.0
 
 
 def _stop(v: float, push: float, jerk: float) -> float:
-    """First s > 0 at which v + push s + jerk s²/2, positive before, is zero; infinite if it stays positive."""
+    """Return the first s > 0 at which v + push s + jerk s²/2, positive before, is zero; infinite if there is none."""
     disc = push * push - 2.0 * jerk * v
     if disc < 0.0:
         return math.inf

@@ -1,4 +1,4 @@
-"""Rayleigh waves, and what dashpots on a plane boundary reflect: closed forms (V8.1, V8.3).
+"""Solve Rayleigh waves, and what dashpots on a plane boundary reflect, in closed form.
 
 The dashpots are those of Lysmer and Kuhlemeyer, sigma_n = -rho c_P v_n and tau = -rho c_S v_t.
 """
@@ -16,7 +16,7 @@ from ..laws.materials import LinearElastic
 
 
 def rayleigh_speed(material: LinearElastic) -> float:
-    """c_R [m/s]: (2 - x²)² = 4 sqrt(1 - x²) sqrt(1 - x² c_S²/c_P²), x = c_R/c_S, the root in (0, 1)."""
+    """Return c_R [m/s]: (2 - x²)² = 4 sqrt(1 - x²) sqrt(1 - x² c_S²/c_P²), x = c_R/c_S, the root in (0, 1)."""
     ratio = (material.c_s / material.c_p) ** 2
 
     def equation(y: float) -> float:  # y = x², divided by y: the trivial root is gone
@@ -26,7 +26,7 @@ def rayleigh_speed(material: LinearElastic) -> float:
 
 
 def rayleigh_motion(material: LinearElastic, depth: Array, wavelength: float) -> tuple[Array, Array]:
-    """(U, V) at depths >= 0 [m] of u_x = U cos k(x - c t), u_y = V sin k(x - c t), y upwards; U = 1 at the surface.
+    """Return (U, V) at depths >= 0 [m]: u_x = U cos k(x - c t), u_y = V sin k(x - c t), y upwards; U(0) = 1.
 
     With q, s = k sqrt(1 - c²/c_P²), k sqrt(1 - c²/c_S²): U ~ exp(-q z) - (1 + s²/k²)/2 exp(-s z) and
     V ~ (q/k) (exp(-q z) - 2/(1 + s²/k²) exp(-s z)); y = -z.
@@ -42,7 +42,7 @@ def rayleigh_motion(material: LinearElastic, depth: Array, wavelength: float) ->
 def dashpot_reflection(
     material: LinearElastic, angle: float, *, wave: str, normal: float = 1.0, tangential: float = 1.0
 ) -> tuple[float, float]:
-    """(|A_P|, |A_S|) of the waves reflected by dashpots, for one of amplitude 1 that arrives at ``angle`` [rad].
+    """Return (|A_P|, |A_S|) of the waves reflected by dashpots, for one of amplitude 1 that arrives at ``angle`` [rad].
 
     angle: from the normal of the boundary, 0 to pi/2; wave: "P" or "S"; normal, tangential: factors of rho c_P and
     rho c_S. Amplitudes of displacement. InputError for another wave or angle.
@@ -53,7 +53,7 @@ def dashpot_reflection(
 def dashpot_energy(
     material: LinearElastic, angle: float, *, wave: str, normal: float = 1.0, tangential: float = 1.0
 ) -> float:
-    """Reflected over incident energy flux at right angles to the boundary; arguments as ``dashpot_reflection``."""
+    """Return reflected over incident energy flux at right angles to the boundary; see ``dashpot_reflection``."""
     a_p, a_s = _reflected(material, angle, wave, normal, tangential)
     c_p, c_s = material.c_p, material.c_s
     speed = c_p if wave == "P" else c_s
@@ -66,7 +66,7 @@ def dashpot_energy(
 def _reflected(
     material: LinearElastic, angle: float, wave: str, normal: float, tangential: float
 ) -> tuple[complex, complex]:
-    """Amplitudes of the reflected P and S wave.
+    """Return the amplitudes of the reflected P and S wave.
 
     Boundary y = 0, body y < 0, factor exp(i w (t - p x)) with slowness p along the boundary. P waves have displacement
     (p, ±eta_p) c_P, S waves (±eta_s, -p) c_S with the vertical slownesses eta (+ travels towards the boundary).
@@ -80,7 +80,7 @@ def _reflected(
     eta_p, eta_s = (complex(eta.real, -abs(eta.imag)) for eta in (eta_p, eta_s))
 
     def residual(u: tuple[complex, complex], eta: complex) -> Array:
-        """(sigma_xy + c v_x, sigma_yy + c v_y)/(i w) of u exp(i w (t - p x - eta y))."""
+        """Return (sigma_xy + c v_x, sigma_yy + c v_y)/(i w) of u exp(i w (t - p x - eta y))."""
         lame, shear = material.lame_lambda, material.shear_modulus
         tau = -shear * (eta * u[0] + p * u[1])
         sigma = -(lame * (p * u[0] + eta * u[1]) + 2.0 * shear * eta * u[1])

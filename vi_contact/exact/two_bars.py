@@ -1,4 +1,4 @@
-"""Two coaxial elastic bars that collide (verification V1.4)."""
+"""Solve the collision of two coaxial elastic bars."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..core.errors import InputError
 
 @dataclass(frozen=True)
 class TwoBars:
-    """A stress-free bar 1 with velocity `speed` v0 hits bar 2, stress-free and at rest, at t = 0; both ends free.
+    """Describe a bar 1 that hits bar 2, at rest, with `speed` v0 at t = 0; both stress-free, their far ends free.
 
     With impedances z = rho c and crossing times T = length/c, continuity of velocity gives, until a wave returns,
 
@@ -44,35 +44,35 @@ class TwoBars:
 
     @property
     def pressure(self) -> float:
-        """p = v0 z1 z2/(z1 + z2) [Pa], constant during the contact."""
+        """Return p = v0 z1 z2/(z1 + z2) [Pa], constant during the contact."""
         return self.speed * self.z1 * self.z2 / (self.z1 + self.z2)
 
     @property
     def duration(self) -> float:
-        """2 min(T1, T2) [s]."""
+        """Return 2 min(T1, T2) [s]."""
         return 2.0 * min(self.length1 / self.c1, self.length2 / self.c2)
 
     @property
     def impulse(self) -> float:
-        """pressure · duration [Pa s]."""
+        """Return pressure · duration [Pa s]."""
         return self.pressure * self.duration
 
     @property
     def velocity1(self) -> float:
-        """Mean velocity of bar 1 after the contact [m/s]: v0 - impulse/mass."""
+        """Return the mean velocity of bar 1 after the contact [m/s]: v0 - impulse/mass."""
         return self.speed - self.impulse / (self.z1 * self.length1 / self.c1)
 
     @property
     def velocity2(self) -> float:
-        """Mean velocity of bar 2 after the contact [m/s]: impulse/mass."""
+        """Return the mean velocity of bar 2 after the contact [m/s]: impulse/mass."""
         return self.impulse / (self.z2 * self.length2 / self.c2)
 
     @property
     def restitution(self) -> float:
-        """(velocity2 - velocity1)/v0."""
+        """Return (velocity2 - velocity1)/v0."""
         return (self.velocity2 - self.velocity1) / self.speed
 
     def force(self, t: ArrayLike) -> Array:
-        """Contact pressure p(t) [Pa] >= 0 at times t [s] after the first touch."""
+        """Return the contact pressure p(t) [Pa] >= 0 at times t [s] after the first touch."""
         t = np.asarray(t, dtype=float)
         return self.pressure * ((t > 0.0) & (t < self.duration))

@@ -1,4 +1,4 @@
-"""Ground motions: readers and writers of record files, processing, spectra, intensity measures, synthetic motions."""
+"""Read, write, process and make ground motions: record files, spectra, intensity measures, synthetic motions."""
 
 from ..core.units import STANDARD_GRAVITY
 from .baseline import baseline_corrected

@@ -1,4 +1,4 @@
-"""Baseline correction: a polynomial taken from the acceleration so that the motion ends at rest."""
+"""Correct baselines: a polynomial is taken from the acceleration so that the motion ends at rest."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ HIGHEST = 6
 
 
 def baseline_corrected(record: Record, *, degree: int = 2, displacement: bool = False, at_rest: bool = True) -> Record:
-    """The record minus p(t) = sum c_k (t/T)^k, k = 0..degree, T its duration, with c fitted to the integrated motion.
+    """Return the record minus p(t) = sum c_k (t/T)^k, k = 0..degree, T its duration; c fits the integrated motion.
 
     c minimises the sum of squares of the velocity left over (of the displacement, if `displacement`), subject to
     v(T) = u(T) = 0 if at_rest; v and u are those of `integrated`, so both end at zero to round-off. A second correction

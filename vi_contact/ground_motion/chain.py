@@ -14,7 +14,7 @@ from .record import Record
 
 @dataclass(frozen=True)
 class Processing:
-    """What to do with a record; calling it gives the new one. The order is that of the fields, each step optional.
+    """Say what to do with a record; calling it gives the new one. Fields are in order, each step is optional.
 
     trim: (start, end) [s]; pad: zeros (before, after) [s]; mean: remove the mean; taper: fraction of the duration at
     each end; low, high: Butterworth corners [Hz] with order and causal; resample: time step [s]; baseline: degree of
@@ -44,7 +44,7 @@ class Processing:
             raise InputError(f"Processing: {' and '.join(asked)} were both asked for; scale a record once")
 
     def __call__(self, record: Record) -> Record:
-        """The processed record; its notes tell every step taken."""
+        """Return the processed record; its notes tell every step taken."""
         if self.trim is not None:
             record = trimmed(record, *self.trim)
         if self.pad is not None:
@@ -72,7 +72,7 @@ class Processing:
 
 
 def scaled_to_psa(record: Record, target: float, period: float, *, damping: float = 0.05) -> Record:
-    """Scaled so that the pseudo-acceleration at `period` [s] is `target` [m/s²]; the sign of the motion is kept.
+    """Scale a record so that its pseudo-acceleration at `period` [s] is `target` [m/s²], and keep its sign.
 
     Raises InputError unless target > 0 and the record is not all zero.
     """
@@ -80,7 +80,7 @@ def scaled_to_psa(record: Record, target: float, period: float, *, damping: floa
 
 
 def scaled_to_arias(record: Record, target: float) -> Record:
-    """Scaled so that the Arias intensity is `target` [m/s]; the sign of the motion is kept.
+    """Scale a record so that its Arias intensity is `target` [m/s], and keep its sign.
 
     Raises InputError unless target > 0 and the record is not all zero.
     """
@@ -88,7 +88,7 @@ def scaled_to_arias(record: Record, target: float) -> Record:
 
 
 def _ratio(record: Record, name: str, target: float, value: float) -> float:
-    """target / value."""
+    """Return target / value."""
     if not math.isfinite(target) or target <= 0.0:
         raise InputError(f"{name}: target is {target!r}; give a positive number")
     if value == 0.0:

@@ -1,4 +1,4 @@
-"""Elastic response spectra of Eurocode 8, EN 1998-1:2004, 3.2.2.2 (horizontal) and 3.2.2.3 (vertical)."""
+"""Give the elastic response spectra of Eurocode 8, EN 1998-1:2004, 3.2.2.2 (horizontal) and 3.2.2.3 (vertical)."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ VERTICAL = {1: (0.90, 0.05, 0.15, 1.0), 2: (0.45, 0.05, 0.15, 1.0)}
 
 @dataclass(frozen=True)
 class EC8Spectrum:
-    """S_e(T), eqs. 3.2 to 3.5, of given parameters; `on_ground` and `vertical` take them from the tables.
+    """Hold S_e(T), eqs. 3.2 to 3.5, of given parameters; `on_ground` and `vertical` take them from the tables.
 
     ag: design ground acceleration on ground A, gamma_I a_gR [m/s²]; s: soil factor; tb, tc, td [s]; damping: ratio;
     plateau: 2.5, or 3.0 vertically. A National Annex may give other numbers.
@@ -48,14 +48,14 @@ class EC8Spectrum:
 
     @classmethod
     def on_ground(cls, ground: str, *, ag: float, kind: int = 1, damping: float = 0.05) -> EC8Spectrum:
-        """The horizontal spectrum of type `kind` (1, or 2 for weak near earthquakes) on ground "A" to "E"."""
+        """Return the horizontal spectrum of type `kind` (1, or 2 for weak near earthquakes) on ground "A" to "E"."""
         if kind not in GROUNDS or ground not in GROUNDS[kind]:
             raise InputError(f"EC8Spectrum: ground {ground!r}, type {kind!r}; give A, B, C, D or E and type 1 or 2")
         return cls(ag, *GROUNDS[kind][ground], damping=damping)
 
     @classmethod
     def vertical(cls, *, ag: float, kind: int = 1, damping: float = 0.05) -> EC8Spectrum:
-        """The vertical spectrum S_ve(T), eqs. 3.8 to 3.11, the same on every ground; ag is the horizontal one."""
+        """Return the vertical spectrum S_ve(T), eqs. 3.8 to 3.11, for every ground; ag is the horizontal one."""
         if kind not in VERTICAL:
             raise InputError(f"EC8Spectrum: type {kind!r}; give 1 or 2")
         ratio, tb, tc, td = VERTICAL[kind]
@@ -63,11 +63,11 @@ class EC8Spectrum:
 
     @property
     def eta(self) -> float:
-        """Damping correction sqrt(10 / (5 + xi in %)), not below 0.55 (eq. 3.6)."""
+        """Return the damping correction sqrt(10 / (5 + xi in %)), not below 0.55 (eq. 3.6)."""
         return max(math.sqrt(10.0 / (5.0 + 100.0 * self.damping)), 0.55)
 
     def acceleration(self, periods: Array) -> Array:
-        """S_e [m/s²] at the periods [s] >= 0; the code states it up to 4 s."""
+        """Return S_e [m/s²] at the periods [s] >= 0; the code states it up to 4 s."""
         t = np.asarray(periods, dtype=float)
         if np.any(t < 0.0):
             raise InputError("EC8Spectrum: a period is negative; give seconds from 0 upwards")
@@ -79,5 +79,5 @@ class EC8Spectrum:
         return self.ag * self.s * shape
 
     def displacement(self, periods: Array) -> Array:
-        """S_De = S_e (T / 2 pi)² [m], eq. 3.7."""
+        """Return S_De = S_e (T / 2 pi)² [m], eq. 3.7."""
         return self.acceleration(periods) * (np.asarray(periods, dtype=float) / (2.0 * math.pi)) ** 2

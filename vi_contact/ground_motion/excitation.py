@@ -11,7 +11,7 @@ from .record import Record
 
 @dataclass(frozen=True)
 class GroundMotion:
-    """A recorded motion: a(t) = scale · (straight lines between the samples of `record`, sample k at k · dt).
+    """Describe a recorded motion: a(t) = scale · (straight lines between the samples of `record`, sample k at k · dt).
 
     Zero before the first and after the last sample. scale: a factor; for a peak use `scaled_to_pga(record, pga)`.
     Raises InputError unless scale is finite. Solve with a time step no longer than the record's, or resample it first.
@@ -27,11 +27,11 @@ class GroundMotion:
 
     @property
     def duration(self) -> float:
-        """Time of the last sample [s]."""
+        """Return the time of the last sample [s]."""
         return self.record.duration
 
     def acceleration(self, t: float) -> float:
-        """scale · linear interpolation between the two samples around t [m/s²]."""
+        """Return scale · record at t [m/s²], linear between the two samples around t."""
         record = self.record
         if not 0.0 <= t <= record.duration:
             return 0.0

@@ -1,4 +1,4 @@
-"""What a record file holds, as the text printed by `vi-contact motion info FILE`."""
+"""Tell what a record file holds, as the text printed by `vi-contact motion info FILE`."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ from .record import UNITS, Record
 def motion_info(path: str | os.PathLike[str], units: str | None = None, *, dt: float | None = None,
                 resample_dt: float | None = None, channel: int | None = None,
                 largest: float = LARGEST_PEAK, processing: Processing | None = None) -> str:
-    """A table of one quantity a line, after `processing`; other options and InputError: see `read_record`."""
+    """Return a table of one quantity a line, after `processing`; other options and InputError: see `read_record`."""
     record = read_record(path, units, dt=dt, resample_dt=resample_dt, channel=channel, largest=largest)
     return record_info(record if processing is None else processing(record))
 
 
 def record_info(record: Record) -> str:
-    """The table of a record: where it comes from, peaks, intensities, what is left at its end, notes."""
+    """Return the table of a record: where it comes from, peaks, intensities, what is left at its end, notes."""
     shaken = pga(record) > 0.0
     velocity, displacement = integrated(record)
     rows = [

@@ -15,32 +15,32 @@ from .spectra import fourier_spectrum, response_spectrum
 
 
 def pga(record: Record) -> float:
-    """Peak ground acceleration, the largest |a| of the samples [m/s²]."""
+    """Return the peak ground acceleration, the largest |a| of the samples [m/s²]."""
     return float(np.max(np.abs(record.acceleration)))
 
 
 def pga_time(record: Record) -> float:
-    """Time of the first sample that reaches the peak ground acceleration [s]."""
+    """Return the time of the first sample that reaches the peak ground acceleration [s]."""
     return float(np.argmax(np.abs(record.acceleration))) * record.dt
 
 
 def pgv(record: Record) -> float:
-    """Peak ground velocity, the largest |v| at the samples of the integrated record [m/s]."""
+    """Return the peak ground velocity, the largest |v| at the samples of the integrated record [m/s]."""
     return float(np.max(np.abs(integrated(record)[0])))
 
 
 def pgd(record: Record) -> float:
-    """Peak ground displacement, the largest |u| at the samples of the twice integrated record, drift included [m]."""
+    """Return the peak ground displacement, the largest |u| of the twice integrated samples, with their drift [m]."""
     return float(np.max(np.abs(integrated(record)[1])))
 
 
 def arias(record: Record) -> float:
-    """Arias intensity pi / (2 g) times the integral of a² over the record, by the trapezoidal rule [m/s]."""
+    """Return the Arias intensity pi / (2 g) times the integral of a² over the record, by the trapezoidal rule [m/s]."""
     return float(husid(record)[-1])
 
 
 def d5_95(record: Record) -> float:
-    """Significant duration: time between 5 % and 95 % of the Arias intensity [s], zero for a record that is all zero.
+    """Return the time between 5 % and 95 % of the Arias intensity [s], zero for a record that is all zero.
 
     Both instants are interpolated linearly in the Husid curve, the Arias intensity accumulated up to t.
     """
@@ -48,14 +48,14 @@ def d5_95(record: Record) -> float:
 
 
 def husid(record: Record) -> Array:
-    """Arias intensity accumulated up to each sample, shape (n,) [m/s]."""
+    """Return the Arias intensity accumulated up to each sample, shape (n,) [m/s]."""
     square = record.acceleration**2
     steps = 0.5 * record.dt * (square[:-1] + square[1:])
     return math.pi / (2.0 * STANDARD_GRAVITY) * np.concatenate(([0.0], np.cumsum(steps)))
 
 
 def significant_duration(record: Record, start: float, end: float) -> float:
-    """Time between the fractions `start` and `end` of the Arias intensity [s], zero for a record that is all zero."""
+    """Return the time between fractions `start` and `end` of the Arias intensity [s]; zero if all is zero."""
     if not 0.0 <= start < end <= 1.0:
         raise InputError(f"significant_duration: {start!r} to {end!r}; give fractions with 0 <= start < end <= 1")
     curve = husid(record)
@@ -66,7 +66,7 @@ def significant_duration(record: Record, start: float, end: float) -> float:
 
 
 def bracketed_duration(record: Record, threshold: float) -> float:
-    """Time between the first and the last sample with |a| >= threshold [m/s²], zero if there is none [s]."""
+    """Return the time between the first and the last sample with |a| >= threshold [m/s²], zero if there is none [s]."""
     if not threshold > 0.0:
         raise InputError(f"bracketed_duration: threshold is {threshold!r}; give a positive acceleration in m/s²")
     above = np.flatnonzero(np.abs(record.acceleration) >= threshold)
@@ -74,7 +74,7 @@ def bracketed_duration(record: Record, threshold: float) -> float:
 
 
 def cav(record: Record) -> float:
-    """Cumulative absolute velocity, the integral of |a| [m/s], exact for straight lines between samples."""
+    """Return the cumulative absolute velocity, the integral of |a| [m/s], exact for straight lines between samples."""
     a, b = np.abs(record.acceleration[:-1]), np.abs(record.acceleration[1:])
     change = record.acceleration[:-1] * record.acceleration[1:] < 0.0  # two triangles where the sign changes
     total = np.where(change, a + b, 1.0)
@@ -82,7 +82,7 @@ def cav(record: Record) -> float:
 
 
 def rms(record: Record) -> float:
-    """Root of the mean of a² over the record, by the trapezoidal rule [m/s²]."""
+    """Return the root of the mean of a² over the record, by the trapezoidal rule [m/s²]."""
     return math.sqrt(2.0 * STANDARD_GRAVITY / math.pi * arias(record) / record.duration)
 
 
@@ -94,18 +94,18 @@ PREDOMINANT_PERIODS = np.geomspace(0.02, 10.0, 400)
 
 
 def psa(record: Record, period: float, *, damping: float = 0.05) -> float:
-    """Pseudo-acceleration at one period [m/s²]."""
+    """Return the pseudo-acceleration at one period [m/s²]."""
     return float(response_spectrum(record, np.array([period]), damping=damping).psa[0])
 
 
 def housner_intensity(record: Record, *, damping: float = 0.05) -> float:
-    """Housner's spectrum intensity: integral of the pseudo-velocity over T from 0.1 to 2.5 s [m]."""
+    """Return Housner's spectrum intensity: integral of the pseudo-velocity over T from 0.1 to 2.5 s [m]."""
     psv = response_spectrum(record, HOUSNER_PERIODS, damping=damping).psv
     return float(np.sum(0.5 * (psv[:-1] + psv[1:]) * np.diff(HOUSNER_PERIODS)))
 
 
 def predominant_period(record: Record, *, damping: float = 0.05) -> float:
-    """Period of the largest pseudo-acceleration from 0.02 (or ten steps of the record) to 10 s [s]."""
+    """Return the period of the largest pseudo-acceleration from 0.02 (or ten steps of the record) to 10 s [s]."""
     periods = PREDOMINANT_PERIODS[PREDOMINANT_PERIODS / record.dt >= 10.0]
     if not periods.size:
         raise InputError(f"predominant_period: a step of {record.dt:g} s resolves no period; use a finer record")
@@ -113,7 +113,7 @@ def predominant_period(record: Record, *, damping: float = 0.05) -> float:
 
 
 def mean_period(record: Record) -> float:
-    """Mean period of Rathje, Abrahamson and Bray (1998) [s]: sum(C²/f) / sum(C²), 0.25 <= f <= 20 Hz.
+    """Return the mean period of Rathje, Abrahamson and Bray (1998) [s]: sum(C²/f) / sum(C²), 0.25 <= f <= 20 Hz.
 
     C are the Fourier amplitudes. Raises InputError when nothing lies in that band.
     """

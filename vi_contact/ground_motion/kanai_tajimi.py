@@ -1,4 +1,4 @@
-"""Stochastic motions: white noise filtered by the ground (Kanai-Tajimi), without long periods (Clough-Penzien)."""
+"""Make stochastic motions: white noise filtered by the ground (Kanai-Tajimi), without long periods (Clough-Penzien)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .record import Record
 
 @dataclass(frozen=True)
 class KanaiTajimi:
-    """Two-sided power spectral density of the ground acceleration [m²/s³], the variance being its integral over omega.
+    """Describe a two-sided power spectral density of the ground acceleration [m²/s³]; its integral is the variance.
 
     S = S0 (wg⁴ + 4 zg² wg² w²) / ((wg² - w²)² + 4 zg² wg² w²) · w⁴ / ((wf² - w²)² + 4 zf² wf² w²), the last factor
     only when omega_f > 0 (Clough and Penzien, 1975). s0: density of the rock's white noise [m²/s³]; omega_g, omega_f
@@ -35,7 +35,7 @@ class KanaiTajimi:
             raise InputError(f"{self!r}: give positive numbers, and omega_f = 0 for no high-pass")
 
     def density(self, omega: Array) -> Array:
-        """S(omega) [m²/s³], shape as omega [rad/s]."""
+        """Return S(omega) [m²/s³], shape as omega [rad/s]."""
         square = np.asarray(omega, dtype=float) ** 2
         ground = self.omega_g**2
         damped = 4.0 * self.zeta_g**2 * ground * square
@@ -48,7 +48,7 @@ class KanaiTajimi:
 
 @dataclass(frozen=True)
 class Envelope:
-    """Rise (t/rise)², then 1, then exp(-decay (t - end)): Jennings, Housner and Tsai (1968).
+    """Describe an envelope (t/rise)², then 1, then exp(-decay (t - end)): Jennings, Housner and Tsai (1968).
 
     rise, end: [s], 0 <= rise <= end; decay: [1/s] >= 0. Raises InputError otherwise.
     """
@@ -62,7 +62,7 @@ class Envelope:
             raise InputError(f"{self!r}: give 0 <= rise <= end in seconds and decay >= 0 in 1/s")
 
     def __call__(self, times: Array) -> Array:
-        """The factor at each time [s]."""
+        """Return the factor at each time [s]."""
         rising = (times / self.rise) ** 2 if self.rise > 0.0 else np.ones_like(times)
         falling = np.exp(-self.decay * np.maximum(times - self.end, 0.0))
         return np.where(times < self.rise, rising, falling)
@@ -70,7 +70,7 @@ class Envelope:
 
 def synthetic(spectrum: KanaiTajimi, duration: float, dt: float, *, seed: int,
               envelope: Envelope | None = None) -> Record:
-    """A motion of this density: a = sum sqrt(4 S(w_k) dw) cos(w_k t + phi_k), phi_k uniform from `seed`.
+    """Make a motion of this density: a = sum sqrt(4 S(w_k) dw) cos(w_k t + phi_k), phi_k uniform from `seed`.
 
     Spectral representation (Shinozuka and Deodatis, 1991) with w_k = k dw, dw = 2 pi / period; the period, the next
     power of two of steps from twice the duration, keeps the motion from repeating itself. Without an envelope it is

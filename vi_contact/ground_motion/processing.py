@@ -21,14 +21,14 @@ LARGEST_RATIO = 1000
 
 
 def scaled(record: Record, *, factor: float) -> Record:
-    """Every sample times `factor`; a negative one turns the motion round. Raises InputError unless it is finite."""
+    """Scale every sample by `factor`; a negative one turns the motion round. Raises InputError unless it is finite."""
     if not math.isfinite(factor):
         raise InputError(f"scaled: factor is {factor!r}; give a finite number")
     return replace(record, acceleration=factor * record.acceleration, notes=record.notes + (f"scaled by {factor:.6g}",))
 
 
 def scaled_to_pga(record: Record, pga: float) -> Record:
-    """Scaled so that the largest |acceleration| is `pga` [m/s²]; the sign of the motion is kept.
+    """Scale a record so that its largest |acceleration| is `pga` [m/s²], and keep its sign.
 
     Raises InputError unless pga > 0 and the record is not all zero.
     """
@@ -42,7 +42,7 @@ def scaled_to_pga(record: Record, pga: float) -> Record:
 
 
 def resampled(record: Record, dt: float) -> Record:
-    """The record at time step dt [s]: band-limited interpolation up, anti-aliased decimation down.
+    """Return the record at time step dt [s]: band-limited interpolation up, anti-aliased decimation down.
 
     scipy.signal.resample_poly: a zero-phase windowed-sinc filter (Kaiser, beta 5) whose amplitude is halved at the
     lower of the two Nyquist frequencies 1 / (2 dt). The record is taken as zero outside its samples, so a record
@@ -72,7 +72,7 @@ def resampled(record: Record, dt: float) -> Record:
 
 
 def integrated(record: Record) -> tuple[Array, Array]:
-    """Ground velocity [m/s] and displacement [m] at the samples, both shape (n,) and zero at t = 0.
+    """Return ground velocity [m/s] and displacement [m] at the samples, both shape (n,) and zero at t = 0.
 
     Exact for an acceleration that is a straight line between samples: the trapezoidal rule for the velocity,
     v_{k+1} = v_k + dt (a_k + a_{k+1}) / 2, and u_{k+1} = u_k + dt v_k + dt² (2 a_k + a_{k+1}) / 6.
@@ -85,7 +85,7 @@ def integrated(record: Record) -> tuple[Array, Array]:
 
 
 def trimmed(record: Record, start: float = 0.0, end: float | None = None) -> Record:
-    """The samples at start <= t <= end [s]; the first one kept becomes t = 0. end: the record's last sample.
+    """Keep the samples at start <= t <= end [s]; the first one kept becomes t = 0. end: the record's last sample.
 
     Raises InputError unless 0 <= start < end <= duration and two samples are left.
     """
@@ -102,7 +102,7 @@ def trimmed(record: Record, start: float = 0.0, end: float | None = None) -> Rec
 
 
 def padded(record: Record, before: float = 0.0, after: float = 0.0) -> Record:
-    """Zeros for `before` seconds ahead of the record and `after` seconds behind it, rounded up to whole steps.
+    """Add zeros for `before` seconds ahead of the record and `after` seconds behind it, rounded up to whole steps.
 
     Raises InputError unless both are zero or positive.
     """
@@ -116,7 +116,7 @@ def padded(record: Record, before: float = 0.0, after: float = 0.0) -> Record:
 
 
 def without_mean(record: Record, *, until: float | None = None) -> Record:
-    """The record minus its mean, or minus the mean of the samples at t <= until [s], the quiet before the shaking.
+    """Subtract the mean of the record, or of the samples at t <= until [s], the quiet before the shaking.
 
     Raises InputError when until is not within the record.
     """
@@ -131,7 +131,7 @@ def without_mean(record: Record, *, until: float | None = None) -> Record:
 
 
 def tapered(record: Record, *, fraction: float = 0.05, start: bool = True, end: bool = True) -> Record:
-    """Both ends (or one) brought to zero by half a cosine over `fraction` of the record's duration.
+    """Bring both ends (or one) to zero by half a cosine over `fraction` of the record's duration.
 
     w(t) = (1 - cos(pi t / (fraction T))) / 2 at the start, mirrored at the end; 1 between.
     Raises InputError unless 0 < fraction <= 0.5.
@@ -148,7 +148,7 @@ def tapered(record: Record, *, fraction: float = 0.05, start: bool = True, end: 
 
 def filtered(record: Record, *, low: float | None = None, high: float | None = None, order: int = 4,
              causal: bool = False) -> Record:
-    """Butterworth high-pass above `low` [Hz], low-pass below `high` [Hz], or band-pass between them.
+    """Apply a Butterworth high-pass above `low` [Hz], low-pass below `high` [Hz], or band-pass between them.
 
     One pass has the gain |H|² = 1 / (1 + (f/high)^(2 order)) and likewise (low/f) of the high-pass, each applied by
     itself, so a band-pass has `order` on both flanks; the bilinear transform replaces f by tan(pi f dt). causal: one
@@ -183,7 +183,7 @@ def filtered(record: Record, *, low: float | None = None, high: float | None = N
 
 
 def _ringing(record: Record, corner: float) -> int:
-    """Samples in which the slowest filter has died away: six periods of its lowest corner."""
+    """Return the number of samples in which the slowest filter dies away: six periods of its lowest corner."""
     asked = 6.0 / (corner * record.dt)
     counted("filtered", f"a corner of {corner:g} Hz", 3.0 * asked + record.acceleration.size)
     return math.ceil(asked)

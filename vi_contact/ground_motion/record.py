@@ -1,4 +1,4 @@
-"""One component of a recorded ground motion, and the units its file may be written in."""
+"""Hold one component of a recorded ground motion, and name the units its file may be written in."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ UNITS = {"m/s2": 1.0, "cm/s2": 0.01, "gal": 0.01, "g": STANDARD_GRAVITY, "g/10":
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """Equally spaced accelerations. Sample k is the acceleration at t = k · dt: the first sample is at t = 0.
+    """Describe equally spaced accelerations: sample k is the acceleration at t = k · dt, the first one at t = 0.
 
     acceleration: shape (n,), n >= 2 [m/s²], copied and made read-only; dt: time step [s] > 0; title; source: path of
     the file; format: name of its format; units: of the file, before conversion to m/s²; sha256: of the file's bytes;
@@ -62,17 +62,17 @@ class Record:
 
     @property
     def times(self) -> Array:
-        """k · dt [s], shape (n,)."""
+        """Return k · dt [s], shape (n,)."""
         return self.dt * np.arange(self.acceleration.size)
 
     @property
     def duration(self) -> float:
-        """Time of the last sample, (n - 1) · dt [s]."""
+        """Return the time of the last sample, (n - 1) · dt [s]."""
         return (self.acceleration.size - 1) * self.dt
 
 
 def canonical_units(source: str, units: str) -> str:
-    """The key of UNITS that `units` spells ("CM/SEC/SEC", "(g)", "cm/s^2"); InputError if it is no acceleration."""
+    """Return the key of UNITS that `units` spells ("CM/SEC/SEC", "(g)", "cm/s^2"); InputError if there is none."""
     text = units.lower().strip(" ()[].,;").replace("²", "2").replace("^", "").replace("**", "")
     text = "".join(text.split()).replace("sec", "s").replace("/s/s", "/s2")
     if text not in UNITS:
@@ -82,7 +82,7 @@ def canonical_units(source: str, units: str) -> str:
 
 
 def file_units(source: str, stated: str | None, given: str | None) -> str:
-    """Units, as a key of UNITS, of a file that states `stated` (or nothing) when the caller says `given` (or nothing).
+    """Return the units of a file, a key of UNITS: it states `stated`, or the caller says `given` (None: nothing).
 
     Raises InputError when neither is known, one is not an acceleration, or the two contradict each other.
     """
@@ -96,7 +96,7 @@ def file_units(source: str, stated: str | None, given: str | None) -> str:
 
 
 def file_dt(source: str, stated: float | None, given: float | None) -> float:
-    """The time step [s] of a file that states `stated` (or nothing) when the caller says `given` (or nothing).
+    """Return the time step [s] of a file that states `stated` (or nothing) when the caller says `given` (or nothing).
 
     Raises InputError when neither is known or they differ by more than one part in a million.
     """

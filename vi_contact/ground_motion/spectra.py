@@ -1,4 +1,4 @@
-"""Response spectra by exact integration of piecewise linear accelerations, and Fourier spectra.
+"""Compute response spectra by exact integration of piecewise linear accelerations, and Fourier spectra.
 
 Nigam and Jennings (1969): between samples the acceleration is a straight line, so the oscillator
 u'' + 2 zeta omega u' + omega² u = -a(t) has a closed solution from one sample to the next, exact for any period and
@@ -33,7 +33,7 @@ _BLOCK = 512  # samples marched before their peaks are taken: bounds the memory
 
 @dataclass(frozen=True, eq=False)
 class ResponseSpectrum:
-    """Peaks of the response of damped oscillators at rest at t = 0, each of shape (m,).
+    """Hold the peaks of the response of damped oscillators at rest at t = 0, each of shape (m,).
 
     periods [s]; damping: ratio zeta; displacement: relative, SD [m]; velocity: relative, SV [m/s]; acceleration:
     absolute, SA = max |u'' + a| [m/s²].
@@ -47,18 +47,18 @@ class ResponseSpectrum:
 
     @property
     def psv(self) -> Array:
-        """Pseudo-velocity omega SD [m/s]."""
+        """Return the pseudo-velocity omega SD [m/s]."""
         return 2.0 * math.pi / self.periods * self.displacement
 
     @property
     def psa(self) -> Array:
-        """Pseudo-acceleration omega² SD [m/s²]."""
+        """Return the pseudo-acceleration omega² SD [m/s²]."""
         return (2.0 * math.pi / self.periods) ** 2 * self.displacement
 
 
 @dataclass(frozen=True, eq=False)
 class _Step:
-    """Motion after `time` from u, v and the line from a0 to a1 = its value after `length`, for each omega.
+    """Hold the motion after `time` from u, v and the line from a0 to a1 = its value after `length`, for each omega.
 
     x(time) = u·of_u + v·of_v + a0·of_a0 + a1·of_a1, each of shape (2, m): displacement and velocity.
     """
@@ -70,7 +70,7 @@ class _Step:
 
     @classmethod
     def after(cls, time: Array | float, length: Array | float, omega: Array, zeta: float) -> _Step:
-        """The exact solution: free vibration about the particular one -(a0 + s t) / omega² + 2 zeta s / omega³."""
+        """Return the exact solution: free vibration about the particular -(a0 + s t)/omega² + 2 zeta s/omega³."""
         root = math.sqrt(1.0 - zeta**2)
         decay, angle = np.exp(-zeta * omega * time), root * omega * time
         sine, cosine = np.sin(angle), np.cos(angle)
@@ -88,13 +88,13 @@ class _Step:
         return cls(of_u, of_v, of_one - of_slope, of_slope)
 
     def __call__(self, u: Array, v: Array, a0: Array | float, a1: Array | float) -> Array:
-        """(displacement, velocity), shape (2, ..., m)."""
+        """Return (displacement, velocity), shape (2, ..., m)."""
         parts = [self.of_u[k] * u + self.of_v[k] * v + self.of_a0[k] * a0 + self.of_a1[k] * a1 for k in (0, 1)]
         return np.array(parts)
 
 
 def _series(time: Array | float, omega: Array, zeta: float, first: int) -> Array:
-    """Motion at `time` under a = 1 (first = 2) or a = t (first = 3) from rest, by its power series, shape (2, m).
+    """Return the motion at `time` under a = 1 (first = 2) or a = t (first = 3) from rest, a power series (2, m).
 
     u = sum c_k t^k with c_first = -1/first! and k (k-1) c_k = -2 zeta omega (k-1) c_{k-1} - omega² c_{k-2}.
     """
@@ -109,7 +109,7 @@ def _series(time: Array | float, omega: Array, zeta: float, first: int) -> Array
 
 
 def response_spectrum(record: Record, periods: Array, *, damping: float = 0.05) -> ResponseSpectrum:
-    """Peaks of relative displacement, relative velocity and absolute acceleration at each period [s].
+    """Return the peaks of relative displacement, relative velocity and absolute acceleration at each period [s].
 
     A record says little about periods below ten of its steps: between its samples nothing is known but the straight
     line assumed here. Raises InputError unless every period is positive and 0 <= damping < 1.
@@ -132,7 +132,7 @@ def response_spectrum(record: Record, periods: Array, *, damping: float = 0.05) 
 
 
 def fourier_spectrum(record: Record) -> tuple[Array, Array]:
-    """Frequencies [Hz] and Fourier amplitudes |A(f)| [m/s], from 0 to the Nyquist frequency.
+    """Return the frequencies [Hz] and Fourier amplitudes |A(f)| [m/s], from 0 to the Nyquist frequency.
 
     A(f) is the integral of a(t) exp(-2 pi i f t), by the rectangle rule: dt times the discrete transform, no window.
     Two-sided: the integral of |A|² over all f, negative ones too, is dt sum a² (Parseval).
@@ -142,7 +142,7 @@ def fourier_spectrum(record: Record) -> tuple[Array, Array]:
 
 
 def _peaks(record: Record, omega: Array, zeta: float, parts: int) -> Array:
-    """Largest |u|, |v| and |u'' + a|, shape (3, m), looked at `parts` times a step."""
+    """Return the largest |u|, |v| and |u'' + a|, shape (3, m), looked at `parts` times a step."""
     dt = record.dt
     looks = [_Step.after(dt * part / parts, dt, omega, zeta) for part in range(1, parts + 1)]
     peaks = np.zeros((3, omega.size))
@@ -159,7 +159,7 @@ def _peaks(record: Record, omega: Array, zeta: float, parts: int) -> Array:
 
 
 def _march(record: Record, step: _Step, size: int) -> Iterator[tuple[Array, Array, Array, Array]]:
-    """(states (2, k, m) at the starts of k steps, a0 (k, 1), a1 (k, 1), state after them), from rest, in blocks."""
+    """Yield (states (2, k, m) at the starts of k steps, a0 (k, 1), a1 (k, 1), state after them), from rest."""
     a, x = record.acceleration, np.zeros((2, size))
     for start in range(0, a.size - 1, _BLOCK):
         end = min(start + _BLOCK, a.size - 1)
@@ -171,5 +171,5 @@ def _march(record: Record, step: _Step, size: int) -> Iterator[tuple[Array, Arra
 
 
 def _sizes(x: Array, omega: Array, zeta: float) -> Array:
-    """|u|, |v| and |u'' + a| = |2 zeta omega v + omega² u|, shape (3, ..., m)."""
+    """Return |u|, |v| and |u'' + a| = |2 zeta omega v + omega² u|, shape (3, ..., m)."""
     return np.abs(np.array([x[0], x[1], 2.0 * zeta * omega * x[1] + omega**2 * x[0]]))

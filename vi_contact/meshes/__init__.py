@@ -1,4 +1,4 @@
-"""Parametric Gmsh scripts, and the way from a Gmsh model to plain arrays. One structure per file.
+"""Build meshes by parametric Gmsh scripts, one structure per file, and turn a Gmsh model into plain arrays.
 
 A mesh is a frozen value with a method `build(gmsh)` that adds geometry, named physical groups and cells to Gmsh's
 current model. `write(mesh, path)` of `gmsh_session` makes a file of it, `fem.build_mesh(mesh, comm)` a distributed

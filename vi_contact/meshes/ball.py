@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A quarter or an eighth of a ball of tetrahedra, fine at its lowest point: a sphere that lies on or strikes a plane.
+"""Mesh a quarter or an eighth of a ball by tetrahedra, finest at its lowest point, which lies on or strikes a plane.
 
 The ball touches the plane y = 0 at the origin, its centre is (0, R, 0), and the planes x = 0 and z = 0 are planes of
 symmetry: the quarter has x >= 0 and z >= 0, the eighth also y <= R. Physical groups: cells "ball"; boundary "surface"
@@ -83,14 +83,14 @@ class BallMesh:
         _add_foot(model, sphere, self.foot)
 
     def _size_field(self) -> str:
-        """min(coarsest, size + growth max(0, distance - foot)), written with abs: MathEval has neither."""
+        """Return min(coarsest, size + growth max(0, distance - foot)), written with abs: MathEval has neither."""
         beyond = f"(sqrt(x^2+y^2+z^2)-{self.foot!r})"
         wanted = f"({self.size!r}+{0.5 * self.growth!r}*({beyond}+abs({beyond})))"
         return f"0.5*({self._largest!r}+{wanted}-abs({self._largest!r}-{wanted}))"
 
 
 def _add_ball(model: Any, radius: float, eighth: bool) -> int:
-    """The part of the ball, its parametric poles on the x axis: away from the foot, where cells are finest."""
+    """Add the part of the ball, its parametric poles on the x axis: away from the foot, where cells are finest."""
     turn = 0.5 * math.pi
     ball: int = model.occ.addSphere(0.0, 0.0, 0.0, radius, -1, 0.0, turn, turn if eighth else 2.0 * turn)
     model.occ.rotate([(3, ball)], 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 2.0 * math.pi / 3.0)  # x to y to z to x
@@ -102,7 +102,7 @@ def _add_ball(model: Any, radius: float, eighth: bool) -> int:
 
 
 def _name_sides(model: Any, volume: int, radius: float) -> int:
-    """Physical groups; the tag of the spherical surface."""
+    """Name the physical groups; return the tag of the spherical surface."""
     model.setPhysicalName(3, model.addPhysicalGroup(3, [volume]), "ball")
     groups: dict[str, list[int]] = {}
     for _, surface in model.getEntities(2):
@@ -117,7 +117,7 @@ def _name_sides(model: Any, volume: int, radius: float) -> int:
 
 
 def _add_foot(model: Any, sphere: int, foot: float) -> None:
-    """The triangles of the sphere whose centre is nearer to the origin than `foot`, as a group of their own."""
+    """Group the triangles of the sphere whose centre is nearer to the origin than `foot`."""
     _, nodes = model.mesh.getElementsByType(_TRIANGLE, sphere)
     tags, points, _ = model.mesh.getNodes(2, sphere, includeBoundary=True)
     order = np.argsort(tags)
@@ -131,7 +131,7 @@ def _add_foot(model: Any, sphere: int, foot: float) -> None:
 
 @contextmanager
 def _sizes_by_field(gmsh: Any) -> Iterator[None]:
-    """Options for the length of a with-block."""
+    """Set options for the length of a with-block."""
     kept = {option: gmsh.option.getNumber(option) for option in _SIZES}
     for option, value in _SIZES.items():
         gmsh.option.setNumber(option, value)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A bar, rectangle or box, evenly divided, if wanted bent by a smooth map and turned: the body of most tests.
+"""Mesh a bar, rectangle or box, evenly divided, if wanted bent by a smooth map and turned: the body of most tests.
 
 Physical groups: cells "block"; boundary "left", "right" (x lowest, highest), "bottom", "top" (y), "back", "front" (z,
 front towards the viewer). A bar has the first two, a rectangle four, a box six.
@@ -52,7 +52,7 @@ class BlockMesh:
             raise InputError("a bar in one dimension cannot be turned: leave the angle out or give two lengths")
 
     def points(self) -> Array:
-        """All nodes, (n_1+1, ..., n_d+1, d) [m]."""
+        """Return all nodes, (n_1+1, ..., n_d+1, d) [m]."""
         nodes = lattice(self.lengths, self.divisions)
         if self.corner is not None:
             nodes = nodes + np.asarray(self.corner)

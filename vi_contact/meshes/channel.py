@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A U-shaped channel buried in a soil layer on bedrock (seed 000, Fig. 6): two bodies with nodes of their own.
+"""Mesh a U-shaped channel in a soil layer on bedrock (Fig. 6 of the boundary method): two bodies, nodes of their own.
 
 Physical groups: cells "channel", "soil"; boundary "bedrock" (y = 0), "left_side", "right_side" (x = 0, width),
 "surface" (y = depth); the interface from both sides, "channel_left", "channel_base", "channel_right" and "soil_left",
@@ -73,14 +73,14 @@ class ChannelMesh:
 
     @property
     def x(self) -> tuple[float, ...]:
-        """Ends of the layer, outer and inner sides of the walls, from left to right [m]."""
+        """Return the ends of the layer, outer and inner sides of the walls, from left to right [m]."""
         left = 0.5 * (self.width - self.outer_width) if self.left is None else self.left
         right = left + self.outer_width
         return 0.0, left, left + self.wall, right - self.wall, right, self.width
 
     @property
     def y(self) -> tuple[float, ...]:
-        """Bedrock, lower and upper side of the slab, surface [m]."""
+        """Return the heights of bedrock, lower and upper side of the slab, surface [m]."""
         return 0.0, self.depth - self.height, self.depth - self.height + self.slab, self.depth
 
     def build(self, gmsh: Any) -> None:
@@ -107,7 +107,7 @@ def _build_irregular(mesh: ChannelMesh, gmsh: Any, far: float) -> None:
 def _add_body(
     model: Any, name: str, outline: Outline, names: Sequence[str], sizes: Sequence[float], mesh: ChannelMesh
 ) -> None:
-    """A surface within an outline; its first three curves are the interface, divided alike on both bodies."""
+    """Add a surface within an outline; its first three curves are the interface, divided alike on both bodies."""
     points = [model.geo.addPoint(*place, 0.0, size) for place, size in zip(outline, sizes, strict=True)]
     curves = [model.geo.addLine(one, two) for one, two in zip(points, [*points[1:], points[0]], strict=True)]
     for i in range(3):

@@ -1,4 +1,4 @@
-"""The channel and its layer as cells of one grid whose lines follow all their sides."""
+"""Divide the channel and its layer into cells of one grid whose lines follow all their sides."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Mask = npt.NDArray[np.bool_]
 
 
 def channel_grid(x: Sequence[float], y: Sequence[float], size: float, *, triangles: bool = False) -> MeshArrays:
-    """Channel and soil between the lines x (6,) and y (4,) of `ChannelMesh`, cells of about `size` [m].
+    """Divide channel and soil between the lines x (6,) and y (4,) of `ChannelMesh` into cells of about `size` [m].
 
     Diagonals of triangles run upwards to the middle of the channel on both sides of it: a symmetric layer has a
     symmetric mesh.
@@ -53,12 +53,12 @@ def channel_grid(x: Sequence[float], y: Sequence[float], size: float, *, triangl
 
 
 def _interface(x: Sequence[float], y: Sequence[float]) -> dict[str, tuple[Sequence[float], Sequence[float]]]:
-    """Side -> (range of x, range of y); one number for a line."""
+    """Return side -> (range of x, range of y); one number for a line."""
     return {"left": (x[1:2], (y[1], y[3])), "base": ((x[1], x[4]), y[1:2]), "right": (x[4:5], (y[1], y[3]))}
 
 
 def _divided(places: Sequence[float], size: float) -> Array:
-    """Every part between two places evenly divided into cells of about `size`."""
+    """Divide every part between two places evenly into cells of about `size`."""
     parts = [
         low + (high - low) * np.arange(n) / n
         for low, high in zip(places, places[1:], strict=False)
@@ -68,7 +68,7 @@ def _divided(places: Sequence[float], size: float) -> Array:
 
 
 def _body(xs: Array, ys: Array, kept: Mask, middle: float, triangles: bool) -> tuple[Array, Rows, Rows]:
-    """(points, cells, number of the point at every node of the grid, -1 for none) of the kept boxes."""
+    """Return (points, cells, number of the point at every node of the grid, -1 for none) of the kept boxes."""
     column, row = np.nonzero(kept)
     around = np.stack([column, column + 1, column + 1, column]), np.stack([row, row, row + 1, row + 1])
     used = np.zeros((len(xs), len(ys)), dtype=bool)
@@ -84,7 +84,7 @@ def _body(xs: Array, ys: Array, kept: Mask, middle: float, triangles: bool) -> t
 
 
 def _along(xs: Array, ys: Array, number: Rows, x: Sequence[float], y: Sequence[float]) -> Rows:
-    """Facets of a body on a straight line, between the two values of its longer range."""
+    """Return the facets of a body on a straight line, between the two values of its longer range."""
     i, j = (np.flatnonzero((line >= ends[0]) & (line <= ends[-1])) for line, ends in ((xs, x), (ys, y)))
     nodes = number[np.ix_(i, j)].reshape(-1)
     return np.column_stack([nodes[:-1], nodes[1:]])

@@ -1,4 +1,4 @@
-"""What a mesh must be for a solver: cells with volume, neither twisted nor folded; boundary groups of their sides.
+"""Check what a solver asks of a mesh: cells with volume, neither twisted nor folded; boundary groups of their sides.
 
 Pure arithmetic on arrays: points (n, d) [m], cells (n_cells, n_vertices) as rows of points, vertices in Gmsh's order.
 Which way round the vertices of a cell run does not matter (finite elements use |det J|); neighbours on the same side
@@ -76,7 +76,7 @@ def check_sides(groups: dict[str, Rows], cells: Rows, cell: str, source: str) ->
 
 
 def _normals(x: Array) -> Array:
-    """Normals of facets through their first d vertices, (n, d, d) -> (n, d), of any length and direction."""
+    """Return the normals of facets through their first d vertices, (n, d, d) -> (n, d), of any length and direction."""
     d = x.shape[-1]
     if d == 1:
         return np.ones((len(x), 1))

@@ -1,4 +1,4 @@
-"""Joints and cracks in a mesh: nodes along an inner boundary are doubled (cut open) or those of two bodies made one
+"""Make joints and cracks: nodes along an inner boundary are doubled (cut open) or those of two bodies made one
 (welded).
 
 Two bodies that may part need nodes of their own on either side. A mesh of one geometry, fragmented along the joint and
@@ -27,7 +27,7 @@ Mask = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class CutOpen:
-    """The mesh of `source`, a script or a file, cut open along its inner boundary group; see `cut_open`."""
+    """Describe the mesh of `source`, a script or a file, cut open along its inner boundary group; see `cut_open`."""
 
     source: Source
     group: str
@@ -41,7 +41,7 @@ class CutOpen:
 
 @dataclass(frozen=True)
 class Welded:
-    """The mesh of `source` with the nodes of two boundary groups made one where they coincide; see `welded`."""
+    """Describe the mesh of `source` with the coinciding nodes of two boundary groups made one; see `welded`."""
 
     source: Source
     first: str
@@ -55,7 +55,7 @@ class Welded:
 def cut_open(
     arrays: MeshArrays, group: str, *, inside: str | None = None, towards: Sequence[float] | None = None
 ) -> MeshArrays:
-    """The mesh with doubled nodes along an inner boundary; the two sides become the groups "<group>_1", "<group>_2".
+    """Double the nodes along an inner boundary; its two sides become the groups "<group>_1", "<group>_2".
 
     Side 1 is that of the cell group `inside`, or the one from which the vector `towards` leads across the boundary:
     give one of them. Cells around a node of the boundary keep a common node as long as they hang together through
@@ -81,7 +81,7 @@ def cut_open(
     cells, points = _doubled(arrays, np.unique(facets), sides, owner, one[~cut], other[~cut])
 
     def moved(rows: Rows, number: Rows, at: Rows) -> Rows:
-        """The facets `rows` of these numbers as the cells beside them know them now, for the rows `at` of sides."""
+        """Return the facets `rows` of these numbers as the cells beside them know them now; `at`: rows of sides."""
         known, place = np.unique(number, return_index=True)
         before = rows[place[np.searchsorted(known, side[at])]]
         match = arrays.cells[owner[at]][:, None, :] == before[:, :, None]
@@ -98,7 +98,7 @@ def cut_open(
 
 
 def welded(arrays: MeshArrays, first: str, second: str) -> MeshArrays:
-    """The mesh in which every node of the group `second` is the node of `first` at its place.
+    """Replace every node of the group `second` by the node of `first` at its place.
 
     Both groups remain, as the same inner boundary. InputError for nodes of `second` without a partner (within 1e-9 of
     the mesh's size).
@@ -133,7 +133,7 @@ def _group(arrays: MeshArrays, name: str) -> Rows:
 def _on_first_side(
     arrays: MeshArrays, group: str, one: Rows, other: Rows, inside: str | None, towards: Sequence[float] | None
 ) -> Mask:
-    """For every cut facet whether the first of its two cells is on side 1."""
+    """Tell for every cut facet whether the first of its two cells is on side 1."""
     if inside is not None:
         if inside not in arrays.cell_groups:
             raise InputError(f"mesh has no cell group '{inside}'; it has {', '.join(arrays.cell_groups)}")
@@ -154,7 +154,7 @@ def _on_first_side(
 def _doubled(
     arrays: MeshArrays, nodes: Rows, sides: Rows, owner: Rows, one: Rows, other: Rows
 ) -> tuple[Rows, npt.NDArray[np.float64]]:
-    """(cells, points) with a node of its own for every part of the cells around each of the nodes; parts hang together
+    """Return (cells, points): each of the nodes gets a node for every part of the cells around it; parts hang together
     through the facets (rows `one`, `other` of sides)."""
     n = len(arrays.points)
     around, column = np.nonzero(np.isin(arrays.cells, nodes))
@@ -163,7 +163,7 @@ def _doubled(
     order = np.argsort(key)
 
     def place(rows: Rows) -> Rows:
-        """Places among `key` of the vertices of sides that are nodes of the cut."""
+        """Return the places among `key` of the vertices of sides that are nodes of the cut."""
         vertices = sides[rows]
         return order[np.searchsorted(key[order], (owner[rows][:, None] * n + vertices)[np.isin(vertices, nodes)])]
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A disk of triangles of one size, its left half the mirror image of the right one: a ball in the plane.
+"""Mesh a disk by triangles of one size, its left half the mirror image of the right one: a ball in the plane.
 
 The disk touches the line y = 0 at the origin, its centre is (0, R). Physical groups: cells "disk"; boundary "foot" (the
 arc within an angle of the lowest point: the contact side) and "rest". Symmetric loads leave it exactly symmetric.
@@ -61,7 +61,7 @@ class DiskMesh:
             _name(model, 1, name, [arc, _mirrored(model, 1, arc, _LINE, image)])
 
     def _add_half(self, geo: Any) -> tuple[int, int, int]:
-        """The half x >= 0, its sides evenly divided: (surface, foot, rest)."""
+        """Add the half x >= 0, its sides evenly divided: (surface, foot, rest)."""
         R = self.radius
         end = R * math.sin(self.foot), R * (1.0 - math.cos(self.foot))
         places = ((0.0, 0.0), end, (0.0, 2.0 * R), (0.0, R))
@@ -75,7 +75,7 @@ class DiskMesh:
 
 
 def _mirror_nodes(model: Any) -> npt.NDArray[np.int_]:
-    """Adds the mirror images of all nodes off the axis to a surface of their own; image[tag] is the tag of the image,
+    """Add the mirror images of all nodes off the axis to a surface; image[tag] is the tag of the image,
     the tag itself on the axis."""
     tags, points, _ = model.mesh.getNodes()
     tags, points = np.asarray(tags, dtype=int), np.reshape(points, (-1, 3))
@@ -88,7 +88,7 @@ def _mirror_nodes(model: Any) -> npt.NDArray[np.int_]:
 
 
 def _mirrored(model: Any, dimension: int, entity: int, kind: int, image: npt.NDArray[np.int_]) -> int:
-    """A discrete entity with the mirror images of the cells of another, turned round so that they stay positive."""
+    """Add an entity with the mirror images of the cells of another, turned round so that they stay positive."""
     _, nodes = model.mesh.getElementsByType(kind, entity)
     cells = image[np.asarray(nodes, dtype=int).reshape(-1, dimension + 1)][:, ::-1]
     left: int = model.addDiscreteEntity(dimension)

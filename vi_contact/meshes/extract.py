@@ -1,7 +1,7 @@
-"""From Gmsh's current model to plain arrays: nodes renumbered, groups by name, what a solver could choke on refused.
+"""Turn Gmsh's current model into plain arrays: nodes renumbered, groups named, what solvers choke on refused.
 
-DOLFINx's own readers fail on node tags that do not start at 1, on facets in two groups and on missing groups (solver
-notes, P21), so nothing of them is used. Vertices stay in Gmsh's order here.
+DOLFINx's own readers fail on node tags that do not start at 1, on facets in two groups and on missing groups, so
+nothing of them is used. Vertices stay in Gmsh's order here.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _FACET = {1: 15, 2: 1, 3: 1, 4: 2, 5: 3}  # Gmsh's element numbers: cell -> its 
 
 @dataclass(frozen=True, eq=False)
 class MeshArrays:
-    """A mesh without its library.
+    """Hold a mesh without its library.
 
     `cell` is UFL's name, `points` (n_points, d) are in metres, `cells` (n_cells, n_vertices) rows of points. Groups
     by name: of cells as masks (n_cells,), of facets as rows of points (n_facets, n_facet_vertices).
@@ -45,7 +45,7 @@ class MeshArrays:
 
 @dataclass(frozen=True, eq=False)
 class _Elements:
-    """Elements of one type: Gmsh's node tags (n, n_vertices) and the entity (n,) that holds each."""
+    """Hold elements of one type: Gmsh's node tags (n, n_vertices) and the entity (n,) that holds each."""
 
     nodes: Rows
     entity: Rows
@@ -73,7 +73,7 @@ def arrays_from_script(mesh: MeshScript) -> MeshArrays:
 
 
 def extract(gmsh: Any, source: str) -> MeshArrays:
-    """The mesh of Gmsh's current model; `source` names it in error messages.
+    """Return the mesh of Gmsh's current model; `source` names it in error messages.
 
     As in Gmsh, the mesh is what the physical groups of the highest dimension hold; without any, all cells are taken,
     as a group "all". Nodes no cell uses are dropped, the others numbered from 0 in the order of their tags. Raises
@@ -114,7 +114,7 @@ def extract(gmsh: Any, source: str) -> MeshArrays:
 
 
 def _named_entities(model: Any, dim: int) -> dict[str, list[int]]:
-    """Entities of each physical group of a dimension; a group without a name is called by its number."""
+    """Return the entities of each physical group of a dimension; a group without a name is called by its number."""
     groups: dict[str, list[int]] = {}
     for _, tag in model.getPhysicalGroups(dim) if dim >= 0 else ():
         name = model.getPhysicalName(dim, tag) or str(tag)
@@ -127,7 +127,7 @@ def _union(groups: dict[str, list[int]]) -> list[int]:
 
 
 def _elements(model: Any, dim: int, entities: Iterable[int]) -> dict[int, _Elements]:
-    """Elements of the entities, by Gmsh's element number."""
+    """Return the elements of the entities, by Gmsh's element number."""
     parts: dict[int, list[tuple[Rows, int]]] = {}
     for entity in entities:
         kinds, tags, nodes = model.mesh.getElements(dim, entity)
@@ -142,7 +142,7 @@ def _elements(model: Any, dim: int, entities: Iterable[int]) -> dict[int, _Eleme
 
 
 def _first_order(model: Any, elements: dict[int, _Elements], dim: int, source: str) -> int:
-    """The one type of cell there is."""
+    """Return the one type of cell there is."""
     if dim == 0 or not elements:
         raise InputError(f"{source} has no cells: mesh the geometry in Gmsh before saving it")
     names = {kind: model.mesh.getElementProperties(kind)[0] for kind in elements}
@@ -159,7 +159,7 @@ def _first_order(model: Any, elements: dict[int, _Elements], dim: int, source: s
 
 
 def _coordinates(model: Any, tags: Rows, source: str) -> Array:
-    """Coordinates (n, 3) of the nodes with the given tags, which may start anywhere and have holes."""
+    """Return the coordinates (n, 3) of the nodes with the given tags, which may start anywhere and have holes."""
     known, coordinates, _ = model.mesh.getNodes()
     order = np.argsort(known)
     place = order[np.minimum(np.searchsorted(known, tags, sorter=order), len(known) - 1)]
@@ -172,7 +172,7 @@ def _coordinates(model: Any, tags: Rows, source: str) -> Array:
 
 
 def _flat(points: Array, d: int, source: str) -> Array:
-    """The first d coordinates; the others must be zero."""
+    """Return the first d coordinates; the others must be zero."""
     away = np.abs(points[:, d:]).max(initial=0.0)
     if away > 1e-9 * np.ptp(points, axis=0).max():
         plane, missing = ("plane z = 0", "volume") if d == 2 else ("axis y = z = 0", "surface")
@@ -184,7 +184,7 @@ def _flat(points: Array, d: int, source: str) -> Array:
 
 
 def _without_repeats(rows: Rows) -> tuple[Rows, Rows]:
-    """Rows kept (first of those with the same members, in order), and for every row its place among the kept ones."""
+    """Return the rows kept (first of each with the same members), and for every row its place among these."""
     _, first, place = np.unique(number_alike(rows)[0], return_index=True, return_inverse=True)
     order = np.argsort(first)
     rank = np.empty_like(order)
@@ -193,7 +193,7 @@ def _without_repeats(rows: Rows) -> tuple[Rows, Rows]:
 
 
 def _facets(model: Any, entities: list[int], kind: int, tags: Rows, points: Array, what: str) -> Rows:
-    """Facets of a group as rows of points, each once; -1 for nodes that are at no point.
+    """Return the facets of a group as rows of points, each once; -1 for nodes that are at no point.
 
     OpenCASCADE may copy a curve or surface when it bounds a body with it, and the named original is then meshed by
     itself, with nodes at the places of the body's (dolfinx#2456). Such a node stands for the one point at its place.
@@ -212,7 +212,7 @@ def _facets(model: Any, entities: list[int], kind: int, tags: Rows, points: Arra
 
 
 def _at_same_place(places: Array, points: Array) -> Rows:
-    """For each place the one point there, -1 if there is none or more than one (two bodies in touch)."""
+    """Find for each place the one point there, -1 if there is none or more than one (two bodies in touch)."""
     tolerance = 1e-10 * np.ptp(points, axis=0).max()
     distance, nearest = cKDTree(points).query(places, k=2)
     return np.where((distance[:, 0] <= tolerance) & (distance[:, 1] > tolerance), nearest[:, 0], -1)

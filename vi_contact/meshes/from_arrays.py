@@ -1,4 +1,4 @@
-"""From plain arrays back to a Gmsh model: meshes that were changed (vi_contact.meshes.cut) are written and built like
+"""Turn plain arrays into a Gmsh model: changed meshes (vi_contact.meshes.cut) are written and built like
 any other."""
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _TYPES = {  # Gmsh's numbers of a cell and of its side
 
 
 def arrays_of(source: Source) -> MeshArrays:
-    """The arrays of a mesh file or of a script; InputError like `vi_contact.meshes.extract`."""
+    """Return the arrays of a mesh file or of a script; InputError like `vi_contact.meshes.extract`."""
     return arrays_from_file(source) if isinstance(source, str | Path) else arrays_from_script(source)
 
 
@@ -38,7 +38,7 @@ def add_arrays(gmsh: Any, arrays: MeshArrays) -> None:
 
 
 def _members(groups: dict[str, Rows]) -> tuple[Rows, dict[str, npt.NDArray[np.bool_]]]:
-    """Rows of all groups, each once, and which of them are in each group."""
+    """Return the rows of all groups, each once, and which of them are in each group."""
     if not groups:
         return np.zeros((0, 1), dtype=np.int64), {}
     numbers = number_alike(*groups.values())
@@ -48,7 +48,7 @@ def _members(groups: dict[str, Rows]) -> tuple[Rows, dict[str, npt.NDArray[np.bo
 
 
 def _add_groups(gmsh: Any, dim: int, kind: int, rows: Rows, groups: dict[str, npt.NDArray[np.bool_]]) -> None:
-    """Physical groups of elements that may be in several."""
+    """Add the physical groups of elements that may be in several."""
     if not groups:
         return
     table = np.column_stack(list(groups.values()))

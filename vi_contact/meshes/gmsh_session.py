@@ -1,4 +1,4 @@
-"""A quiet, reproducible Gmsh for the length of a with-block, and the two things done in it: build a mesh, write it."""
+"""Run a quiet, reproducible Gmsh for the length of a with-block, and in it build a mesh and write it."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _OPTIONS = {
 
 
 class MeshScript(Protocol):
-    """Anything that can put a mesh into Gmsh's current model."""
+    """Describe anything that can put a mesh into Gmsh's current model."""
 
     def build(self, gmsh: Any) -> None:
         """Add geometry, named physical groups and first-order cells to the current (empty) model."""
@@ -37,7 +37,7 @@ class MeshScript(Protocol):
 
 @contextmanager
 def session(name: str = "vi_contact") -> Iterator[Any]:
-    """The gmsh module with an empty current model; all traces are removed afterwards.
+    """Give the gmsh module with an empty current model; all traces are removed afterwards.
 
     A Gmsh the caller has already initialised is borrowed: its models, current model and options are left as they
     were. Raises InputError if Gmsh is not installed.
@@ -88,7 +88,7 @@ def _initialise(gmsh: Any) -> None:
 
 
 def _is_initialised(gmsh: Any) -> bool:
-    """Gmsh 4.8 (Debian 12) cannot be asked: it lists no model before initialize() and complains after finalize()."""
+    """Tell whether Gmsh runs; 4.8 (Debian 12) lists no model before initialize() and complains after finalize()."""
     if hasattr(gmsh, "isInitialized"):
         return bool(gmsh.isInitialized())
     with _silent_stderr(), _zeroed_memory():
@@ -100,7 +100,7 @@ def _is_initialised(gmsh: Any) -> bool:
 
 @contextmanager
 def _zeroed_memory() -> Iterator[None]:
-    """Gmsh 4.8 complains by an option that it has not set yet, and ends the process when that happens to be 4."""
+    """Zero new memory: Gmsh 4.8 complains by an option that it has not set yet, and ends the process if it is 4."""
     mallopt = getattr(ctypes.CDLL(None), "mallopt", None)  # of glibc: large new blocks are filled with ~0xFF
     if mallopt:
         mallopt(M_PERTURB, 0xFF)
@@ -113,7 +113,7 @@ def _zeroed_memory() -> Iterator[None]:
 
 @contextmanager
 def _silent_stderr() -> Iterator[None]:
-    """Gmsh writes its complaint from C++, past sys.stderr."""
+    """Silence the complaint that Gmsh writes from C++, past sys.stderr."""
     kept, sink = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     os.dup2(sink, 2)
     try:

@@ -1,4 +1,4 @@
-"""Structured meshes of bars, rectangles and boxes, node by node: Gmsh's transfinite curves are only exact to 1e-11."""
+"""Mesh bars, rectangles and boxes node by node: Gmsh's transfinite curves are only exact to 1e-11."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _BOX_TYPE = (15, 1, 3, 5)  # point, line, quadrangle, hexahedron
 
 
 def lattice(lengths: Sequence[float], divisions: Sequence[int]) -> Array:
-    """Nodes of an evenly divided box with one corner at the origin, (n_1+1, ..., n_d+1, d) [m]."""
+    """Return the nodes of an evenly divided box with one corner at the origin, (n_1+1, ..., n_d+1, d) [m]."""
     axes = [length * np.arange(n + 1) / n for length, n in zip(lengths, divisions, strict=True)]
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
 
@@ -53,7 +53,7 @@ def _add_entity(model: Any, dim: int, name: str, boundary: Sequence[int] = ()) -
 
 
 def _cells(tags: npt.NDArray[np.int_], simplices: bool) -> npt.NDArray[np.int_]:
-    """Vertices of every cell of a lattice of node tags, in Gmsh's order, (n_cells, n_vertices)."""
+    """Return the vertices of every cell of a lattice of node tags, in Gmsh's order, (n_cells, n_vertices)."""
     d = tags.ndim
     shapes = _kuhn_simplices(d) if simplices else [_box_corners(d)]
     count = [n - 1 for n in tags.shape]
@@ -69,7 +69,7 @@ def _box_corners(d: int) -> list[tuple[int, ...]]:
 
 
 def _kuhn_simplices(d: int) -> list[list[tuple[int, ...]]]:
-    """The d! simplices walked from corner (0,...,0) to (1,...,1) along the axes in every order, positively oriented."""
+    """Return the d! simplices walked from corner (0,...,0) to (1,...,1) along the axes, positively oriented."""
     simplices = []
     for order in permutations(range(d)):
         steps = np.eye(d, dtype=int)[list(order)]

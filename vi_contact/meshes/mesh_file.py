@@ -1,4 +1,4 @@
-"""A mesh file on its way to Gmsh: only what is certainly a mesh, under a name and in a folder of our own.
+"""Check a mesh file on its way to Gmsh: only what is certainly a mesh, under a name and in a folder of our own.
 
 Gmsh runs as a script whatever it does not recognise as a mesh, and a script may run any command of the shell. It decides
 by the name of a file, else by the first word in it, and it runs FILE.opt beside a mesh too. So a mesh file is read only
@@ -23,7 +23,7 @@ SHORT = 80  # bytes in which what comes first is found
 
 
 def copied(file: Path, folder: Path) -> Path:
-    """A copy of a mesh file in this folder, safe for Gmsh to read.
+    """Copy a mesh file into this folder, safe for Gmsh to read.
 
     InputError for a file that is missing, empty, no MSH file (a script most of all), cut short, or that announces more
     nodes or cells than it has bytes.
@@ -63,7 +63,7 @@ def _check_magic(data: mmap.mmap, file: Path) -> None:
 
 
 def _check_sections(data: mmap.mmap, file: Path) -> None:
-    """What is opened is closed, and no more is announced than the file can hold: Gmsh makes room before it reads."""
+    """Refuse sections not closed, or that announce more than the file holds: Gmsh makes room before it reads."""
     version, binary = (data[:SHORT].split() + [b"", b""])[1:3]
     opened, name = b"", b""
     for section in _SECTION.finditer(data):
@@ -84,12 +84,12 @@ def _check_sections(data: mmap.mmap, file: Path) -> None:
 
 
 def _written(ahead: bytes) -> tuple[int, ...]:
-    """The first two numbers after the name of a section: of format 4 blocks and items, of format 2 items, and more."""
+    """Return the first two numbers after a section's name: blocks and items in format 4, items and more in 2."""
     return tuple(int(word) if word.isdigit() else 0 for word in ahead.split()[:2]) or (0,)
 
 
 def _packed(ahead: bytes) -> tuple[int, ...]:
-    """The same of a binary file: 8 bytes each, in the order of bytes that makes them smaller; of format 2 in text."""
+    """Return these numbers of a binary file: 8 bytes each, in the order of bytes that makes them smaller."""
     head = ahead[1:17]
     both = [struct.unpack(order, head) for order in ("<2Q", ">2Q")] if len(head) == 16 else []
     return min([*both, _written(ahead)] if ahead[1:2].isdigit() else both, key=max, default=(0,))

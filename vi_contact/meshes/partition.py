@@ -1,4 +1,4 @@
-"""Which rank gets which cell: by repeated halving across the longest side, the same every time.
+"""Assign cells to ranks by repeated halving across the longest side, the same every time.
 
 Graph partitioners give smaller interfaces but, in parallel, another answer on every run: results must not depend on
 that.
@@ -16,7 +16,7 @@ Ranks = npt.NDArray[np.int32]
 
 
 def halve(centres: Array, n: int) -> Ranks:
-    """Owner, 0 to n - 1, of each of the points (n_points, d); equal shares but for one point."""
+    """Return the owner, 0 to n - 1, of each of the points (n_points, d); equal shares but for one point."""
     owner = np.zeros(len(centres), dtype=np.int32)
 
     def split(rows: npt.NDArray[np.intp], first: int, count: int) -> None:
@@ -35,7 +35,7 @@ def halve(centres: Array, n: int) -> Ranks:
 
 
 def destinations(points: Array, cells: Rows, cell: str, n: int) -> tuple[Ranks, Ranks]:
-    """Ranks each cell goes to, as one list and the n_cells + 1 offsets of the cells in it.
+    """Return the ranks each cell goes to, as one list and the n_cells + 1 offsets of the cells in it.
 
     First its owner, then, as a ghost, the owners of its neighbours across a facet.
     """

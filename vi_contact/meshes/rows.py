@@ -1,4 +1,4 @@
-"""Rows of vertices: the sides of cells, and which rows have the same members."""
+"""Handle rows of vertices: the sides of cells, and which rows have the same members."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ _SIDES: dict[str, list[tuple[int, ...]]] = {
 
 
 def cell_sides(cells: Rows, cell: str) -> tuple[Rows, Rows]:
-    """Sides of all cells, vertices ascending, (n_cells * n_sides, n_side_vertices), and the cell of each side."""
+    """Return all sides (n_cells * n_sides, n_side_vertices), vertices ascending, and the cell of each side."""
     sides = np.array(_SIDES[cell])
     rows = np.sort(cells[:, sides].reshape(-1, sides.shape[1]), axis=1)
     return rows, np.repeat(np.arange(len(cells)), len(sides))
 
 
 def number_alike(*tables: Rows) -> list[Rows]:
-    """A number for every row of tables of one width: rows have equal numbers if they have equal members, in any order.
+    """Number the rows of tables of one width: rows with equal members, in any order, have equal numbers.
 
     Members are at least -1. Much faster than np.unique(axis=0).
     """
@@ -39,7 +39,7 @@ def number_alike(*tables: Rows) -> list[Rows]:
 
 
 def found_in(numbers: Rows, among: Rows) -> npt.NDArray[np.bool_]:
-    """Which of the numbers (>= 0) occur among the others."""
+    """Tell which of the numbers (>= 0) occur among the others."""
     known = np.zeros(max(numbers.max(initial=0), among.max(initial=0)) + 1, dtype=bool)
     known[among] = True
     return known[numbers]

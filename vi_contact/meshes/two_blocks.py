@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Bars, rectangles or boxes that touch without sharing a node: bodies of their own, meshed each for itself.
+"""Mesh bars, rectangles or boxes that touch without sharing a node: bodies of their own, meshed each for itself.
 
 Physical groups of a body called "lower": cells "lower"; boundary "lower_left", "lower_right" (x lowest, highest),
 "lower_bottom", "lower_top" (y), "lower_back", "lower_front" (z).
@@ -27,7 +27,7 @@ from vi_contact.meshes.grid import add_grid
 
 @dataclass(frozen=True)
 class Blocks:
-    """Any number of blocks by name, each a body of its own. InputError for blocks of different dimension or cells."""
+    """Hold blocks by name, each a body of its own. InputError for blocks of different dimension or cells."""
 
     blocks: Mapping[str, BlockMesh]
 
@@ -48,7 +48,7 @@ class Blocks:
 
 @dataclass(frozen=True, kw_only=True)
 class TwoBlocks:
-    """Block "upper" on top of block "lower", in one dimension to the right of it.
+    """Describe a block "upper" on top of a block "lower", in one dimension to the right of it.
 
     The lower one has a corner at the origin; the upper one begins at `offset` [m] along the interface (x, and z of a
     box), `gap` [m] above it. Interface "lower_top" and "upper_bottom", of bars "lower_right" and "upper_left": nodes at
@@ -63,11 +63,11 @@ class TwoBlocks:
 
     @property
     def interface(self) -> tuple[str, str]:
-        """Names of the side of the upper block and of that of the lower one."""
+        """Return the names of the side of the upper block and of that of the lower one."""
         return ("upper_left", "lower_right") if len(self.lower.lengths) == 1 else ("upper_bottom", "lower_top")
 
     def blocks(self) -> Blocks:
-        """Both blocks where they are."""
+        """Return both blocks where they are."""
         d = len(self.lower.lengths)
         up = 0 if d == 1 else 1
         corner = np.zeros(d)

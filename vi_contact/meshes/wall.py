@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The wall of seed 000, Fig. 2: a rectangle standing on its base, one-sided supports along its right side.
+"""Mesh the wall of Fig. 2 of the boundary method: a rectangle on its base, one-sided supports along its right side.
 
 Physical groups: cells "wall"; boundary "base" (y = 0), "face" (x = width: the contact side), "top", "back" (x = 0). The
 defaults are the mesh of the published example: 8 x 12 cells, 40 boundary nodes 0.75 m apart.
@@ -32,7 +32,7 @@ class WallMesh:
     """Mesh of a wall, height x width [m].
 
     `divisions` are the exact numbers of cells along width and height; `size` [m] asks for an irregular mesh of about
-    that cell size instead; without either, the 8 x 12 cells of seed 000. `triangles` instead of quadrilaterals.
+    that cell size instead; without either, the 8 x 12 published cells. `triangles` instead of quadrilaterals.
     Raises InputError for sizes that make no wall.
     """
 

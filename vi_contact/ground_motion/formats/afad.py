@@ -1,4 +1,4 @@
-"""Text files of AFAD (Türkiye): "KEY : value" lines, then three columns N-S, E-W, U-D in gal."""
+"""Read text files of AFAD (Türkiye): "KEY : value" lines, then three columns N-S, E-W, U-D in gal."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ COMPONENTS = ("N-S", "E-W", "U-D")
 
 
 def recognises(text: TextFile) -> bool:
-    """Whether the first line is that of the national network."""
+    """Tell whether the first line is one of the national network."""
     return text.lines[0].strip().upper().startswith("STRONG GROUND MOTION RECORDS OF TURK")
 
 
 def read(text: TextFile, units: str | None = None, dt: float | None = None, channel: int | None = None) -> Record:
-    """The record of one component; channel: 1 (N-S), 2 (E-W) or 3 (U-D). Nothing is subtracted.
+    """Return the record of one component; channel: 1 (N-S), 2 (E-W) or 3 (U-D). Nothing is subtracted.
 
     Raises InputError naming the file, mostly with a line: no channel chosen, an entry of the header missing or no
     number, a row that has not three numbers, a number of rows unlike "NUMBER OF DATA".
@@ -51,7 +51,7 @@ def read(text: TextFile, units: str | None = None, dt: float | None = None, chan
 
 
 def _number(text: TextFile, header: dict[str, tuple[int, str]], key: str) -> float:
-    """The number after a key of the header."""
+    """Return the number after a key of the header."""
     if key not in header:
         raise InputError(f"{text.path}: the header does not give {key}; get the complete file")
     index, value = header[key]

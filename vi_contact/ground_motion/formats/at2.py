@@ -1,6 +1,6 @@
-"""PEER .AT2 files: a few header lines with NPTS and DT, then the samples row by row.
+"""Read PEER .AT2 files: a few header lines with NPTS and DT, then the samples row by row.
 
-Variants met in the wild and all read here (seismic.md 1.2): `NPTS=  1559, DT= .02000 SEC` with or without filter data
+Variants met in the wild and all read here: `NPTS=  1559, DT= .02000 SEC` with or without filter data
 after it, `3930 0.00500 NPTS, DT`, NPTS and DT on lines of their own, and files without NPTS whose data start after a
 line `*** Begin data ***`, the time step standing only in a sentence. Any number of values per row; the last row may be
 short and lack its line end.
@@ -31,18 +31,18 @@ _UNITS = re.compile(r"\bunits?\s*+(?:of|are|is|in|[=:])\s*+(\([^()]*+\)|[^\s,;]+
 
 
 def begin_data(text: TextFile) -> int | None:
-    """Index of the first line after `*** Begin data ***`, or None."""
+    """Return the index of the first line after `*** Begin data ***`, or None."""
     return next((k + 1 for k, line in enumerate(text.heads) if _BEGIN.search(line)), None)
 
 
 def recognises(text: TextFile) -> bool:
-    """Whether the file says NPTS in its first lines, outside "#" comments, or has a `*** Begin data ***` line."""
+    """Tell whether the first lines say NPTS, outside "#" comments, or there is a `*** Begin data ***` line."""
     header = [line for line in text.heads[:HEADER_LINES] if not line.startswith("#")]
     return any(_NPTS.search(line) or _VALUES_FIRST.search(line) for line in header) or begin_data(text) is not None
 
 
 def read(text: TextFile, units: str | None = None, dt: float | None = None) -> Record:
-    """The record of an AT2 file; units and dt are needed only where the file does not state them.
+    """Return the record of an AT2 file; units and dt are needed only where the file does not state them.
 
     Raises InputError naming the file, mostly with a line: number of values unlike NPTS, no or contradicting time step
     or units, a velocity or displacement file, a word that is not a number.
@@ -60,7 +60,7 @@ def read(text: TextFile, units: str | None = None, dt: float | None = None) -> R
 
 
 def _header(text: TextFile) -> tuple[int | None, float | None, int, int]:
-    """NPTS, DT, the index of the NPTS line and the index of the first data line."""
+    """Return NPTS, DT, the index of the NPTS line and the index of the first data line."""
     npts, dt, npts_line, start = None, None, 0, begin_data(text)
     last = 0
     for index, line in enumerate(text.heads[:HEADER_LINES if start is None else start]):
@@ -79,12 +79,12 @@ def _header(text: TextFile) -> tuple[int | None, float | None, int, int]:
 
 
 def _prose_dt(text: TextFile, start: int) -> float | None:
-    """The time step of a sentence like "1559 points at equal spacing of 0.02 sec", if the header has exactly one."""
+    """Return the time step of a sentence "1559 points at equal spacing of 0.02 sec", if there is exactly one."""
     found = {number(text, index, match[1]) for index in range(start) for pattern in _PROSE_DT
              for match in pattern.finditer(text.heads[index])}
     return found.pop() if len(found) == 1 else None
 
 
 def _stated_units(header: list[str]) -> str | None:
-    """What follows "units of" or "units are" in the header, or None."""
+    """Return what follows "units of" or "units are" in the header, or None."""
     return next((match[1] for match in map(_UNITS.search, header) if match), None)

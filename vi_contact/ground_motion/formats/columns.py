@@ -1,4 +1,4 @@
-"""Plain columns: time [s] and acceleration, or acceleration alone with the time step given by the caller.
+"""Read plain columns: time [s] and acceleration, or acceleration alone with the time step given by the caller.
 
 The latter are the path series of OpenSees (.th, .g3, .acc): no header, values in one column or row by row.
 
@@ -25,7 +25,7 @@ JITTER = 1e-6
 
 
 def read(text: TextFile, units: str | None = None, dt: float | None = None, resample_dt: float | None = None) -> Record:
-    """The record of a column file; `units` is required, `dt` too when there is no time column.
+    """Return the record of a column file; `units` is required, `dt` too when there is no time column.
 
     Uneven times are refused unless resample_dt [s] is given: then straight lines between the samples are read off at
     resample_dt, or at the nearest whole part of it that is not longer than the usual step, so that reading does not
@@ -54,7 +54,7 @@ def read(text: TextFile, units: str | None = None, dt: float | None = None, resa
 
 
 def follow_begin_data(text: TextFile) -> bool:
-    """Whether times and accelerations, and not rows of accelerations, follow a `*** Begin data ***` line."""
+    """Tell whether times and accelerations, and not rows of accelerations, follow a `*** Begin data ***` line."""
     start = begin_data(text)
     if start is None:
         return False
@@ -64,7 +64,7 @@ def follow_begin_data(text: TextFile) -> bool:
 
 
 def _table(text: TextFile, *, series: bool) -> tuple[list[int], Array]:
-    """Line index of every row and the rows, shape (n, 1) or (n, 2), n >= 2.
+    """Return the line index of every row and the rows, shape (n, 1) or (n, 2), n >= 2.
 
     series: rows of more than two values, the last perhaps shorter, are one column written in rows.
     """
@@ -82,7 +82,7 @@ def _table(text: TextFile, *, series: bool) -> tuple[list[int], Array]:
 
 
 def _uneven_line(text: TextFile, lines: list[int], times: Array) -> str | None:
-    """None for equal steps, else the beginning of a sentence about the first step unlike the others."""
+    """Return None for equal steps, else the beginning of a sentence about the first step unlike the others."""
     steps = np.diff(times)
     usual = float(np.median(steps))
     backward = steps <= 0.0

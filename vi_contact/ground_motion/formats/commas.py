@@ -1,4 +1,4 @@
-"""What the commas of a file mean: separators between numbers, or the points of decimal fractions.
+"""Find out what the commas of a file mean: separators between numbers, or the points of decimal fractions.
 
 "0,12" is one number or two. With a decimal point anywhere in the data, with a blank beside a comma, or with two commas
 in one word, commas separate. With semicolons between the columns, as spreadsheets of half of Europe write them, they
@@ -18,14 +18,14 @@ _INSIDE = re.compile(r"(?<=\d),(?=\d)")
 
 
 class Commas(Enum):
-    """The meaning of commas in the data of a file."""
+    """Name what commas mean in the data of a file."""
 
     SEPARATE = "separators"
     DECIMAL = "decimal"
 
 
 def commas_of(data: Sequence[str], at: Callable[[int], str]) -> Commas:
-    """The meaning of the commas in all the lines of data of a file; ``at``: the place of one of them, for a sentence.
+    """Return what commas mean in all the lines of data of a file; ``at``: the place of one of them, for a sentence.
 
     Raises InputError where it cannot be told.
     """

@@ -1,4 +1,4 @@
-"""COSMOS and CSMIP files (.V1, .V2, .V2c): one or more channels, each with text, numbers and blocks of samples.
+"""Read COSMOS and CSMIP files (.V1, .V2, .V2c): one or more channels, each with text, numbers and blocks of samples.
 
 A block begins with a line that states its number of points, quantity, units and Fortran format, such as
 "7500 points of accel data equally spaced at .010 sec, in cm/sec2. (8f10.6)" (CSMIP) or
@@ -46,7 +46,7 @@ _UNKNOWN = re.compile(rf"unknown/unspecified:\s*+{NUMBER}[,\s]++({NUMBER})", re.
 
 @dataclass(frozen=True)
 class Block:
-    """Samples announced on lines[line]: `count` in columns of `width`, `per_line` a line; header: its lines."""
+    """Describe samples announced on lines[line]: `count`, `per_line` a line, `width` wide; header: its lines."""
 
     line: int
     header: range
@@ -56,17 +56,17 @@ class Block:
 
     @property
     def end(self) -> int:
-        """Index of the line after the samples."""
+        """Return the index of the line after the samples."""
         return self.line + 1 + -(-self.count // self.per_line)
 
 
 def recognises(text: TextFile) -> bool:
-    """Whether the first line is that of a COSMOS or CSMIP file of any volume."""
+    """Tell whether the first line is one of a COSMOS or CSMIP file of any volume."""
     return _FIRST.search(text.heads[0]) is not None
 
 
 def read(text: TextFile, units: str | None = None, dt: float | None = None, channel: int | None = None) -> Record:
-    """The record of one channel; channel: 1 for the first of the file, required where it holds several.
+    """Return the record of one channel; channel: 1 for the first of the file, required where it holds several.
 
     Raises InputError naming the file, mostly with a line: no acceleration in it, several channels, samples missing,
     unequal steps, counts instead of accelerations, an unknown sample, text where a number should be.
@@ -90,7 +90,7 @@ def read(text: TextFile, units: str | None = None, dt: float | None = None, chan
 
 
 def _blocks(text: TextFile) -> list[Block]:
-    """The blocks of accelerations; blocks of other quantities belong to the channel before them."""
+    """Return the blocks of accelerations; blocks of other quantities belong to the channel before them."""
     found, index, start = [], 0, 0
     while index < len(text.lines):
         announced = _announced(text, index)
@@ -120,7 +120,7 @@ def _announced(text: TextFile, index: int) -> tuple[int, str] | None:
 
 
 def _words(text: TextFile, block: Block) -> tuple[list[str], list[str]]:
-    """The text of a channel's header, which ends where its numbers begin, and its comments, blanks squeezed."""
+    """Return the text of a channel's header, which ends where numbers begin, and its comments, blanks squeezed."""
     header = [" ".join(text.heads[index].split()) for index in block.header]
     numbers = (k for k, entry in enumerate(header) if _NUMBERS.fullmatch(entry) or "header values" in entry)
     comments = [entry.lstrip("| ") for entry in header if entry.startswith("|")]
@@ -128,7 +128,7 @@ def _words(text: TextFile, block: Block) -> tuple[list[str], list[str]]:
 
 
 def _chosen(text: TextFile, blocks: list[Block], channel: int | None) -> Block:
-    """The block of a channel; InputError that lists them when there are several and none is named."""
+    """Return the block of a channel, or raise InputError that lists them when there are several and none is named."""
     names = ", ".join(f"{k}: {_component(text, block) or 'unnamed'}" for k, block in enumerate(blocks, 1))
     if channel is None and len(blocks) > 1:
         raise InputError(f"{text.path}: the file holds {len(blocks)} channels ({names}); pass channel=")
@@ -138,7 +138,7 @@ def _chosen(text: TextFile, blocks: list[Block], channel: int | None) -> Block:
 
 
 def _samples(text: TextFile, block: Block) -> Array:
-    """The samples in the file's units, shape (count,)."""
+    """Return the samples in the file's units, shape (count,)."""
     marks = ((index, _UNKNOWN.search(text.heads[index])) for index in block.header)
     unknown = next((number(text, index, mark[1]) for index, mark in marks if mark), None)
     values: list[float] = []
@@ -155,7 +155,7 @@ def _samples(text: TextFile, block: Block) -> Array:
 
 
 def _step(text: TextFile, block: Block) -> float | None:
-    """The time step stated with the samples, in the text of the header or among its real numbers."""
+    """Return the time step stated with the samples, in the text of the header or among its real numbers."""
     rate = _RATE.search(text.heads[block.line])
     if rate and number(text, block.line, rate[1]) > 0.0:
         return 1.0 / number(text, block.line, rate[1])
@@ -173,7 +173,7 @@ def _step(text: TextFile, block: Block) -> float | None:
 
 
 def _component(text: TextFile, block: Block) -> str:
-    """Direction of the channel, such as "90 Deg" or "UP", from the text of its header."""
+    """Return the direction of the channel, such as "90 Deg" or "UP", from the text of its header."""
     found = (_CHANNEL.search(text.heads[index]) for index in block.header)
     named = (" ".join(_FROM.split(match[2], maxsplit=1)[0].split()) for match in found if match)
     return next(filter(None, named), "")

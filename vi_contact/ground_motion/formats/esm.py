@@ -1,4 +1,4 @@
-"""ASCII files of the Engineering Strong-Motion database (ESM, ITACA; AFAD alike): 64 lines "KEY: value", then samples.
+"""Read files of the Engineering Strong-Motion database (ESM, ITACA; AFAD alike): 64 lines "KEY: value", then samples.
 
 One value a line. Read DATA_LICENSE and DATA_CITATION, kept in the notes, before passing a record on.
 """
@@ -18,14 +18,14 @@ _KEY = re.compile(r"[A-Z][A-Z0-9_/^ ]*+")
 
 
 def recognises(text: TextFile) -> bool:
-    """Whether the first line is an entry "KEY: value" and one of the first hundred is NDATA or SAMPLING_INTERVAL_S."""
+    """Tell whether line 1 is an entry "KEY: value" and one of the first 100 is NDATA or SAMPLING_INTERVAL_S."""
     keys = ("EVENT_NAME", "SAMPLING_INTERVAL_S", "NDATA")
     entries = [_entry(line) for line in text.heads[:100]]
     return entries[0] is not None and any(entry is not None and entry[0] in keys for entry in entries)
 
 
 def read(text: TextFile, units: str | None = None, dt: float | None = None) -> Record:
-    """The record of an ESM ASCII file; units and dt are only checked.
+    """Return the record of an ESM ASCII file; units and dt are only checked.
 
     Raises InputError naming the file, mostly with a line: a velocity or displacement file, a needed entry missing or no
     number, a word between the samples, a number of samples unlike NDATA.
@@ -54,7 +54,7 @@ def read(text: TextFile, units: str | None = None, dt: float | None = None) -> R
 
 
 def _header(text: TextFile) -> tuple[dict[str, tuple[int, str]], int]:
-    """Line index and value of each key, and the index of the first line that is no entry."""
+    """Return the line index and value of each key, and the index of the first line that is no entry."""
     header: dict[str, tuple[int, str]] = {}
     for index, line in enumerate(text.heads):
         entry = _entry(line)
@@ -65,13 +65,13 @@ def _header(text: TextFile) -> tuple[dict[str, tuple[int, str]], int]:
 
 
 def _entry(line: str) -> tuple[str, str] | None:
-    """Key and value of a line "KEY: value", None for any other line."""
+    """Return the key and value of a line "KEY: value", None for any other line."""
     key, colon, value = (part.strip() for part in line.partition(":"))
     return (key, value) if colon and _KEY.fullmatch(key) else None
 
 
 def _number(text: TextFile, header: dict[str, tuple[int, str]], key: str) -> float:
-    """The number after a key of the header."""
+    """Return the number after a key of the header."""
     index, value = header[key]
     try:
         return to_float(value)

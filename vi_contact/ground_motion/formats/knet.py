@@ -1,4 +1,4 @@
-"""NIED K-NET and KiK-net ASCII files: 17 header lines, then integer counts, eight a row, one component a file.
+"""Read NIED K-NET and KiK-net files: 17 header lines, then integer counts, eight a row, one component a file.
 
 Acceleration = count x "Scale Factor", written as 3920(gal)/6182761. The counts carry the sensor's offset, so their mean
 is removed, as the agency does before it prints "Max. Acc.". NIED forbids passing these files on.
@@ -23,12 +23,12 @@ _FREQUENCY = re.compile(rf"({NUMBER})\s*+(?:Hz)?\s*+$", re.IGNORECASE)
 
 
 def recognises(text: TextFile) -> bool:
-    """Whether the first line is the origin time and a scale factor follows."""
+    """Tell whether the first line is the origin time and a scale factor follows."""
     return text.lines[0].startswith("Origin Time") and any(line.startswith("Scale Factor") for line in text.heads[:20])
 
 
 def read(text: TextFile, units: str | None = None, dt: float | None = None) -> Record:
-    """The record of a K-NET or KiK-net file, its mean removed; units and dt are only checked.
+    """Return the record of a K-NET or KiK-net file, its mean removed; units and dt are only checked.
 
     Raises InputError naming the file, mostly with a line: an entry of the header is missing or no number, words
     between the counts, fewer or more samples than "Duration Time(s)".
@@ -55,7 +55,7 @@ def read(text: TextFile, units: str | None = None, dt: float | None = None) -> R
 
 
 def _scale(text: TextFile, index: int) -> tuple[float, str]:
-    """Size of a count, and its unit, of "Scale Factor      3920(gal)/6182761"."""
+    """Return the size of a count, and its unit, of "Scale Factor      3920(gal)/6182761"."""
     match = _SCALE.search(text.heads[index])
     if match is None or number(text, index, match[3]) == 0.0:
         raise InputError(f"{text.at(index)}: the scale factor is not like '3920(gal)/6182761'; get the file again")
@@ -63,7 +63,7 @@ def _scale(text: TextFile, index: int) -> tuple[float, str]:
 
 
 def _number(text: TextFile, index: int, key: str) -> float:
-    """The positive number after a key, "Hz" allowed."""
+    """Return the positive number after a key, "Hz" allowed."""
     match = _FREQUENCY.match(text.heads[index][len(key):].strip())
     if match is None or number(text, index, match[1]) <= 0.0:
         raise InputError(f"{text.at(index)}: {key!r} gives no positive number; get the file again")

@@ -29,7 +29,7 @@ STEPS = 1e-6, 100.0
 def read_record(path: str | os.PathLike[str], units: str | None = None, *, dt: float | None = None,
                 resample_dt: float | None = None, channel: int | None = None,
                 largest: float = LARGEST_PEAK) -> Record:
-    """One component of ground motion from a file of any format listed in docs/guide/records.md.
+    """Read one component of ground motion from a file of any format listed in docs/guide/records.md.
 
     units: a key of UNITS ("m/s2", "cm/s2", "gal", "g", ...); required for column and SimCenter files, elsewhere only
     checked against what the file states. dt: time step [s], for files that do not state one. resample_dt: time step [s]
@@ -50,7 +50,7 @@ def read_record(path: str | os.PathLike[str], units: str | None = None, *, dt: f
 
 
 def _doubt(record: Record, largest: float) -> None:
-    """InputError for a peak or a time step that no ground motion has."""
+    """Raise InputError for a peak or a time step that no ground motion has."""
     peak = float(np.max(np.abs(record.acceleration)))
     if peak > largest:
         raise InputError(f"{record.source}: the peak acceleration is {peak / STANDARD_GRAVITY:.4g} g = {peak:.4g} m/s2 "

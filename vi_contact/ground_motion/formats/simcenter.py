@@ -1,4 +1,4 @@
-"""Event files of the SimCenter tools (JSON): time series "name", "dT", "data", and patterns that say what they are.
+"""Read event files of the SimCenter tools (JSON): time series "name", "dT", "data", and patterns that explain them.
 
 {"Events": [{"timeSeries": [{"name": "accel_X", "type": "Value", "dT": 0.01, "data": [...]}, ...],
 "pattern": [{"type": "UniformAcceleration", "timeSeries": "accel_X", "dof": 1}, ...]}]}; the outer "Events" may be
@@ -19,12 +19,12 @@ from .text import HEAD, TextFile
 
 
 def recognises(text: TextFile) -> bool:
-    """Whether the first character is that of a JSON object and a time series is mentioned."""
+    """Tell whether the first character begins a JSON object and a time series is mentioned."""
     return text.lines[0].lstrip().startswith("{") and any('"timeSeries"' in line for line in text.lines)
 
 
 def read(text: TextFile, units: str | None = None, dt: float | None = None, channel: int | None = None) -> Record:
-    """The record of one time series; units are required, channel (from 1) where there are several.
+    """Return the record of one time series; units are required, channel (from 1) where there are several.
 
     Raises InputError naming the file, and the line where it is not JSON: no series, several and none chosen, a velocity
     or displacement, a factor, data that are not numbers, no step.
@@ -59,7 +59,7 @@ def read(text: TextFile, units: str | None = None, dt: float | None = None, chan
 
 
 def _series(text: TextFile) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """The first event that holds time series, and these."""
+    """Return the first event that holds time series, and its series."""
     try:
         content = json.loads("\n".join(text.lines))
     except json.JSONDecodeError as error:
@@ -81,5 +81,5 @@ def _is_number(value: Any) -> bool:
 
 
 def _text(value: Any) -> str:
-    """A text of the file on one line that may be printed and written: lone surrogates become question marks."""
+    """Return a text of the file on one printable line: lone surrogates become question marks."""
     return " ".join(str(value)[:HEAD].encode("utf-8", "replace").decode().split()) if isinstance(value, str) else ""

@@ -1,4 +1,4 @@
-"""USGS SMC files (National Strong-Motion Program), type 2 CORRECTED ACCELEROGRAM, accelerations in cm/s².
+"""Read USGS SMC files (National Strong-Motion Program), type 2 CORRECTED ACCELEROGRAM, accelerations in cm/s².
 
 Layout: 11 lines of text; 6 lines of 8 integers in columns of 10; 10 lines of 5 reals in columns of 15; comment lines
 starting with "|"; the samples, 8 a line in columns of 10 that touch, so they are cut by column and not by blanks. The
@@ -28,12 +28,12 @@ _STATION = re.compile(r"station\s*+=\s*+(.*+)", re.IGNORECASE)
 
 
 def recognises(text: TextFile) -> bool:
-    """Whether the first line is the type line of an SMC file, of any type."""
+    """Tell whether the first line is the type line of an SMC file, of any type."""
     return _KIND.match(text.heads[0]) is not None
 
 
 def read(text: TextFile, units: str | None = None, dt: float | None = None) -> Record:
-    """The record of an SMC file; dt is needed only where the file leaves its sampling rate undefined.
+    """Return the record of an SMC file; dt is needed only where the file leaves its sampling rate undefined.
 
     Raises InputError naming the file, mostly with a line: a type other than corrected acceleration, a short file,
     a number of samples unlike the header's, an undefined sample, text where a number should be.
@@ -69,7 +69,7 @@ def _refuse_other_kinds(text: TextFile) -> None:
 
 
 def _fields(text: TextFile, start: int, lines: int, width: int, per_line: int) -> list[float]:
-    """`lines` lines from `start` cut into `per_line` columns of `width` characters."""
+    """Cut `lines` lines from `start` into `per_line` columns of `width` characters."""
     values: list[float] = []
     for index in range(start, start + lines):
         row = text.fixed(index, width) if index < len(text.lines) else []
@@ -80,7 +80,7 @@ def _fields(text: TextFile, start: int, lines: int, width: int, per_line: int) -
 
 
 def _samples(text: TextFile, start: int, count: int) -> Array:
-    """The samples in cm/s², shape (count,)."""
+    """Return the samples in cm/s², shape (count,)."""
     values: list[float] = []
     for index in range(start, len(text.lines)):
         row = text.fixed(index, SAMPLE_WIDTH)
@@ -94,12 +94,12 @@ def _samples(text: TextFile, start: int, count: int) -> Array:
 
 
 def _title(text: TextFile) -> str:
-    """Event (text line 4) and station (text line 6), blanks squeezed."""
+    """Return the event (text line 4) and station (text line 6), blanks squeezed."""
     return "; ".join(" ".join(text.heads[index].split()) for index in (3, 5) if text.heads[index].strip(" *"))
 
 
 def _direction(integers: list[float]) -> str:
-    """The component's direction in words."""
+    """Return the component's direction in words."""
     if integers[VERTICAL] in (0.0, 180.0):
         return f"vertical, {'up' if integers[VERTICAL] == 0.0 else 'down'}"
     undefined = integers[0]
@@ -107,12 +107,12 @@ def _direction(integers: list[float]) -> str:
 
 
 def _problem(integers: list[float]) -> tuple[str, ...]:
-    """The agency's problem flag, in words."""
+    """Return the agency's problem flag, in words."""
     return ("the file carries the agency's problem flag: read its comments",) if integers[PROBLEM] == 1.0 else ()
 
 
 def _station(text: TextFile) -> str:
-    """What follows "station =" on text line 6, up to "component"."""
+    """Return what follows "station =" on text line 6, up to "component"."""
     match = _STATION.search(text.heads[5])
     named = match[1] if match else ""
     end = named.lower().find("component")

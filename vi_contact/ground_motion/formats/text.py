@@ -1,4 +1,4 @@
-"""The lines of a record file, and numbers as Fortran writes them."""
+"""Hold the lines of a record file, and read numbers as Fortran writes them."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _BETWEEN_DECIMALS = re.compile(r"[\s;]+")
 
 @dataclass(frozen=True)
 class TextFile:
-    """A file as read: its path as given by the caller, its lines without line ends, the sha256 of its bytes."""
+    """Describe a file as read: its path as the caller gave it, its lines without ends, the sha256 of its bytes."""
 
     path: str
     lines: tuple[str, ...]
@@ -36,20 +36,20 @@ class TextFile:
 
     @cached_property
     def heads(self) -> tuple[str, ...]:
-        """The beginning of every line, for patterns of headers: a line of data may be as long as the file."""
+        """Return the beginning of every line, for patterns of headers: a line of data may be as long as the file."""
         return tuple(line[:HEAD] for line in self.lines)
 
     def at(self, index: int) -> str:
-        """'path, line N' of lines[index], counted from 1 as editors do."""
+        """Return 'path, line N' of lines[index], counted from 1 as editors do."""
         return f"{self.path}, line {index + 1}"
 
     def rows(self, indices: Sequence[int]) -> Iterator[list[float]]:
-        """Values on each of these lines, which are all the data of the file: see ``numbers`` and ``commas_of``."""
+        """Return the values on each of these lines, all the data of the file: see ``numbers`` and ``commas_of``."""
         commas = commas_of([self.lines[index] for index in indices], lambda k: self.at(indices[k]))
         return (self.numbers(index, commas) for index in indices)
 
     def numbers(self, index: int, commas: Commas = Commas.SEPARATE) -> list[float]:
-        """Values on lines[index], separated by blanks, commas or semicolons, or touching where the next has a sign.
+        """Return the values on lines[index], divided by blanks, commas or semicolons, or by the sign of the next.
 
         Raises InputError naming file, line and word for anything else, "1.234.567" included: where two unsigned
         numbers touch nobody can tell where the first one ends.
@@ -65,7 +65,7 @@ class TextFile:
         return values
 
     def fixed(self, index: int, width: int) -> list[float]:
-        """Values on lines[index] in columns of `width` characters, which may touch; trailing blanks are ignored.
+        """Return the values on lines[index] in columns of `width` characters, which may touch.
 
         Raises InputError naming file, line, columns and word for anything that is not a number.
         """
@@ -82,7 +82,7 @@ class TextFile:
 
 
 def to_float(number: str) -> float:
-    """float() that also reads the exponent letter D of Fortran; ValueError for anything else, NaN and infinity too."""
+    """Read a float, also with Fortran's exponent letter D; ValueError for anything else, NaN and infinity too."""
     if not _NUMBER.fullmatch(number):
         raise ValueError(number)
     found = float(number.upper().replace("D", "E"))
@@ -92,14 +92,14 @@ def to_float(number: str) -> float:
 
 
 def whole(text: TextFile, index: int, digits: str) -> int:
-    """The whole number of these digits; InputError where there are too many to count samples with."""
+    """Return the whole number of these digits; InputError where there are too many to count samples with."""
     if len(digits) > 12:
         raise InputError(f"{text.at(index)}: a count of {shown(digits)} is too large; get the file again")
     return int(digits)
 
 
 def number(text: TextFile, index: int, word: str) -> float:
-    """The number that a header states; InputError where it is too large for one."""
+    """Return the number that a header states; InputError where it is too large for one."""
     try:
         return to_float(word)
     except ValueError:
@@ -107,7 +107,7 @@ def number(text: TextFile, index: int, word: str) -> float:
 
 
 def filled(text: TextFile, start: int) -> Sequence[int]:
-    """Indices of the lines from `start` on that are not blank."""
+    """Return the indices of the lines from `start` on that are not blank."""
     return [index for index in range(start, len(text.lines)) if text.lines[index].strip()]
 
 

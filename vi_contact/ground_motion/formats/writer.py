@@ -12,7 +12,7 @@ DIGITS = 9
 
 
 def write_columns(record: Record, path: str | os.PathLike[str], units: str) -> None:
-    """Time [s] and acceleration in `units`, after comment lines "#" with title, units, time step and notes."""
+    """Write time [s] and acceleration in `units`, after comment lines "#" with title, units, time step and notes."""
     samples, name = _samples(record, units)
     comments = [record.title, f"time [s], acceleration [{name}], dt = {record.dt:.10g} s", *record.notes]
     rows = [f"{time:.10g} {sample}" for time, sample in zip(record.times, samples, strict=True)]
@@ -20,7 +20,7 @@ def write_columns(record: Record, path: str | os.PathLike[str], units: str) -> N
 
 
 def write_at2(record: Record, path: str | os.PathLike[str], units: str = "g") -> None:
-    """PEER AT2: four header lines with units, NPTS and DT, then five values a row."""
+    """Write PEER AT2: four header lines with units, NPTS and DT, then five values a row."""
     samples, name = _samples(record, units)
     header = ["PEER AT2 format, written by vi_contact", _one_line(record.title) or "record",
               f"ACCELERATION TIME SERIES IN UNITS OF {name.upper()}",
@@ -30,12 +30,12 @@ def write_at2(record: Record, path: str | os.PathLike[str], units: str = "g") ->
 
 
 def write_path_series(record: Record, path: str | os.PathLike[str], units: str) -> None:
-    """One value a line and nothing else, as `timeSeries Path -filePath` of OpenSees reads; it needs -dt and units."""
+    """Write one value a line, as `timeSeries Path -filePath` of OpenSees reads; it needs -dt and units."""
     _write(path, _samples(record, units)[0])
 
 
 def _samples(record: Record, units: str) -> tuple[list[str], str]:
-    """The accelerations in `units` as text, and the key of UNITS."""
+    """Return the accelerations in `units` as text, and the key of UNITS."""
     name = canonical_units("output units", units)
     return [f"{value:.{DIGITS - 1}e}" for value in record.acceleration / UNITS[name]], name
 
