@@ -81,6 +81,6 @@ def test_what_is_kept_is_made_once_and_belongs_to_one_system():
         made.append(object())
         return made[-1]
 
-    assert system.kept("factor", make) is system.kept("factor", make)
+    assert system.cached("factor", make) is system.cached("factor", make)
     assert len(made) == 1
-    assert system.with_load().kept("factor", make) is made[1]
+    assert system.with_load().cached("factor", make) is made[1]

@@ -144,7 +144,7 @@ class BoundaryLayer(Midpoint):
 
 def _compliance(problem: ContactProblem, A: EffectiveMatrix, scale: float) -> Array:
     """B A⁻¹ Bᵀ (m, m), made once for every A."""
-    kept: WeakKeyDictionary[EffectiveMatrix, Array] = problem.equations.kept("boundary layer", WeakKeyDictionary)
+    kept: WeakKeyDictionary[EffectiveMatrix, Array] = problem.equations.cached("boundary layer", WeakKeyDictionary)
     if A not in kept:
         kept[A] = np.asarray(Condensed().prepare(A, problem.surface, scale).delassus)
     return kept[A]

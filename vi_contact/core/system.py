@@ -176,8 +176,8 @@ class SemiDiscreteSystem:
         """½ uᵀ K u [J]."""
         return 0.5 * self.algebra.dot(u, self.K @ u)
 
-    def kept(self, name: str, make: Callable[[], Any]) -> Any:
-        """What ``make`` returned the first time: factors that live as long as the system."""
+    def cached(self, name: str, make: Callable[[], Any]) -> Any:
+        """Return what ``make`` returned the first time: factors and the like, which live as long as the system."""
         if name not in self._cache:
             self._cache[name] = make()
         return self._cache[name]

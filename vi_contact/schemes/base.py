@@ -102,7 +102,7 @@ def contact_in_the_balance(name: str, problem: ContactProblem) -> None:
     rigid = bool(np.any(~surface.bilateral & (surface.compliance == 0.0)))
     if not rigid or has_massless_contact(problem):
         return
-    told = problem.equations.kept(f"told of {name}", list)
+    told = problem.equations.cached(f"told of {name}", list)
     if not told and surface.comm.rank == 0:
         log.warning(
             "%s with consistent mass can gain energy whenever a contact opens: with Newmark's method a bar that "

@@ -67,7 +67,7 @@ def _with_contact(problem: ContactProblem, state: State, force: Array, dt: float
         slip0=None if slip is None else -slip / dt,
         rate_factor=dt,
     )
-    solver: PreparedSolver = problem.equations.kept(
+    solver: PreparedSolver = problem.equations.cached(
         "resting contacts", lambda: Condensed().prepare(step.A, step.surface, 1.0)
     )
     result = solver.solve(step)
@@ -96,7 +96,7 @@ def mass_matrix(problem: ContactProblem) -> EffectiveMatrix:
         regular: Matrix = system.M if system.massless is None else system.algebra.held(system.M, system.massless)
         return EffectiveMatrix(regular, system.algebra)
 
-    matrix: EffectiveMatrix = system.kept("mass", make)
+    matrix: EffectiveMatrix = system.cached("mass", make)
     return matrix
 
 
@@ -131,7 +131,7 @@ def equilibrated(problem: ContactProblem, state: State) -> State:
     if layer is None:
         return state
     load = system.load(state.t) - system.K @ np.where(layer, 0.0, state.u)
-    A = system.kept("contact layer", lambda: EffectiveMatrix(system.algebra.block(system.K, layer), system.algebra))
+    A = system.cached("contact layer", lambda: EffectiveMatrix(system.algebra.block(system.K, layer), system.algebra))
     surface = _within(problem.surface, layer)
     step = StepProblem(
         A=A,
