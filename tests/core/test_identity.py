@@ -67,7 +67,7 @@ def test_a_surface_belongs_to_the_systems_of_its_space() -> None:
     system, other = (fem.assemble(mesh, STEEL, clamped=tags[name]) for name in ("bottom", "left"))
     surface = fem.contact_surface(system, tags["right"])
     for same in (vc.with_weight(system), system.with_load((system.u0, np.sin)), replace(system, v0=system.v0 + 1.0)):
-        vc.ContactProblem(same, surface.held().on_springs(1e9))
+        vc.ContactProblem(same, surface.bilateral_everywhere().on_springs(1e9))
     with pytest.raises(InputError, match="contact surface was made for another system"):
         vc.ContactProblem(other, surface)
 

@@ -170,7 +170,7 @@ def test_what_surfaces_know_is_kept():
     """Gaps, springs, bilateral points, motions, each in its place; joined surfaces may be joined again."""
     mesh = blocks(2, gap=0.125)
     system, tags = two_blocks(COMM, mesh)
-    pair = contact_pair(system, *(tags[side] for side in mesh.interface)).held()
+    pair = contact_pair(system, *(tags[side] for side in mesh.interface)).bilateral_everywhere()
     ground = contact_surface(system, tags["lower_bottom"]).on_springs(1e6).moving(towards=lambda t: 2.0 * t)
     wall = contact_surface(system, tags["upper_right"])
     once, twice = joined_surfaces(pair, ground, wall), joined_surfaces(joined_surfaces(pair, ground), wall)

@@ -257,7 +257,7 @@ def test_springs_open():
 def test_held_points_stay_and_pull(scheme):
     """The bilateral comparison case: u_n = gap0 with reactions of both signs."""
     problem = shaken(gap=0.0, impact=Inelastic())
-    problem = replace(problem, surface=problem.surface.held())
+    problem = replace(problem, surface=problem.surface.bilateral_everywhere())
     reactions = []
     for report in run(problem, scheme, dt=5e-3, steps=100):
         assert report.new.u[-1] == 0.0 and report.new.active.all()

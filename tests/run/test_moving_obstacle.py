@@ -81,7 +81,7 @@ def test_its_work_is_in_the_ledger(scheme: Any, mass: Any) -> None:
 def test_a_held_point_follows_its_obstacle() -> None:
     """Bilateral on a moving wall: a prescribed motion."""
     given = bar(40, gap=0.0, mass=Redistributed())
-    moving = replace(given, surface=given.surface.held().moving(lambda t: 0.1 * np.sin(3.0 * t)))
+    moving = replace(given, surface=given.surface.bilateral_everywhere().moving(lambda t: 0.1 * np.sin(3.0 * t)))
     for report in run(moving, Trapezoidal(), dt=0.01, steps=100):
         u_n = moving.surface.normal_values(report.new.u)[0]
         assert u_n == pytest.approx(-0.1 * np.sin(3.0 * report.new.t), abs=1e-14)

@@ -94,8 +94,8 @@ def test_bilateral_points_pull_as_well():
     mesh, tags = block(COMM, lengths=(2.0, 1.0), divisions=(4, 2))
     system = assemble(mesh, CONCRETE, clamped=tags["left"], loads=Traction(tags["top"], (0.0, 1.0e6)))
     one = contact_surface(system, tags["bottom"], obstacle=GROUND)
-    assert not one.bilateral.any() and one.held().bilateral.all()
-    held = static_equilibrium(ContactProblem(system, one.held()), solver=Condensed())
+    assert not one.bilateral.any() and one.bilateral_everywhere().bilateral.all()
+    held = static_equilibrium(ContactProblem(system, one.bilateral_everywhere()), solver=Condensed())
     loose = static_equilibrium(ContactProblem(system, one), solver=Condensed())
     assert held.active.all() and held.r_n.min() < 0.0
     assert np.abs(one.normal_values(held.u)).max() <= 1e-15 * max_over_ranks(COMM, held.u)

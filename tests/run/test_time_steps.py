@@ -343,7 +343,7 @@ def test_resting_and_held_contacts_are_not_halved():
     problem = shaken(gap=0.0, excitation=(), constant=3.0)
     resting = replace(next(run(problem, HALF, dt=1e-3, steps=1)).new, active=np.ones(1, dtype=bool))
     assert len(list(run(problem, HALF, dt=HalvedAtImpact(1e-3), steps=20, state=resting))) == 20
-    held = replace(shaken(gap=0.0), surface=shaken(gap=0.0).surface.held())
+    held = replace(shaken(gap=0.0), surface=shaken(gap=0.0).surface.bilateral_everywhere())
     assert len(list(run(held, HALF, dt=HalvedAtImpact(5e-3), steps=50))) == 50
 
 

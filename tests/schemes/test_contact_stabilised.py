@@ -199,7 +199,7 @@ def test_positive_homogeneity():
 
 def test_bilateral_points_are_brought_to_the_obstacle_and_stay():
     problem = chain(gap=0.02, v0=np.linspace(0.0, 1.0, 6), consistent=True)
-    held = replace(problem, surface=problem.surface.held())
+    held = replace(problem, surface=problem.surface.bilateral_everywhere())
     for report in run(held, STABILISED, dt=5e-3, steps=100):
         assert report.new.u[-1] == pytest.approx(0.02, abs=1e-15)
     assert course(held, STABILISED, dt=5e-3, steps=100, state=report.new).rise <= 1e-11
@@ -212,7 +212,7 @@ def test_nan_stops_the_step(held):
         chain(gap=0.0, v0=np.array([1.0, 1.0, 1.0, 1.0, 1.0, np.nan]))
     problem = chain(gap=0.0)
     surface = problem.surface.moving(lambda t: np.nan if t else 0.0)
-    problem = replace(problem, surface=surface.held() if held else surface)
+    problem = replace(problem, surface=surface.bilateral_everywhere() if held else surface)
     with pytest.raises(InputError, match=r"moving obstacle: towards\(0.01 s\) is nan; return finite metres"):
         list(run(problem, STABILISED, dt=0.01, steps=1))
 

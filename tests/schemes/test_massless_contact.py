@@ -88,7 +88,7 @@ def with_the_whole_matrix(problem: ContactProblem, state: State) -> tuple[Array,
     system, surface = problem.equations, problem.surface
     assert system.massless is not None
     inner = ~system.massless
-    A = EffectiveMatrix(system.algebra.held(system.K, inner), system.algebra)
+    A = EffectiveMatrix(system.algebra.with_identity_rows(system.K, inner), system.algebra)
     step = StepProblem(
         A=A, b=np.where(inner, state.u, system.load(0.0) - system.K @ (inner * state.u)), bound=surface.gap(0.0),
         surface=surface, scale=1.0, guess=state.u, active=state.active, t=0.0, k=0, friction=problem.friction,

@@ -79,7 +79,7 @@ def test_what_cannot_work_is_refused(problem, words):
     if "springs" in words:
         problem = replace(problem, surface=surface.on_springs(1e4))
     if "bilateral" in words:
-        problem = replace(problem, surface=surface.held())
+        problem = replace(problem, surface=surface.bilateral_everywhere())
     with pytest.raises(InputError, match=words):
         INELASTIC.check(problem)
 
@@ -304,7 +304,7 @@ def test_a_weight_at_rest_stays_at_rest():
 def test_held_points_stay_and_open_points_are_free():
     """Bilateral points keep their place, pulled or pushed; with a wall out of reach nothing happens at all."""
     problem = chain(gap=0.0, v0=np.linspace(0.0, 1.0, 6) * np.array([1, 1, 1, 1, 1, 0]), consistent=True)
-    held = replace(problem, surface=problem.surface.held())
+    held = replace(problem, surface=problem.surface.bilateral_everywhere())
     signs = set()
     for report in run(held, INELASTIC, dt=5e-3, steps=100):
         assert report.new.u[-1] == 0.0

@@ -161,7 +161,7 @@ def test_held_beside_unilateral(method):
         assert np.all(report.new.active[[0, 3]]) and report.certificate.worst <= 1e-11
         signs |= set(np.sign(report.new.r_n[[0, 3]]))
     assert {-1.0, 1.0} <= signs
-    held = replace(mixed, surface=replace(mixed.surface.held(), gap0=np.zeros(5)))
+    held = replace(mixed, surface=replace(mixed.surface.bilateral_everywhere(), gap0=np.zeros(5)))
     step = stepped(held, 10)
     K, free = dense(held, DT), np.arange(5)
     result = Condensed(method).prepare(step.A, held.surface, step.scale).solve(step)

@@ -144,7 +144,7 @@ def racking(box: LinedBox, flexibility: float, *, nu: float = 0.3) -> float:
             fem.contact_pair(system, tags[f"lining_{name}"], tags[f"soil_{name}"], points=box.contact_points(name))
             for name in ("right", "top")
         ]
-        surface = fem.joined_surfaces(*pairs).held()
+        surface = fem.joined_surfaces(*pairs).bilateral_everywhere()
     problem = ContactProblem(system, surface)
     state = static_equilibrium(problem, solver=Condensed())
     x = np.array([0.5 * box.width, 0.5 * box.height])

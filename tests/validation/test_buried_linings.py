@@ -40,7 +40,7 @@ def sheared(slip: bool, divisions: tuple[int, int, int], *, pressure: float = 0.
     surface: Any = empty_surface(system.algebra.comm, 2)
     if slip:
         surface = fem.contact_pair(system, tags["lining_out"], tags["soil_in"])
-        surface = surface.held() if held else surface
+        surface = surface.bilateral_everywhere() if held else surface
     problem = ContactProblem(system, surface)
     return problem, static_equilibrium(problem, solver=Condensed())
 

@@ -29,7 +29,7 @@ def pressed(nu: float, acceleration: float, *, cells: int = 40, gravity: float =
     system = fem.assemble(mesh, soil, clamped=tags["bottom"], prescribed=sides, loads=loads)
     wall = HalfSpace(point=(0.0, 0.0), normal=(1.0, 0.0))
     surface = fem.contact_surface(system, tags["left"], obstacle=wall)
-    problem = ContactProblem(system, surface.held() if bilateral else surface)
+    problem = ContactProblem(system, surface.bilateral_everywhere() if bilateral else surface)
     return problem, static_equilibrium(problem, solver=Condensed())
 
 

@@ -117,7 +117,7 @@ def test_warm_start_at_the_solution_costs_nothing(name):
 def test_bilateral_points_by_both_routes(solver):
     """Held points: u_n = 0 all along, reactions of both signs, the same by every route."""
     problem = shaken_wall(COMM, angle=pi / 6.0)
-    held = replace(problem, surface=problem.surface.held())
+    held = replace(problem, surface=problem.surface.bilateral_everywhere())
     found = run(held, dt=WALL_DT, steps=30, solver=solver)
     assert found.r_n.min() < 0.0 < found.r_n.max() and found.active.all()
     checked = cross_check(held, scheme=SCHEME, solvers=(solver, Condensed(Hildreth())), dt=WALL_DT, steps=30)

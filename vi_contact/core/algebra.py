@@ -87,7 +87,7 @@ class Algebra(Protocol):
         """The matrix of given entries between unknowns of the same rank, which owns n; entries given twice add up."""
         ...
 
-    def held(self, A: Matrix, mask: Mask) -> Matrix:
+    def with_identity_rows(self, A: Matrix, mask: Mask) -> Matrix:
         """A with the rows and columns of the masked unknowns replaced by those of the identity."""
         ...
 
@@ -208,7 +208,7 @@ class SerialAlgebra:
     def local(self, rows: Indices, columns: Indices, values: Array, n: int) -> Matrix:
         return SerialMatrix(sp.coo_matrix((values, (rows, columns)), shape=(n, n)))
 
-    def held(self, A: Matrix, mask: Mask) -> Matrix:
+    def with_identity_rows(self, A: Matrix, mask: Mask) -> Matrix:
         free = sp.diags([(~mask).astype(float)], [0])
         return SerialMatrix(free @ serial(A).csr @ free + sp.diags([mask.astype(float)], [0]))
 

@@ -229,7 +229,7 @@ class ContactSurface:
             slide=None if along is None else spread("along", along, (self.count, self.tangents.shape[1])),
         )
 
-    def held(self) -> ContactSurface:
+    def bilateral_everywhere(self) -> ContactSurface:
         """The bilateral comparison case: every point stays on the obstacle."""
         return replace(self, bilateral=np.ones(self.count, dtype=bool))
 

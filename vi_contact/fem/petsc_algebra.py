@@ -229,7 +229,7 @@ class PetscAlgebra:
     def replaced_rows(self, n: int, rows: Mapping[int, tuple[Indices, Array]]) -> Matrix:
         return self._matrix(identity_with(n, rows, first=self.first(n), columns=self._all(n)))
 
-    def held(self, A: Matrix, mask: Mask) -> Matrix:
+    def with_identity_rows(self, A: Matrix, mask: Mask) -> Matrix:
         every = np.arange(len(mask))
         ones = self.local(every, every, mask.astype(float), len(mask))  # a row of zeros may have no diagonal entry
         mat = as_petsc(self.combine([(1.0, A), (1.0, ones)])).mat

@@ -108,7 +108,7 @@ class WallModel:
             return empty_surface(MpiComm(self.mesh.comm), 2)
         points = [self.wall.point(number) for number in CASES[case]]
         surface = contact_surface(self.system, self.face, obstacle=ground, points=points)
-        return surface.held() if case == "bilateral" else surface
+        return surface.bilateral_everywhere() if case == "bilateral" else surface
 
     def problem(
         self,

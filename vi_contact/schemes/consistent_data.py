@@ -93,8 +93,9 @@ def mass_matrix(problem: ContactProblem) -> EffectiveMatrix:
     system = problem.equations
 
     def make() -> EffectiveMatrix:
-        regular: Matrix = system.M if system.massless is None else system.algebra.held(system.M, system.massless)
-        return EffectiveMatrix(regular, system.algebra)
+        algebra, massless = system.algebra, system.massless
+        regular: Matrix = system.M if massless is None else algebra.with_identity_rows(system.M, massless)
+        return EffectiveMatrix(regular, algebra)
 
     matrix: EffectiveMatrix = system.cached("mass", make)
     return matrix

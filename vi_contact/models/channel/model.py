@@ -115,7 +115,7 @@ class ChannelModel:
         """
         return ContactProblem(
             self.system,
-            self.surface.held() if bilateral else self.surface,
+            self.surface.bilateral_everywhere() if bilateral else self.surface,
             friction=friction or Frictionless(),
             impact=Inelastic(MassProjection()) if impact is None else impact,
             mass=ConsistentMass() if impact is None and mass is None else mass,

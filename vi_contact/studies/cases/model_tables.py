@@ -53,7 +53,7 @@ def _channel(
     ends = replace(sides, base=bottom or excitations) if isinstance(sides, FreeFieldSides) else sides or Rollers()
 
     def parts(model: channel.ChannelModel, firm: Parts | None = None) -> Parts:
-        surface = model.surface.held() if held else model.surface
+        surface = model.surface.bilateral_everywhere() if held else model.surface
         return Parts(model.system, surface, model.tags, bool(weighing), model.recorders(), firm, bottom is not None)
 
     if ends.firm and not isinstance(bottom, RockBelow):

@@ -47,12 +47,12 @@ def surface(
     points: Sequence[tuple[float, ...]] | None = None, feature_angle: float = FEATURE_ANGLE, held: bool = False,
     springs: float | None = None, frictionless_corners: bool = False,
 ) -> ContactSurface:
-    """``contact_surface``; held: ``.held()``; springs: ``.on_springs(stiffness)``; the last:
+    """``contact_surface``; held: ``.bilateral_everywhere()``; springs: ``.on_springs(stiffness)``; the last:
     ``.with_frictionless_corners()``."""
     found = contact_surface(system, facets, obstacle=obstacle, points=points, feature_angle=feature_angle)
     found = found if springs is None else found.on_springs(springs)
     found = found.with_frictionless_corners() if frictionless_corners else found
-    return found.held() if held else found
+    return found.bilateral_everywhere() if held else found
 
 
 def pair(
@@ -60,10 +60,10 @@ def pair(
     points: Sequence[tuple[float, ...]] | None = None, feature_angle: float = FEATURE_ANGLE, held: bool = False,
     frictionless_corners: bool = False,
 ) -> ContactSurface:
-    """``contact_pair``; held: ``.held()``; the last: ``.with_frictionless_corners()``."""
+    """``contact_pair``; held: ``.bilateral_everywhere()``; the last: ``.with_frictionless_corners()``."""
     found = contact_pair(system, facets1, facets2, matching=matching, points=points, feature_angle=feature_angle)
     found = found.with_frictionless_corners() if frictionless_corners else found
-    return found.held() if held else found
+    return found.bilateral_everywhere() if held else found
 
 
 def first_mode_harmonic(
