@@ -6,7 +6,7 @@ from ..core.lazy import lazy
 
 _CONTENTS = {
     "cross_check": ("CrossChecked", "cross_check"),
-    "defaults": ("completed",),
+    "defaults": ("with_defaults",),
     "files.reading": ("RunFolder", "read_run"),
     "march": ("march",),
     "quasi_static": ("quasi_static",),

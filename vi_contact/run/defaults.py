@@ -14,7 +14,7 @@ from ..schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from .checks import check_scheme
 
 
-def completed(problem: ContactProblem, scheme: Scheme | None) -> tuple[ContactProblem, Scheme]:
+def with_defaults(problem: ContactProblem, scheme: Scheme | None) -> tuple[ContactProblem, Scheme]:
     """The problem with a mass matrix and the scheme to run it with.
 
     Without a scheme: the trapezoidal rule on redistributed mass; with an impact law, or with mass at the contact nodes

@@ -15,7 +15,7 @@ from ..core.step import Report, Scheme, Solver, State, initial_state
 from ..solvers.certified import TOLERANCE, CertifiedSolver
 from ..solvers.condensed import Condensed
 from .checks import bind_companions, check_methods, check_state
-from .defaults import completed
+from .defaults import with_defaults
 from .time_steps import Course, TimeSteps, course
 
 
@@ -33,7 +33,7 @@ def march(
 ) -> Iterator[tuple[State, Report]]:
     """Yields (state, report) after every certified step.
 
-    ``scheme`` None, and the mass matrix of a problem that does not name one: see ``schemes.choice.completed``, whose
+    ``scheme`` None, and the mass matrix of a problem that does not name one: see ``run.defaults.with_defaults``, whose
     problem is ``report.problem``. ``solver`` None is Condensed().
 
     ``dt`` [s] is constant, or a Schedule, or HalvedAtImpact. ``steps`` and ``t_end`` count base steps: the halves of
@@ -43,7 +43,7 @@ def march(
     InputError, at the call, for arguments of the wrong kind, and a state of another problem or inside the obstacle.
     """
     check_methods("march", solver, escalation, tolerance)
-    problem, scheme = completed(problem, scheme)
+    problem, scheme = with_defaults(problem, scheme)
     plan = course(dt, steps, t_end, start_time("march", state))
     bind_companions(problem, scheme, dt)
     if state is None:

@@ -17,7 +17,7 @@ from ..core.step import Columns, Recorder, Row, Scheme, Solver, State, initial_s
 from ..solvers.certified import TOLERANCE
 from ..solvers.condensed import Condensed
 from .checks import bind_companions, check_methods, check_state
-from .defaults import completed
+from .defaults import with_defaults
 from .files.checkpoint import Place, read_checkpoint
 from .files.folder import run_folder
 from .files.lock import locked
@@ -56,7 +56,7 @@ def simulate(
 
     Args:
         scheme: None is the trapezoidal rule on redistributed mass, with an impact law the Zienkiewicz-Wood-Taylor step;
-            a problem that names no mass matrix gets the one of the scheme (``schemes.choice.completed``).
+            a problem that names no mass matrix gets the one of the scheme (``run.defaults.with_defaults``).
         solver: Condensed() when None.
         dt: time step [s], or a plan: Schedule, HalvedAtImpact. ``steps``, t_end and checkpoint_every count base steps.
         record: recorders, (Energy(), Contact()) when None; time, iterations and certificate are always recorded.
@@ -80,7 +80,7 @@ def simulate(
     """
     _check_outputs(record, out, restart, checkpoint_every, (progress, changed), fields, cross_check)
     check_methods("simulate", solver, escalation, tolerance)
-    problem, scheme = completed(problem, scheme)
+    problem, scheme = with_defaults(problem, scheme)
     solver = Condensed() if solver is None else solver
     first = course(dt, steps, t_end, start_time("simulate", state)).dt(0)
     bind_companions(problem, scheme, dt)

@@ -31,7 +31,7 @@ from ...laws.materials import LinearElastic
 from ...laws.weight import with_weight
 from ...meshes.gmsh_session import MeshScript
 from ...run.cross_check import CrossChecked
-from ...run.defaults import completed
+from ...run.defaults import with_defaults
 from ...run.files.folder import run_folder
 from ...run.files.lock import locked
 from ...run.files.writer import FieldWriter
@@ -141,7 +141,7 @@ class Case:
         problem = self._problem(parts)
         own = self._recorders(parts)
         recorders = [Steps(problem.system.influence.shape[1]), *((Energy(), Contact()) if own is None else own)]
-        problem, _ = completed(problem, self._made("scheme"))
+        problem, _ = with_defaults(problem, self._made("scheme"))
         state = initial_state(problem)
         return frozenset(
             name for one in recorders for name, value in one.start(problem, state).items() if np.ndim(value) == 0
