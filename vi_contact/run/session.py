@@ -17,7 +17,7 @@ import numpy as np
 from ..core.errors import Interrupted
 from ..core.problem import ContactProblem
 from ..core.step import Recorder, Report, Scheme, Solver, State, StepResult
-from .files.checkpoint import Place, Problem
+from .files.checkpoint import Problem, RestartPoint
 from .files.log import Progress, versions
 from .files.table import Table
 from .files.writer import Writer
@@ -83,7 +83,7 @@ class Run:
     recorders: Sequence[Recorder]
     table: Table
     course: Course
-    place: Place
+    place: RestartPoint
     resumed_from: int | None = None
     last: Report | None = None
     dt: float = float("nan")

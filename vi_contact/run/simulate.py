@@ -18,7 +18,7 @@ from ..solvers.certified import TOLERANCE
 from ..solvers.condensed import Condensed
 from .checks import bind_companions, check_methods, check_state
 from .defaults import with_defaults
-from .files.checkpoint import Place, read_checkpoint
+from .files.checkpoint import RestartPoint, read_checkpoint
 from .files.folder import run_folder
 from .files.lock import locked
 from .files.stored_rows import StoredRows
@@ -108,7 +108,7 @@ def _prepared(
     problem, scheme, dt = settings.problem, settings.scheme, settings.dt
     checksum = ""
     if source is None:
-        place = Place.first(initial_state(problem) if state is None else state)
+        place = RestartPoint.first(initial_state(problem) if state is None else state)
     else:
         place, checksum = read_checkpoint(source, problem, scheme=scheme, dt=dt, changed=settings.changed)
     plan = course(dt, steps, t_end, place.t_start)

@@ -38,7 +38,7 @@ SAID = 200  # characters of a foreign reason
 
 
 @dataclass(frozen=True)
-class Place:
+class RestartPoint:
     """The end of a base step, where a run can be left and continued.
 
     t_start, k_start: of the state the whole run began with; ``steps`` and ``t_end`` of a restart count from there.
@@ -52,7 +52,7 @@ class Place:
     halved: int = 0
 
     @classmethod
-    def first(cls, state: State) -> Place:
+    def first(cls, state: State) -> RestartPoint:
         """The beginning of a run."""
         return cls(state, state.t, state.k)
 
@@ -76,7 +76,9 @@ class Problem:
         return cls(identity(problem, scheme, dt, start=start, end=end), (start, end))
 
 
-def write_checkpoint(folder: Path, problem: ContactProblem, place: Place, *, of: Problem, rows: str = "") -> None:
+def write_checkpoint(
+    folder: Path, problem: ContactProblem, place: RestartPoint, *, of: Problem, rows: str = ""
+) -> None:
     """Replaces the checkpoint in the folder. ``rows``: checksum of the histories up to here. Collective;
     ViContactError on all ranks when the disk refuses it."""
     state = place.state
@@ -123,7 +125,7 @@ def _split(problem: ContactProblem, state: State) -> tuple[Arrays, Arrays]:
 
 def read_checkpoint(
     folder: Path, problem: ContactProblem, *, scheme: Scheme, dt: TimeSteps, changed: bool = False
-) -> tuple[Place, str]:
+) -> tuple[RestartPoint, str]:
     """(where a run was left, with the state on the ranks of this one; checksum of its histories). Collective.
 
     InputError when the checkpoint is missing, damaged, of an unknown format, or of another problem, dt (or plan of
@@ -141,7 +143,7 @@ def read_checkpoint(
     state = State(about["t"], about["k"], arrays["u"], arrays["v"], memory=memory, **contact)
     if "format" not in about and memory:
         _check_memory(file, problem, scheme, state, about)
-    place = Place(state, about["t_start"], about["k_start"], about["base"], about["halved"])
+    place = RestartPoint(state, about["t_start"], about["k_start"], about["base"], about["halved"])
     return _adapted(place, other), about.get("rows", "")
 
 
@@ -164,7 +166,7 @@ def _compare(
     return names
 
 
-def _adapted(place: Place, other: list[str]) -> Place:
+def _adapted(place: RestartPoint, other: list[str]) -> RestartPoint:
     """The place for a run that differs in these."""
     if other:  # what the scheme keeps in mind was made of the old problem's matrices and loads
         place = replace(place, state=replace(place.state, memory={}))

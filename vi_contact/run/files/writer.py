@@ -15,7 +15,7 @@ from ...core.algebra import Array
 from ...core.files import FIELDS, on_root, to_json, write_atomically
 from ...core.problem import ContactProblem
 from ...core.step import Report, Row, State
-from .checkpoint import Place, Problem, write_checkpoint
+from .checkpoint import Problem, RestartPoint, write_checkpoint
 from .folder import ABOUT, FORMAT, HISTORY_H5, LOG, SUMMARY, clear, remove_litter
 from .history import HistoryFiles
 from .log import RunLog, versions
@@ -108,7 +108,7 @@ class Writer:
         if self._fields is not None and self._settings is not None and number % self._settings.every == 0:
             self._fields.write(report.new, report.balance.a, report)
 
-    def checkpoint(self, place: Place, of: Callable[[], Problem]) -> None:
+    def checkpoint(self, place: RestartPoint, of: Callable[[], Problem]) -> None:
         """A checkpoint of this place, unless there is one already. ``of``: what problem it is."""
         k = place.state.k
         if self._folder is None or self._saved == k:
