@@ -26,7 +26,7 @@ from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.run.march import March
 from vi_contact.run.recorders import Energy
 from vi_contact.run.simulate import simulate
-from vi_contact.run.time_steps import Course, HalvedAtImpact, Schedule, course
+from vi_contact.run.time_steps import HalvedAtImpact, Schedule, StepPlan, step_plan
 from vi_contact.schemes.linear_multistep import LinearMultistep
 from vi_contact.schemes.ss22 import SS22
 from vi_contact.schemes.trapezoidal import Trapezoidal
@@ -57,9 +57,9 @@ LONG = Schedule(((4e-3, 0.4), (1e-3, 0.6), (2.5e-3, inf)))  # contacts open and 
     ],
 )
 def test_steps_of_a_constant_dt(dt, steps, t_end, t0, expected):
-    assert course(dt, steps, t_end, t0) == Course(((dt, expected),))
-    assert course(HalvedAtImpact(dt, 4), steps, t_end, t0) == Course(((dt, expected),), 4)
-    assert course(Schedule(((dt, inf),)), steps, t_end, t0) == Course(((dt, expected),))
+    assert step_plan(dt, steps, t_end, t0) == StepPlan(((dt, expected),))
+    assert step_plan(HalvedAtImpact(dt, 4), steps, t_end, t0) == StepPlan(((dt, expected),), 4)
+    assert step_plan(Schedule(((dt, inf),)), steps, t_end, t0) == StepPlan(((dt, expected),))
 
 
 @serial
@@ -78,7 +78,7 @@ def test_steps_of_a_constant_dt(dt, steps, t_end, t0, expected):
 )
 def test_steps_of_a_schedule(steps, t_end, t0, parts):
     """A piece ends with the first step that reaches its time."""
-    found = course(THREE, steps, t_end, t0)
+    found = step_plan(THREE, steps, t_end, t0)
     assert found.parts == parts and found.steps == sum(count for _, count in parts)
     sizes = [dt for dt, count in parts for _ in range(count)]
     assert [found.dt(base) for base in range(found.steps)] == sizes and found.dt(found.steps + 5) == sizes[-1]
@@ -91,10 +91,10 @@ def test_round_off_of_many_pieces_adds_no_step(t0):
     sizes = [1e-3 * (1.0 + 0.01 * i) for i in range(100)]
     ends = [t0 + 12.0 * sum(sizes[: i + 1]) for i in range(100)]
     plan = Schedule(tuple(zip(sizes, ends, strict=True)))
-    assert course(plan, None, ends[-1], t0) == Course(tuple((size, 12) for size in sizes))
-    assert course(plan, None, ends[-1] + 1e-10, t0 - 1e-10).steps == 1200
+    assert step_plan(plan, None, ends[-1], t0) == StepPlan(tuple((size, 12) for size in sizes))
+    assert step_plan(plan, None, ends[-1] + 1e-10, t0 - 1e-10).steps == 1200
     thirds = Schedule(tuple((1.0 / 300.0, t0 + (i + 1) / 25.0) for i in range(100)))
-    assert course(thirds, None, t0 + 4.0, t0).steps == 1200
+    assert step_plan(thirds, None, t0 + 4.0, t0).steps == 1200
 
 
 @serial
@@ -130,7 +130,7 @@ def test_round_off_of_many_pieces_adds_no_step(t0):
 )
 def test_nonsense_is_named(dt, steps, t_end, word):
     with pytest.raises(InputError, match=word):
-        course(dt, steps, t_end)
+        step_plan(dt, steps, t_end)
     with pytest.raises(InputError, match=word):
         run_chain(None, steps, t_end=t_end, dt=dt)
 
@@ -433,10 +433,10 @@ def test_restart_with_a_plan_to_the_last_bit(tmp_path: Path, scheme: Any, plan: 
     """From checkpoints here and there, also right after halved steps: state and files of the straight run."""
     straight = run_chain(tmp_path / "straight", 200, scheme=scheme, dt=plan)
     loop = March(
-        chain(), scheme=scheme, solvers=[Condensed()], course=course(plan, 199, None), dt=plan,
+        chain(), scheme=scheme, solvers=[Condensed()], step_plan=step_plan(plan, 199, None), dt=plan,
         state=initial_state(chain()), tolerance=1e-9,
     )
-    halved = [loop.base for _ in loop if loop.ended and loop.dt < course(plan, 199, None).dt(loop.base - 1)]
+    halved = [loop.base for _ in loop if loop.ended and loop.dt < step_plan(plan, 199, None).dt(loop.base - 1)]
     assert bool(halved) == isinstance(plan, HalvedAtImpact)
     stops = sorted({50, 75, 101, 150, *halved[:2]})
     for stop in stops:

@@ -16,7 +16,7 @@ from ..solvers.certified import TOLERANCE, CertifiedSolver
 from ..solvers.condensed import Condensed
 from .checks import bind_companions, check_methods, check_state
 from .defaults import with_defaults
-from .time_steps import Course, TimeSteps, course
+from .time_steps import StepPlan, TimeSteps, step_plan
 
 
 def march(
@@ -44,18 +44,18 @@ def march(
     """
     check_methods("march", solver, escalation, tolerance)
     problem, scheme = with_defaults(problem, scheme)
-    plan = course(dt, steps, t_end, start_time("march", state))
+    plan = step_plan(dt, steps, t_end, start_time("march", state))
     bind_companions(problem, scheme, dt)
     if state is None:
         state = initial_state(problem)
     else:
         check_state("march", problem, state, dt=plan.dt(0), tolerance=tolerance, scheme=scheme)
     solvers = [Condensed() if solver is None else solver, *escalation]
-    return iter(March(problem, scheme=scheme, solvers=solvers, course=plan, dt=dt, state=state, tolerance=tolerance))
+    return iter(March(problem, scheme=scheme, solvers=solvers, step_plan=plan, dt=dt, state=state, tolerance=tolerance))
 
 
 class March:
-    """The loop along a course, with its books.
+    """The loop along the steps of a plan, with its books.
 
     Attributes, at the time a step is handed out:
         base: base steps done. ended: whether this step ended one, so that a restart may begin here.
@@ -68,7 +68,7 @@ class March:
         *,
         scheme: Scheme,
         solvers: Sequence[Solver],
-        course: Course,
+        step_plan: StepPlan,
         dt: TimeSteps,
         state: State,
         tolerance: float,
@@ -76,21 +76,21 @@ class March:
         halved: int = 0,
     ) -> None:
         scheme.check(problem)
-        self._problem, self._scheme, self._course, self._plan = problem, scheme, course, dt
+        self._problem, self._scheme, self._step_plan, self._plan = problem, scheme, step_plan, dt
         self._solvers = _Solvers(problem, scheme, solvers, tolerance)
         self._state = state
         self.base, self.halved, self.ended, self.dt = base, halved, True, float("nan")
 
     def __iter__(self) -> Iterator[tuple[State, Report]]:
-        while self.base < self._course.steps:
-            dt = self._course.dt(self.base)
+        while self.base < self._step_plan.steps:
+            dt = self._step_plan.dt(self.base)
             bind_companions(self._problem, self._scheme, self._plan)  # another run of the problem may be under way
-            self._solvers.keep([dt / 2**level for level in range(self._course.halvings + 1)])
+            self._solvers.keep([dt / 2**level for level in range(self._step_plan.halvings + 1)])
             self._state, self.dt = self._restarted(dt), dt
             levels = [0]  # how often the parts of the base step that are left were halved
             while levels:
                 level = levels.pop()
-                report = self._attempt(dt / 2**level, final=level == self._course.halvings)
+                report = self._attempt(dt / 2**level, final=level == self._step_plan.halvings)
                 if report is None:
                     self.halved += 1
                     levels += [level + 1, level + 1]

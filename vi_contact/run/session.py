@@ -25,7 +25,7 @@ from .march import March
 from .recorders import refuse_overflow
 from .solution import Solution, energy_warning, sampling_warning
 from .stop_signals import StopSignals
-from .time_steps import Course, TimeSteps, described, longest
+from .time_steps import StepPlan, TimeSteps, described, longest
 
 log = logging.getLogger(__name__)
 TIMED = 10_000  # the last steps, of which seconds_per_step is the median
@@ -82,7 +82,7 @@ class Run:
     settings: Settings
     recorders: Sequence[Recorder]
     table: Table
-    course: Course
+    step_plan: StepPlan
     place: RestartPoint
     resumed_from: int | None = None
     last: Report | None = None
@@ -93,7 +93,7 @@ class Run:
     @property
     def left(self) -> int:
         """Base steps to do."""
-        return max(self.course.steps - self.place.base, 0)
+        return max(self.step_plan.steps - self.place.base, 0)
 
     def go(self, writer: Writer) -> Solution:
         """The remaining steps and everything that is written before, during and after them."""
@@ -124,7 +124,7 @@ class Run:
     def _march(self, writer: Writer, signals: StopSignals) -> None:
         s, place = self.settings, self.place
         loop = March(
-            s.problem, scheme=s.scheme, solvers=[s.solver, *s.escalation], course=self.course, dt=s.dt,
+            s.problem, scheme=s.scheme, solvers=[s.solver, *s.escalation], step_plan=self.step_plan, dt=s.dt,
             state=place.state, tolerance=s.tolerance, base=place.base, halved=place.halved,
         )
         worst, begin = 0.0, time.perf_counter()
@@ -177,7 +177,7 @@ class Run:
     def _problem(self) -> Problem:
         """What the run is of, for its checkpoints. Collective."""
         s, start = self.settings, self.place.t_start
-        return Problem.of(s.problem, s.scheme, s.dt, start, start + self.course.length)
+        return Problem.of(s.problem, s.scheme, s.dt, start, start + self.step_plan.length)
 
     def _rescue(self, writer: Writer, status: str, reason: str, seconds: float) -> None:
         """Saves what there is. A checkpoint of the last base step only on one rank: others might not come."""

@@ -27,7 +27,7 @@ from .files.writer import FieldWriter, Writer
 from .recorders import Contact, Energy, Steps
 from .session import Comparison, Run, Settings
 from .solution import Solution
-from .time_steps import TimeSteps, course
+from .time_steps import TimeSteps, step_plan
 
 __all__ = ["Solution", "simulate"]
 
@@ -82,7 +82,7 @@ def simulate(
     check_methods("simulate", solver, escalation, tolerance)
     problem, scheme = with_defaults(problem, scheme)
     solver = Condensed() if solver is None else solver
-    first = course(dt, steps, t_end, start_time("simulate", state)).dt(0)
+    first = step_plan(dt, steps, t_end, start_time("simulate", state)).dt(0)
     bind_companions(problem, scheme, dt)
     scheme.check(problem)
     solver.check(problem)
@@ -111,7 +111,7 @@ def _prepared(
         place = RestartPoint.first(initial_state(problem) if state is None else state)
     else:
         place, checksum = read_checkpoint(source, problem, scheme=scheme, dt=dt, changed=settings.changed)
-    plan = course(dt, steps, t_end, place.t_start)
+    plan = step_plan(dt, steps, t_end, place.t_start)
     place = replace(place, state=scheme.start(problem, place.state, plan.dt(place.base)))
     table = Table(*_started(problem, recorders, place.state), on_disk=on_disk)
     run = Run(settings, recorders, table, plan, place, None if source is None else place.state.k)

@@ -77,8 +77,8 @@ def longest(plan: TimeSteps) -> float:
 
 
 @dataclass(frozen=True)
-class Course:
-    """The base steps of one run: parts (dt, number of steps), and how often each may be halved."""
+class StepPlan:
+    """Hold the base steps of one run: parts (dt, number of steps), and how often each may be halved."""
 
     parts: tuple[tuple[float, int], ...]
     halvings: int = 0
@@ -90,7 +90,7 @@ class Course:
 
     @property
     def length(self) -> float:
-        """Of all of them together [s]."""
+        """Return the duration of all of them together [s]."""
         return sum(dt * steps for dt, steps in self.parts)
 
     def dt(self, base: int) -> float:
@@ -102,11 +102,11 @@ class Course:
         return self.parts[-1][0]
 
 
-def course(plan: TimeSteps, steps: int | None, t_end: float | None, t0: float = 0.0) -> Course:
+def step_plan(plan: TimeSteps, steps: int | None, t_end: float | None, t0: float = 0.0) -> StepPlan:
     """The base steps from t0 to t_end, or so many; InputError when plan, steps or t_end make no sense.
 
     Counted from the times of the plan, not from those of the run, whose round-off accumulates: a restart, which
-    builds it from the same t0, has the same course. A step shorter than a millionth of dt would be round-off of these
+    builds it from the same t0, has the same steps. A step shorter than a millionth of dt would be round-off of these
     times, at the end of a piece and of the run alike, and is not made. InputError for more than 1e9 steps.
     """
     halvings = plan.halvings if isinstance(plan, HalvedAtImpact) else 0
@@ -125,7 +125,7 @@ def course(plan: TimeSteps, steps: int | None, t_end: float | None, t0: float = 
             parts.append((size, done))
         t, left = t + done * size, 0 if last else left - done
         if left == 0:
-            return Course(tuple(parts), halvings)
+            return StepPlan(tuple(parts), halvings)
         t = until if abs(t - until) <= SLACK * size else t  # the next piece begins where the plan says
     rest = f"t_end = {t_end:g} s" if t_end is not None else f"the {left:g} steps that are left"
     raise InputError(f"the last piece of the Schedule ends at {pieces[-1][1]:g} s, before {rest}: end it at math.inf")

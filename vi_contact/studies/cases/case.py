@@ -38,7 +38,7 @@ from ...run.files.writer import FieldWriter
 from ...run.recorders import Contact, Energy, Steps
 from ...run.simulate import Solution, simulate
 from ...run.static import static_equilibrium
-from ...run.time_steps import course
+from ...run.time_steps import step_plan
 from ...solvers.condensed import Condensed
 from .library import base_folder, keep_copy
 from .model_tables import Parts
@@ -122,7 +122,7 @@ class Case:
         own = self._made("run")
         steps = own.get("steps") if "steps" in own or "t_end" in own else 1  # else as long as the excitation
         try:
-            course(own["dt"], steps, own.get("t_end"))
+            step_plan(own["dt"], steps, own.get("t_end"))
         except InputError as error:
             raise InputError(f"{self.path}: [run] {error}") from None
 
