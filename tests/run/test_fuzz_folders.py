@@ -49,7 +49,7 @@ def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
         raise Killed
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("vi_contact.run.session.Run._rescue", lambda *_: None)
+        patch.setattr("vi_contact.run.session.Session._rescue", lambda *_: None)
         patch.setattr("vi_contact.run.files.writer.Writer.close", kill)
         with pytest.raises(Killed):
             run(folder, 52, problem=PROBLEM)

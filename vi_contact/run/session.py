@@ -38,57 +38,56 @@ class Comparison(Protocol):
     def report(self) -> Mapping[str, Mapping[str, float]]: ...
 
 
-@dataclass(frozen=True)
-class Settings:
-    """The arguments of ``simulate`` that hold for the whole run."""
+@dataclass
+class Session:
+    """Hold a run under way: the arguments of ``simulate`` that hold for all of it, and where it is.
+
+    Attributes:
+        recorders: the user's, after those of every run.
+        table: the rows so far. step_plan: the base steps. place: the end of the last base step.
+        resumed_from: the step of the checkpoint that it continues, None for a new run.
+    """
 
     problem: ContactProblem
     scheme: Scheme
     solver: Solver
-    dt: TimeSteps
+    time_steps: TimeSteps
     escalation: Sequence[Solver]
     tolerance: float
     checkpoint_every: int
     cross_check: Comparison | None
     progress: bool
-    changed: bool = False
-
-    @property
-    def root(self) -> bool:
-        """Whether this is rank 0, the one that speaks."""
-        return self.problem.system.algebra.comm.rank == 0
-
-    def facts(self) -> dict[str, Any]:
-        """What was asked for, for log and summary."""
-        checked = None if self.cross_check is None else getattr(self.solver, "primary", self.solver)
-        return {
-            "scheme": repr(self.scheme),
-            "mass": repr(self.problem.mass),
-            "solver": repr(self.solver if checked is None else checked),
-            "dt": described(self.dt),
-            "tolerance": self.tolerance,
-            "ranks": self.problem.system.algebra.comm.size,
-            "unknowns": self.problem.system.space.unknowns,
-            "contact_points": self.problem.surface.count,
-            "boundaries": list(self.problem.system.notes),
-            "sampling": sampling_warning(self.problem.excitations, longest(self.dt)) or "",
-        }
-
-
-@dataclass
-class Run:
-    """The state of a run. ``place``: the end of the last base step; ``resumed_from``: the step of the checkpoint."""
-
-    settings: Settings
+    changed: bool
     recorders: Sequence[Recorder]
-    table: Table
-    step_plan: StepPlan
-    place: RestartPoint
+    table: Table = field(init=False)
+    step_plan: StepPlan = field(init=False)
+    place: RestartPoint = field(init=False)
     resumed_from: int | None = None
     last: Report | None = None
     dt: float = float("nan")
     halved: int = 0
     seconds: deque[float] = field(default_factory=lambda: deque(maxlen=TIMED))
+
+    @property
+    def root(self) -> bool:
+        """Say whether this is rank 0, the one that speaks."""
+        return self.problem.system.algebra.comm.rank == 0
+
+    def settings(self) -> dict[str, Any]:
+        """Return what was asked for, for log and summary."""
+        checked = None if self.cross_check is None else getattr(self.solver, "primary", self.solver)
+        return {
+            "scheme": repr(self.scheme),
+            "mass": repr(self.problem.mass),
+            "solver": repr(self.solver if checked is None else checked),
+            "dt": described(self.time_steps),
+            "tolerance": self.tolerance,
+            "ranks": self.problem.system.algebra.comm.size,
+            "unknowns": self.problem.system.space.unknowns,
+            "contact_points": self.problem.surface.count,
+            "boundaries": list(self.problem.system.notes),
+            "sampling": sampling_warning(self.problem.excitations, longest(self.time_steps)) or "",
+        }
 
     @property
     def left(self) -> int:
@@ -116,19 +115,19 @@ class Run:
             raise
         facts = self._facts("finished", "", time.perf_counter() - begin) | {"seconds_per_linear_step": linear}
         warning = energy_warning(facts)
-        if warning and self.settings.root:
+        if warning and self.root:
             log.warning("%s", warning)
         writer.close(facts)
         return Solution(self.table.history(writer.history), self.table.columns, self.place.state, facts)
 
     def _march(self, writer: Writer, signals: StopSignals) -> None:
-        s, place = self.settings, self.place
+        place = self.place
         loop = March(
-            s.problem, scheme=s.scheme, solvers=[s.solver, *s.escalation], step_plan=self.step_plan, dt=s.dt,
-            state=place.state, tolerance=s.tolerance, base=place.base, halved=place.halved,
+            self.problem, scheme=self.scheme, solvers=[self.solver, *self.escalation], step_plan=self.step_plan,
+            dt=self.time_steps, state=place.state, tolerance=self.tolerance, base=place.base, halved=place.halved,
         )
         worst, begin = 0.0, time.perf_counter()
-        with Progress(self.left, shown=s.progress and s.root) as progress:
+        with Progress(self.left, shown=self.progress and self.root) as progress:
             for state, report in loop:
                 self._keep(state, report, writer)
                 self.dt, self.halved = loop.dt, loop.halved
@@ -136,7 +135,7 @@ class Run:
                 if loop.ended:
                     self.place = replace(place, state=state, base=loop.base, halved=loop.halved)
                     self._end_base_step(report, writer)
-                    if s.root:
+                    if self.root:
                         progress.step(state.k, state.t, iterations=report.result.iterations, worst=worst)
                 self.seconds.append(time.perf_counter() - begin)
                 if loop.ended and self.left:
@@ -145,7 +144,7 @@ class Run:
 
     def _stop_if_asked(self, writer: Writer, signals: StopSignals) -> None:
         """Interrupted on all ranks, with a checkpoint, when a signal has reached one of them. Collective."""
-        number = signals.asked(self.settings.problem.system.algebra.comm)
+        number = signals.asked(self.problem.system.algebra.comm)
         if number:
             self._checkpoint(writer)
             where = f"after step {self.place.state.k}, t = {self.place.state.t:.6g} s"
@@ -153,7 +152,7 @@ class Run:
 
     def _keep(self, state: State, report: Report, writer: Writer) -> None:
         """Everything that is recorded of a step, be it a base step or a part of one."""
-        if report.escalated and self.settings.root:
+        if report.escalated and self.root:
             log.warning("step %d, t = %.6g s: escalated to %s", state.k, state.t, report.result.method)
         row: dict[str, Any] = {}
         for recorder in self.recorders:
@@ -167,7 +166,7 @@ class Run:
     def _end_base_step(self, report: Report, writer: Writer) -> None:
         """What happens between base steps only."""
         writer.frame(report, self.place.number)
-        if self.place.number % self.settings.checkpoint_every == 0:
+        if self.place.number % self.checkpoint_every == 0:
             self._checkpoint(writer)
 
     def _checkpoint(self, writer: Writer) -> None:
@@ -176,13 +175,13 @@ class Run:
     @cached_property
     def _problem(self) -> Problem:
         """What the run is of, for its checkpoints. Collective."""
-        s, start = self.settings, self.place.t_start
-        return Problem.of(s.problem, s.scheme, s.dt, start, start + self.step_plan.length)
+        start = self.place.t_start
+        return Problem.of(self.problem, self.scheme, self.time_steps, start, start + self.step_plan.length)
 
     def _rescue(self, writer: Writer, status: str, reason: str, seconds: float) -> None:
         """Saves what there is. A checkpoint of the last base step only on one rank: others might not come."""
         with suppress(Exception):
-            if self.settings.problem.system.algebra.comm.size == 1:
+            if self.problem.system.algebra.comm.size == 1:
                 self._checkpoint(writer)
         facts: dict[str, Any] = {"status": status, "reason": reason, "steps": self.place.state.k}
         with suppress(Exception):
@@ -190,10 +189,10 @@ class Run:
         writer.rescue(facts)
 
     def _tell_start(self) -> None:
-        if not self.settings.root:
+        if not self.root:
             return
         log.info("versions: %s", ", ".join(f"{name} {version}" for name, version in versions().items()))
-        for name, value in self.settings.facts().items():
+        for name, value in self.settings().items():
             if name != "sampling":
                 log.info("%s: %s", name, value)
             elif value:
@@ -204,16 +203,15 @@ class Run:
 
     def _facts(self, status: str, reason: str, seconds: float) -> dict[str, Any]:
         """The content of summary.json."""
-        cross_check = self.settings.cross_check
         return (
             {"status": status, "reason": reason, "versions": versions()}
-            | self.settings.facts()
+            | self.settings()
             | {"restarted_from_step": self.resumed_from}
             | self.table.facts()
             | {
                 "base_steps": self.place.base,
                 "halved_steps": self.halved,
-                "cross_check": None if cross_check is None else cross_check.report(),
+                "cross_check": None if self.cross_check is None else self.cross_check.report(),
                 "seconds": seconds,
                 "seconds_per_step": float(np.median(list(self.seconds))) if self.seconds else float("nan"),
                 "seconds_per_linear_step": float("nan"),
@@ -224,13 +222,13 @@ class Run:
         """Median time of right-hand side, one back-substitution and update with the same A, from the last state [s]."""
         if self.last is None or not self.last.step.A.factorised:  # none is made for this: it may not fit
             return float("nan")
-        s, dt, old, A = self.settings, self.dt, self.last.old, self.last.step.A
-        none = np.zeros(s.problem.surface.count)
+        dt, old, A = self.dt, self.last.old, self.last.step.A
+        none = np.zeros(self.problem.surface.count)
         found = []
         for _ in range(LINEAR_STEPS + 1):
             begin = time.perf_counter()
-            step = s.scheme.step(s.problem, old, A, dt)
+            step = self.scheme.step(self.problem, old, A, dt)
             x = A.factor.solve(step.b)
-            s.scheme.finish(s.problem, old, step, StepResult(x, none, none.astype(bool), 0, "linear"), dt)
+            self.scheme.finish(self.problem, old, step, StepResult(x, none, none.astype(bool), 0, "linear"), dt)
             found.append(time.perf_counter() - begin)
         return float(np.median(found[1:]))  # the first is slower

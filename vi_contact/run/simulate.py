@@ -25,7 +25,7 @@ from .files.stored_rows import StoredRows
 from .files.table import Block, Table
 from .files.writer import FieldWriter, Writer
 from .recorders import Contact, Energy, Steps
-from .session import Comparison, Run, Settings
+from .session import Comparison, Session
 from .solution import Solution
 from .time_steps import TimeSteps, step_plan
 
@@ -88,38 +88,38 @@ def simulate(
     solver.check(problem)
     if state is not None:
         check_state("simulate", problem, state, dt=first, tolerance=tolerance, scheme=scheme)
-    settings = Settings(
-        problem, scheme, solver, dt, escalation, tolerance, checkpoint_every, cross_check, progress, changed
-    )
     folder = None if out is None else run_folder(problem.system.algebra.comm, out)
     recorders: list[Any] = [Steps(problem.system.influence.shape[1])]
     recorders += (Energy(), Contact()) if record is None else record
+    session = Session(
+        problem, scheme, solver, dt, escalation, tolerance, checkpoint_every, cross_check, progress, changed, recorders
+    )
     source = _source(restart, folder)
     with locked(problem.system.algebra.comm, folder):
-        run, stored = _prepared(settings, recorders, source, state, steps, t_end, on_disk=folder is not None)
-        return run.go(Writer(problem, folder, fields, run.table, stored))
+        stored = _prepare(session, source, state, steps, t_end, on_disk=folder is not None)
+        return session.go(Writer(problem, folder, fields, session.table, stored))
 
 
-def _prepared(
-    settings: Settings, recorders: Sequence[Recorder], source: Path | None, state: State | None, steps: int | None,
-    t_end: float | None, *, on_disk: bool,
-) -> tuple[Run, StoredRows | None]:
-    """The run at its first step, or at the checkpoint in ``source`` with the rows before it. Collective."""
-    problem, scheme, dt = settings.problem, settings.scheme, settings.dt
+def _prepare(
+    session: Session, source: Path | None, state: State | None, steps: int | None, t_end: float | None, *, on_disk: bool
+) -> StoredRows | None:
+    """Put the session at its first step, or at the checkpoint in ``source``; return the rows before it. Collective."""
+    problem, scheme, dt, recorders = session.problem, session.scheme, session.time_steps, session.recorders
     checksum = ""
     if source is None:
         place = RestartPoint.first(initial_state(problem) if state is None else state)
     else:
-        place, checksum = read_checkpoint(source, problem, scheme=scheme, dt=dt, changed=settings.changed)
-    plan = step_plan(dt, steps, t_end, place.t_start)
-    place = replace(place, state=scheme.start(problem, place.state, plan.dt(place.base)))
-    table = Table(*_started(problem, recorders, place.state), on_disk=on_disk)
-    run = Run(settings, recorders, table, plan, place, None if source is None else place.state.k)
+        place, checksum = read_checkpoint(source, problem, scheme=scheme, dt=dt, changed=session.changed)
+    session.step_plan = step_plan(dt, steps, t_end, place.t_start)
+    begun = scheme.start(problem, place.state, session.step_plan.dt(place.base))
+    session.place = place = replace(place, state=begun)
+    session.table = table = Table(*_started(problem, recorders, begun), on_disk=on_disk)
     if source is None:
-        return run, None
+        return None
+    session.resumed_from = place.state.k
     stored = StoredRows(source, table, place.state.k, checksum)
-    _started(problem, recorders, place.state, _restored(table, stored, problem.system.algebra.comm))
-    return run, stored
+    _started(problem, recorders, begun, _restored(table, stored, problem.system.algebra.comm))
+    return stored
 
 
 def _check_outputs(
