@@ -35,9 +35,9 @@ This page is made from the docstrings by `python3 docs/make_api.py`: mend them, 
 more about each name: shapes, units, errors, sources.
 
 The contract comes first: what schemes, solvers, recorders, laws, excitations and obstacles promise to the loop. A class
-of your own needs these methods and no base class. Then come the names of `import vi_contact as vc`, and each room with
-all its public names. Names are imported when they are first used, so that `import vi_contact` needs numpy and scipy
-only; `vi_contact.fem` needs DOLFINx, and `Volume` needs PETSc.
+of your own needs these methods and no base class: [extend](../guide/extend.md) shows three. Then come
+the names of `import vi_contact as vc`, and each room with all its public names. Names are imported when they are first
+used, so that `import vi_contact` needs numpy and scipy only; `vi_contact.fem` needs DOLFINx, and `Volume` needs PETSc.
 """
 
 Def = ast.FunctionDef | ast.ClassDef

@@ -182,6 +182,13 @@ def test_nothing_is_cited_by_a_private_name(document: Path) -> None:
         assert not re.findall(f".*(?:{CIPHERS}).*", document.read_text(encoding="utf-8"))
 
 
+def test_import_alone_is_quick() -> None:
+    """It imports nothing outside the standard library, so it costs less than numpy and scipy do."""
+    code = "import sys, vi_contact; print({'numpy', 'scipy'} & set(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, encoding="utf-8", timeout=120)
+    assert done.stdout == "set()\n", done.stderr
+
+
 IDS = {"reference/verification.md": r"\bV\d+\.\d+[a-z]?\b", "reference/petsc.md": r"\bP[1-9]\d?\b"}
 
 
