@@ -243,7 +243,7 @@ def test_bad_input():
 @pytest.mark.parametrize("law", ["none", "Tresca"])
 def test_a_third_opinion(law):
     """cross_check takes the boundary element run: impulses within 2 % of 20 x 20 finite elements although meshes and
-    steps differ; another problem is noticed; an opinion in space is refused."""
+    steps differ; another problem is noticed; a reference in space is refused."""
     from mpi4py import MPI
 
     from vi_contact.models.square import Square, build
@@ -251,14 +251,14 @@ def test_a_third_opinion(law):
     problem = build(Square(cells=20, pressure=1.0), MPI.COMM_WORLD).problem(friction=LAWS[law])
     wrong = run("Coulomb")
     checked = vc.cross_check(
-        problem, solvers=[vc.Condensed()], dt=0.05, steps=100, opinions=[run(law), wrong], bound=0.02
+        problem, solvers=[vc.Condensed()], dt=0.05, steps=100, references=[run(law), wrong], bound=0.02
     )
-    mine, other = checked.opinions
+    mine, other = checked.differences
     assert 0.0 < mine.impulse < 0.02 and 0.0 < mine.towards < 0.02 and mine.agrees
     assert not other.agrees and other.impulse > 2.0 * mine.impulse
     assert set(checked.report()["boundary elements"]) == {"impulse", "towards"}
     with pytest.raises(InputError, match="2 components each"):
-        vc.cross_check(problem, solvers=[vc.Condensed()], dt=0.05, steps=2, opinions=[InSpace()])
+        vc.cross_check(problem, solvers=[vc.Condensed()], dt=0.05, steps=2, references=[InSpace()])
 
 
 class InSpace:

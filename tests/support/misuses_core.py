@@ -369,7 +369,7 @@ def runs() -> Table:
             "problem": NEEDED, "solvers": {"one": vc.Condensed(), "alone": [vc.Condensed()],
             "texts for a solver": ["a", "b"], "none": None},
             "scheme": THING, "dt": STEP, "steps": {"text": "3", "half": 2.5}, "state": states(), "bound": POSITIVE,
-            "opinions": {"number": 3.0, "texts": ["bem"], "none": None}}),
+            "references": {"number": 3.0, "texts": ["bem"], "none": None}}),
         (vc.static_equilibrium, {"problem": b.problem},
          {"problem": NEEDED, "solver": but(THING, "none"), "t": NUMBER, "tolerance": POSITIVE}),
         (vc.quasi_static, {"problem": b.problem, "times": [0.0, 1.0]}, {

@@ -1,4 +1,4 @@
-"""Whole runs compared with answers of another method, whose steps and points are its own.
+"""Compare whole runs with answers of another method, whose steps and points are its own.
 
 Per step such answers differ by their discretisations, so what is compared are resultants over time: the impulse of the
 contact forces on the body and the mean displacement of its contact boundary towards the support.
@@ -17,8 +17,8 @@ from ..core.problem import ContactProblem
 from ..core.step import Report
 
 
-class Opinion(Protocol):
-    """Another answer to the same problem, from the same initial time on; per metre of thickness 1 m in the plane."""
+class Reference(Protocol):
+    """Give another answer to the same problem, from the same initial time on; in the plane per metre of thickness."""
 
     @property
     def name(self) -> str: ...
@@ -39,9 +39,12 @@ class Opinion(Protocol):
 
 
 @dataclass(frozen=True)
-class Overall:
-    """Largest differences between a run and an opinion over the common times, relative: the impulse to the largest one,
-    the mean displacement to the largest displacement of any point; ``bound``: up to which they are said to agree."""
+class RunDifference:
+    """Hold the largest differences between a run and a reference over their common times, relative.
+
+    The impulse is compared with the largest one, the mean displacement with the largest displacement of any point;
+    ``bound``: up to which they are said to agree.
+    """
 
     name: str
     impulse: float
@@ -50,18 +53,18 @@ class Overall:
 
     @property
     def worst(self) -> float:
-        """The larger of them."""
+        """Return the larger of them."""
         return max(self.impulse, self.towards)
 
     @property
     def agrees(self) -> bool:
-        """Whether both are within the bound."""
+        """Say whether both are within the bound."""
         return self.worst <= self.bound
 
 
 @dataclass
-class WholeRun:
-    """Collects the resultants of a march, report by report, and compares them."""
+class RunComparison:
+    """Collect the resultants of a march, report by report, and compare them."""
 
     times: list[float] = field(default_factory=lambda: [0.0])
     impulse: list[Array] = field(default_factory=list)
@@ -69,7 +72,7 @@ class WholeRun:
     largest: float = 0.0
 
     def add(self, report: Report) -> None:
-        """One more step. Collective."""
+        """Add one more step. Collective."""
         problem, mean = report.problem, report.balance
         surface, system = problem.surface, problem.system
         load = surface.reaction_load(mean.r_n, system.rows, mean.r_t)
@@ -87,19 +90,19 @@ class WholeRun:
         weights = problem.surface.weights
         return float(weights @ problem.surface.normal_values(u) / weights.sum())
 
-    def compare(self, opinion: Opinion, bound: float) -> Overall:
-        """InputError for an opinion in other dimensions, without common times, or with NaN."""
-        mine, theirs = np.array(self.impulse), np.asarray(opinion.impulse, float)
-        t = np.asarray(opinion.times, float)
+    def compare(self, reference: Reference, bound: float) -> RunDifference:
+        """Return the differences. InputError for a reference in other dimensions, without common times, or with NaN."""
+        mine, theirs = np.array(self.impulse), np.asarray(reference.impulse, float)
+        t = np.asarray(reference.times, float)
         common = (t >= self.times[0]) & (t <= self.times[-1] * (1.0 + 1e-12))
         if theirs.shape != (len(t), mine.shape[1]) or not common.any() or not np.isfinite(theirs).all():
-            raise InputError(f"{opinion.name}: impulses of shape {theirs.shape}, {common.sum()} common times; give "
+            raise InputError(f"{reference.name}: impulses of shape {theirs.shape}, {common.sum()} common times; give "
                              f"finite ones, {mine.shape[1]} components each, at times of the run")
         at = np.array([np.interp(t[common], self.times, column) for column in mine.T]).T
         off = float(np.linalg.norm(at - theirs[common], axis=1).max())
         size = float(np.linalg.norm(theirs[common], axis=1).max())
-        away = max_abs(np.interp(t[common], self.times, self.towards) - np.asarray(opinion.mean_towards)[common])
-        return Overall(opinion.name, off / (size or 1.0), away / (self.largest or 1.0), bound)
+        away = max_abs(np.interp(t[common], self.times, self.towards) - np.asarray(reference.mean_towards)[common])
+        return RunDifference(reference.name, off / (size or 1.0), away / (self.largest or 1.0), bound)
 
 
 def _on_body(problem: ContactProblem, load: Array) -> Array:

@@ -1,7 +1,7 @@
 """Independent routes to the same step, compared step by step from the same state (design idea 4).
 
 Whole runs of an energy-growing scheme may drift apart by round-off; single steps from one state must not. Answers of
-another method, boundary elements for example, have other steps: ``opinions`` are compared over the whole run.
+another method, boundary elements for example, have other steps: ``references`` are compared over the whole run.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from ..core.problem import ContactProblem
 from ..core.step import PreparedSolver, Scheme, Solver, State, StepProblem, StepResult
 from ..core.surfaces import ContactSurface
 from .checks import check_solver
-from .compare_runs import Opinion, Overall, WholeRun
+from .compare_runs import Reference, RunComparison, RunDifference
 from .march import march
 from .time_steps import TimeSteps
 
-OPINION = ("name", "times", "impulse", "mean_towards")
+REFERENCE = ("name", "times", "impulse", "mean_towards")
 
 
 @dataclass
@@ -68,14 +68,14 @@ class Disagreement:
 class CrossChecked:
     """A solver that also asks others at every step and remembers how far they are off; returns the primary's answer.
 
-    ``found`` does not count attempts that ``HalvedAtImpact`` threw away; ``opinions``: what ``cross_check`` found
+    ``found`` does not count attempts that ``HalvedAtImpact`` threw away; ``differences``: what ``cross_check`` found
     about answers of other methods.
     """
 
     primary: Solver
     others: Sequence[Solver]
     found: list[Disagreement] = field(default_factory=list)
-    opinions: list[Overall] = field(default_factory=list)
+    differences: list[RunDifference] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         check_solver("CrossChecked", self.primary, "the first solver")
@@ -110,11 +110,11 @@ class CrossChecked:
             | ({"r_t": one.relative_r_t} if one.rubbed else {})
             | {"iterations_per_step": one.iterations / max(one.steps, 1)}
             for rank, (name, one) in enumerate(zip(names, self.found, strict=True), start=1)
-        } | {one.name: {"impulse": one.impulse, "towards": one.towards} for one in self.opinions}
+        } | {one.name: {"impulse": one.impulse, "towards": one.towards} for one in self.differences}
 
     @property
     def worst(self) -> float:
-        """The largest relative difference of any solver in u, r_n or r_t, step by step; not of opinions."""
+        """The largest relative difference of any solver in u, r_n or r_t, step by step; not of references."""
         return max((one.worst for one in self.found), default=0.0)
 
 
@@ -156,24 +156,24 @@ def cross_check(
     dt: TimeSteps,
     steps: int,
     state: State | None = None,
-    opinions: Sequence[Opinion] = (),
+    references: Sequence[Reference] = (),
     bound: float = 0.02,
 ) -> CrossChecked:
     """Marches with the first solver and compares the others with it at every step; see ``worst`` and ``report()``.
 
     ``dt`` and ``steps`` as in ``march``: ``steps`` counts base steps, the statistics all accepted ones.
-    ``opinions``: answers of other methods to the same problem, a ``bem.ContactRun`` for a homogeneous body for example;
+    ``references``: answers of other methods to the same problem, for example a ``bem.ContactRun`` of a uniform body;
     impulses and mean displacements are compared over the whole run and should agree within ``bound``, relative.
     """
     given = several("cross_check", "solvers", solvers, "give a list of two or more solvers")
-    if len(given) < (1 if opinions else 2):
+    if len(given) < (1 if references else 2):
         raise InputError(f"cross_check: {len(given)} solvers; give two or more to compare")
-    for one in several("cross_check", "opinions", opinions, "give a list of answers of other methods"):
-        provides("cross_check", "an opinion", one, OPINION, "give a bem.ContactRun, for example")
+    for one in several("cross_check", "references", references, "give a list of answers of other methods"):
+        provides("cross_check", "a reference", one, REFERENCE, "give a bem.ContactRun, for example")
     number("cross_check", "bound", bound, positive=True)
-    checked, whole = CrossChecked(solvers[0], tuple(solvers[1:])), WholeRun()
+    checked, whole = CrossChecked(solvers[0], tuple(solvers[1:])), RunComparison()
     for _, report in march(problem, scheme=scheme, solver=checked, dt=dt, steps=steps, state=state):
-        if opinions:
+        if references:
             whole.add(report)
-    checked.opinions = [whole.compare(opinion, bound) for opinion in opinions]
+    checked.differences = [whole.compare(reference, bound) for reference in references]
     return checked
