@@ -1,1 +1,22 @@
 """Draw runs, records and studies, and write the page about a run. matplotlib is imported when something is drawn."""
+
+from __future__ import annotations
+
+from ..core.lazy import lazy
+
+_CONTENTS = {
+    "beam": ("plot_beam_energies", "plot_shapes", "plot_tips"),
+    "channel": ("Outline", "plot_envelope", "plot_interface", "plot_openings", "plot_rocking"),
+    "channel_mesh": ("animate",),
+    "channel_run": ("illustrate",),
+    "deformed": ("read_frames", "read_tractions"),
+    "friction": ("plot_hysteresis", "plot_states"),
+    "histories": ("plot_certificate", "plot_contact", "plot_energy", "plot_excitation", "plot_points", "plot_runs"),
+    "ida": ("plot_ida",),
+    "layer": ("plot_particle",),
+    "records": ("plot_motion", "plot_spectra"),
+    "report": ("plot_report",),
+    "spectra": ("plot_loop", "plot_transfer"),
+}
+__all__ = sorted(name for names in _CONTENTS.values() for name in names)
+__getattr__, __dir__ = lazy(__name__, _CONTENTS)
