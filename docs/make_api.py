@@ -28,6 +28,10 @@ CONTRACT = (
     ("core.protocols", ("FrictionLaw", "ImpactLaw", "MassLaw", "Excitation")),
     ("core.surfaces", ("Obstacle",)),
 )
+VALUES = (
+    ("core.step", ("State", "StepProblem", "EffectiveMatrix", "StepResult", "Balance", "Report")),
+    ("core.protocols", ("Impact",)),
+)
 PROMISED = {name for _, names in CONTRACT for name in names}
 HEAD = """# Names
 
@@ -220,6 +224,17 @@ def documentation(node: Def | ast.Module) -> str:
     return inspect.cleandoc(ast.get_docstring(node, clean=False) or "")
 
 
+def whole(node: Def) -> str:
+    """Return the whole docstring; its lists of arguments, attributes and results become lists of the page."""
+
+    def listed(found: re.Match[str]) -> str:
+        items = re.sub(r"^ {4}(?! )", "- ", found[2], flags=re.MULTILINE)
+        return f"*{found[1]}*\n\n" + re.sub(r"^ {8,}", "  ", items, flags=re.MULTILINE)
+
+    heading = r"^(Args|Attributes|Returns|Raises):\n((?: {4}.*(?:\n|\Z))+)"
+    return re.sub(heading, listed, documentation(node), flags=re.MULTILINE)
+
+
 def first_paragraph(where: Module, node: Def) -> str:
     """Return it on one line; where it refers to the module's equations, after that of the module."""
     words = documentation(node).split("\n\n")[0]
@@ -241,17 +256,25 @@ def entry(where: Module, name: str) -> str:
 
 
 def contract() -> Iterator[str]:
-    """Yield the protocols with every method and the whole of every docstring."""
+    """Yield the protocols with every method, then the values they exchange, and the whole of every docstring."""
     yield "## The contract\n"
     for path, names in CONTRACT:
         for name in names:
             where, node = definition(module(path), name)
             assert isinstance(node, ast.ClassDef)
             yield f"### `{name}` (`vi_contact.{path}`)\n"
-            yield f"{documentation(node)}\n"
+            yield f"{whole(node)}\n"
             for one in methods(node):
                 yield f"#### `{function(where, one, 1)}`\n"
-                yield f"{documentation(one)}\n"
+                yield f"{whole(one)}\n"
+    yield "## Values of the contract\n"
+    for path, names in VALUES:
+        for name in names:
+            where, node = definition(module(path), name)
+            assert isinstance(node, ast.ClassDef)
+            yield f"### `{name}` (`vi_contact.{path}`)\n"
+            yield f"`{constructor(where, node)}`\n"
+            yield f"{whole(node)}\n"
 
 
 def short_names() -> Iterator[str]:
