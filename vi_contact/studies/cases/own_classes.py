@@ -73,10 +73,15 @@ def _within(module: str, allowed: Iterable[str]) -> bool:
 def _imported(module: str, name: str, spot: Spot) -> Any:
     try:
         return getattr(import_module(module), name)
-    except Exception as error:  # a module may raise anything
-        why = " ".join(f"{type(error).__name__}: {error}".split())
+    except (Exception, SystemExit) as error:  # a module may raise anything
+        why = f"{type(error).__name__}: {_line(error)}"
         raise spot.inside(f"has the type '{module}:{name}', which Python cannot import ({why}): install "
                           f"{module.partition('.')[0]}, or set PYTHONPATH to its folder") from error
+
+
+def _line(error: BaseException) -> str:
+    """What an error says, on one line."""
+    return " ".join(str(error).split())[:200]
 
 
 def _check(cls: Any, text: str, asked: Sequence[Any], allowed: Sequence[str], spot: Spot) -> None:
@@ -87,7 +92,7 @@ def _check(cls: Any, text: str, asked: Sequence[Any], allowed: Sequence[str], sp
                           "package if you trust it")
     defects = [defect(cls, kind) for kind in asked]
     if all(defects):
-        raise spot.inside(f"has the type '{text}', which {defects[0]}, as a {asked[0].__name__} must: see "
+        raise spot.inside(f"has the type '{text}', which {defects[0]}, as {asked[0].__name__} must: see "
                           "docs/reference/api.md")
 
 
@@ -100,14 +105,14 @@ def _callee(cls: type, text: str, asked: Sequence[Any], spot: Spot) -> Callee:
         except InputError:
             raise
         except (TypeError, ValueError) as error:
-            raise InputError(f"{text}: {error}") from error
+            raise InputError(f"{text}: {_line(error)}") from error
         defects = [lacks(one, kind) for kind in asked if not defect(cls, kind)]
         if all(defects):
-            raise InputError(f"{text} {defects[0]}, as a {asked[0].__name__} must: see docs/reference/api.md")
+            raise InputError(f"{text} {defects[0]}, as {asked[0].__name__} must: see docs/reference/api.md")
         return one
 
     try:
         return replace(callee(cls, name=text, given=()), function=made)
     except Exception as error:  # type hints are evaluated
-        raise spot.inside(f"has the type '{text}', whose arguments cannot be read ({error}): correct the type hints of "
-                          "its constructor") from error
+        raise spot.inside(f"has the type '{text}', whose arguments cannot be read ({_line(error)}): correct the type "
+                          "hints of its constructor") from error
