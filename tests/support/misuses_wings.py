@@ -95,7 +95,6 @@ def operators() -> Table:
         (bem.convolution_operator, body | {"quadrature": quadrature, "dt": 0.5, "steps": 2}, BODY | {
             "quadrature": OTHER | {"class": bem.ConvolutionQuadrature}, "dt": POSITIVE, "steps": STEPS,
             "symmetric": FLAG}),
-        (bem.Operators, body, BODY | {"orders": OTHER}),
         (bem.LaplaceKernels, {"s": 1.0 + 1.0j, "c_p": 1.0, "c_s": 0.5},
          speed | {"s": {"text": "1", "nan": complex(nan, 1.0), "negative": -1.0 + 1.0j, "zero": 0.0, "none": None}}),
         (bem.TimeKernels, {"t": 1.0, "c_p": 1.0, "c_s": 0.5}, speed | {"t": POSITIVE}),

@@ -10,7 +10,6 @@ from .energetic import EnergeticBlocks, Marching, energetic_blocks
 from .fundamental_solution import LaplaceKernels, TimeKernels
 from .interior import interior_displacement
 from .loads import traction_forces
-from .operators import Operators
 from .poincare_steklov import BoundaryMotion, BoundaryProblem, CondensedCompliance, PoincareSteklov
 from .quadrature import Orders
 from .radial_table import RadialTable
@@ -23,7 +22,7 @@ __all__ = [
     "BDF2", "BoundaryContact", "BoundaryMesh", "BoundaryMotion", "BoundaryProblem", "CondensedCompliance",
     "Conditions", "ContactLedger", "ContactRun", "ConvolutionOperator", "ConvolutionProblem",
     "ConvolutionQuadrature", "EnergeticBlocks", "Frequencies", "Galerkin", "LaplaceKernels", "Marching",
-    "OperatorMatrices", "Operators", "Orders", "PoincareSteklov", "RadauIIA", "RadialTable", "SpaceTimeUzawa",
+    "OperatorMatrices", "Orders", "PoincareSteklov", "RadauIIA", "RadialTable", "SpaceTimeUzawa",
     "TimeKernels", "TimeMethod", "Trapezoid", "TwoBodies", "circle", "conditions_on", "convolution_operator",
     "energetic_blocks", "from_segments", "interior_displacement", "ledger", "load_blocks", "march_contact",
     "polygon", "save_blocks", "smooth_curve", "stored_blocks", "traction_forces",

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from ..core.algebra import Array
 from ..core.checks import instance, number
+from ..laws.materials import LinearElastic
 from .boundary_mesh import BoundaryMesh
 from .element_pairs import ElementPairs
 from .fundamental_solution import KernelSet
@@ -33,6 +34,14 @@ SLOPE = np.array([-1.0, 1.0])  # derivative of the two shape functions times the
 N_SINGLE, N_DOUBLE, N_HYPER = 3, 8, 10
 
 
+def check_body(mesh: BoundaryMesh, material: LinearElastic, orders: Orders) -> None:
+    """Raise InputError unless these are a boundary mesh, a material and numbers of points."""
+    owner = "boundary elements"
+    instance(owner, "the mesh", mesh, BoundaryMesh, "give a BoundaryMesh, for example polygon(...)")
+    instance(owner, "the material", material, LinearElastic, "give a LinearElastic")
+    instance(owner, "orders", orders, Orders, "give numbers of points, Orders()")
+
+
 @dataclass(frozen=True)
 class OperatorMatrices:
     """Hold single (4n, 4n) <V p, psi>, double (4n, 2n) <K u, psi>, hyper (2n, 2n) <D u, v>; None if not asked."""
@@ -40,11 +49,6 @@ class OperatorMatrices:
     single: NDArray | None
     double: NDArray | None
     hyper: NDArray | None
-
-    @property
-    def adjoint(self) -> NDArray | None:
-        """Return (2n, 4n) <K' p, v>, the transposed double layer."""
-        return None if self.double is None else self.double.T
 
 
 class Galerkin:

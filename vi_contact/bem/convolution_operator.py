@@ -18,10 +18,10 @@ from ..core.checks import array, counted, flag, instance, mask, shape_of
 from ..core.errors import InputError
 from ..laws.materials import LinearElastic
 from .boundary_mesh import BoundaryMesh
+from .boundary_operators import check_body
 from .convolution_quadrature import ConvolutionQuadrature, Frequencies
 from .energetic import NUMBERS, check_time_step
 from .fundamental_solution import LaplaceKernels
-from .operators import check_body
 from .poincare_steklov import BoundaryMotion, CondensedCompliance
 from .quadrature import Orders
 from .radial_table import RadialTable

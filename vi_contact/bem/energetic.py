@@ -26,7 +26,8 @@ from ..core.checks import array, attributes, counted, flag, instance, mask, numb
 from ..core.errors import InputError
 from ..laws.materials import LinearElastic
 from .boundary_mesh import BoundaryMesh
-from .operators import Operators, check_body
+from .boundary_operators import Galerkin, check_body
+from .fundamental_solution import TimeKernels
 from .quadrature import Orders
 
 NUMBERS = 4_000_000_000  # in the blocks of a body: 32 GB
@@ -89,20 +90,21 @@ def energetic_blocks(
     counted("boundary elements", f"{steps} steps of {len(mesh)} elements", 28 * steps * len(mesh) ** 2, "numbers",
             most=NUMBERS)
     check_time_step(mesh, material.c_p, dt)
-    operators, n = Operators(mesh, material, orders), len(mesh)
+    galerkin, n, c_p, c_s = Galerkin(mesh, material.c_s, orders), len(mesh), material.c_p, material.c_s
     single, double = np.empty((steps, 4 * n, 4 * n)), np.empty((steps, 4 * n, 2 * n))
     curved = np.empty((steps, 2 * n, 2 * n)) if hyper else None
     a, b, c = np.zeros_like(single[0]), np.zeros_like(double[0]), np.zeros((2 * n, 2 * n))
     change = np.zeros_like(c)
     for j in range(steps):
-        now = operators.unit_in_time((j + 1) * dt, hyper=hyper)
+        t = (j + 1) * dt
+        now = galerkin.assemble(TimeKernels(t, c_p, c_s, hyper), (c_s * t, c_p * t))
         assert now.single is not None and now.double is not None
         single[j], double[j] = now.single - a, (now.double - b) / dt
         a, b = now.single, now.double
         if curved is not None and now.hyper is not None:
             curved[j] = (now.hyper - c - change) / dt**2
             change, c = now.hyper - c, now.hyper
-    return EnergeticBlocks(mesh, material.c_p, material.c_s, dt, single, double, curved)
+    return EnergeticBlocks(mesh, c_p, c_s, dt, single, double, curved)
 
 
 @dataclass(frozen=True)

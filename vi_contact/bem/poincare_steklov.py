@@ -77,12 +77,6 @@ class BoundaryMotion:
         increments = np.diff(self.displacement, axis=0, prepend=0.0)
         return np.cumsum((self.forces * increments).sum(axis=(1, 2)))
 
-    def work_on(self, nodes: ArrayLike) -> Array:
-        """Return (steps,) the part of the work done at masked nodes (n,) [J/m]."""
-        increments = np.diff(self.displacement, axis=0, prepend=0.0)
-        chosen = mask("BoundaryMotion.work_on", "nodes", nodes, self.displacement.shape[2:])
-        return np.cumsum((self.forces * increments)[:, :, chosen].sum(axis=(1, 2)))
-
 
 @dataclass(frozen=True)
 class CondensedCompliance:

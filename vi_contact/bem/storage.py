@@ -14,7 +14,7 @@ from ..laws.materials import LinearElastic
 from .boundary_mesh import BoundaryMesh
 from .element_pairs import ElementPairs
 from .energetic import EnergeticBlocks, energetic_blocks
-from .operators import check_body
+from .boundary_operators import check_body
 from .quadrature import Orders
 
 FORMAT = "vi_contact boundary element blocks, 2"

@@ -8,7 +8,7 @@ multistep methods, a matrix that couples the stages for Runge-Kutta methods (Lub
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,15 +38,8 @@ class TimeMethod(Protocol):
 class BDF2:
     """Describe backward differences of order 2: delta = 3/2 - 2 z + z²/2. Damps high frequencies."""
 
-    @property
-    def abscissae(self) -> tuple[float, ...]:
-        """Return the stages within a step."""
-        return (1.0,)
-
-    @property
-    def smallest_ratio(self) -> float:
-        """Return the least c_P dt/h."""
-        return 0.05
+    abscissae: ClassVar[tuple[float, ...]] = (1.0,)
+    smallest_ratio: ClassVar[float] = 0.05
 
     def delta(self, z: NDArray) -> NDArray:
         """Return (L, 1, 1)."""
@@ -60,15 +53,8 @@ class Trapezoid:
     No numerical damping: fronts ring, and below c_P dt/h = 0.5 the errors of integration over elements grow in time.
     """
 
-    @property
-    def abscissae(self) -> tuple[float, ...]:
-        """Return the stages within a step."""
-        return (1.0,)
-
-    @property
-    def smallest_ratio(self) -> float:
-        """Return the least c_P dt/h."""
-        return 0.5
+    abscissae: ClassVar[tuple[float, ...]] = (1.0,)
+    smallest_ratio: ClassVar[float] = 0.5
 
     def delta(self, z: NDArray) -> NDArray:
         """Return (L, 1, 1)."""
@@ -79,15 +65,8 @@ class Trapezoid:
 class RadauIIA:
     """Describe Radau IIA of two stages, order 3: delta = (A + z/(1 - z) 1 bᵀ)⁻¹, b the last row of A."""
 
-    @property
-    def abscissae(self) -> tuple[float, ...]:
-        """Return the stages within a step."""
-        return (1.0 / 3.0, 1.0)
-
-    @property
-    def smallest_ratio(self) -> float:
-        """Return the least c_P dt/h."""
-        return 0.05
+    abscissae: ClassVar[tuple[float, ...]] = (1.0 / 3.0, 1.0)
+    smallest_ratio: ClassVar[float] = 0.05
 
     def delta(self, z: NDArray) -> NDArray:
         """Return (L, 2, 2)."""
