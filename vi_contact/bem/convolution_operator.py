@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..core.algebra import Array
-from ..core.checks import array, counted, flag, instance, mask, shape_of
+from ..core.checks import array, counted, flag, instance, shape_of
 from ..core.errors import InputError
 from ..laws.materials import LinearElastic
 from .boundary_mesh import BoundaryMesh
@@ -22,7 +22,7 @@ from .boundary_operators import check_body
 from .convolution_quadrature import ConvolutionQuadrature, Frequencies
 from .energetic import NUMBERS, check_time_step
 from .fundamental_solution import LaplaceKernels
-from .poincare_steklov import BoundaryMotion, CondensedCompliance
+from .poincare_steklov import BodyProblem, BoundaryMotion, CondensedCompliance
 from .quadrature import Orders
 from .radial_table import RadialTable
 
@@ -116,7 +116,7 @@ def convolution_operator(
 
 
 @dataclass(frozen=True, eq=False)
-class ConvolutionProblem:
+class ConvolutionProblem(BodyProblem):
     """Describe what BoundaryProblem is for the energetic method: a body with supports, loads and perhaps contact.
 
     forces: nodal forces of the loads [N/m], (steps, 2, n) means over the steps, or (steps, stages, 2, n) means between
@@ -126,62 +126,30 @@ class ConvolutionProblem:
     """
 
     operator: ConvolutionOperator
-    forces: Array
-    fixed: Mask | None = None
-    prescribed: Array | None = None
-    contact: Mask | None = None
 
     def __post_init__(self) -> None:
-        owner, operator = "ConvolutionProblem", self.operator
-        instance(owner, "operator", operator, ConvolutionOperator, "give one of convolution_operator(...)")
-        n, steps, stages = len(self.operator.mesh), self.operator.steps, self.operator.frequencies.s.shape[1]
-        means = (steps, stages, 2, n) if len(shape_of(self.forces)) == 4 else (steps, 2, n)
-        object.__setattr__(self, "forces", array(owner, "forces", self.forces, means, unit="N/m"))
-        if self.prescribed is not None:
-            array(owner, "prescribed", self.prescribed, (steps, 2, n), unit="m")
-        for name, shape in (("fixed", (2, n)), ("contact", (n,))):
-            if getattr(self, name) is not None:
-                mask(owner, name, getattr(self, name), shape)
-
-    @property
-    def times(self) -> Array:
-        """Return (steps,) ends of the steps [s]."""
-        return self.operator.dt * np.arange(1, self.operator.steps + 1)
-
-    @property
-    def contact_nodes(self) -> NDArray[np.int64]:
-        """Return (m,) numbers of the nodes of the contact boundary."""
-        if self.contact is None or not np.any(self.contact):
-            raise InputError("ConvolutionProblem: no contact boundary; give `contact`, the mask of its elements")
-        return np.flatnonzero(self.operator.mesh.nodes_of(self.contact))
-
-    @property
-    def _free(self) -> Mask:
-        n = len(self.operator.mesh)
-        return np.ones(2 * n, bool) if self.fixed is None else ~np.asarray(self.fixed).ravel()
+        operator = self.operator
+        instance("ConvolutionProblem", "operator", operator, ConvolutionOperator,
+                 "give one of convolution_operator(...)")
+        n, steps, stages = len(operator.mesh), operator.steps, operator.frequencies.s.shape[1]
+        self._check((steps, stages, 2, n) if len(shape_of(self.forces)) == 4 else (steps, 2, n))
 
     def solve(self, contact_forces: ArrayLike | None = None) -> BoundaryMotion:
         """Return the motion under loads and nodal contact forces (steps, 2m), ordered as CondensedCompliance."""
-        table, steps, n = self.operator.frequencies, self.operator.steps, len(self.operator.mesh)
-        forces = np.asarray(self.forces, float)
-        forces = forces.reshape(steps, -1, 2, n).copy()
-        if contact_forces is not None:
-            shape = (steps, 2 * len(self.contact_nodes))
-            given = array("ConvolutionProblem.solve", "contact_forces", contact_forces, shape, unit="N/m")
-            forces[..., self.contact_nodes] += given.reshape(steps, 1, 2, -1)
-        u = self._displacement_modes(table.impulses(forces.reshape(steps, -1, 2 * n)))
+        table, n = self.operator.frequencies, len(self.operator.mesh)
+        forces = self._loads(contact_forces).reshape(self.operator.steps, -1, 2 * n)
+        u = self._displacement_modes(table.impulses(forces))
         over_s = u[..., None] / table.s[..., None, None]
         traction = table.step_means((self.operator.to_traction @ over_s)[..., 0])
         reaction = table.step_means((self.operator.steklov @ over_s)[..., 0])
-        given = forces.reshape(steps, -1, 2 * n).transpose(0, 2, 1) @ self._stage_widths(forces.shape[1])
-        total = np.where(self._free, given, reaction)
+        widths = np.diff(table.method.abscissae, prepend=0.0) if forces.shape[1] > 1 else np.ones(1)
+        total = np.where(self._fixed, reaction, forces.transpose(0, 2, 1) @ widths)
         return BoundaryMotion(self.times, table.at_ends(u).reshape(-1, 2, n), traction.reshape(-1, 2, n, 2),
                               total.reshape(-1, 2, n))
 
     def condensed(self) -> CondensedCompliance:
         """Return the compliance of the contact unknowns, by frequencies, and their motion without contact."""
-        mesh, nodes, table, free = self.operator.mesh, self.contact_nodes, self.operator.frequencies, self._free
-        unknowns = np.concatenate([nodes, nodes + len(mesh)])
+        table, free, unknowns = self.operator.frequencies, ~self._fixed, self._unknowns
         moving = free[unknowns]
         places = np.searchsorted(np.flatnonzero(free), unknowns[moving])
         units = np.eye(int(free.sum()))[:, places]
@@ -190,16 +158,11 @@ class ConvolutionProblem:
             inverse = np.linalg.solve(matrices[:, free][:, :, free], units[None])[:, places]
             at_z[np.ix_(moving, moving)] = np.einsum("i,icd->cd", factors, inverse)
         u_free = self.solve().displacement.reshape(len(self.times), -1)[:, unknowns]
-        elements = np.asarray(self.contact, bool)
-        return CondensedCompliance(
-            table.contour.backward(transform), u_free, nodes, mesh.points[nodes],
-            mesh.node_normals(elements)[nodes], mesh.node_lengths(elements)[nodes], self.operator.dt,
-            mesh.node_turns(elements)[nodes],
-        )
+        return self._compliance(table.contour.backward(transform), u_free)
 
     def _displacement_modes(self, impulses: NDArray) -> NDArray:
         """Return (L, stages, 2n) displacements at the frequencies; prescribed ones move evenly during each step."""
-        table, free = self.operator.frequencies, self._free
+        table, free = self.operator.frequencies, ~self._fixed
         u = np.zeros_like(impulses)
         load = impulses * table.s[..., None]
         if self.prescribed is not None:
@@ -209,7 +172,3 @@ class ConvolutionProblem:
         for at_z, matrices, right in zip(u, self.operator.steklov, load, strict=True):
             at_z[:, free] = np.linalg.solve(matrices[:, free][:, :, free], right[:, free, None])[..., 0]
         return u
-
-    def _stage_widths(self, pieces: int) -> Array:
-        abscissae = self.operator.frequencies.method.abscissae
-        return np.diff(abscissae, prepend=0.0) if pieces > 1 else np.ones(1)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -38,6 +39,11 @@ class PoincareSteklov:
     def mesh(self) -> BoundaryMesh:
         """Return the boundary."""
         return self.blocks.mesh
+
+    @property
+    def dt(self) -> float:
+        """Return the time step [s]."""
+        return self.blocks.dt
 
     def apply(self, displacement: ArrayLike) -> Array:
         """Return (steps, 2, n) nodal forces [N/m] of displacements (steps, 2, n) at t_1, t_2, ...; 0 at t_0."""
@@ -115,7 +121,66 @@ class CondensedCompliance:
 
 
 @dataclass(frozen=True, eq=False)
-class BoundaryProblem:
+class BodyProblem:
+    """Hold what both routes, energetic and convolution quadrature, ask of a body that may come into contact."""
+
+    operator: Any
+    forces: Array
+    fixed: Mask | None = None
+    prescribed: Array | None = None
+    contact: Mask | None = None
+
+    def _check(self, forces: tuple[int | None, ...]) -> None:
+        owner, n = type(self).__name__, len(self.operator.mesh)
+        object.__setattr__(self, "forces", array(owner, "forces", self.forces, forces, unit="N/m"))
+        for name, shape in (("fixed", (2, n)), ("contact", (n,))):
+            if getattr(self, name) is not None:
+                mask(owner, name, getattr(self, name), shape)
+        if self.prescribed is not None:
+            array(owner, "prescribed", self.prescribed, (len(self.forces), 2, n), unit="m")
+
+    @property
+    def times(self) -> Array:
+        """Return (steps,) ends of the steps [s]."""
+        return self.operator.dt * np.arange(1, len(self.forces) + 1)
+
+    @cached_property
+    def contact_nodes(self) -> NDArray[np.int64]:
+        """Return (m,) numbers of the nodes of the contact boundary."""
+        if self.contact is None or not np.any(self.contact):
+            raise InputError(f"{type(self).__name__}: no contact boundary; give `contact`, the mask of its elements")
+        return np.flatnonzero(self.operator.mesh.nodes_of(self.contact))
+
+    @property
+    def _unknowns(self) -> NDArray[np.int64]:
+        """Return (2m,) contact unknowns, x of all nodes, then y."""
+        return np.concatenate([self.contact_nodes, self.contact_nodes + len(self.operator.mesh)])
+
+    @property
+    def _fixed(self) -> Mask:
+        shape = (2, len(self.operator.mesh))
+        return (np.zeros(shape, bool) if self.fixed is None else np.asarray(self.fixed, bool)).ravel()
+
+    def _loads(self, contact_forces: ArrayLike | None) -> Array:
+        """Return (steps, pieces of a step, 2, n) nodal forces, those of contact (steps, 2m) added."""
+        steps = len(self.forces)
+        forces = np.array(self.forces, float).reshape(steps, -1, 2, len(self.operator.mesh))
+        if contact_forces is not None:
+            shape = (steps, 2 * len(self.contact_nodes))
+            given = array(f"{type(self).__name__}.solve", "contact_forces", contact_forces, shape, unit="N/m")
+            forces[..., self.contact_nodes] += given.reshape(steps, 1, 2, -1)
+        return forces
+
+    def _compliance(self, W: Array, u_free: Array) -> CondensedCompliance:
+        mesh, nodes, elements = self.operator.mesh, self.contact_nodes, np.asarray(self.contact, bool)
+        return CondensedCompliance(
+            W, u_free, nodes, mesh.points[nodes], mesh.node_normals(elements)[nodes],
+            mesh.node_lengths(elements)[nodes], self.operator.dt, mesh.node_turns(elements)[nodes],
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class BoundaryProblem(BodyProblem):
     """Describe a body with supports, loads and a boundary that may come into contact.
 
     operator: its S; forces: (steps, 2, n) nodal forces of the loads [N/m] (loads.py); fixed: (2, n) supported unknowns;
@@ -124,52 +189,21 @@ class BoundaryProblem:
     """
 
     operator: PoincareSteklov
-    forces: Array
-    fixed: Mask | None = None
-    prescribed: Array | None = None
-    contact: Mask | None = None
 
     def __post_init__(self) -> None:
-        owner = "BoundaryProblem"
-        instance(owner, "operator", self.operator, PoincareSteklov, "give PoincareSteklov(blocks, rho)")
-        n = len(self.operator.mesh)
-        forces = array(owner, "forces", self.forces, (None, 2, n), unit="N/m")
-        object.__setattr__(self, "forces", forces)
-        for name, shape in (("fixed", (2, n)), ("contact", (n,))):
-            if getattr(self, name) is not None:
-                mask(owner, name, getattr(self, name), shape)
-        if self.prescribed is not None:
-            array(owner, "prescribed", self.prescribed, forces.shape, unit="m")
+        instance("BoundaryProblem", "operator", self.operator, PoincareSteklov, "give PoincareSteklov(blocks, rho)")
+        self._check((None, 2, len(self.operator.mesh)))
 
     @cached_property
     def marching(self) -> Marching:
         """Return the factored system."""
-        n = len(self.operator.mesh)
-        fixed = np.zeros(2 * n, bool) if self.fixed is None else np.asarray(self.fixed, bool).ravel()
-        return Marching(self.operator.blocks, fixed, symmetric=self.operator.symmetric)
-
-    @property
-    def times(self) -> Array:
-        """Return (steps,) ends of the steps [s]."""
-        return self.operator.blocks.dt * np.arange(1, len(self.forces) + 1)
-
-    @cached_property
-    def contact_nodes(self) -> NDArray[np.int64]:
-        """Return (m,) numbers of the nodes of the contact boundary."""
-        if self.contact is None or not np.any(self.contact):
-            raise InputError("BoundaryProblem: no contact boundary; give `contact`, the mask of its elements")
-        return np.flatnonzero(self.operator.mesh.nodes_of(self.contact))
+        return Marching(self.operator.blocks, self._fixed, symmetric=self.operator.symmetric)
 
     def solve(self, contact_forces: ArrayLike | None = None) -> BoundaryMotion:
         """Return the motion under loads and nodal contact forces (steps, 2m), ordered as CondensedCompliance."""
         n, rho = len(self.operator.mesh), self.operator.rho
-        forces = np.array(self.forces, float)
-        if contact_forces is not None:
-            shape = (len(forces), 2 * len(self.contact_nodes))
-            given = array("BoundaryProblem.solve", "contact_forces", contact_forces, shape, unit="N/m")
-            forces[:, :, self.contact_nodes] += given.reshape(len(forces), 2, -1)
-        prescribed = None if self.prescribed is None else np.asarray(self.prescribed).reshape(len(forces), 2 * n, 1)
-        motion: Motion = self.marching.run(forces.reshape(len(forces), 2 * n, 1) / rho, prescribed)
+        prescribed = None if self.prescribed is None else np.asarray(self.prescribed).reshape(-1, 2 * n, 1)
+        motion: Motion = self.marching.run(self._loads(contact_forces).reshape(-1, 2 * n, 1) / rho, prescribed)
         return BoundaryMotion(
             self.times, motion.displacement.reshape(-1, 2, n), rho * motion.traction.reshape(-1, 2, n, 2),
             rho * motion.forces.reshape(-1, 2, n),
@@ -177,9 +211,8 @@ class BoundaryProblem:
 
     def condensed(self) -> CondensedCompliance:
         """Return the compliance of the contact unknowns and their free motion, in one march with 2m + 1 columns."""
-        mesh, nodes, steps = self.operator.mesh, self.contact_nodes, len(self.forces)
-        n, unknowns = len(mesh), np.concatenate([nodes, nodes + len(mesh)])
-        forces = np.zeros((steps, 2 * n, len(unknowns) + 1))
+        steps, unknowns = len(self.forces), self._unknowns
+        forces = np.zeros((steps, 2 * len(self.operator.mesh), len(unknowns) + 1))
         forces[0, unknowns, np.arange(len(unknowns))] = 1.0 / self.operator.rho
         forces[:, :, -1] = self.forces.reshape(steps, -1) / self.operator.rho
         prescribed = None
@@ -187,9 +220,4 @@ class BoundaryProblem:
             prescribed = np.zeros_like(forces)
             prescribed[:, :, -1] = np.asarray(self.prescribed).reshape(steps, -1)
         u = self.marching.run(forces, prescribed).displacement[:, unknowns]
-        elements = np.asarray(self.contact, bool)
-        return CondensedCompliance(
-            np.ascontiguousarray(u[:, :, :-1]), np.ascontiguousarray(u[:, :, -1]), nodes, mesh.points[nodes],
-            mesh.node_normals(elements)[nodes], mesh.node_lengths(elements)[nodes], self.operator.blocks.dt,
-            mesh.node_turns(elements)[nodes],
-        )
+        return self._compliance(np.ascontiguousarray(u[:, :, :-1]), np.ascontiguousarray(u[:, :, -1]))

@@ -12,9 +12,9 @@ from ..core import checks
 from ..core.errors import InputError
 from ..laws.materials import LinearElastic
 from .boundary_mesh import BoundaryMesh
+from .boundary_operators import check_body
 from .element_pairs import ElementPairs
 from .energetic import EnergeticBlocks, energetic_blocks
-from .boundary_operators import check_body
 from .quadrature import Orders
 
 FORMAT = "vi_contact boundary element blocks, 2"
