@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from vi_contact.core.algebra import Array
-from vi_contact.plots.histories import STYLE, History, save
+from vi_contact.plots.histories import History, canvas, save
 
 COLUMNS = ("displacement of the foot [m]", "contact force / section [Pa]", "energy / exact energy [-]")
 
@@ -20,15 +20,10 @@ def plot_bounces(histories: Mapping[str, History], exact: Any, section: float, p
     histories: name -> history with u_?_foot, contact_resultant, energy_kinetic and energy_strain of a bar of that
     section; all of the same times. Forces beyond three times the exact one leave the panel and are written in it.
     """
-    import matplotlib
-    from matplotlib.figure import Figure
-
     t = next(iter(histories.values()))["t"]
     fine = np.linspace(t[0], t[-1], 4000)
     curves = (exact.displacement(0.0, fine), exact.force(fine), np.ones_like(fine))
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(13.0, 1.55 * len(histories) + 1.0), layout="constrained")
-        axes = figure.subplots(len(histories), 3, sharex=True, squeeze=False)
+    figure, axes = canvas(len(histories), 3, (13.0, 1.55 * len(histories) + 1.0), sharex=True)
     for row, (name, history) in zip(axes, histories.items(), strict=True):
         for axis, curve, values in zip(row, curves, _values(history, exact.energy * section, section), strict=True):
             axis.plot(fine, curve, color="0.72", lw=2.5, label="exact")

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from vi_contact.core.algebra import Array
-from vi_contact.plots.histories import STYLE, History, panels, save
+from vi_contact.plots.histories import History, canvas, panels, save
 
 
 def plot_rubbing(history: History, path: str | Path, *, mu: float, gap: float, title: str) -> Path:
@@ -46,12 +46,7 @@ def plot_regularisation(
     eps: Sequence[float], errors: Mapping[str, Array], tips: Mapping[str, tuple[Array, Array]], path: str | Path
 ) -> Path:
     """Draw the largest difference of the tip from the exact law over eps, left; tips (t, u) of some runs, right."""
-    import matplotlib
-    from matplotlib.figure import Figure
-
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(11.0, 4.5), layout="constrained")
-        left, right = figure.subplots(1, 2)
+    figure, ((left, right),) = canvas(1, 2, (11.0, 4.5))
     for label, values in errors.items():
         left.loglog(eps, values, "o-", ms=4, lw=1.1, label=label)
     last = min(values[-1] for values in errors.values())

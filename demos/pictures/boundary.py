@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from vi_contact.core.algebra import Array
-from vi_contact.plots.histories import STYLE, save, scaled
+from vi_contact.plots.histories import canvas, save, scaled
 
 ARROW = 0.3  # length of the longest arrow of a row over the size of its bodies
 
@@ -55,13 +55,8 @@ class Panel:
 
 def plot_boundary_snapshots(rows: Mapping[str, Sequence[Shot]], path: str | Path, *, title: str) -> Path:
     """Draw a row per example, a column per time: deformed outlines, points inside, contact tractions (row's scale)."""
-    import matplotlib
-    from matplotlib.figure import Figure
-
     columns = max(len(shots) for shots in rows.values())
-    with matplotlib.rc_context(STYLE | {"axes.grid": False}):
-        figure = Figure(figsize=(2.6 * columns + 0.6, 2.5 * len(rows) + 0.6), layout="constrained")
-        axes = figure.subplots(len(rows), columns, squeeze=False)
+    figure, axes = canvas(len(rows), columns, (2.6 * columns + 0.6, 2.5 * len(rows) + 0.6), lattice=False)
     for row, (name, shots) in zip(axes, rows.items(), strict=True):
         points = np.concatenate([outline for shot in shots for outline in shot.outlines])
         low, high = points.min(axis=0), points.max(axis=0)
@@ -94,13 +89,8 @@ def _draw(axis: Any, shot: Shot, scale: float, size: float) -> None:
 
 def plot_panels(rows: Sequence[Sequence[Panel]], path: str | Path, *, title: str) -> Path:
     """Draw panels in rows and columns, each with its own scale and one legend for its curves."""
-    import matplotlib
-    from matplotlib.figure import Figure
-
     columns = max(len(row) for row in rows)
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(3.7 * columns + 0.4, 2.7 * len(rows) + 0.6), layout="constrained")
-        axes = figure.subplots(len(rows), columns, squeeze=False)
+    figure, axes = canvas(len(rows), columns, (3.7 * columns + 0.4, 2.7 * len(rows) + 0.6))
     for line, panels in zip(axes, rows, strict=True):
         for axis, panel in zip(line, panels, strict=True):
             _panel(axis, panel)

@@ -22,7 +22,7 @@ from vi_contact.plots.channel_mesh import (
     plane,
     read_bodies,
 )
-from vi_contact.plots.histories import STYLE, History, panels, save
+from vi_contact.plots.histories import History, canvas, panels, save
 
 
 def plot_layout(
@@ -77,14 +77,10 @@ def plot_moments(
 ) -> Path:
     """Draw a row per run (name -> folder), a column per time [s]: the bodies around the channel, their displacements
     less the channel's mean drawn ``magnified`` times; contact points coloured by their pressure, open ones white."""
-    import matplotlib
-    from matplotlib.figure import Figure
-
     runs = {name: read_bodies(folder) for name, folder in folders.items()}
     colours = Colours.of(np.concatenate([run.tractions.at(t)[0] for run in runs.values() for t in times]))
-    with matplotlib.rc_context(STYLE | {"axes.grid": False}):
-        figure = Figure(figsize=(3.7 * len(times) + 1.3, 2.75 * len(runs) + 0.7), layout="constrained")
-        axes = figure.subplots(len(runs), len(times), sharex=True, sharey=True, squeeze=False)
+    size = (3.7 * len(times) + 1.3, 2.75 * len(runs) + 0.7)
+    figure, axes = canvas(len(runs), len(times), size, lattice=False, sharex=True, sharey=True)
     for row, (name, run) in zip(axes, runs.items(), strict=True):
         for axis, t in zip(row, times, strict=True):
             shown = draw_bodies(axis, run, t, magnified=magnified, colours=colours, follow=True)

@@ -10,7 +10,7 @@ import numpy as np
 
 from vi_contact.core.algebra import Array
 from vi_contact.plots.deformed import StoredFrames, Tractions, read_frames, read_tractions
-from vi_contact.plots.histories import STYLE, save, scaled
+from vi_contact.plots.histories import canvas, save, scaled
 
 ARROW = 0.3  # length of the longest arrow over the size of the body
 
@@ -29,9 +29,6 @@ def plot_snapshots(
     Cells are coloured by von Mises stress, tractions drawn as arrows with one scale for all. ``support``: height y [m]
     of the rigid support at a time; displacements (not ``support``) are drawn ``magnified`` times.
     """
-    import matplotlib
-    from matplotlib.figure import Figure
-
     runs = {name: (read_frames(folder), read_tractions(folder)) for name, folder in folders.items()}
     shots = [[frames.at(t) for t in times] for frames, _ in runs.values()]
     stresses = np.array([stress.max() for row in shots for *_, stress in row])
@@ -41,9 +38,8 @@ def plot_snapshots(
     size = float(np.ptp(points, axis=0).max())
     low, high = _limits([points + magnified * u for row in shots for _, u, _ in row], size)
     height = 2.4 * (high[1] - low[1]) / (high[0] - low[0]) + 0.4
-    with matplotlib.rc_context(STYLE | {"axes.grid": False}):
-        figure = Figure(figsize=(2.5 * len(times) + 1.6, height * len(runs) + 0.8), layout="constrained")
-        axes = figure.subplots(len(runs), len(times), sharex=True, sharey=True, squeeze=False)
+    sheet = (2.5 * len(times) + 1.6, height * len(runs) + 0.8)
+    figure, axes = canvas(len(runs), len(times), sheet, lattice=False, sharex=True, sharey=True)
     axes[0, 0].set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     for row, row_shots, (name, (frames, tractions)) in zip(axes, shots, runs.items(), strict=True):
         for axis, (t, u, stress) in zip(row, row_shots, strict=True):
@@ -109,17 +105,14 @@ def plot_tractions(
 
     The shear is that of the support on the body and positive along +x, as in the pictures of boundary elements.
     """
-    import matplotlib
-    from matplotlib.figure import Figure
+    from matplotlib import colormaps
 
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(3.8 * len(folders) + 0.5, 5.4), layout="constrained")
-        axes = figure.subplots(2, len(folders), sharex=True, sharey="row", squeeze=False)
+    figure, axes = canvas(2, len(folders), (3.8 * len(folders) + 0.5, 5.4), sharex=True, sharey="row")
     runs = {name: read_tractions(folder) for name, folder in folders.items()}
     size = np.array([max(float(np.abs(run.at(t)).max(initial=0.0)) for run in runs.values() for t in times)])
     shown, unit = scaled(size, "Pa")
     factor = shown[0] / size[0] if size[0] else 1.0
-    colours = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.85, len(times)))
+    colours = colormaps["viridis"](np.linspace(0.0, 0.85, len(times)))
     for column, (name, tractions) in zip(axes.T, runs.items(), strict=True):
         x, order = tractions.points[:, 0], np.argsort(tractions.points[:, 0])
         for t, colour in zip(times, colours, strict=True):

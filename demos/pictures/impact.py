@@ -10,7 +10,7 @@ import numpy as np
 
 from vi_contact.core.algebra import Array
 from vi_contact.exact.hertz import HertzImpact
-from vi_contact.plots.histories import STYLE, save
+from vi_contact.plots.histories import canvas, save
 
 
 @dataclass(frozen=True)
@@ -33,12 +33,7 @@ def plot_impact(
 
     course: t -> (approach, force) of the theory, also before and after the contact.
     """
-    import matplotlib
-    from matplotlib.figure import Figure
-
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(13.0, 4.2), layout="constrained")
-        force, approach, pressure = figure.subplots(1, 3)
+    figure, ((force, approach, pressure),) = canvas(1, 3, (13.0, 4.2))
     a = exact.deepest.contact_radius
     t = np.linspace(-0.03, 1.2, 1000) * exact.duration
     r = np.linspace(0.0, 1.3, 1000) * a

@@ -11,13 +11,13 @@ from vi_contact.boundary_layer.layer import Layer
 from vi_contact.boundary_layer.particle import ParticleImpact
 from vi_contact.boundary_layer.trajectory import Trajectory
 from vi_contact.core.algebra import Array
-from vi_contact.plots.histories import save
-from vi_contact.plots.layer import COLOURS, grid
+from vi_contact.plots.histories import canvas, save
+from vi_contact.plots.layer import COLOURS
 
 
 def plot_parameters(values: Sequence[float], dampers: Sequence[float], path: str | Path) -> Path:
     """Draw Fig. 2: duration and restitution against k for several c, in units where a = b = V = m = 1."""
-    figure, axes = grid(1, 2, (10.0, 3.8))
+    figure, axes = canvas(1, 2, (10.0, 3.8))
     duration, rebound = axes[0]
     for c, colour in zip(dampers, COLOURS, strict=False):
         impacts = [ParticleImpact(Layer(1.0, k=k, c=c), 1.0, 1.0) for k in values]
@@ -33,7 +33,7 @@ def plot_parameters(values: Sequence[float], dampers: Sequence[float], path: str
 
 def plot_cut_off(motions: Mapping[str, Trajectory], exact: ParticleImpact, path: str | Path) -> Path:
     """Draw Fig. 3: distance and velocity against time for several a/b, the closed form behind them; label -> motion."""
-    figure, axes = grid(1, 2, (10.0, 3.8))
+    figure, axes = canvas(1, 2, (10.0, 3.8))
     place, speed = axes[0]
     t = np.linspace(0.0, exact.duration, 400)
     place.plot(t, exact.position(t), color="0.75", lw=4.0, label="closed form")
@@ -54,7 +54,7 @@ def plot_bounces_of_body(
 
     energy: (m,) [J]; still: (m,) what the energy would be with the impact map's losses.
     """
-    figure, axes = grid(3, 1, (9.0, 8.0), sharex=True)
+    figure, axes = canvas(3, 1, (9.0, 8.0), sharex=True)
     place, ledger, spin = axes[:, 0]
     place.plot(motion.t, motion.q[:, 2], color="black", lw=1.2, label="mass centre")
     place.plot(motion.t, motion.rho, color="tab:blue", lw=1.2, label="lowest point")
@@ -76,7 +76,7 @@ def plot_thin_limit(
     errors: Mapping[str, tuple[Array, Array]], path: str | Path, *, quantity: str, slope: str = "order 1"
 ) -> Path:
     """Draw an error over the width of the layer; label -> (widths [m], errors). A line of order 1 beside them."""
-    figure, axes = grid(1, 1, (6.5, 4.2))
+    figure, axes = canvas(1, 1, (6.5, 4.2))
     axis = axes[0, 0]
     for (label, (width, error)), colour in zip(errors.items(), COLOURS, strict=False):
         axis.loglog(width, error, "o-", color=colour, lw=1.2, ms=4.0, label=label)
@@ -91,7 +91,7 @@ def plot_layered_bar(
     runs: Mapping[str, tuple[Array, Array, Array]], exact: tuple[Array, Array, Array], path: str | Path
 ) -> Path:
     """Draw the height of a bar's foot [m] and contact pressure [Pa] against time; label -> (t, height, pressure)."""
-    figure, axes = grid(1, 2, (11.0, 4.0))
+    figure, axes = canvas(1, 2, (11.0, 4.0))
     height, force = axes[0]
     height.plot(exact[0], exact[1], color="0.75", lw=4.0, label="exact inequality, closed form")
     force.plot(exact[0], exact[2], color="0.75", lw=4.0)

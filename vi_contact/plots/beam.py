@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..beam.algorithm import BeamRun
-from .histories import STYLE, panels, save
+from .histories import canvas, panels, save
 
 _QUANTITIES = ("(A) rotation [-]", "(B) angular speed [1/s]", "(C) displacement [m]", "(D) velocity [m/s]")
 
@@ -43,15 +43,12 @@ def plot_shapes(
 ) -> Path:
     """Draw rotation, angular speed, displacement and velocity along the beam at ``count`` times of a span [s] (Figs.
     8.4 to 8.9): the last part ``near`` of the beam above, the whole below. The run needs snapshots in the span."""
-    import matplotlib
-    from matplotlib.figure import Figure
+    from matplotlib import colormaps
 
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(13.0, 6.5), layout="constrained")
-        axes = figure.subplots(2, 4)
+    figure, axes = canvas(2, 4, (13.0, 6.5))
     inside = [snapshot for snapshot in run.snapshots if span[0] - 1e-9 <= snapshot.t <= span[1] + 1e-9]
     chosen = np.unique(np.rint(np.linspace(0, len(inside) - 1, count)).astype(int))
-    colours = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.92, len(chosen)))
+    colours = colormaps["viridis"](np.linspace(0.0, 0.92, len(chosen)))
     close = run.x >= (1.0 - near) * run.x[-1]
     for row, label in enumerate(_QUANTITIES):
         for index, colour in zip(chosen, colours, strict=True):

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..core.algebra import Array, Mask
 from ..core.errors import InputError
-from .histories import STYLE, History, cell_edges, panels, save, scaled
+from .histories import History, canvas, cell_edges, panels, save, scaled
 from .maps import thinned
 
 SHOWN = {  # panels of plot_openings: point -> outward normal of the channel there
@@ -187,18 +187,14 @@ def _mark_sides(axis: Any, outline: Outline) -> None:
 
 def plot_envelope(runs: Mapping[str, History], outline: Outline, path: str | Path, *, title: str) -> Path:
     """Draw along the arc largest pressure and static pressure (dotted), largest opening, and share of time open."""
-    import matplotlib
-    from matplotlib.figure import Figure
-
     keys = ("pressure", "gap", "active")
     rows = {name: [np.reshape(run[key], (len(run["t"]), -1)) for key in keys] for name, run in runs.items()}
     size = np.array([max(float(pressure.max()) for pressure, *_ in rows.values())])
     shown, unit = scaled(size, "Pa")
     factor = shown[0] / size[0] if size[0] else 1.0
     metres, length = unit_of(max(float(gap.max()) for _, gap, _ in rows.values()))
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(9.0, 8.0), layout="constrained")
-        axes = figure.subplots(3, 1, sharex=True)
+    figure, axes = canvas(3, 1, (9.0, 8.0), sharex=True)
+    axes = axes[:, 0]
     for colour, (name, (pressure, gap, active)) in zip(RUNS, rows.items(), strict=False):
         shares = np.mean(active[1:] == 0.0, axis=0)
         for side, (_, one) in enumerate(outline.along()):

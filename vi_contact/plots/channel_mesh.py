@@ -12,7 +12,7 @@ import numpy as np
 from ..core.algebra import Array, Indices, Mask
 from ..core.errors import InputError
 from .deformed import StoredFrames, Tractions, read_frames, read_tractions
-from .histories import STYLE, History, scaled
+from .histories import History, canvas, scaled
 
 SOIL, CONCRETE, CONTACT = "#efe3c8", "#9aa3ab", "tab:red"
 MAP = "YlOrRd"  # colours of pressures
@@ -152,14 +152,9 @@ def _traces(axis: Any, history: History, openings: Mapping[str, Array], span: tu
 
 def plane(size: tuple[float, float], heights: Sequence[float] = (1.0,)) -> tuple[Any, Any]:
     """Return (figure, axes above each other); the first axis has one scale for both directions."""
-    import matplotlib
-    from matplotlib.figure import Figure
-
-    with matplotlib.rc_context(STYLE | {"axes.grid": False}):
-        figure = Figure(figsize=size, layout="constrained")
-        axes = figure.subplots(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
-    axes[0].set_aspect("equal")
-    return figure, axes if len(heights) > 1 else axes[0]
+    figure, axes = canvas(len(heights), 1, size, lattice=False, height_ratios=heights)
+    axes[0, 0].set_aspect("equal")
+    return figure, axes[:, 0] if len(heights) > 1 else axes[0, 0]
 
 
 def filled(axis: Any, cells: Array, colour: str, lw: float = 0.4) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..core.algebra import Array
 from ..core.errors import InputError
-from .histories import STYLE, History, cell_edges, length_unit, panels, save, scaled
+from .histories import History, canvas, cell_edges, length_unit, panels, save, scaled
 
 OPEN, STICK, SLIP = 1, 2, 3  # as contact_status in fields.xdmf
 _COLOURS = {OPEN: ("open", "white"), STICK: ("stick", "tab:blue"), SLIP: ("slip", "tab:orange")}
@@ -24,18 +24,13 @@ def plot_hysteresis(
     sign is that of the axis for work that is done on the support, so that the loop runs clockwise and its area is the
     work of friction where all points slide alike. InputError without records of friction.
     """
-    import matplotlib
-    from matplotlib.figure import Figure
-
     force, name = _force(history, axis)
     slip = _slip(history)[:, :, tangent].mean(axis=1)
     work = float(np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(slip)))
     slip = slip if work >= 0.0 else -slip
     metres, unit = length_unit(float(np.max(np.abs(slip), initial=0.0)))
     newtons, force_unit = scaled(force, "N")
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(6.4, 4.8), layout="constrained")
-        plot = figure.subplots()
+    figure, ((plot,),) = canvas(1, 1, (6.4, 4.8))
     plot.axhline(0.0, color="0.6", lw=0.6)
     plot.axvline(0.0, color="0.6", lw=0.6)
     plot.plot(slip / metres, newtons, color="black", lw=0.9)

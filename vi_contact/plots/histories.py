@@ -18,16 +18,30 @@ _UNITS = ((1.0, "m"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm"))
 STYLE = {"axes.grid": True, "grid.alpha": 0.3, "axes.spines.top": False, "axes.spines.right": False}
 
 
-def panels(rows: int, size: tuple[float, float], **more: Any) -> tuple[Any, Any]:
-    """Make (figure, array of axes above each other with one time axis)."""
+def canvas(rows: int, columns: int, size: tuple[float, float], lattice: bool = True, **more: Any) -> tuple[Any, Any]:
+    """Make (figure, its axes (rows, columns)); ``lattice``: whether grid lines are drawn behind the curves."""
     import matplotlib
     from matplotlib.figure import Figure
 
-    with matplotlib.rc_context(STYLE):
+    with matplotlib.rc_context(STYLE | {"axes.grid": lattice}):
         figure = Figure(figsize=size, layout="constrained")
-        axes = figure.subplots(rows, 1, sharex=True, squeeze=False, **more)[:, 0]
-    axes[-1].set_xlabel("time [s]")
-    return figure, axes
+        return figure, figure.subplots(rows, columns, squeeze=False, **more)
+
+
+def panels(rows: int, size: tuple[float, float], **more: Any) -> tuple[Any, Any]:
+    """Make (figure, array of axes above each other with one time axis)."""
+    figure, axes = canvas(rows, 1, size, sharex=True, **more)
+    axes[-1, 0].set_xlabel("time [s]")
+    return figure, axes[:, 0]
+
+
+def plain_numbers(axis: Any) -> None:
+    """Mark 1, 2 and 5 of every decade of a logarithmic axis in plain numbers."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def plain(text: str) -> str:

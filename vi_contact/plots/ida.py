@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..core.algebra import Array
-from .histories import STYLE, plain, scaled
+from .histories import canvas, plain, scaled
 
 _FRACTILES = (("16 %", "tab:blue", "--"), ("50 %", "black", "-"), ("84 %", "tab:red", "--"))
 
@@ -30,12 +30,7 @@ class DemandPanel:
 
 def plot_ida(panels: Sequence[DemandPanel], path: str | Path, *, intensity: str) -> Path:
     """Draw a panel for every demand, side by side: a grey curve for each record, and the fractiles."""
-    import matplotlib
-    from matplotlib.figure import Figure
-
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(1.0 + 4.4 * len(panels), 4.6), layout="constrained")
-        axes = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
+    figure, ((*axes,),) = canvas(1, len(panels), (1.0 + 4.4 * len(panels), 4.6), sharey=True)
     for axis, panel in zip(axes, panels, strict=True):
         _draw(axis, panel)
     axes[0].set_ylabel(intensity)

@@ -4,29 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from ..boundary_layer.particle import ParticleImpact
-from .histories import STYLE, save
+from .histories import canvas, save
 
 COLOURS = ("tab:blue", "tab:orange", "tab:green", "tab:red", "tab:purple")
 
 
-def grid(rows: int, columns: int, size: tuple[float, float], **more: Any) -> tuple[Any, Any]:
-    import matplotlib
-    from matplotlib.figure import Figure
-
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=size, layout="constrained")
-        axes = figure.subplots(rows, columns, squeeze=False, **more)
-    return figure, axes
-
-
 def plot_particle(impacts: Mapping[str, Sequence[tuple[str, ParticleImpact]]], path: str | Path) -> Path:
     """Draw Fig. 1: distance and velocity against t/t_f, a row of panels for each group; group -> (label, impact)."""
-    figure, axes = grid(len(impacts), 2, (10.0, 3.3 * len(impacts) + 0.3))
+    figure, axes = canvas(len(impacts), 2, (10.0, 3.3 * len(impacts) + 0.3))
     for (place, speed), (title, group) in zip(axes, impacts.items(), strict=True):
         for (label, impact), colour in zip(group, COLOURS, strict=False):
             part = np.linspace(0.0, 1.0, 301)

@@ -21,7 +21,7 @@ from ..ground_motion import (
     integrated,
     pga,
 )
-from .histories import STYLE, length_unit, panels, plain, save
+from .histories import canvas, length_unit, panels, plain, plain_numbers, save
 
 SAMPLES_A_PERIOD = 10
 """A spectrum is drawn pale at periods with fewer samples of the record than this."""
@@ -89,18 +89,10 @@ def plot_spectra(
 
 def _logarithmic_panels() -> tuple[Any, Any]:
     """(figure, two axes above each other) with one logarithmic axis of periods, marked in plain numbers."""
-    import matplotlib
-    from matplotlib.figure import Figure
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(8.0, 7.5), layout="constrained")
-        axes = figure.subplots(2, 1, sharex=True)
-    axes[1].set_xscale("log")
-    axes[1].xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes[1].xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes[1].xaxis.set_minor_formatter(NullFormatter())
-    return figure, axes
+    figure, axes = canvas(2, 1, (8.0, 7.5), sharex=True)
+    axes[1, 0].set_xscale("log")
+    plain_numbers(axes[1, 0].xaxis)
+    return figure, axes[:, 0]
 
 
 def _line(axis: Any, times: Array, values: Array, label: str) -> None:

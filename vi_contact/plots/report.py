@@ -16,7 +16,7 @@ from ..engineering.floor_spectra import recorded_motion
 from ..engineering.peak_values import Peak, peaks
 from ..ground_motion import STANDARD_GRAVITY, Record, response_spectrum
 from ..run.files.reading import RunFolder
-from .histories import LEDGER, STYLE, log_axis, scaled
+from .histories import LEDGER, STYLE, log_axis, plain_numbers, scaled
 from .maps import arc_position, draw_map, thinned
 
 PAGE = (8.27, 11.69)  # inches, A4
@@ -171,8 +171,6 @@ def _label(axis: Any, title: str, rows: int = 1) -> None:
 
 def _spectrum(axis: Any, run: RunFolder, names: Sequence[str]) -> None:
     """Pseudo-acceleration of the ground's motion, 5 % damping; pale at periods that its steps do not resolve."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
     for name in names:
         record = recorded_motion(run.history, name)
         periods = shown_periods(record)
@@ -181,9 +179,7 @@ def _spectrum(axis: Any, run: RunFolder, names: Sequence[str]) -> None:
         trusted = periods >= SAMPLES_A_PERIOD * record.dt
         axis.semilogx(periods[trusted], psa[trusted], lw=0.9, color=line.get_color(), label=name)
     _label(axis, "response spectrum of the ground, 5 %")
-    axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axis.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axis.xaxis.set_minor_formatter(NullFormatter())
+    plain_numbers(axis.xaxis)
     axis.set_ylim(bottom=0.0)
     axis.set(xlabel="period [s]", ylabel="pseudo-acceleration [g]")
 

@@ -3,29 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from ..engineering.floor_spectra import TransferFunction
 from ..engineering.peak_values import Loop
-from .histories import STYLE, plain, save, scaled
-
-
-def _panel(size: tuple[float, float]) -> tuple[Any, Any]:
-    import matplotlib
-    from matplotlib.figure import Figure
-
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=size, layout="constrained")
-        return figure, figure.subplots()
+from .histories import canvas, plain, plain_numbers, save, scaled
 
 
 def plot_loop(
     loop: Loop, path: str | Path, *, x: tuple[str, str], y: tuple[str, str], title: str | None = None
 ) -> Path:
     """Draw force over deformation; ``x``, ``y``: (name, SI unit) of the two. The title says the work at the end."""
-    figure, axis = _panel((6.4, 4.8))
+    figure, ((axis,),) = canvas(1, 1, (6.4, 4.8))
     across, x_unit = scaled(loop.deformation, x[1])
     up, y_unit = scaled(loop.force, y[1])
     axis.axhline(0.0, color="0.6", lw=0.6)
@@ -44,16 +34,12 @@ def plot_transfer(
     found: TransferFunction, path: str | Path, *, title: str, theory: TransferFunction | None = None
 ) -> Path:
     """Draw the amplitude over frequency, both logarithmic; a theory dashed."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
-    figure, axis = _panel((7.5, 4.5))
+    figure, ((axis,),) = canvas(1, 1, (7.5, 4.5))
     axis.loglog(found.frequencies, found.amplitude, color="black", lw=1.0, label="computed")
     if theory is not None:
         axis.loglog(theory.frequencies, theory.amplitude, "--", color="tab:red", lw=1.0, label="theory")
         axis.legend(fontsize=8)
-    axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axis.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axis.xaxis.set_minor_formatter(NullFormatter())
+    plain_numbers(axis.xaxis)
     axis.axhline(1.0, color="0.6", lw=0.6)
     frequency, amplitude = found.peak
     axis.plot(frequency, amplitude, "o", color="tab:blue", ms=4)
