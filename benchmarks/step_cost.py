@@ -30,7 +30,7 @@ import numpy as np  # noqa: E402
 from mpi4py import MPI  # noqa: E402
 
 import vi_contact as vc  # noqa: E402
-from vi_contact.core.step import initial_state  # noqa: E402
+from vi_contact.core.state_checks import initial_state  # noqa: E402
 from vi_contact.meshes.channel import ChannelMesh  # noqa: E402
 from vi_contact.models.channel import model as channel  # noqa: E402
 from vi_contact.models.wall import Wall, build  # noqa: E402

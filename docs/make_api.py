@@ -26,7 +26,8 @@ ROOMS = (
 CONTRACT = (
     ("core.step", ("Scheme", "Solver", "PreparedSolver", "Recorder")),
     ("core.protocols", ("FrictionLaw", "ImpactLaw", "MassLaw", "Excitation")),
-    ("core.surfaces", ("Obstacle",)),
+    ("core.obstacles", ("Obstacle",)),
+    ("core.companion", ("Companion",)),
 )
 VALUES = (
     ("core.step", ("State", "StepProblem", "EffectiveMatrix", "StepResult", "Balance", "Report")),

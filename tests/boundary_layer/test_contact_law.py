@@ -18,7 +18,7 @@ from vi_contact.boundary_layer.metric import Metric
 from vi_contact.boundary_layer.scheme import BoundaryLayer
 from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.core.problem import ContactProblem
-from vi_contact.core.step import initial_state
+from vi_contact.core.state_checks import initial_state
 from vi_contact.exact.bar import ThrownBar
 from vi_contact.laws.excitation import Harmonic
 from vi_contact.laws.friction import Coulomb

@@ -8,9 +8,9 @@ from bar import bar
 from chain import chain_problem
 
 from vi_contact.core.algebra import EffectiveMatrix, SerialAlgebra, SerialMatrix
+from vi_contact.core.certificate import Certificate
 from vi_contact.core.errors import InputError, StepFailure, ViContactError
 from vi_contact.core.protocols import Frictionless
-from vi_contact.core.step import Certificate
 from vi_contact.laws.excitation import Harmonic
 
 pytestmark = pytest.mark.serial

@@ -8,8 +8,8 @@ from chain import chain_surface
 
 from vi_contact.core.algebra import SerialComm
 from vi_contact.core.errors import InputError
-from vi_contact.core.initial_gap import admissible_gap
-from vi_contact.core.surfaces import AnalyticGap, HalfSpace, Touching, empty_surface, nodal_frames
+from vi_contact.core.obstacles import AnalyticGap, HalfSpace, Touching, admissible_gap
+from vi_contact.core.surfaces import empty_surface, nodal_frames
 
 pytestmark = pytest.mark.serial
 POINTS = np.array([[0.0, 1.0], [2.0, 3.0], [-1.0, 0.5]])

@@ -12,7 +12,8 @@ from chain import chain_problem
 from shaken import changes, shaken
 
 from vi_contact.core.algebra import EffectiveMatrix, SerialMatrix
-from vi_contact.core.step import Report, StepProblem, StepResult, initial_state
+from vi_contact.core.state_checks import initial_state
+from vi_contact.core.step import Report, StepProblem, StepResult
 from vi_contact.core.verify import energies, energy_balance, kkt_residual
 from vi_contact.laws.impact import ComponentReset, Elastic, Inelastic, MassProjection, Newton
 from vi_contact.schemes.linear_multistep import LinearMultistep

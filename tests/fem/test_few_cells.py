@@ -12,9 +12,9 @@ pytest.importorskip("dolfinx")
 
 from fem_problems import CONCRETE, block
 
+from vi_contact.core.obstacles import HalfSpace
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.protocols import Frictionless
-from vi_contact.core.surfaces import HalfSpace
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.output.fields import XDMF

@@ -15,9 +15,9 @@ from standing import COLUMN, G, standing
 
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
+from vi_contact.core.obstacles import HalfSpace
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.step import State
-from vi_contact.core.surfaces import HalfSpace
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.initial_stress import geometric_stiffness, initial_stress_matrix

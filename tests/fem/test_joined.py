@@ -15,9 +15,10 @@ from two_bodies import SOFT, blocks, forces, momenta, per_body, relative, thrown
 
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
+from vi_contact.core.obstacles import AnalyticGap, HalfSpace
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.protocols import Frictionless
-from vi_contact.core.surfaces import AnalyticGap, ContactSurface, HalfSpace, empty_surface
+from vi_contact.core.surfaces import ContactSurface, empty_surface
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.joined import joined_surfaces
 from vi_contact.fem.contact.pairs import contact_pair

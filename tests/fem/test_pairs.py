@@ -16,8 +16,8 @@ from two_bodies import SOFT, blocks, forces, per_body, relative, thrown, two_blo
 
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
+from vi_contact.core.obstacles import HalfSpace
 from vi_contact.core.problem import ContactProblem
-from vi_contact.core.surfaces import HalfSpace
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.matching import NodeToNode
 from vi_contact.fem.contact.pairs import contact_pair

@@ -12,7 +12,7 @@ import vi_contact as vc
 from vi_contact import engineering, fem, solvers
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
-from vi_contact.core.step import initial_state
+from vi_contact.core.state_checks import initial_state
 from vi_contact.core.surfaces import nodal_frames
 from vi_contact.engineering.resultants import tangent_vectors
 from vi_contact.fem import compat

@@ -12,9 +12,9 @@ from mpi4py import MPI
 
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
+from vi_contact.core.obstacles import AnalyticGap, HalfSpace, Touching
 from vi_contact.core.problem import ContactProblem
-from vi_contact.core.step import initial_state
-from vi_contact.core.surfaces import AnalyticGap, HalfSpace, Touching
+from vi_contact.core.state_checks import initial_state
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import BodyForce, Prescribed

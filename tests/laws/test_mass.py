@@ -15,8 +15,8 @@ from mpi4py import MPI
 
 from vi_contact.core.algebra import largest, total
 from vi_contact.core.errors import InputError
+from vi_contact.core.obstacles import Touching
 from vi_contact.core.problem import ContactProblem
-from vi_contact.core.surfaces import Touching
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.laws.friction import Coulomb

@@ -11,7 +11,7 @@ from chain import chain_problem
 from shaken import SHAKE, changes, shaken
 
 from vi_contact.core.errors import InputError
-from vi_contact.core.step import initial_state
+from vi_contact.core.state_checks import initial_state
 from vi_contact.laws.impact import Elastic, Inelastic
 from vi_contact.schemes.linear_multistep import LinearMultistep
 from vi_contact.schemes.ss22 import SS22

@@ -11,10 +11,12 @@ from fem_problems import CONCRETE, block, linear
 from mpi4py import MPI
 
 from vi_contact.core.algebra import EffectiveMatrix
+from vi_contact.core.certificate import Certificate
 from vi_contact.core.errors import InputError, StepFailure
+from vi_contact.core.obstacles import HalfSpace
 from vi_contact.core.problem import ContactProblem
-from vi_contact.core.step import Certificate, State, StepProblem, StepResult, initial_state
-from vi_contact.core.surfaces import HalfSpace
+from vi_contact.core.state_checks import initial_state
+from vi_contact.core.step import State, StepProblem, StepResult
 from vi_contact.core.verify import kkt_residual
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.pairs import contact_pair

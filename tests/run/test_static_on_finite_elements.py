@@ -10,9 +10,10 @@ from fem_problems import CONCRETE, block, field, held_by, max_over_ranks, turned
 from mpi4py import MPI
 
 from vi_contact.core.algebra import Array
+from vi_contact.core.obstacles import HalfSpace
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.step import State
-from vi_contact.core.surfaces import ContactSurface, HalfSpace
+from vi_contact.core.surfaces import ContactSurface
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import BodyForce, Prescribed, Traction

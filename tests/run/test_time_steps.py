@@ -20,7 +20,8 @@ from shaken import changes, shaken
 
 from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.core.problem import ContactProblem
-from vi_contact.core.step import Report, initial_state
+from vi_contact.core.state_checks import initial_state
+from vi_contact.core.step import Report
 from vi_contact.laws.impact import Inelastic, MassProjection
 from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.run.march import March

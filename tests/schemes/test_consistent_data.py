@@ -20,7 +20,8 @@ from shaken import changes, shaken
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.core.problem import ContactProblem
-from vi_contact.core.step import Report, State, initial_state
+from vi_contact.core.state_checks import initial_state
+from vi_contact.core.step import Report, State
 from vi_contact.core.verify import energies, energy_balance
 from vi_contact.exact.columns import ObliqueImpact
 from vi_contact.laws.friction import Coulomb

@@ -14,7 +14,8 @@ from oscillator import FAR, amplification, observed_order
 
 from vi_contact.core.errors import InputError
 from vi_contact.core.problem import ContactProblem
-from vi_contact.core.step import State, initial_state
+from vi_contact.core.state_checks import initial_state
+from vi_contact.core.step import State
 from vi_contact.laws.excitation import Harmonic
 from vi_contact.laws.impact import Inelastic, NoImpact
 from vi_contact.laws.mass import ConsistentMass, Redistributed

@@ -14,8 +14,8 @@ from energy_checks import course
 from fem_problems import WALL_DT, run, shaken_wall
 from mpi4py import MPI
 
+from vi_contact.core.obstacles import HalfSpace
 from vi_contact.core.problem import ContactProblem
-from vi_contact.core.surfaces import HalfSpace
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.mesh import build_mesh

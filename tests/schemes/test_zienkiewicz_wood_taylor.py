@@ -10,7 +10,7 @@ from kane import kane
 from oscillator import SHAKEN, amplification, exact, last_state, observed_order, oscillators
 
 from vi_contact.core.errors import InputError
-from vi_contact.core.step import initial_state
+from vi_contact.core.state_checks import initial_state
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 
 pytestmark = pytest.mark.serial

@@ -13,7 +13,8 @@ from mpi4py import MPI
 from vi_contact.core.algebra import EffectiveMatrix
 from vi_contact.core.errors import StepFailure
 from vi_contact.core.problem import ContactProblem
-from vi_contact.core.step import Scheme, StepProblem, StepResult, initial_state
+from vi_contact.core.state_checks import initial_state
+from vi_contact.core.step import Scheme, StepProblem, StepResult
 from vi_contact.core.verify import kkt_residual
 from vi_contact.laws.friction import Coulomb, ExponentialDecay, SlipRateCoulomb, Tresca
 from vi_contact.schemes.moreau_jean import MoreauJean

@@ -13,9 +13,9 @@ pytest.importorskip("dolfinx")
 from fem_problems import BOX_DT, block, thrown_box
 from tipped import ROUGH_ON_ONE_SIDE, RUBBER, tipped
 
+from vi_contact.core.obstacles import HalfSpace
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.protocols import FrictionLaw
-from vi_contact.core.surfaces import HalfSpace
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import BodyForce, Prescribed

@@ -6,7 +6,7 @@ import numpy as np
 from bar import run
 from oscillator import oscillators
 
-from vi_contact.core.step import initial_state
+from vi_contact.core.state_checks import initial_state
 from vi_contact.schemes.generalised_alpha import AlphaStep
 
 

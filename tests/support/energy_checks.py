@@ -10,7 +10,8 @@ from bar import before_impact, energy, run
 
 from vi_contact.core.algebra import total
 from vi_contact.core.problem import ContactProblem
-from vi_contact.core.step import State, initial_state
+from vi_contact.core.state_checks import initial_state
+from vi_contact.core.step import State
 from vi_contact.core.verify import energies, energy_balance
 
 

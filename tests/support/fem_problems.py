@@ -15,9 +15,10 @@ from typing import Any
 import numpy as np
 
 from vi_contact.core.algebra import Array, Mask, total
+from vi_contact.core.obstacles import HalfSpace
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.step import Scheme, Solver, State
-from vi_contact.core.surfaces import HalfSpace, empty_surface
+from vi_contact.core.surfaces import empty_surface
 from vi_contact.core.system import SemiDiscreteSystem
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface

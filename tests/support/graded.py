@@ -10,8 +10,8 @@ import numpy as np
 from fem_problems import block
 
 from vi_contact.core.algebra import Array
+from vi_contact.core.obstacles import Obstacle
 from vi_contact.core.problem import ContactProblem
-from vi_contact.core.surfaces import Obstacle
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import Prescribed, Traction

@@ -8,8 +8,8 @@ import numpy as np
 from fem_problems import BODIES, CONCRETE, block
 from mpi4py import MPI
 
+from vi_contact.core.obstacles import Touching
 from vi_contact.core.problem import ContactProblem
-from vi_contact.core.surfaces import Touching
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface
 

@@ -6,8 +6,8 @@ import numpy as np
 from fem_problems import CONCRETE, block, turned
 from mpi4py import MPI
 
+from vi_contact.core.obstacles import HalfSpace
 from vi_contact.core.problem import ContactProblem
-from vi_contact.core.surfaces import HalfSpace
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import BodyForce, Prescribed, Traction

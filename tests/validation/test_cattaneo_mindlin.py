@@ -27,8 +27,8 @@ from graded import even_then_growing, growing
 from mpi4py import MPI
 
 from vi_contact.core.algebra import Array
+from vi_contact.core.obstacles import AnalyticGap
 from vi_contact.core.problem import ContactProblem
-from vi_contact.core.surfaces import AnalyticGap
 from vi_contact.exact.hertz import HertzLine
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.pairs import contact_pair

@@ -26,9 +26,9 @@ from fem_problems import block, field, held_by, turned
 from mpi4py import MPI
 
 from vi_contact.core.algebra import Array
+from vi_contact.core.obstacles import HalfSpace
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.step import State
-from vi_contact.core.surfaces import HalfSpace
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import Prescribed, Traction

@@ -19,8 +19,8 @@ from fem_problems import field, orders
 from graded import Pressed, even_then_growing, growing, pressed_half
 from mpi4py import MPI
 
+from vi_contact.core.obstacles import AnalyticGap, HalfSpace
 from vi_contact.core.problem import ContactProblem
-from vi_contact.core.surfaces import AnalyticGap, HalfSpace
 from vi_contact.exact.hertz import HertzLine, HertzPoint, contact_modulus
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface

@@ -17,8 +17,8 @@ from mpi4py import MPI
 
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
+from vi_contact.core.obstacles import HalfSpace, Touching
 from vi_contact.core.problem import ContactProblem
-from vi_contact.core.surfaces import HalfSpace, Touching
 from vi_contact.core.verify import energy_balance
 from vi_contact.exact.hertz import HertzPoint
 from vi_contact.fem.assembly import assemble

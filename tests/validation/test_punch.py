@@ -13,7 +13,7 @@ from graded import Pressed, growing, pressed_half
 from mpi4py import MPI
 
 from vi_contact.core.algebra import Array, Mask
-from vi_contact.core.surfaces import AnalyticGap
+from vi_contact.core.obstacles import AnalyticGap
 from vi_contact.exact.punch import StripPunch
 from vi_contact.laws.materials import LinearElastic
 

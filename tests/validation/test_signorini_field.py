@@ -16,9 +16,9 @@ import pytest
 from fem_problems import Errors, block, field, field_errors, orders, plane_strain, signorini_field, signorini_pressure
 from mpi4py import MPI
 
+from vi_contact.core.obstacles import HalfSpace
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.step import State
-from vi_contact.core.surfaces import HalfSpace
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import BodyForce, Prescribed

@@ -24,10 +24,10 @@ from ..core.algebra import Array, EffectiveMatrix, Indices, Mask, SerialAlgebra,
 from ..core.checks import array, flag, function, instance, integers, provides
 from ..core.corners import FEATURE_ANGLE
 from ..core.errors import InputError
-from ..core.initial_gap import admissible_gap
+from ..core.obstacles import Obstacle, Touching, admissible_gap
 from ..core.protocols import FrictionLaw, Frictionless
 from ..core.step import StepProblem
-from ..core.surfaces import ContactSurface, Obstacle, Touching, nodal_frames
+from ..core.surfaces import ContactSurface, nodal_frames
 from .boundary_mesh import BoundaryMesh
 from .energetic import summed
 from .poincare_steklov import CondensedCompliance

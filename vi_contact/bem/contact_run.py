@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core.algebra import Array, Mask
+from ..core.certificate import Certificate
 from ..core.checks import array, instance, mask, number
 from ..core.errors import InputError, StepFailure
-from ..core.step import Certificate, StepProblem, StepResult
+from ..core.step import StepProblem, StepResult
 from ..core.verify import kkt_residual
 from ..solvers.certified import TOLERANCE
 from ..solvers.condensed import Condensed

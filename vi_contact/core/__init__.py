@@ -5,11 +5,14 @@ from __future__ import annotations
 from .lazy import lazy
 
 _CONTENTS = {
+    "certificate": ("Certificate",),
+    "companion": ("Companion",),
     "errors": ("InputError", "Interrupted", "StepFailure", "ViContactError"),
+    "obstacles": ("AnalyticGap", "HalfSpace", "Obstacle", "Touching"),
     "problem": ("ContactProblem",),
     "protocols": ("Excitation", "Frictionless", "FrictionLaw", "ImpactLaw", "MassLaw"),
-    "step": ("Certificate", "Recorder", "Report", "Scheme", "Solver", "State", "StepProblem", "StepResult"),
-    "surfaces": ("AnalyticGap", "ContactSurface", "HalfSpace", "Touching"),
+    "step": ("PreparedSolver", "Recorder", "Report", "Scheme", "Solver", "State", "StepProblem", "StepResult"),
+    "surfaces": ("ContactSurface",),
     "system": ("Load", "SemiDiscreteSystem"),
     "verify": ("energy_balance", "kkt_residual"),
 }

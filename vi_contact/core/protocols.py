@@ -13,75 +13,85 @@ from .system import SemiDiscreteSystem
 
 
 class Excitation(Protocol):
-    """The contract of every excitation."""
+    """Shake the ground in one direction, or give any motion its history: the contract of every excitation."""
 
     @property
     def direction(self) -> tuple[float, ...]:
-        """Components of the direction, one per space dimension, not all zero."""
+        """Return the components of the direction, (d,), not all zero; its length is a factor on the acceleration."""
         ...
 
     @property
     def duration(self) -> float:
-        """Time [s] after which the acceleration stays zero or negligible; infinite if it never does."""
+        """Return the time [s] after which the acceleration stays zero or negligible; infinite if it never does."""
         ...
 
     def acceleration(self, t: float) -> float:
-        """Acceleration [m/s²] at time t [s], positive along the direction."""
+        """Return the acceleration [m/s²] at time ``t`` [s], positive along the direction.
+
+        Asked for at any time >= 0, also twice and between the steps; the same on every rank, a finite number.
+        """
         ...
 
     def __call__(self, t: float) -> Array:
-        """The vector acceleration(t) · direction [m/s²], shape (d,)."""
+        """Return the vector acceleration(t) · direction [m/s²] at time ``t`` [s], shape (d,)."""
         ...
 
 
 class FrictionLaw(Protocol):
-    """What a solver asks of a friction law."""
+    """Bound the tangential reaction by the normal one: what a solver asks of a friction law.
+
+    |r_t| <= limit(r_n) = cohesion + slope max(r_n, 0); r_t = limit along the slip where there is one.
+    """
 
     def limit(self, r_n: Array, weights: Array, scale: float) -> Array:
-        """Largest tangential reaction of each node, shape (n,), in the unit of r_n.
+        """Return the largest tangential reaction of each condition, (m,), in the unit of ``r_n``; >= 0.
 
-        r_n: normal reactions, shape (n,) [N or N s]; weights: tributary lengths or areas, shape (n,) [m or m²];
-        scale: 1 for forces, dt [s] for impulses.
+        Args:
+            r_n: normal reactions (m,), ``scale`` times newtons; of either sign, tension counts as zero.
+            weights: tributary lengths times thickness, or areas (m,) [m²]: what turns stresses into forces.
+            scale: of the step: 1 for forces, dt [s] for impulses. A limit that does not depend on r_n is multiplied
+                by it.
         """
         ...
 
     def slope(self, weights: Array) -> Array:
-        """d limit / d r_n of each node under pressure, shape (n,); limit does not grow with tension."""
+        """Return d limit / d r_n >= 0 of each condition under pressure, (m,); ``weights`` as in ``limit``."""
         ...
 
     def at(self, speed: Array) -> FrictionLaw:
-        """The law at slip rates |v| [m/s], shape (n,), with a slope of its own.
+        """Return the law at slip rates ``speed`` = |v_t| (m,) [m/s], >= 0, with limit and slope of its own.
 
-        ``limit`` and ``slope`` of a law itself are those at rest. A law that does not know rates returns itself.
+        ``limit`` and ``slope`` of the law itself are those at rest. A law that does not know rates returns itself,
+        the same object: that spares the iteration over rates.
         """
         ...
 
 
 @dataclass(frozen=True)
 class Frictionless:
-    """No tangential reaction: limit = 0."""
+    """Let everything slide freely: limit = 0."""
 
     def limit(self, r_n: Array, weights: Array, scale: float) -> Array:
-        """Zeros, shape (n,)."""
+        """Return zeros, shape (m,)."""
         return np.zeros_like(r_n, dtype=float)
 
     def slope(self, weights: Array) -> Array:
-        """Zeros, shape (n,)."""
+        """Return zeros, shape (m,)."""
         return np.zeros(len(weights))
 
     def at(self, speed: Array) -> Frictionless:
-        """Itself: the law does not know the slip rate."""
+        """Return itself: the law does not know the slip rate."""
         return self
 
 
 @dataclass(frozen=True)
 class Impact:
-    """What an impact law is told of the m conditions.
+    """Tell an impact law of the m conditions; springs do not collide, their conditions are never active here.
 
     Attributes:
-        before: normal velocities before the step [m/s], > 0 towards the obstacle.
-        v_n: normal velocities that the step left [m/s].
-        active: which are closed. closing: which have just closed.
+        before: (m,) normal velocities before the step [m/s], > 0 towards the obstacle.
+        v_n: (m,) normal velocities that the step left [m/s].
+        active: (m,) which are closed. closing: (m,) which have just closed.
     """
 
     before: Array
@@ -91,20 +101,39 @@ class Impact:
 
 
 class ImpactLaw(Protocol):
-    """Post-impact velocity law: one of this file, or the user's own object with these two methods."""
+    """Change velocities after a step in which conditions are closed: a law of ``laws.impact``, or your own."""
 
     def target(self, impact: Impact) -> Array:
-        """Normal velocities (m,) after the impact; NaN where the law leaves the velocity alone."""
+        """Return the normal velocities (m,) [m/s] after ``impact``; NaN where the law leaves the velocity alone.
+
+        > 0 is towards the obstacle, so a rebound is negative. Called only when some condition is active.
+        """
         ...
 
     def apply(self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array) -> Array:
-        """The velocity vector that has these normal velocities."""
+        """Return the velocity vector (n,) [m/s] that has the normal velocities ``target`` (m,), where they are not NaN.
+
+        Args:
+            system: the equations that are marched, whose M says what an impulse does.
+            surface: its contact conditions, ``surface.normal_values(v)`` are the velocities to change.
+            v: the velocity (n,) [m/s] that the step left; not to be written to. Collective.
+        """
         ...
 
 
 class MassLaw(Protocol):
-    """Turns the system, in the rotated basis, into one with the wanted mass matrix."""
+    """Choose the mass matrix that contact is marched with."""
 
     def apply(
         self, system: SemiDiscreteSystem, surface: ContactSurface, *, tangential: bool
-    ) -> SemiDiscreteSystem: ...
+    ) -> SemiDiscreteSystem:
+        """Return ``system`` with the wanted mass matrix, as ``system.changed(M=…, massless=…)``, or as it is.
+
+        Args:
+            system: in the rotated basis of ``surface``, every body in its own unknowns, before the excitations.
+            surface: the conditions, whose nodes may lose their inertia (``massless``: True for unknowns without).
+            tangential: whether there is friction: then tangential contact unknowns matter as normal ones do.
+
+        Total mass and centre of mass should stay as they are; C and the load follow when inertia is moved. Collective.
+        """
+        ...

@@ -1,4 +1,4 @@
-"""Check that a state belongs to a problem: its time, and sizes and kinds of its arrays on every rank."""
+"""Make the state a run begins with; check that a state belongs to a problem: its time, its arrays on every rank."""
 
 from __future__ import annotations
 
@@ -7,18 +7,20 @@ from typing import Any
 
 import numpy as np
 
+from .algebra import largest, max_abs
 from .checks import instance, number, refuse, shown, whole
+from .errors import InputError
 from .problem import ContactProblem
 from .step import State
 
 
 def check_problem_given(owner: str, value: Any) -> None:
-    """InputError unless it is a contact problem."""
+    """Raise InputError unless it is a contact problem."""
     instance(owner, "problem", value, ContactProblem, "give a ContactProblem(system, surface, …)")
 
 
 def start_time(owner: str, state: Any) -> float:
-    """The time of a state [s], 0 of None; InputError for anything else."""
+    """Return the time of a state [s], 0 for None; InputError for anything else."""
     if state is None:
         return 0.0
     instance(owner, "state", state, State, "give a state, of static_equilibrium or of a run, or None")
@@ -27,14 +29,14 @@ def start_time(owner: str, state: Any) -> float:
 
 
 def check_sizes(owner: str, problem: ContactProblem, state: Any) -> None:
-    """InputError, on all ranks, for a state of another problem. Collective."""
+    """Raise InputError, on all ranks, for a state of another problem. Collective."""
     start_time(owner, state)
     instance(owner, "state", state, State, "give a state, of static_equilibrium or of a run")
     refuse((f"{owner}: {text}" for text in _of_state(problem, state)), problem.surface.comm)
 
 
 def _of_state(problem: ContactProblem, state: State) -> Iterator[str]:
-    """What is wrong with a state on this rank."""
+    """Say what is wrong with a state on this rank."""
     n, m, d = problem.system.rows, problem.surface.count, problem.system.influence.shape[1]
     shapes: dict[str, tuple[int, ...]] = {"u": (n,), "v": (n,), "r_n": (m,), "active": (m,), "r_t": (m, d - 1)}
     for name, shape in shapes.items():
@@ -46,3 +48,17 @@ def _of_state(problem: ContactProblem, state: State) -> Iterator[str]:
             yield f"the state has {name} of shape {np.shape(value)} and the problem needs {shape}: give one of its own"
         elif value.dtype.kind not in kinds or not np.all(np.isfinite(value)):
             yield f"{name} of the state is {shown(value)}: give {wanted}"
+
+
+def initial_state(problem: ContactProblem, t: float = 0.0) -> State:
+    """Return u0 and v0 of the system in the rotated basis, without reaction; InputError when u0 is in the obstacle."""
+    system, surface = problem.equations, problem.surface
+    gap = surface.gap(t) - surface.normal_values(system.u0)
+    u_max = largest(surface.comm, max_abs(system.u0))
+    size = max(u_max, float(np.max(surface.gap0, initial=0.0)))
+    if len(gap) and gap.min() < -1e-9 * size:
+        raise InputError(
+            f"the initial displacement penetrates the obstacle by {-gap.min():.3g} m: reduce it or enlarge the gap"
+        )
+    none = np.zeros(surface.count)
+    return State(t, 0, system.u0.copy(), system.v0.copy(), none, surface.bilateral.copy())

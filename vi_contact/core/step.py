@@ -1,4 +1,4 @@
-"""THE CONTRACT between time schemes and solvers, and the values that pass between them.
+"""State THE CONTRACT between time schemes and solvers, and the values that pass between them.
 
 Every time scheme turns a step into the same one-step problem, and every solver solves it:
 
@@ -9,6 +9,14 @@ Every time scheme turns a step into the same one-step problem, and every solver 
 ``r_n`` and ``r_t`` are ``scale`` times the reactions of the step in newtons, those of the body on its support;
 ``compliance`` is zero on a rigid support. Vectors are arrays of owned unknowns in the rotated basis; contact arrays
 have shape (m,) or, tangential ones, (m, d - 1), and are equal on all ranks; r_t is None without friction.
+
+The loop (``run.march``) calls, for every step, in this order:
+
+    scheme.step -> solver.solve -> kkt_residual (core.verify) -> scheme.finish -> the impact law, scheme.jump
+
+and ``scheme.effective_matrix`` and ``solver.prepare`` once for every dt. Below n are the unknowns this rank owns, m the
+contact conditions, d the dimensions. ``problem.equations`` is the system to march: in the rotated basis, with mass law
+and excitations in it; ``problem.surface`` are its contact conditions. Arrays that come in are read, never written to.
 """
 
 from __future__ import annotations
@@ -20,7 +28,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from .algebra import Array, EffectiveMatrix, Mask, largest, max_abs
+from .algebra import Array, EffectiveMatrix, Mask
+from .certificate import Certificate
 from .errors import InputError
 from .problem import ContactProblem
 from .protocols import FrictionLaw, Frictionless, MassLaw
@@ -29,10 +38,10 @@ from .surfaces import ContactSurface
 
 @dataclass(frozen=True)
 class State:
-    """Displacement, velocity and contact at time t = t_k, in the rotated basis.
+    """Hold displacement u (n,) [m], velocity v (n,) [m/s] and contact at time t = t_k [s], in the rotated basis.
 
-    ``r_n``, ``r_t`` [N] are the reactions of the step that led here (mean or end values, as the scheme says);
-    ``memory`` holds what a scheme carries besides u and v.
+    ``r_n`` (m,), ``r_t`` (m, d - 1) [N] are the reactions of the step that led here (mean or end values, as the scheme
+    says); ``active`` (m,) the closed conditions; ``memory`` holds what a scheme carries besides u and v.
     """
 
     t: float
@@ -47,7 +56,7 @@ class State:
 
 @dataclass(frozen=True)
 class StepProblem:
-    """One step, as every solver sees it. ``guess``: predicted x; ``active``: predicted contact set.
+    """Pose one step, as every solver sees it. ``guess`` (n,): predicted x; ``active`` (m,): predicted contact set.
 
     ``rate_factor``: slip rate [m/s] = rate_factor (B_t x - slip0): 1/dt for displacements, 1 for velocities, 0 in
     static problems, where friction is that of rest.
@@ -73,14 +82,15 @@ class StepProblem:
                              f"contact set of {len(self.active)} for {conditions} conditions: give one of each")
 
     def friction_at(self, slip: Array) -> FrictionLaw:
-        """The friction law at the rates [m/s] of this slip, B_t x - slip0 (m, d - 1)."""
+        """Return the friction law at the rates [m/s] of this slip, B_t x - slip0 (m, d - 1)."""
         return self.friction.at(self.rate_factor * np.linalg.norm(slip, axis=1))
 
 
 @dataclass(frozen=True)
 class StepResult:
-    """x, reactions, active set; iterations count changes of the active set, sweeps or Newton steps (method says).
+    """Answer a step: x (n,), r_n (m,) and r_t (m, d - 1), ``scale`` times newtons, and the closed conditions (m,).
 
+    ``iterations`` count changes of the active set, sweeps or Newton steps, as ``method`` says.
     ``history``: what the method with friction logs of its convergence, see there.
     """
 
@@ -95,7 +105,7 @@ class StepResult:
 
 @dataclass(frozen=True)
 class Balance:
-    """The equation of motion that the step satisfied, with the scheme's own averages:
+    """Hold the equation of motion that the step satisfied, with the scheme's own averages:
 
         M a + C v + K u = f - B_nᵀ r_n - B_tᵀ r_t
 
@@ -111,42 +121,98 @@ class Balance:
 
 
 class Scheme(Protocol):
-    """A time scheme: turns a state into a StepProblem and its solution into the next state.
+    """Turn a state into a StepProblem, and the answer into the next state: a time scheme.
 
-    ``mass``: the mass matrix it takes when the problem does not say which. One whose contact condition is on velocities
-    says ``penetrates = True``: states of its own runs may lie inside the obstacle, and it goes on from them.
+    One whose contact condition is on velocities says ``penetrates = True``: states of its own runs may lie inside the
+    obstacle, and it goes on from them. A scheme is a value without state of its own: what it carries from step to step
+    is in ``State.memory``, so that a checkpoint holds all of it.
     """
 
     @property
-    def mass(self) -> MassLaw: ...
+    def mass(self) -> MassLaw:
+        """Return the mass matrix that it takes when the problem does not say which."""
+        ...
 
-    def check(self, problem: ContactProblem) -> None: ...
-    def start(self, problem: ContactProblem, state: State, dt: float) -> State: ...
-    def jump(self, problem: ContactProblem, state: State, v: Array, dt: float) -> State: ...
-    def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix: ...
-    def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem: ...
-    def finish(
-        self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float
-    ) -> State: ...
-    def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance: ...
+    def check(self, problem: ContactProblem) -> None:
+        """Raise InputError unless ``problem`` suits the scheme. Called before anything is computed, on all ranks."""
+        ...
+
+    def start(self, problem: ContactProblem, state: State, dt: float) -> State:
+        """Return ``state`` with the memory that steps of ``dt`` [s] need: accelerations or earlier levels, for example.
+
+        Called with the first state of a run of ``problem``, on a restart, and whenever dt changes; what is in
+        ``state.memory`` already was put there by this scheme, or by none. It may bring initial data into equilibrium.
+        """
+        ...
+
+    def jump(self, problem: ContactProblem, state: State, v: Array, dt: float) -> State:
+        """Return ``state`` with the velocity ``v`` (n,) [m/s] that the impact law of ``problem`` gave, same u and t.
+
+        What the scheme remembers of accelerations has to fit the new velocity before the next step of ``dt`` [s].
+        """
+        ...
+
+    def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
+        """Return A (n rows) of ``problem`` for all steps of ``dt`` [s], as a rule ``problem.equations.effective(…)``.
+
+        A is symmetric positive definite; nothing in it depends on time or state. It is made once for every dt.
+        """
+        ...
+
+    def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem:
+        """Return the problem of the step of ``problem`` from ``state`` to state.t + dt, whose matrix ``A`` is.
+
+        ``dt`` [s] is that of A. The meaning of x is the scheme's own (u1 or v1, say); ``bound`` and ``scale`` fit it,
+        and ``scale`` is the same in all steps of one dt.
+        """
+        ...
+
+    def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
+        """Return the state of ``problem`` at the end of a step of ``dt`` [s], before the impact law.
+
+        ``state`` is the one the step began with, ``step`` what ``step()`` returned for it and ``result`` its certified
+        answer: reactions in it are ``scale`` times newtons, those of the new state are newtons.
+        """
+        ...
+
+    def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
+        """Return the equation of motion that the step of ``dt`` [s] from ``old`` to ``new`` satisfied, for the ledger.
+
+        ``new`` is what ``finish`` returned: before the impact law of ``problem``. Called when a recorder asks.
+        """
+        ...
 
 
 class PreparedSolver(Protocol):
-    """A solver bound to one effective matrix and one surface."""
+    """Solve steps with one effective matrix and one surface; what ``Solver.prepare`` returns."""
 
-    def solve(self, step: StepProblem) -> StepResult: ...
+    def solve(self, step: StepProblem) -> StepResult:
+        """Return x, reactions and closed conditions of ``step``, whose A, surface and scale are those it was made for.
+
+        The answer is judged by its certificate, so the method may stop where it finds best. StepFailure, on all ranks,
+        when there is none. Collective; the reactions are the same arrays on every rank.
+        """
+        ...
 
 
 class Solver(Protocol):
-    """Settings of a one-step solver; ``prepare`` does the work that is shared by all steps with the same A."""
+    """Hold the settings of a one-step solver; ``prepare`` does the work that is shared by all steps with the same A."""
 
-    def check(self, problem: ContactProblem) -> None: ...
-    def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> PreparedSolver: ...
+    def check(self, problem: ContactProblem) -> None:
+        """Raise InputError unless the solver can treat ``problem``: its friction law, supports and matrices."""
+        ...
+
+    def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> PreparedSolver:
+        """Return a solver of steps with the matrix ``A`` on ``surface`` whose reactions are ``scale`` times newtons.
+
+        Called once for every dt; factors and whatever else depends on A alone belong here. Collective.
+        """
+        ...
 
 
 @dataclass(frozen=True)
 class Report:
-    """What happened in one step, for recorders. ``new.v`` is after the impact law, ``v_minus`` before it.
+    """Tell recorders what happened in one step. ``new.v`` is after the impact law, ``v_minus`` before it.
 
     ``problem`` is the one that was solved, with the mass matrix that the scheme chose when none was given.
     """
@@ -163,77 +229,37 @@ class Report:
 
     @cached_property
     def balance(self) -> Balance:
-        """The equation of motion that the step satisfied; made when somebody asks."""
+        """Return the equation of motion that the step satisfied; made when somebody asks."""
         return self.averages()
 
 
-@dataclass(frozen=True)
-class Certificate:
-    """Dimensionless residuals of the inequality problem of one step (design idea 5); each is 0 for an exact solution.
-
-    equilibrium: |A x - b + B_nᵀ r_n|_max / max(|b|_max, |A x|_max, 1e-5 |A_ii|_max |x|_max). The last term matters on
-    fine meshes only, where the parts of A x cancel: it keeps the rounding errors of the residual itself (1e-16 |A||x|)
-    below the tolerance; what passes at 1e-9 is then at most 1e-14 |A||x|.
-    penetration: max(-gap, 0) / x_ref;  tension: max(-r_n, 0) / r_ref.
-    complementarity: max |gap| / x_ref over active and bilateral conditions, max |r_n| / r_ref over the others: the set
-    that the impact law will see is certified too.
-    cone: max(|r_t| - limit(r_n), 0) / t_ref;  dissipation: max (limit |slip| - r_t·slip) / (t_ref s_ref), the maximum
-    dissipation that Coulomb's and Tresca's law ask for: it is 0 where the slip or the limit is, or where r_t lies
-    along the slip on the edge of the cone. t_ref = max(limit, |r_t|, 1e-10 r_ref), s_ref = max(|slip|, 1e-5 x_ref): a
-    step slides a small part of the way and rubs with a small part of the inertia. Both are 0 without friction.
-    x_ref = max(|x|, |guess|), r_ref = max(|b|, |r_n|), maxima over all unknowns: a wide gap blunts no residual.
-    resultant: of static stages, the largest |w·(b - B_nᵀ r_n - B_tᵀ r_t)| over max |w| times the sum of |b| and |Bᵀr|
-    on a body, for its rigid motions w that no prescribed displacement holds: nodal residuals may be small and add up.
-    """
-
-    equilibrium: float
-    penetration: float
-    tension: float
-    complementarity: float
-    cone: float = 0.0
-    dissipation: float = 0.0
-    resultant: float = 0.0
-
-    @property
-    def worst(self) -> float:
-        """The largest residual; NaN counts as infinite."""
-        values = vars(self).values()
-        return float("inf") if any(np.isnan(value) for value in values) else max(values)
-
-
 class Recorder(Protocol):
-    """Listens to the loop. ``columns`` names what ``row`` returns each step: name -> (unit, meaning)."""
+    """Listen to the loop: name columns once, and fill a row after every step. Values are equal on every rank."""
 
-    def columns(self) -> Mapping[str, tuple[str, str]]: ...
+    def columns(self) -> Mapping[str, tuple[str, str]]:
+        """Return what ``start`` and ``row`` fill in: name -> (unit, meaning). Called after ``start``, always the same.
+
+        Names are made of letters, digits and underscores; no two recorders of a run have one in common.
+        """
+        ...
+
     def start(
         self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
     ) -> Mapping[str, Any]:
-        """The row of the initial state; ``resumed`` is the last row of the run that a restart continues."""
+        """Return the row of the initial ``state`` of ``problem``; forget whatever an earlier run has left.
+
+        ``resumed``: the last row of the run that a restart continues, from which sums over time go on; else None.
+        """
         ...
 
     def row(self, report: Report) -> Mapping[str, Any]:
-        """The row of a step: numbers, or arrays (which go to HDF5 only)."""
+        """Return the row of the step that ``report`` tells of: numbers, or arrays of one shape (to HDF5 only).
+
+        Called once a step, in order, on all ranks: collective operations are allowed here.
+        """
         ...
 
 
 Columns = Mapping[str, tuple[str, str]]
-
-
 Row = Mapping[str, Any]
-
-
 AXES = "xyz"
-
-
-def initial_state(problem: ContactProblem, t: float = 0.0) -> State:
-    """u0, v0 of the system, in the rotated basis, no reaction; InputError when u0 penetrates the obstacle."""
-    system, surface = problem.equations, problem.surface
-    gap = surface.gap(t) - surface.normal_values(system.u0)
-    u_max = largest(surface.comm, max_abs(system.u0))
-    size = max(u_max, float(np.max(surface.gap0, initial=0.0)))
-    if len(gap) and gap.min() < -1e-9 * size:
-        raise InputError(
-            f"the initial displacement penetrates the obstacle by {-gap.min():.3g} m: reduce it or enlarge the gap"
-        )
-    none = np.zeros(surface.count)
-    return State(t, 0, system.u0.copy(), system.v0.copy(), none, surface.bilateral.copy())

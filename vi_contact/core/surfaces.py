@@ -1,4 +1,4 @@
-"""Contact surfaces and the obstacles they may touch.
+"""Hold the contact conditions of a surface, the same on every rank.
 
 A contact condition bounds one unknown: after the change of basis u = T û (nodal frames turned to the contact
 direction) the normal displacement u_n of a contact point *is* an entry of û, and B_n is a selection of entries.
@@ -11,102 +11,17 @@ import logging
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from .algebra import Array, Comm, Indices, Mask, Matrix
-from .checks import array, function, real, shown
+from .checks import function, real, shown
+from .companion import Companion
 from .errors import InputError
 
 log = logging.getLogger(__name__)
 Motion = Callable[[float], float | Array]
-
-
-class Obstacle(Protocol):
-    """A rigid support. ``directions`` gives the unit contact direction of each point, ``gap`` its initial gap [m]."""
-
-    def directions(self, points: Array, normals: Array) -> Array: ...
-    def gap(self, points: Array, normals: Array) -> Array: ...
-
-
-@dataclass(frozen=True)
-class Touching:
-    """A support that fits the boundary exactly: zero initial gap, contact along the body's outward normal."""
-
-    def directions(self, points: Array, normals: Array) -> Array:
-        return normals
-
-    def gap(self, points: Array, normals: Array) -> Array:
-        return np.zeros(len(points))
-
-
-@dataclass(frozen=True)
-class HalfSpace:
-    """The rigid half-space behind the plane through ``point`` with ``normal`` pointing out of it, towards the body.
-
-    The condition is exact for any boundary shape: (X + u - point)·normal >= 0, so the contact direction is -normal.
-    """
-
-    point: tuple[float, ...]
-    normal: tuple[float, ...]
-
-    def __post_init__(self) -> None:
-        point, normal = (array("HalfSpace", name, getattr(self, name), (None,)) for name in ("point", "normal"))
-        if not normal.any() or not np.isfinite(np.linalg.norm(normal)) or len(point) != len(normal):
-            raise InputError(
-                f"HalfSpace(point={self.point}, normal={self.normal}): give a point and a nonzero normal "
-                "with the same number of components"
-            )
-
-    @property
-    def unit_normal(self) -> Array:
-        """The normal with length one."""
-        normal = np.asarray(self.normal, dtype=float)
-        return np.asarray(normal / np.linalg.norm(normal))
-
-    def _check(self, points: Array, normals: Array) -> None:
-        if points.shape[1] != len(self.normal):
-            raise InputError(
-                f"HalfSpace has {len(self.normal)} components but the body has {points.shape[1]}: "
-                "give one per dimension"
-            )
-        away = normals @ self.unit_normal > 1e-9  # a side at right angles may touch with its edge
-        if np.any(away) and np.any(away & ~np.isin(alike(points), alike(points)[~away])):  # a corner has several
-            raise InputError(
-                f"HalfSpace normal {self.normal} points away from the body: turn its sign, "
-                "it must point out of the obstacle towards the contact boundary"
-            )
-
-    def directions(self, points: Array, normals: Array) -> Array:
-        self._check(points, normals)
-        return np.tile(-self.unit_normal, (len(points), 1))
-
-    def gap(self, points: Array, normals: Array) -> Array:
-        self._check(points, normals)
-        return np.asarray((points - np.asarray(self.point, dtype=float)) @ self.unit_normal)
-
-
-@dataclass(frozen=True)
-class AnalyticGap:
-    """Initial gap g0(x) given as a function of points (k, d) -> (k,) [m], measured along the body's outward normal."""
-
-    function: Callable[[Array], Array]
-
-    def __post_init__(self) -> None:
-        function("AnalyticGap", "function", self.function, "give a function of points (k, d) that returns gaps (k,)")
-
-    def directions(self, points: Array, normals: Array) -> Array:
-        return normals
-
-    def gap(self, points: Array, normals: Array) -> Array:
-        gap = np.asarray(self.function(points))
-        if gap.shape != (len(points),) or gap.dtype.kind not in "iuf":
-            raise InputError(
-                f"AnalyticGap returned shape {gap.shape} of {gap.dtype} for {len(points)} points: return one gap per "
-                "point, a real number"
-            )
-        return gap.astype(float)
 
 
 @dataclass(frozen=True)
@@ -149,7 +64,7 @@ class ContactSurface:
     motion: Callable[[float], Array] | None = None
     slide: Callable[[float], Array] | None = None
     space: Any = field(default=None, repr=False)
-    companions: tuple[Any, ...] = ()
+    companions: tuple[Companion, ...] = ()
     dual: Matrix | None = None
     nodes: Indices | None = None
     frictionless_corners: bool = False
@@ -262,11 +177,6 @@ def _spread(name: str, value: Any, shape: tuple[int, ...], t: float) -> Array:
         raise InputError(f"a moving obstacle: {name}({t:g} s) is {shown(value)}; return finite metres, one number or "
                          f"an array of shape {shape}")
     return np.broadcast_to(found.astype(float), shape)
-
-
-def alike(points: Array) -> Indices:
-    """A number (k,) for every point, equal where points coincide."""
-    return np.asarray(np.unique(points, axis=0, return_inverse=True)[1], dtype=np.int64).ravel()
 
 
 def nodal_frames(directions: Array) -> Array:

@@ -10,6 +10,7 @@ import numpy as np
 
 from .algebra import Algebra, Array, EffectiveMatrix, Mask, Matrix
 from .checks import array, function, instance, provides, several, shown
+from .companion import Companion
 from .errors import InputError
 
 
@@ -147,7 +148,7 @@ class SemiDiscreteSystem:
     tied: Mask | None = None
     notes: tuple[str, ...] = ()
     absolute: bool = False
-    companions: tuple[Any, ...] = ()
+    companions: tuple[Companion, ...] = ()
     _cache: dict[str, Any] = field(default_factory=dict, compare=False, repr=False)
 
     def __post_init__(self) -> None:

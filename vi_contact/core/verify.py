@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from .algebra import Array, max_abs
+from .certificate import Certificate
 from .problem import ContactProblem
-from .step import Balance, Certificate, State, StepProblem, StepResult
+from .step import Balance, State, StepProblem, StepResult
 from .system import SemiDiscreteSystem
 
 ROUNDED = 1e-5  # of |A||x|, and of what friction is compared with: see Certificate

@@ -19,8 +19,8 @@ import numpy as np
 from ..core.algebra import Array, max_abs
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
-from ..core.state_checks import check_problem_given, check_sizes
-from ..core.step import State, initial_state
+from ..core.state_checks import check_problem_given, check_sizes, initial_state
+from ..core.step import State
 from .space import FemSpace
 
 log = logging.getLogger(__name__)

@@ -16,9 +16,9 @@ from scipy.special import betaincinv
 
 from ..core.algebra import Array
 from ..core.errors import InputError
+from ..core.obstacles import HalfSpace
 from ..core.problem import ContactProblem
 from ..core.protocols import MassLaw
-from ..core.surfaces import HalfSpace
 from ..core.system import SemiDiscreteSystem
 from ..exact.hertz import HertzImpact, contact_modulus
 from ..fem.assembly import assemble

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from ..core.algebra import Array
+from ..core.obstacles import HalfSpace
 from ..core.problem import ContactProblem
 from ..core.protocols import ImpactLaw, MassLaw
-from ..core.surfaces import HalfSpace
 from ..core.system import SemiDiscreteSystem
 from ..exact.bar import PeriodicBar, ThrownBar
 from ..exact.bouncing_bar import BouncingBar

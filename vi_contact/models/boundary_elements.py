@@ -19,8 +19,8 @@ from ..bem.two_bodies import TwoBodies
 from ..core.algebra import Array, Mask
 from ..core.checks import function, instance, number, whole
 from ..core.errors import InputError
+from ..core.obstacles import HalfSpace
 from ..core.protocols import FrictionLaw, Frictionless
-from ..core.surfaces import HalfSpace
 from ..laws.materials import LinearElastic
 
 Load = Callable[[float], float]

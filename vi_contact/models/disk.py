@@ -12,10 +12,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..core.checks import attributes, function, instance
+from ..core.obstacles import HalfSpace
 from ..core.problem import ContactProblem
 from ..core.protocols import FrictionLaw, Frictionless, MassLaw
 from ..core.step import Report, State
-from ..core.surfaces import HalfSpace
 from ..core.system import SemiDiscreteSystem
 from ..fem.assembly import assemble
 from ..fem.contact.surface import contact_surface

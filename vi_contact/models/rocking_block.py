@@ -22,10 +22,10 @@ import numpy as np
 
 from ..core.algebra import Array
 from ..core.errors import InputError
+from ..core.obstacles import HalfSpace
 from ..core.problem import ContactProblem
 from ..core.protocols import Excitation
 from ..core.step import Report, State
-from ..core.surfaces import HalfSpace
 from ..exact.housner import HousnerBlock
 from ..fem.assembly import assemble
 from ..fem.contact.surface import contact_surface

@@ -10,10 +10,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..core.errors import InputError
+from ..core.obstacles import HalfSpace
 from ..core.problem import ContactProblem
 from ..core.protocols import Excitation
 from ..core.step import State
-from ..core.surfaces import HalfSpace
 from ..exact.sliding import SlidingBlock
 from ..fem.assembly import assemble
 from ..fem.contact.surface import contact_surface

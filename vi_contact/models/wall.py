@@ -11,9 +11,10 @@ from typing import Any
 
 from ..core.checks import check_word
 from ..core.errors import InputError
+from ..core.obstacles import HalfSpace
 from ..core.problem import ContactProblem
 from ..core.protocols import Excitation, ImpactLaw, MassLaw
-from ..core.surfaces import ContactSurface, HalfSpace, empty_surface
+from ..core.surfaces import ContactSurface, empty_surface
 from ..core.system import SemiDiscreteSystem
 from ..core.units import STANDARD_GRAVITY
 from ..engineering.modal import lowest_frequency

@@ -10,8 +10,8 @@ import numpy as np
 from ..core.algebra import EffectiveMatrix
 from ..core.problem import ContactProblem
 from ..core.protocols import Impact
-from ..core.state_checks import start_time
-from ..core.step import Report, Scheme, Solver, State, initial_state
+from ..core.state_checks import initial_state, start_time
+from ..core.step import Report, Scheme, Solver, State
 from ..solvers.certified import TOLERANCE, CertifiedSolver
 from ..solvers.condensed import Condensed
 from .checks import bind_companions, check_methods, check_state

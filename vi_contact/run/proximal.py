@@ -21,9 +21,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..core.algebra import Array, EffectiveMatrix, Mask, largest, max_abs
+from ..core.certificate import Certificate
 from ..core.errors import InputError, StepFailure
 from ..core.problem import ContactProblem
-from ..core.step import Certificate, Solver, StepProblem, StepResult
+from ..core.step import Solver, StepProblem, StepResult
 from ..core.verify import kkt_residual
 from ..solvers.correction import MARGIN, added, kept, left_over, share_of
 from .rigid_bodies import RigidBodies, body_springs

@@ -20,8 +20,8 @@ import numpy as np
 from ..core.checks import real, shown
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
-from ..core.state_checks import check_problem_given, check_sizes
-from ..core.step import Solver, State, initial_state
+from ..core.state_checks import check_problem_given, check_sizes, initial_state
+from ..core.step import Solver, State
 from ..solvers.certified import TOLERANCE
 from .checks import check_methods
 from .static import Equilibria

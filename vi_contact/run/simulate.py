@@ -12,8 +12,8 @@ from ..core.checks import flag, instance, provides, several, whole
 from ..core.errors import InputError
 from ..core.files import on_root
 from ..core.problem import ContactProblem
-from ..core.state_checks import start_time
-from ..core.step import Columns, Recorder, Row, Scheme, Solver, State, initial_state
+from ..core.state_checks import initial_state, start_time
+from ..core.step import Columns, Recorder, Row, Scheme, Solver, State
 from ..solvers.certified import TOLERANCE
 from ..solvers.condensed import Condensed
 from .checks import bind_companions, check_methods, check_state

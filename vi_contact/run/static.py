@@ -9,8 +9,8 @@ import numpy as np
 from ..core.algebra import EffectiveMatrix
 from ..core.checks import number
 from ..core.problem import ContactProblem
-from ..core.state_checks import check_problem_given
-from ..core.step import Solver, State, StepProblem, StepResult, initial_state
+from ..core.state_checks import check_problem_given, initial_state
+from ..core.step import Solver, State, StepProblem, StepResult
 from ..solvers.certified import TOLERANCE, CertifiedSolver, refuse_nan
 from ..solvers.condensed import Condensed
 from .checks import check_methods

@@ -11,9 +11,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..core.algebra import EffectiveMatrix, largest
+from ..core.certificate import Certificate
 from ..core.errors import StepFailure
 from ..core.problem import ContactProblem
-from ..core.step import Certificate, PreparedSolver, Solver, StepProblem, StepResult
+from ..core.step import PreparedSolver, Solver, StepProblem, StepResult
 from ..core.surfaces import ContactSurface
 from ..core.verify import kkt_residual
 from .correction import corrected

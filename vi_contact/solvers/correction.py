@@ -19,9 +19,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..core.algebra import Array
+from ..core.certificate import Certificate
 from ..core.errors import StepFailure
 from ..core.protocols import FrictionLaw
-from ..core.step import Certificate, StepProblem, StepResult
+from ..core.step import StepProblem, StepResult
 from ..core.verify import kkt_residual
 
 MARGIN = 2.0**10  # share over residual: reactions may be that much more wrong than the residual tells

@@ -13,8 +13,8 @@ from ...core.algebra import Array
 from ...core.checks import array, provides, several
 from ...core.corners import FEATURE_ANGLE, PARALLEL
 from ...core.errors import InputError
-from ...core.initial_gap import admissible_gap, facing
-from ...core.surfaces import ContactSurface, Obstacle, Touching
+from ...core.obstacles import Obstacle, Touching, admissible_gap, facing
+from ...core.surfaces import ContactSurface
 from ...core.system import SemiDiscreteSystem
 from ..groups import facets_of
 from ..mesh import Facets

@@ -21,7 +21,8 @@ from ...core.checks import shown
 from ...core.errors import InputError
 from ...core.problem import ContactProblem
 from ...core.protocols import Excitation, FrictionLaw, Frictionless, ImpactLaw, MassLaw
-from ...core.step import Recorder, Scheme, Solver, State, initial_state
+from ...core.state_checks import initial_state
+from ...core.step import Recorder, Scheme, Solver, State
 from ...core.surfaces import ContactSurface, empty_surface
 from ...fem.assembly import assemble
 from ...fem.contact.joined import joined_surfaces

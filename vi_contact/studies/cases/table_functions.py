@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ...core import surfaces
 from ...core.checks import number
 from ...core.corners import FEATURE_ANGLE
+from ...core.obstacles import Obstacle
 from ...core.surfaces import ContactSurface
 from ...core.system import SemiDiscreteSystem
 from ...engineering.modal import lowest_frequency
@@ -43,7 +43,7 @@ def record(
 
 
 def surface(
-    system: SemiDiscreteSystem, facets: Facets, *, obstacle: surfaces.Obstacle | None = None,
+    system: SemiDiscreteSystem, facets: Facets, *, obstacle: Obstacle | None = None,
     points: Sequence[tuple[float, ...]] | None = None, feature_angle: float = FEATURE_ANGLE, held: bool = False,
     springs: float | None = None, frictionless_corners: bool = False,
 ) -> ContactSurface:

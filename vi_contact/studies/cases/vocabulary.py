@@ -14,9 +14,10 @@ from types import MappingProxyType, ModuleType
 from typing import Any, get_origin, get_type_hints
 
 from ... import core, engineering, fem, ground_motion, laws, meshes, run, schemes, solvers
+from ...core.obstacles import Obstacle
 from ...core.protocols import Excitation, FrictionLaw, ImpactLaw, MassLaw
 from ...core.step import Recorder, Scheme, Solver
-from ...core.surfaces import ContactSurface, Obstacle
+from ...core.surfaces import ContactSurface
 from ...fem.contact.matching import Matching
 from ...fem.dashpots import CompliantBase, Dashpots
 from ...fem.loads import BodyForce, Prescribed, Traction
