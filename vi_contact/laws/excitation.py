@@ -85,11 +85,8 @@ class Ricker:
 
 
 @dataclass(frozen=True)
-class HalfSine:
-    """a(t) = amplitude · sin(pi t / duration) for 0 <= t < duration [s], zero elsewhere.
-
-    Raises InputError unless amplitude [m/s²] is finite and duration > 0.
-    """
+class Pulse:
+    """Hold what one-sided and two-sided pulses share; amplitude [m/s²] is finite and duration [s] > 0 (InputError)."""
 
     amplitude: float
     duration: float
@@ -99,52 +96,34 @@ class HalfSine:
         check_excitation(self, finite=("amplitude",), positive=("duration",))
 
     def acceleration(self, t: float) -> float:
-        """amplitude · sin(pi t / duration) [m/s²] inside the pulse."""
-        return self.amplitude * math.sin(math.pi * t / self.duration) if 0.0 <= t < self.duration else 0.0
+        """Return the acceleration [m/s²] inside the pulse, 0 outside; the value at a jump is the one after it."""
+        return self.amplitude * self._shape(t) if 0.0 <= t < self.duration else 0.0
+
+    def _shape(self, t: float) -> float:
+        return 1.0
 
     __call__ = vector
 
 
 @dataclass(frozen=True)
-class FullSine:
-    """a(t) = amplitude · sin(2 pi t / duration) for 0 <= t < duration [s], zero elsewhere; the velocity ends at zero.
+class HalfSine(Pulse):
+    """Shake with a(t) = amplitude · sin(pi t / duration) for 0 <= t < duration [s], zero elsewhere."""
 
-    Raises InputError unless amplitude [m/s²] is finite and duration > 0.
-    """
-
-    amplitude: float
-    duration: float
-    direction: tuple[float, ...] = (1.0, 0.0)
-
-    def __post_init__(self) -> None:
-        check_excitation(self, finite=("amplitude",), positive=("duration",))
-
-    def acceleration(self, t: float) -> float:
-        """amplitude · sin(2 pi t / duration) [m/s²] inside the pulse."""
-        return self.amplitude * math.sin(2.0 * math.pi * t / self.duration) if 0.0 <= t < self.duration else 0.0
-
-    __call__ = vector
+    def _shape(self, t: float) -> float:
+        return math.sin(math.pi * t / self.duration)
 
 
 @dataclass(frozen=True)
-class Rectangular:
-    """a(t) = amplitude for 0 <= t < duration [s], zero elsewhere (verification.md V2.7).
+class FullSine(Pulse):
+    """Shake with a(t) = amplitude · sin(2 pi t / duration) for 0 <= t < duration [s]; the velocity ends at zero."""
 
-    The value at a jump is the one after it. Raises InputError unless amplitude [m/s²] is finite and duration > 0.
-    """
+    def _shape(self, t: float) -> float:
+        return math.sin(2.0 * math.pi * t / self.duration)
 
-    amplitude: float
-    duration: float
-    direction: tuple[float, ...] = (1.0, 0.0)
 
-    def __post_init__(self) -> None:
-        check_excitation(self, finite=("amplitude",), positive=("duration",))
-
-    def acceleration(self, t: float) -> float:
-        """amplitude [m/s²] inside the pulse."""
-        return self.amplitude if 0.0 <= t < self.duration else 0.0
-
-    __call__ = vector
+@dataclass(frozen=True)
+class Rectangular(Pulse):
+    """Shake with a(t) = amplitude for 0 <= t < duration [s], zero elsewhere."""
 
 
 @dataclass(frozen=True)
