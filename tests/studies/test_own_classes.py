@@ -20,6 +20,7 @@ from vi_contact.laws.mass import ConsistentMass
 from vi_contact.studies import read_case
 from vi_contact.studies.cases.conformity import defect
 from vi_contact.studies.cases.vocabulary import words
+from vi_contact.studies.ida.runs import OneRun, Shaking
 
 pytestmark = pytest.mark.serial
 CASE = """
@@ -141,6 +142,13 @@ def test_classes_of_allowed_packages(folder: Path, monkeypatch: pytest.MonkeyPat
                      allow="pack")
     made.check()
     assert made.excitations()[0].direction == (1.0, 0.0)
+
+
+def test_runs_of_a_study_are_allowed_the_same(folder: Path) -> None:
+    motion = ("excitation.type=GroundMotion", "excitation.record=m.at2")
+    case = read_case(folder / "case.toml", law("pack:Law", *motion), allow=("pack", "other"))
+    command = OneRun(case, Shaking("m", (Path("m.at2"),)), 1.0, folder / "run").command(())
+    assert command[-4:] == ["--allow", "pack", "--allow", "other"]
 
 
 def test_installed_packages_register_an_entry_point(folder: Path) -> None:

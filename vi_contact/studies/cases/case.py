@@ -1,4 +1,4 @@
-"""Case files: a contact problem and its run in TOML, table by table the calls of the Python interface.
+"""Read and run case files: a contact problem and its run in TOML, table by table the calls of the Python interface.
 
     [mesh]            fem.build_mesh, fem.read_mesh        [scheme] [solver] [[escalation]]
     [material.NAME]   LinearElastic                        [[record]] [fields]
@@ -81,7 +81,7 @@ TABLES = ("format", "title", "model", "mesh", "material", "system", "contact", "
 
 @dataclass(frozen=True)
 class Case:
-    """A case file that has been read and checked; nothing is computed yet.
+    """Hold a case file that has been read and checked; nothing is computed yet.
 
     path: of the file; tables: its content, with the settings; settings: the KEY=VALUE made after reading; nodes: the
     calls that its tables are; allowed: the packages whose classes it may name.
@@ -95,7 +95,7 @@ class Case:
 
     @property
     def out(self) -> Path | None:
-        """The run folder of [run], if it names one."""
+        """Return the run folder of [run], if it names one."""
         node = self._run.get("out")
         return node.build({}) if node is not None else None
 
@@ -107,11 +107,11 @@ class Case:
         return node.arguments
 
     def excitations(self, **context: Any) -> tuple[Excitation, ...]:
-        """What shakes the body; record files are read here."""
+        """Return what shakes the body; record files are read here."""
         return self._several("excitation", **context)
 
     def check(self) -> None:
-        """Makes everything that needs no mesh, so that a wrong value or record file is told at once; InputError."""
+        """Make everything that needs no mesh, so that a wrong value or record file is told at once; InputError."""
         for table in ("material", *TABLES[TABLES.index("friction") :]):
             if table in self.nodes and not needs_body(self.nodes[table]):
                 self._made(table)
@@ -128,16 +128,16 @@ class Case:
             raise InputError(f"{self.path}: [run] {error}") from None
 
     def check_mesh(self, comm: Any) -> None:
-        """Makes or reads the mesh and looks up every group that the tables name; InputError. Collective."""
+        """Make or read the mesh and look up every group that the tables name; InputError. Collective."""
         if "mesh" in self.nodes:
             self._mesh(comm)
 
     def problem(self, comm: Any) -> ContactProblem:
-        """The contact problem; collective."""
+        """Return the contact problem; collective."""
         return self._problem(self._parts(comm))
 
     def columns(self, comm: Any) -> frozenset[str]:
-        """Names of the columns that a run writes into history.csv; assembles, and computes no step. Collective."""
+        """Return the columns that a run writes into history.csv; assembles, and computes no step. Collective."""
         parts = self._parts(comm)
         problem = self._problem(parts)
         own = self._recorders(parts)
@@ -149,14 +149,14 @@ class Case:
         )
 
     def _recorders(self, parts: Parts) -> tuple[Recorder, ...] | None:
-        """Those of [[record]], else the model's own; None for those of ``simulate``."""
+        """Return the recorders of [[record]], else the model's own; None for those of ``simulate``."""
         return self._several("record", tags=parts.tags) if "record" in self.nodes else parts.recorders
 
     def run(
         self, comm: Any, *, out: str | Path | None = None, restart: bool | str | Path = False, progress: bool = True,
         changed: bool = False,
     ) -> Solution:
-        """The whole run; collective. ``out``: the run folder, by default the one of [run], if any.
+        """Compute the whole run; collective. ``out``: the run folder, by default the one of [run], if any.
 
         Without ``steps`` and ``t_end`` it lasts as long as the excitation. A problem with weight starts from its static
         equilibrium. The folder gets a copy of the case, ``case.toml``. Raises as ``simulate``.
@@ -183,11 +183,11 @@ class Case:
             )
 
     def _made(self, table: str, **context: Any) -> Any:
-        """What a table makes; None where there is none."""
+        """Return what a table makes; None where there is none."""
         return self.nodes[table].build(context) if table in self.nodes else None
 
     def _several(self, table: str, **context: Any) -> tuple[Any, ...]:
-        """The same of a table, or an array of tables."""
+        """Return what a table, or an array of tables, makes, as a tuple."""
         made = self._made(table, **context)
         return made if isinstance(made, tuple) else () if made is None else (made,)
 
@@ -208,7 +208,7 @@ class Case:
         return Parts(system, surface, tags, "gravity" in self.nodes)
 
     def _mesh(self, comm: Any) -> tuple[Any, Tags]:
-        """The mesh and its groups, all those that the tables name among them."""
+        """Return the mesh and its groups, all those that the tables name among them."""
         script = self._made("mesh")
         mesh, tags = read_mesh(script.path, comm) if isinstance(script, MeshFile) else build_mesh(script, comm)
         for node in self.nodes.values():
@@ -235,7 +235,7 @@ class Case:
         return release(static, static_equilibrium(static, solver=own), problem)
 
     def _duration(self, parts: Parts) -> float:
-        """Until the last excitation ends [s]."""
+        """Return the time until the last excitation ends [s]."""
         longest = max((one.duration for one in self.excitations(system=parts.system)), default=math.inf)
         if not math.isfinite(longest):
             raise InputError(f"{self.path}: [run] has neither steps nor t_end, and the excitation has no end: give one")
@@ -243,7 +243,7 @@ class Case:
 
 
 def read_case(path: str | Path, settings: Sequence[str] = (), *, allow: Sequence[str] = ()) -> Case:
-    """Reads and checks a case file; ``settings``: texts KEY=VALUE that replace values of it (``with_settings``);
+    """Read and check a case file; ``settings``: texts KEY=VALUE that replace values of it (``with_settings``);
     ``allow``: packages whose classes it may name as "package.module:Name", which runs them: those you trust.
 
     Raises InputError, one sentence with file, table, key and remedy: no TOML (with the line), a table, type or key that
@@ -294,7 +294,7 @@ def _node(name: str, tables: Mapping[str, Any], spot: Spot, known: Words) -> Nod
 
 
 def _with_materials(system: Mapping[str, Any], materials: Mapping[str, Any]) -> Mapping[str, Any]:
-    """[system] with the materials it does not name: one for the whole body, or each for the cell group of its name."""
+    """Return [system] with the materials it does not name: one for the whole body, or each for its cell group."""
     names = list(materials)
     if "material" in system or not names:
         return system
@@ -305,5 +305,5 @@ def run_case(
     path: str | Path, comm: Any, *, settings: Sequence[str] = (), allow: Sequence[str] = (),
     out: str | Path | None = None, restart: bool | str | Path = False, progress: bool = True,
 ) -> Solution:
-    """``read_case(path, settings, allow=allow).run(comm, …)``."""
+    """Run a case file: ``read_case(path, settings, allow=allow).run(comm, …)``."""
     return read_case(path, settings, allow=allow).run(comm, out=out, restart=restart, progress=progress)

@@ -8,7 +8,7 @@ from typing import Any
 
 
 def is_protocol(kind: Any) -> bool:
-    """Whether the kind is a protocol, which own classes may satisfy."""
+    """Return whether the kind is a protocol, which own classes may satisfy."""
     return bool(getattr(kind, "_is_protocol", False))
 
 
@@ -31,7 +31,7 @@ def lacks(value: object, kind: Any) -> str:
 
 
 def _asked(kind: Any, wanted: Callable[[Any], bool]) -> Iterator[tuple[str, Any]]:
-    """The public members of a protocol and of those it extends."""
+    """Yield the public members of a protocol and of those it extends."""
     for base in kind.__mro__:
         for name, value in vars(base).items() if is_protocol(base) else ():
             if wanted(value) and (name == "__call__" or not name.startswith("_")):
@@ -39,13 +39,13 @@ def _asked(kind: Any, wanted: Callable[[Any], bool]) -> Iterator[tuple[str, Any]
 
 
 def _plain(cls: type, name: str) -> Any:
-    """The function behind a method; None where there is none."""
+    """Return the function behind a method; None where there is none."""
     found = next((vars(base)[name] for base in cls.__mro__ if name in vars(base)), None)
     return getattr(found, "__func__", found)
 
 
 def _takes(cls: type, name: str, asked: Callable[..., Any]) -> bool:
-    """Whether the method of a class can be called with the arguments that the protocol's is called with."""
+    """Return whether a method of a class can be called with the arguments of the protocol's."""
     parameters = list(signature(asked).parameters.values())
     if isinstance(getattr_static(cls, name), staticmethod):
         parameters = parameters[1:]
@@ -58,5 +58,5 @@ def _takes(cls: type, name: str, asked: Callable[..., Any]) -> bool:
 
 
 def _shown(asked: Callable[..., Any]) -> str:
-    """The parameters of a method without types: "(problem, state, dt)"."""
+    """Return the parameters of a method without types: "(problem, state, dt)"."""
     return f"({', '.join(list(signature(asked).parameters)[1:])})"

@@ -62,7 +62,7 @@ def own_class(text: str, kinds: Sequence[Any], allowed: Sequence[str], spot: Spo
 
 
 def _registered() -> list[str]:
-    """The packages whose entry points somebody has installed."""
+    """Return the packages whose entry points somebody has installed."""
     return [one.value.partition(":")[0].strip() for one in entry_points(group=GROUP)]
 
 
@@ -80,7 +80,7 @@ def _imported(module: str, name: str, spot: Spot) -> Any:
 
 
 def _line(error: BaseException) -> str:
-    """What an error says, on one line."""
+    """Return what an error says, on one line."""
     return " ".join(str(error).split())[:200]
 
 
@@ -97,7 +97,7 @@ def _check(cls: Any, text: str, asked: Sequence[Any], allowed: Sequence[str], sp
 
 
 def _callee(cls: type, text: str, asked: Sequence[Any], spot: Spot) -> Callee:
-    """The call, which looks up what shows on objects only, and tells errors of the constructor."""
+    """Return the call, which looks up what only objects show, and tells errors of the constructor."""
 
     def made(**given: Any) -> Any:
         try:

@@ -1,4 +1,4 @@
-"""From values of a TOML file to nodes of calls, by type hints; see ``calls``."""
+"""Read values of a TOML file into nodes of calls, by type hints; see ``table_calls``."""
 
 from __future__ import annotations
 
@@ -18,9 +18,12 @@ from .table_calls import GROUP, Call, Callee, Group, Items, Named, Node, Spot, V
 
 @dataclass(frozen=True)
 class Words:
-    """What names mean: the ``choices`` of every type that tables can make, by the word after ``type``; the ``default``
-    where it may be left out; ``groups``: types that are named groups of the mesh; ``short``: the one key that a plain
-    text stands for; ``allowed``: the packages whose classes may be named; ``named``: nodes by type and name."""
+    """Say what names mean.
+
+    choices: of every type that tables can make, by the word after ``type``; default: where it may be left out;
+    groups: types that are named groups of the mesh; short: the one key that a plain text stands for; allowed: the
+    packages whose classes may be named; named: nodes by type and name.
+    """
 
     folder: Path
     choices: Mapping[Any, Mapping[str, Callee]]
@@ -32,7 +35,7 @@ class Words:
 
 
 def read(value: Any, hint: Any, spot: Spot, words: Words) -> Node:
-    """The node of a value for a parameter with this hint. InputError when it does not fit."""
+    """Return the node of a value for a parameter with this hint. InputError when it does not fit."""
     members = list(_members(hint))
     if any(_is_path(member) for member in members):  # a text is the path then, and belongs to the case file's folder
         members = [member for member in members if member is not str]
@@ -51,7 +54,7 @@ def call(
     table: Mapping[str, Any], choices: Mapping[str, Callee], default: str | None, kinds: Sequence[Any], spot: Spot,
     words: Words,
 ) -> Call:
-    """The call of a table, whose ``type`` is one of the choices, or names a class of others of one of these kinds."""
+    """Return the call of a table, whose ``type`` is one of the choices, or names a class of others of these kinds."""
     chosen = table.get("type", default)
     if isinstance(chosen, str) and ":" in chosen:
         return arguments(table, own_class(chosen, kinds, words.allowed, spot), spot, words)
@@ -63,7 +66,7 @@ def call(
 
 
 def arguments(table: Mapping[str, Any], target: Callee, spot: Spot, words: Words) -> Call:
-    """The call of this function with the keys of the table."""
+    """Return the call of this function with the keys of the table."""
     given = {key: value for key, value in table.items() if key != "type"}
     for key in given:
         if key not in target.hints:
@@ -76,7 +79,7 @@ def arguments(table: Mapping[str, Any], target: Callee, spot: Spot, words: Words
 
 
 def nearest(word: Any, known: Iterable[str]) -> str:
-    """The rest of a sentence about a word nobody knows."""
+    """Return the rest of a sentence about a word nobody knows."""
     names = sorted(known) if isinstance(known, frozenset) else list(known)
     if not names:
         return "leave it out, there are none"
@@ -85,7 +88,7 @@ def nearest(word: Any, known: Iterable[str]) -> str:
 
 
 def _members(hint: Any) -> Iterator[Any]:
-    """The types of a union, or the one type."""
+    """Yield the types of a union, or the one type."""
     if get_origin(hint) in (Union, types.UnionType):
         for one in get_args(hint):
             yield from _members(one)
@@ -94,7 +97,7 @@ def _members(hint: Any) -> Iterator[Any]:
 
 
 def _scalar(value: Any, member: Any, spot: Spot, words: Words) -> Node | None:
-    """The node, or None where the value is nothing of this type."""
+    """Return the node, or None where the value is nothing of this type."""
     if member in (Any, object):
         return Value(value)
     if isinstance(value, bool):
@@ -171,7 +174,7 @@ def _table(value: dict[str, Any], members: list[Any], spot: Spot, words: Words) 
 
 
 def _choices(member: Any, words: Words) -> Mapping[str, Callee]:
-    """What a table may make for this type: as listed, or an object of the value class itself."""
+    """Return what a table may make for this type: as listed, or an object of the value class itself."""
     if member in words.choices:
         return words.choices[member]
     if isinstance(member, type) and is_dataclass(member) and member not in words.groups:
@@ -180,7 +183,7 @@ def _choices(member: Any, words: Words) -> Mapping[str, Callee]:
 
 
 def _shown(value: Any) -> str:
-    """A value as in the file."""
+    """Return a value as in the file."""
     if isinstance(value, bool):
         return str(value).lower()
     return f"'{value[:SHOWN]}'" if isinstance(value, str) else shown(value)
@@ -190,7 +193,7 @@ _EXPECTED = {float: "a number", int: "a whole number", bool: "true or false", st
 
 
 def _expected(members: Sequence[Any], words: Words) -> str:
-    """What would fit."""
+    """Return what would fit."""
     found = []
     for member in members:
         if member in _EXPECTED:

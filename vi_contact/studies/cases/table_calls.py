@@ -1,4 +1,4 @@
-"""A table is a call: tables are read against the signatures of the functions they name, before anything is computed.
+"""Take a table as a call: read it against the signature of the function it names, before anything is computed.
 
     [friction]
     type = "Coulomb"       Coulomb(mu=0.3)
@@ -24,14 +24,14 @@ GIVEN = ("comm", "mesh", "system", "excitations", "run_dt")  # parameters that t
 
 
 class Node(Protocol):
-    """A value that has been read; ``build`` makes it."""
+    """Hold a value that has been read; ``build`` makes it."""
 
     def build(self, context: Context) -> Any: ...
 
 
 @dataclass(frozen=True)
 class Spot:
-    """Where in the file: str() is "[system.damping] alpha"."""
+    """Say where in the file: str() is "[system.damping] alpha"."""
 
     file: str
     table: str = ""
@@ -41,28 +41,28 @@ class Spot:
         return f"[{self.table}] {self.key}".strip() if self.table else f"[{self.key}]"
 
     def at(self, key: str) -> Spot:
-        """A key of the table that is here."""
+        """Return the spot of a key of the table that is here."""
         return Spot(self.file, self._here(), key)
 
     def entry(self, number: int) -> Spot:
-        """An entry of the list that is here, counted from 1."""
+        """Return the spot of an entry of the list that is here, counted from 1."""
         return Spot(self.file, self.table, f"{self.key}[{number}]")
 
     def _here(self) -> str:
         return f"{self.table}.{self.key}" if self.table and self.key else self.table or self.key
 
     def wrong(self, text: str) -> InputError:
-        """What is wrong here; ``text`` continues the sentence."""
+        """Return the error of what is wrong here; ``text`` continues the sentence."""
         return InputError(f"{self.file}: {self} {text}")
 
     def inside(self, text: str) -> InputError:
-        """What is wrong with the table that is here."""
+        """Return the error of what is wrong with the table that is here."""
         return InputError(f"{self.file}: [{self._here()}] {text}")
 
 
 @dataclass(frozen=True)
 class Value:
-    """A plain value."""
+    """Hold a plain value."""
 
     value: Any
 
@@ -72,7 +72,7 @@ class Value:
 
 @dataclass(frozen=True)
 class Group:
-    """A named group of the mesh."""
+    """Name a group of the mesh."""
 
     name: str
     kind: type
@@ -102,7 +102,7 @@ GROUP = {"Facets": "a boundary group", "Cells": "a cell group"}
 
 @dataclass(frozen=True)
 class Items:
-    """A list, as a tuple."""
+    """Hold a list; it becomes a tuple."""
 
     items: tuple[Node, ...]
 
@@ -112,7 +112,7 @@ class Items:
 
 @dataclass(frozen=True)
 class Named:
-    """A table of names."""
+    """Hold a table of names."""
 
     items: Mapping[str, Node]
 
@@ -122,7 +122,7 @@ class Named:
 
 @dataclass(frozen=True)
 class Callee:
-    """A function that tables may call: the hints of its parameters, which of them it needs, which are supplied."""
+    """Describe a function that tables may call: hints of its parameters, which it needs, which are supplied."""
 
     name: str
     function: Callable[..., Any]
@@ -134,7 +134,7 @@ class Callee:
 def callee(
     function: Callable[..., Any], *, name: str = "", only: Sequence[str] = (), given: Sequence[str] = GIVEN
 ) -> Callee:
-    """How to call a function or a class; ``only``: the parameters a file may give; those ``given`` are supplied."""
+    """Return how to call a function or class; ``only``: what a file may give; parameters ``given`` are supplied."""
     plain_class = isinstance(function, type) and not is_dataclass(function)
     hints = get_type_hints(function.__init__ if plain_class else function)  # type: ignore[misc]
     found = signature(function).parameters
@@ -151,7 +151,7 @@ def callee(
 
 @dataclass(frozen=True)
 class Call:
-    """A call; InputErrors of the function get the place in the file."""
+    """Call a function; its InputErrors get the place in the file."""
 
     callee: Callee
     arguments: Mapping[str, Node]

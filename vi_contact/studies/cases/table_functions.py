@@ -1,4 +1,4 @@
-"""Functions of the public interface in the form in which tables can call them: no functions among their arguments."""
+"""Offer functions of the public interface in the form in which tables call them: no functions among their arguments."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from ...soil.upgoing_wave import UpgoingVelocity
 
 
 class MeshFile:
-    """What [mesh] makes of type = "read_mesh": the path of a file for ``fem.read_mesh``."""
+    """Hold what [mesh] makes of type = "read_mesh": the path of a file for ``fem.read_mesh``."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -37,7 +37,7 @@ def record(
     path: Path, units: str | None = None, *, dt: float | None = None, resample_dt: float | None = None,
     channel: int | None = None, largest: float = LARGEST_PEAK, processing: Processing | None = None,
 ) -> Record:
-    """``read_record``, then ``processing``."""
+    """Read a record, ``read_record``, then apply ``processing``."""
     found = read_record(path, units, dt=dt, resample_dt=resample_dt, channel=channel, largest=largest)
     return found if processing is None else processing(found)
 
@@ -47,7 +47,7 @@ def surface(
     points: Sequence[tuple[float, ...]] | None = None, feature_angle: float = FEATURE_ANGLE, held: bool = False,
     springs: float | None = None, frictionless_corners: bool = False,
 ) -> ContactSurface:
-    """``contact_surface``; held: ``.bilateral_everywhere()``; springs: ``.on_springs(stiffness)``; the last:
+    """Make a ``contact_surface``; held: ``.bilateral_everywhere()``; springs: ``.on_springs(stiffness)``; the last:
     ``.with_frictionless_corners()``."""
     found = contact_surface(system, facets, obstacle=obstacle, points=points, feature_angle=feature_angle)
     found = found if springs is None else found.on_springs(springs)
@@ -60,7 +60,7 @@ def pair(
     points: Sequence[tuple[float, ...]] | None = None, feature_angle: float = FEATURE_ANGLE, held: bool = False,
     frictionless_corners: bool = False,
 ) -> ContactSurface:
-    """``contact_pair``; held: ``.bilateral_everywhere()``; the last: ``.with_frictionless_corners()``."""
+    """Make a ``contact_pair``; held: ``.bilateral_everywhere()``; the last: ``.with_frictionless_corners()``."""
     found = contact_pair(system, facets1, facets2, matching=matching, points=points, feature_angle=feature_angle)
     found = found.with_frictionless_corners() if frictionless_corners else found
     return found.bilateral_everywhere() if held else found
@@ -94,7 +94,7 @@ def free_field(
     excitations: Any, facets: Facets, *, base: CompliantBase | None = None,
     material: materials.LinearElastic | None = None, normal: float = 1.0, tangential: float = 1.0,
 ) -> FreeField:
-    """On the base of the run's excitations, or a compliant one."""
+    """Make a free-field side on the base of the run's excitations, or a compliant one."""
     foot = excitations if base is None else base
     return FreeField(facets, material, normal, tangential, base=foot)
 

@@ -1,4 +1,4 @@
-"""Reads TOML files, and sets single values of what was read; every mistake is one sentence with the file."""
+"""Read TOML files, and set single values of what was read; every mistake is one sentence with the file."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _REASON = re.compile(r"^(.*) \(at (?:line (\d+), column (\d+)|end of document)\)
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:
-    """The tables of a file. InputError with file, line and reason when it cannot be read or is no TOML."""
+    """Return the tables of a file. InputError with file, line and reason when it cannot be read or is no TOML."""
     try:
         with open(path, "rb") as file:
             data = file.read(BYTES + 1)
@@ -51,7 +51,7 @@ def read_toml(path: str | Path) -> dict[str, Any]:
 
 
 def checked(tables: dict[str, Any], source: str) -> dict[str, Any]:
-    """The tables; InputError naming the key for what no table of a case can hold.
+    """Return the tables; InputError naming the key for what no table of a case can hold.
 
     These are NaN, whole numbers beyond 64 bits, the character NUL, and tables in tables in tables without end.
     """
@@ -79,7 +79,7 @@ def _defect(value: Any, depth: int) -> str:
 
 
 def _reason(said: str, text: str) -> tuple[str, str]:
-    """(what is wrong, "line 3, column 7") of tomllib's sentence."""
+    """Return (what is wrong, "line 3, column 7") of tomllib's sentence."""
     found = _REASON.fullmatch(said)
     if found is None:
         return said, f"line {text.count(chr(10)) + 1}"
@@ -89,7 +89,7 @@ def _reason(said: str, text: str) -> tuple[str, str]:
 
 
 def with_settings(tables: dict[str, Any], settings: Sequence[str]) -> dict[str, Any]:
-    """A copy of the tables with KEY=VALUE settings made; what is missing on the way to a key is added.
+    """Return a copy of the tables with KEY=VALUE settings made; what is missing on the way to a key is added.
 
     KEY: names joined by dots; entries of lists are counted from 1 ("excitation.1.scale"). VALUE: as in TOML; what is no
     TOML is text; none at all takes the key away. Raises InputError for a setting without "=", an entry that is not
@@ -154,7 +154,7 @@ def _quoted(text: str) -> str:
 
 
 def _place(there: Any, name: str, setting: str) -> Any:
-    """The key, or the index, of a name of the way."""
+    """Return the key, or the index, of a name of the way."""
     if isinstance(there, dict):
         return name
     if not isinstance(there, list):

@@ -1,4 +1,4 @@
-"""The words of case files: which classes and functions a table may call where, all of them of the public interface.
+"""Say the words of case files: which classes and functions a table may call where, all of them of the public interface.
 
 Rooms list their public classes once, in their ``__init__``; a class is a word wherever it is of the kind that is asked
 for, and so are its named constructors ("GeneralisedAlpha.spectral_radius"). What takes functions has no word, or one in
@@ -74,7 +74,7 @@ def names_of(kind: Any) -> tuple[str, ...]:
 
 @cache
 def _choices() -> Mapping[Any, Mapping[str, Callee]]:
-    """Type -> word -> what it calls."""
+    """Return kind -> word -> what it calls."""
     found: dict[Any, dict[str, Callee]] = {Parts: dict(MODELS)}
     for kind, rooms in _ROOMS.items():
         found[kind] = {one.name: one for room in rooms for one in _callees(room, kind)}
@@ -84,7 +84,7 @@ def _choices() -> Mapping[Any, Mapping[str, Callee]]:
 
 
 def _callees(room: ModuleType, kind: Any) -> Iterator[Callee]:
-    """The public classes of a room that are of this kind, with their named constructors; none that needs functions."""
+    """Yield the public classes of a room that are of this kind, and named constructors; none that needs functions."""
     for cls in (getattr(room, name) for name in room.__all__):
         if isinstance(cls, type) and not is_protocol(cls) and not defect(cls, kind):
             made = [callee(one, name=one.__qualname__) for one in (cls, *_constructors(cls))]
@@ -96,14 +96,14 @@ def _function(hint: Any) -> bool:
 
 
 def _constructors(cls: type) -> Iterator[Any]:
-    """Classmethods that return an object of the class."""
+    """Yield the classmethods that return an object of the class."""
     for name, one in vars(cls).items():
         if isinstance(one, classmethod) and get_type_hints(one.__func__).get("return") is cls:
             yield getattr(cls, name)
 
 
 def words(folder: Path, allowed: Sequence[str] = ()) -> Words:
-    """The words of a case file in this folder, to which its relative paths belong; ``allowed``: packages of others."""
+    """Return the words of a case file in this folder, where its relative paths begin; ``allowed``: others' packages."""
     default = {
         LinearElastic: "LinearElastic", Record: "read_record", ContactSurface: "contact_surface", Traction: "Traction",
         Dashpots: "Dashpots",

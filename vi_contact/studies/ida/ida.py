@@ -38,7 +38,7 @@ TABLE, COLUMNS, FIGURE, STUDY, RUNS = "ida.csv", "columns.json", "ida.png", "ida
 
 @dataclass(frozen=True)
 class IDA:
-    """What to run, and what to tell of it.
+    """Say what to run, and what to tell of it.
 
     case: shaken by GroundMotions alone, whose record files are replaced; motions: a file, or one file per GroundMotion
     of the case, for each record; its name is that of its first file. scales: factors on the motion as the case prepares
@@ -66,21 +66,21 @@ class IDA:
 
     @property
     def measure(self) -> Intensity:
-        """The intensity measure."""
+        """Return the intensity measure."""
         return intensity(self.intensity)
 
     @property
     def wanted(self) -> list[Demand]:
-        """The demand parameters."""
+        """Return the demand parameters."""
         return [demand(text) for text in self.demands]
 
     @property
     def shakings(self) -> list[Shaking]:
-        """The motions by name."""
+        """Return the motions by name."""
         return shakings(self.case, self.motions)
 
     def runs(self, out: Path) -> list[OneRun]:
-        """Every record at every scale, record by record."""
+        """Return every record at every scale, record by record."""
         return [self._run(out, one, value) for one in self.shakings for value in (*self.scales, *self.levels)]
 
     def _run(self, out: Path, shaking: Shaking, value: float) -> OneRun:
@@ -97,7 +97,7 @@ def run_ida(
     study: IDA, out: str | Path, *, jobs: int = 1, part: tuple[int, int] = (1, 1), launch: Sequence[str] = (),
     say: Callable[[str], None] = print,
 ) -> list[Row]:
-    """Makes the runs that have not finished yet, and the table and figure of all that are in ``out``; returns its rows.
+    """Make the runs that have not finished yet, and the table and figure of all that are in ``out``; returns its rows.
 
     Each run is a process of its own; what it cannot do is told in its row, and the others go on. Called again it keeps
     finished runs, continues interrupted ones from their checkpoints, and tries failed ones again. The table is

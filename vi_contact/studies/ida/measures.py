@@ -32,7 +32,7 @@ _WAYS: dict[str, tuple[Callable[[Array], float], str]] = {
 
 @dataclass(frozen=True)
 class Intensity:
-    """An intensity measure: of(record) in ``unit``; a motion times f has f**degree of it."""
+    """Define an intensity measure: of(record) in ``unit``; a motion times f has f**degree of it."""
 
     name: str
     unit: str
@@ -41,7 +41,7 @@ class Intensity:
     of: Callable[[Record], float]
 
     def scale(self, record: Record, level: float) -> float:
-        """The factor that brings the record to this level; InputError unless both are positive."""
+        """Return the factor that brings the record to this level; InputError unless both are positive."""
         value = self.of(record)
         if not (level > 0.0 and value > 0.0):
             raise InputError(f"level {level:g} of {self.name}: the record has {value:g}; give levels above zero, and "
@@ -50,7 +50,7 @@ class Intensity:
 
 
 def intensity(text: str) -> Intensity:
-    """The measure of a word: pga, pgv, pgd, arias, cav, housner, or sa:T, the pseudo-acceleration at T seconds, 5 %."""
+    """Return the measure of a word: pga, pgv, pgd, arias, cav, housner, or sa:T (pseudo-acceleration at T s, 5 %)."""
     word, _, period = text.partition(":")
     if word == "sa":
         try:
@@ -69,23 +69,23 @@ def intensity(text: str) -> Intensity:
 
 @dataclass(frozen=True)
 class Demand:
-    """A demand parameter: a column of history.csv and what of it counts; values that are not a number do not."""
+    """Define a demand parameter: a column of history.csv and what of it counts; values that are not a number do not."""
 
     column: str
     way: str = "absmax"
 
     @property
     def name(self) -> str:
-        """The column of the table, "u_x_top_absmax"."""
+        """Return the column of the table, "u_x_top_absmax"."""
         return f"{self.column}_{self.way}"
 
     @property
     def meaning(self) -> str:
-        """In words."""
+        """Return it in words."""
         return f"{_WAYS[self.way][1]} {self.column}"
 
     def of(self, history: Mapping[str, Array]) -> float:
-        """The value of a run; InputError for a column it has not recorded."""
+        """Return the value of a run; InputError for a column it has not recorded."""
         if self.column not in history:
             known = ", ".join(history)
             raise InputError(f"the run has no column '{self.column}': record it, or choose one of {known}")
@@ -93,7 +93,7 @@ class Demand:
 
 
 def demand(text: str) -> Demand:
-    """The demand of "COLUMN" (its largest magnitude) or "COLUMN:max", ":min", ":absmax", ":last"."""
+    """Return the demand of "COLUMN" (its largest magnitude) or "COLUMN:max", ":min", ":absmax", ":last"."""
     column, _, way = text.partition(":")
     if not column or (way or "absmax") not in _WAYS:
         raise InputError(f"demand '{text}': give COLUMN or COLUMN:WAY, WAY one of {', '.join(_WAYS)}")
@@ -101,7 +101,7 @@ def demand(text: str) -> Demand:
 
 
 def fractiles(curves: Mapping[str, tuple[Array, Array]], shares: tuple[float, ...]) -> tuple[Array, Array]:
-    """(levels (n,), demands (n, shares)): fractiles over the records of the demand at equal intensity.
+    """Return (levels (n,), demands (n, shares)): fractiles over the records of the demand at equal intensity.
 
     curves: record -> (intensities, demands), straight lines between them; the levels are those of all records in the
     range that every record covers (Vamvatsikos and Cornell, Earthquake Engng Struct. Dyn. 31, 2002, section 5). Empty

@@ -34,13 +34,13 @@ _MPI = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_RANK")  # in the environment o
 
 @dataclass(frozen=True)
 class Shaking:
-    """A name for the record files of one run, one for each ground motion of the case: "h" of (h.at2, v.at2)."""
+    """Name the record files of one run, one for each ground motion of the case: "h" of (h.at2, v.at2)."""
 
     name: str
     files: tuple[Path, ...]
 
     def settings(self, case: Case, factor: float = 1.0) -> tuple[str, ...]:
-        """KEY=VALUE that put these records into the case, times its own scales and the factor."""
+        """Return KEY=VALUE that put these records into the case, times its own scales and the factor."""
         found = []
         for (place, table), path in zip(ground_motions(case), self.files, strict=True):
             record = table.get("record")
@@ -49,7 +49,7 @@ class Shaking:
         return tuple(found)
 
     def record(self, case: Case) -> Record:
-        """The first motion as the case prepares it, factor 1; InputError when a file is wrong."""
+        """Return the first motion as the case prepares it, factor 1; InputError when a file is wrong."""
         return _record(case.path, (*case.settings, *self.settings(case)), case.allowed)
 
 
@@ -61,7 +61,7 @@ def _record(path: Path, settings: tuple[str, ...], allowed: tuple[str, ...]) -> 
 
 
 def ground_motions(case: Case) -> list[tuple[str, Mapping[str, Any]]]:
-    """(key, table) of the ground motions of a case; InputError unless it is shaken by records alone."""
+    """Return (key, table) of the ground motions of a case; InputError unless it is shaken by records alone."""
     tables = case.tables.get("excitation", [])
     found: list[tuple[str, Mapping[str, Any]]] = [("excitation", tables)]
     if not isinstance(tables, dict):
@@ -77,7 +77,7 @@ def ground_motions(case: Case) -> list[tuple[str, Mapping[str, Any]]]:
 
 
 def shakings(case: Case, motions: Sequence[str | Path | Sequence[str | Path]]) -> list[Shaking]:
-    """The records by name; a motion is a file, or one file for each ground motion of the case."""
+    """Return the records by name; a motion is a file, or one file for each ground motion of the case."""
     count = len(ground_motions(case))
     found: dict[str, Shaking] = {}
     for motion in motions:
@@ -97,7 +97,7 @@ def shakings(case: Case, motions: Sequence[str | Path | Sequence[str | Path]]) -
 
 @dataclass(frozen=True)
 class OneRun:
-    """One record at one scale, in its folder. ``wrong``: why it cannot run at all."""
+    """Run one record at one scale, in its folder. ``wrong``: why it cannot run at all."""
 
     case: Case
     shaking: Shaking
@@ -107,29 +107,29 @@ class OneRun:
 
     @property
     def name(self) -> str:
-        """For people."""
+        """Return a name for people."""
         return f"{self.shaking.name} x {self.factor:g}"
 
     def settings(self) -> tuple[str, ...]:
-        """All KEY=VALUE of the run."""
+        """Return all KEY=VALUE of the run."""
         return (*self.case.settings, *self.shaking.settings(self.case, self.factor))
 
     def done(self) -> dict[str, Any] | None:
-        """The row of a run that has finished, or None."""
+        """Return the row of a run that has finished, or None."""
         row = read_row(self.folder / ROW)
         if row is None and (read_json(self.folder / SUMMARY) or {}).get("status") == "finished":
             row = self.keep("", 0)  # it outlived the process that had started it
         return row if row is not None and row["status"] == "finished" else None
 
     def command(self, launch: Sequence[str]) -> list[str]:
-        """What runs it, from its checkpoint where there is one."""
+        """Return the command that runs it, from its checkpoint where there is one."""
         own = [sys.executable, "-m", "vi_contact", "run", str(self.case.path), "--out", str(self.folder), "--quiet"]
         made = [word for setting in self.settings() for word in ("--set", setting)]
         made += [word for package in self.case.allowed for word in ("--allow", package)]
         return [*launch, *own, *made, *(["--restart"] if (self.folder / CHECKPOINT).is_file() else [])]
 
     def keep(self, said: str, code: int) -> dict[str, Any]:
-        """Writes the row of a run that ended with this status, having said this; failed ones leave that in a file."""
+        """Write the row of a run that ended with this status, having said this; failed ones leave that in a file."""
         facts = read_json(self.folder / SUMMARY) or {}
         finished = code == 0 and facts.get("status") == "finished"
         row = {
@@ -145,7 +145,7 @@ class OneRun:
         return row
 
     def start(self, launch: Sequence[str]) -> subprocess.Popen[str]:
-        """Starts it, in the environment without what MPI of this process may have put there."""
+        """Start it, in the environment without what MPI of this process may have put there."""
         package = str(Path(__file__).resolve().parents[2])
         way = os.pathsep.join([package, *filter(None, [os.environ.get("PYTHONPATH")])])
         environment = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"} | dict(os.environ) | {"PYTHONPATH": way}
@@ -161,7 +161,7 @@ class OneRun:
 
 
 def executed(runs: Sequence[OneRun], jobs: int, launch: Sequence[str]) -> Iterator[dict[str, Any]]:
-    """Runs them, so many at a time, and yields the row of each when it ends. Left early, it stops those that go on."""
+    """Run them, so many at a time, and yield the row of each when it ends. Left early, it stops those that go on."""
     stopped, lock = threading.Event(), threading.Lock()
     going: set[subprocess.Popen[str]] = set()
 
@@ -214,14 +214,14 @@ def _stop(processes: Sequence[subprocess.Popen[str]]) -> None:
 
 
 def refuse_mpirun() -> None:
-    """InputError in a process that mpirun has started: processes started by it would take themselves for this one."""
+    """Raise InputError in a process that mpirun has started: those it starts would take themselves for it."""
     if any(name in os.environ for name in _MPI):
         raise InputError("ida starts processes and must not be one of MPI's: start it without mpirun, and give the "
                          "runs their ranks with --launch 'mpirun -n N'")
 
 
 def read_json(path: Path) -> dict[str, Any] | None:
-    """A whole JSON object, or None when there is none."""
+    """Return a whole JSON object, or None when there is none."""
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
@@ -230,7 +230,7 @@ def read_json(path: Path) -> dict[str, Any] | None:
 
 
 def read_row(path: Path) -> dict[str, Any] | None:
-    """The row of a run; None when there is none, or the file is not as ``OneRun.keep`` leaves it."""
+    """Return the row of a run; None when there is none, or the file is not as ``OneRun.keep`` leaves it."""
     row = read_json(path) or {}
     files, scale = row.get("files"), row.get("scale")
     whole = all(isinstance(row.get(name), str) for name in ("record", "status", "reason"))

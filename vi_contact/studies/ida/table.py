@@ -23,7 +23,7 @@ Units = dict[str, tuple[str, str]]
 
 
 def tabulated(case: Case, out: Path, measure: Intensity, demands: Sequence[Demand]) -> tuple[list[Row], Units]:
-    """(rows by record and scale, column -> (unit, meaning)) of all runs in the folder that have ended.
+    """Return (rows by record and scale, column -> (unit, meaning)) of all runs in the folder that have ended.
 
     What a run has not measured is None: its demands when it failed, its intensity when its record cannot be read.
     InputError when a finished run has no such column.
