@@ -21,7 +21,7 @@ from ..core.checks import array, counted, flag, function, integers, mask, number
 from ..core.errors import InputError
 from .loops import check_orientation, check_simple, check_size, ordered_loops
 
-MOST = 3000  # elements: the matrices of one time step take 2 GB
+MOST_ELEMENTS = 3000  # elements: the matrices of one time step take 2 GB
 P1_MASS = np.array([[2.0, 1.0], [1.0, 2.0]]) / 6.0
 
 
@@ -42,7 +42,7 @@ class BoundaryMesh:
 
     def __post_init__(self) -> None:
         points = array("BoundaryMesh", "points", self.points, (None, 2), unit="m")
-        counted("BoundaryMesh", "points", len(points), "elements", most=MOST)
+        counted("BoundaryMesh", "points", len(points), "elements", most=MOST_ELEMENTS)
         given = np.atleast_1d(np.asarray(self.loop_sizes, object))
         sizes = tuple(whole("BoundaryMesh", "the size of a loop", size, least=1) for size in given) or (len(points),)
         if min(sizes) < 3 or sum(sizes) != len(points):
@@ -175,9 +175,9 @@ def polygon(corners: ArrayLike, h: float | Sequence[int], *, exterior: bool = Fa
         length = number("polygon", "the element length h", h, positive=True, unit="m")
         with np.errstate(over="ignore"):
             wanted = np.maximum(1.0, np.ceil(np.hypot(*sides.T) / length - 1e-9))
-        counted("polygon", f"h = {length:g} m", float(wanted.sum()), "elements", most=MOST)
+        counted("polygon", f"h = {length:g} m", float(wanted.sum()), "elements", most=MOST_ELEMENTS)
         counts = wanted.astype(int)
-    counted("polygon", "h", int(counts.sum()), "elements", most=MOST)
+    counted("polygon", "h", int(counts.sum()), "elements", most=MOST_ELEMENTS)
     fractions = [np.arange(count)[:, None] / count for count in counts]
     points = np.concatenate([p + f * side for p, f, side in zip(start, fractions, sides, strict=True)])
     return BoundaryMesh(points, labels=np.repeat(np.arange(len(start)), counts), exterior=exterior)
@@ -186,7 +186,7 @@ def polygon(corners: ArrayLike, h: float | Sequence[int], *, exterior: bool = Fa
 def smooth_curve(curve: Callable[[Array], Array], count: int, *, exterior: bool = False) -> BoundaryMesh:
     """Mesh of a closed curve: `count` chords at equal steps of its parameter in [0, 1), curve(parameters) -> (m, 2)."""
     function("smooth_curve", "curve", curve, "give a function of parameters (m,) that returns points (m, 2)")
-    counted("smooth_curve", "count", whole("smooth_curve", "count", count, least=3), "elements", most=MOST)
+    counted("smooth_curve", "count", whole("smooth_curve", "count", count, least=3), "elements", most=MOST_ELEMENTS)
     points = array("smooth_curve", "what curve(parameters) returns", curve(np.arange(count) / count), (count, 2))
     return BoundaryMesh(points, exterior=exterior)
 

@@ -79,7 +79,7 @@ class Galerkin:
         total, which = None, (False, False, False)
         for points in point_sets(self.pairs, fronts, self.orders):
             kernel_set = kernels(points.r)
-            values = stacked(kernel_set, points.d, points.r)
+            values = integrands(kernel_set, points.d, points.r)
             if total is None:
                 total = np.zeros((len(values), len(self.pairs), 4), values.dtype)
                 which = (kernel_set.single is not None, kernel_set.double is not None, kernel_set.hyper is not None)
@@ -106,7 +106,7 @@ class Galerkin:
             for c in range(2):
                 for k in range(2):
                     local[c, x, :, k, y, :] = values[c, k]
-        return joined(self.mesh, local, 4).reshape(4 * n, 2 * n)
+        return joined_at_nodes(self.mesh, local, 4).reshape(4 * n, 2 * n)
 
     def _hyper(self, moments: NDArray) -> NDArray:
         n, e, f = len(self.mesh), self.pairs.first, self.pairs.second
@@ -116,8 +116,8 @@ class Galerkin:
             for k in range(2):
                 local[c, e, :, k, f, :] = values[c, k]
                 local[k, f, :, c, e, :] = values[c, k].swapaxes(1, 2)
-        columns = joined(self.mesh, local, 4)
-        return joined(self.mesh, columns, 1).reshape(2 * n, 2 * n)
+        columns = joined_at_nodes(self.mesh, local, 4)
+        return joined_at_nodes(self.mesh, columns, 1).reshape(2 * n, 2 * n)
 
     def _hyper_local(self, m: NDArray) -> NDArray:
         """Return (2, 2, p, 2, 2): component of v on the first element, of u on the second, pair, shape of v, of u."""
@@ -160,7 +160,7 @@ def double_local(mesh: BoundaryMesh, shear: float, m: NDArray, y: NDArray[np.int
     return values
 
 
-def joined(mesh: BoundaryMesh, local: NDArray, axis: int) -> NDArray:
+def joined_at_nodes(mesh: BoundaryMesh, local: NDArray, axis: int) -> NDArray:
     """Add up shape functions (element at `axis`, end at axis + 1) at the nodes; the end axis goes."""
     start, end = np.take(local, 0, axis + 1), np.take(local, 1, axis + 1)
     before = np.empty_like(mesh.after)
@@ -173,7 +173,7 @@ def _tensor(m: NDArray) -> NDArray:
     return np.stack([np.stack([m[0], m[1]]), np.stack([m[1], m[2]])])
 
 
-def stacked(kernels: KernelSet, d: Array, r: Array) -> NDArray:
+def integrands(kernels: KernelSet, d: Array, r: Array) -> NDArray:
     """Return (k, m) integrands of the wanted operators at d = x - y, in the order their methods read them."""
     xx, xy, yy = d[0] ** 2 / r**2, d[0] * d[1] / r**2, d[1] ** 2 / r**2
     rows: list[NDArray] = []

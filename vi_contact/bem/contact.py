@@ -32,9 +32,9 @@ from .boundary_mesh import BoundaryMesh
 from .energetic import summed
 from .poincare_steklov import CondensedCompliance
 
-Motion = Callable[[float], float | Array]
+ObstacleMotion = Callable[[float], float | Array]
 ASYMMETRIC = 1e-8  # of W[0], beyond which there is no small problem to solve
-HELD = 1e-12  # of the largest flexibility: supported unknowns
+SUPPORTED = 1e-12  # of the largest flexibility: supported unknowns
 
 
 @dataclass(frozen=True)
@@ -95,8 +95,8 @@ class BoundaryContact:
     compliance: CondensedCompliance
     obstacle: Obstacle = field(default_factory=Touching)
     friction: FrictionLaw = field(default_factory=Frictionless)
-    towards: Motion | None = None
-    along: Motion | None = None
+    towards: ObstacleMotion | None = None
+    along: ObstacleMotion | None = None
     bilateral: bool = False
     conditions: Conditions | None = None
 
@@ -171,27 +171,27 @@ class BoundaryContact:
         return N.reshape(2 * m, 2 * m)
 
     @cached_property
-    def kept(self) -> Mask:
+    def free(self) -> Mask:
         """Return (2m,) unknowns v that are not supported."""
         flexibility = (self.frames @ self.compliance.W[0] @ self.frames.T).diagonal()
-        return np.asarray(flexibility > HELD * flexibility.max(initial=0.0))
+        return np.asarray(flexibility > SUPPORTED * flexibility.max(initial=0.0))
 
     @cached_property
     def W(self) -> Array:
-        """Return (steps, f, f) compliance of the f kept unknowns v."""
+        """Return (steps, f, f) compliance of the f free unknowns v."""
         turned = np.matmul(np.matmul(self.frames, self.compliance.W), self.frames.T)
-        return np.ascontiguousarray(turned[:, self.kept][:, :, self.kept])
+        return np.ascontiguousarray(turned[:, self.free][:, :, self.free])
 
     @cached_property
     def v_free(self) -> Array:
-        """Return (steps, f) motion of the kept unknowns without contact."""
-        return np.ascontiguousarray((self.compliance.u_free @ self.frames.T)[:, self.kept])
+        """Return (steps, f) motion of the free unknowns without contact."""
+        return np.ascontiguousarray((self.compliance.u_free @ self.frames.T)[:, self.free])
 
     @cached_property
     def surface(self) -> ContactSurface:
-        """Return the conditions as the contract has them; its unknowns are the kept ones."""
+        """Return the conditions as the contract has them; its unknowns are the free ones."""
         rows, second, points = self._rows, self._second, self.compliance.points
-        number = np.where(self.kept, np.cumsum(self.kept) - 1, -1)
+        number = np.where(self.free, np.cumsum(self.free) - 1, -1)
         owned = number[rows.nodes + self.count * second]
         if (owned < 0).any():
             raise InputError("BoundaryContact: a support holds a contact node in its contact direction; leave the node "
@@ -236,9 +236,9 @@ class BoundaryContact:
         )
 
     def load(self, r_n: Array, r_t: Array | None) -> Array:
-        """Return (f,) forces of the support on the kept unknowns, -B_nᵀ r_n - B_tᵀ r_t."""
-        return -self.surface.reaction_load(r_n, int(self.kept.sum()), r_t)
+        """Return (f,) forces of the support on the free unknowns, -B_nᵀ r_n - B_tᵀ r_t."""
+        return -self.surface.reaction_load(r_n, int(self.free.sum()), r_t)
 
     def cartesian(self, loads: Array) -> Array:
         """Return (steps, 2m) nodal forces lam on the body, x of all contact nodes, then y, of loads (steps, f)."""
-        return np.asarray(loads @ self.frames[self.kept])
+        return np.asarray(loads @ self.frames[self.free])

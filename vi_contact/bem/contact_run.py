@@ -32,7 +32,7 @@ def march_contact(
     number("march_contact", "tolerance", tolerance, positive=True)
     surface, matrix = contact.surface, contact.matrix
     prepared = (solver or Condensed()).prepare(matrix, surface, 1.0)
-    v, active = np.zeros(int(contact.kept.sum())), surface.gap(0.0) <= 0.0
+    v, active = np.zeros(int(contact.free.sum())), surface.gap(0.0) <= 0.0
     loads = np.zeros_like(contact.v_free)
     steps: list[StepProblem] = []
     results: list[StepResult] = []
@@ -47,7 +47,7 @@ def march_contact(
         v, active = result.x, result.active
         steps.append(step)
         results.append(result)
-    return run_of(contact, steps, results)
+    return certified_run(contact, steps, results)
 
 
 @dataclass(frozen=True)
@@ -167,7 +167,7 @@ def ledger(run: ContactRun, motion: BoundaryMotion, loads: Array, *, supported: 
     return ContactLedger(motion.work, load, run.work, support, run.friction_loss)
 
 
-def run_of(
+def certified_run(
     contact: BoundaryContact,
     steps: Sequence[StepProblem],
     results: Sequence[StepResult],

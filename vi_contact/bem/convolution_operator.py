@@ -154,7 +154,7 @@ class ConvolutionProblem(BodyProblem):
         places = np.searchsorted(np.flatnonzero(free), unknowns[moving])
         units = np.eye(int(free.sum()))[:, places]
         transform = np.zeros((len(table.s), len(unknowns), len(unknowns)), complex)
-        for at_z, matrices, factors in zip(transform, self.operator.steklov, table.held, strict=True):
+        for at_z, matrices, factors in zip(transform, self.operator.steklov, table.held_factors, strict=True):
             inverse = np.linalg.solve(matrices[:, free][:, :, free], units[None])[:, places]
             at_z[np.ix_(moving, moving)] = np.einsum("i,icd->cd", factors, inverse)
         u_free = self.solve().displacement.reshape(len(self.times), -1)[:, unknowns]

@@ -64,7 +64,7 @@ class Frequencies:
         return self._eigen[1]
 
     @cached_property
-    def held(self) -> NDArray:
+    def held_factors(self) -> NDArray:
         """Return (N/2 + 1, stages) a_i: û = sum_i a_i C(s_i) ĝ at the end of the step, for g held in each step."""
         z = self.contour.z[:, None]
         impulse = self.dt * (np.array(self.method.abscissae) + z / (1.0 - z))
@@ -110,7 +110,7 @@ class ConvolutionQuadrature:
         table = self.frequencies(dt=dt, steps=steps)
         sums = [
             sum(a * np.asarray(transfer(complex(s))) for a, s in zip(*rows, strict=True))
-            for rows in zip(table.held, table.s, strict=True)
+            for rows in zip(table.held_factors, table.s, strict=True)
         ]
         return table.contour.backward(np.array(sums))
 

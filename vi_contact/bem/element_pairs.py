@@ -9,10 +9,10 @@ from ..core.algebra import Array
 from ..core.checks import instance
 from ..core.errors import InputError
 from .boundary_mesh import BoundaryMesh
-from .loops import place
+from .loops import point_at
 
 Index = NDArray[np.int64]
-NEAR = 3.0  # pairs closer than this many element lengths get the finer rule
+NEAR_LENGTHS = 3.0  # pairs closer than this many element lengths get the finer rule
 CLOSE = 0.9  # pairs whose elements are this share of the longer one's length apart are integrated with their feet
 
 LEAST = 0.05  # of the longer element: nearer ones are refused, for nothing is known of the answers
@@ -53,7 +53,7 @@ class ElementPairs:
         width = np.where(self.corner, np.minimum(*free), self.r_min) / self.h
         self.width: Array = np.where(self.same, np.inf, width)
         self.close = self.width < CLOSE
-        self.near = self.r_min < NEAR * self.h
+        self.near = self.r_min < NEAR_LENGTHS * self.h
         self._check_width(mesh)
 
     def _check_width(self, mesh: BoundaryMesh) -> None:
@@ -68,7 +68,7 @@ class ElementPairs:
         if self.corner[pair]:
             near, remedy = "has a sharp or uneven corner", "widen its angle or make its two elements more equal"
         raise InputError(
-            f"boundary elements: the boundary {near} at {place(mesh.points[second])}, where elements {first} and "
+            f"boundary elements: the boundary {near} at {point_at(mesh.points[second])}, where elements {first} and "
             f"{second} are {apart:.3g} m apart, less than 1/20 of the {h:.3g} m of the longer one; {remedy}"
         )
 

@@ -31,7 +31,7 @@ from .fundamental_solution import TimeKernels
 from .quadrature import Orders
 
 NUMBERS = 4_000_000_000  # in the blocks of a body: 32 GB
-SMALLEST, GREATEST = 0.05, 8.0  # limits of c_P dt / h
+SMALLEST_RATIO, GREATEST_RATIO = 0.05, 8.0  # limits of c_P dt / h
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,9 +71,9 @@ def check_time_step(mesh: BoundaryMesh, c_p: float, dt: float) -> None:
     number("boundary elements", "the time step dt", dt, positive=True, unit="s")
     ratio = c_p * dt / float(mesh.lengths.max())
     advice = f"c_P dt / h is {ratio:.3g} (h = {mesh.lengths.max():.3g} m, dt = {dt:.3g} s), good is 0.5 to 2"
-    if ratio < SMALLEST:
+    if ratio < SMALLEST_RATIO:
         raise InputError(f"boundary elements: {advice}; enlarge the time step or refine the mesh")
-    if ratio > GREATEST:
+    if ratio > GREATEST_RATIO:
         raise InputError(f"boundary elements: {advice}; reduce the time step or coarsen the mesh")
 
 
@@ -108,7 +108,7 @@ def energetic_blocks(
 
 
 @dataclass(frozen=True)
-class Motion:
+class BoundaryHistories:
     """Hold histories on the boundary, last axis R of right-hand sides: at the end of, or as a mean over, each step.
 
     displacement: (steps, 2n, R) at t_1 ... t_N; traction: (steps, 4n, R) constant in each step; forces: (steps, 2n, R)
@@ -144,7 +144,7 @@ class Marching:
             self.s0 = 0.5 * (self.s0 + self.s0.T)
         self.factor = lu_factor(self.s0[np.ix_(self.free, self.free)]) if self.free.any() else None
 
-    def run(self, forces: Array, prescribed: Array | None = None) -> Motion:
+    def run(self, forces: Array, prescribed: Array | None = None) -> BoundaryHistories:
         """Return the motion under forces (steps, 2n, R); prescribed: (steps, 2n, R), read at fixed unknowns only."""
         array("Marching", "forces", forces, (None, 2 * len(self.blocks.mesh), None), unit="N/m")
         steps, unknowns, count = forces.shape
@@ -170,7 +170,7 @@ class Marching:
             if self.symmetric:
                 q[k] = p[k] - p[k - 1] if k else p[k]
             before = before + u[k]
-        return Motion(np.cumsum(u, axis=0, out=u), p, total)
+        return BoundaryHistories(np.cumsum(u, axis=0, out=u), p, total)
 
     def _past_first(self, k: int, p: Array, u: Array) -> Array:
         """Return the sum over earlier steps of V p - K u."""

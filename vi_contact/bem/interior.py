@@ -12,7 +12,7 @@ from ..core.algebra import Array
 from ..core.checks import array, instance, integers, shape_of
 from ..core.errors import InputError
 from .boundary_mesh import BoundaryMesh
-from .boundary_operators import N_SINGLE, double_local, joined, stacked
+from .boundary_operators import N_SINGLE, double_local, integrands, joined_at_nodes
 from .fundamental_solution import TimeKernels
 from .poincare_steklov import BoundaryMotion, PoincareSteklov
 from .rules import pieces, roots, smoothed, stretched
@@ -64,7 +64,7 @@ def _matrices(mesh: BoundaryMesh, x: Array, t: float, c_p: float, c_s: float) ->
         for k in range(2):
             single[c, point, k, element] = moments[c + k]
             double[c, point, k, element] = values[c, k][:, 0]
-    return single.reshape(2 * m, 4 * n), joined(mesh, double, 3).reshape(2 * m, 2 * n)
+    return single.reshape(2 * m, 4 * n), joined_at_nodes(mesh, double, 3).reshape(2 * m, 2 * n)
 
 
 def _moments(mesh: BoundaryMesh, x: Array, t: float, c_p: float, c_s: float) -> Iterator[Array]:
@@ -87,7 +87,7 @@ def _moments(mesh: BoundaryMesh, x: Array, t: float, c_p: float, c_s: float) -> 
         r = np.hypot(*d)
         heard = r < c_p * t
         d, r, eta, owner, weight = d[:, heard], r[heard], eta[heard], owner[heard], weight[heard]
-        values = stacked(kernels(r), d, r)
+        values = integrands(kernels(r), d, r)
         shapes = np.stack([1.0 - eta, eta], axis=1) * weight[:, None]
         rows = 2 * owner[:, None] + np.arange(2)
         matrix = csc_matrix((shapes.ravel(), rows.ravel(), np.arange(0, 2 * len(r) + 1, 2)), (2 * count * n, len(r)))

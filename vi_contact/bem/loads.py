@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from ..core.algebra import Array
 from ..core.checks import array, counted, function, instance, mask, number, whole
 from .boundary_mesh import BoundaryMesh
-from .quadrature import MOST
+from .quadrature import MOST_POINTS
 from .rules import gauss
 
 
@@ -35,7 +35,7 @@ def traction_forces(
     counted(owner, "steps", 2 * steps * len(mesh), "numbers")
     everywhere = np.ones(len(mesh), bool)
     chosen = np.flatnonzero(everywhere if elements is None else mask(owner, "elements", elements, (len(mesh),)))
-    x, w = gauss(whole(owner, "order", order, least=1, most=MOST))
+    x, w = gauss(whole(owner, "order", order, least=1, most=MOST_POINTS))
     start, end = mesh.points[chosen, None], mesh.points[mesh.after[chosen], None]
     places = (start + x[:, None] * (end - start)).reshape(-1, 2)
     normals = np.repeat(mesh.normals[chosen], order, axis=0)

@@ -71,8 +71,8 @@ def check_simple(points: Array, after: Index) -> None:
     crossing = splits & splits.T & ~neighbours
     if crossing.any():
         i, j = np.argwhere(crossing)[0]
-        raise InputError(f"BoundaryMesh: the boundary crosses itself near {place(a[i])}, where elements {i} and {j} "
-                         "cross; give a boundary that does not meet itself")
+        raise InputError(f"BoundaryMesh: the boundary crosses itself near {point_at(a[i])}, where elements {i} and "
+                         f"{j} cross; give a boundary that does not meet itself")
 
 
 def _check_touching(points: Array, after: Index) -> None:
@@ -84,11 +84,11 @@ def _check_touching(points: Array, after: Index) -> None:
     distance[index, index] = distance[after, index] = np.inf
     node, element = np.unravel_index(int(distance.argmin()), distance.shape)
     if distance[node, element] <= TOUCHING * np.hypot(*np.ptp(points, axis=0)):
-        raise InputError(f"BoundaryMesh: the boundary crosses or touches itself at {place(points[node])}, where node "
-                         f"{node} lies on element {element}; give a boundary that does not meet itself")
+        raise InputError(f"BoundaryMesh: the boundary crosses or touches itself at {point_at(points[node])}, where "
+                         f"node {node} lies on element {element}; give a boundary that does not meet itself")
 
 
-def place(point: Array) -> str:
+def point_at(point: Array) -> str:
     """Format a point for a sentence."""
     return f"({point[0]:.4g}, {point[1]:.4g})"
 

@@ -17,7 +17,7 @@ from ..core.algebra import Array
 from ..core.checks import array, flag, instance, integers, mask, number
 from ..core.errors import InputError
 from .boundary_mesh import BoundaryMesh
-from .energetic import EnergeticBlocks, Marching, Motion, summed
+from .energetic import EnergeticBlocks, Marching, summed
 
 Mask = NDArray[np.bool_]
 
@@ -203,7 +203,7 @@ class BoundaryProblem(BodyProblem):
         """Return the motion under loads and nodal contact forces (steps, 2m), ordered as CondensedCompliance."""
         n, rho = len(self.operator.mesh), self.operator.rho
         prescribed = None if self.prescribed is None else np.asarray(self.prescribed).reshape(-1, 2 * n, 1)
-        motion: Motion = self.marching.run(self._loads(contact_forces).reshape(-1, 2 * n, 1) / rho, prescribed)
+        motion = self.marching.run(self._loads(contact_forces).reshape(-1, 2 * n, 1) / rho, prescribed)
         return BoundaryMotion(
             self.times, motion.displacement.reshape(-1, 2, n), rho * motion.traction.reshape(-1, 2, n, 2),
             rho * motion.forces.reshape(-1, 2, n),

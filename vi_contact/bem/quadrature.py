@@ -28,7 +28,7 @@ from .rules import gauss, graded, linear, pieces, roots, smoothed, stretched
 
 Index = NDArray[np.int64]
 Rule = tuple[Array, Array]
-MOST = 200  # Gauss points a rule may have
+MOST_POINTS = 200  # Gauss points a rule may have
 CHUNK = 40_000  # points evaluated at once: keeps the arrays in the cache
 
 
@@ -48,7 +48,7 @@ class Orders:
 
     def __post_init__(self) -> None:
         for name in ("far", "near", "outer", "inner", "touching", "close"):
-            whole("Orders", name, getattr(self, name), least=1, most=MOST)
+            whole("Orders", name, getattr(self, name), least=1, most=MOST_POINTS)
 
 
 @dataclass(frozen=True)

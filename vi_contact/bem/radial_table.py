@@ -28,7 +28,7 @@ from .quadrature import Orders, PointSet, point_sets
 
 POINTS = 16  # Chebyshev points of a panel
 PANELS = 100_000  # of equal width
-SMALLEST = 1e-9  # end of the dyadic panels, relative to the shortest element
+INNERMOST = 1e-9  # end of the dyadic panels, relative to the shortest element
 
 
 class RadialTable(Galerkin):
@@ -42,7 +42,7 @@ class RadialTable(Galerkin):
         number("RadialTable", "the width of its panels", width, positive=True, unit="m")
         far = float(self.pairs.r_max.max())
         counted("RadialTable", "the width of its panels", far / width, "panels", most=PANELS)
-        dyadic = width * 0.5 ** np.arange(np.ceil(np.log2(width / (SMALLEST * mesh.lengths.min()))), 0.0, -1.0)
+        dyadic = width * 0.5 ** np.arange(np.ceil(np.log2(width / (INNERMOST * mesh.lengths.min()))), 0.0, -1.0)
         self.edges: Array = np.concatenate([dyadic, width * np.arange(1.0, np.ceil(far / width * (1.0 + 1e-9)) + 1.0)])
         reference = np.cos(np.pi * (np.arange(POINTS) + 0.5) / POINTS)
         self._to_coefficients = np.linalg.inv(chebvander(reference, POINTS - 1))

@@ -19,7 +19,7 @@ from .quadrature import Orders
 
 FORMAT = "vi_contact boundary element blocks, 2"
 EARLIER = "vi_contact boundary element blocks, 1"  # the same numbers but for thin and sharp bodies
-SAME = 1e-12  # relative difference up to which geometry, speeds and time step count as equal
+EQUAL = 1e-12  # relative difference up to which geometry, speeds and time step count as equal
 
 
 def save_blocks(path: str | Path, blocks: EnergeticBlocks) -> None:
@@ -116,9 +116,9 @@ def _differences(file: Any, mesh: BoundaryMesh, material: LinearElastic, dt: flo
     different = []
     for name, here in (("c_p", material.c_p), ("c_s", material.c_s), ("dt", dt)):
         there = float(file.attrs[name])
-        if not abs(there - here) <= SAME * abs(here):
+        if not abs(there - here) <= EQUAL * abs(here):
             different.append(f"{name} = {there:.6g}, here {here:.6g}")
-    if not np.abs(points - mesh.points).max() <= SAME * mesh.size or tuple(file["loop_sizes"][:]) != mesh.loop_sizes:
+    if not np.abs(points - mesh.points).max() <= EQUAL * mesh.size or tuple(file["loop_sizes"][:]) != mesh.loop_sizes:
         different.append("other points of the boundary")
     if bool(file.attrs["exterior"]) != mesh.exterior:
         different.append("the other side of the boundary")

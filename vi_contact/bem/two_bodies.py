@@ -20,11 +20,11 @@ from scipy.linalg import cho_factor, cho_solve
 from ..core.algebra import Array, Indices, Mask
 from ..core.checks import array, mask, provides
 from ..core.errors import InputError
+from .contact import SUPPORTED
 from .energetic import summed
 from .poincare_steklov import BoundaryMotion, BoundaryProblem, CondensedCompliance
 
 MATCH = 1e-9  # of the extent of the interface: distance of matching nodes
-HELD = 1e-12  # of the largest flexibility: supported unknowns
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,13 +102,13 @@ def matching(points: Array, others: Array) -> Indices:
 
 @dataclass(frozen=True, eq=False)
 class Weld:
-    """Eliminate weld forces: ``contact`` is what is left. Masks (2m,) of unknowns; held: (steps, |I|, 2m_c + 1) weld
-    forces after unit contact forces in step 0, and, in the last column, without any."""
+    """Eliminate weld forces: ``contact`` is what is left. Masks (2m,) of unknowns; responses: (steps, |I|, 2m_c + 1)
+    weld forces after unit contact forces in step 0, and, in the last column, without any."""
 
     contact: CondensedCompliance
     welded: Mask
     touching: Mask
-    held: Array
+    responses: Array
 
     def forces(self, contact_forces: Array) -> Array:
         """Return (steps, 2m): contact forces (steps, 2m_c) and the weld forces that go with them."""
@@ -116,8 +116,8 @@ class Weld:
         everything[:, self.touching] = contact_forces
         if self.welded.any():
             for k in range(len(contact_forces)):
-                follow = summed(self.held[k::-1, :, :-1], contact_forces[: k + 1, :, None])[:, 0]
-                everything[k, self.welded] = self.held[k, :, -1] + follow
+                follow = summed(self.responses[k::-1, :, :-1], contact_forces[: k + 1, :, None])[:, 0]
+                everything[k, self.welded] = self.responses[k, :, -1] + follow
         return everything
 
 
@@ -125,22 +125,22 @@ def weld(compliance: CondensedCompliance, nodes: Mask) -> Weld:
     """Hold the relative displacement of masked nodes (m,) at zero from the first step on."""
     W, steps = compliance.W, len(compliance.W)
     flexibility = W[0].diagonal()
-    welded = np.tile(nodes, 2) & (flexibility > HELD * flexibility.max())
+    welded = np.tile(nodes, 2) & (flexibility > SUPPORTED * flexibility.max())
     touching = np.tile(~nodes, 2)
     inner, cross, across = W[:, welded][:, :, welded], W[:, welded][:, :, touching], W[:, touching][:, :, welded]
     known = np.concatenate([cross, compliance.u_free[:, welded, None]], axis=2)
-    held = np.zeros_like(known)
+    responses = np.zeros_like(known)
     if welded.any():
         factor = cho_factor(0.5 * (inner[0] + inner[0].T))
         for k in range(steps):
-            early = summed(inner[k:0:-1], held[:k]) if k else 0.0
-            held[k] = -cho_solve(factor, known[k] + early)
+            early = summed(inner[k:0:-1], responses[:k]) if k else 0.0
+            responses[k] = -cho_solve(factor, known[k] + early)
     left = np.concatenate([W[:, touching][:, :, touching], compliance.u_free[:, touching, None]], axis=2)
     if welded.any():
-        left += np.array([summed(across[k::-1], held[: k + 1]) for k in range(steps)])
+        left += np.array([summed(across[k::-1], responses[: k + 1]) for k in range(steps)])
     contact = replace(
         compliance, W=np.ascontiguousarray(left[:, :, :-1]), u_free=np.ascontiguousarray(left[:, :, -1]),
         nodes=compliance.nodes[~nodes], points=compliance.points[~nodes], normals=compliance.normals[~nodes],
         lengths=compliance.lengths[~nodes],
     )
-    return Weld(contact, welded, touching, held)
+    return Weld(contact, welded, touching, responses)

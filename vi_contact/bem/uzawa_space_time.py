@@ -23,7 +23,7 @@ from ..core.errors import InputError, StepFailure
 from ..core.step import StepResult
 from ..laws.friction import project
 from .contact import BoundaryContact
-from .contact_run import ContactRun, run_of
+from .contact_run import ContactRun, certified_run
 from .energetic import summed
 
 GROWN = 1e12  # change over the first one: diverged
@@ -139,7 +139,7 @@ class _SpaceTime:
     def run(self, r: Array, counts: Array, history: tuple[float, ...]) -> ContactRun:
         """Return the steps of these multipliers with their certificates."""
         contact, steps, results = self.contact, [], []
-        v, active = np.zeros(int(contact.kept.sum())), contact.surface.gap(0.0) <= 0.0
+        v, active = np.zeros(int(contact.free.sum())), contact.surface.gap(0.0) <= 0.0
         loads = np.zeros_like(contact.v_free)
         for k in range(self._total):
             r_t = r[k, 1][:, None] if contact.frictional else None
@@ -149,4 +149,4 @@ class _SpaceTime:
             active = (r[k, 0] > 0.0) | contact.bilateral
             steps.append(step)
             results.append(StepResult(v, r[k, 0], active, int(counts.sum()), "space-time Uzawa", r_t))
-        return run_of(contact, steps, results, iterations=counts, history=history)
+        return certified_run(contact, steps, results, iterations=counts, history=history)

@@ -27,7 +27,7 @@ from ..core.checks import attributes
 from ..core.errors import InputError
 from .bar import UprightBar
 
-SAME = 1e-12  # events and piece ends closer than this, relative to the problem's own scales, are the same
+COINCIDENT = 1e-12  # events and piece ends closer than this, relative to the problem's own scales, are the same
 
 
 @dataclass(frozen=True)
@@ -118,12 +118,12 @@ class BouncingBar(UprightBar):
 def _pieces(bar: BouncingBar, round_trips: int) -> tuple[Array, Array, Array]:
     """Return the pieces of F from -2T to at least `round_trips` · 2T, as BouncingBar._history returns them."""
     trip, g = 2.0 * bar.crossing, bar.gravity
-    near = SAME * (bar.height + g * trip**2)
-    slow = SAME * g * (bar.fall_time + trip)
+    near = COINCIDENT * (bar.height + g * trip**2)
+    slow = COINCIDENT * g * (bar.fall_time + trip)
     start, wave, closed = [-trip], [(0.0, 0.0, 0.0)], [False]
     t, y, delayed = 0.0, bar.height, 0  # delayed: the piece that holds t - 2T
     while t < round_trips * trip:
-        while delayed + 1 < len(start) and start[delayed + 1] + trip <= t + SAME * trip:
+        while delayed + 1 < len(start) and start[delayed + 1] + trip <= t + COINCIDENT * trip:
             delayed += 1
         end = (start[delayed + 1] if delayed + 1 < len(start) else t) + trip
         value, slope, curvature = wave[delayed]
@@ -141,7 +141,7 @@ def _pieces(bar: BouncingBar, round_trips: int) -> tuple[Array, Array, Array]:
         else:
             wave.append((y - fall - value, slope, curvature))
             event = t + _landing(y, a, a1)
-        step = (event if event < end - SAME * trip else end) - t
+        step = (event if event < end - COINCIDENT * trip else end) - t
         t += step
         y = 0.0 if touching or t == event else y + (a + 0.5 * a1 * step) * step
     return np.array(start), np.array(wave), np.array(closed, dtype=float)
