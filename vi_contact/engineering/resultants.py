@@ -175,7 +175,7 @@ _MEANING = {
 }
 
 
-def meaning(quantity: str, name: str) -> tuple[str, str]:
+def unit_and_meaning(quantity: str, name: str) -> tuple[str, str]:
     """Return (unit, meaning) of a quantity of a part."""
     kind, _, axis = quantity.partition("_")
     if kind == "force":
@@ -210,7 +210,7 @@ class Resultants:
 
     def columns(self) -> Columns:
         """Call ``start`` first."""
-        return {f"{quantity}_{self.name}": meaning(quantity, self.name) for quantity in self._quantities}
+        return {f"{quantity}_{self.name}": unit_and_meaning(quantity, self.name) for quantity in self._quantities}
 
     def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
         """Find the part once, and return the row of the state, a static one or the start of a run."""

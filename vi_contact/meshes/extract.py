@@ -19,7 +19,7 @@ from scipy.spatial import cKDTree
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.checks import Array, check_cells, check_folds, check_sides
 from vi_contact.meshes.gmsh_session import MeshScript, session
-from vi_contact.meshes.mesh_file import copied
+from vi_contact.meshes.mesh_file import safe_copy
 from vi_contact.meshes.rows import Rows, number_alike
 
 Mask = npt.NDArray[np.bool_]
@@ -55,7 +55,7 @@ def arrays_from_file(path: str | Path) -> MeshArrays:
     """Read a mesh file in Gmsh's own format, MSH 2 to 4, text or binary. InputError like `copied` and `extract`."""
     file = Path(path)
     with TemporaryDirectory(prefix="vi_contact-") as folder:
-        copy = copied(file, Path(folder))
+        copy = safe_copy(file, Path(folder))
         with session() as gmsh:
             try:
                 gmsh.merge(str(copy))

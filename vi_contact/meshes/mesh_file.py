@@ -22,7 +22,7 @@ _SECTION = re.compile(rb"\n\$(End)?(PhysicalNames|Entities|Nodes|Elements)\b")
 SHORT = 80  # bytes in which what comes first is found
 
 
-def copied(file: Path, folder: Path) -> Path:
+def safe_copy(file: Path, folder: Path) -> Path:
     """Copy a mesh file into this folder, safe for Gmsh to read.
 
     InputError for a file that is missing, empty, no MSH file (a script most of all), cut short, or that announces more

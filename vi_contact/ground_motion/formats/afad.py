@@ -6,7 +6,7 @@ import numpy as np
 
 from ...core.errors import InputError
 from ..record import UNITS, Record, file_dt, file_units
-from .text import TextFile, filled, to_float
+from .text import TextFile, filled_lines, header_number
 
 COMPONENTS = ("N-S", "E-W", "U-D")
 
@@ -32,8 +32,8 @@ def read(text: TextFile, units: str | None = None, dt: float | None = None, chan
         key, colon, value = line.partition(":")
         if colon:
             header[" ".join(key.split()).upper()] = index, " ".join(value.split())
-    count, step = _number(text, header, "NUMBER OF DATA"), _number(text, header, "SAMPLING INTERVAL (SEC)")
-    data = filled(text, start)
+    count, step = header_number(text, header, "NUMBER OF DATA"), header_number(text, header, "SAMPLING INTERVAL (SEC)")
+    data = filled_lines(text, start)
     rows = list(zip(data, text.rows(data), strict=True))
     for index, row in rows:
         if len(row) != 3:
@@ -48,14 +48,3 @@ def read(text: TextFile, units: str | None = None, dt: float | None = None, chan
     return Record(acceleration=UNITS[name] * samples, dt=file_dt(text.path, step, dt), source=text.path, units=name,
                   title=f"{date} {station} {COMPONENTS[channel - 1]}".strip(),
                   format="AFAD", sha256=text.sha256, notes=lines, station=station, component=COMPONENTS[channel - 1])
-
-
-def _number(text: TextFile, header: dict[str, tuple[int, str]], key: str) -> float:
-    """Return the number after a key of the header."""
-    if key not in header:
-        raise InputError(f"{text.path}: the header does not give {key}; get the complete file")
-    index, value = header[key]
-    try:
-        return to_float(value)
-    except ValueError:
-        raise InputError(f"{text.at(index)}: {key} is {value!r}, not a number; get the file again") from None

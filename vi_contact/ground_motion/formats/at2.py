@@ -14,7 +14,7 @@ import numpy as np
 
 from ...core.errors import InputError
 from ..record import UNITS, Record, file_dt, file_units
-from .text import NUMBER, TextFile, filled, number, whole
+from .text import NUMBER, TextFile, filled_lines, stated_count, stated_number
 
 HEADER_LINES = 8
 """NPTS and DT are looked for in this many first lines."""
@@ -50,7 +50,7 @@ def read(text: TextFile, units: str | None = None, dt: float | None = None) -> R
     npts, stated_dt, npts_line, start = _header(text)
     header = [" ".join(line.split()) for line in text.heads[:start] if line.strip()]
     name = file_units(text.path, _stated_units(header), units)
-    values = [value for row in text.rows(filled(text, start)) for value in row]
+    values = [value for row in text.rows(filled_lines(text, start)) for value in row]
     if npts is not None and len(values) != npts:
         raise InputError(f"{text.at(npts_line)}: NPTS is {npts} but {len(values)} values follow; "
                          "get the complete file or correct NPTS")
@@ -68,11 +68,12 @@ def _header(text: TextFile) -> tuple[int | None, float | None, int, int]:
         if npts is not None and (both or count):
             raise InputError(f"{text.at(index)}: NPTS is stated a second time; give one record")
         if both:
-            npts, dt, npts_line, last = whole(text, index, both[1]), number(text, index, both[2]), index, index
+            npts, dt = stated_count(text, index, both[1]), stated_number(text, index, both[2])
+            npts_line = last = index
         if count:
-            npts, npts_line, last = whole(text, index, count[1]), index, index
+            npts, npts_line, last = stated_count(text, index, count[1]), index, index
         if step:
-            dt, last = number(text, index, step[1]), index
+            dt, last = stated_number(text, index, step[1]), index
     if start is None:
         start = last + 1
     return npts, dt if dt is not None else _prose_dt(text, start), npts_line, start
@@ -80,7 +81,7 @@ def _header(text: TextFile) -> tuple[int | None, float | None, int, int]:
 
 def _prose_dt(text: TextFile, start: int) -> float | None:
     """Return the time step of a sentence "1559 points at equal spacing of 0.02 sec", if there is exactly one."""
-    found = {number(text, index, match[1]) for index in range(start) for pattern in _PROSE_DT
+    found = {stated_number(text, index, match[1]) for index in range(start) for pattern in _PROSE_DT
              for match in pattern.finditer(text.heads[index])}
     return found.pop() if len(found) == 1 else None
 

@@ -18,7 +18,7 @@ from ...core.checks import counted, number
 from ...core.errors import InputError
 from ..record import UNITS, Record, file_dt, file_units
 from .at2 import begin_data
-from .text import TextFile, filled
+from .text import TextFile, filled_lines
 
 JITTER = 1e-6
 """Relative difference between time steps that still counts as rounding."""
@@ -58,7 +58,7 @@ def follow_begin_data(text: TextFile) -> bool:
     start = begin_data(text)
     if start is None:
         return False
-    rows = list(text.rows(filled(text, start)))
+    rows = list(text.rows(filled_lines(text, start)))
     times = [row[0] for row in rows]
     return all(len(row) == 2 for row in rows) and all(after > before >= 0.0 for before, after in pairwise(times))
 
@@ -68,7 +68,8 @@ def _table(text: TextFile, *, series: bool) -> tuple[list[int], Array]:
 
     series: rows of more than two values, the last perhaps shorter, are one column written in rows.
     """
-    lines = [index for index in filled(text, begin_data(text) or 0) if not text.lines[index].lstrip().startswith("#")]
+    filled = filled_lines(text, begin_data(text) or 0)
+    lines = [index for index in filled if not text.lines[index].lstrip().startswith("#")]
     rows = list(text.rows(lines))
     if series and rows and len(rows[0]) > 2:
         return lines, np.array([value for row in rows for value in row])[:, None]

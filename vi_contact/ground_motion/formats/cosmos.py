@@ -17,7 +17,7 @@ import numpy as np
 from ...core.algebra import Array
 from ...core.errors import InputError
 from ..record import UNITS, Record, file_dt, file_units
-from .text import NUMBER, TextFile, number, whole
+from .text import NUMBER, TextFile, stated_count, stated_number
 
 STEP = 33
 """Place of the time step among the real header values of COSMOS, from 0."""
@@ -97,7 +97,7 @@ def _blocks(text: TextFile) -> list[Block]:
         form = _FORMAT.search(text.heads[index]) if announced else None
         if announced and (form or _SPACED.search(text.heads[index])):
             count, quantity = announced
-            per_line, width = (whole(text, index, part or "1") for part in form.groups()) if form else (8, 10)
+            per_line, width = (stated_count(text, index, part or "1") for part in form.groups()) if form else (8, 10)
             block = Block(index, range(start, index), count, max(per_line, 1), max(width, 1))
             if quantity == "accel":
                 found.append(block)
@@ -116,7 +116,7 @@ def _announced(text: TextFile, index: int) -> tuple[int, str] | None:
     quantity = _QUANTITY.search(line, count.end()) if count else None
     if count is None or quantity is None or not _SAMPLES.search(line, quantity.end()):
         return None
-    return whole(text, index, count[1]), quantity[1].lower()
+    return stated_count(text, index, count[1]), quantity[1].lower()
 
 
 def _words(text: TextFile, block: Block) -> tuple[list[str], list[str]]:
@@ -140,7 +140,7 @@ def _chosen(text: TextFile, blocks: list[Block], channel: int | None) -> Block:
 def _samples(text: TextFile, block: Block) -> Array:
     """Return the samples in the file's units, shape (count,)."""
     marks = ((index, _UNKNOWN.search(text.heads[index])) for index in block.header)
-    unknown = next((number(text, index, mark[1]) for index, mark in marks if mark), None)
+    unknown = next((stated_number(text, index, mark[1]) for index, mark in marks if mark), None)
     values: list[float] = []
     for index in range(block.line + 1, block.end):
         row = text.fixed(index, block.width) if index < len(text.lines) else []
@@ -157,17 +157,17 @@ def _samples(text: TextFile, block: Block) -> Array:
 def _step(text: TextFile, block: Block) -> float | None:
     """Return the time step stated with the samples, in the text of the header or among its real numbers."""
     rate = _RATE.search(text.heads[block.line])
-    if rate and number(text, block.line, rate[1]) > 0.0:
-        return 1.0 / number(text, block.line, rate[1])
+    if rate and stated_number(text, block.line, rate[1]) > 0.0:
+        return 1.0 / stated_number(text, block.line, rate[1])
     for index in (block.line, *block.header):
         spaced = _SPACED.search(text.heads[index])
         if spaced:
-            return number(text, index, spaced[1])
+            return stated_number(text, index, spaced[1])
     for index in block.header:
         reals, form = _REALS.match(text.heads[index]), _FORMAT.search(text.heads[index])
         if reals and form:
-            rows = range(index + 1, min(index + 1 + whole(text, index, reals[2]), block.line))
-            values = [value for row in rows for value in text.fixed(row, max(whole(text, index, form[2]), 1))]
+            rows = range(index + 1, min(index + 1 + stated_count(text, index, reals[2]), block.line))
+            values = [value for row in rows for value in text.fixed(row, max(stated_count(text, index, form[2]), 1))]
             return values[STEP] if len(values) > STEP and values[STEP] > 0.0 else None
     return None
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...core.errors import InputError
 from ..record import UNITS, Record, file_dt, file_units
-from .text import TextFile, filled, to_float
+from .text import TextFile, filled_lines, header_number
 
 NEEDED = ("SAMPLING_INTERVAL_S", "NDATA", "UNITS")
 _KEY = re.compile(r"[A-Z][A-Z0-9_/^ ]*+")
@@ -37,8 +37,8 @@ def read(text: TextFile, units: str | None = None, dt: float | None = None) -> R
     index, kind = header.get("DATA_TYPE", (0, "ACCELERATION"))
     if kind and "ACCELERATION" not in kind.upper():
         raise InputError(f"{text.at(index)}: the file holds {kind.lower()}; get the file of accelerations (.ACC.ASC)")
-    count, step = _number(text, header, "NDATA"), _number(text, header, "SAMPLING_INTERVAL_S")
-    values = [value for row in text.rows(filled(text, start)) for value in row]
+    count, step = header_number(text, header, "NDATA"), header_number(text, header, "SAMPLING_INTERVAL_S")
+    values = [value for row in text.rows(filled_lines(text, start)) for value in row]
     if len(values) != count:
         raise InputError(f"{text.at(header['NDATA'][0])}: NDATA is {count:g} but {len(values)} values follow; get the "
                          "complete file")
@@ -68,12 +68,3 @@ def _entry(line: str) -> tuple[str, str] | None:
     """Return the key and value of a line "KEY: value", None for any other line."""
     key, colon, value = (part.strip() for part in line.partition(":"))
     return (key, value) if colon and _KEY.fullmatch(key) else None
-
-
-def _number(text: TextFile, header: dict[str, tuple[int, str]], key: str) -> float:
-    """Return the number after a key of the header."""
-    index, value = header[key]
-    try:
-        return to_float(value)
-    except ValueError:
-        raise InputError(f"{text.at(index)}: {key} is {value!r}, not a number; get the file again") from None

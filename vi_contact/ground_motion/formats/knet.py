@@ -12,7 +12,7 @@ import numpy as np
 
 from ...core.errors import InputError
 from ..record import UNITS, Record, file_dt, file_units
-from .text import NUMBER, TextFile, filled, number
+from .text import NUMBER, TextFile, filled_lines, stated_number
 
 KEYS = ("Origin Time", "Station Code", "Record Time", "Sampling Freq(Hz)", "Duration Time(s)", "Dir.", "Scale Factor",
         "Max. Acc. (gal)", "Memo.")
@@ -39,7 +39,7 @@ def read(text: TextFile, units: str | None = None, dt: float | None = None) -> R
         raise InputError(f"{text.path}: the header has no line {missing[0]!r}; get the complete file")
     scale, unit = _scale(text, header["Scale Factor"])
     frequency = _number(text, header["Sampling Freq(Hz)"], "Sampling Freq(Hz)")
-    counts = [value for row in text.rows(filled(text, header["Memo."] + 1)) for value in row]
+    counts = [value for row in text.rows(filled_lines(text, header["Memo."] + 1)) for value in row]
     seconds = _number(text, header["Duration Time(s)"], "Duration Time(s)")
     if not abs(len(counts) - seconds * frequency) <= 0.5:
         raise InputError(f"{text.at(header['Duration Time(s)'])}: {seconds:g} s at {frequency:g} Hz are announced but "
@@ -57,14 +57,14 @@ def read(text: TextFile, units: str | None = None, dt: float | None = None) -> R
 def _scale(text: TextFile, index: int) -> tuple[float, str]:
     """Return the size of a count, and its unit, of "Scale Factor      3920(gal)/6182761"."""
     match = _SCALE.search(text.heads[index])
-    if match is None or number(text, index, match[3]) == 0.0:
+    if match is None or stated_number(text, index, match[3]) == 0.0:
         raise InputError(f"{text.at(index)}: the scale factor is not like '3920(gal)/6182761'; get the file again")
-    return number(text, index, match[1]) / number(text, index, match[3]), match[2]
+    return stated_number(text, index, match[1]) / stated_number(text, index, match[3]), match[2]
 
 
 def _number(text: TextFile, index: int, key: str) -> float:
     """Return the positive number after a key, "Hz" allowed."""
     match = _FREQUENCY.match(text.heads[index][len(key):].strip())
-    if match is None or number(text, index, match[1]) <= 0.0:
+    if match is None or stated_number(text, index, match[1]) <= 0.0:
         raise InputError(f"{text.at(index)}: {key!r} gives no positive number; get the file again")
-    return number(text, index, match[1])
+    return stated_number(text, index, match[1])

@@ -43,13 +43,13 @@ def read_record(path: str | os.PathLike[str], units: str | None = None, *, dt: f
         raise InputError(f"{text.path}: channel={channel} was passed but the file holds one record; leave channel out")
     number("read_record", "largest", largest, positive=True, unit="m/s²")
     record = _read(text, units, dt, resample_dt, channel)
-    _doubt(record, largest)
+    _refuse_improbable(record, largest)
     if resample_dt is not None and not math.isclose(record.dt, resample_dt, rel_tol=1e-9):
         record = resampled(record, resample_dt)
     return record
 
 
-def _doubt(record: Record, largest: float) -> None:
+def _refuse_improbable(record: Record, largest: float) -> None:
     """Raise InputError for a peak or a time step that no ground motion has."""
     peak = float(np.max(np.abs(record.acceleration)))
     if peak > largest:

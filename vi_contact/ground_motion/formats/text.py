@@ -61,7 +61,7 @@ class TextFile:
             parts = _NUMBER.findall(written)
             if "".join(parts) != written or any(part[0] not in "+-" for part in parts[1:]):
                 raise InputError(f"{self.at(index)}: {shown(word)} is not a number; correct or remove it")
-            values += [number(self, index, part) for part in parts]
+            values += [stated_number(self, index, part) for part in parts]
         return values
 
     def fixed(self, index: int, width: int) -> list[float]:
@@ -91,14 +91,14 @@ def to_float(number: str) -> float:
     return found
 
 
-def whole(text: TextFile, index: int, digits: str) -> int:
+def stated_count(text: TextFile, index: int, digits: str) -> int:
     """Return the whole number of these digits; InputError where there are too many to count samples with."""
     if len(digits) > 12:
         raise InputError(f"{text.at(index)}: a count of {shown(digits)} is too large; get the file again")
     return int(digits)
 
 
-def number(text: TextFile, index: int, word: str) -> float:
+def stated_number(text: TextFile, index: int, word: str) -> float:
     """Return the number that a header states; InputError where it is too large for one."""
     try:
         return to_float(word)
@@ -106,7 +106,18 @@ def number(text: TextFile, index: int, word: str) -> float:
         raise InputError(f"{text.at(index)}: {shown(word)} is no number; get the file again") from None
 
 
-def filled(text: TextFile, start: int) -> Sequence[int]:
+def header_number(text: TextFile, header: dict[str, tuple[int, str]], key: str) -> float:
+    """Return the number after a key of the header."""
+    if key not in header:
+        raise InputError(f"{text.path}: the header does not give {key}; get the complete file")
+    index, value = header[key]
+    try:
+        return to_float(value)
+    except ValueError:
+        raise InputError(f"{text.at(index)}: {key} is {value!r}, not a number; get the file again") from None
+
+
+def filled_lines(text: TextFile, start: int) -> Sequence[int]:
     """Return the indices of the lines from `start` on that are not blank."""
     return [index for index in range(start, len(text.lines)) if text.lines[index].strip()]
 
