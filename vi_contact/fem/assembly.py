@@ -23,7 +23,7 @@ from ..laws.materials import Damping, LinearElastic, Section
 from . import compat
 from .assembly_checks import check_body, check_boundaries, check_initial
 from .dashpots import BoundaryLoads, DashpotMatrix, Dashpots, describe_boundaries
-from .loads import BodyForce, Prescribed, TangentialTraction, Traction, as_tuple, evaluate, is_constant
+from .loads import ActingLoad, BodyForce, Prescribed, Traction, as_tuple, evaluate
 from .mesh import Cells, Facets
 from .petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc
 from .space import FemSpace
@@ -205,7 +205,7 @@ def assemble_loads(space: FemSpace, section: Section, loads: tuple[Any, ...], fu
         name = type(load).__name__
         if load.history is not None:
             separable.append((integrate(evaluate(name, load.value, space.points, 0.0, space.comm)), load.history))
-        elif is_constant(load):
+        elif load.is_constant:
             constant += integrate(evaluate(name, load.value, space.points, 0.0, space.comm))
         else:
             general.append(_field_load(space, name, load.value, integrate))
@@ -224,16 +224,10 @@ def _field_load(
     return lambda t: integrate(evaluate(name, value, space.points, t, space.comm))
 
 
-def _integrator(space: FemSpace, section: Section, load: Traction | BodyForce) -> Callable[[Array], Array]:
+def _integrator(space: FemSpace, section: Section, load: ActingLoad) -> Callable[[Array], Array]:
     """Nodal values (owned, d) -> Pᵀ ∫ interpolated value · v, as one product with a matrix assembled here."""
     g, v = ufl.TrialFunction(space.V), ufl.TestFunction(space.V)
-    if isinstance(load, BodyForce):
-        form = ufl.inner(g, v) * ufl.dx
-    else:
-        n = ufl.FacetNormal(space.mesh)
-        tangential = isinstance(load, TangentialTraction)
-        acting = g - ufl.dot(g, n) * n if tangential else g
-        form = ufl.inner(acting, v) * compat.measure(space.mesh, space.mesh.topology.dim - 1, load.facets.indices)
+    form = ufl.inner(load.acting(g, space.mesh), v) * load.measure(space.mesh)
     matrix = PetscMatrix(compat.assemble_matrix(compat.compile_form(form)))
 
     def integrate(values: Array) -> Array:

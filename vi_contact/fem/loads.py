@@ -13,9 +13,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import ufl
+from dolfinx.mesh import Mesh
 
 from ..core.algebra import Array, Comm
 from ..core.checks import function, refuse, shown
+from . import compat
 from .groups import components_given, facets_of, field_given
 from .mesh import Facets
 
@@ -113,8 +116,34 @@ def _at_rest(value: Value) -> bool:
     return value is _zero or (not callable(value) and not np.any(value))
 
 
+class ActingLoad:
+    """Say where and how a load acts in forms; by default in the whole body, and all of it."""
+
+    value: Value
+    history: Callable[[float], float] | None
+
+    def __post_init__(self) -> None:
+        owner = type(self).__name__
+        field_given(owner, "value", self.value)
+        if self.history is not None:
+            function(owner, "history", self.history, "give a function of the time [s], or None")
+
+    @property
+    def is_constant(self) -> bool:
+        """Return whether one assembly serves all times."""
+        return self.history is not None or not callable(self.value)
+
+    def measure(self, mesh: Mesh) -> Any:
+        """Return the measure of integration over the part on which the load acts."""
+        return ufl.dx
+
+    def acting(self, g: Any, mesh: Mesh) -> Any:
+        """Return the part that acts of a load with the values ``g``."""
+        return g
+
+
 @dataclass(frozen=True)
-class Traction:
+class Traction(ActingLoad):
     """Apply S_i = F_i(x, t) [Pa] on facets (eq. 4). ``history``: a factor f(t) of a value that is constant in time.
 
     With a history, or with a tuple, the load is assembled once; a callable without history is evaluated every step.
@@ -126,7 +155,10 @@ class Traction:
 
     def __post_init__(self) -> None:
         facets_of(type(self).__name__, "facets", self.facets)
-        _check_load(self)
+        super().__post_init__()
+
+    def measure(self, mesh: Mesh) -> Any:
+        return compat.measure(mesh, mesh.topology.dim - 1, self.facets.indices)
 
 
 @dataclass(frozen=True)
@@ -134,29 +166,17 @@ class TangentialTraction(Traction):
     """Apply the tangential traction S_T = C_T(x, t) of eq. 6 on the contact boundary: the part of ``value`` along the
     facet, its normal component is removed."""
 
+    def acting(self, g: Any, mesh: Mesh) -> Any:
+        n = ufl.FacetNormal(mesh)
+        return g - ufl.dot(g, n) * n
+
 
 @dataclass(frozen=True)
-class BodyForce:
+class BodyForce(ActingLoad):
     """Apply a volume force f_i(x, t) [N/m³] (eq. 7). Weight of a material is BodyForce((0, -rho * 9.80665))."""
 
     value: Value
     history: Callable[[float], float] | None = None
-
-    def __post_init__(self) -> None:
-        _check_load(self)
-
-
-def _check_load(load: Traction | BodyForce) -> None:
-    """InputError for a value or a history of another kind."""
-    owner = type(load).__name__
-    field_given(owner, "value", load.value)
-    if load.history is not None:
-        function(owner, "history", load.history, "give a function of the time [s], or None")
-
-
-def is_constant(load: Traction | BodyForce) -> bool:
-    """Return whether one assembly serves all times."""
-    return load.history is not None or not callable(load.value)
 
 
 def as_tuple(items: Any) -> tuple[Any, ...]:

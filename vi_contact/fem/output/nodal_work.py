@@ -23,7 +23,7 @@ from ...core.problem import ContactProblem
 from ...core.step import Report, State
 from .. import compat
 from ..groups import facets_of
-from ..loads import BodyForce, TangentialTraction, Traction, as_tuple, evaluate, is_constant
+from ..loads import BodyForce, Traction, as_tuple, evaluate
 from ..space import FemSpace, known_matrices, space_of
 
 log = logging.getLogger(__name__)
@@ -53,15 +53,19 @@ class NodalWork:
         known_matrices("reactions and section forces", problem.system, "MCK")
         self._problem, self.space, self._loads = problem, space, as_tuple(loads)
         check_actions("NodalWork", loads, gravity)
-        for load in self._loads:
-            if isinstance(load, Traction):
-                facets_of("NodalWork", "the facets of loads", load.facets, space.mesh)
+        for facets in (getattr(load, "facets", None) for load in self._loads):
+            if facets is not None:
+                facets_of("NodalWork", "the facets of loads", facets, space.mesh)
         self._gravity = np.zeros(space.dimension) if gravity is None else np.asarray(gravity, dtype=float)
         if self._gravity.shape != (space.dimension,):
             raise InputError(f"gravity has {self._gravity.size} components: give {space.dimension}")
         self._r, self._inside = compat.function(space.V), compat.function(compat.cell_space(space.mesh))
         self._forms = [None if form is None else compat.compile_form(form) for form in self._motions()]
-        self._load_forms = [compat.compile_form(self._load(load)) for load in self._loads]
+        g, mesh, factor = ufl.TestFunction(space.V), space.mesh, space.forms.section.thickness * self._inside
+        self._load_forms = [  # their products with nodal values of the loads are rᵀf
+            compat.compile_form(factor * ufl.inner(self._r, load.acting(g, mesh)) * load.measure(mesh))
+            for load in self._loads
+        ]
         self._rows: list[list[Any]] = [[] for _ in range(len(self._forms) + len(self._loads))]
 
     def _motions(self) -> tuple[Any, Any | None, Any]:
@@ -72,16 +76,6 @@ class NodalWork:
         fields = forms.fields
         damping = inside * (fields["alpha_rho"] * mass + fields["beta"] * strain) * ufl.dx if forms.damped else None
         return inside * strain * ufl.dx, damping, inside * fields["rho"] * mass * ufl.dx
-
-    def _load(self, load: Traction | BodyForce) -> Any:
-        """Return the vector whose product with nodal values of the load is rᵀf."""
-        g, mesh, thickness = ufl.TestFunction(self.space.V), self.space.mesh, self.space.forms.section.thickness
-        if isinstance(load, BodyForce):
-            return thickness * self._inside * ufl.inner(self._r, g) * ufl.dx
-        n = ufl.FacetNormal(mesh)
-        acting = g - ufl.dot(g, n) * n if isinstance(load, TangentialTraction) else g
-        ds = compat.measure(mesh, mesh.topology.dim - 1, load.facets.indices)
-        return thickness * self._inside * ufl.inner(self._r, acting) * ds
 
     def known(self, name: str) -> None:
         """Warn when the system has constant loads and none were given: who forgets the weight measures reactions that
@@ -162,7 +156,7 @@ class NodalWork:
             values = evaluate(type(load).__name__, load.value, self.space.points, t, self.space.comm)
             return np.asarray(matrix @ values.ravel())
 
-        if load.history is None and not is_constant(load):
+        if load.history is None and not load.is_constant:
             return np.asarray(at(work))
         if k not in self._still:
             self._still[k] = work(0.0)
