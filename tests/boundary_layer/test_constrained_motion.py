@@ -10,7 +10,7 @@ from scipy.special import ellipk
 from vi_contact.boundary_layer import trajectory
 from vi_contact.boundary_layer.bilateral import bilateral_motion
 from vi_contact.boundary_layer.layer import Layer
-from vi_contact.boundary_layer.metric import Metric, b_affinities, normal_mass
+from vi_contact.boundary_layer.metric import Metric, normal_mass
 from vi_contact.boundary_layer.motion import ConstrainedSystem, Evaluations
 from vi_contact.boundary_layer.particle import ParticleImpact, damping_ratio, layer_for, restitution
 from vi_contact.boundary_layer.rigid_body import Ellipsoid, RigidBody, rotation
@@ -180,7 +180,7 @@ def test_metric_and_affinities():
     g = normal_mass(M, A)
     hat = b_metric(M, A, rho, b) - M
     assert hat == pytest.approx(g * (b / rho) ** 2 * np.outer(A, A), abs=1e-12)
-    turned = b_affinities(M, A, rho)
+    turned = -np.einsum("k,i,j->kij", g * np.linalg.solve(M, A), A, A) / rho  # the affinities (21)
     assert np.einsum("k,kij,i,j->", A, turned, v, v) == pytest.approx(-((A @ v) ** 2) / rho, rel=1e-12)
     orthogonal = M @ np.linalg.svd(A[None, :])[2][1:].T  # momenta of directions with A v = 0 get nothing
     assert np.einsum("ks,kij->sij", orthogonal, turned) == pytest.approx(0.0, abs=1e-10)

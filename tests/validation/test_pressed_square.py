@@ -94,7 +94,6 @@ def test_the_wave_takes_in_energy_at_a_constant_rate(scheme):
     history = run("none", scheme)
     early = history["t"] < 1.0 - 1e-9
     t, energy = history["t"][early], history["energy"][early]
-    assert model(20).square.energy_rate == pytest.approx(0.01, rel=1e-14)
     assert np.max(np.abs(energy - (0.01 * t + 1.4e-3 * t**2))) < 0.01 * 0.0114
     for law in ("tresca", "coulomb"):
         assert np.max(np.abs(run(law, scheme)["energy"][early] - energy)) < 1e-12 * energy.max()

@@ -51,9 +51,3 @@ class Metric(Enum):
 def normal_mass(M: Array, A: Array) -> float:
     """Return g_11 = 1/(A M⁻¹ Aᵀ): the mass that the boundary feels. M (n, n), A (n,)."""
     return float(1.0 / (A @ np.linalg.solve(M, A)))
-
-
-def b_affinities(M: Array, A: Array, rho: float) -> Array:
-    """Return Λ̂^K_IJ of (21), (n, n, n) in the order K, I, J."""
-    B = normal_mass(M, A) * np.linalg.solve(M, A)
-    return np.asarray(-np.einsum("k,i,j->kij", B, A, A) / rho)

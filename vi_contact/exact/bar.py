@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -121,6 +122,10 @@ class PeriodicBar:
     linear in x and s in the four zones that the lines s = x and s = 1 - x divide a phase into (Dabaghi, Petrov, Pousin,
     Renard; Chouly, Hild, Renard).
     """
+
+    length: ClassVar[float] = 1.0
+    E: ClassVar[float] = 1.0
+    rho: ClassVar[float] = 1.0
 
     @property
     def period(self) -> float:

@@ -98,11 +98,6 @@ def measure(mesh: Mesh, dim: int, indices: Indices) -> ufl.Measure:
 # Function spaces ------------------------------------------------------------------------------------------------------
 
 
-def scalar_space(mesh: Mesh) -> Any:
-    """Make the space of continuous P1 or Q1 functions on the mesh."""
-    return fem.functionspace(mesh, ("Lagrange", 1)) if _BASIX_ELEMENTS else fem.FunctionSpace(mesh, ("Lagrange", 1))
-
-
 def vector_space(mesh: Mesh) -> Any:
     """Make the space of P1 or Q1 vector fields with as many components as coordinates; the block size is gdim."""
     if _BASIX_ELEMENTS:

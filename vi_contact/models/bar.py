@@ -42,13 +42,11 @@ class Bar:
     @property
     def length(self) -> float:
         """Return the length of the bar [m]."""
-        return 1.0 if isinstance(self.case, PeriodicBar) else self.case.length
+        return self.case.length
 
     @property
     def material(self) -> LinearElastic:
         """Return the material, with nu = 0."""
-        if isinstance(self.case, PeriodicBar):
-            return LinearElastic(E=1.0, nu=0.0, rho=1.0)
         return LinearElastic(E=self.case.E, nu=0.0, rho=self.case.rho)
 
     @property

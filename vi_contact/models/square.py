@@ -48,11 +48,6 @@ class Square:
         """Return the time in which a pressure wave crosses a cell [s]."""
         return self.side / self.cells / self.material.c_p
 
-    @property
-    def energy_rate(self) -> float:
-        """Return the power [W/m] that a plane wave takes in under constant pressure, p² side / (rho c_P)."""
-        return self.pressure**2 * self.side / (self.material.rho * self.material.c_p)
-
 
 def concrete(cells: int = 20) -> Square:
     """Describe a box of concrete on steel, 1 m wide: c_P = 3253 m/s, c_S = 1992 m/s, 4 MPa tanh((t/15 ms)²)."""
