@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from reference_lcp import spd
+from reference_lcp import LCP, spd
 
 from vi_contact.core.errors import InputError
-from vi_contact.solvers.normal.lcp import LCP, energy_scale, largest_eigenvalue, scaled_dense
+from vi_contact.solvers.normal.lcp import energy_scale, largest_eigenvalue, scaled_dense
 
 pytestmark = pytest.mark.serial
 

@@ -2,12 +2,66 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
+from typing import Any
 
 import numpy as np
 
-from vi_contact.core.algebra import Array, Mask
-from vi_contact.solvers.normal.lcp import LCP
+from vi_contact.core.algebra import Array, Mask, max_abs
+from vi_contact.solvers.normal.lcp import (
+    LCPResult,
+    Operator,
+    check_gap,
+    check_operator,
+    complementarity,
+    energy_scale,
+    violation,
+)
+
+
+@dataclass(frozen=True)
+class LCP:
+    """The problem w = q + G r, 0 <= r ⊥ w >= 0 (w = 0 in bilateral rows); G an array or an Operator.
+
+    Raises InputError for shapes that do not match, a NaN or -inf in q, and an infinite q in a bilateral row.
+    """
+
+    G: Array | Operator
+    q: Array
+    bilateral: Mask
+
+    def __post_init__(self) -> None:
+        check_operator(self.G, self.bilateral)
+        check_gap(self.q, self.bilateral)
+
+    def w(self, r: Array) -> Array:
+        """Gap q + G r (m,)."""
+        return self.q + np.asarray(self.G @ r)
+
+    def residual(self, r: Array) -> float:
+        """How far r (m,) is from solving it, dimensionless and the same in all units.
+
+        max |min(r_i/d_i, w_i d_i)| over unilateral and max |w_i d_i| over bilateral rows, divided by the violation of
+        r = 0 (by max |q_i d_i| when r = 0 is the solution, by max |r_i/d_i| when q = 0). 1 is what r = 0 scores, 0 is
+        exact.
+        """
+        d = self._scale
+        q, bilateral = self.q * d, self.bilateral
+        reaction = r / d
+        unit = violation(q, bilateral) or max_abs(q[np.isfinite(q)]) or max_abs(reaction) or 1.0
+        return complementarity(reaction, self.w(r) * d, bilateral) / unit
+
+    @cached_property
+    def _scale(self) -> Array:
+        return energy_scale(self.G)
+
+
+def solve(method: Any, problem: LCP, *, guess: Array | Mask | None = None) -> LCPResult:
+    """The answer of a method: ActiveSet, Hildreth or ProjectedCG."""
+    result: LCPResult = method.prepare(problem.G, problem.bilateral).solve(problem.q, guess)
+    return result
 
 
 def enumerate_lcp(G: Array, q: Array, bilateral: Mask) -> Array:

@@ -37,9 +37,14 @@ STORED_ENTRIES = 200_000  # of A⁻¹E over all ranks: beyond it a second back-s
 
 
 class SmallMethod(Protocol):
-    """A method for the small problem: ActiveSet, Hildreth or ProjectedCG."""
+    """Solve the small problem without friction: ActiveSet, Hildreth or ProjectedCG."""
 
-    def prepare(self, G: Any, bilateral: Mask) -> Any: ...
+    def prepare(self, G: Any, bilateral: Mask) -> Any:
+        """Check G (m, m) and factor or scale it, once for many right-hand sides; ``bilateral`` (m,).
+
+        What it returns has ``solve(q, guess) -> LCPResult``, q (m,) the gaps without reactions and ``guess`` (m,).
+        """
+        ...
 
 
 @dataclass(frozen=True)
@@ -58,7 +63,7 @@ class Condensed:
 
     def __post_init__(self) -> None:
         remedy = "give ActiveSet(), Hildreth() or ProjectedCG()"
-        provides("Condensed", "method", self.method, ("prepare", "solve"), remedy, lacks=("check",))
+        provides("Condensed", "method", self.method, ("prepare",), remedy, lacks=("check", "carries_friction"))
         inner_method("Condensed", "friction_method", self.friction_method)
         instance("Condensed", "rates", self.rates, RateIteration, "give RateIteration()")
 

@@ -8,6 +8,7 @@ Analysis IV, 1996). Its observed factor is in the result. ``extrapolation`` may 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
@@ -29,6 +30,7 @@ class FixedPoint:
     ``contraction(result)`` is the mean factor between them: with Plain() that of the map itself.
     """
 
+    carries_friction: ClassVar[bool] = True
     tolerance: float = 1e-12
     max_iterations: int = 200
     tresca: FrictionMethod = field(default_factory=FrictionNewton)

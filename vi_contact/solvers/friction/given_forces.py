@@ -14,6 +14,7 @@ under Coulomb's when coupling and friction are moderate, linearly. ``extrapolati
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
@@ -33,6 +34,7 @@ class GivenForces:
     In the result ``iterations`` counts pairs of problems and ``history`` the relative change in each.
     """
 
+    carries_friction: ClassVar[bool] = True
     tolerance: float = 1e-11
     max_iterations: int = 1000
     tangential: FrictionMethod = field(default_factory=FrictionNewton)

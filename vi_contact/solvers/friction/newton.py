@@ -18,6 +18,7 @@ slip to and fro. Where Newton cycles all the same, Gauss-Seidel sweeps (nsgs.py)
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -39,6 +40,7 @@ class FrictionNewton:
     after each linear solve.
     """
 
+    carries_friction: ClassVar[bool] = True
     tolerance: float = 1e-11
     max_iterations: int = 30
 

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from scipy.optimize import brentq
@@ -31,6 +32,7 @@ class NSGS:
     In the result ``iterations`` counts sweeps and ``history`` the residual after each.
     """
 
+    carries_friction: ClassVar[bool] = True
     tolerance: float = 1e-12
     max_iterations: int = 5000
 

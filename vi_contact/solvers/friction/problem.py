@@ -61,15 +61,22 @@ class PreparedFriction(Protocol):
 
 
 class FrictionMethod(Protocol):
-    """A method for (1): FrictionNewton, NSGS, FixedPoint, GivenForces or Uzawa."""
+    """Solve (1): FrictionNewton, NSGS, FixedPoint, GivenForces or Uzawa."""
 
-    def prepare(self, G: Array, bilateral: Mask) -> PreparedFriction: ...
+    @property
+    def carries_friction(self) -> bool:
+        """Say True: that tells such a method from those for the problem without friction."""
+        ...
+
+    def prepare(self, G: Array, bilateral: Mask) -> PreparedFriction:
+        """Check G (m d, m d) and scale it, once for many right-hand sides; ``bilateral`` (m,)."""
+        ...
 
 
 def inner_method(owner: str, meaning: str, value: Any) -> None:
-    """InputError unless it is a method for the small problem with friction."""
+    """Raise InputError unless it is a method for the small problem with friction."""
     remedy = "give FrictionNewton(), NSGS(), FixedPoint(), GivenForces() or Uzawa()"
-    provides(owner, meaning, value, ("prepare",), remedy, lacks=("solve", "check"))
+    provides(owner, meaning, value, ("prepare", "carries_friction"), remedy, lacks=("check",))
 
 
 @dataclass(frozen=True)

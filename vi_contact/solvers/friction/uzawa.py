@@ -13,6 +13,7 @@ that of friction_small.py's scaled numbers, in which rho is dimensionless. Slow 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -29,6 +30,7 @@ class Uzawa:
     In the result ``iterations`` counts projections and ``history`` the residual after each. InputError for rho <= 0.
     """
 
+    carries_friction: ClassVar[bool] = True
     tolerance: float = 1e-12
     max_iterations: int = 100_000
     rho: float | None = None

@@ -22,7 +22,7 @@ from scipy.linalg import lapack
 
 from ...core.algebra import Array, Mask
 from ...core.checks import attributes
-from .lcp import LCP, LCPResult, check_guess, cholesky, failure, scaled_dense
+from .lcp import LCPResult, check_guess, cholesky, failure, scaled_dense
 
 PATIENCE = 10  # Júdice and Pires, Comput. Oper. Res. 21, 1994
 
@@ -45,12 +45,6 @@ class ActiveSet:
         """Check and factor G (m, m) once for many right-hand sides. InputError when it is not SPD."""
         return PreparedActiveSet(self, G, bilateral)
 
-    def solve(self, problem: LCP, *, guess: Array | Mask | None = None) -> LCPResult:
-        """Solve one problem. ``guess``: the active set, or reactions whose signs tell it; None: the rows with q < 0.
-
-        Raises StepFailure when no set fits within ``max_iterations`` or G is too ill-conditioned for ``tolerance``.
-        """
-        return self.prepare(problem.G, problem.bilateral).solve(problem.q, guess)  # type: ignore[arg-type]
 
 
 class PreparedActiveSet:
@@ -63,7 +57,10 @@ class PreparedActiveSet:
         self._factor = _Factor(np.zeros(bilateral.size, dtype=bool), self._scaled.matrix)
 
     def solve(self, q: Array, guess: Array | Mask | None = None) -> LCPResult:
-        """See ActiveSet.solve; q (m,) [m]."""
+        """Solve the problem of q (m,) [m]. ``guess``: the active set, or reactions whose signs tell it; None: q < 0.
+
+        Raises StepFailure when no set fits within ``max_iterations`` or G is too ill-conditioned for ``tolerance``.
+        """
         scaled = self._scaled
         gap = scaled.gap(q)
         unit = scaled.violation(gap)

@@ -18,7 +18,7 @@ from scipy.linalg import lapack
 
 from ...core.algebra import Array, Mask, max_abs
 from ...core.checks import attributes
-from .lcp import EPS, LCP, LCPResult, cholesky, failure, scaled_dense
+from .lcp import EPS, LCPResult, cholesky, failure, scaled_dense
 
 
 @dataclass(frozen=True)
@@ -42,12 +42,6 @@ class Hildreth:
         """Check G (m, m), and invert it for the primal form. InputError when it is not SPD."""
         return PreparedHildreth(self, G, bilateral)
 
-    def solve(self, problem: LCP, *, guess: Array | Mask | None = None) -> LCPResult:
-        """Solve one problem. ``guess``: reactions of a similar problem, or their active set; None: zero.
-
-        Raises StepFailure after ``max_sweeps``.
-        """
-        return self.prepare(problem.G, problem.bilateral).solve(problem.q, guess)  # type: ignore[arg-type]
 
 
 class PreparedHildreth:
@@ -63,7 +57,10 @@ class PreparedHildreth:
         self._rows = [(i, self._H[i]) for i in np.flatnonzero(~fixed).tolist()]
 
     def solve(self, q: Array, guess: Array | Mask | None = None) -> LCPResult:
-        """See Hildreth.solve; q (m,) [m]."""
+        """Solve the problem of q (m,) [m]. ``guess``: reactions of a similar problem, or their active set; None: zero.
+
+        Raises StepFailure after ``max_sweeps``.
+        """
         scaled, method = self._scaled, self.method
         gap = scaled.gap(q)
         unit = scaled.violation(gap)

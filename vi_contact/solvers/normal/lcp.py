@@ -16,7 +16,6 @@ resolve. Gaps that are far from closing do not enter it: a wide gap does not blu
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -37,49 +36,13 @@ class Operator(Protocol):
 
 
 @dataclass(frozen=True)
-class LCP:
-    """Problem (1): ``G`` (m, m) an array or an Operator, ``q`` (m,) with +inf allowed, ``bilateral`` (m,) boolean.
-
-    Raises InputError for shapes that do not match, a NaN or -inf in q, and an infinite q in a bilateral row.
-    """
-
-    G: Array | Operator
-    q: Array
-    bilateral: Mask
-
-    def __post_init__(self) -> None:
-        check_operator(self.G, self.bilateral)
-        check_gap(self.q, self.bilateral)
-
-    def w(self, r: Array) -> Array:
-        """Gap q + G r (m,)."""
-        return self.q + np.asarray(self.G @ r)
-
-    def residual(self, r: Array) -> float:
-        """How far r (m,) is from solving (1), dimensionless and the same in all units.
-
-        max |min(r_i/d_i, w_i d_i)| over unilateral and max |w_i d_i| over bilateral rows, divided by the violation of
-        r = 0 (by max |q_i d_i| when r = 0 is the solution, by max |r_i/d_i| when q = 0). 1 is what r = 0 scores, 0 is
-        exact.
-        """
-        d = self._scale
-        q, bilateral = self.q * d, self.bilateral
-        reaction = r / d
-        unit = violation(q, bilateral) or max_abs(q[np.isfinite(q)]) or max_abs(reaction) or 1.0
-        return complementarity(reaction, self.w(r) * d, bilateral) / unit
-
-    @cached_property
-    def _scale(self) -> Array:
-        return energy_scale(self.G)
-
-
-@dataclass(frozen=True)
 class LCPResult:
-    """What a method returns when it has reached its tolerance or the limit that rounding sets (else StepFailure).
+    """Answer problem (1), within the tolerance of the method or the limit that rounding sets (else StepFailure).
 
     ``r`` (m,) with r >= 0 exactly in unilateral rows; ``active`` (m,) boolean: r > 0, or bilateral, where a grazing row
-    (r = w = 0 but for rounding) may be either; ``residual`` as in LCP.residual; ``method`` the settings that
-    made it. Each method tells what ``iterations`` and ``history`` count.
+    (r = w = 0 but for rounding) may be either; ``residual``: max |min(r_i/d_i, w_i d_i)| over unilateral and
+    max |w_i d_i| over bilateral rows, over the unit: 1 is what r = 0 scores, 0 is exact, in all units of G and q;
+    ``method`` the settings that made it. Each method tells what ``iterations`` and ``history`` count.
     """
 
     r: Array
@@ -104,7 +67,7 @@ class ScaledLCP:
         object.__setattr__(self, "any_bilateral", bool(self.bilateral.any()))
 
     def gap(self, q: Array) -> Array:
-        """The scaled gap; InputError as in LCP."""
+        """The scaled gap; InputError for NaN, -inf, or +inf in a bilateral row."""
         check_gap(q, self.bilateral)
         return q * self.scale
 

@@ -17,7 +17,7 @@ import numpy as np
 from ...core.algebra import Array, Mask
 from ...core.checks import attributes
 from ...core.errors import InputError
-from .lcp import LCP, LCPResult, Operator, ScaledLCP, failure, largest_eigenvalue, scaled_dense, scaled_operator
+from .lcp import LCPResult, Operator, ScaledLCP, failure, largest_eigenvalue, scaled_dense, scaled_operator
 
 PROPORTION = 1.0  # Gamma; any positive number works, 1 is Dostál's choice
 STEP = 1.5  # of the expansion, in units of 1/‖G‖: less than 2 converges; the rest is for the error of the estimate
@@ -40,12 +40,6 @@ class ProjectedCG:
         """Estimate ‖G‖ by power iteration. G (m, m): an array, or anything with ``shape`` and ``@``."""
         return PreparedCG(self, G, bilateral)
 
-    def solve(self, problem: LCP, *, guess: Array | Mask | None = None) -> LCPResult:
-        """Solve one problem. ``guess``: reactions of a similar problem, or their active set; None: zero.
-
-        Raises StepFailure after ``max_iterations``, InputError when G proves not to be positive definite.
-        """
-        return self.prepare(problem.G, problem.bilateral).solve(problem.q, guess)
 
 
 class PreparedCG:
@@ -61,7 +55,10 @@ class PreparedCG:
             self._norm = self._scaled.norm
 
     def solve(self, q: Array, guess: Array | Mask | None = None) -> LCPResult:
-        """See ProjectedCG.solve; q (m,) [m]."""
+        """Solve the problem of q (m,) [m]. ``guess``: reactions of a similar problem, or their active set; None: zero.
+
+        Raises StepFailure after ``max_iterations``, InputError when G proves not to be positive definite.
+        """
         scaled, method = self._scaled, self.method
         gap = scaled.gap(q)
         unit = scaled.violation(gap)
