@@ -43,8 +43,8 @@ _CONTENTS = {
     "run.files.reading": ("read_run",),
     "run.cross_check": ("CrossChecked", "cross_check"),
 }
-__all__ = ["__version__", *sorted(name for names in _CONTENTS.values() for name in names)]
-__getattr__, _names = lazy(__name__, _CONTENTS)
+_names, __getattr__, _ = lazy(__name__, _CONTENTS)
+__all__ = ["__version__", *_names]
 
 
 def __dir__() -> list[str]:

@@ -21,5 +21,4 @@ _CONTENTS = {
     "scheme": ("BoundaryLayer",),
     "trajectory": ("layer_motion",),
 }
-__all__ = sorted(name for names in _CONTENTS.values() for name in names)
-__getattr__, __dir__ = lazy(__name__, _CONTENTS)
+__all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from .. import schemes
 from ..core.errors import InputError
 from .options import add_restart
 
@@ -24,7 +25,7 @@ def add_case_commands(commands: Any) -> None:
     short.add_argument("--dt", type=float, metavar="S", help="time step [s]")
     short.add_argument("--steps", type=int, metavar="N", help="number of steps")
     short.add_argument("--solver", metavar="NAME", help="Condensed, Volume, or a method of them, as Hildreth")
-    short.add_argument("--scheme", metavar="NAME", help="ZienkiewiczWoodTaylor, Trapezoidal, Newmark, HHT, ...")
+    short.add_argument("--scheme", metavar="NAME", help=", ".join(schemes.__all__))
     short.add_argument("--cross-check", action="store_true", help="solve every step by the other route too and compare")
     run.add_argument("--out", metavar="DIR", help="output folder (default: out of [run], or results/NAME of the case)")
     add_restart(run, "the output folder")

@@ -16,5 +16,4 @@ _CONTENTS = {
     "system": ("Load", "SemiDiscreteSystem"),
     "verify": ("energy_balance", "kkt_residual"),
 }
-__all__ = sorted(name for names in _CONTENTS.values() for name in names)
-__getattr__, __dir__ = lazy(__name__, _CONTENTS)
+__all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)

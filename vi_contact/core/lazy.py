@@ -7,13 +7,16 @@ from importlib import import_module
 from typing import Any
 
 
-def lazy(package: str, contents: Mapping[str, Sequence[str]]) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
-    """Return ``__getattr__`` and ``__dir__`` of a package (PEP 562) with these modules and their public names."""
+def lazy(
+    package: str, contents: Mapping[str, Sequence[str]]
+) -> tuple[list[str], Callable[[str], Any], Callable[[], list[str]]]:
+    """Return ``__all__``, ``__getattr__``, ``__dir__`` of a package (PEP 562) with these modules and public names."""
     home = {name: module for module, names in contents.items() for name in names}
+    public = sorted(home)
 
     def get(name: str) -> Any:
         if name not in home:
             raise AttributeError(f"module '{package}' has no attribute '{name}'")
         return getattr(import_module(f"{package}.{home[name]}"), name)
 
-    return get, lambda: sorted(home)
+    return public, get, lambda: public

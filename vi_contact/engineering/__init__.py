@@ -11,5 +11,4 @@ _CONTENTS = {
     "racking": ("Racking",),
     "resultants": ("Resultants", "contact_summary"),
 }
-__all__ = sorted(name for names in _CONTENTS.values() for name in names)
-__getattr__, __dir__ = lazy(__name__, _CONTENTS)
+__all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)

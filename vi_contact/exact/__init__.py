@@ -19,5 +19,4 @@ _CONTENTS = {
     "surface_waves": ("dashpot_energy", "dashpot_reflection", "rayleigh_motion", "rayleigh_speed"),
     "two_bars": ("TwoBars",),
 }
-__all__ = sorted(name for names in _CONTENTS.values() for name in names)
-__getattr__, __dir__ = lazy(__name__, _CONTENTS)
+__all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)

@@ -21,5 +21,4 @@ _CONTENTS = {
     "released_supports": ("release",),
     "ties": ("Tied",),
 }
-__all__ = sorted(name for names in _CONTENTS.values() for name in names)
-__getattr__, __dir__ = lazy(__name__, _CONTENTS)
+__all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)

@@ -12,5 +12,4 @@ _CONTENTS = {
     "materials": ("LinearElastic", "MassProportional", "NoDamping", "PlaneStrain", "PlaneStress", "Rayleigh", "Solid"),
     "weight": ("with_weight",),
 }
-__all__ = sorted(name for names in _CONTENTS.values() for name in names)
-__getattr__, __dir__ = lazy(__name__, _CONTENTS)
+__all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)

@@ -19,5 +19,4 @@ _CONTENTS = {
     "two_blocks": ("Blocks", "TwoBlocks"),
     "wall": ("WallMesh",),
 }
-__all__ = sorted(name for names in _CONTENTS.values() for name in names)
-__getattr__, __dir__ = lazy(__name__, _CONTENTS)
+__all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)

@@ -18,5 +18,4 @@ _CONTENTS = {
     "report": ("plot_report",),
     "spectra": ("plot_loop", "plot_transfer"),
 }
-__all__ = sorted(name for names in _CONTENTS.values() for name in names)
-__getattr__, __dir__ = lazy(__name__, _CONTENTS)
+__all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)

@@ -16,5 +16,4 @@ _CONTENTS = {
     "static": ("static_equilibrium",),
     "time_steps": ("HalvedAtImpact", "Schedule"),
 }
-__all__ = sorted(name for names in _CONTENTS.values() for name in names)
-__getattr__, __dir__ = lazy(__name__, _CONTENTS)
+__all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)

@@ -17,5 +17,4 @@ _CONTENTS = {
     "trapezoidal": ("Trapezoidal",),
     "zienkiewicz_wood_taylor": ("ZienkiewiczWoodTaylor",),
 }
-__all__ = sorted(name for names in _CONTENTS.values() for name in names)
-__getattr__, __dir__ = lazy(__name__, _CONTENTS)
+__all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)

@@ -8,5 +8,4 @@ _CONTENTS = {
     "cases.case": ("Case", "read_case", "run_case"),
     "ida.ida": ("IDA", "run_ida"),
 }
-__all__ = sorted(name for names in _CONTENTS.values() for name in names)
-__getattr__, __dir__ = lazy(__name__, _CONTENTS)
+__all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)

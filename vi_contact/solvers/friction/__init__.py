@@ -13,5 +13,4 @@ _CONTENTS = {
     "slip_rate": ("RateIteration",),
     "uzawa": ("Uzawa",),
 }
-__all__ = sorted(name for names in _CONTENTS.values() for name in names)
-__getattr__, __dir__ = lazy(__name__, _CONTENTS)
+__all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)

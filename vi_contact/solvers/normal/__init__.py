@@ -9,5 +9,4 @@ _CONTENTS = {
     "hildreth": ("Hildreth",),
     "projected_cg": ("ProjectedCG",),
 }
-__all__ = sorted(name for names in _CONTENTS.values() for name in names)
-__getattr__, __dir__ = lazy(__name__, _CONTENTS)
+__all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)

@@ -10,5 +10,4 @@ _CONTENTS = {
     "snes": ("ReducedNewton", "SemismoothNewton"),
     "tao": ("TaoTron",),
 }
-__all__ = sorted(name for names in _CONTENTS.values() for name in names)
-__getattr__, __dir__ = lazy(__name__, _CONTENTS)
+__all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)
