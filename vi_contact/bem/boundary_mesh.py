@@ -158,7 +158,7 @@ class BoundaryMesh:
 
 
 def polygon(corners: ArrayLike, h: float | Sequence[int], *, exterior: bool = False) -> BoundaryMesh:
-    """Mesh of a polygon; label of an element = number of its side, side i from corner i to corner i + 1.
+    """Mesh a polygon; label of an element = number of its side, side i from corner i to corner i + 1.
 
     corners: (m, 2) [m], counter-clockwise (clockwise for an exterior body). h: greatest element length [m], or the
     number of elements of every side.
@@ -184,7 +184,7 @@ def polygon(corners: ArrayLike, h: float | Sequence[int], *, exterior: bool = Fa
 
 
 def smooth_curve(curve: Callable[[Array], Array], count: int, *, exterior: bool = False) -> BoundaryMesh:
-    """Mesh of a closed curve: `count` chords at equal steps of its parameter in [0, 1), curve(parameters) -> (m, 2)."""
+    """Mesh a closed curve: `count` chords at equal steps of its parameter in [0, 1), curve(parameters) -> (m, 2)."""
     function("smooth_curve", "curve", curve, "give a function of parameters (m,) that returns points (m, 2)")
     counted("smooth_curve", "count", whole("smooth_curve", "count", count, least=3), "elements", most=MOST_ELEMENTS)
     points = array("smooth_curve", "what curve(parameters) returns", curve(np.arange(count) / count), (count, 2))
@@ -207,7 +207,7 @@ def circle(radius: float, count: int, *, centre: ArrayLike = (0.0, 0.0), exterio
 def from_segments(
     points: ArrayLike, segments: ArrayLike, *, labels: ArrayLike | None = None, exterior: bool = False
 ) -> BoundaryMesh:
-    """Mesh from loose segments, for example the facets of a finite element boundary, in any order and direction.
+    """Join loose segments to a mesh, for example the facets of a finite element boundary, in any order and direction.
 
     points: (p, 2) or (p, 3) coordinates [m]; segments: (n, 2) indices of points; labels: (n,) e.g. facet tags. Loops
     are joined and turned so that the body is on the left. Raises InputError when a curve is open or branches.

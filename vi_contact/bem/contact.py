@@ -133,7 +133,7 @@ class BoundaryContact:
 
     @property
     def count(self) -> int:
-        """Number of contact nodes m."""
+        """Return the number of contact nodes m."""
         return len(self.compliance.nodes)
 
     @property
@@ -221,7 +221,7 @@ class BoundaryContact:
         return EffectiveMatrix(SerialMatrix(np.linalg.inv(first)), SerialAlgebra())
 
     def step(self, k: int, loads: Array, before: Array, active: Mask) -> StepProblem:
-        """Step k (from 0) after loads (k, f) = -B_nᵀ r_n - B_tᵀ r_t of the steps before; before: v at its beginning."""
+        """Return step k (from 0) after loads (k, f) = -B_nᵀ r_n - B_tᵀ r_t of earlier steps; before: v at its start."""
         dt, surface = self.compliance.dt, self.surface
         past = self.v_free[k] + summed(self.W[k:0:-1], loads[:k, :, None])[:, 0] if k else self.v_free[0]
         slip0 = None

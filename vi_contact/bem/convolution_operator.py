@@ -55,7 +55,7 @@ class ConvolutionOperator:
 
     @property
     def steps(self) -> int:
-        """Number of time steps, that of every history."""
+        """Return the number of time steps, that of every history."""
         return self.frequencies.steps
 
     @property

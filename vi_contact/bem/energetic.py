@@ -62,7 +62,7 @@ class EnergeticBlocks:
 
     @property
     def steps(self) -> int:
-        """Number of time steps."""
+        """Return the number of time steps."""
         return len(self.single)
 
 

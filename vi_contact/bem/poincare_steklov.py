@@ -66,7 +66,7 @@ class PoincareSteklov:
 
 @dataclass(frozen=True)
 class BoundaryMotion:
-    """Answer of a boundary value problem.
+    """Hold the answer of a boundary value problem.
 
     times: (steps,) ends of the steps [s]; displacement: (steps, 2, n) there [m]; traction: (steps, 2, n, 2) in each
     step [Pa], at both ends of each element; forces: (steps, 2, n) nodal forces [N/m], reactions included.

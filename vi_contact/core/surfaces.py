@@ -71,7 +71,7 @@ class ContactSurface:
 
     @property
     def count(self) -> int:
-        """Number of contact conditions m."""
+        """Return the number of contact conditions m."""
         return len(self.gap0)
 
     @cached_property

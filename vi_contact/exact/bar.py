@@ -105,7 +105,7 @@ class ThrownBar(UprightBar):
         return self.pressure * ((t > self.contact_start) & (t < self.contact_end))
 
     def contacts(self, until: float) -> Array:
-        """Start and end of the contacts before `until` [s], one row each, clipped there; shape (1, 2) or (0, 2)."""
+        """Return start and end of the contacts before `until` [s], one row each, clipped there; (1, 2) or (0, 2)."""
         times = np.array([[self.contact_start, self.contact_end]])
         return np.minimum(times[times[:, 0] < until], until)
 
@@ -156,7 +156,7 @@ class PeriodicBar:
         return 0.5 * (phase == 1.0)
 
     def contacts(self, until: float) -> Array:
-        """Start and end of the contacts before `until` [s], one row each, clipped there; shape (m, 2)."""
+        """Return start and end of the contacts before `until` [s], one row each, clipped there; shape (m, 2)."""
         starts = np.arange(1.0, until, 3.0)
         return np.minimum(np.stack([starts, starts + 1.0], axis=1), until)
 

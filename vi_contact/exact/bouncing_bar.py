@@ -89,7 +89,7 @@ class BouncingBar(UprightBar):
         return self.height + self.displacement(0.0, t)
 
     def contacts(self, until: float) -> Array:
-        """Start and end of the contacts before `until` [s], one row each, clipped there; shape (m, 2)."""
+        """Return start and end of the contacts before `until` [s], one row each, clipped there; shape (m, 2)."""
         start, _, closed = self._history(until)
         change = np.flatnonzero(np.diff(closed, append=0.0))
         times = np.append(start, math.inf)[change + 1].reshape(-1, 2)

@@ -105,7 +105,7 @@ class HousnerBlock:
         return np.cumsum(halves) - 0.5 * halves[:1]
 
     def rest_time(self, theta0: float) -> float:
-        """Limit of the impact times, when the block has come to rest, slender [s]."""
+        """Return the limit of the impact times, when the block has come to rest, slender [s]."""
         return float(self.impact_times(theta0, self._impacts())[-1])
 
     def free_rocking(self, theta0: float, t: ArrayLike) -> Array:

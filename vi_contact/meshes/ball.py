@@ -39,7 +39,7 @@ _SIZES = {  # the size field alone decides
 
 @dataclass(frozen=True, kw_only=True)
 class BallMesh:
-    """Mesh of a ball of `radius` [m].
+    """Describe a mesh of a ball of `radius` [m].
 
     Cells have about `size` [m] within the distance `foot` [m] of the origin, from there on `size` + `growth` times the
     distance from the foot, but no more than `coarsest` (a quarter of the radius unless given). The sphere becomes a

@@ -30,7 +30,7 @@ SIDES = (("left", "right"), ("bottom", "top"), ("back", "front"))
 
 @dataclass(frozen=True, kw_only=True)
 class BlockMesh:
-    """Mesh of a d-dimensional box, d = len(lengths) = 1, 2 or 3.
+    """Describe a mesh of a d-dimensional box, d = len(lengths) = 1, 2 or 3.
 
     A node starts at corner + (i lengths_x/n_x, ...), is moved by `deform`, then turned by `angle` [rad] about the
     origin (the z axis for a box). `deform` takes and returns points (n, d) [m]. Raises InputError for sizes that make

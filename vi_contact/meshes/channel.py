@@ -32,7 +32,7 @@ Outline = list[tuple[float, float]]
 
 @dataclass(frozen=True, kw_only=True)
 class ChannelMesh:
-    """Mesh of a layer, width x depth [m], and of a channel in it, `outer_width` x `height`, of `wall` and `slab` [m].
+    """Describe a layer, width x depth [m], and a channel in it, `outer_width` x `height`, of `wall` and `slab` [m].
 
     `left`: x of the outer left side of the channel, by default in the middle. `size` [m]: of the cells, a grid of
     rectangles or, with `triangles`, of their halves; every part is divided evenly into cells of about that size. With

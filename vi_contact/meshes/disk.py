@@ -30,7 +30,7 @@ _LINE, _TRIANGLE = 1, 2  # Gmsh's numbers
 
 @dataclass(frozen=True, kw_only=True)
 class DiskMesh:
-    """Mesh of a disk of `radius` [m] with cells of about `size` [m].
+    """Describe a mesh of a disk of `radius` [m] with cells of about `size` [m].
 
     `foot` [rad] is half the angle of the contact side, less than a right angle. The circle becomes a polygon inside it:
     the area is too small by (size/radius)²/6. Raises InputError for sizes that make no disk.

@@ -29,7 +29,7 @@ _PUBLISHED = (8, 12)
 
 @dataclass(frozen=True, kw_only=True)
 class WallMesh:
-    """Mesh of a wall, height x width [m].
+    """Describe a mesh of a wall, height x width [m].
 
     `divisions` are the exact numbers of cells along width and height; `size` [m] asks for an irregular mesh of about
     that cell size instead; without either, the 8 x 12 published cells. `triangles` instead of quadrilaterals.

@@ -46,7 +46,7 @@ def plot_states(
     history: History, path: str | Path, *, position: Array, axis_label: str = "position [m]",
     title: str = "Open, sticking and slipping points",
 ) -> Path:
-    """Map of the states of the contact points over position and time. ``position``: (m,) of the points.
+    """Map the states of the contact points over position and time. ``position``: (m,) of the points.
 
     InputError without records of friction.
     """

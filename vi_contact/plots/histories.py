@@ -188,7 +188,7 @@ def plot_runs(
 
 
 def plot_contact(history: History, path: str | Path, *, position: Array, axis_label: str = "position [m]") -> Path:
-    """Map of the contact pressure over position and time, and the uplift ratio. ``position``: (m,) of the points.
+    """Map the contact pressure over position and time, and the uplift ratio. ``position``: (m,) of the points.
 
     Open points are white; held points that pull are blue.
     """

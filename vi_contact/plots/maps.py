@@ -40,7 +40,7 @@ def arc_position(points: Array, normals: Array | None = None) -> tuple[Array, st
 
 
 def chain(points: Array) -> Indices:
-    """Order of the points from the highest (leftmost) one, each time to the nearest that is left."""
+    """Order the points from the highest (leftmost) one, each time to the nearest that is left."""
     size = float(np.ptp(points, axis=0).max()) or 1.0
     top = points[:, 1] >= points[:, 1].max() - STRAIGHT * size
     here = int(np.flatnonzero(top)[np.argmin(points[top, 0])])
