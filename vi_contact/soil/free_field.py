@@ -30,7 +30,7 @@ from ..fem.petsc_algebra import PetscMatrix
 from ..fem.space import FemSpace
 from ..laws.materials import Section
 from .companion import CompanionRun
-from .moving_base import BaseMotion
+from .moving_base import BaseMotion, GroundFrame
 from .soil_column import SoilColumn
 
 Base = Excitation | Sequence[Excitation] | BaseMotion | CompliantBase
@@ -48,21 +48,25 @@ class FreeField(Dashpots):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if isinstance(self.base, BaseMotion | CompliantBase):
-            return
-        for one in self.base if isinstance(self.base, Sequence) else (self.base,):
+        for one in getattr(self.ground, "excitations", ()):
             remedy = "give the excitations of the run, its BaseMotion or its CompliantBase"
             provides("FreeField", "base", one, EXCITATION, remedy)
+
+    @property
+    def ground(self) -> BaseMotion | CompliantBase | GroundFrame:
+        """Return what the column stands on: the base, or the frame of the ground that the excitations shake."""
+        if isinstance(self.base, BaseMotion | CompliantBase):
+            return self.base
+        return GroundFrame(tuple(self.base) if isinstance(self.base, Sequence) else (self.base,))
 
     def loads(self, matrix: DashpotMatrix, forms: Any) -> BoundaryLoads:
         """Return the stress of the free field on the side, D v_ff, and the column that both are taken from."""
         side = FreeFieldSide(matrix, self, forms)
-        beside = self.base.companions if isinstance(self.base, BaseMotion) else ()
-        return BoundaryLoads((side.elastic,), (side.viscous,), (side.run, *beside))
+        return BoundaryLoads((side.elastic,), (side.viscous,), (side.run, *getattr(self.base, "companions", ())))
 
     @property
     def expects(self) -> str:
-        if isinstance(self.base, CompliantBase):
+        if self.ground.lets_waves_in:
             return "expects the upgoing motion of the compliant base"
         return "expects the motion of the rigid base itself (within motion)"
 
@@ -75,7 +79,7 @@ class FreeFieldSide:
     """
 
     def __init__(self, absorber: DashpotMatrix, given: FreeField, forms: Any) -> None:
-        self.space, self.given = absorber.space, given
+        self.space, self.given, self._ground = absorber.space, given, given.ground
         self.run = CompanionRun(f"FreeField on '{given.facets.name}'", self._problem)
         if self.space.dimension != 2:
             raise InputError("FreeField is for bodies in the plane: tie the sides of others, or put dashpots on them")
@@ -89,7 +93,7 @@ class FreeFieldSide:
 
     def _check_foot(self) -> None:
         held = total(self.space.comm, self.space.held[self._blocks[self._rows == 0]].sum())
-        name, compliant = self.given.facets.name, isinstance(self.given.base, CompliantBase)
+        name, compliant = self.given.facets.name, self._ground.lets_waves_in
         if not compliant and held < 2:
             raise InputError(f"the lowest node of free-field side '{name}' is not held: clamp or prescribe the base, "
                              "or give the side its CompliantBase")
@@ -99,26 +103,19 @@ class FreeFieldSide:
 
     def _problem(self) -> ContactProblem:
         """The column on its base."""
-        base, column = self.given.base, self.column
-        if isinstance(base, CompliantBase):
-            shear, normal = _foot(column, base, self._section)
-            return column.on_dashpots(shear, normal, base.motion)
-        if isinstance(base, BaseMotion):
-            return column.on_rigid_base(lambda t: base.at(t)[2], lambda t: base.at(t)[1])
-        shaken = tuple(base) if isinstance(base, Sequence) else (base,)
-        return column.on_rigid_base(lambda t: np.sum([one(t) for one in shaken], axis=0))
+        ground, column = self._ground, self.column
+        if isinstance(ground, CompliantBase):
+            return column.on_dashpots(*_foot(column, ground, self._section), ground.motion)
+        return column.on_rigid_base(lambda t: ground.at(t)[2], lambda t: ground.at(t)[1])
 
     def motion(self, t: float) -> tuple[Array, Array]:
         """Return (u_ff, v_ff) at the heights of the column, (n+1, 2), in the frame of the run."""
-        base, foot = self.given.base, np.zeros((1, 2))
         u, v = (x.reshape(-1, 2) for x in self.run.at(t))
-        if isinstance(base, CompliantBase):
+        if isinstance(self._ground, CompliantBase):
             return u, v
-        u, v = np.vstack([foot, u]), np.vstack([foot, v])
-        if isinstance(base, BaseMotion):
-            ground = base.at(t)
-            u, v = u + ground[0], v + ground[1]
-        return u, v
+        u_base, v_base, _ = self._ground.at(t)
+        foot = np.zeros((1, 2))
+        return np.vstack([foot, u]) + u_base, np.vstack([foot, v]) + v_base
 
     def elastic(self, t: float) -> Array:
         """Return Pᵀ times the nodal forces of sigma_ff·n."""

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import ClassVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -57,6 +58,18 @@ class PointSpace:
 
 
 @dataclass(frozen=True)
+class GroundFrame:
+    """Describe the base in the frame of the ground: at rest, shaken by the excitations as inertia loads."""
+
+    excitations: tuple[Excitation, ...]
+    lets_waves_in: ClassVar[bool] = False
+
+    def at(self, t: float) -> tuple[Array, Array, Array]:
+        """Return (0, 0, a_g) at time t, each (2,)."""
+        return np.zeros(2), np.zeros(2), np.sum([excitation(t) for excitation in self.excitations], axis=0)
+
+
+@dataclass(frozen=True)
 class BaseMotion:
     """Hold displacement [m], velocity [m/s] and acceleration [m/s²] of the ground, starting from rest at t = 0.
 
@@ -66,6 +79,7 @@ class BaseMotion:
 
     excitations: tuple[Excitation, ...]
     path: CompanionRun = field(repr=False)
+    lets_waves_in: ClassVar[bool] = False
 
     def at(self, t: float) -> tuple[Array, Array, Array]:
         """Return (u_g, v_g, a_g) at time t, each (d,)."""

@@ -30,6 +30,7 @@ class RockBelow:
 
     motion: Callable[[float], Array] = field(repr=False)
     rock: LinearElastic | None = None
+    lets_waves_in: ClassVar[bool] = True
 
     def absorber(self, tags: Any) -> CompliantBase:
         """Return the boundary condition on the bedrock of a ChannelMesh."""

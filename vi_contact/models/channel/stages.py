@@ -46,7 +46,7 @@ def at_rest(
         contact: arguments of ``ChannelModel.problem``.
     """
     ends, solver = sides or Rollers(), solver or Condensed()
-    if ends.firm and not isinstance(base, RockBelow):
+    if ends.firm and (base is None or not base.lets_waves_in):
         model = build(channel, comm, sides=ends, weighing=weighing, base=base)
         problem = model.problem(**contact)
         return AtRest(model, problem, static_equilibrium(problem, solver=solver) if weighing else None)

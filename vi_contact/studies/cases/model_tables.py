@@ -14,7 +14,7 @@ from ...core.system import SemiDiscreteSystem
 from ...laws.materials import LinearElastic
 from ...models import wall
 from ...models.channel import model as channel
-from ...models.channel.sides import FreeFieldSides, RockBelow, Rollers, Sides, bedrock
+from ...models.channel.sides import FreeFieldSides, Rollers, Sides, bedrock
 from ...run.recorders import Contact, Energy, Probe
 from .table_calls import GIVEN, Callee
 
@@ -56,7 +56,7 @@ def _channel(
         surface = model.surface.bilateral_everywhere() if held else model.surface
         return Parts(model.system, surface, model.tags, bool(weighing), model.recorders(), firm, bottom is not None)
 
-    if ends.firm and not isinstance(bottom, RockBelow):
+    if ends.firm and (bottom is None or not bottom.lets_waves_in):
         return parts(channel.build(shape, comm, sides=ends, weighing=weighing, base=bottom))
     still = channel.build(shape, comm, sides=ends if ends.firm else None, weighing=weighing)
     meshed = (still.mesh, still.tags)
