@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,24 +30,17 @@ def march_contact(
     if solver is not None:
         instance("march_contact", "solver", solver, Condensed, "give Condensed() with any of its methods, or None")
     number("march_contact", "tolerance", tolerance, positive=True)
-    surface, matrix = contact.surface, contact.matrix
-    prepared = (solver or Condensed()).prepare(matrix, surface, 1.0)
-    v, active = np.zeros(int(contact.free.sum())), surface.gap(0.0) <= 0.0
-    loads = np.zeros_like(contact.v_free)
-    steps: list[StepProblem] = []
-    results: list[StepResult] = []
-    for k in range(len(loads)):
-        step = contact.step(k, loads, v, active)
+    prepared = (solver or Condensed()).prepare(contact.matrix, contact.surface, 1.0)
+
+    def solved(step: StepProblem) -> StepResult:
         result = prepared.solve(step)
         certificate = kkt_residual(step, result)
         if not certificate.worst <= tolerance:
             raise StepFailure(f"boundary element step {step.k} at t = {step.t:.6g} s stayed above the certificate "
                               f"tolerance {tolerance:g} ({certificate}): try another method for the small problem")
-        loads[k] = contact.load(result.r_n, result.r_t)
-        v, active = result.x, result.active
-        steps.append(step)
-        results.append(result)
-    return certified_run(contact, steps, results)
+        return result
+
+    return run_steps(contact, solved)
 
 
 @dataclass(frozen=True)
@@ -167,28 +160,36 @@ def ledger(run: ContactRun, motion: BoundaryMotion, loads: Array, *, supported: 
     return ContactLedger(motion.work, load, run.work, support, run.friction_loss)
 
 
-def certified_run(
+def run_steps(
     contact: BoundaryContact,
-    steps: Sequence[StepProblem],
-    results: Sequence[StepResult],
+    solved: Callable[[StepProblem], StepResult],
     *,
     iterations: Array | None = None,
     history: tuple[float, ...] = (),
 ) -> ContactRun:
-    """Gather solved steps into a run, certified."""
-    surface, count = contact.surface, contact.surface.count
-    v = np.array([result.x for result in results])
-    loads = np.array([contact.load(result.r_n, result.r_t) for result in results])
-    nothing = np.zeros((count, 1))
-    normal = np.array([step.bound - surface.normal_values(x) for step, x in zip(steps, v, strict=True)])
-    slip = [nothing if step.slip0 is None else surface.tangential_values(x) - step.slip0
-            for step, x in zip(steps, v, strict=True)]
+    """Take all steps, each answered by ``solved``, into a run with certificates."""
+    surface = contact.surface
+    nothing = np.zeros((surface.count, 1))
+    x, active = np.zeros(int(contact.free.sum())), surface.gap(0.0) <= 0.0
+    loads = np.zeros_like(contact.v_free)
+    steps: list[StepProblem] = []
+    results: list[StepResult] = []
+    for k in range(len(loads)):
+        step = contact.step(k, loads, x, active)
+        result = solved(step)
+        loads[k] = contact.load(result.r_n, result.r_t)
+        x, active = result.x, result.active
+        steps.append(step)
+        results.append(result)
+    pairs = list(zip(steps, results, strict=True))
+    slip = [nothing if step.slip0 is None else surface.tangential_values(result.x) - step.slip0
+            for step, result in pairs]
     forces = contact.cartesian(loads)
     return ContactRun(
         contact, np.array([step.t for step in steps]), np.array([result.r_n for result in results]),
         np.array([nothing if result.r_t is None else result.r_t for result in results])[:, :, 0],
-        normal, np.array(slip)[:, :, 0], contact.compliance.displacement(forces), forces,
-        np.array([result.active for result in results]),
-        tuple(kkt_residual(step, result) for step, result in zip(steps, results, strict=True)),
+        np.array([step.bound - surface.normal_values(result.x) for step, result in pairs]),
+        np.array(slip)[:, :, 0], contact.compliance.displacement(forces), forces,
+        np.array([result.active for result in results]), tuple(kkt_residual(step, result) for step, result in pairs),
         np.array([result.iterations for result in results]) if iterations is None else iterations, history,
     )

@@ -20,10 +20,10 @@ from scipy.fft import irfft, next_fast_len, rfft
 from ..core.algebra import Array
 from ..core.checks import attributes, instance, whole
 from ..core.errors import InputError, StepFailure
-from ..core.step import StepResult
+from ..core.step import StepProblem, StepResult
 from ..laws.friction import project
 from .contact import BoundaryContact
-from .contact_run import ContactRun, certified_run
+from .contact_run import ContactRun, run_steps
 from .energetic import summed
 
 GROWN = 1e12  # change over the first one: diverged
@@ -138,15 +138,11 @@ class _SpaceTime:
 
     def run(self, r: Array, counts: Array, history: tuple[float, ...]) -> ContactRun:
         """Return the steps of these multipliers with their certificates."""
-        contact, steps, results = self.contact, [], []
-        v, active = np.zeros(int(contact.free.sum())), contact.surface.gap(0.0) <= 0.0
-        loads = np.zeros_like(contact.v_free)
-        for k in range(self._total):
-            r_t = r[k, 1][:, None] if contact.frictional else None
-            step = contact.step(k, loads, v, active)
-            loads[k] = contact.load(r[k, 0], r_t)
-            v = contact.matrix.factor.solve(step.b + loads[k])
-            active = (r[k, 0] > 0.0) | contact.bilateral
-            steps.append(step)
-            results.append(StepResult(v, r[k, 0], active, int(counts.sum()), "space-time Uzawa", r_t))
-        return certified_run(contact, steps, results, iterations=counts, history=history)
+        contact = self.contact
+
+        def solved(step: StepProblem) -> StepResult:
+            r_n, r_t = r[step.k - 1, 0], r[step.k - 1, 1][:, None] if contact.frictional else None
+            x = contact.matrix.factor.solve(step.b + contact.load(r_n, r_t))
+            return StepResult(x, r_n, (r_n > 0.0) | contact.bilateral, int(counts.sum()), "space-time Uzawa", r_t)
+
+        return run_steps(contact, solved, iterations=counts, history=history)
