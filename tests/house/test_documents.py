@@ -160,7 +160,7 @@ ROOMS = ["core", "fem", "solvers", "schemes", "soil", "engineering", "ground_mot
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
 def test_names_are_public(document: Path) -> None:
-    """Every ``vc.name`` and ``room.name`` that a document writes."""
+    """Every ``vc.name`` and ``room.name`` that a document writes; the files that it names are there."""
     if document.name in ("CHANGELOG.md", "extend.md"):  # old names; names that its reader adds, run by test_extend
         return
     text = re.sub(r"--set \S+", "", document.read_text(encoding="utf-8"))  # keys of a case: others check them
@@ -170,6 +170,9 @@ def test_names_are_public(document: Path) -> None:
         inside = {path.stem for path in (ROOT / "vi_contact" / room).iterdir()} | {"md", "py", "csv"}
         unknown |= {f"{room}.{name}" for name in written - inside - set(import_module(f"vi_contact.{room}").__all__)}
     assert not unknown
+    files = set(re.findall(r"`((?:\w+/)+\w+\.(?:py|toml))`", text))
+    tops = (ROOT, ROOT / "vi_contact", ROOT / "tests")
+    assert [name for name in files if not any((top / name).exists() for top in tops)] == []
 
 
 CIPHERS = r"\b[Ss]eed 00\d|\bV\d+\.\d|\bP(?:[3-9]|[12]\d)\b|\b[Dd]esign idea|\b[Ss]olver notes|\bseismic\.md"
