@@ -101,7 +101,7 @@ class BallModel:
 
 
 def build(ball: Ball, comm: Any) -> BallModel:
-    """Mesh and system of a quarter of the ball; collective."""
+    """Mesh and assemble a quarter of the ball; collective."""
     mesh, tags = build_mesh(ball.mesh, comm)
     system = assemble(
         mesh, ball.material,

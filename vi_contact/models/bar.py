@@ -95,7 +95,7 @@ class BarModel:
 
 
 def build(bar: Bar, comm: Any) -> BarModel:
-    """Mesh and system of the bar, with the initial data of its case."""
+    """Mesh and assemble the bar, with the initial data of its case."""
     d, case = bar.dimension, bar.case
     axis = UP[d]
     lengths, divisions = np.full(d, bar.across * bar.cell), np.full(d, bar.across)

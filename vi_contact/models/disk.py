@@ -83,7 +83,7 @@ class DiskModel:
 
 
 def build(disk: Disk, comm: Any) -> DiskModel:
-    """Mesh and system of the disk; collective."""
+    """Mesh and assemble the disk; collective."""
     mesh, tags = build_mesh(DiskMesh(radius=disk.radius, size=disk.size), comm)
     system = assemble(mesh, disk.material, section=PlaneStrain())
     up = system.influence[:, 1]

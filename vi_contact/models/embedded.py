@@ -98,7 +98,7 @@ class EmbeddedModel:
 
 
 def build(embedded: Embedded, comm: Any, *, mesh: Callable[[], Any] | None = None) -> EmbeddedModel:
-    """Mesh, system and contact surface; collective. ``mesh``: makes another mesh with the same groups of cells and
+    """Build mesh, system and contact surface; collective. ``mesh``: makes another mesh with the same groups of cells and
     boundaries."""
     box = embedded.box
     built, tags = build_mesh((mesh or embedded.mesh)(), comm)

@@ -40,6 +40,7 @@ from ..solvers.condensed import Condensed
 
 RIGID = 200.0  # least sqrt(E/rho)/height over p
 
+
 @dataclass(frozen=True)
 class RockingBlock:
     """Describe width and height of ``shape`` [m], a material stiff enough to be rigid, and the mesh.
@@ -121,8 +122,7 @@ class RockingModel:
 
     @property
     def onset_acceleration(self) -> float:
-        """Return the horizontal acceleration [m/s²] that lifts the block when it grows slowly, g b/h: m g b / turn·M
-        r."""
+        """Return the horizontal acceleration [m/s²] that lifts the block when it grows slowly: m g b / turn·M r."""
         system = self.problem.equations
         overturning = float(system.algebra.dot(self._turn, system.inertia(np.array([1.0, 0.0]))))
         return 0.5 * self.block.mass * self.block.shape.gravity * self.block.shape.width / abs(overturning)
@@ -184,7 +184,7 @@ class Rocking:
 
 
 def build(block: RockingBlock, comm: Any) -> RockingModel:
-    """Mesh, gravity stage and second-order system of the block.
+    """Build mesh, gravity stage and second-order system of the block.
 
     The stresses are those of the block on its whole base: standing on its corners it pushes them apart, and the thrust
     of the held base would be counted as weight (virial theorem, see ``fem.gravity``).

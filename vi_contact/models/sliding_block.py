@@ -61,7 +61,7 @@ class SlidingModel:
 
 
 def build(body: SlidingBody, comm: Any, *, excitation: Excitation | Sequence[Excitation]) -> SlidingModel:
-    """Mesh, system and gravity stage of the block."""
+    """Build mesh, system and gravity stage of the block."""
     mesh, tags = build_mesh(BlockMesh(lengths=body.lengths, divisions=body.divisions), comm)
     weight = BodyForce((0.0, -body.material.rho * body.law.gravity))
     system = assemble(mesh, body.material, section=PlaneStress(1.0), damping=body.damping, loads=weight)

@@ -79,7 +79,7 @@ class SquareModel:
 
 
 def build(square: Square, comm: Any) -> SquareModel:
-    """Mesh and system of the square; collective."""
+    """Mesh and assemble the square; collective."""
     half = 0.5 * square.side
     mesh, tags = build_mesh(
         BlockMesh(lengths=(square.side,) * 2, divisions=(square.cells,) * 2, corner=(-half, -half)), comm

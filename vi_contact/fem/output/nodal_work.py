@@ -127,7 +127,7 @@ class NodalWork:
         motion = []
         for k, x in enumerate((balance.u, balance.v, balance.a)):
             free = problem.cartesian(x)
-            motion.append(between(partial(_expanded, space, free, k)) if moves else space.expand(free, t1, k))
+            motion.append(between(partial(space.expand, free, derivative=k)) if moves else space.expand(free, t1, k))
         motion[2] = motion[2] + between(problem.ground_acceleration) - self._gravity
         return self._sum(motion, between)
 
@@ -161,10 +161,6 @@ class NodalWork:
         if k not in self._still:
             self._still[k] = work(0.0)
         return self._still[k] if load.history is None else np.asarray(at(load.history) * self._still[k])
-
-
-def _expanded(space: FemSpace, free: Array, derivative: int, t: float) -> Array:
-    return space.expand(free, t, derivative)
 
 
 def rigid_fields(points: Array, centre: Sequence[float]) -> tuple[list[Array], list[str]]:
