@@ -24,7 +24,7 @@ from ...core.step import Report, State
 from .. import compat
 from ..groups import facets_of
 from ..loads import BodyForce, Traction, as_tuple, evaluate
-from ..space import FemSpace, known_matrices, space_of
+from ..space import known_matrices, space_of
 
 log = logging.getLogger(__name__)
 
