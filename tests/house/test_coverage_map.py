@@ -29,7 +29,9 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
         "boundary_layer.trajectory",
     "boundary_layer/test_contact_law.py": "boundary_layer.layer boundary_layer.scheme",
     "cli/test_fuzz_cli.py": "cli.errors",
-    "cli/test_main.py": "cli.beam cli.layer cli.options cli.ranks plots.layer",
+    "cli/test_entry.py":
+        "cli.beam cli.layer cli.options cli.ranks plots.layer studies.cases.beam_study studies.cases.layer_study "
+        "studies.cases.library studies.cases.own_case studies.cases.short_settings",
     "cli/test_motion.py": "plots.records",
     "core/test_friction_certificate.py": "core.certificate core.protocols",
     "core/test_identity.py": "run.checks",
@@ -131,8 +133,9 @@ def users() -> dict[str, list[str]]:
     found: dict[str, list[str]] = {}
     for user, tree in modules().items():
         for node in ast.walk(tree):
-            if isinstance(node, ast.ImportFrom) and node.level:
-                base = ".".join([*user.split(".")[: -node.level], *([node.module] if node.module else [])])
+            if isinstance(node, ast.ImportFrom):
+                above = user.split(".")[: -node.level] if node.level else []
+                base = ".".join([*above, *([node.module] if node.module else [])]).removeprefix("vi_contact.")
                 for target in {base, *(f"{base}.{alias.name}".lstrip(".") for alias in node.names)}:
                     found.setdefault(target, []).append(user)
     return found
