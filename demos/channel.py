@@ -27,8 +27,7 @@ import vi_contact as vc
 from demos.pictures.channel import plot_beside, plot_layout, plot_moments
 from vi_contact import fem
 from vi_contact.meshes.channel import ChannelMesh
-from vi_contact.models.channel.model import Channel, ChannelModel, build
-from vi_contact.models.channel.run import REFERENCE
+from vi_contact.models.channel.model import REFERENCE, Channel, ChannelModel, build
 from vi_contact.plots import channel as pictures
 from vi_contact.plots.channel_mesh import animate
 from vi_contact.plots.friction import plot_states

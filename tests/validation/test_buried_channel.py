@@ -16,7 +16,7 @@ from channel_runs import CHANNEL, DT, EXACT, FRICTION, SCHEME, follow, model, mo
 
 import vi_contact as vc
 from vi_contact.core.algebra import Array
-from vi_contact.models.channel.run import REFERENCE
+from vi_contact.models.channel.model import REFERENCE
 
 pytestmark = pytest.mark.serial  # whole runs; test_channel.py shows that ranks do not matter
 

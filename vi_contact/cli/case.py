@@ -35,7 +35,7 @@ def add_case_commands(commands: Any) -> None:
     add_allow(run)
     run.add_argument("--check", action="store_true", help="read the case and stop: nothing is computed")
     run.add_argument("--quiet", action="store_true", help="no progress line")
-    run.set_defaults(run=_run)
+    run.set_defaults(run=_run, spelling={"units": "units (--set excitation.1.record.units=UNIT)"})
     cases = commands.add_parser("cases", help="list the cases that ship with the package",
                                 description="List the cases that ship with the package, and their folder.")
     cases.set_defaults(run=_cases)
@@ -56,14 +56,12 @@ def add_allow(command: argparse.ArgumentParser) -> None:
 
 
 def _run(options: argparse.Namespace) -> str:
-    from mpi4py import MPI
-
     from ..studies.cases.library import located
     from ..studies.cases.own_case import OwnCase, open_case
     from ..studies.cases.short_settings import ShortOptions
     from ..studies.cases.toml_file import read_toml, with_settings
 
-    comm, path = MPI.COMM_WORLD, located(options.case)
+    comm, path = _world(), located(options.case)
     if options.steps is not None and options.steps < 1:
         raise InputError(f"--steps {options.steps}: give at least one step")
     short = ShortOptions(**{name: getattr(options, name) for name in ShortOptions.__dataclass_fields__})
@@ -86,3 +84,14 @@ def _run(options: argparse.Namespace) -> str:
     out = options.out or case.out or Path("results") / path.stem
     solution = case.run(comm, out=out, restart=restart, progress=not options.quiet, changed=options.changed)
     return f"{name}\n{solution.summary()}\noutput: {out}" if comm.rank == 0 else ""
+
+
+def _world() -> Any:
+    """Return all ranks; this process alone without mpi4py, which the beam and the layer do not need."""
+    try:
+        from mpi4py import MPI
+    except ImportError:
+        from ..core.algebra import SerialComm
+
+        return SerialComm()
+    return MPI.COMM_WORLD

@@ -1,8 +1,7 @@
-"""Options that the commands of several models share."""
+"""Options that several commands share, and checks of the files they write."""
 
 from __future__ import annotations
 
-import argparse
 import math
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
@@ -12,58 +11,8 @@ from typing import Any
 from ..core.checks import counted, shown
 from ..core.errors import InputError
 
-SHAKING = ("motion", "vertical", "units", "scale", "pga", "resample")
-STEP = ("solver", "scheme", "dt", "steps", "cross_check")
 MOST_SPACED = 100_000  # periods or frequencies of a spectrum
-OUTPUT = ("fields_every", "restart", "changed")
 PICTURES = (".png", ".pdf", ".svg")
-
-
-def add_shaking(parser: argparse.ArgumentParser, *, harmonic: str) -> Any:
-    """The group of options for the ground motion; ``harmonic``: amplitude of the motion without a record."""
-    parser.set_defaults(spelling={"units": "--units"})
-    shake = parser.add_argument_group("ground motion")
-    shake.add_argument("--motion", metavar="FILE", help="horizontal record: PEER AT2, USGS SMC or two columns")
-    shake.add_argument("--vertical", metavar="FILE", help="vertical record, beside --motion")
-    shake.add_argument("--units", help="units of two-column files: m/s2, cm/s2, gal, g, ...")
-    shake.add_argument(
-        "--scale", type=float, help=f"factor on the record, or on the harmonic's {harmonic}; not beside --pga"
-    )
-    shake.add_argument("--pga", type=float, metavar="A", help="scale both to this peak [m/s2] of the first")
-    shake.add_argument("--resample", type=float, metavar="DT", help="resample to this step [s], band-limited")
-    return shake
-
-
-def add_step(parser: argparse.ArgumentParser, *, dt: str) -> Any:
-    """The group of options for the step; ``dt``: what it is by default."""
-    step = parser.add_argument_group("step")
-    step.add_argument(
-        "--solver", default="condensed",
-        help="condensed (default), hildreth, projected-cg, volume, volume-reference, semismooth, tron"
-    )
-    step.add_argument(
-        "--scheme", default="zwt",
-        help="zwt: the source's (default); trapezoidal: does not ring; newmark, hht, generalised-alpha, houbolt, "
-        "contact-stabilised, kane, moreau-jean, midpoint, ss22, newmark-consistent",
-    )
-    step.add_argument(
-        "--impact", help="inelastic, elastic, none or a restitution in [0, 1]; default inelastic with zwt and ss22, "
-        "none with schemes that need no impact law",
-    )
-    step.add_argument("--dt", type=float, help=f"time step [s] (default {dt})")
-    step.add_argument("--steps", type=int, help="number of steps (default 400, or the whole record)")
-    step.add_argument("--cross-check", action="store_true", help="solve every step by the other route too and compare")
-    return step
-
-
-def add_output(parser: argparse.ArgumentParser, *, out: str) -> Any:
-    """The group of options for the run folder, by default ``out``."""
-    output = parser.add_argument_group("output")
-    output.add_argument("--out", default=out, metavar="DIR", help=f"output folder (default {out})")
-    output.add_argument("--fields-every", type=int, default=10, metavar="K", help="steps between frames, 0: none")
-    add_restart(output, "--out")
-    output.add_argument("--quiet", action="store_true", help="no progress line")
-    return output
 
 
 def add_restart(options: Any, where: str) -> None:
@@ -71,17 +20,6 @@ def add_restart(options: Any, where: str) -> None:
     options.add_argument("--restart", action="store_true", help=f"continue the run in {where} from its checkpoint")
     options.add_argument("--restart-changed", action="store_true", dest="changed",
                          help="the same, also when the problem is another one than that of the checkpoint")
-
-
-def chosen(options: argparse.Namespace) -> dict[str, Any]:
-    """The shared options by the names of the runs' own arguments, but for the impact law."""
-    if options.scale is not None and options.pga is not None:
-        raise InputError("--scale and --pga both scale the motion: give one of them")
-    if options.steps is not None and options.steps < 1:
-        raise InputError(f"--steps {options.steps}: give at least one step")
-    found = {name: getattr(options, name) for name in (*SHAKING, *STEP, *OUTPUT)}
-    scale = 1.0 if options.scale is None else options.scale
-    return found | {"scale": scale, "restart": options.restart or options.changed}
 
 
 def spaced(option: str, values: Sequence[float]) -> Any:
@@ -126,25 +64,3 @@ def table_beside_picture(path: str | Path, *, reads: Iterable[str | Path] = ()) 
         raise InputError(f"{out}: the table would be overwritten by its picture; give a name such as {out.stem}.csv")
     output_file(out.with_suffix(PICTURES[0]))
     return out
-
-
-def impact_law(name: str | None, projection: bool) -> Any:
-    """The impact law of --impact, read as an M-orthogonal impulse or as a reset; None for the run's own choice."""
-    from ..laws.impact import ComponentReset, Elastic, Inelastic, MassProjection, Newton, NoImpact
-
-    if name is None and not projection:
-        return None
-    reading: Any = MassProjection() if projection else ComponentReset()
-    if name is None:
-        return Inelastic(reading)
-    if name == "none":
-        return NoImpact()
-    if name in ("inelastic", "elastic"):
-        return Inelastic(reading) if name == "inelastic" else Elastic(reading)
-    try:
-        return Newton(float(name), reading)
-    except ValueError as error:
-        if isinstance(error, InputError):
-            raise
-        known = "inelastic, elastic, none or a restitution in [0, 1]"
-        raise InputError(f"unknown impact law '{name}': give {known}") from None

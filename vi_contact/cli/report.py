@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..core.errors import ViContactError
+from ..core.errors import InputError, ViContactError
 from .options import output_file, spaced, table_beside_picture
 
 _ACTIONS = {
@@ -23,12 +23,12 @@ _ACTIONS = {
 def add_report_commands(commands: Any) -> None:
     """Adds ``report`` and ``post`` to the commands of the top parser."""
     report = commands.add_parser(
-        "report", help="one page about a run", description="One page about a run, from the files in its folder alone, "
-        "and its peak values in peaks.csv beside it."
+        "report", help="one page about a run, and its pictures", description="One page about a run, from the files in "
+        "its folder alone, and beside it its peak values in peaks.csv and its pictures."
     )
     report.add_argument("folder", metavar="DIR", help="output folder of a run")
     report.add_argument("--out", metavar="FILE", help=".pdf, .png or .svg (default DIR/report.pdf)")
-    report.add_argument("--title", help="default: the name of the folder")
+    report.add_argument("--title", help="default: that of the case, or the name of the folder")
     report.add_argument("--show", metavar="COLUMN[,COLUMN...]", action="append",
                         help="a panel with these columns, of one unit; repeat for more (default: the page chooses)")
     report.set_defaults(run=_report)
@@ -68,14 +68,42 @@ def _add_actions(parsers: dict[str, argparse.ArgumentParser]) -> None:
 def _report(options: argparse.Namespace) -> str:
     from ..engineering.peak_values import peaks, write_peaks
     from ..plots.report import plot_report
+    from ..plots.run_pictures import draw_run
     from ..run.files.reading import read_run
+    from ..studies.cases.library import read_copy
 
-    run = read_run(options.folder)
-    out = output_file(options.out or Path(options.folder) / "report.pdf", picture=True)
+    folder = Path(options.folder)
+    tables = read_copy(folder)
+    if "beam" in tables or "layer" in tables:
+        from ..studies.cases.own_case import draw_study
+
+        for option in ("out", "title", "show"):
+            if getattr(options, option) is not None:
+                raise InputError(f"the report of this case is pictures in its folder: leave --{option} away")
+        return _listed(draw_study(folder, tables))
+    run = read_run(folder)
+    out = output_file(options.out or folder / "report.pdf", picture=True)
+    title = options.title or tables.get("title") or f"Run {folder.resolve().name}"
     shown = None if options.show is None else [one.split(",") for one in options.show]
-    page = plot_report(run, out, title=options.title, columns=shown)
+    page = plot_report(run, out, title=title, columns=shown)
     table = write_peaks(out.with_name("peaks.csv"), peaks(run.history, run.columns))
-    return f"report: {page}\ntable: {table}"
+    drawn = draw_run(run, out.parent, title=title, unilateral=_contact_labels(tables.get("model")))
+    return f"report: {page}\ntable: {table}\n{_listed(drawn)}"
+
+
+def _listed(pictures: Sequence[Path]) -> str:
+    return f"pictures in {pictures[0].parent}: {', '.join(path.name for path in pictures)}"
+
+
+def _contact_labels(model: Any) -> list[str] | None:
+    """Return the labels of the wall's probes that are contact points; None for another model."""
+    if not isinstance(model, dict) or model.get("type") != "Wall":
+        return None
+    try:
+        from ..models.wall import CASES
+    except ImportError:  # without DOLFINx
+        return None
+    return [str(number) for number in CASES.get(model.get("case", "b"), range(1, 13))]
 
 
 def _peaks(options: argparse.Namespace) -> str:

@@ -8,23 +8,28 @@ import numpy as np
 
 from ..core.algebra import Array
 from ..core.errors import InputError
-from ..run.files.reading import read_run
+from ..run.files.reading import RunFolder
 from .channel import Outline, opening, plot_envelope, plot_interface, plot_openings, plot_rocking
 from .channel_mesh import animate, read_bodies
 
+SOIL = "_soil"  # after the label of a point: that of the soil which touches it
 FILM_FRAMES = 48  # at most: a film of two megabytes
 DRAWN = 0.15  # of the channel's height: how large its largest displacement is drawn
 
 
-def illustrate(folder: str | Path, *, title: str = "Buried channel") -> list[Path]:
-    """Draw openings.png, rocking.png, interface.png and envelope.png into the folder of a finished run of
-    ``vi-contact channel`` or of its model's recorders, and with fields channel.gif, around the widest opening.
+def of_channel(run: RunFolder) -> bool:
+    """Return whether it is a finished run of the buried channel with its model's recorders."""
+    return run.contact is not None and "pressure" in run.history and f"u_x_19{SOIL}" in run.history
 
-    Returns what was drawn. InputError for the folder of another run.
+
+def illustrate(run: RunFolder, folder: Path, *, title: str = "Buried channel") -> list[Path]:
+    """Draw openings.png, rocking.png, interface.png and envelope.png of a run of the buried channel into a folder, and
+    with fields channel.gif, around the widest opening.
+
+    Returns what was drawn. InputError for another run.
     """
-    run, folder = read_run(folder), Path(folder)
-    if run.contact is None or "pressure" not in run.history or "u_x_19_soil" not in run.history:
-        raise InputError(f"'{folder}' is not of a finished run of the buried channel: give the folder of one")
+    if run.contact is None or not of_channel(run):
+        raise InputError(f"'{run.folder}' is not of a finished run of the buried channel: give the folder of one")
     outline = Outline.of(run.contact.points, run.contact.normals)
     drawn = [
         plot_openings(run.history, folder / "openings.png", title=f"{title}, openings of the interface"),
@@ -32,15 +37,15 @@ def illustrate(folder: str | Path, *, title: str = "Buried channel") -> list[Pat
         plot_interface({"": run.history}, outline, folder / "interface.png", title=f"{title}, interface"),
         plot_envelope({title: run.history}, outline, folder / "envelope.png", title=f"{title}, envelopes"),
     ]
-    if (folder / "fields" / "mesh.h5").is_file():
+    if (run.folder / "fields" / "mesh.h5").is_file():
         tops = {
             "top of the left wall": opening(run.history, "19", (-1.0, 0.0)),
             "of the right wall": opening(run.history, "13", (1.0, 0.0)),
         }
         widest = float(run.history["t"][int(np.argmax(sum(tops.values())))])
-        times, magnified = film(folder, widest)
+        times, magnified = film(run.folder, widest)
         drawn.append(animate(
-            folder, folder / "channel.gif", title=title, history=run.history, openings=tops, times=times.tolist(),
+            run.folder, folder / "channel.gif", title=title, history=run.history, openings=tops, times=times.tolist(),
             magnified=magnified,
         ))
     return drawn

@@ -33,9 +33,14 @@ from ...laws.weight import own_weight
 from ...meshes.channel import ChannelMesh
 from ...run.recorders import Contact, Energy, Probe
 from ...soil.moving_base import BaseMotion
+from ...solvers.volume.route import Volume
+from ...solvers.volume.snes import ReducedNewton
 from .points import Openings, SoilProbe
 from .sides import RockBelow, Rollers, Sides
 
+REFERENCE = Volume(method=ReducedNewton(), petsc_options={"snes_linesearch_type": "l2"})
+"""The volume route to compare with and to fall back on. Without a line search its active set runs in circles in some
+steps of the channel: M/dt² of a consistent mass couples neighbours with the sign that sets need to settle reversed."""
 BODIES = ("channel", "soil")  # in the order of their nodes
 SIDES = ("base", "left", "right")  # of the contact, in the order of its conditions
 POINTS = 19

@@ -45,15 +45,23 @@ def at_rest(
         solver: of the gravity stage, Condensed() when None.
         contact: arguments of ``ChannelModel.problem``.
     """
-    ends, solver = sides or Rollers(), solver or Condensed()
-    if ends.firm and (base is None or not base.lets_waves_in):
-        model = build(channel, comm, sides=ends, weighing=weighing, base=base)
-        problem = model.problem(**contact)
-        return AtRest(model, problem, static_equilibrium(problem, solver=solver) if weighing else None)
-    firm = build(channel, comm, sides=ends if ends.firm else None, weighing=weighing)
-    model = build(channel, comm, sides=ends, weighing=weighing, base=base, meshed=(firm.mesh, firm.tags))
+    solver = solver or Condensed()
+    model, firm = staged(channel, comm, sides=sides, weighing=weighing, base=base)
     problem = model.problem(**contact)
     if not weighing:
         return AtRest(model, problem, None)
+    if firm is None:
+        return AtRest(model, problem, static_equilibrium(problem, solver=solver))
     static = firm.problem(**(contact | {"excitation": ()}))
     return AtRest(model, *release(static, static_equilibrium(static, solver=solver), problem))
+
+
+def staged(
+    channel: Channel, comm: Any, *, sides: Sides | None, weighing: Sequence[str], base: BaseMotion | RockBelow | None
+) -> tuple[ChannelModel, ChannelModel | None]:
+    """Return the model, and on its mesh the one for its gravity stage where its own supports hold no static load."""
+    ends = sides or Rollers()
+    if ends.firm and (base is None or not base.lets_waves_in):
+        return build(channel, comm, sides=ends, weighing=weighing, base=base), None
+    firm = build(channel, comm, sides=ends if ends.firm else None, weighing=weighing)
+    return build(channel, comm, sides=ends, weighing=weighing, base=base, meshed=(firm.mesh, firm.tags)), firm

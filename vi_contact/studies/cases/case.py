@@ -17,7 +17,6 @@ from typing import Any
 
 import numpy as np
 
-from ...core.checks import shown
 from ...core.errors import InputError
 from ...core.problem import ContactProblem
 from ...core.protocols import Excitation, FrictionLaw, Frictionless, ImpactLaw, MassLaw
@@ -41,7 +40,7 @@ from ...run.simulate import Solution, simulate
 from ...run.static import static_equilibrium
 from ...run.time_steps import step_plan
 from ...solvers.condensed import Condensed
-from .library import base_folder, keep_copy
+from .library import base_folder, check_format, keep_copy
 from .model_tables import Parts
 from .own_classes import packages
 from .parsing import Words, arguments, nearest, read
@@ -74,7 +73,6 @@ _CALLED: dict[str, Callee] = {  # tables that always call the same function
         function=dict,
     ),
 }
-FORMAT = 1  # of case files
 TABLES = ("format", "title", "model", "mesh", "material", "system", "contact", "gravity", "friction", "impact", "mass",
            "excitation", "scheme", "solver", "escalation", "run", "record", "fields")
 
@@ -269,14 +267,6 @@ def read_case(path: str | Path, settings: Sequence[str] = (), *, allow: Sequence
     order = sorted(given.keys() - {"format"}, key=TABLES.index)  # materials are known before the system names them
     nodes = {name: _node(name, given, Spot(file, "", name), known) for name in order}
     return Case(path, tables, tuple(settings), nodes, allowed)
-
-
-def check_format(path: Path, tables: Mapping[str, Any]) -> None:
-    """Raise InputError for the format of another version."""
-    found = tables.get("format", FORMAT)
-    if found != FORMAT or isinstance(found, bool):
-        raise InputError(f"{path}: format is {shown(found)}, and this version of vi_contact reads format {FORMAT}: "
-                         "take the version it was written for, or correct the number")
 
 
 def _node(name: str, tables: Mapping[str, Any], spot: Spot, known: Words) -> Node:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from .toml_file import read_toml, with_settings
 
 FOLDER = Path(__file__).parent / "builtin"
 COPY = "case.toml"
+FORMAT = 1  # of case files
 _SET = "# set "  # before a setting, in the copy
 
 
@@ -33,6 +34,14 @@ def located(case: str) -> Path:
         raise InputError(f"there is no built-in case {shown(case)}: {nearest(case, names)}; a file ends "
                          "in .toml")
     return FOLDER / f"{case}.toml"
+
+
+def check_format(path: Path, tables: Mapping[str, Any]) -> None:
+    """Raise InputError for the format of another version."""
+    found = tables.get("format", FORMAT)
+    if found != FORMAT or isinstance(found, bool):
+        raise InputError(f"{path}: format is {shown(found)}, and this version of vi_contact reads format {FORMAT}: "
+                         "take the version it was written for, or correct the number")
 
 
 def base_folder(path: Path) -> Path:

@@ -14,7 +14,8 @@ from ...core.system import SemiDiscreteSystem
 from ...laws.materials import LinearElastic
 from ...models import wall
 from ...models.channel import model as channel
-from ...models.channel.sides import FreeFieldSides, Rollers, Sides, bedrock
+from ...models.channel.sides import FreeFieldSides, Sides, bedrock
+from ...models.channel.stages import staged
 from ...run.recorders import Contact, Energy, Probe
 from .table_calls import GIVEN, Callee
 
@@ -50,17 +51,14 @@ def _channel(
     rock: LinearElastic | None = None,
 ) -> Parts:
     bottom = bedrock(base, excitations, dt=run_dt, rock=rock)
-    ends = replace(sides, base=bottom or excitations) if isinstance(sides, FreeFieldSides) else sides or Rollers()
+    ends = replace(sides, base=bottom or excitations) if isinstance(sides, FreeFieldSides) else sides
 
     def parts(model: channel.ChannelModel, firm: Parts | None = None) -> Parts:
         surface = model.surface.bilateral_everywhere() if held else model.surface
         return Parts(model.system, surface, model.tags, bool(weighing), model.recorders(), firm, bottom is not None)
 
-    if ends.firm and (bottom is None or not bottom.lets_waves_in):
-        return parts(channel.build(shape, comm, sides=ends, weighing=weighing, base=bottom))
-    still = channel.build(shape, comm, sides=ends if ends.firm else None, weighing=weighing)
-    meshed = (still.mesh, still.tags)
-    return parts(channel.build(shape, comm, sides=ends, weighing=weighing, base=bottom, meshed=meshed), parts(still))
+    model, firm = staged(shape, comm, sides=ends, weighing=weighing, base=bottom)
+    return parts(model, None if firm is None else parts(firm))
 
 
 def model(shape: type, build: Callable[..., Parts], inner: str = "") -> Callee:

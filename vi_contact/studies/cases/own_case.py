@@ -5,20 +5,21 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from ...core.algebra import Comm, SerialComm
 from ...core.errors import InputError
 from ...core.files import on_root
 from ...run.files.folder import run_folder
 from .beam_study import BeamStudy
-from .case import Case, check_format, read_case
 from .layer_study import LayerStudy
-from .library import COPY, base_folder, keep_copy, read_copy
-from .parsing import arguments
+from .library import COPY, base_folder, check_format, keep_copy
+from .parsing import Words, arguments
 from .table_calls import Call, Spot, callee
 from .toml_file import read_toml, with_settings
-from .vocabulary import words
+
+if TYPE_CHECKING:
+    from .case import Case
 
 STUDIES = {"beam": callee(BeamStudy), "layer": callee(LayerStudy)}
 
@@ -64,15 +65,15 @@ def open_case(path: str | Path, settings: Sequence[str] = (), allow: Sequence[st
     """Return the case of a file, whatever its tables; arguments and InputError as of ``read_case``."""
     path = Path(path)
     tables = with_settings(read_toml(path), settings)
-    own = [name for name in tables if name in STUDIES]
-    return _own(path, tables, settings) if own else read_case(path, settings, allow=allow)
+    if any(name in STUDIES for name in tables):
+        return _own(path, tables, settings)
+    from .case import read_case  # late: the others need no finite elements
+
+    return read_case(path, settings, allow=allow)
 
 
-def drawn_study(folder: Path) -> list[Path] | None:
-    """Draw the pictures of the folder of one of STUDIES; None for the folder of another run."""
-    tables = read_copy(folder)
-    if not any(name in STUDIES for name in tables):
-        return None
+def draw_study(folder: Path, tables: Mapping[str, Any]) -> list[Path]:
+    """Draw the pictures of a run folder that one of STUDIES has filled; ``tables``: its case (``read_copy``)."""
     return _own(folder / COPY, tables, ()).study().draw(folder)
 
 
@@ -85,5 +86,5 @@ def _own(path: Path, tables: Mapping[str, Any], settings: Sequence[str]) -> OwnC
     table = tables[name]
     if not isinstance(table, dict):
         raise InputError(f"{path}: [{name}] is no table: give its keys below it")
-    node = arguments(table, STUDIES[name], Spot(str(path), "", name), words(base_folder(path)))
+    node = arguments(table, STUDIES[name], Spot(str(path), "", name), Words(base_folder(path), {}, {}, (), {}))
     return OwnCase(path, tables, tuple(settings), node)

@@ -9,12 +9,8 @@ from typing import Any
 
 from ...core.checks import shown
 from ...core.errors import InputError
-from ...core.step import Scheme
-from ...solvers.condensed import SmallMethod
-from ...solvers.volume.route import Method
 from .parsing import nearest
 from .toml_file import toml_value, with_settings
-from .vocabulary import names_of
 
 OF_MOTION = {  # settings of a model that come with records: with any, with a vertical one
     "Wall": ({"model.base_inertia": "whole"}, {}),
@@ -22,7 +18,6 @@ OF_MOTION = {  # settings of a model that come with records: with any, with a ve
 }
 REFERENCE = {"type": "Volume", "method": {"type": "ReducedNewton"}}
 IMPULSIVE = ("ZienkiewiczWoodTaylor", "SS22")  # whose contact points have mass: they take an impact law
-OWNERS = ("Condensed", "Volume")  # solvers by name; others by that of their method
 OF_OWN: dict[str, dict[str, str]] = {"beam": {"dt": "beam.dt"}, "layer": {}}  # table -> short options it has a use for
 
 
@@ -88,7 +83,7 @@ class ShortOptions:
         """Replace scheme and solver; schemes that need no impact law run without the one of the case."""
         found = []
         if self.scheme is not None:
-            found.append(f"scheme={toml_value({'type': _known(Scheme, self.scheme, 'scheme')})}")
+            found.append(f"scheme={toml_value(_scheme(self.scheme))}")
             if "impact" in tables and self.scheme not in IMPULSIVE and ":" not in self.scheme:
                 found.append("impact=")
         return found if self.solver is None else [*found, f"solver={toml_value(_solver(self.solver))}"]
@@ -126,18 +121,27 @@ def _tables(value: Any) -> list[dict[str, Any]]:
     return [one for one in (value if isinstance(value, list) else [value]) if isinstance(one, dict)]
 
 
-def _known(kind: Any, name: str, what: str) -> str:
-    if name not in names_of(kind) and ":" not in name:  # package.module:Name
-        raise InputError(f"unknown {what} {shown(name)}: {nearest(name, names_of(kind))}")
-    return name
+def _scheme(name: str) -> dict[str, Any]:
+    """Return the table of a scheme."""
+    from ...core.step import Scheme
+    from .vocabulary import names_of  # late: it needs the finite elements, which not every case does
+
+    if name not in names_of(Scheme) and ":" not in name:  # package.module:Name
+        raise InputError(f"unknown scheme {shown(name)}: {nearest(name, names_of(Scheme))}")
+    return {"type": name}
 
 
 def _solver(name: str) -> dict[str, Any]:
     """Return the table of a solver, or of the solver that a method belongs to."""
-    for kind, owner in ((SmallMethod, "Condensed"), (Method, "Volume")):
-        if name in names_of(kind):
+    from ...solvers.condensed import SmallMethod
+    from ...solvers.volume.route import Method
+    from .vocabulary import names_of
+
+    methods = {"Condensed": names_of(SmallMethod), "Volume": names_of(Method)}
+    for owner, names in methods.items():
+        if name in names:
             return {"type": owner, "method": {"type": name}}
-    if name not in OWNERS and ":" not in name:  # package.module:Name
-        names = [*OWNERS, *names_of(SmallMethod), *names_of(Method)]
+    if name not in methods and ":" not in name:  # package.module:Name
+        names = (*methods, *methods["Condensed"], *methods["Volume"])
         raise InputError(f"unknown solver {shown(name)}: {nearest(name, names)}")
     return {"type": name}

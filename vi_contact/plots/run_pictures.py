@@ -1,0 +1,58 @@
+"""Draw the pictures of a run beside its page: ground motion, displacements, energy, certificate, contact."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from ..core.algebra import Array
+from ..run.files.reading import RunFolder
+from .channel_run import SOIL, illustrate, of_channel
+from .histories import History, plain, plot_certificate, plot_contact, plot_energy, plot_excitation, plot_points
+from .maps import arc_position
+
+
+class ContactPoints(Protocol):
+    """Where the contact points are: of a surface, or of a run folder."""
+
+    @property
+    def points(self) -> Array: ...
+    @property
+    def normals(self) -> Array: ...
+
+
+def draw_run(run: RunFolder, out: Path, *, title: str, unilateral: Sequence[str] | None = None) -> list[Path]:
+    """Draw all pictures of a run folder into ``out``, of the buried channel those of its interface too.
+
+    ``unilateral``: labels of probes that are contact points, drawn with their bound (see ``plot_points``).
+    """
+    drawn = draw_histories(run.history, run.contact, out, title=title, unilateral=unilateral)
+    return drawn + (illustrate(run, out, title=plain(title)) if of_channel(run) else [])
+
+
+def draw_histories(
+    history: History, contact: ContactPoints | None, out: Path, *, title: str,
+    unilateral: Sequence[str] | None = None, reference: History | None = None,
+) -> list[Path]:
+    """Draw the pictures of recorded histories, each where there is something to draw; ``reference``: in grey."""
+    drawn = []
+    if any(np.any(history.get(f"a_g_{axis}", 0.0)) for axis in "xyz"):
+        drawn.append(plot_excitation(history, out / "excitation.png"))
+    for axis in "xyz":
+        labels = [name.removeprefix(f"u_{axis}_") for name in history
+                  if name.startswith(f"u_{axis}_") and not name.endswith(SOIL)]
+        if any(np.any(history[f"u_{axis}_{label}"]) for label in labels):
+            drawn.append(plot_points(
+                history, labels, out / f"displacements_{axis}.png", title=plain(title), component=axis,
+                unilateral=unilateral if axis == "x" else None, reference=reference,
+            ))
+    if "energy_defect" in history:
+        drawn.append(plot_energy(history, out / "energy.png"))
+    drawn.append(plot_certificate(history, out / "certificate.png"))
+    if contact is not None and "pressure" in history and contact.points.shape[0] and contact.points.shape[1] == 2:
+        position, label = arc_position(contact.points, contact.normals)
+        drawn.append(plot_contact(history, out / "contact.png", position=position, axis_label=label))
+    return drawn
