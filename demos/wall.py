@@ -6,7 +6,7 @@ step is solved twice, condensed to the contact points and on all unknowns, and t
 
     bash demos/run.sh wall                      # both figures, into results/wall/a and results/wall/b
     bash demos/run.sh -n 3 wall                 # the same on three ranks
-    bash demos/run.sh wall --case a --motion FILE --scale 2     # any option of "vi-contact wall" makes one such run
+    bash demos/run.sh wall --case a --motion FILE --scale 2   # one run as "vi-contact run wall", and its report
 
 Units are SI; the case data and what the source leaves open are explained in docs/start/first_wall.md.
 """
@@ -14,6 +14,8 @@ Units are SI; the case data and what the source leaves open are explained in doc
 from __future__ import annotations
 
 import sys
+from argparse import ArgumentParser
+from collections.abc import Sequence
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the source tree without installing
@@ -22,9 +24,10 @@ from mpi4py import MPI
 
 import vi_contact as vc
 from vi_contact import fem
+from vi_contact.cli import main as command
 from vi_contact.models import wall as wall_model
-from vi_contact.models.wall_run import draw
 from vi_contact.plots.histories import plot_runs
+from vi_contact.plots.run_pictures import draw_histories
 from vi_contact.solvers.volume.route import Volume
 from vi_contact.solvers.volume.snes import ReducedNewton
 
@@ -69,7 +72,8 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
         }
         if comm.rank == 0:
             print(f"\nCase {case}. {title}\n{solution.summary()}")
-            draw(solution.history, case, problem.surface, out / case, title=title, reference=linear.history)
+            draw_histories(solution.history, problem.surface, out / case, title=title, reference=linear.history,
+                           unilateral=[str(number) for number in wall_model.CASES[case]])
         comm.Barrier()  # nobody leaves before the figures are there
     for case in CASES:
         compare_schemes(model, case, steps, 2 if quick else REFINED, out / f"schemes_{case}.png")
@@ -100,11 +104,25 @@ def compare_schemes(model: wall_model.WallModel, case: str, steps: int, refined:
     MPI.COMM_WORLD.Barrier()
 
 
+def command_line(words: Sequence[str]) -> int:
+    """Run the built-in case and draw its report, both routes to every step; without --case, cases a and b."""
+    options = ArgumentParser(add_help=False, allow_abbrev=False)
+    options.add_argument("--case")
+    options.add_argument("--out", default=str(OUT))
+    own, others = options.parse_known_args(words)
+    runs = {own.case: own.out} if own.case else {case: f"{own.out}/{case}" for case in CASES}
+    for case, folder in runs.items():
+        status = command(["run", "wall", "--cross-check", "--set", f"model.case={case}", "--out", folder, *others])
+        if status == 0 and MPI.COMM_WORLD.rank == 0:
+            status = command(["report", folder])
+        if status:
+            return status
+    return 0
+
+
 # Things to try: bilateral instead of unilateral contact (case "bilateral"); impact=vc.Elastic(); a finer mesh,
 # Wall(divisions=(32, 48)); triangles; a real earthquake with --motion; mpirun -n 3.
 if __name__ == "__main__":
     if len(sys.argv) > 1:
-        from vi_contact.cli.entry import main as command
-
-        raise SystemExit(command(["wall", "--cross-check", *sys.argv[1:]]))
+        raise SystemExit(command_line(sys.argv[1:]))
     main()

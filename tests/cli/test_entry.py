@@ -14,10 +14,8 @@ import pytest
 
 import vi_contact
 from vi_contact.cli import ranks as cli_ranks
-from vi_contact.cli.entry import main, parser, split_petsc
-from vi_contact.cli.options import impact_law
+from vi_contact.cli.entry import main, split_petsc
 from vi_contact.core.errors import InputError
-from vi_contact.laws.impact import ComponentReset, Inelastic, MassProjection, Newton, NoImpact
 
 pytestmark = pytest.mark.serial
 ROOT = Path(vi_contact.__file__).parent.parent
@@ -43,12 +41,12 @@ def record(tmp_path: Path) -> Path:
 def test_help_explains_itself():
     done = shell("--help")
     assert done.returncode == 0 and not done.stderr
-    for word in ("vi-contact", "unilateral contact", "mpirun", "wall", "seed 000", "motion", "ground motion files"):
+    for word in ("vi-contact", "unilateral contact", "mpirun", "run a case", "cases", "motion", "ground motion files"):
         assert word in done.stdout
 
 
 def test_every_command_has_its_own_help():
-    for command in (["wall"], ["motion"], ["motion", "info"]):
+    for command in (["run"], ["motion"], ["motion", "info"]):
         with pytest.raises(SystemExit) as stopped:
             main([*command, "--help"])
         assert stopped.value.code == 0
@@ -86,13 +84,14 @@ def test_motion_info(record):
     [
         (["motion", "info", "nowhere.AT2"], "nowhere.AT2: there is no such file"),
         (["motion", "info", "."], "Is a directory"),
-        (["wall", "--case", "z"], "unknown case 'z': choose one of"),
-        (["wall", "--impact", "soft"], "unknown impact law 'soft'"),
-        (["wall", "--impact", "1.5"], "restitution coefficient e is 1.5"),
+        (["run", "wall", "--set", "model.case=z"], "unknown case 'z': choose one of"),
+        (["run", "wall", "--set", "impact.type=Soft"], "unknown type 'Soft'"),
+        (["run", "wall", "--set", 'impact={type="Newton", e=1.5}'], "restitution coefficient e is 1.5"),
+        (["run", "wal"], "there is no built-in case 'wal': did you mean wall?"),
     ],
 )
 def test_errors_are_one_sentence(arguments, word):
-    if arguments[0] == "wall":
+    if arguments[0] == "run":
         pytest.importorskip("dolfinx")
     done = shell(*arguments)
     assert done.returncode == 1 and "Traceback" not in done.stderr
@@ -116,7 +115,6 @@ def test_errors_are_one_sentence(arguments, word):
         (["post", "peaks", "run", "--out", "run/../run/checkpoint.npz"], "checkpoint.npz is read by this command"),
         (["post", "spectrum", "run", "a_g_x", "--out", "x.png"], "give a name such as x.csv"),
         (["report", "run", "--out", "page.docx"], "a picture ends in"),
-        (["layer", "--out", "x.nosuch"], "a picture ends in"),
     ],
 )
 def test_no_input_is_overwritten(tmp_path, monkeypatch, capsys, arguments, word):
@@ -170,23 +168,46 @@ def test_units_must_be_said(record, capsys):
     assert not captured.out and "units" in captured.err and captured.err.count("\n") == 1
 
 
-def test_impact_laws_by_name():
-    assert impact_law("none", False) == NoImpact()
-    assert impact_law("inelastic", False) == Inelastic(ComponentReset())
-    assert isinstance(impact_law("inelastic", True).reading, MassProjection)
-    assert impact_law("elastic", False) == Newton(1.0) and impact_law("0.25", False) == Newton(0.25)
-    with pytest.raises(InputError, match="give inelastic, elastic, none or a restitution"):
-        impact_law("bouncy", False)
-
-
 def test_petsc_options_are_told_from_ours():
     options = ["-vi_contact_volume_snes_monitor", "-vi_contact_volume_snes_rtol", "1e-9"]
-    own, petsc = split_petsc(["wall", *options, "--case", "b", "--dt", "0.1"])
-    assert own == ["wall", "--case", "b", "--dt", "0.1"] and petsc == options
-    assert split_petsc(["wall", "--out", "x"]) == (["wall", "--out", "x"], [])
+    own, petsc = split_petsc(["run", "wall", *options, "--steps", "5", "--dt", "0.1"])
+    assert own == ["run", "wall", "--steps", "5", "--dt", "0.1"] and petsc == options
+    assert split_petsc(["run", "--out", "x"]) == (["run", "--out", "x"], [])
 
 
-def test_wall_defaults_are_those_of_the_seed():
-    options = parser().parse_args(["wall"])
-    assert (options.solver, options.scheme, options.impact) == ("condensed", "zwt", None)
-    assert options.motion is None and not options.gravity and not options.projection and options.dt is None
+@pytest.mark.parametrize(("old", "new"), [
+    ("wall", "run wall, and"), ("beam --t-end 0.5 --exact", "run beam --set beam.t_end=0.5 --set beam.exact=true,"),
+    ("layer --k 1 2 --c 0", "run layer --set 'layer.k=[1, 2]' --set layer.c=0,"),
+    ("wall --case b --motion h --vertical v --scale 2 --gravity --cross-check",
+     "run wall --motion h,v --set model.case=b --scale 2 --set model.weight=true --cross-check,"),
+    ("channel --contact coulomb --mu 0.5 --size 0.25 --far 1 --sides tied --gravity all",
+     "run channel --set friction.type=Coulomb --set friction.mu=0.5 --set model.size=0.25 --set model.far=1 "
+     "--set model.sides.type=TiedSides --set 'model.weighing=[\"channel\", \"soil\"]',"),
+    ("wall --scheme trapezoidal --solver volume-reference --divisions 4 6 --pga=3",
+     "run wall --scheme Trapezoidal --solver ReducedNewton --set 'model.divisions=[4, 6]' "
+     "--set excitation.1.record.processing.pga=3,"),
+    ("channel --damping 0.05 1 10", "run channel, and for its pictures vi-contact report DIR; for --damping see docs"),
+])
+def test_old_commands_name_the_new_ones(old, new, capsys):
+    """One sentence with the user's own options in today's words; nothing is computed."""
+    assert main(old.split()) == 1
+    said = capsys.readouterr().err
+    assert f"give vi-contact {new}" in said and said.startswith("vi-contact: '") and said.count("\n") == 1
+
+
+def test_cases_are_listed(capsys):
+    assert main(["cases"]) == 0
+    *lines, folder = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == ["beam", "channel", "layer", "wall"]
+    assert (Path(folder.removeprefix("the files: ")) / "wall.toml").is_file()
+
+
+def test_the_beam_needs_no_finite_elements(tmp_path):
+    """Nor do the layer and their reports: what they import is numpy, scipy and matplotlib."""
+    blocked = "import sys\nfor name in ('dolfinx', 'petsc4py', 'mpi4py', 'gmsh'): sys.modules[name] = None\n"
+    for words in (["run", "beam", "--set", "beam.t_end=0.02", "--set", "beam.elements=4"], ["run", "layer"]):
+        for command in ([*words, "--out", str(tmp_path / words[1])], ["report", str(tmp_path / words[1])]):
+            code = f"{blocked}from vi_contact.cli import main\nraise SystemExit(main({command!r}))"
+            done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=False)
+            assert (done.returncode, done.stderr) == (0, ""), done.stderr
+    assert (tmp_path / "beam" / "tip.png").is_file() and (tmp_path / "layer" / "particle.png").is_file()

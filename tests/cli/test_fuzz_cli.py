@@ -38,10 +38,11 @@ READING = {
 PERIODS = ["0.1 1 1e12", "1 0.1 5", "0.1 1 2.5", "nan 1 5", "0.1 inf 5", "1e-300 1 5", "0.1 1 1", "0.1 1 nan", "0 1 5"]
 STEP = {
     "--steps": ["0", "-1", "x", "1" * 5000], "--dt": [*POSITIVE, "1e-300"], "--solver": ["foo", ""],
-    "--scheme": ["foo"], "--impact": ["foo", "2", "-1", "nan"],
-    "--motion": PLACES, "--vertical": ["x"], "--scale": ["inf", "nan", "x"],
-    "--fields-every": ["-1", "x"], "--scale=2 --pga": ["3"], "--out": [""],
+    "--scheme": ["foo"], "--motion": [*PLACES, "a,b,c", ","], "--scale": ["inf", "nan", "x"], "--out": [""],
+    "--set": ["impact.type=foo", "impact.e=2", "fields.every=-1", "fields.every=x", "excitation=3", "model=3", "run=",
+              "solver=3"],
 }
+SET = [value for value in POSITIVE if value]  # an empty one takes the key away
 WRONG: dict[str, dict[str, list[str]]] = {  # command -> option -> values; an option "" stands for more words
     "motion info FILE": READING | {"": ["x.at2", "--nosuch", "FOLDER"]},
     "motion plot FILE": {"--out": ["x.nosuch", "nowhere/x.png", "", "FILE"], "--out-units": ["furlong", ""]},
@@ -75,23 +76,26 @@ WRONG: dict[str, dict[str, list[str]]] = {  # command -> option -> values; an op
         "--part": ["0/1", "5/2", "x", "1"], "--launch": ["'"], "--motions": ["FILE FILE", "FILE,FILE", ",", ""],
         "--levels": ["1"], "--set": ["x"],
     },
-    "beam --elements 4 --t-end 0.01 --out beam": {
-        "--length": POSITIVE, "--rho": POSITIVE, "--E": POSITIVE,
-        "--elements": ["0", "-1", "x", "1000000000", "1" * 5000],
-        "--dt": POSITIVE, "--t-end": [*POSITIVE, "1e300"], "--reading": ["Z", ""], "--eps": POSITIVE,
-        "--mu": ["nan", "-1", "inf"], "--out": ["", "FILE"],
+    "run beam --set beam.elements=4 --set beam.t_end=0.01 --out beam": {
+        **{f"--set beam.{key}=": SET for key in ("length", "rho", "E", "dt", "eps")},
+        "--set beam.elements=": ["0", "-1", "x", "1000000000", "1" * 5000], "--set beam.t_end=": [*SET, "1e300"],
+        "--set beam.mu=": ["nan", "-1", "inf"], "--set": ["beam.reading=Z", "beam.force=-1", "x.y=1", "beam=3"],
+        "--dt": POSITIVE, "--steps": ["3"], "--motion": ["FILE"], "--scheme": ["Newmark"], "--out": ["", "FILE"],
     },
-    "layer": {
-        "--mass": POSITIVE, "--speed": [*POSITIVE, "1e300"], "--width": POSITIVE, "--k": POSITIVE[1:],
-        "--c": POSITIVE[1:], "--restitution": ["2", "-1", "nan"],
-        "--metric": ["foo"], "--out": ["x.nosuch", ""],
+    "run layer": {
+        **{f"--set layer.{key}=": SET for key in ("mass", "width", "k", "c")}, "--set layer.speed=": [*SET, "1e300"],
+        "--set layer.restitution=": ["2", "-1", "nan"], "--set": ["layer.metric=foo", "layer.k=[-1]", "layer.c=[nan]"],
+        "--dt": ["1"], "--scale": ["2"], "--out": ["FILE", ""], "": ["--cross-check", "--restart"],
     },
-    "wall": STEP | {"--case": ["foo", ""], "--divisions": ["0 1", "x 1", "1000000 1000000"],
-                    "--size": [*POSITIVE, "1e-9"]},
-    "channel": STEP | {
-        "--contact": ["foo"], "--sides": ["foo"], "--base": ["foo"], "--gravity": ["foo"], "--size": POSITIVE,
-        "--rock": ["nan 0 1", "1 0.6 1"], "--damping": ["-1 1 2", "nan 1 2", "0.1 0 1"], "--mu": ["0.3"],
+    "run wall": STEP | {"--set model.case=": ["foo", "3"], "--set model.size=": [*SET, "1e-9"],
+                        "--set model.divisions=": ["[0,1]", "[1.5,1]", "[1000000,1000000]"]},
+    "run channel": STEP | {
+        "--set model.sides=": ["foo", '{type="foo"}'], "--set model.base=": ["foo", "3"], "--set model.size=": SET,
+        "--set model.rock=": ["{E=1,nu=0.6,rho=1}", "3"], "--set friction.mu=": ["0.3"],
+        "--set model.damping=": ['{type="Rayleigh",alpha=-1}', '{type="Rayleigh.from_frequencies",f1=nan}'],
     },
+    **{command: {"": ["", "--steps 3", "--out x", "--k 1 2", "--help", "--motion FILE --scale 2"]}
+       for command in ("wall", "channel", "beam", "layer")},  # answered by the command that has taken their place
     "report": {"": ["nowhere", "FILE", "FOLDER", "RUN --out x.docx", "RUN --show nosuch", "RUN --show t,u_x_end"]},
     "post peaks RUN": {"": ["nosuch", "--out nowhere/x", "--out RUN/history.csv"]},
     "post spectrum RUN": {"a_x_end --periods": PERIODS, "a_x_end --damping": ["1", "nan", "-1"],
@@ -130,6 +134,8 @@ def lines() -> list[list[str]]:
 
 
 def words(command: str, option: str, value: str) -> list[str]:
+    if option.endswith("="):  # a key of --set
+        return [*command.split(), *f"{option}{value}".split(" ")]
     given = value.split(" ") if value else [""]
     if option and len(given) == 1 and " " not in option:
         return [*command.split(), f"{option}={value}"]  # a value that begins with a dash is one, too
@@ -163,7 +169,8 @@ def test_wrong_command_lines(places: dict[str, str], tmp_path: Path, monkeypatch
 
 
 @pytest.mark.parametrize(("command", "words"), [
-    ("motion info", "pass --units as one of m/s2"), ("wall --motion", "pass --units as one of m/s2"),
+    ("motion info", "pass --units as one of m/s2"),
+    ("run wall --motion", "pass units (--set excitation.1.record.units=UNIT) as one of m/s2"),
     ("motion info --units g --channel 1", "--channel 1 was passed"),
     ("motion info --units g --dt 0.5", "--dt 0.5 was passed"),
     ("motion info --units cm/s2 --trim 0.5 9", "start=0.5 and end=9.0"),

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+
 import numpy as np
 import pytest
 
 pytest.importorskip("dolfinx")
 
-from channel_runs import CHANNEL, DT, FRICTION, follow, model
+from channel_runs import CHANNEL, DT, FRICTION, SCHEME, follow, model
 from mpi4py import MPI
 
 import vi_contact as vc
@@ -16,11 +18,14 @@ from vi_contact.core.errors import InputError
 from vi_contact.core.units import STANDARD_GRAVITY
 from vi_contact.meshes.channel import ChannelMesh
 from vi_contact.meshes.extract import arrays_from_script
-from vi_contact.models.channel.model import BODIES, Channel, build
+from vi_contact.models.channel.model import BODIES, REFERENCE, Channel, build
 from vi_contact.models.channel.points import SoilProbe
-from vi_contact.models.channel.run import ChannelRun, prepared
-from vi_contact.models.channel.sides import Fixed, Rollers, TiedSides
-from vi_contact.models.choices import SCHEMES
+from vi_contact.models.channel.sides import DashpotSides, Fixed, Rollers, TiedSides
+from vi_contact.models.channel.stages import at_rest
+from vi_contact.studies.cases.case import read_case
+from vi_contact.studies.cases.library import located
+from vi_contact.studies.cases.short_settings import ShortOptions
+from vi_contact.studies.cases.toml_file import read_toml
 
 COMM = MPI.COMM_WORLD
 serial = pytest.mark.serial
@@ -210,82 +215,112 @@ def test_other_meshes(name):
 
 @pytest.mark.slow
 def test_the_command(shared_tmp, capsys):
-    """vi-contact channel: histories, fields and figures in the folder, the summary on rank 0."""
-    options = ["--contact", "coulomb", "--mu", "0.4", "--damping", "0.05", "1", "10", "--steps", "10", "--quiet"]
-    assert main(["channel", *options, "--out", str(shared_tmp)]) == 0
+    """vi-contact run channel: histories and fields in the folder, the summary on rank 0."""
+    damping = '{type="Rayleigh.from_frequencies", f1=1, f2=10, xi1=0.05, xi2=0.05}'
+    options = ["friction.type=Coulomb", "friction.mu=0.4", f"model.damping={damping}"]
+    command = ["run", "channel", *(word for one in options for word in ("--set", one)), "--steps", "10", "--quiet"]
+    assert main([*command, "--out", str(shared_tmp)]) == 0
     text = capsys.readouterr().out
-    assert (text.startswith("Channel, coulomb\n") and str(shared_tmp) in text) == (COMM.rank == 0)
-    wanted = {"history.csv", "history.h5", "fields.xdmf", "contact.png", "displacements_x.png", "displacements_y.png"}
-    assert wanted <= {path.name for path in shared_tmp.iterdir()}
+    assert (text.startswith("A channel buried in soil") and str(shared_tmp) in text) == (COMM.rank == 0)
+    assert {"history.csv", "history.h5", "fields.xdmf", "case.toml"} <= {path.name for path in shared_tmp.iterdir()}
     table = np.genfromtxt(shared_tmp / "history.csv", delimiter=",", names=True)
     one = build(Channel(damping=vc.Rayleigh.from_frequencies(1.0, 10.0, xi1=0.05, xi2=0.05)), COMM)
     straight = follow(one, one.problem(friction=FRICTION), 10).history
     assert np.abs(table["u_x_19"] - straight["u_x_19"]).max() < 1e-9 * np.abs(straight["u_x_19"]).max()
 
 
-@serial
-def test_a_command_that_makes_no_sense(capsys):
-    assert main(["channel", "--contact", "coulomb"]) == 1
-    assert "needs its friction coefficient mu" in capsys.readouterr().err
+def test_the_case_that_ships_is_the_channel_of_the_figures():
+    """Shape, materials, harmonic and time step are those of the model, its reference that of the catalogue."""
+    case = built_in()
+    assert case.excitations() == (CHANNEL.harmonic(),)
+    assert case.nodes["run"].build({}) == {"dt": CHANNEL.time_step(), "steps": 400}
+    given = {key: node.build({}) for key, node in case.nodes["model"].arguments.items()}
+    shape = {one.name: given.get(one.name) for one in fields(ChannelMesh) if one.name in given}
+    assert ChannelMesh(**shape) == CHANNEL.shape
+    assert (given["soil"], given["concrete"], given["damping"]) == (CHANNEL.soil, CHANNEL.concrete, CHANNEL.damping)
+    assert case.nodes["escalation"].build({})[0] == REFERENCE
+    impact = case.nodes["impact"].build({})
+    assert isinstance(impact, vc.Inelastic) and isinstance(impact.reading, vc.MassProjection)
+
+
+def built_in(*given, **short):
+    """The channel that ships with the package."""
+    path = located("channel")
+    return read_case(path, ShortOptions(**short).settings(read_toml(path), given))
+
+
+WEIGHING = ("fields=", 'model.weighing=["channel","soil"]')
 
 
 @serial
-@pytest.mark.parametrize("sides, scheme", [(None, "hht"), ("free-field", "zwt"), ("dashpots", "zwt")])
+@pytest.mark.parametrize("sides, scheme", [(None, "HHT"), ("FreeFieldSides", None), ("DashpotSides", None)])
 def test_a_moved_bedrock_from_options(tmp_path, sides, scheme):
-    """--base prescribed: the same contact forces, with records in both directions, whatever the sides."""
+    """model.base prescribed: the same contact forces, with records in both directions, whatever the sides."""
     t = 0.01 * np.arange(31)
     record = tmp_path / "record.txt"
     record.write_text("".join(f"{a:.4f} {b:.9e}\n" for a, b in zip(t, np.sin(20.0 * t), strict=True)))
     found = []
     for base in ("relative", "prescribed"):
-        ready = prepared(
-            ChannelRun(
-                motion=str(record), vertical=str(record), units="m/s2", scheme=scheme, dt=0.01, base=base,
-                sides=sides, gravity="all",
-            ), COMM,
-        )  # fmt: skip
-        assert ready.steps == 31 and len(ready.problem.excitations) == (2 if base == "relative" else 0)
-        assert ready.model.system.space.tied.any() == (sides is None)  # tied sides with a vertical record
-        march = follow(ready.model, ready.problem, 20, dt=ready.dt, state=ready.start, scheme=SCHEMES[scheme].scheme)
-        found.append(np.asarray(march.history["pressure"]))
-    same_dashpots = sides != "dashpots"  # these resist the velocity that they see: another problem in another frame
+        given = [f"model.base={base}", *WEIGHING, *(f"excitation.{k}.record.units=m/s2" for k in (1, 2))]
+        given += [f"model.sides.type={sides}"] if sides else []
+        case = built_in(*given, motion=f"{record},{record}", dt=0.01, steps=20, scheme=scheme)
+        problem = case.problem(COMM)
+        assert len(problem.excitations) == (2 if base == "relative" else 0)
+        assert problem.system.space.tied.any() == (sides is None)  # tied sides with a vertical record
+        found.append(np.asarray(case.run(COMM, progress=False).history["pressure"]))
+    same_dashpots = sides != "DashpotSides"  # these resist the velocity they see: another problem in another frame
     assert (np.abs(found[0] - found[1]).max() < 1e-8 * found[0].max()) == same_dashpots
     assert np.abs(found[0] - found[0][0]).max() > 0.1 * found[0].max()
 
 
 @serial
-@pytest.mark.parametrize("sides", ["tied", "free-field"])
+@pytest.mark.parametrize("sides", ["TiedSides", "FreeFieldSides"])
 def test_waves_from_below_from_options(sides):
-    """--base compliant: at rest without waves, on what the released bedrock carried; with waves stiff rock brings
+    """model.base compliant: at rest without waves, on what the released bedrock carried; with waves stiff rock brings
     nearly the motion of a rigid base, whose acceleration is that of the outcrop."""
-    quiet = prepared(ChannelRun(base="compliant", sides=sides, scale=0.0, gravity="all"), COMM)
-    history = follow(quiet.model, quiet.problem, 20, state=quiet.start).history
+    ends = f"model.sides.type={sides}"
+    history = built_in(ends, *WEIGHING, "model.base=compliant", scale=0.0, steps=20).run(COMM, progress=False).history
     size = np.abs(history["u_y_1"]).max()
     assert max(np.ptp(history[name]) for name in ("u_x_1", "u_y_1", "u_x_13")) < 1e-10 * size
-    rock = vc.LinearElastic(E=2.0e14, nu=0.25, rho=2400.0)
-    options = {"sides": sides, "dt": 0.005}
     opening = []
-    for run in (ChannelRun(**options), ChannelRun(base="compliant", rock=rock, **options)):
-        one = prepared(run, COMM)
-        opening.append(follow(one.model, one.problem, 60, state=one.start, dt=one.dt).history["opening_left"])
+    for more in ((), ("model.base=compliant", "model.rock={E=2e14, nu=0.25, rho=2400}")):
+        solution = built_in(ends, "fields=", *more, dt=0.005, steps=60).run(COMM, progress=False)
+        opening.append(solution.history["opening_left"])
     assert np.abs(opening[1] - opening[0]).max() < 0.03 * opening[0].max()
+
+
+def test_at_rest_before_the_shaking():
+    """Python's way to the same: ends that hold no static load come after the gravity stage, and stay at rest."""
+    one = at_rest(Channel(ChannelMesh(size=1.0)), COMM, sides=DashpotSides(), excitation=())
+    solution = vc.simulate(one.problem, scheme=SCHEME, dt=DT, steps=2, state=one.start, record=one.model.recorders(),
+                           progress=False)
+    size = np.abs(solution.history["u_y_1"]).max()
+    assert size > 0.0 and max(np.ptp(solution.history[name]) for name in ("u_x_1", "u_y_1")) < 1e-10 * size
 
 
 @serial
 @pytest.mark.parametrize(
     "wrong, sentence",
     [
-        ({"contact": "glued"}, "unknown contact 'glued': choose one of sliding, coulomb, bilateral"),
-        ({"contact": "coulomb"}, "contact 'coulomb' needs its friction coefficient mu"),
-        ({"mu": 0.3}, "the other contacts take none"),
-        ({"sides": "walls"}, "unknown sides 'walls': choose one of rollers"),
-        ({"gravity": "moon"}, "unknown gravity 'moon': choose one of channel, all, none"),
-        ({"base": "free"}, "unknown base 'free': choose one of relative, prescribed, compliant"),
-        ({"rock": CHANNEL.concrete}, "rock is what is under a compliant base"),
-        ({"pga": 3.0}, "pga speaks of a record"),
-        ({"solver": "magic"}, "unknown solver 'magic'"),
+        ("friction.mu=0.3", r"\[friction\] has no type"),
+        ("friction.type=Coulomb", "lacks 'mu', which Coulomb needs"),
+        ("model.sides.type=walls", "unknown type 'walls': .*Rollers"),
+        ('model.weighing=["moon"]', "unknown body 'moon': channel and soil may have weight"),
+        ("model.base=free", "unknown base 'free': choose one of relative, prescribed, compliant"),
+        ("model.rock={E=2e10, nu=0.2, rho=2400}", "rock is what is under a compliant base"),
+        ("model.wide=3", "unknown key 'wide' for Channel: did you mean width"),
+        ("model.size=-1", "size is -1.0 m"),
     ],
 )
 def test_wrong_options(wrong, sentence):
     with pytest.raises(InputError, match=sentence):
-        ChannelRun(**wrong)
+        built_in(wrong).problem(COMM)
+
+
+@serial
+def test_shape_as_a_table_or_as_keys():
+    """Keys of the mesh stand in the model or in its shape, and those in the model count."""
+    one, two = (built_in(*given).problem(COMM).system.space.unknowns for given in (
+        ("model.size=1",), ("model.size=", "model.shape={size=1.0}")))
+    three = built_in("model.shape={size=0.5}", "model.size=1").problem(COMM).system.space.unknowns
+    assert one == two == three < model().system.space.unknowns

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from fem_problems import field, max_over_ranks
@@ -15,14 +17,16 @@ from vi_contact.ground_motion.excitation import GroundMotion
 from vi_contact.laws.excitation import Harmonic
 from vi_contact.laws.impact import Elastic, Inelastic
 from vi_contact.laws.materials import LinearElastic, Rayleigh
-from vi_contact.models import wall_run
 from vi_contact.models.wall import CASES, Wall, build
-from vi_contact.models.wall_run import WallRun, run_wall
 from vi_contact.run.march import march
 from vi_contact.run.simulate import simulate
 from vi_contact.run.static import static_equilibrium
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
+from vi_contact.studies.cases.case import Case, read_case
+from vi_contact.studies.cases.library import located
+from vi_contact.studies.cases.short_settings import ShortOptions
+from vi_contact.studies.cases.toml_file import read_toml
 
 COMM = MPI.COMM_WORLD
 COARSE = Wall(divisions=(4, 6))
@@ -129,30 +133,36 @@ def test_the_ground_accelerates_the_whole_mass():
         build(COARSE, COMM, base_inertia=False)
 
 
+def built_in(*given: str, **short: Any) -> Case:
+    """The wall that ships with the package."""
+    path = located("wall")
+    return read_case(path, ShortOptions(**short).settings(read_toml(path), given))
+
+
 def test_which_mass_a_run_shakes():
     """All of it under a record; under the harmonic of the figures what their reference numbers have; or as asked."""
     conventions = {
-        "whole": ({"motion": "f"}, {"vertical": "f"}, {"base_inertia": "whole"}),
-        "catalogue": ({}, {"case": "face"}, {"motion": "f", "base_inertia": "catalogue"}),
+        "whole": (built_in(motion="f"), built_in(motion="f,g"), built_in("model.base_inertia=whole")),
+        "catalogue": (built_in(), built_in("model.case=face"), built_in("model.base_inertia=catalogue", motion="f")),
     }
-    for word, runs in conventions.items():
-        assert [WallRun(**given).convention for given in runs] == [word] * 3
-    with pytest.raises(InputError, match="unknown base inertia 'half': choose one of whole, catalogue"):
-        WallRun(base_inertia="half")
+    for word, cases in conventions.items():
+        assert [case.tables["model"]["base_inertia"] for case in cases] == [word] * 3
+    with pytest.raises(InputError, match="unknown base_inertia 'half': choose one of whole, catalogue"):
+        built_in("model.base_inertia=half").problem(COMM)
 
 
 @pytest.mark.parametrize("recorded", [True, False])
-def test_records_shake_the_whole_mass(shared_tmp, monkeypatch, recorded):
+def test_records_shake_the_whole_mass(shared_tmp, recorded):
     """The run and the same problem assembled here; log and summary tell which mass the ground motion accelerates."""
-    monkeypatch.setattr(wall_run, "draw", lambda *_: None)
-    path, given, shaking = shared_tmp / "pulse.txt", {}, None
+    path, given, shaking, short = shared_tmp / "pulse.txt", [], None, {}
     if recorded:
         if COMM.rank == 0:
             path.write_text("0.00 0.0\n0.01 2.0\n0.02 0.0\n")
         COMM.Barrier()
-        given, shaking = {"motion": str(path), "units": "m/s2"}, GroundMotion(read_record(path, "m/s2"))
-    run = WallRun(case="face", dt=1e-3, steps=3, fields_every=0, **given)
-    found = run_wall(run, COMM, shared_tmp / "run", progress=False)
+        short, given = {"motion": str(path)}, ["excitation.1.record.units=m/s2"]
+        shaking = GroundMotion(read_record(path, "m/s2"))
+    case = built_in("model.case=face", "fields=", *given, dt=1e-3, steps=3, **short)
+    found = case.run(COMM, out=shared_tmp / "run", progress=False)
     told = "the whole mass" if recorded else "the convention of the catalogue"
     assert told in found.facts["boundaries"][0]
     assert told in (shared_tmp / "run" / "run.log").read_text(encoding="utf-8")
@@ -160,6 +170,14 @@ def test_records_shake_the_whole_mass(shared_tmp, monkeypatch, recorded):
     expected = simulate(problem, scheme=ZienkiewiczWoodTaylor(), dt=1e-3, steps=3, progress=False)
     off, size = (max_over_ranks(COMM, u) for u in (found.state.u - expected.state.u, expected.state.u))
     assert off < 1e-10 * size  # the other mass makes 1e-2
+
+
+def test_the_case_that_ships_is_the_wall_of_the_figures():
+    """Its harmonic, time step and number of steps are those of the model, to the last bit."""
+    case, model = built_in(), build(Wall(), COMM, base_inertia="catalogue")
+    assert case.excitations(system=model.system) == (model.harmonic(),)
+    own = case.nodes["run"].build({"system": model.system})
+    assert own == {"dt": model.time_step(), "steps": 400}
 
 
 def test_gravity_stage_with_contact_then_shaking():

@@ -139,7 +139,7 @@ def test_a_boundary_saved_without_its_body(folder: Path, capsys: pytest.CaptureF
 
 @pytest.mark.parametrize("arguments", [
     ["run", "CASE", "--out", ""], ["run", "CASE", "--out="], ["report", "CASE", "--out", ""],
-    ["wall", "--out", "", "--steps", "1"], ["run", "a\0b"], ["motion", "info", "a\0b"],
+    ["run", "wall", "--out", "", "--steps", "1"], ["run", "a\0b"], ["motion", "info", "a\0b"],
 ])
 def test_empty_names_and_nul_are_refused(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
                                          capsys: pytest.CaptureFixture[str], arguments: list[str]) -> None:
@@ -150,9 +150,8 @@ def test_empty_names_and_nul_are_refused(folder: Path, tmp_path: Path, monkeypat
     assert not list((tmp_path / "here").iterdir())
 
 
-def test_wall_refuses_no_steps_and_two_scales(capsys: pytest.CaptureFixture[str]) -> None:
-    assert "--steps 0: give at least one step" in said(capsys, ["wall", "--steps", "0"])
-    assert "give one of them" in said(capsys, ["wall", "--scale", "2", "--pga", "3"])
+def test_run_refuses_no_steps(capsys: pytest.CaptureFixture[str]) -> None:
+    assert "--steps 0: give at least one step" in said(capsys, ["run", "wall", "--steps", "0"])
 
 
 # Incremental dynamic analysis ---------------------------------------------------------------------------------------

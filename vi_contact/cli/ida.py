@@ -53,6 +53,7 @@ def _part(text: str) -> tuple[int, int]:
 
 def _ida(options: argparse.Namespace) -> str:
     from ..studies.cases.case import read_case
+    from ..studies.cases.library import located
     from ..studies.ida.ida import IDA, run_ida
 
     try:
@@ -60,7 +61,7 @@ def _ida(options: argparse.Namespace) -> str:
     except ValueError as error:
         raise InputError(f"--launch {shown(options.launch)}: {error}; close the quotation mark") from None
     study = IDA(
-        read_case(options.case, options.settings, allow=options.allow),
+        read_case(located(options.case), options.settings, allow=options.allow),
         [_files(motion) for motion in options.motions], options.edp,
         scales=options.scales or (), levels=options.levels or (), intensity=options.im,
     )

@@ -47,7 +47,7 @@ def whole(owner: str, meaning: str, value: Any, *, least: int = 0, most: int | N
 def check_word(name: str, given: object, known: Sequence[str]) -> None:
     """Raise InputError for a word that is not among those known."""
     if given not in known:
-        raise InputError(f"unknown {name} {shown(given)}: choose one of {', '.join(known)}")
+        raise InputError(f"unknown {name} {shown(str(given))}: choose one of {', '.join(known)}")
 
 
 def counted(owner: str, asked: str, value: Any, things: str = "samples", *, most: int = LARGEST) -> int:

@@ -216,6 +216,7 @@ def _energies(axis: Any, run: RunFolder) -> None:
 
 def _certificate(axis: Any, run: RunFolder) -> None:
     log_axis(axis, run.history["t"][1:], run.history["certificate"][1:])
+    axis.yaxis.set_major_formatter("{x:.0e}")  # powers of ten are formulas, which the page does not read
     tolerance = run.facts.get("tolerance")
     if tolerance:
         axis.axhline(tolerance, color="tab:red", ls="--", lw=0.8, label=f"tolerance {tolerance:g}")

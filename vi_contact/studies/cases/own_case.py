@@ -57,8 +57,9 @@ class OwnCase:
     def _alone(self, out: Path) -> str:
         study = self.study()
         folder = run_folder(SerialComm(), out)
+        found = study.run(folder)
         keep_copy(self.path, self.settings, folder, SerialComm())
-        return study.run(folder)
+        return found
 
 
 def open_case(path: str | Path, settings: Sequence[str] = (), allow: Sequence[str] = ()) -> Case | OwnCase:

@@ -60,7 +60,8 @@ class ShortOptions:
             return []
         files = self.motion.split(",")
         before = _tables(tables.get("excitation"))
-        axes = len(before[0].get("direction", (0.0, 0.0))) if before else 2
+        direction = before[0].get("direction") if before else None
+        axes = len(direction) if isinstance(direction, list) else 2
         if not all(files) or len(files) > 2:
             raise InputError(f"--motion {shown(self.motion)}: give FILE, or FILE,FILE for a vertical one too")
         motions: list[dict[str, Any]] = []
@@ -70,8 +71,8 @@ class ShortOptions:
             axis = 0 if number == 0 else axes - 1
             motions.append({"type": "GroundMotion", "direction": [float(k == axis) for k in range(axes)]} | old | {
                 "record": (record if isinstance(record, dict) else {}) | {"path": str(Path(file).absolute())}})
-        with_any, vertical = OF_MOTION.get(str(_tables(tables.get("model"))[0].get("type")), ({}, {})) \
-            if "model" in tables else ({}, {})
+        models = [str(one.get("type")) for one in _tables(tables.get("model"))]
+        with_any, vertical = OF_MOTION.get(models[0] if models else "", ({}, {}))
         settings = {"excitation": motions} | with_any | (vertical if len(files) == 2 else {})
         return [*(f"{key}={toml_value(value)}" for key, value in settings.items()), "run.steps=", "run.t_end="]
 
@@ -109,7 +110,7 @@ class ShortOptions:
         if not self.cross_check:
             return []
         solver = tables.get("solver", {"type": "Condensed"})
-        if solver.get("type") == "CrossChecked":
+        if not isinstance(solver, dict) or solver.get("type") == "CrossChecked":
             return []
         routes = [one for one in _tables(tables.get("escalation")) if one.get("type") == "Volume"] or [REFERENCE]
         other = routes[0] if solver.get("type") == "Condensed" else {"type": "Condensed"}
