@@ -70,9 +70,9 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "meshes/test_partition.py": "meshes.rows",
     "meshes/test_two_body_meshes.py": "meshes.block meshes.cut meshes.from_arrays meshes.two_blocks",
     "models/test_channel.py":
-        "cli.channel models.channel.model models.channel.points models.channel.run models.channel.sides "
-        "models.channel.stages models.choices models.run_options",
-    "models/test_wall.py": "core.units models.wall_run",
+        "models.channel.model models.channel.points models.channel.sides models.channel.stages "
+        "studies.cases.model_tables studies.cases.short_settings",
+    "models/test_wall.py": "core.units",
     "plots/test_plots_channel.py": "plots.channel plots.channel_mesh plots.channel_run",
     "plots/test_plots_friction.py": "plots.friction",
     "plots/test_report.py": "cli.report plots.spectra run.files.reading",

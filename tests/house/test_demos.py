@@ -19,7 +19,7 @@ from vi_contact.cli.entry import main
 from vi_contact.ground_motion import Record, pga, read_record
 
 SHARED = Path(os.environ.get("VI_CONTACT_GROUND_MOTIONS", ROOT.parent / "shared" / "ground_motions"))
-FIGURES = ("excitation.png", "displacements.png", "energy.png", "certificate.png", "contact.png")
+FIGURES = ("excitation.png", "displacements_x.png", "energy.png", "certificate.png", "contact.png")
 SUMMARY = (
     "versions", "ranks", "unknowns", "contact_points", "steps", "iterations_per_step", "worst_certificate",
     "cross_check", "energy", "energy_defect", "seconds_per_step", "seconds_per_linear_step",
@@ -72,6 +72,19 @@ def test_the_wall_demo(comm: Any, shared_tmp: Path) -> None:
         assert column(shared_tmp / case, "contact_active").max() > 0
 
 
+@pytest.mark.serial
+def test_the_command_line_of_the_wall_demo(tmp_path: Path) -> None:
+    """README's command: the run, both routes to every step, its report; numbers of the case that ships."""
+    demos = [sys.executable, str(ROOT / "demos" / "wall.py")]
+    done = subprocess.run([*demos, "--case", "b", "--out", "demo", "--steps", "9"], cwd=tmp_path, capture_output=True,
+                          encoding="utf-8", env=dict(os.environ), check=False)
+    assert done.returncode == 0 and "cross-check Volume(ReducedNewton)" in done.stdout, done.stderr
+    for name in (*FIGURES, "report.pdf", "peaks.csv"):
+        assert (tmp_path / "demo" / name).stat().st_size > 500, name
+    assert main(["run", "wall", "--out", str(tmp_path / "run"), "--steps", "9", "--quiet"]) == 0
+    assert (tmp_path / "demo" / "history.csv").read_bytes() == (tmp_path / "run" / "history.csv").read_bytes()
+
+
 def vi_contact(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     """The command line in the scripts' environment, in which MPI keeps its remarks to itself."""
     quiet = f'. "{ROOT}/install/setup.sh"; vi_clean_environment; vi_mpi_environment; exec "$0" "$@"'
@@ -102,11 +115,12 @@ def test_the_wall_on_a_record(tmp_path: Path) -> None:
     """The ground acceleration of the run is the record in m/s², scaled to 5 m/s², sample k at t = k dt."""
     path = recorded(tmp_path)
     done = vi_contact(
-        tmp_path, "wall", "--case", "b", "--motion", str(path), "--pga", "5", "--dt", "0.02", "--steps", "50",
-        "--cross-check", "--out", "out/quake", "--fields-every", "25", "--quiet",
+        tmp_path, "run", "wall", "--motion", str(path), "--set", "excitation.1.record.processing.pga=5", "--dt", "0.02",
+        "--steps", "50", "--cross-check", "--out", "out/quake", "--set", "fields.every=25", "--quiet",
     )
     assert (done.returncode, done.stderr) == (0, "")
     assert "run finished: 50 steps" in done.stdout and "output: out/quake" in done.stdout
+    assert vi_contact(tmp_path, "report", "out/quake").returncode == 0
     summary = check_folder(tmp_path / "out" / "quake", steps=50, frames_every=25)
     assert summary["worst_certificate"] <= 1e-9 and summary["energy_defect"] <= 1e-10
     (difference,) = summary["cross_check"].values()
@@ -122,10 +136,10 @@ def test_the_wall_on_a_record(tmp_path: Path) -> None:
 BAD = {
     "missing record": (["--motion", "none.at2"], ["none.at2", "no such file"]),
     "record that is no text": (["--motion", "binary.at2"], ["binary.at2", "not a text file"]),
-    "unknown case": (["--case", "c"], ["'c'", "choose one of a, b"]),
-    "unknown solver": (["--solver", "magic"], ["'magic'", "choose one of condensed"]),
-    "folder below a file": (["--case", "a", "--out", "file/run"], ["file/run", "choose another"]),
-    "dt zero": (["--case", "a", "--dt", "0"], ["dt is 0", "positive"]),
+    "unknown case": (["--set", "model.case=c"], ["'c'", "choose one of a, b"]),
+    "unknown solver": (["--solver", "magic"], ["'magic'", "Known: Condensed"]),
+    "folder below a file": (["--set", "model.case=a", "--out", "file/run"], ["file/run", "choose another"]),
+    "dt zero": (["--set", "model.case=a", "--dt", "0"], ["dt is 0", "positive"]),
 }
 
 
@@ -140,11 +154,11 @@ def test_bad_input_is_one_sentence(
     (tmp_path / "binary.at2").write_bytes(b"\0\1\2")
     before = sorted(tmp_path.rglob("*"))
     if name == "missing record":  # one as users do it; the others in this process, which is quicker
-        done = vi_contact(tmp_path, "wall", *arguments)
+        done = vi_contact(tmp_path, "run", "wall", *arguments)
         status, out, err = done.returncode, done.stdout, done.stderr
     else:
         monkeypatch.chdir(tmp_path)
-        status, (out, err) = main(["wall", *arguments]), capsys.readouterr()
+        status, (out, err) = main(["run", "wall", *arguments]), capsys.readouterr()
     assert status == 1 and out == ""
     assert err.startswith("vi-contact: ") and err.count("\n") == 1
     assert [word for word in words if word not in err] == []

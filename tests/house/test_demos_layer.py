@@ -59,40 +59,51 @@ def test_the_contact_layer_demo(comm: Any, shared_tmp: Path) -> None:
         assert all(is_picture(shared_tmp / f"{name}.png") for name in ("ThrownBar", "ThrownBar_limit", "wall_limit"))
 
 
+def words(settings: list[str]) -> list[str]:
+    """The arguments --set layer.KEY=VALUE."""
+    return [word for setting in settings for word in ("--set", f"layer.{setting}")]
+
+
 @serial
 def test_the_command(tmp_path: Path, capsys: Any) -> None:
-    """Closed form, other readings, a wanted restitution, the picture."""
+    """Closed form, other readings, a wanted restitution; the table in its folder, and the picture of the report."""
 
-    def rows(*arguments: str) -> list[list[float]]:
-        assert main(["layer", *arguments]) == 0
+    def rows(*settings: str) -> list[list[float]]:
+        assert main(["run", "layer", *words([*settings]), "--out", str(tmp_path / "new" / "p")]) == 0
         lines = capsys.readouterr().out.splitlines()
         return [[float(word) for word in line.split()] for line in lines[1:] if line[:12].strip()[:1].isdigit()]
 
-    assert rows("--k", "1", "--c", "0", "5") == [
+    assert rows("k=[1]", "c=[0, 5]") == [
         [1.0, 0.0, 1.0, 1.0, 1.0, 2.0, 0.606531], [1.0, 5.0, 0.196980, 0.204157, 0.358352, 1.19698, 0.879563]
     ]
-    (near,) = rows("--k", "1", "--c", "1", "--start", "0.99")
+    (near,) = rows("k=[1]", "c=[1]", "start=0.99")
     assert near[2] == 0.593624 and near[5] == pytest.approx(1.60709, abs=5.1e-6)
-    (full,) = rows("--c", "1", "--metric", "full")
+    assert main(["report", str(tmp_path / "new" / "p")]) == 1 and "the closed form" in capsys.readouterr().err
+    (full,) = rows("c=[1]", "metric=full")
     assert full[2] == pytest.approx(0.56918, abs=5.1e-6) and full[5:] == pytest.approx([2.70353, 0.55461], abs=5.1e-6)
-    wanted = rows("--restitution", "0.7", "--mass", "80", "--speed", "3", "--width", "1e-3",
-                  "--out", str(tmp_path / "new" / "p.png"))[0]
-    assert wanted[2] == 0.7 and wanted[6] == 5e-4 and is_picture(tmp_path / "new" / "p.png")
+    wanted = rows("restitution=0.7", "mass=80", "speed=3", "width=1e-3")[0]
+    assert wanted[2] == 0.7 and wanted[6] == 5e-4
+    head, *lines = (tmp_path / "new" / "p" / "impacts.csv").read_text(encoding="utf-8").splitlines()
+    assert head.startswith("k [N/m],c [N],e,e_p") and float(lines[0].split(",")[6]) == pytest.approx(5e-4, rel=1e-12)
+    assert main(["report", str(tmp_path / "new" / "p")]) == 0
+    assert is_picture(tmp_path / "new" / "p" / "particle.png")
 
 
 @serial
 @pytest.mark.parametrize(
-    ("arguments", "word"),
+    ("settings", "word"),
     [
-        (["--metric", "round"], "unknown metric 'round'"),
-        (["--restitution", "1.5"], "restitution coefficient e is 1.5"),
-        (["--restitution", "0.5", "--metric", "full"], "are for the closed form"),
-        (["--k", "0", "--c", "1"], "parameter k is zero"),
-        (["--width", "-1"], "layer width b is -1.0"),
+        (["metric=round"], "unknown metric 'round'"),
+        (["restitution=1.5"], "restitution coefficient e is 1.5"),
+        (["restitution=0.5", "metric=full"], "is for the closed form"),
+        (["k=[0]", "c=[1]"], "parameter k is zero"),
+        (["width=-1"], "layer width b is -1.0"),
+        (["k=1"], "k is 1: give a list"),
+        (["q=1"], "unknown key 'q'"),
     ],
 )
-def test_the_command_refuses(arguments: list[str], word: str, capsys: Any) -> None:
-    assert main(["layer", *arguments]) == 1
+def test_the_command_refuses(settings: list[str], word: str, capsys: Any) -> None:
+    assert main(["run", "layer", *words(settings)]) == 1
     printed = capsys.readouterr()
     assert word in printed.err and not printed.out
 

@@ -27,6 +27,7 @@ from vi_contact.plots.channel import (
 )
 from vi_contact.plots.channel_mesh import animate, read_bodies
 from vi_contact.plots.channel_run import film, illustrate
+from vi_contact.run.files.reading import read_run
 from vi_contact.run.static import static_equilibrium
 
 pytestmark = pytest.mark.serial
@@ -194,7 +195,7 @@ def test_all_pictures_from_the_folder_alone(run: Any, figures: list[Any], tmp_pa
     _, history, folder = run
     copy = tmp_path / "copy"
     shutil.copytree(folder, copy)
-    drawn = illustrate(copy)
+    drawn = illustrate(read_run(copy), copy)
     names = ["openings.png", "rocking.png", "interface.png", "envelope.png", "channel.gif"]
     assert [path.name for path in drawn] == names and all(path.stat().st_size > 10_000 for path in drawn)
     top = {line.get_label(): line.get_ydata() for line in figures[0].axes[1].lines}
@@ -204,4 +205,4 @@ def test_all_pictures_from_the_folder_alone(run: Any, figures: list[Any], tmp_pa
     assert magnified in {step * 10.0**power for step in (1, 2, 5) for power in (1, 2, 3)}
     (copy / "history.h5").unlink()
     with pytest.raises(InputError, match="buried channel"):
-        illustrate(copy)
+        illustrate(read_run(copy), copy)

@@ -16,7 +16,7 @@ from .maps import arc_position
 
 
 class ContactPoints(Protocol):
-    """Where the contact points are: of a surface, or of a run folder."""
+    """Say where contact points are: a surface's, or those of a run folder."""
 
     @property
     def points(self) -> Array: ...
