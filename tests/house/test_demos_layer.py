@@ -11,6 +11,7 @@ from demo_runs import demo
 
 from demos.pictures.layer import plot_thin_limit
 from vi_contact.cli.entry import main
+from vi_contact.studies.cases.layer_study import LayerStudy
 
 serial = pytest.mark.serial
 
@@ -76,6 +77,7 @@ def test_the_command(tmp_path: Path, capsys: Any) -> None:
     assert rows("k=[1]", "c=[0, 5]") == [
         [1.0, 0.0, 1.0, 1.0, 1.0, 2.0, 0.606531], [1.0, 5.0, 0.196980, 0.204157, 0.358352, 1.19698, 0.879563]
     ]
+    assert [one.duration for one in LayerStudy(k=(1.0,), c=(0.0,)).impacts] == pytest.approx([2.0])
     (near,) = rows("k=[1]", "c=[1]", "start=0.99")
     assert near[2] == 0.593624 and near[5] == pytest.approx(1.60709, abs=5.1e-6)
     assert main(["report", str(tmp_path / "new" / "p")]) == 1 and "the closed form" in capsys.readouterr().err
