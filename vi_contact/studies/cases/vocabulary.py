@@ -1,4 +1,4 @@
-"""Say the words of case files: which classes and functions a table may call where, all of them of the public interface.
+"""Say the words of case files: which classes and functions a table may call where, all of the public interface.
 
 Rooms list their public classes once, in their ``__init__``; a class is a word wherever it is of the kind that is asked
 for, and so are its named constructors ("GeneralisedAlpha.spectral_radius"). What takes functions has no word, or one in
@@ -14,22 +14,17 @@ from types import MappingProxyType, ModuleType
 from typing import Any, get_origin, get_type_hints
 
 from ... import core, engineering, fem, ground_motion, laws, meshes, run, schemes, solvers
-from ...core.obstacles import Obstacle
-from ...core.protocols import Excitation, FrictionLaw, ImpactLaw, MassLaw
-from ...core.step import Recorder, Scheme, Solver
-from ...core.surfaces import ContactSurface
+from ...core import ContactSurface, Excitation, FrictionLaw, ImpactLaw, MassLaw, Obstacle, Recorder, Scheme, Solver
+from ...fem import BodyForce, Cells, CompliantBase, Dashpots, Facets, Prescribed, Traction
 from ...fem.contact.matching import Matching
-from ...fem.dashpots import CompliantBase, Dashpots
-from ...fem.loads import BodyForce, Prescribed, Traction
-from ...fem.mesh import Cells, Facets
 from ...ground_motion import Record, synthetic
 from ...laws.impact import Reading
 from ...laws.materials import Damping, LinearElastic, Section
 from ...meshes.gmsh_session import MeshScript
-from ...models.channel import sides
+from ...models import channel
+from ...run import HalvedAtImpact, Schedule
 from ...run.files.writer import FieldWriter
-from ...run.time_steps import HalvedAtImpact, Schedule
-from ...soil.upgoing_wave import UpgoingVelocity, upgoing
+from ...soil import UpgoingVelocity, upgoing
 from ...solvers import friction, normal, volume
 from ...solvers.condensed import SmallMethod
 from ...solvers.friction.extrapolation import Extrapolation
@@ -41,13 +36,17 @@ from .model_tables import MODELS, Parts
 from .parsing import Words
 from .table_calls import Callee, callee
 
-_ROOMS: Mapping[Any, tuple[ModuleType, ...]] = {  # kind -> where its classes are listed
-    MeshScript: (meshes,), LinearElastic: (laws,), Section: (laws,), Damping: (laws,), Prescribed: (fem,),
-    Traction: (fem,), BodyForce: (fem,), Dashpots: (fem,), Obstacle: (core,), Matching: (fem,),
-    FrictionLaw: (core, laws), ImpactLaw: (laws,), Reading: (laws,), MassLaw: (laws,),
-    Excitation: (laws, ground_motion), Scheme: (schemes,), Solver: (solvers, run), SmallMethod: (normal,),
-    FrictionMethod: (friction,), Extrapolation: (friction,), Method: (volume,), Schedule: (run,),
-    HalvedAtImpact: (run,), Recorder: (run, engineering, fem), FieldWriter: (fem,),
+_KINDS: Mapping[ModuleType, tuple[Any, ...]] = {  # room -> the kinds of things it lists
+    core: (Obstacle, FrictionLaw),
+    laws: (LinearElastic, Section, Damping, FrictionLaw, ImpactLaw, Reading, MassLaw, Excitation),
+    ground_motion: (Excitation,),
+    meshes: (MeshScript,),
+    fem: (Prescribed, Traction, BodyForce, Dashpots, Matching, Recorder, FieldWriter),
+    solvers: (Solver,), normal: (SmallMethod,), friction: (FrictionMethod, Extrapolation), volume: (Method,),
+    schemes: (Scheme,),
+    run: (Solver, Schedule, HalvedAtImpact, Recorder),
+    engineering: (Recorder,),
+    channel: (channel.Sides,),
 }
 _FUNCTIONS: Mapping[Any, Mapping[str, Callable[..., Any]]] = {  # kind -> word -> what it calls
     plain.MeshFile: {"read_mesh": plain.MeshFile},
@@ -55,10 +54,7 @@ _FUNCTIONS: Mapping[Any, Mapping[str, Callable[..., Any]]] = {  # kind -> word -
     CompliantBase: {"CompliantBase": plain.compliant_base},
     UpgoingVelocity: {"upgoing": upgoing},
     ContactSurface: {"contact_surface": plain.surface, "contact_pair": plain.pair},
-    sides.Sides: {
-        "Rollers": sides.Rollers, "Fixed": sides.Fixed, "TiedSides": sides.TiedSides,
-        "DashpotSides": sides.DashpotSides, "FreeFieldSides": plain.free_field_sides,
-    },
+    channel.Sides: {"FreeFieldSides": plain.free_field_sides},
     FrictionLaw: {"SlipRateCoulomb": plain.slip_rate},
     ImpactLaw: {"Elastic": laws.Elastic},
     Record: {"read_record": plain.record, "synthetic": synthetic},
@@ -76,8 +72,9 @@ def names_of(kind: Any) -> tuple[str, ...]:
 def _choices() -> Mapping[Any, Mapping[str, Callee]]:
     """Return kind -> word -> what it calls."""
     found: dict[Any, dict[str, Callee]] = {Parts: dict(MODELS)}
-    for kind, rooms in _ROOMS.items():
-        found[kind] = {one.name: one for room in rooms for one in _callees(room, kind)}
+    for room, kinds in _KINDS.items():
+        for kind in kinds:
+            found.setdefault(kind, {}).update({one.name: one for one in _callees(room, kind)})
     for kind, functions in _FUNCTIONS.items():
         found.setdefault(kind, {}).update({name: callee(one, name=name) for name, one in functions.items()})
     return MappingProxyType(found)
