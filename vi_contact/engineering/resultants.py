@@ -146,8 +146,8 @@ def tangent_vectors(normals: Array) -> Array:
     """Return the tangents (m, d, d - 1) of contact directions (m, d), in which surfaces have slip and r_t.
 
     A direction along an axis has the other axes; another one has the tangents of ``nodal_frames``, in three dimensions
-    in the order of the axes that they are nearest to (``fem.frames``). Points with several directions are not covered:
-    in the plane nothing rubs there.
+    in the order of the axes that they are nearest to (``fem.contact.frames``). Points with several directions are not
+    covered: in the plane nothing rubs there.
     """
     m, d = normals.shape
     tangents = np.empty((m, d, max(d - 1, 0)))

@@ -148,19 +148,19 @@ class FemSpace:
         """Which owned components follow a node of another boundary; InputError where only one of a pair is held."""
         followers = np.zeros_like(self.held)
         for pair in pairs:
-            held = [self._of_nodes(numbers, self.held.astype(float)) > 0.0 for numbers in (pair.first, pair.second)]
+            held = [self.at_nodes(numbers, self.held.astype(float)) > 0.0 for numbers in (pair.first, pair.second)]
             for c in pair.components:
                 if np.any(held[0][:, c] != held[1][:, c]):
                     raise InputError(f"component {c} of a tied node is prescribed on one side only: prescribe both "
                                      "sides alike, or tie the other components (components=)")
-                where = self._where(pair.second)
+                where = self.blocks_of(pair.second)
                 mine = (where >= 0) & ~held[1][:, c]
                 followers[where[mine], c] = True
         return followers
 
-    def _of_nodes(self, numbers: Indices, values: Array) -> Array:
-        """Rows of owned nodal values (k, d) at original node numbers, on every rank; zero for nodes of nobody."""
-        found, where = np.zeros((len(numbers), values.shape[1])), self._where(numbers)
+    def at_nodes(self, numbers: Indices, values: Array) -> Array:
+        """Return owned nodal values (k, d) at original node numbers, on every rank; zero for nodes of nobody."""
+        found, where = np.zeros((len(numbers), values.shape[1])), self.blocks_of(numbers)
         found[where >= 0] = values[where[where >= 0]]
         return self.comm.sum(found)
 
@@ -170,8 +170,8 @@ class FemSpace:
         first = int(self.mesh.comm.exscan(columns) or 0)
         column = np.where(self.free, first + self.free_index, -1)
         for pair in pairs:
-            leaders = self._of_nodes(pair.first, column.reshape(-1, d).astype(float)).astype(np.int64)
-            where = self._where(pair.second)
+            leaders = self.at_nodes(pair.first, column.reshape(-1, d).astype(float)).astype(np.int64)
+            where = self.blocks_of(pair.second)
             for row, leader in zip(where[where >= 0], leaders[where >= 0], strict=True):
                 for c in pair.components:
                     if self.tied[row, c]:
@@ -267,10 +267,10 @@ class FemSpace:
 
     def sample(self, u: Array, nodes: Indices, t: float, derivative: int = 0) -> Array:
         """Return the nodal values (k, d) at original node numbers, equal on all ranks."""
-        return self._of_nodes(nodes, self.expand(u, t, derivative))
+        return self.at_nodes(nodes, self.expand(u, t, derivative))
 
-    def _where(self, nodes: Indices) -> Indices:
-        """Owned block of each original node number, -1 when another rank owns it."""
+    def blocks_of(self, nodes: Indices) -> Indices:
+        """Return the owned block of each original node number, -1 when another rank owns it."""
         order = np.argsort(self.nodes)
         place = np.searchsorted(self.nodes[order], nodes)
         place = np.minimum(place, max(len(order) - 1, 0))

@@ -187,7 +187,7 @@ def build(block: RockingBlock, comm: Any) -> RockingModel:
     """Build mesh, gravity stage and second-order system of the block.
 
     The stresses are those of the block on its whole base: standing on its corners it pushes them apart, and the thrust
-    of the held base would be counted as weight (virial theorem, see ``fem.gravity``).
+    of the held base would be counted as weight (virial theorem, see ``fem.initial_stress``).
     """
     width, height, gravity = block.shape.width, block.shape.height, block.shape.gravity
     mesh, tags = build_mesh(BlockMesh(lengths=(width, height), divisions=block.divisions), comm)

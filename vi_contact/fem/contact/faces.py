@@ -156,7 +156,7 @@ def _of_faces(space: FemSpace, around: Boundary, labels: Indices, pairs: Indices
     total = np.zeros((len(pairs), 1 + space.dimension))
     for number_ in range(int(classes.max()) + 1):
         local = np.asarray(around.local)[classes[around.place] == number_]
-        values = space._of_nodes(corners, integrals(space, local))
+        values = space.at_nodes(corners, integrals(space, local))
         inside = classes == number_
         rows = np.unique(row_of[labels[inside]])
         rows = rows[rows >= 0]

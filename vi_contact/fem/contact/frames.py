@@ -194,7 +194,7 @@ def surface_of(space: FemSpace, parts: Sequence[NodalConditions], **data: Any) -
     """Make the surface of these conditions; ``data``: gap0, weights and what else it holds for each. Collective."""
     frames = NodalFrames(parts)
     d, count = space.dimension, len(frames.place)
-    where = space._where(frames.numbers)
+    where = space.blocks_of(frames.numbers)
     index = np.full((len(where), d), -1, dtype=np.int64)
     index[where >= 0] = space.free_index.reshape(-1, d)[where[where >= 0]]  # a rank may own no node at all
     slots = np.flatnonzero(where[frames.place] >= 0)
