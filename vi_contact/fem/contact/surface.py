@@ -40,8 +40,8 @@ def contact_surface(
     the facets that are clamped in every component (where the boundary meets a clamped part) are left out.
 
     Where the facets turn by more than the feature angle the boundary has faces, and a node on several of them has one
-    condition for each, with the normal and the weight of this face, at any angle between them (``fem.contact.faces``). Where
-    the obstacle gives all faces of a node one direction, as a HalfSpace does, the node has one condition.
+    condition for each, with the normal and the weight of this face, at any angle between them (``fem.contact.faces``).
+    Where the obstacle gives all faces of a node one direction, as a HalfSpace does, the node has one condition.
 
     Args:
         obstacle: Touching() by default, HalfSpace, AnalyticGap or the user's own, asked for every face of a node.
