@@ -73,16 +73,12 @@ class TwoBodies:
         """Return the compliance of the contact nodes, for BoundaryContact; ``normals`` point from body 1 to body 2."""
         return self._weld.contact
 
-    def interface_forces(self, forces: Array) -> Array:
-        """Return (steps, 2m) forces on body 1 at all interface nodes from contact forces (steps, 2m_c) and welds."""
-        return self._weld.forces(forces)
-
     def solve(self, forces: Array | None = None) -> tuple[BoundaryMotion, BoundaryMotion]:
         """Return the motions of both bodies under loads, contact forces (steps, 2m_c) on body 1, and the welds."""
         relative = self.relative
         shape = (len(relative.W), self.condensed().W.shape[1])
         forces = np.zeros(shape) if forces is None else array("TwoBodies.solve", "forces", forces, shape, unit="N/m")
-        on_one = self.interface_forces(forces)
+        on_one = self._weld.forces(forces)
         two_nodes = self.two.operator.mesh.points[self.two.contact_nodes]
         back = matching(two_nodes, relative.points)
         return self.one.solve(on_one), self.two.solve(-on_one[:, np.concatenate([back, back + len(back)])])

@@ -2,7 +2,7 @@
 
 from ..core.units import STANDARD_GRAVITY
 from .baseline import baseline_corrected
-from .chain import Processing, scaled_to_arias, scaled_to_psa
+from .chain import Processing, scaled_to_arias, scaled_to_pga, scaled_to_psa
 from .ec8 import EC8Spectrum
 from .excitation import GroundMotion
 from .formats.reader import read_record
@@ -26,7 +26,7 @@ from .intensity import (
     significant_duration,
 )
 from .kanai_tajimi import Envelope, KanaiTajimi, synthetic
-from .processing import filtered, integrated, padded, resampled, scaled, scaled_to_pga, tapered, trimmed, without_mean
+from .processing import filtered, integrated, padded, resampled, scaled, tapered, trimmed, without_mean
 from .record import UNITS, Record
 from .spectra import ResponseSpectrum, fourier_spectrum, response_spectrum
 

@@ -42,6 +42,5 @@ def baseline_corrected(record: Record, *, degree: int = 2, displacement: bool = 
         rest = np.linalg.lstsq(basis @ free, target - basis @ coefficients, rcond=None)[0]
         coefficients = coefficients + free @ rest
     kind = "displacement" if displacement else "velocity"
-    return replace(record, acceleration=record.acceleration - powers @ coefficients,
-                   notes=(*record.notes, f"baseline: polynomial of degree {degree} fitted to the {kind}"
-                          f"{', v = u = 0 at the end' if at_rest else ''}"))
+    note = f"baseline: polynomial of degree {degree} fitted to the {kind}{', v = u = 0 at the end' if at_rest else ''}"
+    return record.changed(record.acceleration - powers @ coefficients, note)

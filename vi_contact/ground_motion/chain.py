@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from ..core.errors import InputError
 from .baseline import baseline_corrected
-from .intensity import arias, psa
-from .processing import filtered, padded, resampled, scaled, scaled_to_pga, tapered, trimmed, without_mean
+from .intensity import arias, pga, psa
+from .processing import filtered, padded, resampled, scaled, tapered, trimmed, without_mean
 from .record import Record
 
 
@@ -69,6 +69,14 @@ class Processing:
         if self.arias is not None:
             return scaled_to_arias(record, self.arias)
         return record if self.psa is None else scaled_to_psa(record, *self.psa)
+
+
+def scaled_to_pga(record: Record, target: float) -> Record:
+    """Scale a record so that its largest |acceleration| is `target` [m/s²], and keep its sign.
+
+    Raises InputError unless target > 0 and the record is not all zero.
+    """
+    return scaled(record, factor=_ratio(record, "scaled_to_pga", target, pga(record)))
 
 
 def scaled_to_psa(record: Record, target: float, period: float, *, damping: float = 0.05) -> Record:

@@ -6,7 +6,6 @@ Every function returns a new value and notes what it did. Between samples the ac
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -24,21 +23,7 @@ def scaled(record: Record, *, factor: float) -> Record:
     """Scale every sample by `factor`; a negative one turns the motion round. Raises InputError unless it is finite."""
     if not math.isfinite(factor):
         raise InputError(f"scaled: factor is {factor!r}; give a finite number")
-    return replace(record, acceleration=factor * record.acceleration, notes=record.notes + (f"scaled by {factor:.6g}",))
-
-
-def scaled_to_pga(record: Record, pga: float) -> Record:
-    """Scale a record so that its largest |acceleration| is `pga` [m/s²], and keep its sign.
-
-    Raises InputError unless pga > 0 and the record is not all zero.
-    """
-    if not math.isfinite(pga) or pga <= 0:
-        raise InputError(f"scaled_to_pga: pga is {pga!r}; give a positive peak acceleration in m/s²")
-    peak = float(np.max(np.abs(record.acceleration)))
-    if peak == 0.0:
-        raise InputError(f"{record.source or 'Record'}: every sample is zero, so no factor reaches a peak of {pga!r} "
-                         "m/s²; use another record")
-    return scaled(record, factor=pga / peak)
+    return record.changed(factor * record.acceleration, f"scaled by {factor:.6g}")
 
 
 def resampled(record: Record, dt: float) -> Record:
@@ -67,8 +52,7 @@ def resampled(record: Record, dt: float) -> Record:
         raise InputError(f"resampled: a step of {dt!r} s leaves one sample of a record of {record.duration!r} s; "
                          "choose a shorter step")
     samples = resample_poly(record.acceleration, ratio.numerator, ratio.denominator)[:count]
-    return replace(record, acceleration=samples, dt=float(dt),
-                   notes=record.notes + (f"resampled from {record.dt:g} s to {dt:g} s",))
+    return record.changed(samples, f"resampled from {record.dt:g} s to {dt:g} s", dt=float(dt))
 
 
 def integrated(record: Record) -> tuple[Array, Array]:
@@ -97,8 +81,8 @@ def trimmed(record: Record, start: float = 0.0, end: float | None = None) -> Rec
     if np.count_nonzero(inside) < 2:
         raise InputError(f"trimmed: fewer than two samples lie from {start:g} to {last:g} s; give a longer piece")
     first = float(record.times[inside][0])
-    return replace(record, acceleration=record.acceleration[inside],
-                   notes=(*record.notes, f"trimmed to {first:g} ... {float(record.times[inside][-1]):g} s"))
+    return record.changed(record.acceleration[inside],
+                          f"trimmed to {first:g} ... {float(record.times[inside][-1]):g} s")
 
 
 def padded(record: Record, before: float = 0.0, after: float = 0.0) -> Record:
@@ -112,7 +96,7 @@ def padded(record: Record, before: float = 0.0, after: float = 0.0) -> Record:
     counted("padded", f"before={before!r} and after={after!r} s", record.acceleration.size + sum(asked))
     counts = [math.ceil(samples) for samples in asked]
     note = f"zeros added: {counts[0] * record.dt:g} s before, {counts[1] * record.dt:g} s after"
-    return replace(record, acceleration=np.pad(record.acceleration, counts), notes=(*record.notes, note))
+    return record.changed(np.pad(record.acceleration, counts), note)
 
 
 def without_mean(record: Record, *, until: float | None = None) -> Record:
@@ -126,8 +110,7 @@ def without_mean(record: Record, *, until: float | None = None) -> Record:
     count = int(end / record.dt * (1.0 + 1e-12)) + 1
     mean = float(np.mean(record.acceleration[:count]))
     where = "" if until is None else f" of the first {until:g} s"
-    return replace(record, acceleration=record.acceleration - mean,
-                   notes=(*record.notes, f"mean{where} removed: {mean:.6g} m/s2"))
+    return record.changed(record.acceleration - mean, f"mean{where} removed: {mean:.6g} m/s2")
 
 
 def tapered(record: Record, *, fraction: float = 0.05, start: bool = True, end: bool = True) -> Record:
@@ -142,8 +125,8 @@ def tapered(record: Record, *, fraction: float = 0.05, start: bool = True, end: 
     window = 0.5 * (1.0 - np.cos(math.pi * ramp))
     weights = (window if start else 1.0) * (window[::-1] if end else 1.0)
     ends = " and ".join(name for name, used in (("start", start), ("end", end)) if used)
-    return replace(record, acceleration=record.acceleration * weights,
-                   notes=(*record.notes, f"cosine taper over {100 * fraction:g} % at {ends or 'no end'}"))
+    return record.changed(record.acceleration * weights,
+                          f"cosine taper over {100 * fraction:g} % at {ends or 'no end'}")
 
 
 def filtered(record: Record, *, low: float | None = None, high: float | None = None, order: int = 4,
@@ -177,9 +160,8 @@ def filtered(record: Record, *, low: float | None = None, high: float | None = N
         samples = sosfilt(sections, forward[::-1])[::-1][tail.size:tail.size + record.acceleration.size]
     band = " to ".join(f"{corner:g}" for corner in corners)
     kind = "band-pass" if len(corners) == 2 else "high-pass" if low is not None else "low-pass"
-    return replace(record, acceleration=samples,
-                   notes=(*record.notes, f"Butterworth {kind} {band} Hz, order {order}, "
-                          f"{'causal' if causal else 'zero phase (two passes)'}"))
+    passes = "causal" if causal else "zero phase (two passes)"
+    return record.changed(samples, f"Butterworth {kind} {band} Hz, order {order}, {passes}")
 
 
 def _ringing(record: Record, corner: float) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from numbers import Real
 
 import numpy as np
@@ -59,6 +59,10 @@ class Record:
     @property
     def _name(self) -> str:
         return self.source or "Record"
+
+    def changed(self, acceleration: Array, note: str, *, dt: float | None = None) -> Record:
+        """Return a record with these samples, and a note of what was done."""
+        return replace(self, acceleration=acceleration, dt=dt or self.dt, notes=(*self.notes, note))
 
     @property
     def times(self) -> Array:
