@@ -138,4 +138,4 @@ def test_mass_at_the_contact_is_a_choice_with_a_warning(caplog: pytest.LogCaptur
     with caplog.at_level(logging.WARNING):
         last = [report.new for report in run(problem, DEFAULT, dt=0.01, steps=1200)][-1]
     assert energy(problem, last) > 10.0 * 0.125
-    assert len(caplog.records) == 1 and "14 to 29 times its energy" in caplog.text
+    assert len(caplog.records) == 1 and "can gain energy whenever a contact opens" in caplog.text

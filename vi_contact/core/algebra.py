@@ -23,12 +23,12 @@ Indices = NDArray[np.int64]
 
 
 def max_abs(x: Array) -> float:
-    """max |x| over the entries given, 0 for none; NaN stays NaN. Half the time of forming |x|."""
+    """Return max |x| over the entries given, 0 for none; NaN stays NaN. Half the time of forming |x|."""
     return max(float(x.max()), -float(x.min())) if x.size else 0.0
 
 
 class Comm(Protocol):
-    """The few collective operations the package needs."""
+    """Provide the few collective operations that the package needs."""
 
     rank: int
     size: int
@@ -50,11 +50,11 @@ def total(comm: Comm, value: SupportsFloat) -> float:
 
 
 class Matrix(Protocol):
-    """A square sparse matrix whose rows are distributed like the vectors it multiplies."""
+    """Provide products with a square sparse matrix whose rows are distributed like the vectors it multiplies."""
 
     @property
     def rows(self) -> int:
-        """Rows owned by this rank."""
+        """Return how many rows this rank owns."""
         ...
 
     def __matmul__(self, x: Array) -> Array: ...
@@ -63,48 +63,51 @@ class Matrix(Protocol):
 
 
 class Factor(Protocol):
-    """A factorised symmetric matrix; ``solve`` is one forward and back substitution."""
+    """Hold a factorised symmetric matrix; ``solve`` is one forward and back substitution."""
 
     def solve(self, b: Array) -> Array: ...
 
     def solve_units(self, owned: Indices, slots: Indices, m: int) -> Array:
-        """Columns A^-1 e_j for m unit vectors: e_{slots[k]} has its one in row ``owned[k]`` of the owning rank.
-        Returns the owned rows, shape (rows, m)."""
+        """Return the columns A^-1 e_j for m unit vectors: e_{slots[k]} has its one in row ``owned[k]`` of the owning
+        rank. Returns the owned rows, shape (rows, m).
+        """
         ...
 
 
 class Algebra(Protocol):
-    """Makes matrices out of matrices. ``symmetric`` operators only: M, C, K and their combinations."""
+    """Make matrices out of matrices. ``symmetric`` operators only: M, C, K and their combinations."""
 
     @property
     def comm(self) -> Comm: ...
     def combine(self, terms: Sequence[tuple[float, Matrix]]) -> Matrix: ...
     def congruence(self, T: Matrix, K: Matrix) -> Matrix:
-        """Tᵀ K T."""
+        """Return Tᵀ K T."""
         ...
 
     def local(self, rows: Indices, columns: Indices, values: Array, n: int) -> Matrix:
-        """The matrix of given entries between unknowns of the same rank, which owns n; entries given twice add up."""
+        """Return the matrix of given entries between unknowns of the same rank, which owns n; entries given twice add
+        up."""
         ...
 
     def with_identity_rows(self, A: Matrix, mask: Mask) -> Matrix:
-        """A with the rows and columns of the masked unknowns replaced by those of the identity."""
+        """Return A with the rows and columns of the masked unknowns replaced by those of the identity."""
         ...
 
     def block(self, A: Matrix, mask: Mask) -> Matrix:
-        """The rows and columns of A of the masked unknowns, which their ranks own."""
+        """Return the rows and columns of A of the masked unknowns, which their ranks own."""
         ...
 
     def first(self, n: int) -> int:
-        """The number, among those of all ranks, of the first of the n unknowns that this rank owns."""
+        """Return the number, among those of all ranks, of the first of the n unknowns that this rank owns."""
         ...
 
     def entries(self, A: Matrix, row: int) -> tuple[Indices, Array]:
-        """(columns numbered over all ranks, values) of an owned row."""
+        """Return (columns numbered over all ranks, values) of an owned row."""
         ...
 
     def replaced_rows(self, n: int, rows: Mapping[int, tuple[Indices, Array]]) -> Matrix:
-        """The identity with some owned rows replaced by (columns numbered over all ranks, values); n owned rows."""
+        """Return the identity with some owned rows replaced by (columns numbered over all ranks, values); n owned rows.
+        """
         ...
 
     def factor(self, A: Matrix) -> Factor: ...
@@ -120,17 +123,17 @@ class EffectiveMatrix:
 
     @cached_property
     def factor(self) -> Factor:
-        """The one factorisation of A."""
+        """Return the one factorisation of A."""
         return self.algebra.factor(self.matrix)
 
     @property
     def factorised(self) -> bool:
-        """Whether a factor has been made."""
+        """Say whether a factor has been made."""
         return "factor" in self.__dict__
 
     @cached_property
     def largest(self) -> float:
-        """The largest diagonal entry on any rank, a measure of |A|."""
+        """Return the largest diagonal entry on any rank, a measure of |A|."""
         return largest(self.algebra.comm, max_abs(self.matrix.diagonal()))
 
     def __matmul__(self, x: Array) -> Array:
@@ -138,7 +141,7 @@ class EffectiveMatrix:
 
 
 class SerialComm:
-    """One process: every collective operation is the identity."""
+    """Serve one process: every collective operation is the identity."""
 
     rank = 0
     size = 1
@@ -157,7 +160,7 @@ class SerialComm:
 
 
 class SerialMatrix:
-    """A scipy sparse matrix behind the ``Matrix`` protocol."""
+    """Hold a scipy sparse matrix behind the ``Matrix`` protocol."""
 
     def __init__(self, matrix: Any) -> None:
         self.csr: sp.csr_matrix = sp.csr_matrix(matrix, dtype=float)
@@ -177,7 +180,7 @@ class SerialMatrix:
 
 
 class SerialFactor:
-    """Sparse LU of scipy (SuperLU) with a symmetric ordering."""
+    """Factorise by the sparse LU of scipy (SuperLU) with a symmetric ordering."""
 
     def __init__(self, matrix: SerialMatrix) -> None:
         self._lu = splu(matrix.csr.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
@@ -193,7 +196,7 @@ class SerialFactor:
 
 
 class SerialAlgebra:
-    """scipy.sparse on one process."""
+    """Combine matrices of scipy.sparse on one process."""
 
     def __init__(self) -> None:
         self.comm: Comm = SerialComm()
@@ -234,14 +237,15 @@ class SerialAlgebra:
 
 
 def serial(matrix: Matrix) -> SerialMatrix:
-    """The matrix as a SerialMatrix; TypeError when it belongs to another algebra."""
+    """Return the matrix as a SerialMatrix; TypeError when it belongs to another algebra."""
     if not isinstance(matrix, SerialMatrix):
         raise TypeError(f"SerialAlgebra got a {type(matrix).__name__}")
     return matrix
 
 
 def identity_with(n: int, rows: Mapping[int, tuple[Indices, Array]], *, first: int, columns: int) -> sp.coo_matrix:
-    """n rows of the identity, whose ones begin in column ``first``, with some rows replaced by (columns, values)."""
+    """Return n rows of the identity, whose ones begin in column ``first``, with some rows replaced by (columns,
+    values)."""
     kept = np.setdiff1d(np.arange(n), np.fromiter(rows, dtype=np.int64, count=len(rows)))
     where = [kept] + [np.full(len(found), row) for row, (found, _) in rows.items()]
     column = [first + kept] + [found for found, _ in rows.values()]

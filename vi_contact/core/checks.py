@@ -67,8 +67,8 @@ def attributes(
     counts: tuple[str, ...] = (),
     flags: tuple[str, ...] = (),
 ) -> None:
-    """InputError naming the first attribute of ``owner`` that is not a finite number, or not > 0, or not >= 0, or no
-    whole number of at least 1 (``counts``), or neither True nor False (``flags``)."""
+    """Raise InputError naming the first attribute of ``owner`` that is not a finite number, or not > 0, or not >= 0, or
+    no whole number of at least 1 (``counts``), or neither True nor False (``flags``)."""
     for name in finite + positive + not_negative:
         number(
             type(owner).__name__, name, getattr(owner, name),
@@ -146,7 +146,7 @@ def array(owner: str, meaning: str, value: Any, shape: tuple[int | None, ...], *
 
 
 def shape_of(value: Any) -> tuple[int, ...]:
-    """The shape of numbers in lists or arrays; (-1,) for lists of different lengths, which have none."""
+    """Return the shape of numbers in lists or arrays; (-1,) for lists of different lengths, which have none."""
     try:
         return np.shape(value)
     except ValueError:
@@ -181,7 +181,7 @@ def path(owner: str, meaning: str, value: Any) -> Path:
 
 
 def shown(value: Any) -> str:
-    """The value for a sentence: short, on one line, also where its own repr fails."""
+    """Return the value for a sentence: short, on one line, also where its own repr fails."""
     if isinstance(value, type):
         return f"the class {value.__name__}"
     try:
@@ -196,7 +196,7 @@ def _called(value: Any) -> str:
 
 
 def real(value: Any) -> float:
-    """The value as a float, NaN for what is no real number; integers too large for a float are infinite."""
+    """Return the value as a float, NaN for what is no real number; integers too large for a float are infinite."""
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
     if isinstance(value, bool | np.bool_) or not isinstance(value, Real | Integral):
@@ -208,7 +208,7 @@ def real(value: Any) -> float:
 
 
 def refuse(defects: Iterable[str], comm: Comm) -> None:
-    """InputError on all ranks with the first text that is not empty, whichever rank found it; collective."""
+    """Raise InputError on all ranks with the first text that is not empty, whichever rank found it; collective."""
     mine = next((text for text in defects if text), "")
     if largest(comm, bool(mine)):
         found = comm.bcast(comm.gather(mine))

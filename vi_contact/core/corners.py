@@ -18,19 +18,19 @@ PARALLEL = 1e-9  # 1 - cosine of the angle between directions that count as one,
 
 
 def at_right_angles(directions: Array) -> bool:
-    """Whether unit vectors (k, d) are orthogonal to one another, to round-off."""
+    """Say whether unit vectors (k, d) are orthogonal to one another, to round-off."""
     return bool(np.all(np.abs(directions @ directions.T)[np.triu_indices(len(directions), 1)] <= PARALLEL))
 
 
 def oblique_corners(surface: ContactSurface) -> list[Indices]:
-    """The conditions of each node with directions that are not at right angles."""
+    """Return the conditions of each node with directions that are not at right angles."""
     if surface.dual is None:
         return []
     return [corner for corner in surface.corners if not at_right_angles(surface.normals[corner])]
 
 
 def refuse_rubbing(surface: ContactSurface) -> None:
-    """InputError for corners beside friction, unless they are allowed to slide freely."""
+    """Raise InputError for corners beside friction, unless they are allowed to slide freely."""
     if surface.corners and not surface.frictionless_corners:
         where = ", ".join(f"{x:g}" for x in surface.points[surface.corners[0][0]])
         raise InputError(
@@ -41,8 +41,9 @@ def refuse_rubbing(surface: ContactSurface) -> None:
 
 
 def with_open_faces(surface: ContactSurface, v: Array, target: Array) -> Array:
-    """Target normal velocities (m,), NaN for open faces, with those that oblique open faces get from the closed faces
-    of their nodes, whose velocity changes along the normals of these. Collective."""
+    """Return the target normal velocities (m,), NaN for open faces, with those that oblique open faces get from the
+    closed faces of their nodes, whose velocity changes along the normals of these. Collective.
+    """
     corners = oblique_corners(surface)
     if not corners:
         return target
@@ -58,8 +59,8 @@ def with_open_faces(surface: ContactSurface, v: Array, target: Array) -> Array:
 
 
 def lumped_entries(surface: ContactSurface, nodal: Array) -> tuple[Indices, Indices, Array]:
-    """(rows, columns, values) of the lumped masses ``nodal`` of the owned unknowns: the diagonal, but m G⁻¹ at oblique
-    corners."""
+    """Return (rows, columns, values) of the lumped masses ``nodal`` of the owned unknowns: the diagonal, but m G⁻¹ at
+    oblique corners."""
     rows = [np.arange(len(nodal))]
     columns, values = [rows[0]], [nodal.copy()]
     unknown = np.full(surface.count, -1, dtype=np.int64)

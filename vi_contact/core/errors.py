@@ -6,19 +6,22 @@ import signal
 
 
 class ViContactError(Exception):
-    """Base of every error this package raises on purpose; the command line prints its one sentence and exits with 1."""
+    """Name every error that this package raises on purpose; the command line prints its one sentence and exits with 1.
+    """
 
 
 class InputError(ViContactError, ValueError):
-    """The input is wrong. The message is one sentence that names the offending thing and the remedy."""
+    """Say that the input is wrong: the message is one sentence that names the offending thing and the remedy."""
 
 
 class StepFailure(ViContactError, RuntimeError):
-    """A time step stayed above the certificate tolerance with every method; nothing computed before it is lost."""
+    """Say that a time step stayed above the certificate tolerance with every method; nothing computed before it is
+    lost."""
 
 
 class Interrupted(KeyboardInterrupt):
-    """A signal ended a run after a step, on all ranks: Ctrl-C, SIGTERM, SIGHUP. What was computed is in its folder.
+    """Say that a signal ended a run after a step, on all ranks: Ctrl-C, SIGTERM, SIGHUP. What was computed is in its
+    folder.
 
     Like Ctrl-C itself it is no ``Exception``, so that no loop over runs goes on with the next one. ``number``: of the
     signal; the command line exits with 128 + number.

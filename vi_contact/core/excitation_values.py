@@ -13,7 +13,7 @@ from .protocols import Excitation
 
 
 def vector(self: Excitation, t: float) -> Array:
-    """The vector acceleration(t) · direction [m/s²], shape (d,)."""
+    """Return the vector acceleration(t) · direction [m/s²], shape (d,)."""
     return self.acceleration(t) * np.array(self.direction)
 
 
@@ -28,6 +28,6 @@ def check_excitation(excitation: Excitation, *, finite: tuple[str, ...] = (), po
 
 
 def finite_tuple(owner: str, name: str, values: Sequence[float]) -> tuple[float, ...]:
-    """`values` as a tuple of floats; InputError naming the first entry that is not a finite number."""
+    """Return `values` as a tuple of floats; InputError naming the first entry that is not a finite number."""
     entries = several(owner, name, values, "give a sequence of numbers")
     return tuple(number(owner, f"{name}[{k}]", value) for k, value in enumerate(entries))

@@ -25,7 +25,7 @@ _REFUSED = (errno.EACCES, errno.EPERM, errno.EROFS)
 
 
 def on_root(comm: Comm, action: Callable[[], T]) -> T | None:
-    """The action's value on rank 0, None elsewhere; what it raises there is raised on every rank.
+    """Return the action's value on rank 0, None elsewhere; what it raises there is raised on every rank.
 
     An OSError becomes a ViContactError of one sentence with path and reason. Collective.
     """
@@ -49,7 +49,7 @@ def on_root(comm: Comm, action: Callable[[], T]) -> T | None:
 
 
 def sentence(error: OSError) -> str:
-    """One sentence: what happened to which file, and the remedy."""
+    """Return one sentence: what happened to which file, and the remedy."""
     path = error.filename or "the output folder"
     if error.errno in _FULL:
         return (
@@ -62,20 +62,20 @@ def sentence(error: OSError) -> str:
 
 
 def write_atomically(path: Path, data: bytes) -> None:
-    """The file has its old content or all of the new one, whatever happens; OSError names it."""
+    """Write a file that has its old content or all of the new one, whatever happens; OSError names it."""
     with _whole_or_not_at_all(path) as file:
         write_all(file, data)
 
 
 def write_all(file: Any, data: bytes) -> None:
-    """Every byte to an unbuffered file: one call may write less when the disk fills up."""
+    """Write every byte to an unbuffered file: one call may write less when the disk fills up."""
     view = memoryview(data)
     while view:
         view = view[file.write(view) :]
 
 
 def to_json(facts: Mapping[str, Any]) -> str:
-    """Strict JSON of numbers, texts, arrays and mappings; NaN and infinity become null."""
+    """Return strict JSON of numbers, texts, arrays and mappings; NaN and infinity become null."""
     return json.dumps(_plain(facts), indent=2, ensure_ascii=False, allow_nan=False)
 
 
@@ -108,7 +108,7 @@ def _whole_or_not_at_all(path: Path) -> Iterator[Any]:
 
 
 def hdf5_atomically(path: Path, fill: Callable[[Any], None]) -> None:
-    """The same for an HDF5 file, which need not fit the memory."""
+    """Write an HDF5 file likewise, which need not fit the memory."""
     import h5py  # late: the package is imported without it
 
     with _whole_or_not_at_all(path) as raw:

@@ -17,7 +17,7 @@ from .system import SemiDiscreteSystem
 
 @dataclass(frozen=True)
 class ContactProblem:
-    """A semi-discrete system, a contact surface, what shakes it and how it rubs and rebounds.
+    """Pose a problem: a semi-discrete system, a contact surface, what shakes it and how it rubs and rebounds.
 
     The system is turned into the surface's nodal frames once, here. ``impact=None`` leaves velocities alone;
     ``mass=None`` leaves the choice of the mass matrix to the time scheme. InputError, on all ranks, for parts of the
@@ -39,12 +39,13 @@ class ContactProblem:
 
     @property
     def excitations(self) -> tuple[Excitation, ...]:
-        """The excitations as a tuple."""
+        """Return the excitations as a tuple."""
         return tuple(self.excitation) if isinstance(self.excitation, Sequence) else (self.excitation,)
 
     @cached_property
     def equations(self) -> SemiDiscreteSystem:
-        """The system in the rotated basis, with the inertia loads -M r a_g(t) of the excitations; schemes see this."""
+        """Return the system in the rotated basis, with the inertia loads -M r a_g(t) of the excitations; schemes see
+        this."""
         system = self.turned
         if self.mass is not None:
             system = self.mass.apply(system, self.surface, tangential=self.frictional)
@@ -55,12 +56,12 @@ class ContactProblem:
 
     @cached_property
     def static_load(self) -> SemiDiscreteSystem:
-        """The system in the basis of the equations, without excitation: the gravity stage."""
+        """Return the system in the basis of the equations, without excitation: the gravity stage."""
         return self._relative(self.turned)
 
     @cached_property
     def turned(self) -> SemiDiscreteSystem:
-        """The system in the nodal frames, every body in its own unknowns."""
+        """Return the system in the nodal frames, every body in its own unknowns."""
         surface = self.surface
         return self.system if surface.basis is None else self.system.in_basis(surface.basis, surface.dual)
 
@@ -69,22 +70,23 @@ class ContactProblem:
 
     @property
     def frictional(self) -> bool:
-        """Whether tangential reactions can occur at all."""
+        """Say whether tangential reactions can occur at all."""
         return not isinstance(self.friction, Frictionless)
 
     def slip_origin(self, u: Array, start: float, end: float) -> Array | None:
-        """B_t u plus what the obstacle slides until then: where the slip of a step is zero; None without friction."""
+        """Return B_t u plus what the obstacle slides until then: where the slip of a step is zero; None without
+        friction."""
         if not self.frictional:
             return None
         origin, sliding = self.surface.tangential_values(u), self.surface.sliding(start, end)
         return origin if sliding is None else origin + sliding
 
     def cartesian(self, x: Array) -> Array:
-        """T R x: unknowns of the equations back to the system's own."""
+        """Return T R x: unknowns of the equations back to the system's own."""
         x = x if self.surface.coupling is None else self.surface.coupling @ x
         return x if self.surface.basis is None else self.surface.basis @ x
 
     def ground_acceleration(self, t: float) -> Array:
-        """Vector a_g(t) [m/s²] summed over the excitations."""
+        """Return the vector a_g(t) [m/s²] summed over the excitations."""
         parts = (one.acceleration(t) * np.asarray(one.direction, dtype=float) for one in self.excitations)
         return np.asarray(sum(parts, np.zeros(self.system.influence.shape[1])))

@@ -26,7 +26,7 @@ Motion = Callable[[float], float | Array]
 
 @dataclass(frozen=True)
 class ContactSurface:
-    """m contact conditions, the same on every rank and in the same order for any number of ranks.
+    """Hold m contact conditions, the same on every rank and in the same order for any number of ranks.
 
     Attributes:
         comm: the ranks that share the surface.
@@ -34,7 +34,7 @@ class ContactSurface:
         weights: (m,) tributary length [m] times thickness, or area [m²]: pressure = r_n / weights.
         gap0: (m,) initial gap [m], >= 0.
         bilateral: (m,) True where the point is held on the obstacle (u_n = gap0, reaction of either sign).
-        compliance: (m,) of the support [m/N]; 0 is rigid (springs, remark after seed 000 eq. 6).
+        compliance: (m,) of the support [m/N]; 0 is rigid, more is a spring.
         owned: indices in û of the normal unknowns this rank owns; slots: their rows among the m conditions.
         tangents: (len(owned), d-1) indices in û of the tangential unknowns of the same points; -1 where prescribed.
         basis: T with u = T û, the turn into nodal frames, or None when they already point along the axes.
@@ -76,7 +76,7 @@ class ContactSurface:
 
     @cached_property
     def corners(self) -> tuple[Indices, ...]:
-        """The conditions of each node that has several, in the order of the nodes."""
+        """Return the conditions of each node that has several, in the order of the nodes."""
         if self.nodes is None:
             return ()
         order = np.argsort(self.nodes, kind="stable")
@@ -84,29 +84,29 @@ class ContactSurface:
         return tuple(group for group in groups if len(group) > 1)
 
     def in_frames(self, u: Array) -> Array:
-        """T⁻¹ u: displacements along the axes in the nodal frames."""
+        """Return T⁻¹ u: displacements along the axes in the nodal frames."""
         turn = self.basis if self.dual is None else self.dual
         return u if turn is None else turn.transpose_apply(u)
 
     def along_axes(self, load: Array) -> Array:
-        """T⁻ᵀ f: a load [N] on the unknowns û as forces along the axes."""
+        """Return T⁻ᵀ f: a load [N] on the unknowns û as forces along the axes."""
         turn = self.basis if self.dual is None else self.dual
         return load if turn is None else turn @ load
 
     def normal_values(self, x: Array) -> Array:
-        """B_n x on every rank, shape (m,)."""
+        """Return B_n x on every rank, shape (m,)."""
         values = np.zeros(self.count)
         values[self.slots] = x[self.owned]
         return self.comm.sum(values)
 
     def tangential_values(self, x: Array) -> Array:
-        """B_t x on every rank, shape (m, d - 1)."""
+        """Return B_t x on every rank, shape (m, d - 1)."""
         values = np.zeros((self.count, self.tangents.shape[1]))
         values[self.slots] = np.where(self.tangents >= 0, x[self.tangents], 0.0)
         return self.comm.sum(values)
 
     def reaction_load(self, r_n: Array, rows: int, r_t: Array | None = None) -> Array:
-        """B_nᵀ r_n + B_tᵀ r_t: the owned part of the contact reaction on the unknowns [N]."""
+        """Return B_nᵀ r_n + B_tᵀ r_t: the owned part of the contact reaction on the unknowns [N]."""
         load = np.zeros(rows)
         load[self.owned] = r_n[self.slots]
         if r_t is not None:
@@ -115,15 +115,15 @@ class ContactSurface:
         return load
 
     def gap(self, t: float) -> Array:
-        """The gap of the undeformed body at time t, (m,) [m]: gap0 less what the obstacle has moved."""
+        """Return the gap of the undeformed body at time t, (m,) [m]: gap0 less what the obstacle has moved."""
         return self.gap0 if self.motion is None else self.gap0 - self.motion(t)
 
     def advance(self, start: float, end: float) -> Array | None:
-        """What the obstacle moves towards the body between two times, (m,) [m]; None for one at rest."""
+        """Return what the obstacle moves towards the body between two times, (m,) [m]; None for one at rest."""
         return None if self.motion is None else self.motion(end) - self.motion(start)
 
     def sliding(self, start: float, end: float) -> Array | None:
-        """What the obstacle moves along the tangents between two times, (m, d-1) [m]; None for one at rest."""
+        """Return what the obstacle moves along the tangents between two times, (m, d-1) [m]; None for one at rest."""
         return None if self.slide is None else self.slide(end) - self.slide(start)
 
     def moving(
@@ -131,8 +131,9 @@ class ContactSurface:
         towards: Motion | None = None,
         along: Motion | None = None,
     ) -> ContactSurface:
-        """On an obstacle that moves: ``towards`` the body and ``along`` the tangents, t [s] -> [m], one value for all
-        points or arrays of shape (m,) and (m, d-1). A moving obstacle is not turned; its points face the same nodes."""
+        """Return the surface on an obstacle that moves: ``towards`` the body and ``along`` the tangents, t [s] -> [m],
+        one value for all points or arrays of shape (m,) and (m, d-1). A moving obstacle is not turned; its points face
+        the same nodes."""
 
         def spread(name: str, way: Motion, shape: tuple[int, ...]) -> Callable[[float], Array]:
             function("moving", name, way, "give a function of the time t [s] that returns metres")
@@ -145,11 +146,11 @@ class ContactSurface:
         )
 
     def bilateral_everywhere(self) -> ContactSurface:
-        """The bilateral comparison case: every point stays on the obstacle."""
+        """Return the bilateral comparison case: every point stays on the obstacle."""
         return replace(self, bilateral=np.ones(self.count, dtype=bool))
 
     def with_frictionless_corners(self) -> ContactSurface:
-        """Beside friction, let nodes with several conditions slide freely over their faces; else they are refused.
+        """Let nodes, beside friction, with several conditions slide freely over their faces; else they are refused.
 
         What such a node could rub on one face is a force across the other, which the conditions, each a bound on one
         unknown, do not hold. In space it still rubs along its edge, with the normal force of its first condition (of
@@ -160,7 +161,7 @@ class ContactSurface:
         return replace(self, frictionless_corners=True)
 
     def on_springs(self, stiffness: float) -> ContactSurface:
-        """On a linearly deformable support of foundation modulus ``stiffness`` [Pa/m]: the remark after eq. 6.
+        """Return the surface on a linearly deformable support of foundation modulus ``stiffness`` [Pa/m].
 
         Each point presses a fictitious spring k = stiffness * weight, whose far end obeys the unilateral law.
         """
@@ -180,7 +181,7 @@ def _spread(name: str, value: Any, shape: tuple[int, ...], t: float) -> Array:
 
 
 def nodal_frames(directions: Array) -> Array:
-    """Orthonormal frames (k, d, d) whose first column is the contact direction n, the others tangential.
+    """Return orthonormal frames (k, d, d) whose first column is the contact direction n, the others tangential.
 
     2D: t = (-n_y, n_x). 3D: t1 is the projection of the axis least aligned with n, t2 = n x t1.
     """
@@ -199,7 +200,7 @@ def nodal_frames(directions: Array) -> Array:
 
 
 def empty_surface(comm: Comm, dimension: int) -> ContactSurface:
-    """No contact at all: the linear comparison case."""
+    """Return a surface without any contact: the linear comparison case."""
     none = np.zeros(0, dtype=np.int64)
     return ContactSurface(
         comm=comm,

@@ -15,7 +15,7 @@ from .errors import InputError
 
 
 class Space(Protocol):
-    """What the unknowns mean: how an owned vector of unknowns becomes displacements of points.
+    """Say what the unknowns mean: how an owned vector of unknowns becomes displacements of points.
 
     ``ids`` are rank-independent numbers of the owned unknowns, node * dimension + component; ``coordinates`` (rows, d)
     the positions of their nodes [m].
@@ -32,11 +32,12 @@ class Space(Protocol):
     def bodies(self) -> np.ndarray: ...
 
     def find_nodes(self, points: Array) -> np.ndarray:
-        """Node numbers nearest to the points (k, d); InputError for a point outside the body."""
+        """Return the node numbers nearest to the points (k, d); InputError for a point outside the body."""
         ...
 
     def sample(self, u: Array, nodes: np.ndarray, t: float, derivative: int = 0) -> Array:
-        """Values (k, d) at the nodes, the same on every rank; derivative 0, 1, 2: of the prescribed motion."""
+        """Return the values (k, d) at the nodes, the same on every rank; derivative 0, 1, 2: of the prescribed motion.
+        """
         ...
 
 
@@ -45,7 +46,7 @@ PAIR = "give pairs of a vector [N] and a function of the time"
 
 @dataclass(frozen=True)
 class Load:
-    """f(t) = constant + sum vector * history(t) + sum general(t) + sum viscous(t) + sum inertial(t), in newtons.
+    """Hold f(t) = constant + sum vector * history(t) + sum general(t) + sum viscous(t) + sum inertial(t), in newtons.
 
     Separable parts cost one vector update a step; the others are evaluated anew at every time. Viscous and inertial
     parts are the shares in C u' and M u'' of what moves in a given way (a base, a free field): a mass law that changes
@@ -74,7 +75,7 @@ class Load:
         return total
 
     def at_rest(self, t: float) -> Array:
-        """The load of a static stage at time t: what moves in a given way stands still where it then is."""
+        """Return the load of a static stage at time t: what moves in a given way stands still where it then is."""
         total = self.constant.copy()
         for vector, history in self.separable:
             total += _factor(history, t) * vector
@@ -83,7 +84,7 @@ class Load:
         return total
 
     def in_basis(self, T: Matrix) -> Load:
-        """The same load on the unknowns û of u = T û: Tᵀ f."""
+        """Return the same load on the unknowns û of u = T û: Tᵀ f."""
         return Load(
             T.transpose_apply(self.constant),
             tuple((T.transpose_apply(vector), history) for vector, history in self.separable),
@@ -93,7 +94,7 @@ class Load:
         )
 
     def handed_over(self, P: Matrix) -> Load:
-        """The load beside C* = PᵀCP: Pᵀ on its viscous parts."""
+        """Return the load beside C* = PᵀCP: Pᵀ on its viscous parts."""
         return replace(self, viscous=tuple(_turned(P, function) for function in self.viscous))
 
 
@@ -112,12 +113,12 @@ def _turned(T: Matrix, function: Callable[[float], Array]) -> Callable[[float], 
 
 @dataclass(frozen=True)
 class SemiDiscreteSystem:
-    """M u'' + C u' + K u = f(t) on the free unknowns; prescribed displacements are already eliminated into f.
+    """Hold M u'' + C u' + K u = f(t) on the free unknowns; prescribed displacements are already eliminated into f.
 
     Attributes:
         algebra: how its matrices are combined, factorised and reduced over ranks.
         M, K: consistent mass [kg] and stiffness [N/m] (per thickness of the section), symmetric.
-        C: damping [N s/m] or None (seed 000 eq. 7 with c = 0).
+        C: damping [N s/m] or None.
         load: f(t) [N].
         influence: (n, d) rigid unit translation in each direction, for the inertia load -M r a_g(t).
         base_mass: (n, d) forces on the unknowns when the prescribed nodes alone are accelerated by one in each
@@ -166,15 +167,15 @@ class SemiDiscreteSystem:
 
     @property
     def rows(self) -> int:
-        """Unknowns owned by this rank."""
+        """Return how many unknowns this rank owns."""
         return len(self.u0)
 
     def kinetic_energy(self, v: Array) -> float:
-        """½ vᵀ M v [J]."""
+        """Return ½ vᵀ M v [J]."""
         return 0.5 * self.algebra.dot(v, self.M @ v)
 
     def strain_energy(self, u: Array) -> float:
-        """½ uᵀ K u [J]."""
+        """Return ½ uᵀ K u [J]."""
         return 0.5 * self.algebra.dot(u, self.K @ u)
 
     def cached(self, name: str, make: Callable[[], Any]) -> Any:
@@ -195,17 +196,18 @@ class SemiDiscreteSystem:
         return EffectiveMatrix(self.algebra.combine(terms), self.algebra)
 
     def with_load(self, *terms: tuple[Array, Callable[[float], float]]) -> SemiDiscreteSystem:
-        """The same system with separable loads vector * history(t) added."""
+        """Return the same system with separable loads vector * history(t) added."""
         load = replace(self.load, separable=self.load.separable + terms)
         return self.changed(load=load)
 
     def inertia(self, direction: Array) -> Array:
-        """M r: the force [N] that accelerates body and prescribed nodes together by one in this direction (d,)."""
+        """Return M r: the force [N] that accelerates body and prescribed nodes together by one in this direction (d,).
+        """
         force = self.M @ (self.influence @ direction)
         return force if self.base_mass is None else force + self.base_mass @ direction
 
     def in_basis(self, T: Matrix, dual: Matrix | None = None) -> SemiDiscreteSystem:
-        """The same system in the unknowns û of u = T û: TᵀMT, TᵀCT, TᵀKT, Tᵀf (design idea 3).
+        """Return the same system in the unknowns û of u = T û: TᵀMT, TᵀCT, TᵀKT, Tᵀf.
 
         Initial values and influence vectors turn with T⁻¹: ``dual`` is T⁻ᵀ, T itself where it is orthogonal (None).
         """
@@ -223,7 +225,7 @@ class SemiDiscreteSystem:
         )
 
     def in_relative(self, R: Matrix) -> SemiDiscreteSystem:
-        """The same system in the unknowns ǔ of û = R ǔ, in which contact points move relative to the other body.
+        """Return the same system in the unknowns ǔ of û = R ǔ, in which contact points move relative to the other body.
 
         R = 1 + N with N N = 0 (nobody's partner is somebody's partner), so that R⁻¹ = 2 - R.
         """

@@ -16,7 +16,8 @@ ROUNDED = 1e-5  # of |A||x|, and of what friction is compared with: see Certific
 
 
 def kkt_residual(step: StepProblem, result: StepResult) -> Certificate:
-    """The certificate of a step: how well (x, r_n) satisfies the inequality problem. Definitions: ``Certificate``."""
+    """Return the certificate of a step: how well (x, r_n) satisfies the inequality problem. Definitions:
+    ``Certificate``."""
     surface, x, r_n = step.surface, result.x, result.r_n
     Ax = step.A @ x
     residual = Ax - step.b
@@ -65,7 +66,8 @@ def _over(values: Array, reference: float) -> Array:
 
 @dataclass(frozen=True)
 class StepEnergy:
-    """Where the energy of one step went [J]: change = input - damping - contact - friction - algorithmic + defect."""
+    """Say where the energy of one step went [J]: change = input - damping - contact - friction - algorithmic + defect.
+    """
 
     change: float
     input: float
@@ -76,13 +78,14 @@ class StepEnergy:
 
     @property
     def defect(self) -> float:
-        """What the ledger cannot explain; round-off when the equation of motion was satisfied."""
+        """Return what the ledger cannot explain; round-off when the equation of motion was satisfied."""
         return self.change - (self.input - self.damping - self.contact - self.friction - self.algorithmic)
 
 
 @dataclass(frozen=True)
 class Energies:
-    """M v, K u and the energies of a state [J]. A ledger carries them from step to step: each product is made once."""
+    """Hold M v, K u and the energies of a state [J]. A ledger carries them from step to step: each product is made
+    once."""
 
     momentum: Array
     elastic: Array
@@ -91,12 +94,12 @@ class Energies:
 
     @property
     def total(self) -> float:
-        """½ vᵀMv + ½ uᵀKu [J]."""
+        """Return ½ vᵀMv + ½ uᵀKu [J]."""
         return self.kinetic + self.strain
 
 
 def energies(system: SemiDiscreteSystem, u: Array, v: Array) -> Energies:
-    """The energies of displacement u and velocity v: two products."""
+    """Return the energies of displacement u and velocity v: two products."""
     momentum, elastic = system.M @ v, system.K @ u
     kinetic, strain = 0.5 * _dots(system, (v, momentum), (u, elastic))
     return Energies(momentum, elastic, float(kinetic), float(strain))
@@ -116,7 +119,7 @@ def energy_balance(
     before: Energies | None = None,
     after: Energies | None = None,
 ) -> StepEnergy:
-    """The ledger of a step before the impact law, for any scheme (verification V9).
+    """Return the ledger of a step before the impact law, for any scheme.
 
     The step satisfied M a + C v + K u = f - B_nᵀ r_n - B_tᵀ r_t with the averages of ``balance``. Times the increment
     du:

@@ -22,7 +22,7 @@ from ..core.excitation_values import check_excitation, finite_tuple, vector
 
 @dataclass(frozen=True)
 class Harmonic:
-    """a(t) = amplitude · sin(2 pi frequency t + phase), for ever (seed 000 Fig. 3).
+    """Shake with a(t) = amplitude · sin(2 pi frequency t + phase), for ever.
 
     amplitude [m/s²]; frequency [Hz] > 0; phase [rad]. Raises InputError for values out of range or not finite.
     """
@@ -37,11 +37,11 @@ class Harmonic:
 
     @property
     def duration(self) -> float:
-        """Infinite."""
+        """Return infinity."""
         return math.inf
 
     def acceleration(self, t: float) -> float:
-        """amplitude · sin(2 pi frequency t + phase) [m/s²]."""
+        """Return amplitude · sin(2 pi frequency t + phase) [m/s²]."""
         return self.amplitude * math.sin(2.0 * math.pi * self.frequency * t + self.phase)
 
     __call__ = vector
@@ -49,7 +49,8 @@ class Harmonic:
 
 @dataclass(frozen=True)
 class Ricker:
-    """a(t) = amplitude · (1 - 2 x) exp(-x), x = (pi frequency (t - peak_time))² (seismic.md 1.5).
+    """Shake with a(t) = amplitude · (1 - 2 x) exp(-x), x = (pi frequency (t - peak_time))² (Ricker, Geophysics 18,
+    1953).
 
     amplitude [m/s²], the peak; frequency [Hz] > 0, where the spectrum peaks; delay [s] >= 0, the time of the peak, by
     default 1.5 / frequency, which makes |a(0)| < 1e-8 |amplitude|; a smaller one starts with a jump. Velocity and
@@ -68,16 +69,16 @@ class Ricker:
 
     @property
     def peak_time(self) -> float:
-        """Time of the peak [s]: the delay, or 1.5 / frequency when none was given."""
+        """Return the time of the peak [s]: the delay, or 1.5 / frequency when none was given."""
         return 1.5 / self.frequency if self.delay is None else self.delay
 
     @property
     def duration(self) -> float:
-        """peak_time + 1.5 / frequency [s]: beyond it |a| < 1e-8 |amplitude|."""
+        """Return peak_time + 1.5 / frequency [s]: beyond it |a| < 1e-8 |amplitude|."""
         return self.peak_time + 1.5 / self.frequency
 
     def acceleration(self, t: float) -> float:
-        """amplitude · (1 - 2 x) exp(-x) [m/s²]."""
+        """Return amplitude · (1 - 2 x) exp(-x) [m/s²]."""
         x = (math.pi * self.frequency * (t - self.peak_time)) ** 2
         return self.amplitude * (1.0 - 2.0 * x) * math.exp(-x)
 
@@ -128,7 +129,8 @@ class Rectangular(Pulse):
 
 @dataclass(frozen=True)
 class Tabulated:
-    """Accelerations [m/s²] at given times [s], straight lines between them, zero before the first and after the last.
+    """Shake with accelerations [m/s²] at given times [s], straight lines between them, zero before the first and after
+    the last.
 
     times: strictly increasing, at least two; values: as many. Both are kept as tuples. Raises InputError for lengths
     that differ, times that do not increase, NaN or infinite entries.
@@ -152,11 +154,11 @@ class Tabulated:
 
     @property
     def duration(self) -> float:
-        """The last time [s]."""
+        """Return the last time [s]."""
         return self.times[-1]
 
     def acceleration(self, t: float) -> float:
-        """Linear interpolation [m/s²]; the values at both end times are included."""
+        """Return the linear interpolation [m/s²]; the values at both end times are included."""
         times, values = self.times, self.values
         if not times[0] <= t <= times[-1]:
             return 0.0

@@ -2,7 +2,7 @@
 
 With r_n >= 0 the normal reaction of a contact node and r_t its tangential reaction (d - 1 components), every law says
 
-    |r_t| <= limit,      r_t along the slip rate when |r_t| = limit        (seed 003, friction threshold F)
+    |r_t| <= limit,      r_t along the slip rate when |r_t| = limit
 
 and differs only in `limit`, which is affine in the pressure: limit = cohesion + slope max(r_n, 0). Reactions are forces
 [N] for displacement schemes and impulses [N s] for velocity schemes; `scale` (1 or the time step [s]) is the factor
@@ -25,7 +25,8 @@ from ..core.errors import InputError
 
 @dataclass(frozen=True)
 class Tresca:
-    """A given threshold [Pa] >= 0, acting whether or not the node touches: limit = threshold · weight · scale.
+    """Bound friction by a given threshold [Pa] >= 0, acting whether or not the node touches: limit = threshold · weight
+    · scale.
 
     ``threshold``: a number, or one per contact point (then kept as a tuple). Raises InputError when one is negative or
     not a finite number, and, when used, for a wrong count.
@@ -37,21 +38,21 @@ class Tresca:
         object.__setattr__(self, "threshold", _checked("Tresca", "the threshold [Pa]", self.threshold))
 
     def limit(self, r_n: Array, weights: Array, scale: float) -> Array:
-        """threshold · weights · scale, shape (n,)."""
+        """Return threshold · weights · scale, shape (n,)."""
         return _nodal("Tresca", "threshold", self.threshold, len(weights)) * np.asarray(weights, dtype=float) * scale
 
     def slope(self, weights: Array) -> Array:
-        """Zeros, shape (n,)."""
+        """Return zeros, shape (n,)."""
         return np.zeros(len(weights))
 
     def at(self, speed: Array) -> Tresca:
-        """Itself: the law does not know the slip rate."""
+        """Return itself: the law does not know the slip rate."""
         return self
 
 
 @dataclass(frozen=True)
 class Coulomb:
-    """Dry friction with coefficient mu >= 0: limit = mu · r_n, zero for an open node.
+    """Bound dry friction by a coefficient mu >= 0: limit = mu · r_n, zero for an open node.
 
     ``mu``: a number, or one per contact point (then kept as a tuple). Raises InputError when one is negative or not a
     finite number, and, when used, for a wrong count.
@@ -63,21 +64,22 @@ class Coulomb:
         object.__setattr__(self, "mu", _checked("Coulomb", "the friction coefficient mu", self.mu))
 
     def limit(self, r_n: Array, weights: Array, scale: float) -> Array:
-        """mu · max(r_n, 0), shape (n,): the tension of a held point, or of an unconverged iterate, rubs on nothing."""
+        """Return mu · max(r_n, 0), shape (n,): the tension of a held point, or of an unconverged iterate, rubs on
+        nothing."""
         return _nodal("Coulomb", "mu", self.mu, len(r_n)) * np.maximum(r_n, 0.0)
 
     def slope(self, weights: Array) -> Array:
-        """mu, shape (n,)."""
+        """Return mu, shape (n,)."""
         return _nodal("Coulomb", "mu", self.mu, len(weights)) * np.ones(len(weights))
 
     def at(self, speed: Array) -> Coulomb:
-        """Itself: the law does not know the slip rate."""
+        """Return itself: the law does not know the slip rate."""
         return self
 
 
 @dataclass(frozen=True)
 class SlipRateCoulomb:
-    """Dry friction whose coefficient depends on the slip rate: limit = mu(|v|) · r_n.
+    """Bound dry friction by a coefficient that depends on the slip rate: limit = mu(|v|) · r_n.
 
     ``mu``: ExponentialDecay, StaticKinetic, or any function that takes speeds [m/s] >= 0, shape (n,), and returns as
     many coefficients, or one. Raises InputError when it is no function, and, when used, for a coefficient that is
@@ -93,7 +95,7 @@ class SlipRateCoulomb:
         function("SlipRateCoulomb", "mu", self.mu, "give a function of the slip rate, or use Coulomb()")
 
     def at(self, speed: Array) -> Coulomb:
-        """Coulomb's law with the coefficients of these speeds."""
+        """Return Coulomb's law with the coefficients of these speeds."""
         found = _coefficients(self.mu(speed))
         if found.shape not in ((), speed.shape):
             raise InputError(
@@ -110,11 +112,11 @@ class SlipRateCoulomb:
         return Coulomb(found)
 
     def limit(self, r_n: Array, weights: Array, scale: float) -> Array:
-        """mu(0) · max(r_n, 0), shape (n,): at rest."""
+        """Return mu(0) · max(r_n, 0), shape (n,): at rest."""
         return self.at(np.zeros(len(r_n))).limit(r_n, weights, scale)
 
     def slope(self, weights: Array) -> Array:
-        """mu(0), shape (n,): at rest."""
+        """Return mu(0), shape (n,): at rest."""
         return self.at(np.zeros(len(weights))).slope(weights)
 
 
@@ -128,7 +130,7 @@ def _coefficients(values: Any) -> Array:
 
 @dataclass(frozen=True)
 class ExponentialDecay:
-    """mu(v) = mu_k + (mu_s - mu_k) exp(-v/v_c): from static to kinetic friction over the speed v_c [m/s] > 0.
+    """Give mu(v) = mu_k + (mu_s - mu_k) exp(-v/v_c): from static to kinetic friction over the speed v_c [m/s] > 0.
 
     mu_s, mu_k: numbers >= 0, or one per contact point. InputError for other values.
     """
@@ -151,7 +153,7 @@ class ExponentialDecay:
 
 @dataclass(frozen=True)
 class StaticKinetic:
-    """mu_s at rest, mu_k in motion: the limit of ExponentialDecay for v_c -> 0. Where both hold, rest is chosen.
+    """Give mu_s at rest, mu_k in motion: the limit of ExponentialDecay for v_c -> 0. Where both hold, rest is chosen.
 
     mu_s >= mu_k >= 0: numbers, or one per contact point. InputError for other values.
     """
@@ -171,7 +173,7 @@ class StaticKinetic:
 
 
 def project(r_t: Array, limit: Array) -> Array:
-    """Nearest point of the friction disks |r_t| <= limit: r_t · min(1, limit / |r_t|), node by node.
+    """Return the nearest point of the friction disks |r_t| <= limit: r_t · min(1, limit / |r_t|), node by node.
 
     r_t: tangential reactions, shape (n, d - 1); limit: radii >= 0, shape (n,), infinite for a node that cannot slip.
     Returns a new array of the shape of r_t. Raises InputError when the shapes do not match.
@@ -206,7 +208,7 @@ def _nodal(law: str, name: str, value: Any, count: int) -> Array:
 
 
 def _keep_coefficients(law: ExponentialDecay | StaticKinetic) -> None:
-    """Checks mu_s and mu_k and keeps fields as tuples."""
+    """Check mu_s and mu_k and keep fields as tuples."""
     for name, meaning in (("mu_s", "the static coefficient mu_s"), ("mu_k", "the kinetic coefficient mu_k")):
         object.__setattr__(law, name, _checked(type(law).__name__, meaning, getattr(law, name)))
     if isinstance(law.mu_s, tuple) and isinstance(law.mu_k, tuple) and len(law.mu_s) != len(law.mu_k):

@@ -1,10 +1,11 @@
-"""Post-impact velocity laws (seed 000, section 4: inelastic collision, velocity reversal, "any other type").
+"""Change velocities after an impact: inelastic collision, velocity reversal, Newton's restitution, or a law of one's
+own.
 
 After each step a law says which normal velocity every contact condition shall have, and a reading says how the
 velocity vector v is given it:
 
 * ``ComponentReset`` sets the components, as the seed does. With a consistent mass this is not an impulse: its energy
-  change ½ v⁻ᵀMv⁻ - ½ v⁺ᵀMv⁺ may have either sign and the ledger books it with its sign (verification V9.6).
+  change ½ v⁻ᵀMv⁻ - ½ v⁺ᵀMv⁺ may have either sign and the ledger books it with its sign.
 * ``MassProjection`` applies the impulse on the contact unknowns that produces them, the M-orthogonal projection
   v⁺ = v⁻ + M⁻¹Bᵀ(B M⁻¹Bᵀ)⁻¹(target - B v⁻); identical for lumped masses. It takes ½ (v⁻ - v⁺)ᵀM(v⁻ - v⁺) for target 0.
 
@@ -147,5 +148,5 @@ class Newton:
 
 
 def Elastic(reading: Reading | None = None) -> Newton:
-    """Velocity reversal, Newton's law with e = 1."""
+    """Make the law of velocity reversal, Newton's law with e = 1."""
     return Newton(1.0, ComponentReset() if reading is None else reading)

@@ -27,13 +27,13 @@ LARGEST_CORRECTION = 0.35  # of a node's lumped mass: beyond, the mesh is too co
 
 
 def mass_law(owner: str, value: Any) -> None:
-    """InputError unless it is a mass law."""
+    """Raise InputError unless it is a mass law."""
     provides(owner, "mass", value, ("apply",), "give Redistributed() or ConsistentMass()", lacks=("target",))
 
 
 @dataclass(frozen=True)
 class ConsistentMass:
-    """M as assembled. The choice of seed 000; impact laws need it, for without mass there is nothing to rebound."""
+    """Keep M as assembled; impact laws need it, for without mass there is nothing to rebound."""
 
     def apply(self, system: SemiDiscreteSystem, surface: ContactSurface, *, tangential: bool) -> SemiDiscreteSystem:
         return system
@@ -41,7 +41,8 @@ class ConsistentMass:
 
 @dataclass(frozen=True)
 class Redistributed:
-    """Massless normal unknowns of all contact nodes; with friction (``tangential``) massless tangential ones too.
+    """Take the mass from the normal unknowns of all contact nodes; with friction (``tangential``) massless tangential
+    ones too.
 
     M* = Pᵀ M_l P + D with M_l = (1 - lumping) M + lumping diag(row sums of M). P gives every contact node the velocity
     of the rigid motion that fits its neighbours behind the surface best: it hands the node's mass to them, keeps every

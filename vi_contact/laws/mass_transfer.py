@@ -23,7 +23,8 @@ NOTHING = 1e-10  # of a node's own mass: neighbours with less cannot carry it
 
 
 def from_neighbours(system: SemiDiscreteSystem, massless: Mask, contact: Mask, nodal: Array) -> list[Matrix]:
-    """The matrices P_k of v = P_0 P_1 … v that replace massless unknowns; contact: all unknowns of contact nodes.
+    """Return the matrices P_k of v = P_0 P_1 … v that replace massless unknowns; contact: all unknowns of contact
+    nodes.
 
     Contact nodes with neighbours behind the surface come last in the product, those with contact nodes around them
     only, in corners, follow these. Tied nodes carry nothing: they are in two places. InputError when some contact
@@ -128,7 +129,8 @@ def _neighbours(system: SemiDiscreteSystem, donors: Mask, columns: list[Indices]
 
 
 def rigid_motions(directions: Array, offset: Array) -> Array:
-    """Rows R of rigid motions: d translations and the rotations, of unknowns with these directions at these places."""
+    """Return the rows R of rigid motions: d translations and the rotations, of unknowns with these directions at these
+    places."""
     d = directions.shape[1]
     turns = [
         directions[:, j] * offset[:, i] - directions[:, i] * offset[:, j] for i in range(d) for j in range(i + 1, d)

@@ -17,7 +17,7 @@ EXTREME = 1e100  # beyond it, and below its inverse, squares are no numbers any 
 
 @dataclass(frozen=True)
 class LinearElastic:
-    """Isotropic elasticity, sigma = lame_lambda tr(eps) I + 2 shear_modulus eps (seed 000 eq. 9, isotropic case).
+    """Describe isotropic elasticity, sigma = lame_lambda tr(eps) I + 2 shear_modulus eps.
 
     E: Young's modulus [Pa] > 0; nu: Poisson's ratio, -1 < nu < 1/2; rho: mass density [kg/m³] > 0.
     Raises InputError when one of them is outside its range or not finite.
@@ -40,7 +40,7 @@ class LinearElastic:
 
     @classmethod
     def from_wave_speeds(cls, c_p: float, c_s: float, rho: float) -> LinearElastic:
-        """The material whose pressure and shear waves travel at c_p and c_s [m/s] (verification.md section 7).
+        """Return the material whose pressure and shear waves travel at c_p and c_s [m/s].
 
         nu = (c_p² - 2 c_s²) / (2 (c_p² - c_s²)), shear_modulus = rho c_s², E = 2 shear_modulus (1 + nu).
         Raises InputError unless c_p > sqrt(4/3) c_s > 0, which is nu > -1.
@@ -55,49 +55,53 @@ class LinearElastic:
 
     @property
     def lame_lambda(self) -> float:
-        """First Lamé constant E nu / ((1 + nu)(1 - 2 nu)) [Pa]."""
+        """Return the first Lamé constant E nu / ((1 + nu)(1 - 2 nu)) [Pa]."""
         return self.E * self.nu / ((1.0 + self.nu) * (1.0 - 2.0 * self.nu))
 
     @property
     def shear_modulus(self) -> float:
-        """Second Lamé constant E / (2 (1 + nu)) [Pa]; never called mu here, mu is friction."""
+        """Return the second Lamé constant E / (2 (1 + nu)) [Pa]; never called mu here, mu is friction."""
         return self.E / (2.0 * (1.0 + self.nu))
 
     @property
     def c_p(self) -> float:
-        """Pressure wave speed sqrt((lame_lambda + 2 shear_modulus) / rho) [m/s] in a solid or in plane strain."""
+        """Return the pressure wave speed sqrt((lame_lambda + 2 shear_modulus) / rho) [m/s] in a solid or in plane
+        strain.
+        """
         return math.sqrt((self.lame_lambda + 2.0 * self.shear_modulus) / self.rho)
 
     @property
     def c_s(self) -> float:
-        """Shear wave speed sqrt(shear_modulus / rho) [m/s]."""
+        """Return the shear wave speed sqrt(shear_modulus / rho) [m/s]."""
         return math.sqrt(self.shear_modulus / self.rho)
 
     @property
     def c_p_plane_stress(self) -> float:
-        """Pressure wave speed in a thin plate, sqrt(E / (rho (1 - nu²))) [m/s]."""
+        """Return the pressure wave speed in a thin plate, sqrt(E / (rho (1 - nu²))) [m/s]."""
         return math.sqrt(self.E / (self.rho * (1.0 - self.nu**2)))
 
     @property
     def c_bar(self) -> float:
-        """Wave speed in a thin bar, sqrt(E / rho) [m/s]."""
+        """Return the wave speed in a thin bar, sqrt(E / rho) [m/s]."""
         return math.sqrt(self.E / self.rho)
 
 
 class Section(Protocol):
-    """How the body is cut out of space: integrals over the mesh are multiplied by `thickness` [m] (1 for a solid)."""
+    """Say how the body is cut out of space: integrals over the mesh are multiplied by `thickness` [m] (1 for a solid).
+    """
 
     @property
     def thickness(self) -> float: ...
 
     def elastic_constants(self, material: LinearElastic) -> tuple[float, float]:
-        """(lambda_eff, shear_modulus) [Pa] of sigma = lambda_eff tr(eps) I + 2 shear_modulus eps, in plane."""
+        """Return (lambda_eff, shear_modulus) [Pa] of sigma = lambda_eff tr(eps) I + 2 shear_modulus eps, in plane."""
         ...
 
 
 @dataclass(frozen=True)
 class PlaneStress:
-    """A thin panel of the given thickness [m], free of stress across it: lambda_eff = 2 lambda mu / (lambda + 2 mu)."""
+    """Cut a thin panel of the given thickness [m], free of stress across it: lambda_eff = 2 lambda mu / (lambda + 2
+    mu)."""
 
     thickness: float = 1.0
 
@@ -105,14 +109,14 @@ class PlaneStress:
         number("PlaneStress", "the thickness [m]", self.thickness, positive=True)
 
     def elastic_constants(self, material: LinearElastic) -> tuple[float, float]:
-        """(lambda_eff, shear_modulus) [Pa]; equal to (E nu / (1 - nu²), E / (2 (1 + nu)))."""
+        """Return (lambda_eff, shear_modulus) [Pa]; equal to (E nu / (1 - nu²), E / (2 (1 + nu)))."""
         lame, shear = material.lame_lambda, material.shear_modulus
         return 2.0 * lame * shear / (lame + 2.0 * shear), shear
 
 
 @dataclass(frozen=True)
 class PlaneStrain:
-    """A slice of the given thickness [m] of a long body that cannot strain along its axis: lambda_eff = lambda."""
+    """Cut a slice of the given thickness [m] of a long body that cannot strain along its axis: lambda_eff = lambda."""
 
     thickness: float = 1.0
 
@@ -120,41 +124,41 @@ class PlaneStrain:
         number("PlaneStrain", "the thickness [m]", self.thickness, positive=True)
 
     def elastic_constants(self, material: LinearElastic) -> tuple[float, float]:
-        """(lame_lambda, shear_modulus) [Pa]."""
+        """Return (lame_lambda, shear_modulus) [Pa]."""
         return material.lame_lambda, material.shear_modulus
 
 
 @dataclass(frozen=True)
 class Solid:
-    """A three-dimensional body: lambda_eff = lambda, nothing to multiply integrals by."""
+    """Take a three-dimensional body: lambda_eff = lambda, nothing to multiply integrals by."""
 
     thickness: ClassVar[float] = 1.0
 
     def elastic_constants(self, material: LinearElastic) -> tuple[float, float]:
-        """(lame_lambda, shear_modulus) [Pa]."""
+        """Return (lame_lambda, shear_modulus) [Pa]."""
         return material.lame_lambda, material.shear_modulus
 
 
 class Damping(Protocol):
-    """Viscous damping built from the mass and stiffness of one material: C = alpha M + beta K."""
+    """Build viscous damping from the mass and stiffness of one material: C = alpha M + beta K."""
 
     def coefficients(self, material: LinearElastic) -> tuple[float, float]:
-        """(alpha [1/s], beta [s]) of C = alpha M + beta K on the part of the body made of `material`."""
+        """Return (alpha [1/s], beta [s]) of C = alpha M + beta K on the part of the body made of `material`."""
         ...
 
 
 @dataclass(frozen=True)
 class NoDamping:
-    """C = 0, as in both examples of seed 000."""
+    """Leave damping out: C = 0."""
 
     def coefficients(self, material: LinearElastic) -> tuple[float, float]:
-        """(0, 0)."""
+        """Return (0, 0)."""
         return 0.0, 0.0
 
 
 @dataclass(frozen=True)
 class MassProportional:
-    """Damping force c u' per unit volume, rho u'' + c u' = div sigma + f (seed 000 eq. 7); c in [kg/(m³ s)] >= 0."""
+    """Damp by a force c u' per unit volume, rho u'' + c u' = div sigma + f; c in [kg/(m³ s)] >= 0."""
 
     c: float
 
@@ -162,16 +166,16 @@ class MassProportional:
         number("MassProportional", "the damping coefficient c [kg/(m³ s)]", self.c, not_negative=True)
 
     def coefficients(self, material: LinearElastic) -> tuple[float, float]:
-        """(c / rho, 0): integrating c against the shape functions is c / rho times the consistent mass."""
+        """Return (c / rho, 0): integrating c against the shape functions is c / rho times the consistent mass."""
         return self.c / material.rho, 0.0
 
 
 @dataclass(frozen=True)
 class Rayleigh:
-    """C = alpha M + beta K; alpha [1/s] >= 0, beta [s] >= 0, K the stiffness without any contact term.
+    """Damp by C = alpha M + beta K; alpha [1/s] >= 0, beta [s] >= 0, K the stiffness without any contact term.
 
     Once a body lifts off, alpha M also resists its rigid rocking, which nothing physical does: with uplift prefer
-    alpha = 0 (seismic.md 2.4). Raises InputError for a negative or non-finite coefficient.
+    alpha = 0. Raises InputError for a negative or non-finite coefficient.
     """
 
     alpha: float
@@ -183,11 +187,12 @@ class Rayleigh:
 
     @classmethod
     def from_frequencies(cls, f1: float, f2: float, *, xi1: float, xi2: float) -> Rayleigh:
-        """Damping ratio xi1 at f1 and xi2 at f2 [Hz]: solves alpha / (2 w_i) + beta w_i / 2 = xi_i with w_i = 2 pi f_i.
+        """Make the damping that has ratio xi1 at f1 and xi2 at f2 [Hz]: solve alpha / (2 w_i) + beta w_i / 2 = xi_i
+        with w_i = 2 pi f_i.
 
         alpha = 2 w1 w2 (w2 xi1 - w1 xi2) / (w2² - w1²), beta = 2 (w2 xi2 - w1 xi1) / (w2² - w1²); for equal ratios xi
         alpha = 2 xi w1 w2 / (w1 + w2) and beta = 2 xi / (w1 + w2). 5 % at 1 and 10 Hz: 0.5712 1/s and 1.4469e-3 s
-        (seismic.md 2.4). Raises InputError when f1 = f2 or when the solution needs a negative coefficient.
+       . Raises InputError when f1 = f2 or when the solution needs a negative coefficient.
         """
         for name, f in (("f1", f1), ("f2", f2)):
             number("Rayleigh.from_frequencies", f"the frequency {name} [Hz]", f, positive=True)
@@ -206,11 +211,11 @@ class Rayleigh:
         return cls(alpha=factor * w1 * w2 * max(mass, 0.0), beta=factor * max(stiffness, 0.0))
 
     def coefficients(self, material: LinearElastic) -> tuple[float, float]:
-        """(alpha, beta), whatever the material."""
+        """Return (alpha, beta), whatever the material."""
         return self.alpha, self.beta
 
     def ratio(self, f: float) -> float:
-        """Damping ratio alpha / (2 w) + beta w / 2 of a mode of frequency f = w / 2 pi [Hz] > 0.
+        """Return the damping ratio alpha / (2 w) + beta w / 2 of a mode of frequency f = w / 2 pi [Hz] > 0.
 
         Smallest at w = sqrt(alpha / beta), where it is sqrt(alpha beta).
         """

@@ -16,7 +16,7 @@ from ..core.units import STANDARD_GRAVITY
 def with_weight(
     system: SemiDiscreteSystem, *, acceleration: float = STANDARD_GRAVITY, direction: tuple[float, ...] | None = None
 ) -> SemiDiscreteSystem:
-    """The same system under its own weight, f + M r g: whatever its materials and densities.
+    """Return the same system under its own weight, f + M r g: whatever its materials and densities.
 
     acceleration: g [m/s²]; direction: where it acts, of length one, (0, -1) or (0, 0, -1) by default, in one dimension
     (-1,). It is the load of ``BodyForce`` with the density of every material. InputError as for ``own_weight``.
@@ -29,7 +29,7 @@ def with_weight(
 def own_weight(
     system: SemiDiscreteSystem, acceleration: float = STANDARD_GRAVITY, direction: tuple[float, ...] | None = None
 ) -> Array:
-    """M r g [N] on the unknowns; see ``with_weight``.
+    """Return M r g [N] on the unknowns; see ``with_weight``.
 
     InputError for a direction of another length or number of components, and for a system without ``base_inertia``,
     which has lost the mass at held nodes.

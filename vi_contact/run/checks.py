@@ -1,4 +1,4 @@
-"""Checks of what marches a problem: scheme, solvers, tolerance, the state it starts from, and its time steps.
+"""Check what marches a problem: scheme, solvers, tolerance, the state it starts from, and its time steps.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ SAME = 1e-12  # relative difference of time steps that were computed in two ways
 
 
 def check_scheme(owner: str, value: Any) -> None:
-    """InputError unless it is a time scheme, or None."""
+    """Raise InputError unless it is a time scheme, or None."""
     if value is not None:
         provides(owner, "scheme", value, SCHEME, "give a time scheme, such as Trapezoidal(), or None")
 
 
 def check_solver(owner: str, value: Any, meaning: str = "solver") -> None:
-    """InputError unless it is a solver of steps."""
+    """Raise InputError unless it is a solver of steps."""
     provides(owner, meaning, value, ("check", "prepare"), "give a solver, such as Condensed() or Volume()")
 
 
 def check_methods(owner: str, solver: Any, escalation: Any, tolerance: Any) -> None:
-    """InputError unless these are a solver or None, a list of solvers, and a tolerance between 0 and 1."""
+    """Raise InputError unless these are a solver or None, a list of solvers, and a tolerance between 0 and 1."""
     if solver is not None:
         check_solver(owner, solver)
     for one in several(owner, "escalation", escalation, "give a list of solvers"):
@@ -42,7 +42,7 @@ def check_methods(owner: str, solver: Any, escalation: Any, tolerance: Any) -> N
 
 
 def check_state(owner: str, problem: ContactProblem, state: State, *, dt: float, tolerance: float, scheme: Any) -> None:
-    """InputError, on all ranks, for a state of another problem, or one that penetrates the obstacle. Collective.
+    """Raise InputError, on all ranks, for a state of another problem, or one that penetrates the obstacle. Collective.
 
     A scheme that ``penetrates``, whose condition is one on velocities, may go on from states of its own runs (k > 0).
     """

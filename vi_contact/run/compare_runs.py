@@ -24,17 +24,17 @@ class Reference(Protocol):
     def name(self) -> str: ...
     @property
     def times(self) -> Array:
-        """(k,) [s], increasing."""
+        """Return (k,) [s], increasing."""
         ...
 
     @property
     def impulse(self) -> Array:
-        """(k, d) of the contact forces of the support on the body up to each time [N s]."""
+        """Return (k, d) of the contact forces of the support on the body up to each time [N s]."""
         ...
 
     @property
     def mean_towards(self) -> Array:
-        """(k,) displacement towards the support at each time, mean over the contact boundary [m]."""
+        """Return (k,) displacement towards the support at each time, mean over the contact boundary [m]."""
         ...
 
 

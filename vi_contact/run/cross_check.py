@@ -1,4 +1,4 @@
-"""Independent routes to the same step, compared step by step from the same state (design idea 4).
+"""Compare independent routes to the same step, step by step from the same state.
 
 Whole runs of an energy-growing scheme may drift apart by round-off; single steps from one state must not. Answers of
 another method, boundary elements for example, have other steps: ``references`` are compared over the whole run.
@@ -27,7 +27,8 @@ REFERENCE = ("name", "times", "impulse", "mean_towards")
 
 @dataclass
 class Disagreement:
-    """Largest differences between a solver and the primary one so far, with the largest values they compare to.
+    """Hold the largest differences between a solver and the primary one so far, with the largest values they compare
+    to.
 
     ``rubbed``: whether there was friction to compare, in one of the ``steps``.
     """
@@ -45,28 +46,29 @@ class Disagreement:
 
     @property
     def relative_u(self) -> float:
-        """max |x - x'| / max |x| over all unknowns and steps."""
+        """Return max |x - x'| / max |x| over all unknowns and steps."""
         return self.x / self.x_ref if self.x_ref else self.x
 
     @property
     def relative_r_n(self) -> float:
-        """max |r_n - r_n'| / max |r_n| over all conditions and steps."""
+        """Return max |r_n - r_n'| / max |r_n| over all conditions and steps."""
         return self.r_n / self.r_ref if self.r_ref else self.r_n
 
     @property
     def relative_r_t(self) -> float:
-        """max |r_t - r_t'| / max |r_t| over all conditions and steps; 0 without friction."""
+        """Return max |r_t - r_t'| / max |r_t| over all conditions and steps; 0 without friction."""
         return self.r_t / self.t_ref if self.t_ref else self.r_t
 
     @property
     def worst(self) -> float:
-        """The largest of them."""
+        """Return the largest of them."""
         return max(self.relative_u, self.relative_r_n, self.relative_r_t)
 
 
 @dataclass
 class CrossChecked:
-    """A solver that also asks others at every step and remembers how far they are off; returns the primary's answer.
+    """Solve by one solver, ask others at every step too, and remember how far they are off; the first one's answer
+    counts.
 
     ``found`` does not count attempts that ``HalvedAtImpact`` threw away; ``differences``: what ``cross_check`` found
     about answers of other methods.
@@ -85,24 +87,25 @@ class CrossChecked:
         self._earlier, self._last = self.found, (-1, 0.0)
 
     def begin(self, step: StepProblem) -> None:
-        """Forgets the attempt before when this one is of the same step but shorter: that was thrown away."""
+        """Forget the attempt before when this one is of the same step but shorter: that was thrown away."""
         k, t = self._last
         if step.k == k and step.t < t:
             self.found = self._earlier
         self._earlier, self._last = [replace(one) for one in self.found], (step.k, step.t)
 
     def check(self, problem: ContactProblem) -> None:
-        """Every solver must be able to take the problem."""
+        """Raise InputError unless every solver can take the problem."""
         for solver in (self.primary, *self.others):
             solver.check(problem)
 
     def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> PreparedCrossCheck:
-        """All solvers prepared on the same matrix."""
+        """Return all solvers prepared on the same matrix."""
         return PreparedCrossCheck(self, A, surface, scale)
 
     def report(self) -> Mapping[str, Mapping[str, float]]:
-        """method -> relative differences in u, r_n and, with friction, r_t, iterations per step: what summary.json
-        shows. A name that comes again gets a number. Opinions: impulse and mean displacement over the whole run.
+        """Return, by method, relative differences in u, r_n and, with friction, r_t, iterations per step: what
+        summary.json shows. A name that comes again gets a number. Opinions: impulse and mean displacement over the
+        whole run.
         """
         names = [one.method for one in self.found]
         return {
@@ -114,12 +117,12 @@ class CrossChecked:
 
     @property
     def worst(self) -> float:
-        """The largest relative difference of any solver in u, r_n or r_t, step by step; not of references."""
+        """Return the largest relative difference of any solver in u, r_n or r_t, step by step; not of references."""
         return max((one.worst for one in self.found), default=0.0)
 
 
 class PreparedCrossCheck:
-    """See CrossChecked."""
+    """Solve the steps of one matrix by all the solvers; see CrossChecked."""
 
     def __init__(self, settings: CrossChecked, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> None:
         self._settings, self._surface = settings, surface
@@ -159,7 +162,7 @@ def cross_check(
     references: Sequence[Reference] = (),
     bound: float = 0.02,
 ) -> CrossChecked:
-    """Marches with the first solver and compares the others with it at every step; see ``worst`` and ``report()``.
+    """March with the first solver and compare the others with it at every step; see ``worst`` and ``report()``.
 
     ``dt`` and ``steps`` as in ``march``: ``steps`` counts base steps, the statistics all accepted ones.
     ``references``: answers of other methods to the same problem, for example a ``bem.ContactRun`` of a uniform body;

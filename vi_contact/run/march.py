@@ -31,7 +31,7 @@ def march(
     escalation: Sequence[Solver] = (),
     tolerance: float = TOLERANCE,
 ) -> Iterator[tuple[State, Report]]:
-    """Yields (state, report) after every certified step.
+    """Yield (state, report) after every certified step.
 
     ``scheme`` None, and the mass matrix of a problem that does not name one: see ``run.defaults.with_defaults``, whose
     problem is ``report.problem``. ``solver`` None is Condensed().
@@ -55,7 +55,7 @@ def march(
 
 
 class March:
-    """The loop along the steps of a plan, with its books.
+    """Step along a plan, and keep the books of it.
 
     Attributes, at the time a step is handed out:
         base: base steps done. ended: whether this step ended one, so that a restart may begin here.
@@ -147,7 +147,8 @@ class _Solvers:
 
 
 def after_impact(problem: ContactProblem, scheme: Scheme, old: State, new: State, dt: float) -> State:
-    """The state with the impact law applied. Massless supports (springs) do not collide: their points are left out."""
+    """Return the state with the impact law applied. Massless supports (springs) do not collide: their points are left
+    out."""
     law, surface = problem.impact, problem.surface
     if law is None:
         return new

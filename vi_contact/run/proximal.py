@@ -74,7 +74,7 @@ class _Progress:
 
 
 class Proximal:
-    """The proximal-point iteration for the matrix ``K``, which is singular."""
+    """Iterate by the proximal-point method for the matrix ``K``, which is singular."""
 
     step: StepProblem
 
@@ -95,13 +95,13 @@ class Proximal:
         self._prepared = self._solver.prepare(self._A, self._surface, 1.0)
 
     def certificate(self, result: StepResult) -> Certificate:
-        """That of the stage itself, with the equilibrium of every body as a rigid one."""
+        """Return the certificate of the stage itself, with the equilibrium of every body as a rigid one."""
         reaction = self.step.surface.reaction_load(result.r_n, len(result.x), result.r_t)
         resultant = self._bodies.imbalance(self.step.b, reaction)
         return replace(kkt_residual(self.step, result), resultant=resultant)
 
     def solve(self, step: StepProblem) -> StepResult:
-        """Iterates to the tolerance, and on until two answers running are no better. A solver that fails gets stronger
+        """Iterate to the tolerance, and on until two answers running are no better. A solver that fails gets stronger
         springs once: more steps, each of them easier."""
         self.step = step
         progress = _Progress(self._tolerance)

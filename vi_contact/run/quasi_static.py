@@ -35,7 +35,7 @@ def quasi_static(
     state: State | None = None,
     tolerance: float = TOLERANCE,
 ) -> Iterator[State]:
-    """Yields the equilibrium at each of the times, from where the one before left the body. v = 0; k counts stages.
+    """Yield the equilibrium at each of the times, from where the one before left the body. v = 0; k counts stages.
 
     A load that grows in proportion needs one step as long as all slips go one way; a cyclic one at least a step for
     every turn, and more where zones of slip grow (small steps follow the path, the error is that of implicit Euler).

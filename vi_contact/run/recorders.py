@@ -1,4 +1,4 @@
-"""Recorders listen to the loop: each names its columns once and fills a row after every step.
+"""Listen to the loop: each recorder names its columns once and fills a row after every step.
 
 Rows hold numbers (one column of ``history.csv`` each) or arrays (HDF5 only). Values are equal on every rank.
 Displacements and velocities are those of the equations: relative to the ground when an excitation shakes the body.
@@ -21,7 +21,7 @@ from ..core.verify import Energies, energies, energy_balance
 
 
 def refuse_overflow(row: Row) -> None:
-    """StepFailure for a number beyond those of the machine: infinite, or NaN in the energy ledger."""
+    """Raise StepFailure for a number beyond those of the machine: infinite, or NaN in the energy ledger."""
     for name, value in row.items():
         ledger = name.startswith(("energy_", "work_", "loss_"))
         if isinstance(value, float) and (np.isinf(value) or (ledger and np.isnan(value))):
@@ -32,13 +32,14 @@ def refuse_overflow(row: Row) -> None:
 
 
 class Steps:
-    """The columns every run has: time, step, solver iterations, certificate, escalation and ground acceleration."""
+    """Record the columns that every run has: time, step, solver iterations, certificate, escalation and ground
+    acceleration."""
 
     def __init__(self, dimension: int) -> None:
         self._dimension = dimension
 
     def columns(self) -> Columns:
-        """t, k, iterations, certificate, escalated, a_g_x, …"""
+        """Name t, k, iterations, certificate, escalated, a_g_x, …"""
         axes = AXES[: self._dimension]
         ground = {f"a_g_{axis}": ("m/s²", f"ground acceleration along {axis} at time t") for axis in axes}
         return {
@@ -60,7 +61,7 @@ class Steps:
         } | {f"a_g_{axis}": float(value) for axis, value in zip(AXES, ground, strict=False)}
 
     def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
-        """The initial state needed no iterations and no certificate: zeros."""
+        """Return the initial row: no iterations and no certificate were needed, so zeros."""
         self._problem = problem
         return self._row(state, 0, 0.0, False)
 
@@ -69,12 +70,12 @@ class Steps:
 
 
 class Energy:
-    """The energy ledger of the run (verification V9.7), all in joules, works and losses cumulative:
+    """Record the energy ledger of the run, all in joules, works and losses cumulative:
 
         W_input + E(0) = E(t) + D_damping + D_contact + D_friction + D_impact + D_algorithmic - defect
         E = ½ vᵀMv + ½ uᵀKu
 
-    D_impact = ½ v⁻ᵀMv⁻ - ½ v⁺ᵀMv⁺ with its sign (V9.6); W_input is the work of loads, inertia loads -M r a_g and
+    D_impact = ½ v⁻ᵀMv⁻ - ½ v⁺ᵀMv⁺ with its sign; W_input is the work of loads, inertia loads -M r a_g and
     prescribed motions. The defect is the work of the residual of the equation of motion, accumulated; its size relative
     to the largest energy or work is in ``summary.json``. Costs three sparse products a step, one more with damping and
     one more after an impact.
@@ -86,7 +87,7 @@ class Energy:
     )
 
     def columns(self) -> Columns:
-        """energy_kinetic, energy_strain, work_input, loss_*, energy_defect."""
+        """Name energy_kinetic, energy_strain, work_input, loss_*, energy_defect."""
         return {
             "energy_kinetic": ("J", "kinetic energy after the impact law, ½ vᵀMv"),
             "energy_strain": ("J", "strain energy ½ uᵀKu"),
@@ -100,7 +101,8 @@ class Energy:
         }
 
     def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
-        """Energies of the initial state; works and losses are zero, or those of the run that is continued."""
+        """Return the energies of the initial state; works and losses are zero, or those of the run that is continued.
+        """
         self._problem = problem
         self._now = energies(problem.equations, state.u, state.v)
         self._sums = {term: 0.0 if resumed is None else float(resumed[term]) for term in self._TERMS}
@@ -132,7 +134,7 @@ class Energy:
 
 
 class Contact:
-    """What the contact surface does. Reactions are those of the step (mean or end value, as the scheme says).
+    """Record what the contact surface does. Reactions are those of the step (mean or end value, as the scheme says).
 
     gap = gap0 - u_n, plus the shortening of a deformable support; pressure = r_n / weight; the force on the body is
     -Σ r_n n; its point of action is Σ r_n X / Σ r_n (NaN while the contact is open). Arrays have shape (m,) and the
@@ -148,7 +150,7 @@ class Contact:
         self._frictional = False
 
     def columns(self) -> Columns:
-        """contact_uplift, contact_resultant, … and the arrays pressure, gap, active. Call ``start`` first."""
+        """Name contact_uplift, contact_resultant, … and the arrays pressure, gap, active. Call ``start`` first."""
         axes = AXES[: self._dimension]
         force = {f"contact_force_{a}": ("N", f"contact force on the body along {a}, -Σ r_n n_{a}") for a in axes}
         place = {f"contact_{a}": ("m", f"{a} of the point of action, Σ r_n {a} / Σ r_n; nan while open") for a in axes}
@@ -179,7 +181,7 @@ class Contact:
         }
 
     def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
-        """The initial contact: of a gravity stage, or open."""
+        """Return the row of the initial contact: of a gravity stage, or open."""
         self._problem, self._surface = problem, problem.surface
         self._dimension = problem.surface.points.shape[1]
         self._frictional = problem.frictional
@@ -231,7 +233,7 @@ class Contact:
 
 @dataclass
 class Probe:
-    """Histories at points of the body, at the node nearest to each: label -> point (d,) [m].
+    """Record histories at points of the body, at the node nearest to each: label -> point (d,) [m].
 
     Columns u_x_<label>, u_y_<label> [m]; with ``velocity`` v_x_<label> [m/s], after the impact law; with
     ``acceleration`` a_x_<label> [m/s²]: the *absolute* acceleration, the one of the step's equation of motion (velocity
@@ -266,7 +268,7 @@ class Probe:
         return found
 
     def columns(self) -> Columns:
-        """u_x_<label>, …"""
+        """Name u_x_<label>, …"""
         return {
             f"{letter}_{axis}_{label}": (unit, f"{meaning} along {axis} at point {label}")
             for letter, (unit, meaning) in self._quantities().items()
@@ -275,7 +277,7 @@ class Probe:
         }
 
     def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
-        """Finds the nodes."""
+        """Find the nodes."""
         self._problem = problem
         dimension = problem.system.space.dimension
         points = np.array(list(self.points.values()), dtype=float).reshape(len(self.points), -1)

@@ -22,8 +22,8 @@ WEAK, STRONG = 4e-6, 1e-4  # of a stiffness: see body_springs
 
 @dataclass(frozen=True)
 class FreeMotions:
-    """Those of one body: its owned unknowns, the motions w (rows, k) of size one, and the same orthonormal in its mass,
-    with M w."""
+    """Hold the free motions of one body: its owned unknowns, the motions w (rows, k) of size one, and the same
+    orthonormal in its mass, with M w."""
 
     rows: Indices
     unit: Array
@@ -32,15 +32,15 @@ class FreeMotions:
 
 
 class RigidBodies:
-    """The bodies of a problem, and how forces balance on them. Collective."""
+    """Hold the bodies of a problem, and how forces balance on them. Collective."""
 
     def __init__(self, problem: ContactProblem) -> None:
         self._coupling, self._comm = problem.surface.coupling, problem.surface.comm
         self._free = list(_free(problem.turned))
 
     def imbalance(self, load: Array, reaction: Array) -> float:
-        """The largest |w·(load - reaction)| over max |w| times the sum of |load| and |reaction| on the body, forces [N]
-        on the unknowns of ``problem.static_load``. 0 when prescribed displacements hold every body."""
+        """Return the largest |w·(load - reaction)| over max |w| times the sum of |load| and |reaction| on the body,
+        forces [N] on the unknowns of ``problem.static_load``. 0 when prescribed displacements hold every body."""
         f, r = self._own(load), self._own(reaction)
         worst = 0.0
         for body in self._free:
@@ -51,7 +51,8 @@ class RigidBodies:
         return worst
 
     def resultants(self, force: Array) -> Array:
-        """The part M w (w·force) of a force on the unknowns of ``problem.static_load``, which has its resultants."""
+        """Return the part M w (w·force) of a force on the unknowns of ``problem.static_load``, which has its
+        resultants."""
         own, part = self._own(force), np.zeros_like(force)
         for body in self._free:
             part[body.rows] += body.momenta @ self._comm.sum(body.motions.T @ own[body.rows])
@@ -119,9 +120,9 @@ def _form(system: SemiDiscreteSystem, A: Matrix, rows: Indices, w: Array) -> tup
 
 
 def body_springs(problem: ContactProblem) -> Matrix:
-    """P: the mass matrix of every body, times a number [1/s²] that makes the sum of its entries along a direction
-    STRONG of the stiffness of what is softest here, a body or the springs it stands on, and at least WEAK of the body's
-    own largest K_ii; in the unknowns of ``problem.static_load``. Collective.
+    """Return P: the mass matrix of every body, times a number [1/s²] that makes the sum of its entries along a
+    direction STRONG of the stiffness of what is softest here, a body or the springs it stands on, and at least WEAK of
+    the body's own largest K_ii; in the unknowns of ``problem.static_load``. Collective.
 
     It does not grow as meshes are refined, as it would with the largest K_ii / M_ii. Weaker springs take fewer steps to
     push a stiff body into a soft one, and cost digits: round-off of the first step is 1e-16 / WEAK² at worst.

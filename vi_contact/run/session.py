@@ -33,7 +33,7 @@ LINEAR_STEPS = 21  # repetitions of the plain linear step that the step is compa
 
 
 class Comparison(Protocol):
-    """A cross-check of routes that accompanies the run (cross_check.CrossChecked)."""
+    """Report about a cross-check of routes that accompanies the run (cross_check.CrossChecked)."""
 
     def report(self) -> Mapping[str, Mapping[str, float]]: ...
 
@@ -91,11 +91,11 @@ class Session:
 
     @property
     def left(self) -> int:
-        """Base steps to do."""
+        """Return how many base steps are to be done."""
         return max(self.step_plan.steps - self.place.base, 0)
 
     def go(self, writer: Writer) -> Solution:
-        """The remaining steps and everything that is written before, during and after them."""
+        """Make the remaining steps, and write everything before, during and after them."""
         with StopSignals() as signals:
             return self._go(writer, signals)
 

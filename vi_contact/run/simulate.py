@@ -52,7 +52,7 @@ def simulate(
     fields: FieldWriter | None = None,
     cross_check: Comparison | None = None,
 ) -> Solution:
-    """Marches to t_end, or for so many steps, and records. Collective; every rank gets the solution.
+    """March to t_end, or for so many steps, and records. Collective; every rank gets the solution.
 
     Args:
         scheme: None is the trapezoidal rule on redistributed mass, with an impact law the Zienkiewicz-Wood-Taylor step;

@@ -21,7 +21,7 @@ CREATED = 0.01  # of the largest energy: more than schemes without a fault gain 
 
 @dataclass(frozen=True)
 class Solution:
-    """The result of ``simulate``.
+    """Hold the result of ``simulate``.
 
     Attributes:
         history: column -> values, (rows,) or (rows, m) for arrays; row 0 is the initial state.
@@ -37,25 +37,27 @@ class Solution:
 
     @property
     def seconds_per_step(self) -> float:
-        """Median wall time of a step [s]: contact solve, certificate, records and output; nan without steps."""
+        """Return the median wall time of a step [s]: contact solve, certificate, records and output; nan without steps.
+        """
         return float(self.facts["seconds_per_step"])
 
     @property
     def seconds_per_linear_step(self) -> float:
-        """Median wall time of a plain linear step with the same A [s]: right-hand side, back-substitution, update."""
+        """Return the median wall time of a plain linear step with the same A [s]: right-hand side, back-substitution,
+        update."""
         return float(self.facts["seconds_per_linear_step"])
 
     def to_json(self) -> str:
-        """The content of summary.json."""
+        """Return the content of summary.json."""
         return to_json(self.facts)
 
     def summary(self) -> str:
-        """The run in a few lines for people."""
+        """Return the run in a few lines for people."""
         return "\n".join(_lines(self.facts))
 
 
 def energy_warning(facts: Mapping[str, Any]) -> str | None:
-    """A sentence when the run had more energy than was put in, by more than CREATED of the largest energy."""
+    """Return a sentence when the run had more energy than was put in, by more than CREATED of the largest energy."""
     if facts.get("energy_created", 0.0) <= CREATED:
         return None
     return (
@@ -66,7 +68,8 @@ def energy_warning(facts: Mapping[str, Any]) -> str | None:
 
 
 def sampling_warning(excitations: Sequence[Excitation], dt: float) -> str | None:
-    """A sentence when a time step [s] is longer than that of a record, whose peaks then fall between the steps."""
+    """Return a sentence when a time step [s] is longer than that of a record, whose peaks then fall between the steps.
+    """
     finest = min((one.record.dt for one in excitations if isinstance(one, GroundMotion)), default=dt)
     if dt <= finest * (1.0 + 1e-6):
         return None

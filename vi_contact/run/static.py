@@ -22,7 +22,7 @@ ADVICE = "try another solver, or smaller load steps, and check the data"
 def static_equilibrium(
     problem: ContactProblem, *, solver: Solver | None = None, t: float = 0.0, tolerance: float = TOLERANCE
 ) -> State:
-    """The gravity stage: K u = f(t) - B_nᵀ r_n - B_tᵀ r_t with contact active, without excitation.
+    """Return the gravity stage: K u = f(t) - B_nᵀ r_n - B_tᵀ r_t with contact active, without excitation.
 
     The state it leaves has v = 0, keeps stresses, reactions and contact set, and is the start of the dynamic stage. A
     body that no prescribed displacement holds is brought to rest on its contacts; free rigid motions that no load
@@ -40,7 +40,7 @@ def static_equilibrium(
 
 
 class Equilibria:
-    """Static stages of one problem, with one factorisation for all."""
+    """Solve static stages of one problem, with one factorisation for all."""
 
     def __init__(
         self, problem: ContactProblem, *, solver: Solver | None = None, tolerance: float = TOLERANCE
@@ -56,7 +56,8 @@ class Equilibria:
             self._solve = lambda step: certified.solve(step)[0]
 
     def after(self, old: State, t: float) -> State:
-        """The equilibrium at time t, of a body that rubs and slides from where ``old`` left it; numbered as ``old``."""
+        """Return the equilibrium at time t, of a body that rubs and slides from where ``old`` left it; numbered as
+        ``old``."""
         problem = self._problem
         step = StepProblem(
             A=self._K,

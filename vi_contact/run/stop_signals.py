@@ -18,7 +18,7 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class StopSignals:
-    """Listens from ``with`` to its end, in the main thread only; other threads never see a signal.
+    """Listen from ``with`` to its end, in the main thread only; other threads never see a signal.
 
     A signal that was ignored stays so (nohup, jobs in the background), and so do handlers that the caller wrote. A
     second Ctrl-C ends the process at once. What nobody has acted on in the end is sent again, to the old handlers.
@@ -45,7 +45,7 @@ class StopSignals:
             signal.signal(number, signal.SIG_DFL)
 
     def asked(self, comm: Comm) -> int:
-        """The number of a signal that some rank has got, the same on all ranks; 0 for none. Collective."""
+        """Return the number of a signal that some rank has got, the same on all ranks; 0 for none. Collective."""
         number = int(largest(comm, self._found))
         self._found = 0 if number else self._found
         return number

@@ -23,7 +23,7 @@ LONGEST = 1e100  # [s] and its inverse: squares of dt, with masses and stiffness
 
 @dataclass(frozen=True)
 class Schedule:
-    """Pieces (dt [s], until [s]): steps of dt until that time; the last piece is usually (dt, math.inf).
+    """Plan pieces (dt [s], until [s]): steps of dt until that time; the last piece is usually (dt, math.inf).
 
     A piece ends with the first step that reaches its time, be it not a whole number of steps long.
     InputError for no pieces, dt that is not positive, or times that do not increase.
@@ -45,7 +45,8 @@ class Schedule:
 
 @dataclass(frozen=True)
 class HalvedAtImpact:
-    """Steps of ``dt`` [s], or of a Schedule; one that closes an open contact point is discarded and done as two halves.
+    """Plan steps of ``dt`` [s], or of a Schedule; one that closes an open contact point is discarded and done as two
+    halves.
 
     These may be halved again, down to dt/2**halvings, the resolution of the time of an impact. Every accepted part is a
     certified step like any other. At most one matrix is factorised for each of the halvings + 1 lengths of a piece.
@@ -66,12 +67,12 @@ TimeSteps = float | Schedule | HalvedAtImpact
 
 
 def described(plan: TimeSteps) -> float | str:
-    """For checkpoint and summary: a constant dt as the number it is, a plan in words."""
+    """Return, for checkpoint and summary, a constant dt as the number it is, a plan in words."""
     return repr(plan) if isinstance(plan, Schedule | HalvedAtImpact) else plan
 
 
 def longest(plan: TimeSteps) -> float:
-    """The longest base step of a plan [s]."""
+    """Return the longest base step of a plan [s]."""
     dt = plan.dt if isinstance(plan, HalvedAtImpact) else plan
     return max(size for size, _ in dt.pieces) if isinstance(dt, Schedule) else float(dt)
 
@@ -85,7 +86,7 @@ class StepPlan:
 
     @property
     def steps(self) -> int:
-        """The number of base steps."""
+        """Return the number of base steps."""
         return sum(steps for _, steps in self.parts)
 
     @property
@@ -94,7 +95,7 @@ class StepPlan:
         return sum(dt * steps for dt, steps in self.parts)
 
     def dt(self, base: int) -> float:
-        """Length of a base step, counted from 0; beyond the end, of the last one."""
+        """Return the length of a base step, counted from 0; beyond the end, of the last one."""
         for dt, steps in self.parts:
             if base < steps:
                 return dt
@@ -103,7 +104,7 @@ class StepPlan:
 
 
 def step_plan(plan: TimeSteps, steps: int | None, t_end: float | None, t0: float = 0.0) -> StepPlan:
-    """The base steps from t0 to t_end, or so many; InputError when plan, steps or t_end make no sense.
+    """Return the base steps from t0 to t_end, or so many; InputError when plan, steps or t_end make no sense.
 
     Counted from the times of the plan, not from those of the run, whose round-off accumulates: a restart, which
     builds it from the same t0, has the same steps. A step shorter than a millionth of dt would be round-off of these

@@ -25,7 +25,7 @@ from .consistent_data import mass_matrix, rigid_part
 
 
 def admissible(problem: ContactProblem, state: State, u: Array, dt: float) -> tuple[Array, Mask]:
-    """(u_p, the points that stopped it) for a predicted displacement ``u`` of the step of dt after ``state``.
+    """Return (u_p, the points that stopped it) for a predicted displacement ``u`` of the step of dt after ``state``.
 
     StepFailure when the projection cannot be certified.
     """

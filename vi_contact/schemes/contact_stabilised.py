@@ -8,7 +8,7 @@ In x = u1:  A = 4/dt² M + 2/dt C + K,  b = 4/dt² M u_p + 2/dt C u0 - K u0 + 2 
 that projects the predictor moves contact nodes to the obstacle and leaves their velocity alone: r̄ is what the body
 presses with, not what stops the mass of the contact nodes. They keep the velocity of their approach till they open.
 
-Order 2 without contact, where it is the midpoint rule; unconditionally stable. Energy (V9.5), q [N s²] the
+Order 2 without contact, where it is the midpoint rule; unconditionally stable. Energy, q [N s²] the
 multipliers of the projection:
 
     E1 - E0 = Δu·f - Δu·C Δu/dt - r̄_n·gap(u0) - r̄_t·B_t Δu - 2/dt² q·gap(u1)
@@ -36,7 +36,8 @@ from .base import SingleStep, position_step, stepped
 
 @dataclass(frozen=True)
 class ContactStabilisedNewmark(SingleStep):
-    """See the module's equations. ``projected``: whether the predictor is projected. It needs mass at contact nodes.
+    """Step by the module's equations. ``projected``: whether the predictor is projected. It needs mass at contact
+    nodes.
 
     StepFailure when the projection cannot be certified.
     """
@@ -47,7 +48,7 @@ class ContactStabilisedNewmark(SingleStep):
         flag("ContactStabilisedNewmark", "projected", self.projected)
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
-        """A = 4/dt² M + 2/dt C + K."""
+        """Return A = 4/dt² M + 2/dt C + K."""
         return problem.equations.effective(m=4.0 / dt**2, c=2.0 / dt, k=1.0)
 
     def _predictor(self, problem: ContactProblem, state: State, dt: float) -> tuple[Array, Mask]:
@@ -56,7 +57,7 @@ class ContactStabilisedNewmark(SingleStep):
         return admissible(problem, state, u, dt) if self.projected else (u, state.active)
 
     def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem:
-        """b of the module's equations."""
+        """Return the step with b of the module's equations."""
         system = problem.equations
         u_p, active = self._predictor(problem, state, dt)
         b = 2.0 * system.load(state.t + 0.5 * dt) + system.M @ (4.0 / dt**2 * u_p) - system.K @ state.u
@@ -65,11 +66,11 @@ class ContactStabilisedNewmark(SingleStep):
         return position_step(problem, state, A, dt, b=b, scale=2.0, guess=u_p, active=active)
 
     def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
-        """v1 = v0 + 2/dt (u1 - u_p)."""
+        """Return the state with v1 = v0 + 2/dt (u1 - u_p)."""
         return stepped(step, result, result.x, state.v + 2.0 / dt * (result.x - step.guess))
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
-        """Averages of the equation above."""
+        """Return the averages of the equation above."""
         return Balance(
             u=0.5 * (old.u + new.u),
             v=(new.u - old.u) / dt,

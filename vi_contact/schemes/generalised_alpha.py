@@ -13,16 +13,13 @@ gamma >= ½ - alpha_m + alpha_f and beta >= gamma/2, all that is accepted. ``spe
 order 2 with amplification rho_inf at infinite frequency and the least damping of low ones,
 alpha_m = (2 rho - 1)/(1 + rho), alpha_f = rho/(1 + rho), beta = ¼ (1 - alpha_m + alpha_f)².
 
-Start, and restart after every velocity jump: the acceleration that fits (schemes.acceleration). Unknowns without mass
-(mass.Redistributed) have no acceleration, the mean velocity of the step, and are in equilibrium at its ends.
-Energy: the ledger closes with the weights of the equation above (V9.7), its algorithmic part is the damping of high
-frequencies. Contact stands in the balance of forces and on consistent mass creates energy when it opens (V9.2), which
-the damping makes up for only while dt does not resolve the highest frequency of the mesh. V1.3 ends its fourth bounce
-at Courant numbers 1, ½, 0.1 with 1.4, 4.8, 19 times its energy (rho_inf = 0.8), 0.94, 0.97, 4.8 (½), 0.89, 0.93, 0.98
-(0); on redistributed mass with 0.98, 0.99, 0.99 (rho_inf = 0.8).
-Impulses (V9.8): sum of dt r_n,f over a contact with free flight before and after is the change of momentum; in single
-steps it is not, unless the member is Newmark.
-Source: Chung and Hulbert, J. Appl. Mech. 60 (1993) 371-375.
+Start, and restart after every velocity jump: the acceleration that fits (``consistent_data``). Unknowns without mass
+(mass.Redistributed) have no acceleration, the mean velocity of the step, and are in equilibrium at its ends. Energy:
+the ledger closes with the weights of the equation above, its algorithmic part is the damping of high frequencies.
+Contact stands in the balance of forces and on consistent mass creates energy when it opens, which the damping makes up
+for only while dt does not resolve the highest frequency of the mesh: docs/guide/schemes.md has numbers. Impulses: sum
+of dt r_n,f over a contact with free flight before and after is the change of momentum; in single steps it is not,
+unless the member is Newmark. Source: Chung and Hulbert, J. Appl. Mech. 60 (1993) 371-375.
 """
 
 from __future__ import annotations
@@ -45,7 +42,7 @@ SLACK = 1e-12  # round-off in the conditions of stability
 
 @dataclass(frozen=True)
 class Weights:
-    """The four numbers of the module's equations. InputError unless unconditionally stable."""
+    """Hold the four numbers of the module's equations. InputError unless unconditionally stable."""
 
     alpha_m: float
     alpha_f: float
@@ -65,26 +62,28 @@ class Weights:
 
 
 class AlphaStep(BalanceStep, ABC):
-    """The step of the module's equations, with the weights of a member. Its memory is "a" (the acceleration),
+    """Step by the module's equations, with the weights of a member. Its memory is "a" (the acceleration),
     "reaction" (Bᵀr at the same end) and "of" (alpha_m, alpha_f and t they belong to)."""
 
     @property
     @abstractmethod
     def weights(self) -> Weights:
-        """alpha_m, alpha_f, beta, gamma of the member."""
+        """Return alpha_m, alpha_f, beta, gamma of the member."""
 
     def _mark(self, t: float) -> Array:
         return np.array([self.weights.alpha_m, self.weights.alpha_f, t])
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
-        """The contact layer in equilibrium and the acceleration; once, not on restarts and changes of dt."""
+        """Return the state with massless nodes in equilibrium and its acceleration; once, not on restarts and changes
+        of dt.
+        """
         if np.array_equal(state.memory.get("of", ()), self._mark(state.t)):
             return state
         state = equilibrated(problem, state)
         return self._restarted(problem, state, dt)
 
     def jump(self, problem: ContactProblem, state: State, v: Array, dt: float) -> State:
-        """The acceleration that fits the new velocity."""
+        """Return the state with the acceleration that fits the new velocity."""
         return self._restarted(problem, replace(state, v=v), dt)
 
     def _restarted(self, problem: ContactProblem, state: State, dt: float) -> State:
@@ -92,7 +91,7 @@ class AlphaStep(BalanceStep, ABC):
         return replace(state, memory={"a": a, "reaction": reaction, "of": self._mark(state.t)})
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
-        """A of the module's equations."""
+        """Return A of the module's equations."""
         w = self.weights
         inertia = (1.0 - w.alpha_m) / ((1.0 - w.alpha_f) * w.beta * dt**2)
         return problem.equations.effective(m=inertia, c=w.gamma / (w.beta * dt), k=1.0)
@@ -104,7 +103,9 @@ class AlphaStep(BalanceStep, ABC):
         return state.v + dt * ((1.0 - w.gamma) * a0 + w.gamma * a), a
 
     def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem:
-        """b = f1 - C v1 - (M a_m - alpha_f (f0 - C v0 - K u0 - Bᵀr0))/(1 - alpha_f), all for u1 = 0."""
+        """Return the step with b = f1 - C v1 - (M a_m - alpha_f (f0 - C v0 - K u0 - Bᵀr0))/(1 - alpha_f), all for u1 =
+        0.
+        """
         system, w = problem.equations, self.weights
         v, a = self._known(state, dt)
         b = system.load(state.t + dt)
@@ -118,7 +119,7 @@ class AlphaStep(BalanceStep, ABC):
         return position_step(problem, state, A, dt, b=b, scale=1.0)
 
     def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
-        """a1 and v1 from u1; massless unknowns get none and the mean velocity of the step."""
+        """Return the state with a1 and v1 from u1; massless unknowns get none and the mean velocity of the step."""
         w = self.weights
         v, a = self._known(state, dt)
         v += w.gamma / (w.beta * dt) * result.x
@@ -129,12 +130,12 @@ class AlphaStep(BalanceStep, ABC):
         return State(step.t, step.k, result.x, v, result.r_n, result.active, memory, result.r_t)
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
-        """The step's own equation of motion."""
+        """Return the step's own equation of motion."""
         return weighted(problem, old, new, self.weights.alpha_m, self.weights.alpha_f)
 
 
 def weighted(problem: ContactProblem, old: State, new: State, m: float, f: float) -> Balance:
-    """(1 - m) and m of the accelerations, (1 - f) and f of everything else at the ends of a step."""
+    """Return (1 - m) and m of the accelerations, (1 - f) and f of everything else at the ends of a step."""
     load, surface, r0 = problem.equations.load, problem.surface, old.memory["reaction"]
     return Balance(
         u=(1.0 - f) * new.u + f * old.u,
@@ -148,7 +149,7 @@ def weighted(problem: ContactProblem, old: State, new: State, m: float, f: float
 
 @dataclass(frozen=True)
 class GeneralisedAlpha(AlphaStep):
-    """See the module's equations; take ``GeneralisedAlpha.spectral_radius(rho_inf)``. InputError unless stable."""
+    """Step by the module's equations; take ``GeneralisedAlpha.spectral_radius(rho_inf)``. InputError unless stable."""
 
     alpha_m: float
     alpha_f: float
@@ -160,12 +161,13 @@ class GeneralisedAlpha(AlphaStep):
 
     @property
     def weights(self) -> Weights:
-        """As given."""
+        """Return what was given."""
         return Weights(self.alpha_m, self.alpha_f, self.beta, self.gamma)
 
     @classmethod
     def spectral_radius(cls, rho_inf: float = 0.8) -> GeneralisedAlpha:
-        """The member of order 2 with this amplification at infinite frequency, 0 (all damped) to 1 (nothing damped)."""
+        """Return the member of order 2 with this amplification at infinite frequency, 0 (all damped) to 1 (nothing
+        damped)."""
         if not 0.0 <= real(rho_inf) <= 1.0:
             raise InputError(
                 f"rho_inf is {shown(rho_inf)}: give the amplification at infinite frequency, from 0 to 1 (no damping)"

@@ -3,12 +3,11 @@
     M a1 + C v_f + K u_f = (1 + alpha) f1 - alpha f0 - B_nᵀ r_n,f - B_tᵀ r_t,f,    (…)_f = (1 + alpha) (…)1 - alpha (…)0
     beta = ¼ (1 - alpha)²,    gamma = ½ - alpha;    contact and friction conditions at the end of the step
 
-Generalised-alpha with alpha_m = 0, alpha_f = -alpha (see there for equations, restart, energy V9.7 and impulses V9.8).
+Generalised-alpha with alpha_m = 0, alpha_f = -alpha (see there for equations, restart, energy and impulses).
 Order 2, unconditionally stable for -1/3 <= alpha <= 0; amplification (1 + alpha)/(1 - alpha) at infinite frequency: 1
 at alpha = 0, which is Newmark(¼, ½), and ½ at -1/3.
-On consistent mass the damping keeps the energy that contact creates (V9.2) in bounds only while dt does not resolve the
-highest frequency of the mesh: V1.3 ends its fourth bounce with 0.95, 0.99 and 8.4 times its energy at Courant numbers
-1, ½ and 0.1 (alpha = -0.1); on redistributed mass with 0.96, 0.98 and 0.99.
+On consistent mass the damping keeps the energy that contact creates in bounds only while dt does not resolve the
+highest frequency of the mesh: docs/guide/schemes.md has numbers.
 Source: Hilber, Hughes and Taylor, Earthquake Eng. Struct. Dyn. 5 (1977) 283-292.
 """
 
@@ -23,7 +22,7 @@ from .generalised_alpha import AlphaStep, Weights
 
 @dataclass(frozen=True)
 class HHT(AlphaStep):
-    """See the module's equations. InputError unless -1/3 <= alpha <= 0."""
+    """Step by the module's equations. InputError unless -1/3 <= alpha <= 0."""
 
     alpha: float = -0.1
 
@@ -33,5 +32,5 @@ class HHT(AlphaStep):
 
     @property
     def weights(self) -> Weights:
-        """As a generalised-alpha member."""
+        """Return the weights as a generalised-alpha member."""
         return Weights(0.0, -self.alpha, 0.25 * (1.0 - self.alpha) ** 2, 0.5 - self.alpha)

@@ -5,17 +5,15 @@
     M a1 + C v1 + K u1 = f1 - B_nᵀ r_n1 - B_tᵀ r_t1
     0 <= r_n1  ⊥  gap0 - B_n u1 >= 0,    |r_t1| <= limit(r_n1) along B_t (u1 - u0)
 
-The member a = (11/6, -3, 3/2, -1/3), b = (1, 0, 0, 0), gamma = (2, -5, 4, -1), mu = 1 of seed 000, eqs. 11a,b: see
-linear_multistep for A, start and restart. Order 2, unconditionally stable. What is much faster than dt dies out in a
-few steps, but slow vibrations lose too, as with generalised-alpha at rho_inf = 0: 6 % of their amplitude a period with
-20 steps a period, 0.6 % with 50.
+The member a = (11/6, -3, 3/2, -1/3), b = (1, 0, 0, 0), gamma = (2, -5, 4, -1), mu = 1 of eqs. 11a,b of the boundary
+method: see linear_multistep for A, start and restart. Order 2, unconditionally stable. What is much faster than dt dies
+out in a few steps, but slow vibrations lose too, as with generalised-alpha at rho_inf = 0: 6 % of their amplitude a
+period with 20 steps a period, 0.6 % with 50.
 
-Energy: the ledger closes with the means of both ends (V9.7); the damping is its algorithmic part. Contact stands in the
-balance of forces (V9.2), but what it creates at high frequencies is damped away at once: on consistent mass V1.1, V1.2
-and V1.3 never exceeded their first energy at Courant numbers from 1 to 0.1. V1.3 ends its fourth bounce with 0.89, 0.93
-and 0.98 of it at 1, ½ and 0.1, on either mass; five periods of V1.2 leave 0.37 at 1 and 0.56 at ½.
-Impulses (V9.8): those over a contact with free flight before and after are the change of momentum; in single steps not.
-Source: Houbolt, J. Aeronaut. Sci. 17 (1950) 540-550; as a member of eqs. 11a,b: seed 000, section 3.
+Energy: the ledger closes with the means of both ends; the damping is its algorithmic part. Contact stands in the
+balance of forces, but what it creates at high frequencies is damped away at once: docs/guide/schemes.md has numbers.
+Impulses: those over a contact with free flight before and after are the change of momentum; in single steps not.
+Source: Houbolt, J. Aeronaut. Sci. 17 (1950) 540-550; as a member of eqs. 11a,b: docs/reference/sources.md [1].
 """
 
 from __future__ import annotations
@@ -27,7 +25,7 @@ from .linear_multistep import LinearMultistep
 
 @dataclass(frozen=True)
 class Houbolt(LinearMultistep):
-    """See the module's equations."""
+    """Step by the module's equations."""
 
     a: tuple[float, ...] = field(default=(11 / 6, -3.0, 3 / 2, -1 / 3), init=False, repr=False)
     b: tuple[float, ...] = field(default=(1.0, 0.0, 0.0, 0.0), init=False, repr=False)

@@ -1,4 +1,4 @@
-"""The general linear multistep operators of seed 000, eqs. 11a,b, with Newmark as one member.
+"""Step with the general linear multistep operators of the boundary method, eqs. 11a,b, with Newmark as one member.
 
     sum_r a[r] u(p-r)     = dt    sum_r b[r] u'(p-r)          (11a)
     sum_r gamma[r] u(p-r) = mu dt² sum_r b[r] u''(p-r)        (11b)     r = 0..q, b[0] != 0
@@ -7,15 +7,15 @@ Solved for the newest velocity and acceleration and put into M u'' + C u' + K u 
 
     A = gamma[0]/(mu dt² b[0]) M + a[0]/(dt b[0]) C + K,   x = u(p),   scale = 1,   |r_t| <= limit(r_n) along B_t du
 
-(The text prints -A u on the right of the semi-discrete equation; with A > 0 the sign is +, verification 4.1.)
+(The text prints -A u on the right of the semi-discrete equation; with A > 0 the sign is +.)
 Start, and restart after every velocity jump or change of dt: the past is filled in with constant acceleration, which
 makes Newmark's two-step form reproduce its one-step form exactly and keeps second order for the other members. After a
-jump it is the one that fits the state without the reaction of the collision (schemes.acceleration): kept, that would
+jump it is the one that fits the state without the reaction of the collision (``consistent_data``): kept, that would
 act for another step, and throw off what the impact law has just stopped. A change of dt keeps both.
 Unknowns without mass (mass.Redistributed) have no acceleration and the mean velocity of the step.
-Energy: the ledger closes with the means of both ends (V9.7). Unlike the midpoint form, contact in the acceleration
-balance at t_p can *gain* energy on consistent mass (V9.2), booked as algorithmic or contact loss of negative sign.
-Impulses: those over a contact with free flight before and after are the change of momentum (V9.8).
+Energy: the ledger closes with the means of both ends. Unlike the midpoint form, contact in the acceleration
+balance at t_p can *gain* energy on consistent mass, booked as algorithmic or contact loss of negative sign.
+Impulses: those over a contact with free flight before and after are the change of momentum.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ DAMPING = (0.0, 0.1, 1.0)  # damping ratios, for the stability check
 
 @dataclass(frozen=True)
 class LinearMultistep(BalanceStep):
-    """Coefficients of eqs. 11a,b, newest level first, all of the same length q + 1 >= 2.
+    """Step with the coefficients of eqs. 11a,b, newest level first, all of the same length q + 1 >= 2.
 
     InputError for unequal lengths, b[0] = 0, or inconsistent operators (they must be exact for u = 1, t and t²).
     """
@@ -78,15 +78,15 @@ class LinearMultistep(BalanceStep):
         return bool(np.max(np.abs(defects)) <= 1e-12 * scale * len(a) ** 2)
 
     def spectral_radius(self) -> float:
-        """Largest |z| of the solutions u(p) = z^p of u'' + 2 xi w u' + w² u = 0 over FREQUENCIES w dt and DAMPING xi:
-        roots of gamma(z)/mu + 2 xi w dt a(z) + (w dt)² b(z)."""
+        """Return the largest |z| of the solutions u(p) = z^p of u'' + 2 xi w u' + w² u = 0 over FREQUENCIES w dt and
+        DAMPING xi: roots of gamma(z)/mu + 2 xi w dt a(z) + (w dt)² b(z)."""
         a, b, gamma = (np.asarray(c, dtype=float) for c in (self.a, self.b, self.gamma))
         polynomials = [b] + [gamma / (self.mu * w**2) + 2.0 * xi / w * a + b for w in FREQUENCIES for xi in DAMPING]
         return max(float(np.max(np.abs(np.roots(polynomial)), initial=0.0)) for polynomial in polynomials)
 
     @classmethod
     def newmark(cls, beta: float = 0.25, gamma: float = 0.5) -> LinearMultistep:
-        """Newmark(beta, gamma) as the q = 2 member (verification 4.1)."""
+        """Return Newmark(beta, gamma) as the q = 2 member."""
         for name, value in (("beta", beta), ("gamma", gamma)):
             number("LinearMultistep.newmark", name, value)
         if beta <= 0.0:
@@ -101,7 +101,8 @@ class LinearMultistep(BalanceStep):
         return self.gamma[0] / (self.mu * dt**2 * self.b[0])
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
-        """The past, unless the state brings one for this dt; the contact layer in equilibrium, once."""
+        """Return the state with a past, unless it brings one for this dt; massless nodes come into equilibrium, once.
+        """
         memory = state.memory
         if not np.array_equal(memory.get("t", ()), [state.t]):
             state = equilibrated(problem, state)
@@ -111,7 +112,7 @@ class LinearMultistep(BalanceStep):
         return self._with_past(state, memory["a_0"], memory["reaction_0"], dt)
 
     def jump(self, problem: ContactProblem, state: State, v: Array, dt: float) -> State:
-        """After a velocity jump the past is that of the new velocity."""
+        """Return the state with the past of the new velocity."""
         return self._restarted(problem, replace(state, v=v), dt)
 
     def _restarted(self, problem: ContactProblem, state: State, dt: float) -> State:
@@ -133,7 +134,7 @@ class LinearMultistep(BalanceStep):
         return past
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
-        """A of the module's equations."""
+        """Return A of the module's equations."""
         return problem.equations.effective(m=self._acceleration_factor(dt), c=self._velocity_factor(dt), k=1.0)
 
     def _levels(self, state: State) -> dict[str, Array]:
@@ -154,7 +155,7 @@ class LinearMultistep(BalanceStep):
         return v / (dt * self.b[0]), a / (self.mu * dt**2 * self.b[0])
 
     def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem:
-        """b = f(t_p) - M a_known - C v_known."""
+        """Return the step with b = f(t_p) - M a_known - C v_known."""
         system = problem.equations
         v, a = self._known(self._levels(state), dt)
         b = system.load(state.t + dt) - system.M @ a
@@ -163,7 +164,7 @@ class LinearMultistep(BalanceStep):
         return position_step(problem, state, A, dt, b=b, scale=1.0)
 
     def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
-        """Newest velocity and acceleration from eqs. 11c,d; the levels move one down."""
+        """Return the state with velocity and acceleration from eqs. 11c,d; the levels move one down."""
         levels = self._levels(state)
         v_known, a_known = self._known(levels, dt)
         v = v_known + self._velocity_factor(dt) * result.x
@@ -174,7 +175,7 @@ class LinearMultistep(BalanceStep):
         return State(step.t, step.k, result.x, v, result.r_n, result.active, levels | newest, result.r_t)
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
-        """Mean of the equations of motion at both ends of the step, the old end after its impact."""
+        """Return the mean of the equations of motion at both ends of the step, the old end after its impact."""
         load, surface, r0 = problem.equations.load, problem.surface, old.memory["reaction_0"]
         return Balance(
             u=0.5 * (old.u + new.u),

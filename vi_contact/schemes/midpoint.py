@@ -7,9 +7,9 @@
 In x = u1:  A = 4/dt² M + 2/dt C + K,  scale = 2. It is ZienkiewiczWoodTaylor(½), SS22(½, ½) and the rule of Kane,
 Repetto, Ortiz and Marsden with implicit contact, identical to round-off (table 1.7).
 
-Order 2, unconditionally stable, no damping of any frequency. Energy (V9.1): it changes by work of loads, damping and
+Order 2, unconditionally stable, no damping of any frequency. Energy: it changes by work of loads, damping and
 friction, and a closure loses r̄_n times the gap that was closed: contact never creates energy. Contact forces ring,
-since contact nodes need their mass here. Impulses (V9.8): dt r̄_n is the change of momentum in every step.
+since contact nodes need their mass here. Impulses: dt r̄_n is the change of momentum in every step.
 Source: Kane, Repetto, Ortiz and Marsden, Comput. Methods Appl. Mech. Eng. 180 (1999) 1-26.
 """
 
@@ -22,6 +22,6 @@ from .zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 
 @dataclass(frozen=True)
 class Midpoint(ZienkiewiczWoodTaylor):
-    """See the module's equations."""
+    """Step by the module's equations."""
 
     phi: float = field(default=0.5, init=False, repr=False)

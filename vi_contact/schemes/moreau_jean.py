@@ -9,7 +9,7 @@ In x = v1:  A = M + theta dt C + theta² dt² K,  bound = -e B_n v0 on closed po
 scale = dt; the state keeps the mean reactions P/dt, and its active points are those that carry an impulse. Restitution
 is a law for nodes: on a fine mesh it has no macroscopic effect. Order 2 without contact at theta = ½, else 1.
 
-Energy (V9.3):  E1 - E0 = Δu·f_θ - dt v_θ·C v_θ - P·B v_θ - (theta - ½)(Δv·M Δv + Δu·K Δu)
+Energy:  E1 - E0 = Δu·f_θ - dt v_θ·C v_θ - P·B v_θ - (theta - ½)(Δv·M Δv + Δu·K Δu)
 
 With Newton's law P_n B_n v_θ = (1 - theta - theta e) P_n B_n v0: no energy comes from points that approach if
 theta <= 1/(1 + e). From points that had begun to separate and are caught within the step it does. They therefore get
@@ -45,7 +45,7 @@ ROUND_OFF = 1e-12  # of the largest displacement: smaller gaps are closed
 
 @dataclass(frozen=True)
 class MoreauJean(SingleStep):
-    """See the module's equations.
+    """Step by the module's equations.
 
     Attributes:
         theta: weight of the end of the step, from ½ to 1/(1 + e).
@@ -74,7 +74,7 @@ class MoreauJean(SingleStep):
             )
 
     def check(self, problem: ContactProblem) -> None:
-        """InputError for massless contact nodes, springs, an impact law, or a bilateral point with a gap."""
+        """Raise InputError for massless contact nodes, springs, an impact law, or a bilateral point with a gap."""
         super().check(problem)
         surface = problem.surface
         if np.any(surface.compliance > 0.0):
@@ -94,7 +94,7 @@ class MoreauJean(SingleStep):
             )
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
-        """A = M + theta dt C + theta² dt² K."""
+        """Return A = M + theta dt C + theta² dt² K."""
         return problem.equations.effective(m=1.0, c=self.theta * dt, k=(self.theta * dt) ** 2)
 
     def _load(self, problem: ContactProblem, t: float, dt: float) -> Array:
@@ -110,7 +110,9 @@ class MoreauJean(SingleStep):
         return obstacle + np.where(surface.bilateral, 0.0, np.where(v_n < 0.0, returning, -self.e) * v_n)
 
     def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem:
-        """b = M v0 + dt (f_θ - K (u0 + theta (1 - theta) dt v0) - (1 - theta) C v0), and the bound on velocities."""
+        """Return the step with b = M v0 + dt (f_θ - K (u0 + theta (1 - theta) dt v0) - (1 - theta) C v0), and the bound
+        on velocities.
+        """
         system, surface, left = problem.equations, problem.surface, 1.0 - self.theta
         force = self._load(problem, state.t, dt) - system.K @ (state.u + self.theta * left * dt * state.v)
         if system.C is not None:
@@ -134,12 +136,12 @@ class MoreauJean(SingleStep):
         )
 
     def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
-        """u1 = u0 + dt v_θ."""
+        """Return the state with u1 = u0 + dt v_θ."""
         u = state.u + dt * ((1.0 - self.theta) * state.v + self.theta * result.x)
         return stepped(step, result, u, result.x)
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
-        """Averages of the equation above."""
+        """Return the averages of the equation above."""
         return Balance(
             u=old.u + self.theta * (new.u - old.u),
             v=(new.u - old.u) / dt,

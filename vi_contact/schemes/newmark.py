@@ -5,18 +5,17 @@
     0 <= r_n1  ⊥  gap0 - B_n u1 >= 0,    |r_t1| <= limit(r_n1) along B_t (u1 - u0)
 
 Generalised-alpha with alpha_m = alpha_f = 0 (see there for A and restart); LinearMultistep.newmark is the same in the
-two-step form of seed 000. Order 2 at gamma = ½, else 1; unconditionally stable for beta >= gamma/2 >= ¼.
+two-step form of the boundary method. Order 2 at gamma = ½, else 1; unconditionally stable for beta >= gamma/2 >= ¼.
 
-Energy (V9.2, Krenk), E of the bodies and their constant loads, with C = 0:
+Energy (Krenk), E of the bodies and their constant loads, with C = 0:
 
     [E + ½ (beta - gamma/2) dt² aᵀMa]0..1 = - du·(B_nᵀ r_n + B_tᵀ r_t)_gamma
                                             - (gamma - ½) (du·K du + (beta - gamma/2) dt² da·M da)
     (…)_gamma = (1 - gamma) (…)0 + gamma (…)1
 
 At (¼, ½) without contact E is constant. With rigid contact its work is ½ (r_n0 g1 - r_n1 g0): on consistent mass a gain
-whenever a contact opens (more than tenfold in V1.3 within four bounces); on redistributed mass of order dt (V9.4), and
-then Newmark(¼, ½) is Trapezoidal().
-Impulses (V9.8): dt times the reactions (…)_gamma are the change of momentum in every step; the ledger uses these means.
+whenever a contact opens; on redistributed mass of order dt, and then Newmark(¼, ½) is Trapezoidal().
+Impulses: dt times the reactions (…)_gamma are the change of momentum in every step; the ledger uses these means.
 Source: Newmark, J. Eng. Mech. Div. ASCE 85 (1959) 67-94; Krenk, Comput. Methods Appl. Mech. Eng. 195
 (2006) 6110-6124.
 """
@@ -32,7 +31,7 @@ from .generalised_alpha import AlphaStep, Weights, weighted
 
 @dataclass(frozen=True)
 class Newmark(AlphaStep):
-    """See the module's equations. InputError unless beta >= gamma/2 >= ¼."""
+    """Step by the module's equations. InputError unless beta >= gamma/2 >= ¼."""
 
     beta: float = 0.25
     gamma: float = 0.5
@@ -42,9 +41,9 @@ class Newmark(AlphaStep):
 
     @property
     def weights(self) -> Weights:
-        """As a generalised-alpha member."""
+        """Return the weights as a generalised-alpha member."""
         return Weights(0.0, 0.0, self.beta, self.gamma)
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
-        """The equations of both ends, with the weights that make M a the change of momentum."""
+        """Return the equations of both ends, with the weights that make M a the change of momentum."""
         return weighted(problem, old, new, 1.0 - self.gamma, 1.0 - self.gamma)

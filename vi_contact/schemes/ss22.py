@@ -6,8 +6,8 @@
 
 In x = u1:  A = 2/(theta2 dt²) M + 2 theta1/(theta2 dt) C + K,  scale = 1/theta2.
 Same amplification as Newmark(beta = theta2/2, gamma = theta1): unconditionally stable for theta2 >= theta1 >= ½,
-order 2 at theta1 = ½. Energy: as the midpoint rule (V9.1) at theta1 = theta2 = ½; dissipates for theta1 > ½.
-Source: verification 4.1 (Zienkiewicz, Wood and Taylor, reference 25 of seed 000).
+order 2 at theta1 = ½. Energy: as the midpoint rule at theta1 = theta2 = ½; dissipates for theta1 > ½.
+Source: Zienkiewicz, Wood and Taylor, in the form with two weights: docs/reference/sources.md [2].
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from .base import SingleStep, position_step, stepped
 
 @dataclass(frozen=True)
 class SS22(SingleStep):
-    """See the module's equations. InputError unless theta2 >= theta1 >= ½ (else only conditionally stable)."""
+    """Step by the module's equations. InputError unless theta2 >= theta1 >= ½ (else only conditionally stable)."""
 
     theta1: float = 0.5
     theta2: float = 0.5
@@ -39,12 +39,12 @@ class SS22(SingleStep):
             )
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
-        """A = 2/(theta2 dt²) M + 2 theta1/(theta2 dt) C + K."""
+        """Return A = 2/(theta2 dt²) M + 2 theta1/(theta2 dt) C + K."""
         theta1, theta2 = self.theta1, self.theta2
         return problem.equations.effective(m=2.0 / (theta2 * dt**2), c=2.0 * theta1 / (theta2 * dt), k=1.0)
 
     def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem:
-        """b = A (u0 + dt v0) + (f - C v0 - K (u0 + theta1 dt v0))/theta2."""
+        """Return the step with b = A (u0 + dt v0) + (f - C v0 - K (u0 + theta1 dt v0))/theta2."""
         system = problem.equations
         guess = state.u + dt * state.v
         force = system.load(state.t + self.theta1 * dt) - system.K @ (state.u + self.theta1 * dt * state.v)
@@ -54,12 +54,12 @@ class SS22(SingleStep):
         return position_step(problem, state, A, dt, b=b, scale=1.0 / self.theta2, guess=guess)
 
     def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
-        """alpha = 2 (u1 - u0 - dt v0)/dt², v1 = v0 + dt alpha."""
+        """Return the state with alpha = 2 (u1 - u0 - dt v0)/dt², v1 = v0 + dt alpha."""
         v = state.v + 2.0 * (result.x - step.guess) / dt
         return stepped(step, result, result.x, v)
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
-        """Averages of the residual equation."""
+        """Return the averages of the residual equation."""
         alpha = (new.v - old.v) / dt
         return Balance(
             u=old.u + self.theta1 * dt * old.v + 0.5 * self.theta2 * dt**2 * alpha,

@@ -8,9 +8,9 @@ In x = u1:  A = 4/dt² M + 2/dt C + K,  b = 4/dt² M (u0 + dt v0) + 2/dt C u0 - 
 reaction at the end of the step. M is without inertia at the contact nodes (mass.Redistributed): their rows are in
 equilibrium at both ends of the step.
 
-Order 2 while nothing opens or closes; unconditionally stable. Energy (V9.4): changes by work of loads and damping and
+Order 2 while nothing opens or closes; unconditionally stable. Energy: changes by work of loads and damping and
 by the contact work ½ (r1 g0 - r0 g1), of either sign and of order dt per event: quasi-conservative, contact forces do
-not ring. On consistent mass this is Newmark(¼, ½), which gains energy in every impact (V9.2); it runs there with a
+not ring. On consistent mass this is Newmark(¼, ½), which gains energy in every impact; it runs there with a
 warning. Source: Khenous, Laborde and Renard, Eur. J. Mech. A 27 (2008) 918-932.
 """
 
@@ -29,7 +29,7 @@ from .consistent_data import at_rest_between, equilibrated
 
 @dataclass(frozen=True)
 class Trapezoidal:
-    """See the module's equations. ``mass``: the mass matrix for problems that do not name one."""
+    """Step by the module's equations. ``mass``: the mass matrix for problems that do not name one."""
 
     mass: MassLaw = field(default_factory=Redistributed)
 
@@ -37,12 +37,12 @@ class Trapezoidal:
         mass_law("Trapezoidal", self.mass)
 
     def check(self, problem: ContactProblem) -> None:
-        """InputError for an impact law on massless contact nodes; warns when they have mass."""
+        """Raise InputError for an impact law on massless contact nodes; warn when they have mass."""
         needs_no_impact_law(problem)
         contact_in_the_balance("Trapezoidal()", problem)
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
-        """The contact layer in equilibrium; once, not on restarts and changes of dt."""
+        """Return the state with massless nodes in equilibrium; once, not on restarts and changes of dt."""
         if "force" in state.memory:
             return state
         state = equilibrated(problem, state)
@@ -55,15 +55,15 @@ class Trapezoidal:
         return replace(state, memory={"force": system.load(state.t) - system.K @ state.u - reaction})
 
     def jump(self, problem: ContactProblem, state: State, v: object, dt: float) -> State:
-        """The new velocity; forces do not depend on it."""
+        """Return the state with the new velocity; forces do not depend on it."""
         return replace(state, v=v)  # type: ignore[arg-type]
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
-        """A = 4/dt² M + 2/dt C + K."""
+        """Return A = 4/dt² M + 2/dt C + K."""
         return problem.equations.effective(m=4.0 / dt**2, c=2.0 / dt, k=1.0)
 
     def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem:
-        """b of the module's equations."""
+        """Return the step with b of the module's equations."""
         system = problem.equations
         b = state.memory["force"] + system.load(state.t + dt) + system.M @ (4.0 / dt**2 * (state.u + dt * state.v))
         if system.C is not None:
@@ -71,13 +71,13 @@ class Trapezoidal:
         return position_step(problem, state, A, dt, b=b, scale=1.0)
 
     def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
-        """v1 = 2 (u1 - u0)/dt - v0; massless unknowns get the mean velocity of the step."""
+        """Return the state with v1 = 2 (u1 - u0)/dt - v0; massless unknowns get the mean velocity of the step."""
         v = at_rest_between(problem, state, result.x, 2.0 / dt * (result.x - state.u) - state.v, dt)
         new = State(step.t, step.k, result.x, v, result.r_n, result.active, r_t=result.r_t)
         return self._with_force(problem, new)
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
-        """Means of both ends."""
+        """Return the means of both ends."""
         load = problem.equations.load
         return Balance(
             u=0.5 * (old.u + new.u),

@@ -1,13 +1,14 @@
-"""The step of Zienkiewicz, Wood and Taylor that seed 000 uses: displacement and velocity interpolated independently.
+"""Step as Zienkiewicz, Wood and Taylor do: displacement and velocity are interpolated independently.
 
-Linear u and v over the step, weighted residual with weight phi (verification 4.1):
+Linear u and v over the step, weighted residual with weight phi (docs/reference/sources.md [2]):
 
     (u1 - u0)/dt = (1 - phi) v0 + phi v1
     M (v1 - v0)/dt + C (u1 - u0)/dt + K ((1 - phi) u0 + phi u1) = f(t0 + phi dt) - B_nᵀ r̄_n,    gap(u1) >= 0
 
-In x = u1:  A = M/(phi dt)² + C/(phi dt) + K,  scale = 1/phi (r_n = r̄_n / phi; seed 000's doubled form at phi = ½).
+In x = u1:  A = M/(phi dt)² + C/(phi dt) + K,  scale = 1/phi (r_n = r̄_n / phi; the doubled form of the boundary method
+at phi = ½).
 
-Order 2 at phi = ½, else 1; unconditionally stable for phi >= ½. Energy at phi = ½ (V9.1): it changes only by work of
+Order 2 at phi = ½, else 1; unconditionally stable for phi >= ½. Energy at phi = ½: it changes only by work of
 loads, damping and contact, and contact with gap >= 0 at the end of the step never creates energy. At phi = ½ it is the
 midpoint rule, SS22(½, ½) and Newmark(¼, ½) in (u, v). No accelerations are stored, so nothing restarts after an impact.
 """
@@ -26,7 +27,7 @@ from .base import SingleStep, position_step, stepped
 
 @dataclass(frozen=True)
 class ZienkiewiczWoodTaylor(SingleStep):
-    """See the module's equations. ``phi`` in [½, 1]: InputError below ½, where the step is unstable."""
+    """Step by the module's equations. ``phi`` in [½, 1]: InputError below ½, where the step is unstable."""
 
     phi: float = 0.5
 
@@ -36,14 +37,14 @@ class ZienkiewiczWoodTaylor(SingleStep):
                              "unstable")
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
-        """A = M/(phi dt)² + C/(phi dt) + K."""
+        """Return A = M/(phi dt)² + C/(phi dt) + K."""
         return problem.equations.effective(m=1.0 / (self.phi * dt) ** 2, c=1.0 / (self.phi * dt), k=1.0)
 
     def _load(self, problem: ContactProblem, state: State, dt: float) -> Array:
         return problem.equations.load(state.t + self.phi * dt)
 
     def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem:
-        """b = f/phi + M (u0 + dt v0)/(phi dt)² + C u0/(phi dt) - (1 - phi)/phi K u0."""
+        """Return the step with b = f/phi + M (u0 + dt v0)/(phi dt)² + C u0/(phi dt) - (1 - phi)/phi K u0."""
         system = problem.equations
         phi = self.phi
         b = self._load(problem, state, dt) / phi
@@ -54,12 +55,12 @@ class ZienkiewiczWoodTaylor(SingleStep):
         return position_step(problem, state, A, dt, b=b, scale=1.0 / phi)
 
     def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
-        """v1 = v0 + ((u1 - u0)/dt - v0)/phi."""
+        """Return the state with v1 = v0 + ((u1 - u0)/dt - v0)/phi."""
         v = state.v + ((result.x - state.u) / dt - state.v) / self.phi
         return stepped(step, result, result.x, v)
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
-        """Averages of the equation above."""
+        """Return the averages of the equation above."""
         return Balance(
             u=old.u + self.phi * (new.u - old.u),
             v=(new.u - old.u) / dt,

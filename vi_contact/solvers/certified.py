@@ -26,7 +26,7 @@ ADVICE = "try a smaller dt, another solver, or check the data of this time"
 
 
 class CertifiedSolver:
-    """A solver and the methods to escalate to, all bound to one effective matrix; nothing uncertified leaves it."""
+    """Try a solver and the methods to escalate to, all bound to one effective matrix; nothing uncertified leaves it."""
 
     def __init__(
         self,
@@ -54,7 +54,8 @@ class CertifiedSolver:
         return self._prepared[rank]
 
     def solve(self, step: StepProblem) -> tuple[StepResult, Certificate, bool]:
-        """(result, certificate, escalated) of the first method below tolerance; StepFailure when there is none."""
+        """Return (result, certificate, escalated) of the first method below tolerance; StepFailure when there is none.
+        """
         refuse_nan(step)
         tried = []
         for rank in range(len(self._solvers)):
@@ -77,7 +78,7 @@ class CertifiedSolver:
 
 
 def refuse_nan(step: StepProblem) -> None:
-    """A NaN would spread silently through every solver; asked of all ranks, so that all stop."""
+    """Raise StepFailure for a NaN, which would spread silently; asked of all ranks, so that all stop."""
     if largest(step.surface.comm, not np.isfinite(np.sum(step.b))):
         raise StepFailure(
             f"the load of step {step.k} at t = {step.t:.6g} s contains NaN or infinite values: "

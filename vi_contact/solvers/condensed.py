@@ -1,4 +1,4 @@
-"""The condensed route: everything eliminated but the contact unknowns (seed 000, sections 3 and 4).
+"""Eliminate everything but the contact unknowns: the condensed route (docs/reference/sources.md [1], sections 3, 4).
 
 With the one factorisation of A and the unit vectors E of the normal unknowns:
 
@@ -9,7 +9,7 @@ With the one factorisation of A and the unit vectors E of the normal unknowns:
     x = A⁻¹ (b - E r)                  one more back-substitution, or a dense product with the stored A⁻¹E
 
 A step costs one back-substitution, the small problem and the correction, whatever the number of contact changes.
-With friction the tangential unknowns of the contact points are kept too: friction_condensed.py.
+With friction the tangential unknowns of the contact points are kept too: ``friction.condensed``.
 """
 
 from __future__ import annotations
@@ -49,7 +49,8 @@ class SmallMethod(Protocol):
 
 @dataclass(frozen=True)
 class Condensed:
-    """Boundary condensation with a method for the small problem; with or without friction, any number of ranks.
+    """Condense onto the contact unknowns, with a method for the small problem; with or without friction, any number of
+    ranks.
 
     ``method`` solves it without friction. ``ProjectedCG`` never forms G: each of its products is a back-substitution,
     for contact sets too large to store. ``friction_method`` solves it with friction: FrictionNewton, NSGS or
@@ -68,7 +69,7 @@ class Condensed:
         instance("Condensed", "rates", self.rates, RateIteration, "give RateIteration()")
 
     def check(self, problem: ContactProblem) -> None:
-        """InputError for friction without a tangential direction, or of a wrong number of values."""
+        """Raise InputError for friction without a tangential direction, or of a wrong number of values."""
         surface = problem.surface
         if problem.frictional and surface.tangents.shape[1] == 0:
             raise InputError(
@@ -77,12 +78,12 @@ class Condensed:
         problem.friction.limit(np.zeros(surface.count), surface.weights, 1.0)
 
     def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> PreparedCondensed:
-        """Factorises A and condenses it; once per time step size."""
+        """Factorise A and condense it; once per time step size."""
         return PreparedCondensed(self, A, surface, scale)
 
 
 class AppliedDelassus:
-    """G as an operator: each product is one back-substitution. Nothing of size rows x m is stored."""
+    """Apply G as an operator: each product is one back-substitution. Nothing of size rows x m is stored."""
 
     def __init__(self, A: EffectiveMatrix, surface: ContactSurface, extra: Array) -> None:
         self._A, self._surface, self.extra = A, surface, extra
@@ -94,7 +95,7 @@ class AppliedDelassus:
 
 
 class PreparedCondensed:
-    """The condensed problem of one A. ``delassus`` and ``schur`` are G and D~ (dense, equal on all ranks)."""
+    """Solve the condensed problem of one A. ``delassus`` and ``schur`` are G and D~ (dense, equal on all ranks)."""
 
     def __init__(self, settings: Condensed, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> None:
         self._settings, self._A, self._surface = settings, A, surface
@@ -126,11 +127,11 @@ class PreparedCondensed:
 
     @property
     def schur(self) -> Array:
-        """D~ = G⁻¹: reactions of the contact points to unit normal displacements (eq. 49)."""
+        """Return D~ = G⁻¹: reactions of the contact points to unit normal displacements (eq. 49)."""
         return np.asarray(np.linalg.inv(self.delassus))
 
     def solve(self, step: StepProblem) -> StepResult:
-        """x, r_n and the active set of a step."""
+        """Return x, r_n and the active set of a step."""
         x = self._A.factor.solve(step.b)
         if self._surface.count == 0:
             none = np.zeros(0)
@@ -144,7 +145,7 @@ class PreparedCondensed:
 
     @property
     def friction(self) -> CondensedFriction:
-        """The small problem with friction, made at the first step that has some."""
+        """Return the small problem with friction, made at the first step that has some."""
         if self._friction is None:
             normal = self.delassus
             if isinstance(normal, AppliedDelassus):

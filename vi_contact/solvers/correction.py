@@ -32,32 +32,33 @@ ROUNDS = 3
 
 @dataclass(frozen=True)
 class Share:
-    """A friction law whose limit is counted in shares of the reactions: s limit(r / s)."""
+    """Count the limit of a friction law in shares of the reactions: s limit(r / s)."""
 
     law: FrictionLaw
     share: float
 
     def limit(self, r_n: Array, weights: Array, scale: float) -> Array:
-        """The cohesive part is a share of what it was, the slope is the same."""
+        """Return the limit: the cohesive part is a share of what it was, the slope is the same."""
         return self.share * self.law.limit(r_n / self.share, weights, scale)
 
     def slope(self, weights: Array) -> Array:
-        """That of the law."""
+        """Return the slope of the law."""
         return self.law.slope(weights)
 
     def at(self, speed: Array) -> FrictionLaw:
-        """Itself, for a law that does not know the slip rate."""
+        """Return itself, for a law that does not know the slip rate."""
         law = self.law.at(speed)
         return self if law is self.law else Share(law, self.share)
 
 
 def share_of(residual: float) -> float:
-    """The share of its reactions that an answer with this residual gives back, a power of two: it loses no digit."""
+    """Return the share of its reactions that an answer with this residual gives back, a power of two: it loses no
+    digit."""
     return float(np.clip(np.exp2(np.ceil(np.log2(max(residual, LEAST) * MARGIN))), LEAST, 1.0))
 
 
 def left_over(step: StepProblem, answer: StepResult, share: float) -> StepProblem:
-    """The step for d and q of the head of this file."""
+    """Return the step for d and q of the head of this file."""
     surface, x = step.surface, answer.x
     r_n, r_t = kept(step, answer, share)
     return replace(
@@ -72,7 +73,7 @@ def left_over(step: StepProblem, answer: StepResult, share: float) -> StepProble
 
 
 def added(step: StepProblem, answer: StepResult, found: StepResult, share: float) -> StepResult:
-    """The answer with the solution of what it left over."""
+    """Return the answer with the solution of what it left over."""
     r_n, r_t = kept(step, answer, share)
     if found.r_t is not None:
         r_t = found.r_t if r_t is None else r_t + found.r_t
@@ -82,8 +83,8 @@ def added(step: StepProblem, answer: StepResult, found: StepResult, share: float
 
 
 def kept(step: StepProblem, answer: StepResult, share: float) -> tuple[Array, Array | None]:
-    """1 - s times the reactions, those outside the cone, or no farther than s from its edge, on its edge: whether they
-    stick or slip, what is missing then lies in the cone of q."""
+    """Return 1 - s times the reactions, those outside the cone, or no farther than s from its edge, on its edge:
+    whether they stick or slip, what is missing then lies in the cone of q."""
     surface = step.surface
     r_n = np.where(surface.bilateral, answer.r_n, np.maximum(answer.r_n, 0.0))
     if answer.r_t is None or step.slip0 is None:
@@ -101,7 +102,7 @@ def corrected(
     solve: Callable[[StepProblem], StepResult],
     goal: float,
 ) -> tuple[StepResult, Certificate]:
-    """The result after corrections that brought its certificate to the goal, or as near to it as they got."""
+    """Return the result after corrections that brought its certificate to the goal, or as near to it as they got."""
     for _ in range(ROUNDS):
         share = share_of(certificate.worst)
         try:

@@ -39,7 +39,7 @@ SAID = 200  # characters of a foreign reason
 
 @dataclass(frozen=True)
 class RestartPoint:
-    """The end of a base step, where a run can be left and continued.
+    """Hold the end of a base step, where a run can be left and continued.
 
     t_start, k_start: of the state the whole run began with; ``steps`` and ``t_end`` of a restart count from there.
     base: base steps done since then; halved: attempts thrown away since then.
@@ -53,18 +53,18 @@ class RestartPoint:
 
     @classmethod
     def first(cls, state: State) -> RestartPoint:
-        """The beginning of a run."""
+        """Return the beginning of a run."""
         return cls(state, state.t, state.k)
 
     @property
     def number(self) -> int:
-        """Number of the base step, counted on from the k of the first state."""
+        """Return the number of the base step, counted on from the k of the first state."""
         return self.k_start + self.base
 
 
 @dataclass(frozen=True)
 class Problem:
-    """What a checkpoint is of: ``facts`` that a restart must have in common with it, functions of time seen between
+    """Say what a checkpoint is of: ``facts`` that a restart must have in common with it, functions of time seen between
     two times [s]."""
 
     facts: Identity
@@ -72,14 +72,14 @@ class Problem:
 
     @classmethod
     def of(cls, problem: ContactProblem, scheme: Scheme, dt: TimeSteps, start: float, end: float) -> Problem:
-        """Of a run from start to end. Collective."""
+        """Return the problem of a run from start to end. Collective."""
         return cls(identity(problem, scheme, dt, start=start, end=end), (start, end))
 
 
 def write_checkpoint(
     folder: Path, problem: ContactProblem, place: RestartPoint, *, of: Problem, rows: str = ""
 ) -> None:
-    """Replaces the checkpoint in the folder. ``rows``: checksum of the histories up to here. Collective;
+    """Replace the checkpoint in the folder. ``rows``: checksum of the histories up to here. Collective;
     ViContactError on all ranks when the disk refuses it."""
     state = place.state
     vectors, same = _split(problem, state)
@@ -102,7 +102,7 @@ def write_checkpoint(
 
 
 def checksum(arrays: Mapping[str, Any]) -> str:
-    """Of names, types, shapes and values."""
+    """Return the checksum of names, types, shapes and values."""
     found = hashlib.sha256()
     for name, values in sorted(arrays.items()):
         array = np.asarray(values)
@@ -126,7 +126,7 @@ def _split(problem: ContactProblem, state: State) -> tuple[Arrays, Arrays]:
 def read_checkpoint(
     folder: Path, problem: ContactProblem, *, scheme: Scheme, dt: TimeSteps, changed: bool = False
 ) -> tuple[RestartPoint, str]:
-    """(where a run was left, with the state on the ranks of this one; checksum of its histories). Collective.
+    """Return (where a run was left, with the state on the ranks of this one; checksum of its histories). Collective.
 
     InputError when the checkpoint is missing, damaged, of an unknown format, or of another problem, dt (or plan of
     them) or scheme; unless ``changed`` allows the latter. After another dt the steps are counted anew from here;

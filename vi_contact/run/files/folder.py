@@ -29,7 +29,7 @@ SUMMARY = "summary.json"
 FILES = (ABOUT, CHECKPOINT, COLUMNS, FIELDS_INDEX, HISTORY_CSV, HISTORY_H5, JOURNAL, LOG, SUMMARY)  # of a run
 
 def run_folder(comm: Comm, path: str | Path) -> Path:
-    """Makes the folder, with parents, and tries to write into it, before any work is done; InputError if not."""
+    """Make the folder, with parents, and try to write into it, before any work is done; InputError if not."""
     folder = Path(path)
 
     def make() -> None:
@@ -47,14 +47,14 @@ def run_folder(comm: Comm, path: str | Path) -> Path:
 
 
 def check_format(file: Path, found: Any) -> None:
-    """InputError for a file of a format that this version does not know."""
+    """Raise InputError for a file of a format that this version does not know."""
     if found != FORMAT or isinstance(found, bool):
         raise InputError(f"'{file}' has format {shown(found)} and this version of vi_contact reads {FORMAT}: read it "
                          "with the version that wrote it")
 
 
 def check_folder_format(folder: Path) -> None:
-    """The same for a run folder; those of the first version have no number, which is well."""
+    """Raise InputError likewise for a run folder; those of the first version have no number, which is well."""
     try:
         found = json.loads((folder / ABOUT).read_text(encoding="utf-8"))["format"]
     except FileNotFoundError:
@@ -65,7 +65,7 @@ def check_folder_format(folder: Path) -> None:
 
 
 def clear(folder: Path) -> None:
-    """Removes what an earlier run left in the folder and a new one could be mistaken for; histories are overwritten."""
+    """Remove what an earlier run left in the folder and a new one could be mistaken for; histories are overwritten."""
     for name in (ABOUT, CHECKPOINT, JOURNAL, HISTORY_H5, SUMMARY, FIELDS_INDEX):
         (folder / name).unlink(missing_ok=True)
     for frame in (folder / FIELDS).glob("*.h5"):
@@ -73,6 +73,6 @@ def clear(folder: Path) -> None:
 
 
 def remove_litter(folder: Path) -> None:
-    """Removes what killed processes left of files they were about to replace; with the folder's lock only."""
+    """Remove what killed processes left of files they were about to replace; with the folder's lock only."""
     for path in [*folder.glob(".*.*[0-9].tmp"), *(folder / FIELDS).glob(".*.*[0-9].tmp")]:
         path.unlink(missing_ok=True)

@@ -32,7 +32,7 @@ GROWTH = 1.25  # history.h5 is rewritten when it has grown by this factor: what 
 
 
 class HistoryFiles:
-    """The files of a table (rank 0 only). Every method may raise OSError.
+    """Keep the files of a table (rank 0 only). Every method may raise OSError.
 
     ``stored``: the rows of an earlier run that this one continues, in the same folder (later ones are dropped) or in
     another; without them the table has its first row only.
@@ -75,7 +75,7 @@ class HistoryFiles:
             self._journal = open(self._folder / JOURNAL, "wb", buffering=0)  # noqa: SIM115
 
     def append(self, row: Row) -> None:
-        """A row onto the disk; a line that the disk has no room for is taken back as a whole."""
+        """Write a row onto the disk; a line that the disk has no room for is taken back as a whole."""
         line, record = line_of(self._table, row), record_of(self._table, row) if self._table.arrays else b""
         if record:
             self._write(self._journal, record)
@@ -85,7 +85,8 @@ class HistoryFiles:
         self._rows, self._last = self._rows + 1, int(row["k"])
 
     def checksum(self, k: int) -> str:
-        """Of the rows up to step k, for its checkpoint; later ones are of a base step that is not at its end."""
+        """Return the checksum of the rows up to step k, for its checkpoint; later ones are of a base step that is not
+        at its end."""
         if k == self._last:
             return self._hash.hexdigest()
         stored = StoredRows(self._folder, self._table, k)
@@ -103,7 +104,7 @@ class HistoryFiles:
             raise OSError(error.errno, error.strerror, file.name) from error
 
     def sync(self) -> None:
-        """Rows onto the medium before a checkpoint relies on them; history.h5 when it has grown enough."""
+        """Push rows onto the medium before a checkpoint relies on them; history.h5 when it has grown enough."""
         os.fsync(self._csv.fileno())
         if self._journal is not None:
             os.fsync(self._journal.fileno())
@@ -111,7 +112,7 @@ class HistoryFiles:
             self.save()
 
     def save(self) -> None:
-        """history.h5 with all rows; the journal starts anew."""
+        """Write history.h5 with all rows; the journal starts anew."""
         self._replace(self._since(), self._saved)
         self._tail = self._csv.tell()
         self._open_journal()
@@ -161,7 +162,7 @@ class HistoryFiles:
             geometry.create_dataset(name, data=values).attrs["unit"] = unit
 
     def close(self) -> None:
-        """All rows in history.h5, no journal left; what cannot be written stays in the other files."""
+        """Write all rows into history.h5 and leave no journal; what cannot be written stays in the other files."""
         try:
             self.save()
             self._close()
@@ -185,5 +186,5 @@ def _copy(old: h5py.Dataset, new: h5py.Dataset, rows: int) -> None:
 
 
 def describe(columns: Columns) -> dict[str, dict[str, str]]:
-    """Column -> unit and meaning, as columns.json has it."""
+    """Return column -> unit and meaning, as columns.json has it."""
     return {name: {"unit": unit, "meaning": meaning} for name, (unit, meaning) in columns.items()}

@@ -67,17 +67,17 @@ def identity(problem: ContactProblem, scheme: Scheme, dt: TimeSteps, *, start: f
 
 
 def probe(numbers: Any, j: int) -> Array:
-    """Values between -1/2 and 1/2 at these whole numbers; each j gives others."""
+    """Return values between -1/2 and 1/2 at these whole numbers; each j gives others."""
     return np.asarray((np.asarray(numbers, dtype=float) * (GOLDEN / (j + 1))) % 1.0 - 0.5)
 
 
 def text_of(value: Any) -> str:
-    """The repr of a law without addresses, and without what releases of numpy write differently."""
+    """Return the repr of a law without addresses, and without what releases of numpy write differently."""
     return _NUMPY.sub(r"\1", _ADDRESS.sub("", repr(value)))
 
 
 def difference(ours: Identity, theirs: Mapping[str, Any]) -> tuple[str, str] | None:
-    """(name, how) of the first fact of theirs that is another one in ours."""
+    """Return (name, how) of the first fact of theirs that is another one in ours."""
     for name, own in ours.items():
         if name not in theirs:
             continue  # checkpoints of the first version do not have all
@@ -101,7 +101,7 @@ def _same_numbers(own: Numbers, other: Any) -> bool:
 
 
 def _same_text(own: str, other: str) -> bool:
-    """The same words, and the same numbers between them to SAME."""
+    """Say whether words are the same, and numbers between them to SAME."""
     one, two = _NUMBER.split(own), _NUMBER.split(other)
     if len(one) != len(two) or one[::2] != two[::2]:
         return False

@@ -23,7 +23,7 @@ _held: dict[Path, int] = {}  # folders that this process has locked -> the threa
 
 @contextmanager
 def locked(comm: Comm, folder: Path | None) -> Iterator[None]:
-    """While it lasts, other runs that want the folder are refused with one sentence on all their ranks. Collective.
+    """Refuse other runs that want the folder, while it lasts, with one sentence on all their ranks. Collective.
 
     Rank 0 holds a lock (flock) on a file in the folder. What a killed run leaves of it holds nobody up. Within the same
     thread it may be taken again. On a file system that knows no locks there is none, which is logged.

@@ -33,7 +33,7 @@ class _LogFile(logging.FileHandler):
 
 
 class RunLog:
-    """Everything logged under ``vi_contact`` while it is open goes to the file, and warnings to the terminal.
+    """Send everything logged under ``vi_contact`` to a file while it is open, and warnings to the terminal.
 
     Only rank 0 has a path. The root logger is left out: form compilers make it print every line.
     """
@@ -51,13 +51,13 @@ class RunLog:
             LOGGER.propagate = False
 
     def check(self) -> None:
-        """Raises the OSError of a line that could not be written."""
+        """Raise the OSError of a line that could not be written."""
         if self._file is not None and self._file.error is not None:
             error = self._file.error
             raise OSError(error.errno, error.strerror, self._file.baseFilename)
 
     def close(self) -> None:
-        """Gives the logger back as it was."""
+        """Give the logger back as it was."""
         if self._file is not None:
             LOGGER.removeHandler(self._file)
             LOGGER.removeHandler(self._terminal)
@@ -68,7 +68,7 @@ class RunLog:
 
 
 def versions() -> dict[str, str]:
-    """Version of everything that computes in this process."""
+    """Return the version of everything that computes in this process."""
 
     found = {
         "vi_contact": __version__,
@@ -85,14 +85,15 @@ def versions() -> dict[str, str]:
 
 
 def clock(seconds: float) -> str:
-    """1:02:03, or 2:03 below an hour."""
+    """Return 1:02:03, or 2:03 below an hour."""
     minutes, second = divmod(int(seconds), 60)
     hours, minute = divmod(minutes, 60)
     return f"{hours}:{minute:02d}:{second:02d}" if hours else f"{minute}:{second:02d}"
 
 
 class Progress:
-    """The progress line: tqdm on a terminal; otherwise a line in the log every tenth of the run or every 30 s."""
+    """Show the progress: a line of tqdm on a terminal; otherwise a line in the log every tenth of the run or every 30
+    s."""
 
     def __init__(self, total: int, *, shown: bool) -> None:
         self._total, self._done = total, 0
@@ -114,7 +115,7 @@ class Progress:
             self._bar.close()
 
     def step(self, k: int, t: float, *, iterations: int, worst: float) -> None:
-        """One more step is done."""
+        """Count one more step as done."""
         self._done += 1
         if self._bar is not None:
             self._bar.set_postfix_str(f"t={t:.4g} s, iterations={iterations}, worst={worst:.1e}", refresh=False)

@@ -32,7 +32,7 @@ _KINDS: dict[str, type | tuple[type, ...]] = {  # of the entries of summary.json
 
 @dataclass(frozen=True)
 class ContactGeometry:
-    """Contact points as group ``contact`` of history.h5 has them: see ``ContactSurface``."""
+    """Hold contact points as group ``contact`` of history.h5 has them: see ``ContactSurface``."""
 
     points: Array
     normals: Array
@@ -43,7 +43,7 @@ class ContactGeometry:
 
 @dataclass(frozen=True)
 class RunFolder:
-    """A run read from its files, as ``Solution`` has it.
+    """Hold a run read from its files, as ``Solution`` has it.
 
     Attributes:
         folder: where it is. history: column -> values, (rows,) or (rows, …) for arrays per contact point.
@@ -59,7 +59,7 @@ class RunFolder:
 
 
 def read_run(folder: str | Path) -> RunFolder:
-    """Reads a run folder of ``simulate``; of a run that goes on or was killed what is there.
+    """Read a run folder of ``simulate``; of a run that goes on or was killed what is there.
 
     Numbers come from history.csv, which has every step. Arrays come from history.h5, when it has all steps too (it does
     once the run has ended). InputError when there is no history, or a file is damaged.
@@ -85,7 +85,8 @@ def _short(error: Exception) -> str:
 
 
 def read_object(path: Path) -> dict[str, Any]:
-    """The JSON object of a file of a run; ValueError for anything else, NaN, and texts that cannot be printed."""
+    """Return the JSON object of a file of a run; ValueError for anything else, NaN, and texts that cannot be printed.
+    """
     if path.stat().st_size > BYTES:
         raise ValueError(f"{path.name} is larger than {BYTES:.0e} bytes")
     try:

@@ -24,19 +24,19 @@ from .table import BLOCK, Block, Table
 
 
 def line_of(table: Table, row: Row) -> bytes:
-    """A line of history.csv: whole numbers stay whole, all others are floats that read back to the last bit."""
+    """Return a line of history.csv: whole numbers stay whole, all others are floats that read back to the last bit."""
     values = [row[name] for name in table.numbers]
     return (",".join([repr(v if type(v) is int else float(v)) for v in values]) + "\n").encode()
 
 
 def record_of(table: Table, row: Row) -> bytes:
-    """The arrays of a row as the journal has them: float64, k first."""
+    """Return the arrays of a row as the journal has them: float64, k first."""
     arrays = [np.asarray(row[name], dtype=float).ravel() for name in table.arrays]
     return np.concatenate([[float(row["k"])], *arrays]).tobytes()
 
 
 class StoredRows:
-    """Rows up to step k in a folder. ``checksum``: what they must have, as of the checkpoint; "" for one without.
+    """Read rows up to step k in a folder. ``checksum``: what they must have, as of the checkpoint; "" for one without.
 
     After ``blocks`` has come to its end: ``length`` in bytes of their part of history.csv, ``hash`` of what was read.
     """
@@ -46,7 +46,7 @@ class StoredRows:
         self.length, self.hash = 0, hashlib.sha256()
 
     def blocks(self) -> Iterator[Block]:
-        """The rows, in order. InputError, one sentence, for what is missing, damaged or of other columns."""
+        """Return the rows, in order. InputError, one sentence, for what is missing, damaged or of other columns."""
         check_folder_format(self.folder)
         path, names = self.folder / HISTORY_CSV, self._table.numbers
         if not path.is_file():
@@ -75,7 +75,8 @@ class StoredRows:
 def read_blocks(
     csv: Any, table: Table, arrays: StoredArrays, *, first: int = 0, k: int | None = None
 ) -> Iterator[tuple[list[bytes], Block]]:
-    """(lines, rows) from where history.csv is open, row ``first``, to step k or its end. A line cut short is none."""
+    """Return (lines, rows) from where history.csv is open, row ``first``, to step k or its end. A line cut short is
+    none."""
     done = first
     while True:
         lines = [line for line in islice(csv, BLOCK) if line.endswith(b"\n")]
@@ -109,7 +110,7 @@ def _numbers(path: str, lines: list[bytes], width: int, before: int) -> Array:
 
 
 class StoredArrays:
-    """The arrays of a table in history.h5 (the first rows) and in the journal (later ones)."""
+    """Read the arrays of a table in history.h5 (the first rows) and in the journal (later ones)."""
 
     def __init__(self, folder: Path, table: Table) -> None:
         self._path, self._samples = folder / HISTORY_H5, table.arrays
@@ -127,7 +128,7 @@ class StoredArrays:
             self._file.close()
 
     def rows(self, first: int, steps: Array) -> Block:
-        """The arrays of consecutive rows, of these steps; InputError where one is missing."""
+        """Return the arrays of consecutive rows, of these steps; InputError where one is missing."""
         if not self._samples:
             return {}
         n = self._in_hdf5(first, steps)

@@ -24,7 +24,7 @@ Block = dict[str, Array]  # column -> values of some rows: (rows,) float64, or (
 
 
 class Table:
-    """Columns and rows of a run, the same on every rank.
+    """Hold columns and rows of a run, the same on every rank.
 
     Attributes:
         columns: column -> (unit, meaning). first: the row it was made with. count: rows so far.
@@ -44,8 +44,8 @@ class Table:
         self.append(first)
 
     def check(self, row: Row) -> None:
-        """InputError for a row whose recorder, one of your own, fills other columns than it announced, or not with
-        numbers."""
+        """Raise InputError for a row whose recorder, one of your own, fills other columns than it announced, or not
+        with numbers."""
         for name in sorted(row.keys() ^ self.columns.keys()):
             raise InputError(f"a recorder announces the column '{name}' without filling it, or the other way round: "
                              "let columns(), start() and row() name the same")
@@ -54,7 +54,7 @@ class Table:
                 raise InputError(f"column '{name}' is {shown(value)}: let its recorder return a number or an array")
 
     def append(self, row: Row) -> None:
-        """One more row."""
+        """Add one more row."""
         self._open.append(row)
         self.count += 1
         if len(self._open) == BLOCK:
@@ -62,7 +62,7 @@ class Table:
             self._store(self._columns(rows))
 
     def restore(self, block: Block) -> None:
-        """More rows of an earlier run, which are those before the one that the table was made with."""
+        """Add rows of an earlier run, which are those before the one that the table was made with."""
         if self.count == 1 and self._open:
             self._open, self.count = [], 0
         self.count += len(block["k"])
@@ -81,15 +81,15 @@ class Table:
             self._blocks.append(block)
 
     def facts(self) -> dict[str, Any]:
-        """What the rows say about the run, for its summary."""
+        """Return what the rows say about the run, for its summary."""
         tally = copy.deepcopy(self._tally)
         if self._open:
             tally.add(self._columns(self._open))
         return tally.facts()
 
     def history(self, file: Path | None = None) -> Mapping[str, Array]:
-        """Column -> values of all rows: (rows,) float64, or (rows, *shape of the arrays); of too many rows for the
-        memory as they are in ``file``, the history.h5 of the run."""
+        """Return column -> values of all rows: (rows,) float64, or (rows, *shape of the arrays); of too many rows for
+        the memory as they are in ``file``, the history.h5 of the run."""
         if self._open:
             rows, self._open = self._open, []
             self._store(self._columns(rows))
@@ -100,7 +100,7 @@ class Table:
 
 
 class StoredHistory(Mapping[str, Array]):
-    """Histories that are read column by column from history.h5 when somebody asks.
+    """Hold histories that are read column by column from history.h5 when somebody asks.
 
     ViContactError when the file is not there any more, or no longer holds these rows.
     """

@@ -23,7 +23,7 @@ LEDGER = (
 
 
 class Tally:
-    """Steps, iterations, worst certificate, contact and energy ledger of a run. Row 0 is the initial state."""
+    """Step, iterations, worst certificate, contact and energy ledger of a run. Row 0 is the initial state."""
 
     def __init__(self) -> None:
         self._rows = 0
@@ -34,7 +34,7 @@ class Tally:
         self._last: dict[str, float] = {}
 
     def add(self, rows: Mapping[str, Array]) -> None:
-        """More rows, in order: column -> values."""
+        """Add rows, in order: column -> values."""
         self._last = {name: float(rows[name][-1]) for name in ("t", *dict(LEDGER)) if name in rows}
         steps = slice(0 if self._rows else 1, None)
         self._rows += len(rows["t"])
@@ -73,7 +73,7 @@ class Tally:
             self._most[name] = float(np.maximum(self._most.get(name, -np.inf), np.max(values)))
 
     def facts(self) -> dict[str, Any]:
-        """For summary.json."""
+        """Return the numbers for summary.json."""
         steps, most = self._rows - 1, self._most
         facts: dict[str, Any] = {
             "steps": steps,

@@ -26,13 +26,14 @@ log = logging.getLogger(__name__)
 
 
 class OpenFields(Protocol):
-    """Writes frames of fields; collective."""
+    """Write frames of fields; collective."""
 
     def write(self, state: State, acceleration: Array, report: Report | None = None) -> None: ...
 
 
 class FieldWriter(Protocol):
-    """Field output (fem.XDMF). ``open`` is collective; ``kept``: step -> time of the rows kept of an earlier run."""
+    """Write field output (fem.XDMF). ``open`` is collective; ``kept``: step -> time of the rows kept of an earlier run.
+    """
 
     @property
     def every(self) -> int: ...
@@ -41,7 +42,7 @@ class FieldWriter(Protocol):
 
 
 class Writer:
-    """The folder of a run, or none: then nothing is written. Every method but ``rescue`` is collective.
+    """Write into the folder of a run, or into none: then nothing is written. Every method but ``rescue`` is collective.
 
     ``stored``: the rows of an earlier run that this one continues. When they are in this folder, all that is there is
     kept; otherwise it is cleared by ``open``.
@@ -62,13 +63,13 @@ class Writer:
 
     @property
     def rest(self) -> str:
-        """What remains of a run that was ended early, for a sentence."""
+        """Return what remains of a run that was ended early, for a sentence."""
         if self._folder is None:
             return "without an output folder nothing of it is kept"
         return f"restart it from its checkpoint in '{self._folder}'"
 
     def open(self, state: State) -> None:
-        """Makes the files and writes the first frame."""
+        """Make the files and write the first frame."""
         folder = self._folder
         if folder is None:
             return
@@ -94,7 +95,7 @@ class Writer:
         write_atomically(folder / ABOUT, (to_json(about) + "\n").encode())
 
     def append(self, row: Row) -> None:
-        """A row of the histories onto the disk."""
+        """Write a row of the histories onto the disk."""
         if self._folder is not None:
             on_root(self._comm, lambda: self._append(row))
 
@@ -104,12 +105,12 @@ class Writer:
             self._files.append(row)
 
     def frame(self, report: Report, number: int) -> None:
-        """A frame of the fields at the end of a base step, when one is due by its number."""
+        """Write a frame of the fields at the end of a base step, when one is due by its number."""
         if self._fields is not None and self._settings is not None and number % self._settings.every == 0:
             self._fields.write(report.new, report.balance.a, report)
 
     def checkpoint(self, place: RestartPoint, of: Callable[[], Problem]) -> None:
-        """A checkpoint of this place, unless there is one already. ``of``: what problem it is."""
+        """Write a checkpoint of this place, unless there is one already. ``of``: what problem it is."""
         k = place.state.k
         if self._folder is None or self._saved == k:
             return
@@ -127,15 +128,16 @@ class Writer:
 
     @property
     def history(self) -> Path | None:
-        """Where the histories are."""
+        """Say where the histories are."""
         return None if self._folder is None else self._folder / HISTORY_H5
 
     def close(self, facts: Mapping[str, Any]) -> None:
-        """The last version of every file."""
+        """Write the last version of every file."""
         on_root(self._comm, lambda: self._close(facts))
 
     def rescue(self, facts: Mapping[str, Any]) -> None:
-        """The same after a failure: not collective, as other ranks might not come, and no error hides the first one."""
+        """Do the same after a failure: not collective, as other ranks might not come, and no error hides the first one.
+        """
         with suppress(Exception):
             self._close(facts)
 

@@ -4,9 +4,9 @@ With the unit vectors E of the normal and F of the tangential unknowns, x_free =
 
     G = DᵀA⁻¹D (+ compliance/scale on the normal diagonal),    node by node: r_n, then r_t
     q_n = bound - Eᵀx_free,   q_t = slip0 - Fᵀx_free             gap, and minus the slip, without reactions
-    the small problem of friction_small.py gives r;   x = A⁻¹(b - E r_n - F r_t)
+    the small problem of ``problem`` gives r;   x = A⁻¹(b - E r_n - F r_t)
 
-A law that depends on the slip rate makes this a sequence of such problems: slip_rate.py.
+A law that depends on the slip rate makes this a sequence of such problems: ``slip_rate``.
 
 Tangential unknowns that are prescribed carry no reaction: their rows are replaced by those of a free spring.
 """
@@ -23,7 +23,7 @@ from .slip_rate import RateIteration
 
 
 class CondensedFriction:
-    """The small problem with friction of one A. ``normal`` (m, m): the Delassus operator of the normal unknowns.
+    """Solve the small problem with friction of one A. ``normal`` (m, m): the Delassus operator of the normal unknowns.
 
     ``columns``: A⁻¹F, the owned rows, when they are to be kept.
     """
@@ -66,7 +66,7 @@ class CondensedFriction:
         return G.reshape(m * (1 + k), m * (1 + k))
 
     def solve(self, step: StepProblem, x_free: Array) -> FrictionResult:
-        """The reactions of a step."""
+        """Return the reactions of a step."""
         surface = self._surface
         gap = step.bound - surface.normal_values(x_free)
         slip = surface.tangential_values(x_free) - origin(step)
@@ -89,13 +89,13 @@ class CondensedFriction:
         return np.where(((found.r[:, 0] > 0.0) & ~found.stick)[:, None], -w, 0.0)
 
     def held(self, x: Array, step: StepProblem, small: FrictionResult) -> None:
-        """Puts the tangential unknowns of sticking points where they were, which removes round-off only."""
+        """Put the tangential unknowns of sticking points where they were, which removes round-off only."""
         surface = self._surface
         there = (surface.tangents >= 0) & small.stick[surface.slots][:, None]
         x[surface.tangents[there]] = origin(step)[surface.slots][there]
 
 
 def origin(step: StepProblem) -> Array:
-    """B_t x where the slip is zero."""
+    """Return B_t x where the slip is zero."""
     assert step.slip0 is not None
     return step.slip0

@@ -24,30 +24,30 @@ from ...core.errors import InputError
 
 
 class Sequence(Protocol):
-    """The memory of one iteration."""
+    """Remember one iteration."""
 
     def next(self, x: Array, image: Array) -> Array:
-        """The point to try after x (n,), whose image is g(x) (n,)."""
+        """Return the point to try after x (n,), whose image is g(x) (n,)."""
         ...
 
 
 class Extrapolation(Protocol):
-    """A way to choose the next point: Plain, Aitken or Anderson."""
+    """Choose the next point: Plain, Aitken or Anderson."""
 
     def start(self) -> Sequence: ...
 
 
 def accelerated(owner: str, value: Any) -> None:
-    """InputError unless it is an extrapolation."""
+    """Raise InputError unless it is an extrapolation."""
     provides(owner, "extrapolation", value, ("start",), "give Plain(), Aitken() or Anderson()", lacks=("step",))
 
 
 @dataclass(frozen=True)
 class Plain:
-    """The image itself."""
+    """Take the image itself."""
 
     def start(self) -> Sequence:
-        """Needs no memory."""
+        """Return an empty memory: none is needed."""
         return _Plain()
 
 
@@ -59,7 +59,7 @@ class _Plain:
 
 @dataclass(frozen=True)
 class Aitken:
-    """One relaxation factor for all unknowns, between 1/``limit`` and ``limit``. InputError for limit <= 1."""
+    """Use one relaxation factor for all unknowns, between 1/``limit`` and ``limit``. InputError for limit <= 1."""
 
     limit: float = 10.0
 
@@ -68,7 +68,7 @@ class Aitken:
             raise InputError(f"Aitken: limit is {shown(self.limit)}; give the largest relaxation factor, more than 1")
 
     def start(self) -> Sequence:
-        """An empty memory; the first step is plain."""
+        """Return an empty memory; the first step is plain."""
         return _Aitken(self.limit)
 
 
@@ -90,7 +90,7 @@ class _Aitken:
 
 @dataclass(frozen=True)
 class Anderson:
-    """The last ``depth`` differences combined, after ``after`` plain steps. InputError for depth < 1 or after < 0."""
+    """Combine the last ``depth`` differences, after ``after`` plain steps. InputError for depth < 1 or after < 0."""
 
     depth: int = 5
     after: int = 0
@@ -100,7 +100,7 @@ class Anderson:
         whole("Anderson", "after", self.after)
 
     def start(self) -> Sequence:
-        """An empty memory."""
+        """Return an empty memory."""
         return _Anderson(self)
 
 

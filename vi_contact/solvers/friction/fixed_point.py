@@ -21,10 +21,10 @@ from .problem import FrictionMethod, FrictionResult, ScaledDelassus, inner_metho
 
 @dataclass(frozen=True)
 class FixedPoint:
-    """Settings. ``tolerance``: change of the thresholds relative to the largest, or rounding where that is more;
-    ``tresca``: method for each problem; ``extrapolation``: Plain(), Aitken() or Anderson(), how the next thresholds
-    follow. What the thresholds still change by shifts points that stick, and fine meshes amplify that: on 2e5 unknowns
-    the equilibrium of a step is off by 1e-9 at 1e-10.
+    """Hold the settings. ``tolerance``: change of the thresholds relative to the largest, or rounding where that is
+    more; ``tresca``: method for each problem; ``extrapolation``: Plain(), Aitken() or Anderson(), how the next
+    thresholds follow. What the thresholds still change by shifts points that stick, and fine meshes amplify that: on
+    2e5 unknowns the equilibrium of a step is off by 1e-9 at 1e-10.
 
     In the result ``iterations`` counts Tresca problems and ``history`` the relative change of the thresholds in each;
     ``contraction(result)`` is the mean factor between them: with Plain() that of the map itself.
@@ -47,7 +47,7 @@ class FixedPoint:
 
 
 class PreparedFixedPoint:
-    """One G, many right-hand sides."""
+    """Solve for one G and many right-hand sides."""
 
     def __init__(self, method: FixedPoint, G: Array, bilateral: Mask) -> None:
         self.method = method
@@ -55,7 +55,7 @@ class PreparedFixedPoint:
         self._tresca = method.tresca.prepare(G, bilateral)
 
     def solve(self, q: Array, cohesion: Array, slope: Array, guess: Array | Mask | None = None) -> FrictionResult:
-        """See PreparedFriction."""
+        """Solve the small problem; see PreparedFriction."""
         step = self.delassus.problem(q, cohesion, slope)
         constant = np.zeros_like(slope)
         start = step.start(guess) * self.delassus.scale
@@ -81,5 +81,5 @@ class PreparedFixedPoint:
 
 
 def contraction(result: FrictionResult) -> float:
-    """Observed factor between successive changes of the thresholds; NaN when there were fewer than two."""
+    """Return the observed factor between successive changes of the thresholds; NaN when there were fewer than two."""
     return observed_contraction(result.history)

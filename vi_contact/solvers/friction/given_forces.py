@@ -1,8 +1,8 @@
 """Alternation with given forces: the normal problem with r_t given, then the tangential problem with r_n given.
 
-Seed 000 carries tangential forces C_T that are given (eq. 6); they enter the right-hand side, gamma of eq. 40, and what
-is left is the minimum of eq. 42 over normal reactions. With friction C_T is found by turns (Panagiotopoulos, Ing.-Arch.
-44, 1975), with the parts G_nn, G_nt, G_tt of the Delassus operator:
+The boundary method (docs/reference/sources.md [1]) carries tangential forces C_T that are given (eq. 6); they enter the
+right-hand side, gamma of eq. 40, and what is left is the minimum of eq. 42 over normal reactions. With friction C_T is
+found by turns (Panagiotopoulos, Ing.-Arch. 44, 1975), with the parts G_nn, G_nt, G_tt of the Delassus operator:
 
     normal        0 <= r_n  perpendicular to  (q_n + G_nt r_t) + G_nn r_n >= 0               r_t = C_T given
     tangential    minimum of ½ r_tᵀ G_tt r_t + r_t·(q_t + G_tn r_n) over |r_t| <= limit(r_n)     r_n given
@@ -28,8 +28,8 @@ from .problem import FrictionMethod, FrictionResult, ScaledDelassus, inner_metho
 
 @dataclass(frozen=True)
 class GivenForces:
-    """Settings. ``tolerance``: change of the tangential reactions relative to the largest; ``tangential``: method for
-    the tangential problems.
+    """Hold the settings. ``tolerance``: change of the tangential reactions relative to the largest; ``tangential``:
+    method for the tangential problems.
 
     In the result ``iterations`` counts pairs of problems and ``history`` the relative change in each.
     """
@@ -51,7 +51,7 @@ class GivenForces:
 
 
 class PreparedGivenForces:
-    """One G, many right-hand sides."""
+    """Solve for one G and many right-hand sides."""
 
     def __init__(self, method: GivenForces, G: Array, bilateral: Mask) -> None:
         self.method = method
@@ -64,7 +64,7 @@ class PreparedGivenForces:
         self._tangential = method.tangential.prepare(apart, np.zeros_like(bilateral))
 
     def solve(self, q: Array, cohesion: Array, slope: Array, guess: Array | Mask | None = None) -> FrictionResult:
-        """See PreparedFriction."""
+        """Solve the small problem; see PreparedFriction."""
         step = self.delassus.problem(q, cohesion, slope)
         r = step.start(guess)
         sequence, history, none = self.method.extrapolation.start(), [1.0], np.zeros(step.count)

@@ -29,7 +29,7 @@ SHARE = 0.125  # of them, differences up to which it is
 
 
 class NodeStates(Protocol):
-    """The states of m nodes: ``closed``, ``stick`` and, in 3D, ``turns``, slip along an unknown direction (m,).
+    """Hold the states of m nodes: ``closed``, ``stick`` and, in 3D, ``turns``, slip along an unknown direction (m,).
 
     Slip reactions are fixed + growth r_n direction, (m, d - 1) with ``growth`` (m,); ``fixed`` (m, d). ``turning``:
     (|y_t| - limit)/limit of nodes that turn. ``exact``: none does, and the linear problem depends on ``key`` only.
@@ -47,14 +47,14 @@ class NodeStates(Protocol):
 
 
 class Factors:
-    """Those of the last sets of states of one G: they save time and change no digit of an answer."""
+    """Keep the factors of the last sets of states of one G: they save time and change no digit of an answer."""
 
     def __init__(self, G: Array) -> None:
         self.G = G
         self._kept: OrderedDict[bytes, Factored] = OrderedDict()
 
     def of(self, states: NodeStates, reduced: Reduced) -> Factored:
-        """The factor, made when it is not kept."""
+        """Return the factor, made when it is not kept."""
         if states.exact and states.key in self._kept:
             self._kept.move_to_end(states.key)
             return self._kept[states.key]
@@ -67,7 +67,8 @@ class Factors:
 
 
 class LinearProblems:
-    """Those of one run of Newton's method. The way of solution depends on this run alone, not on what is kept."""
+    """Solve the linear problems of one run of Newton's method. The way of solution depends on this run alone, not on
+    what is kept."""
 
     def __init__(self, factors: Factors) -> None:
         self._factors = factors
@@ -76,8 +77,8 @@ class LinearProblems:
         self._solved: set[bytes] = set()
 
     def solve(self, states: NodeStates, w: Array) -> Array | None:
-        """r; None when the problem is singular, or exact and solved before. What (2) has solved without success, (1)
-        solves once more."""
+        """Return r; None when the problem is singular, or exact and solved before. What (2) has solved without success,
+        (1) solves once more."""
         if states.key in self._solved:
             return None
         reduced, near = Reduced(states), self._near
@@ -95,7 +96,7 @@ class LinearProblems:
 
 
 class Reduced:
-    """R, P and the turns, by places in r.
+    """Hold R, P and the turns, by places in r.
 
     z: normals of closed nodes, each with the slip reaction that grows with it, tangents of sticking nodes, turns.
     """
@@ -112,12 +113,12 @@ class Reduced:
         self.size = len(self.plain) + len(self._turned)
 
     def rows(self, w: Array) -> Array:
-        """R w."""
+        """Return R w."""
         flat = w.ravel()
         return np.concatenate([flat[self.plain], np.sum(self._across * flat[self._turned], axis=1)])
 
     def columns(self, z: Array) -> Array:
-        """P z (m, d)."""
+        """Return P z (m, d)."""
         r = np.zeros(self._shape)
         flat, plain = r.ravel(), len(self.plain)
         flat[self.plain] = z[:plain]
@@ -126,14 +127,14 @@ class Reduced:
         return r
 
     def transposed(self, w: Array) -> Array:
-        """Pᵀ applied to rows (k, m d), where no node turns."""
+        """Return Pᵀ applied to rows (k, m d), where no node turns."""
         by_node = w.reshape(len(w), *self._shape)
         r = by_node.copy()
         r[:, :, 0] += np.sum(by_node[:, :, 1:] * self.growth, axis=2)
         return np.asarray(r.reshape(w.shape)[:, self.plain])
 
     def matrix(self, G: Array) -> Array:
-        """K, made as its transpose: G is symmetric, and rows are near each other in memory."""
+        """Return K, made as its transpose: G is symmetric, and rows are near each other in memory."""
         places = np.concatenate([self.plain, self._turned.ravel()])
         part = _block(G, self.plain, places)
         growth = self.growth[self.closed]  # of the first rows of part
@@ -153,7 +154,7 @@ class Reduced:
 
 
 class Factored:
-    """(1) of one set of states with its factor. ``sound``: K is regular."""
+    """Hold (1) of one set of states with its factor. ``sound``: K is regular."""
 
     def __init__(self, reduced: Reduced, G: Array) -> None:
         self.reduced = reduced
@@ -164,12 +165,12 @@ class Factored:
             self._lu, self.sound = (lu, pivots), info == 0
 
     def solve(self, right: Array) -> Array:
-        """K⁻¹ right, of one vector or of the columns of a matrix."""
+        """Return K⁻¹ right, of one vector or of the columns of a matrix."""
         return np.asarray(lapack.dgetrs(*self._lu, right)[0]) if self.reduced.size else right
 
 
 class Bordered:
-    """(2): problems near ``base``, in 2D or without slip; keeps what K0⁻¹ was applied to."""
+    """Solve (2): problems near ``base``, in 2D or without slip; keeps what K0⁻¹ was applied to."""
 
     def __init__(self, base: Factored, G: Array) -> None:
         self._base, self._G, self.size = base, G, base.reduced.size
@@ -187,7 +188,7 @@ class Bordered:
         return added, other, np.flatnonzero(~kept[old.plain])
 
     def serves(self, new: Reduced) -> bool:
-        """Whether (2) is faster than a factor."""
+        """Say whether (2) is faster than a factor."""
         limit = SHARE * self.size if self.size >= LARGE else 0.0
         return self._base.sound and sum(len(part) for part in self._differences(new)) <= limit
 
@@ -206,7 +207,7 @@ class Bordered:
         return np.array([self._known[key] for key in keys.tolist()]).reshape(len(keys), self.size).T
 
     def solve(self, new: Reduced, w: Array) -> Array | None:
-        """z of ``new``; None when it is singular."""
+        """Return z of ``new``; None when it is singular."""
         G, old, flat, d = self._G, self._base.reduced, w.ravel(), w.shape[1]
         added, other, dropped = self._differences(new)
         a, nodes = len(added), np.concatenate([added // d, other])

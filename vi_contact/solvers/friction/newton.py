@@ -2,7 +2,7 @@
 
 With y = r - w of the last iterate every node is open (y_n <= 0) or closed, and sticks (|y_t| <= limit) or slips along
 n = y_t/|y_t|. The next iterate solves the linear problem of these states, Newton's step for the natural map (2) of
-friction_small.py with the limit of the augmented reaction max(y_n, 0) (Alart and Curnier 1991; Hüeber, Stadler and
+``problem`` with the limit of the augmented reaction max(y_n, 0) (Alart and Curnier 1991; Hüeber, Stadler and
 Wohlmuth, SIAM J. Sci. Comput. 30, 2008):
 
     open   r_n = 0                        closed   w_n = 0
@@ -34,7 +34,8 @@ FIRST_SWEEPS = 2
 
 @dataclass(frozen=True)
 class FrictionNewton:
-    """Settings. ``tolerance``: residual above which the answer is refused; ``max_iterations`` of Newton in a row.
+    """Hold the settings. ``tolerance``: residual above which the answer is refused; ``max_iterations`` of Newton in a
+    row.
 
     In the result ``iterations`` counts linear solves and fallback sweeps (0: no contact), ``history`` the residual
     after each linear solve.
@@ -53,7 +54,7 @@ class FrictionNewton:
 
 
 class PreparedNewton:
-    """One G, many right-hand sides. The answer depends on these alone, not on steps before."""
+    """Solve for one G and many right-hand sides. The answer depends on these alone, not on steps before."""
 
     def __init__(self, method: FrictionNewton, G: Array, bilateral: Mask) -> None:
         self.method = method
@@ -61,7 +62,7 @@ class PreparedNewton:
         self._factors = Factors(self.delassus.matrix)
 
     def solve(self, q: Array, cohesion: Array, slope: Array, guess: Array | Mask | None = None) -> FrictionResult:
-        """See PreparedFriction."""
+        """Solve the small problem; see PreparedFriction."""
         step = self.delassus.problem(q, cohesion, slope)
         history: list[float] = []
         r, swept = step.start(guess if step.unit > 0.0 else None), 0

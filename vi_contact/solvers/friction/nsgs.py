@@ -27,7 +27,7 @@ from .problem import FrictionResult, ScaledDelassus, ScaledProblem
 
 @dataclass(frozen=True)
 class NSGS:
-    """Settings. ``tolerance``: largest |F| of the natural map relative to r = 0.
+    """Hold the settings. ``tolerance``: largest |F| of the natural map relative to r = 0.
 
     In the result ``iterations`` counts sweeps and ``history`` the residual after each.
     """
@@ -45,14 +45,14 @@ class NSGS:
 
 
 class PreparedNSGS:
-    """One G, many right-hand sides."""
+    """Solve for one G and many right-hand sides."""
 
     def __init__(self, method: NSGS, G: Array, bilateral: Mask) -> None:
         self.method = method
         self.delassus = ScaledDelassus(G, bilateral)
 
     def solve(self, q: Array, cohesion: Array, slope: Array, guess: Array | Mask | None = None) -> FrictionResult:
-        """See PreparedFriction."""
+        """Solve the small problem; see PreparedFriction."""
         step = self.delassus.problem(q, cohesion, slope)
         r = step.start(guess if step.unit > 0.0 else None)
         history: list[float] = []
@@ -73,7 +73,7 @@ class PreparedNSGS:
 
 
 def sweeps(step: ScaledProblem, r: Array, number: int) -> Array:
-    """r after so many sweeps."""
+    """Return r after so many sweeps."""
     nodes = _nodes(step)
     for _ in range(number):
         r = _sweep(step, nodes, r)
@@ -127,7 +127,7 @@ class _Node:
 
 
 def on_disk(S: Array, q: Array, limit: Callable[[Array], float]) -> Array:
-    """r with S r = -q when |r| <= limit(r), else (S + lambda) r = -q on |r| = limit(r), lambda > 0.
+    """Return r with S r = -q when |r| <= limit(r), else (S + lambda) r = -q on |r| = limit(r), lambda > 0.
 
     S (k, k) symmetric positive definite. r falls from S⁻¹q to 0 as lambda grows; the root of |r| - limit is bracketed
     in s = 1/(1 + lambda/trace S) between 0 and 1.

@@ -14,7 +14,7 @@ bounded sets of s into themselves continuously, Brouwer), and is unique for smal
     F_n = r_n - max(y_n, 0)   (bilateral: w_n),      F_t = r_t - projection of y_t on the disk |r_t| <= limit(r_n)   (2)
 
 Scaling. Normal rows are multiplied by G_nn^(-1/2), tangential ones by one number for each node (disks stay disks),
-the mean of G_tt to the same power: reactions and displacements are then both in sqrt(J), as in lcp.py.
+the mean of G_tt to the same power: reactions and displacements are then both in sqrt(J), as in ``normal.lcp``.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from ..normal.lcp import EPS, check_gap, energy_scale
 
 @dataclass(frozen=True)
 class FrictionResult:
-    """What a friction method returns when it has reached its tolerance or the limit that rounding sets.
+    """Answer (1), when a friction method has reached its tolerance or the limit that rounding sets.
 
     ``r`` (m, d): r_n >= 0 exactly in unilateral rows, |r_t| <= limit(r_n) but for the last digit; ``active`` (m,):
     r_n > 0 or bilateral; ``stick`` (m,): w_t = 0 but for the residual reached, under a limit that is not zero;
@@ -51,10 +51,11 @@ class FrictionResult:
 
 
 class PreparedFriction(Protocol):
-    """A friction method bound to one G."""
+    """Solve (1) for one G."""
 
     def solve(self, q: Array, cohesion: Array, slope: Array, guess: Array | Mask | None = None) -> FrictionResult:
-        """q (m, d), cohesion (m,) [as r], slope (m,). ``guess``: predicted contact set (m,), or reactions (m, d).
+        """Return q (m, d), cohesion (m,) [as r], slope (m,). ``guess``: predicted contact set (m,), or reactions (m,
+        d).
 
         Raises StepFailure when the tolerance is not reached."""
         ...
@@ -81,7 +82,7 @@ def inner_method(owner: str, meaning: str, value: Any) -> None:
 
 @dataclass(frozen=True)
 class ScaledProblem:
-    """(1) in scaled numbers: q (m, d), cohesion and slope (m,)."""
+    """Pose (1) in scaled numbers: q (m, d), cohesion and slope (m,)."""
 
     delassus: ScaledDelassus
     q: Array
@@ -90,26 +91,26 @@ class ScaledProblem:
 
     @property
     def count(self) -> int:
-        """m."""
+        """Return m."""
         return len(self.cohesion)
 
     def moved(self, r: Array) -> Array:
-        """G r (m, d), from the rows that carry something when they are few."""
+        """Return G r (m, d), from the rows that carry something when they are few."""
         carried = np.flatnonzero(r)
         matrix = self.delassus.matrix
         product = matrix @ r.ravel() if len(carried) > 0.25 * r.size else r.ravel()[carried] @ matrix[carried]
         return np.asarray(product.reshape(r.shape))
 
     def w(self, r: Array) -> Array:
-        """q + G r (m, d)."""
+        """Return q + G r (m, d)."""
         return self.q + self.moved(r)
 
     def limit(self, r_n: Array) -> Array:
-        """cohesion + slope max(r_n, 0)."""
+        """Return cohesion + slope max(r_n, 0)."""
         return self.cohesion + self.slope * np.maximum(r_n, 0.0)
 
     def residual(self, r: Array, w: Array) -> float:
-        """max |F| of (2)."""
+        """Return max |F| of (2)."""
         y = r - w
         normal = np.where(self.delassus.bilateral, w[:, 0], r[:, 0] - np.maximum(y[:, 0], 0.0))
         tangential = r[:, 1:] - project(y[:, 1:], self.limit(r[:, 0]))
@@ -117,21 +118,21 @@ class ScaledProblem:
 
     @cached_property
     def unit(self) -> float:
-        """The residual of r = 0: what there is to resolve."""
+        """Return the residual of r = 0: what there is to resolve."""
         return self.residual(np.zeros_like(self.q), self.q)
 
     def rounding(self, r: Array) -> float:
-        """Residuals below this are rounding errors of q + G r."""
+        """Return the residual below which there are rounding errors of q + G r only."""
         return 16.0 * EPS * self.delassus.norm * max_abs(r)
 
     def admissible(self, r: Array) -> Array:
-        """r with r_n >= 0 and r_t within its disk: removes rounding errors, and whatever else is outside."""
+        """Return r with r_n >= 0 and r_t within its disk: removes rounding errors, and whatever else is outside."""
         r_n = np.where(self.delassus.bilateral, r[:, 0], np.maximum(r[:, 0], 0.0))
         return np.column_stack([r_n, project(r[:, 1:], self.limit(r_n))])
 
     def start(self, guess: Array | Mask | None) -> Array:
-        """Reactions to start from: those guessed; or what opens the guessed set row by row, times the number that
-        makes ½ rᵀG r + qᵀr least."""
+        """Return reactions to start from: those guessed; or what opens the guessed set row by row, times the number
+        that makes ½ rᵀG r + qᵀr least."""
         if guess is None:
             return np.zeros_like(self.q)
         if guess.dtype != bool:
@@ -153,8 +154,9 @@ class ScaledProblem:
         history: tuple[float, ...] = (),
         w: Array | None = None,
     ) -> FrictionResult:
-        """Back to newtons; StepFailure when the residual is above ``tolerance`` and above rounding. ``w`` of r, when
-        it is known."""
+        """Return the result in newtons; StepFailure when the residual is above ``tolerance`` and above rounding. ``w``
+        of r, when it is known.
+        """
         inside = self.admissible(r)
         if w is None or not np.array_equal(inside, r):
             w = self.w(inside)
@@ -173,7 +175,7 @@ class ScaledProblem:
 
 
 class ScaledDelassus:
-    """d G d with its scale (m, d): what the methods work on."""
+    """Hold d G d with its scale (m, d): what the methods work on."""
 
     def __init__(self, G: Array, bilateral: Mask) -> None:
         m = len(bilateral)
@@ -193,7 +195,7 @@ class ScaledDelassus:
         self.norm = float(np.abs(self.matrix).sum(axis=1).max(initial=0.0))
 
     def problem(self, q: Array, cohesion: Array, slope: Array) -> ScaledProblem:
-        """Problem (1) in scaled numbers."""
+        """Return problem (1) in scaled numbers."""
         check_gap(q[:, 0], self.bilateral)
         if not np.isfinite(q[:, 1:]).all():
             raise InputError("The slip without reactions contains NaN or infinity: check the loads of this step.")
@@ -202,6 +204,8 @@ class ScaledDelassus:
 
 
 def observed_contraction(history: Any) -> float:
-    """Mean factor between successive changes, of those above rounding (1e-10 of the first); NaN for fewer than two."""
+    """Return the mean factor between successive changes, of those above rounding (1e-10 of the first); NaN for fewer
+    than two.
+    """
     changes = [change for change in history if change > 1e-10 * history[0]]
     return float((changes[-1] / changes[0]) ** (1.0 / (len(changes) - 1))) if len(changes) > 1 else float("nan")

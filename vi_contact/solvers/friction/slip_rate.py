@@ -27,7 +27,8 @@ from .problem import FrictionResult
 
 @dataclass(frozen=True)
 class RateIteration:
-    """Settings. ``tolerance``: change of the coefficients relative to the largest; ``extrapolation``: the next guess.
+    """Hold the settings. ``tolerance``: change of the coefficients relative to the largest; ``extrapolation``: the next
+    guess.
 
     ``iterations`` of the result counts those of all inner problems, ``history`` is the change in each iteration.
     """
@@ -46,8 +47,8 @@ class RateIteration:
         solved: Callable[[Array, FrictionResult | None], FrictionResult],
         image: Callable[[FrictionResult], Array],
     ) -> FrictionResult:
-        """From mu (m,), those at rest. ``solved``: the problem of given coefficients, starting from the last result;
-        ``image``: the coefficients at its slip rates. StepFailure when the tolerance is not reached."""
+        """Iterate from mu (m,), those at rest. ``solved``: the problem of given coefficients, starting from the last
+        result; ``image``: the coefficients at its slip rates. StepFailure when the tolerance is not reached."""
         sequence, spent = self.extrapolation.start(), 0
         history: list[float] = []
         found: FrictionResult | None = None

@@ -1,13 +1,14 @@
 """Uzawa's method: a gradient step on the reactions, then the projection onto the friction cone's cross-section.
 
-Seed 003, "Uzawa algorithm" and its algebraic form, with Lambda = r, U - G the gap and slip, here -w = -(q + G r):
+Aimi, Di Credico and Gimperlein (CMAME 427, 2024), "Uzawa algorithm", with Lambda = r, U - G the gap and slip, here -w =
+-(q + G r):
 
     r <- Pr_C(r - rho w),    Pr_C(y)_n = max(y_n, 0),    Pr_C(y)_t = y_t min(1, F/|y_t|),    F = limit(r_n)
 
 F is Tresca's threshold, or Coulomb's limit of the r_n just found. Under Tresca's law this is the projected gradient
 method for a convex function and converges for 0 < rho < 2/lambda_max(G); the best uniform factor, (k - 1)/(k + 1) with
 the condition number k of G, is reached at rho = 2/(lambda_min + lambda_max), which is taken when no rho is given. G is
-that of friction_small.py's scaled numbers, in which rho is dimensionless. Slow by nature: errors shrink by 1 - 2/k.
+that of the scaled numbers of ``problem``, in which rho is dimensionless. Slow by nature: errors shrink by 1 - 2/k.
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ from .problem import FrictionResult, ScaledDelassus
 
 @dataclass(frozen=True)
 class Uzawa:
-    """Settings. ``tolerance``: largest |F| of the natural map relative to r = 0; ``rho`` > 0, or None: see above.
+    """Hold the settings. ``tolerance``: largest |F| of the natural map relative to r = 0; ``rho`` > 0, or None: see
+    above.
 
     In the result ``iterations`` counts projections and ``history`` the residual after each. InputError for rho <= 0.
     """
@@ -46,7 +48,7 @@ class Uzawa:
 
 
 class PreparedUzawa:
-    """One G, many right-hand sides. ``rho`` is the one in use."""
+    """Solve for one G and many right-hand sides. ``rho`` is the one in use."""
 
     def __init__(self, method: Uzawa, G: Array, bilateral: Mask) -> None:
         self.method = method
@@ -61,7 +63,7 @@ class PreparedUzawa:
         return float(2.0 / (values[0] + values[-1]))
 
     def solve(self, q: Array, cohesion: Array, slope: Array, guess: Array | Mask | None = None) -> FrictionResult:
-        """See PreparedFriction."""
+        """Solve the small problem; see PreparedFriction."""
         step = self.delassus.problem(q, cohesion, slope)
         r, history = step.start(guess if step.unit > 0.0 else None), [1.0]
         w = step.w(r)

@@ -29,7 +29,8 @@ PATIENCE = 10  # Júdice and Pires, Comput. Oper. Res. 21, 1994
 
 @dataclass(frozen=True)
 class ActiveSet:
-    """Settings. ``max_iterations``: set changes allowed; ``tolerance``: residual above which the answer is refused.
+    """Hold the settings. ``max_iterations``: set changes allowed; ``tolerance``: residual above which the answer is
+    refused.
 
     In the result ``iterations`` is the number of changes of the set (0: the guess was right) and ``history`` the number
     of rows that changed sides in each.
@@ -48,7 +49,8 @@ class ActiveSet:
 
 
 class PreparedActiveSet:
-    """One G, many q. Remembers the factor of the last set: a step on the same set costs triangular solves only."""
+    """Solve for one G and many q. Remembers the factor of the last set: a step on the same set costs triangular solves
+    only."""
 
     def __init__(self, method: ActiveSet, G: Array, bilateral: Mask) -> None:
         self.method = method

@@ -1,9 +1,9 @@
-"""Hildreth–d'Esopo: the method of seed 000 for its quadratic program (49). One row after another, to convergence.
+"""Solve row after row, to convergence: Hildreth and d'Esopo, for the quadratic program (49) of the boundary method.
 
-Primal (seed 000 eqs. 46, 49; D = G⁻¹):   v_i <- min(bound_i, v_i + (z - D v)_i / D_ii)
-Dual (seed 000 eq. 42; Hildreth 1957):    r_i <- max(0, r_i - (q + G r)_i / G_ii)
+Primal (eqs. 46, 49 there; D = G⁻¹):   v_i <- min(bound_i, v_i + (z - D v)_i / D_ii)
+Dual (eq. 42 there; Hildreth 1957):    r_i <- max(0, r_i - (q + G r)_i / G_ii)
 
-Both are projected Gauss–Seidel: every sweep lowers the objective (verification document, section 4.1). They converge
+Both are projected Gauss–Seidel: every sweep lowers the objective. They converge
 for every SPD matrix, linearly, and slowly when contacts are strongly coupled. The primal is written in s = x_free - v
 = G r, the displacement that the reactions take back, because s carries no digits of the gap: min ½ sᵀD s over s >= -q,
 which is (49) up to the constant ½ x_freeᵀ D x_free.
@@ -23,7 +23,7 @@ from .lcp import EPS, LCPResult, cholesky, failure, scaled_dense
 
 @dataclass(frozen=True)
 class Hildreth:
-    """Settings. ``primal``: sweep over displacements (49) or over reactions (42).
+    """Hold the settings. ``primal``: sweep over displacements (49) or over reactions (42).
 
     Ends when the largest change of a sweep, relative to the largest unknown, and the residual are below ``tolerance``
     (or at rounding level). In the result ``iterations`` counts sweeps; with ``record``, ``history`` holds the objective
@@ -45,7 +45,8 @@ class Hildreth:
 
 
 class PreparedHildreth:
-    """One G, many q: min ½ xᵀHx + cᵀx over x >= lower, with H scaled to unit diagonal, for x = s or x = r."""
+    """Solve for one G and many q: min ½ xᵀHx + cᵀx over x >= lower, with H scaled to unit diagonal, for x = s or x = r.
+    """
 
     def __init__(self, method: Hildreth, G: Array, bilateral: Mask) -> None:
         self.method = method
@@ -126,7 +127,7 @@ class PreparedHildreth:
 
 
 def sweep(rows: list[tuple[int, Array]], x: list[float], lower: list[float], gradient: Array) -> float:
-    """One sweep over ``rows`` (index, row of H with unit diagonal), in place; returns the largest |change|.
+    """Sweep once over ``rows`` (index, row of H with unit diagonal), in place; return the largest |change|.
 
     Keeps gradient = H x + c up to date by columns, so that rows at rest cost a comparison.
     """

@@ -4,7 +4,7 @@
 
 G (m, m) [m/N] symmetric positive definite: the Delassus operator; q = bound - x_free [m]: the gap that the step without
 reactions would leave, +inf where no obstacle is in reach; r [N] reaction, >= 0 in compression; w [m] gap. Impulses and
-velocities may stand for forces and displacements. (1) is the optimality condition of seed 000 eq. (42),
+velocities may stand for forces and displacements. (1) is the optimality condition of the boundary method, eq. (42),
 min ½ rᵀGr + qᵀr over r >= 0, and, with D = G⁻¹ and v = x_free - G r, of its primal form eqs. (46) and (49).
 
 Scaling. With d_i = G_ii^(-1/2) the numbers r_i/d_i and w_i d_i are both in sqrt(J), and (1) keeps its form with
@@ -28,7 +28,7 @@ EPS = float(np.finfo(float).eps)
 
 
 class Operator(Protocol):
-    """A symmetric positive definite matrix that is only applied; ``diagonal()`` is used when there is one."""
+    """Apply a symmetric positive definite matrix that is only applied; ``diagonal()`` is used when there is one."""
 
     @property
     def shape(self) -> Any: ...
@@ -55,7 +55,7 @@ class LCPResult:
 
 @dataclass(frozen=True)
 class ScaledLCP:
-    """d G d with its scale d: what the methods work on. Everything here is in sqrt(J) or dimensionless."""
+    """Hold d G d with its scale d: what the methods work on. Everything here is in sqrt(J) or dimensionless."""
 
     matrix: Any
     scale: Array
@@ -67,12 +67,12 @@ class ScaledLCP:
         object.__setattr__(self, "any_bilateral", bool(self.bilateral.any()))
 
     def gap(self, q: Array) -> Array:
-        """The scaled gap; InputError for NaN, -inf, or +inf in a bilateral row."""
+        """Return the scaled gap; InputError for NaN, -inf, or +inf in a bilateral row."""
         check_gap(q, self.bilateral)
         return q * self.scale
 
     def reaction(self, guess: Array | Mask | None, q: Array) -> Array:
-        """A start for iterative methods: the guess itself, one Jacobi step on a guessed set, or zero."""
+        """Return a start for iterative methods: the guess itself, one Jacobi step on a guessed set, or zero."""
         if guess is None:
             return np.zeros(q.size)
         guess = check_guess(guess, q.size)
@@ -82,36 +82,36 @@ class ScaledLCP:
         return np.where(self.bilateral, start, np.where(np.isfinite(q), np.maximum(start, 0.0), 0.0))
 
     def rounding(self, r: Array) -> float:
-        """Gaps below this are rounding errors of q + G r."""
+        """Return the gap below which there are rounding errors of q + G r only."""
         return 4.0 * EPS * self.norm * max_abs(r)
 
     def complementarity(self, r: Array, w: Array) -> float:
-        """See the function of the same name."""
+        """Return what the function of the same name does, for the rows of this problem."""
         return complementarity(r, w, self.bilateral) if self.any_bilateral else max_abs(np.minimum(r, w))
 
     def violation(self, q: Array) -> float:
-        """See the function of the same name."""
+        """Return what the function of the same name does, for the rows of this problem."""
         return violation(q, self.bilateral) if self.any_bilateral else max(0.0, -float(q.min(initial=0.0)))
 
     def result(
         self, r: Array, residual: float, *, iterations: int, method: object, history: tuple[float, ...] = ()
     ) -> LCPResult:
-        """Back to newtons."""
+        """Return the result in newtons."""
         active = (r > 0.0) | self.bilateral
         return LCPResult(r * self.scale, active, iterations, residual, method, history)
 
     def no_contact(self, method: object) -> LCPResult:
-        """r = 0, the solution when nothing is violated."""
+        """Return r = 0, the solution when nothing is violated."""
         return self.result(np.zeros(self.scale.size), 0.0, iterations=0, method=method)
 
 
 def complementarity(r: Array, w: Array, bilateral: Mask) -> float:
-    """max |min(r, w)| over unilateral rows, max |w| over bilateral ones."""
+    """Return max |min(r, w)| over unilateral rows, max |w| over bilateral ones."""
     return max_abs(np.where(bilateral, w, np.minimum(r, w)))
 
 
 def violation(q: Array, bilateral: Mask) -> float:
-    """complementarity() of r = 0."""
+    """Return what complementarity() gives for r = 0."""
     return max(0.0, float(np.where(bilateral, np.abs(q), -q).max(initial=0.0)))
 
 
@@ -150,7 +150,7 @@ class _Applied:
 
 
 def energy_scale(G: Array | Operator) -> Array:
-    """d = G_ii^(-1/2) (m,); for an operator without ``diagonal()``, ‖G‖^(-1/2) in every row."""
+    """Return d = G_ii^(-1/2) (m,); for an operator without ``diagonal()``, ‖G‖^(-1/2) in every row."""
     if not hasattr(G, "diagonal"):
         size = int(G.shape[0])
         return np.full(size, largest_eigenvalue(G, size) ** -0.5)
@@ -162,7 +162,8 @@ def energy_scale(G: Array | Operator) -> Array:
 
 
 def largest_eigenvalue(G: Any, size: int) -> float:
-    """Power iteration from a fixed vector; Rayleigh quotient plus its residual, so that it errs upwards. [as G]"""
+    """Return the largest eigenvalue [as G] by power iteration from a fixed vector, its residual added: it errs upwards.
+    """
     if not size:
         return 0.0
     v = 1.0 + np.modf(0.6180339887498949 * np.arange(size))[0]  # no symmetry of a structure is orthogonal to it
@@ -181,7 +182,9 @@ def largest_eigenvalue(G: Any, size: int) -> float:
 
 
 def cholesky(G: Array) -> Array:
-    """Lower Cholesky factor (LAPACK dpotrf); InputError with the row at which G stops being positive definite."""
+    """Return the lower Cholesky factor (LAPACK dpotrf); InputError with the row at which G stops being positive
+    definite.
+    """
     if not G.size:  # LAPACK takes no empty matrix
         return G
     factor, info = lapack.dpotrf(G, lower=1, clean=0)
@@ -194,7 +197,7 @@ def cholesky(G: Array) -> Array:
 
 
 def check_operator(G: Array | Operator, bilateral: Mask) -> None:
-    """InputError unless G is square and ``bilateral`` a boolean mask of its rows."""
+    """Raise InputError unless G is square and ``bilateral`` a boolean mask of its rows."""
     if len(G.shape) != 2 or G.shape[0] != G.shape[1]:
         raise InputError(f"The Delassus operator has shape {tuple(G.shape)}: it must be square.")
     if bilateral.shape != (G.shape[0],) or bilateral.dtype != bool:
@@ -202,7 +205,7 @@ def check_operator(G: Array | Operator, bilateral: Mask) -> None:
 
 
 def check_gap(q: Array, bilateral: Mask) -> None:
-    """InputError unless q has one entry a row, finite or (in unilateral rows) +inf."""
+    """Raise InputError unless q has one entry a row, finite or (in unilateral rows) +inf."""
     if q.shape != bilateral.shape:
         raise InputError(f"q has shape {q.shape} but the Delassus operator has {bilateral.size} rows: they must match.")
     if not np.isfinite(q).all() and not np.where(bilateral, np.isfinite(q), q > -np.inf).all():
@@ -210,12 +213,12 @@ def check_gap(q: Array, bilateral: Mask) -> None:
 
 
 def check_guess(guess: Array | Mask, size: int) -> Array | Mask:
-    """InputError unless the guess, a boolean mask or reactions in newtons, has one entry a row."""
+    """Raise InputError unless the guess, a boolean mask or reactions in newtons, has one entry a row."""
     if guess.shape != (size,):
         raise InputError(f"The guess has shape {guess.shape} but there are {size} rows: pass a mask or all reactions.")
     return guess
 
 
 def failure(method: object, *, iterations: int, residual: float, advice: str) -> StepFailure:
-    """The error of a method that did not reach its tolerance."""
+    """Return the error of a method that did not reach its tolerance."""
     return StepFailure(f"{method} stopped after {iterations} iterations with residual {residual:.1e}: {advice}.")

@@ -1,6 +1,6 @@
 """Projected conjugate gradients (MPRGP) for large contact sets: the Delassus operator is only applied.
 
-min ½ rᵀG r + qᵀr over r >= 0 (bilateral rows unbounded), seed 000 eq. (42), by Dostál's "modified proportioning with
+min ½ rᵀG r + qᵀr over r >= 0 (bilateral rows unbounded), by Dostál's "modified proportioning with
 reduced gradient projections" (Z. Dostál, Optimal Quadratic Programming Algorithms, Springer 2009, algorithm 5.8).
 With g = q + G r, the free gradient is phi = g where r is off its bound, and the chopped gradient beta = min(g, 0) where
 it is on it. As long as beta is small beside phi (constant Gamma), go on with conjugate gradients on the present face;
@@ -25,7 +25,7 @@ STEP = 1.5  # of the expansion, in units of 1/‖G‖: less than 2 converges; th
 
 @dataclass(frozen=True)
 class ProjectedCG:
-    """Settings. ``tolerance``: norm of the projected gradient phi + beta relative to the one at r = 0.
+    """Hold the settings. ``tolerance``: norm of the projected gradient phi + beta relative to the one at r = 0.
 
     In the result ``iterations`` counts applications of G after the start, and ``history`` that norm before each.
     """
@@ -43,7 +43,8 @@ class ProjectedCG:
 
 
 class PreparedCG:
-    """One G, many q. Works on d G d: with a diagonal that is Jacobi preconditioning, which keeps the bounds."""
+    """Solve for one G and many q. Works on d G d: with a diagonal that is Jacobi preconditioning, which keeps the
+    bounds."""
 
     def __init__(self, method: ProjectedCG, G: Array | Operator, bilateral: Mask) -> None:
         self.method = method

@@ -3,8 +3,8 @@
     lower <= z <= upper,   A z - b >= 0 where z = lower,  <= 0 where z = upper,  = 0 elsewhere
 
 On a rigid support z = x and the bounded unknowns are the normal displacements. A point on a spring k = scale/compliance
-keeps law (5) of seed 000 on an enlarged body (the remark after its eq. 6): the far end w = x_n - compliance r_n / scale
-of the spring is a further unknown, and the bound is on w,
+keeps law (5) of the boundary method on an enlarged body (the remark after its eq. 6): the far end w = x_n - compliance
+r_n / scale of the spring is a further unknown, and the bound is on w,
 
     z = (x, w),    [[A + Bᵀ k B, -Bᵀ k], [-k B, k]] z = (b, 0) - reactions,    w <= bound.
 
@@ -26,7 +26,8 @@ from ...core.surfaces import ContactSurface
 
 
 class BoundedSystem:
-    """A, the contact surface and its springs as one system of ``size`` owned unknowns, ``bounded`` of them with bounds.
+    """Hold A, the contact surface and its springs as one system of ``size`` owned unknowns, ``bounded`` of them with
+    bounds.
 
     Attributes:
         soft: (local) True where the support is a spring.
@@ -47,22 +48,22 @@ class BoundedSystem:
 
     @property
     def comm(self) -> Any:
-        """The PETSc communicator."""
+        """Return the PETSc communicator."""
         matrix = self.A.matrix
         return PETSc.COMM_SELF if isinstance(matrix, SerialMatrix) else matrix.mat.comm  # type: ignore[attr-defined]
 
     def max(self, *values: float) -> Array:
-        """Maxima over the ranks."""
+        """Return the maxima over the ranks."""
         return np.asarray(self.surface.comm.max(np.array(values)))
 
     def shared(self, local: Array) -> Array:
-        """Values of the owned contact points -> (m,), the same on all ranks."""
+        """Return values of the owned contact points -> (m,), the same on all ranks."""
         values = np.zeros(self.surface.count)
         values[self.surface.slots] = local
         return self.surface.comm.sum(values)
 
     def apply(self, z: Array) -> Array:
-        """A z."""
+        """Return A z."""
         result = np.empty(self.size)
         result[: self.rows] = self.A @ z[: self.rows]
         if self.soft.any():
@@ -72,11 +73,11 @@ class BoundedSystem:
         return result
 
     def load(self, b: Array) -> Array:
-        """(b, 0)."""
+        """Return (b, 0)."""
         return np.concatenate([b, np.zeros(self.size - self.rows)])
 
     def bounds(self, step: StepProblem) -> tuple[Array, Array]:
-        """(lower, upper) of the owned unknowns; an infinite bound leaves its point free, bilateral or not."""
+        """Return (lower, upper) of the owned unknowns; an infinite bound leaves its point free, bilateral or not."""
         if np.isnan(step.bound).any():
             raise InputError("the bound of the contact conditions contains NaN: check the gap and the time scheme")
         lower, upper = np.full(self.size, -np.inf), np.full(self.size, np.inf)
@@ -87,22 +88,23 @@ class BoundedSystem:
         return lower, upper
 
     def start(self, step: StepProblem) -> Array:
-        """The guess, with springs at rest and the predicted contacts on their bounds."""
+        """Return the guess, with springs at rest and the predicted contacts on their bounds."""
         z = np.concatenate([step.guess, step.guess[self.feet]])
         closed = self.predicted(step)[self.surface.slots]
         z[self.bounded[closed]] = step.bound[self.surface.slots][closed]
         return z
 
     def predicted(self, step: StepProblem) -> Mask:
-        """(m,) the contact set to start from."""
+        """Return (m,) the contact set to start from."""
         return (step.active | self.surface.bilateral) & np.isfinite(step.bound)
 
     def reactions(self, f: Array) -> Array:
-        """(local) r_n from the residual f = A z - b; on a spring k (x_n - w). Meaningful where the bound is active."""
+        """Return (local) r_n from the residual f = A z - b; on a spring k (x_n - w). Meaningful where the bound is
+        active."""
         return np.asarray(-f[self.bounded])
 
     def norm(self) -> float:
-        """Upper bound of the largest absolute row sum of A."""
+        """Return an upper bound of the largest absolute row sum of A."""
         matrix = self.A.matrix
         if isinstance(matrix, SerialMatrix):
             largest = float(abs(matrix.csr).sum(axis=1).max())
@@ -111,7 +113,7 @@ class BoundedSystem:
         return largest + 2.0 * float(self.max(np.max(self.spring, initial=0.0))[0])
 
     def assembled(self) -> Any:
-        """A as an AIJ matrix: the given one when it is a PETSc matrix on a rigid support, else a new one."""
+        """Return A as an AIJ matrix: the given one when it is a PETSc matrix on a rigid support, else a new one."""
         matrix = self.A.matrix
         if isinstance(matrix, SerialMatrix):
             indptr, columns, values = matrix.csr.indptr, matrix.csr.indices, matrix.csr.data
@@ -134,7 +136,9 @@ class BoundedSystem:
 
 
 def renumbered(comm: Comm, old_size: int, new_size: int, columns: Any) -> tuple[int, Indices, int]:
-    """First global number of this rank, global column numbers and total, where every rank's part grows at its end."""
+    """Return the first global number of this rank, global column numbers and total, where every rank's part grows at
+    its end.
+    """
     sizes = np.zeros((comm.size, 2))
     sizes[comm.rank] = old_size, new_size
     sizes = comm.sum(sizes)

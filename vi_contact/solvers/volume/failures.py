@@ -38,13 +38,13 @@ GENERAL_ADVICE = "check that the body is held, try a smaller step, another metho
 
 
 def name_of(reasons: type, reason: int) -> str:
-    """The longest name of a reason in one of petsc4py's classes of reasons: CONVERGED_..., DIVERGED_..."""
+    """Return the longest name of a reason in one of petsc4py's classes of reasons: CONVERGED_..., DIVERGED_..."""
     names = [name for name, value in vars(reasons).items() if value == reason and not name.startswith("_")]
     return max(names, key=len, default=f"reason {reason}")
 
 
 def stopped(method: str, reasons: type, reason: int, iterations: int, worst: float) -> StepFailure:
-    """The failure of a solver that stopped with a reason <= 0."""
+    """Return the failure of a solver that stopped with a reason <= 0."""
     name = name_of(reasons, reason)
     words = WORDS.get(name, "no convergence")
     return StepFailure(
@@ -54,7 +54,7 @@ def stopped(method: str, reasons: type, reason: int, iterations: int, worst: flo
 
 
 def raised(method: str, error: Any) -> StepFailure:
-    """The failure of a PETSc call that raised."""
+    """Return the failure of a PETSc call that raised."""
     said = last_line(error)
     advice = "check that A is positive definite and that load, guess and bound are finite, or try another method"
     if re.search(r"\bnan\b", said, re.IGNORECASE):  # error 72, "Inf or NaN", or 83, "generated infinity or NaN"
@@ -63,5 +63,5 @@ def raised(method: str, error: Any) -> StepFailure:
 
 
 def last_line(error: Any) -> str:
-    """What is wrong, which PETSc tells at the end of its trace."""
+    """Return what is wrong, which PETSc tells at the end of its trace."""
     return str(error).splitlines()[-1].split("] ", 1)[-1].strip()

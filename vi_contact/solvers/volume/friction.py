@@ -4,9 +4,9 @@
 
 Every problem of given thresholds s is solved to round-off, as the mixed complementarity problem of
 volume_friction_system.py; Tresca's law is one such problem. It shares nothing with the condensed route but A, b and the
-extrapolation of thresholds; references: fixed_point.py. The first problem of Coulomb's law is without friction, every
-other starts from the solution before, its sliding points on their new thresholds, and then mostly costs one
-factorisation. A law that depends on the slip rate makes this a sequence of such sequences: slip_rate.py.
+extrapolation of thresholds; references: ``friction.fixed_point``. The first problem of Coulomb's law is without
+friction, every other starts from the solution before, its sliding points on their new thresholds, and then mostly costs
+one factorisation. A law that depends on the slip rate makes this a sequence of such sequences: ``friction.slip_rate``.
 """
 
 from __future__ import annotations
@@ -35,7 +35,8 @@ EXTRAPOLATION = Anderson(depth=5, after=3)
 
 @dataclass(frozen=True)
 class Found:
-    """The solution of a sequence, or of one problem: r_n (m,), slip (L,), zero where points stick, SNES iterations."""
+    """Hold the solution of a sequence, or of one problem: r_n (m,), slip (L,), zero where points stick, SNES
+    iterations."""
 
     state: FrictionUnknowns
     r_n: Array
@@ -46,7 +47,7 @@ class Found:
 
 
 class VolumeFriction:
-    """The step with friction of one A; ``driver`` is the PETSc solver, made by ``make`` from the scaled step."""
+    """Solve the step with friction of one A; ``driver`` is the PETSc solver, made by ``make`` from the scaled step."""
 
     def __init__(
         self, body: BoundedSystem, tolerance: float, make: Callable[[ScaledFrictionStep], Any], name: str
@@ -57,7 +58,7 @@ class VolumeFriction:
         self.driver = make(self._scaled)
 
     def solve(self, step: StepProblem) -> StepResult:
-        """The step; StepFailure with PETSc's reason, or when the thresholds do not settle."""
+        """Return the step; StepFailure with PETSc's reason, or when the thresholds do not settle."""
         surface, law = self._body.surface, step.friction
         cohesion = law.limit(np.zeros(surface.count), surface.weights, step.scale)
         slope = law.slope(surface.weights)

@@ -17,7 +17,7 @@ Entries = tuple[Any, Any, Array]  # rows of this rank, columns of all, values
 
 
 class FrictionJacobian:
-    """The derivatives of ``ScaledFrictionStep.residual`` as an AIJ matrix; see there for the names."""
+    """Hold the derivatives of ``ScaledFrictionStep.residual`` as an AIJ matrix; see there for the names."""
 
     def __init__(self, scaled: ScaledFrictionStep) -> None:
         self._system: FrictionSystem = scaled.friction
@@ -69,7 +69,7 @@ class FrictionJacobian:
             self._write()
 
     def evaluate(self, snes: Any, y: Any, J: Any, P: Any) -> None:
-        """The derivatives at y; constant in 2D."""
+        """Compute the derivatives at y; constant in 2D."""
         if self._system.any_disk:
             self._turn(np.array(y.array_r))
             self._write()

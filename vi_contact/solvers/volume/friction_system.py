@@ -37,7 +37,7 @@ from .scaled_step import ScaledStep, fraction
 
 
 class FrictionSystem:
-    """Unknowns of a rank: z of ``body``, then lambda of the free tangents, point by point, then gamma.
+    """Number the unknowns of a rank: z of ``body``, then lambda of the free tangents, point by point, then gamma.
 
     Attributes:
         point, tangent, stiffness: (L,) local contact point, position in x and diagonal entry of A of each lambda.
@@ -60,26 +60,26 @@ class FrictionSystem:
 
     @property
     def comm(self) -> Any:
-        """The PETSc communicator."""
+        """Return the PETSc communicator."""
         return self.body.comm
 
     def split(self, y: Array) -> tuple[Array, Array, Array]:
-        """(z, lambda, gamma)."""
+        """Return (z, lambda, gamma)."""
         return y[: self.body.size], y[self.body.size : self.first_gamma], y[self.first_gamma :]
 
     def origin(self, step: StepProblem) -> Array:
-        """(L,) x of the free tangents where the slip is zero."""
+        """Return (L,) x of the free tangents where the slip is zero."""
         assert step.slip0 is not None
         return np.asarray(step.slip0[self.surface.slots][self.point, self.component])
 
     def by_point(self, values: Array) -> Array:
-        """(local, d - 1) of values (L,), zero where a tangent is prescribed."""
+        """Return (local, d - 1) of values (L,), zero where a tangent is prescribed."""
         table = np.zeros(self.surface.tangents.shape)
         table[self.point, self.component] = values
         return table
 
     def shared(self, values: Array) -> Array:
-        """Values (L,) -> (m, d - 1), the same on all ranks."""
+        """Return values (L,) -> (m, d - 1), the same on all ranks."""
         table = np.zeros((self.surface.count, self.surface.tangents.shape[1]))
         table[self.surface.slots] = self.by_point(values)
         return self.surface.comm.sum(table)
@@ -87,7 +87,7 @@ class FrictionSystem:
 
 @dataclass(frozen=True)
 class FrictionUnknowns:
-    """Owned values of the unknowns: z, lambda (L,) [as r_t] and gamma (D,) of a rank."""
+    """Hold the owned values of the unknowns: z, lambda (L,) [as r_t] and gamma (D,) of a rank."""
 
     z: Array
     reaction: Array
@@ -95,7 +95,8 @@ class FrictionUnknowns:
 
 
 class ScaledFrictionStep(ScaledStep):
-    """F(y), y = (z/x_ref, lambda/r_ref, gamma r_ref/x_ref), with bounds on y, for the step and thresholds set last."""
+    """Evaluate F(y), y = (z/x_ref, lambda/r_ref, gamma r_ref/x_ref), with bounds on y, for the step and thresholds set
+    last."""
 
     def __init__(self, friction: FrictionSystem, tolerance: float) -> None:
         super().__init__(friction.body, tolerance)
@@ -118,18 +119,18 @@ class ScaledFrictionStep(ScaledStep):
 
     @property
     def disk_limits(self) -> Array:
-        """(D,) scaled thresholds of the points with disks."""
+        """Return (D,) scaled thresholds of the points with disks."""
         return self.limit[self.friction.disk]
 
     @property
     def disk_inverse(self) -> Array:
-        """(D,) 1/s, zero where s = 0."""
+        """Return (D,) 1/s, zero where s = 0."""
         s = self.disk_limits
         return np.divide(1.0, s, out=np.zeros_like(s), where=s > 0.0)
 
     @property
     def disk_stiffness(self) -> Array:
-        """(D,) scaled stiffness of the points with disks."""
+        """Return (D,) scaled stiffness of the points with disks."""
         return np.asarray(self.friction.stiffness[self.friction.pairs].mean(axis=1) * (self.x_ref / self.r_ref))
 
     def _parts(self, y: Array) -> tuple[Array, Array, Array]:
@@ -144,14 +145,14 @@ class ScaledFrictionStep(ScaledStep):
         return body, still, self.disk_limits - np.sum(pairs**2, axis=1) * self.disk_inverse
 
     def disks(self, y: Array) -> tuple[Array, Array, Array]:
-        """(D, 2) lambda, (D, 2) F_lambda and (D,) gamma of the points with disks."""
+        """Return (D, 2) lambda, (D, 2) F_lambda and (D,) gamma of the points with disks."""
         friction = self.friction
         z, reaction, gamma = friction.split(y)
         pairs = reaction[friction.pairs]
         return pairs, (self._origin - z[friction.tangent])[friction.pairs] + gamma[:, None] * pairs, gamma
 
     def residual(self, y: Array) -> Array:
-        """F(y) as SNES sees it."""
+        """Return F(y) as SNES sees it."""
         friction = self.friction
         body, still, room = self._parts(y)
         pairs, moved, _ = self.disks(y)
@@ -163,7 +164,7 @@ class ScaledFrictionStep(ScaledStep):
         return np.concatenate([body, still, room])
 
     def errors(self, y: Array, F: Array) -> tuple[float, float, float]:
-        """As without friction; the second counts what is wrong in slips and disks too."""
+        """Return the errors as without friction; the second counts what is wrong in slips and disks too."""
         friction, s = self.friction, self.disk_limits
         _, reaction, gamma = friction.split(y)
         body, still, room = self._parts(y)
@@ -178,7 +179,7 @@ class ScaledFrictionStep(ScaledStep):
         return force, max(gap, fraction(slip, y_max), disk), backward
 
     def sliding(self, y: Array) -> Mask:
-        """(local) points on the edge of their disk."""
+        """Return (local) points on the edge of their disk."""
         friction = self.friction
         _, reaction, gamma = friction.split(y)
         at_edge = np.abs(reaction) >= self.limit[friction.point]
@@ -188,18 +189,18 @@ class ScaledFrictionStep(ScaledStep):
         return found | (self.limit == 0.0)
 
     def physical(self, y: Array) -> FrictionUnknowns:
-        """y in the units of the step."""
+        """Return y in the units of the step."""
         z, reaction, gamma = self.friction.split(y)
         return FrictionUnknowns(z * self.x_ref, reaction * self.r_ref, gamma * (self.x_ref / self.r_ref))
 
     def slip(self, z: Array, sliding: Mask) -> Array:
-        """(L,) B_t x - slip0 of the owned points, zero where they stick."""
+        """Return (L,) B_t x - slip0 of the owned points, zero where they stick."""
         friction = self.friction
         moved = z[friction.tangent] - self._origin * self.x_ref
         return np.where(sliding[friction.point], moved, 0.0)
 
     def moved(self, state: FrictionUnknowns, slip: Array, limit: Array) -> FrictionUnknowns:
-        """The state with reactions in new disks (m,): sliding points on their edge, along their slip (L,)."""
+        """Return the state with reactions in new disks (m,): sliding points on their edge, along their slip (L,)."""
         friction = self.friction
         s = limit[friction.surface.slots]
         way = friction.by_point(slip)

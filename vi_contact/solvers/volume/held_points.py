@@ -1,4 +1,4 @@
-"""Contact points held at given values, by the one factorisation of A and the Delassus operator (solver notes 1b)."""
+"""Hold contact points at given values, by the one factorisation of A and the Delassus operator."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .bounded_system import BoundedSystem
 
 
 class HeldInverse:
-    """Solves A z = r - reactions with z = target on a held set of contact points, by the factor of A alone.
+    """Solve A z = r - reactions with z = target on a held set of contact points, by the factor of A alone.
 
     Columns of W are made when a point is first held. They are kept when there is room for ``limit`` numbers on every
     rank; else W is applied as a second back-substitution. G costs m² numbers.
@@ -30,7 +30,7 @@ class HeldInverse:
         self._set, self._cholesky = b"", (np.zeros((0, 0)), False)
 
     def unheld(self, r: Array) -> Array:
-        """A⁻¹ r, nothing held: one back-substitution."""
+        """Return A⁻¹ r, nothing held: one back-substitution."""
         system, n = self._system, self._system.rows
         force = r[:n].copy()
         force[system.feet] += r[n:]
@@ -38,7 +38,7 @@ class HeldInverse:
         return np.concatenate([x, x[system.feet] + r[n:] / system.spring])
 
     def hold(self, z: Array, held: Mask, target: Array) -> Array:
-        """z - W reaction, with the reaction on ``held`` (m,) that brings its points to ``target`` (m,)."""
+        """Return z - W reaction, with the reaction on ``held`` (m,) that brings its points to ``target`` (m,)."""
         if not held.any():
             return z
         system, n = self._system, self._system.rows
@@ -52,8 +52,9 @@ class HeldInverse:
         return z
 
     def better_set(self, z: Array, held: Mask, target: Array, exchanges: int) -> Mask:
-        """(m,) A contact set to start from, for z = A⁻¹ b: ``held`` if its reactions push and no other point passes its
-        target; else the points that z takes beyond their targets, with at most so many exchanges of wrong signs.
+        """Return (m,) a contact set to start from, for z = A⁻¹ b: ``held`` if its reactions push and no other point
+        passes its target; else the points that z takes beyond their targets, with at most so many exchanges of wrong
+        signs.
 
         Asked of the contact points alone, it costs little beside a step; SNES decides.
         """

@@ -1,4 +1,4 @@
-"""One factorisation for every reduced system of the volume VI (solver notes 1b).
+"""Use one factorisation for every reduced system of the variational inequality of the volume route.
 
 With the contact unknowns C, W = A⁻¹ E_C and the Delassus operator G = W_C, the system on the inactive set I that
 VINEWTONRSLS asks for when the points a ⊂ C are held is solved exactly by
@@ -29,7 +29,7 @@ from .snes import NEWTON_OPTIONS, SnesDriver
 
 
 class ShellMatrix:
-    """H = A x_ref / r_ref on the unknowns ``local``, for PETSc's Python matrices; all unknowns when None."""
+    """Apply H = A x_ref / r_ref on the unknowns ``local``, for PETSc's Python matrices; all unknowns when None."""
 
     def __init__(self, scaled: ScaledStep, local: Array | None = None) -> None:
         self._scaled = scaled
@@ -40,23 +40,23 @@ class ShellMatrix:
         self.held = scaled.system.shared((~free[scaled.system.bounded]).astype(float)) > 0.0
 
     def mult(self, mat: Any, x: Any, y: Any) -> None:
-        """y = H x."""
+        """Compute y = H x."""
         y.array[:] = self._scaled.system.apply(self.spread(x))[self.local] * (self._scaled.x_ref / self._scaled.r_ref)
 
     def spread(self, x: Any) -> Array:
-        """A vector on ``local`` with zeros elsewhere."""
+        """Return a vector on ``local`` with zeros elsewhere."""
         z = np.zeros(self._scaled.system.size)
         z[self.local] = x.array_r
         return z
 
     def createSubMatrix(self, mat: Any, rows: Any, columns: Any, out: Any = None) -> Any:
-        """The shell on the given rows; PETSc calls it for the inactive set."""
+        """Return the shell on the given rows; PETSc calls it for the inactive set."""
         first, _ = mat.getOwnershipRange()
         return shell(ShellMatrix(self._scaled, rows.indices - first), mat.comm)
 
 
 def shell(context: ShellMatrix, comm: Any) -> Any:
-    """A PETSc matrix around the context."""
+    """Return a PETSc matrix around the context."""
     size = (len(context.local), None)
     mat = PETSc.Mat().createPython((size, size), context, comm=comm)
     mat.setUp()
@@ -64,17 +64,17 @@ def shell(context: ShellMatrix, comm: Any) -> Any:
 
 
 class ShellJacobian:
-    """The Jacobian handed to SNES; it keeps the iterate of its last evaluation for ``ReducedInverse``."""
+    """Hand the Jacobian to SNES; it keeps the iterate of its last evaluation for ``ReducedInverse``."""
 
     def __init__(self, scaled: ScaledStep) -> None:
         self.mat = shell(ShellMatrix(weakref.proxy(scaled)), scaled.system.comm)  # PETSc holds it: see weakly()
         self.y = np.zeros(0)
 
     def rescale(self, ratio: float) -> None:
-        """The context reads the scaled step."""
+        """Do nothing: the context reads the scaled step."""
 
     def evaluate(self, snes: Any, y: Any, J: Any, P: Any) -> None:
-        """Constant."""
+        """Do nothing: the matrix is constant."""
         self.y = np.array(y.array_r)
 
     def destroy(self) -> None:
@@ -83,7 +83,7 @@ class ShellJacobian:
 
 
 class ReducedInverse:
-    """The Python preconditioner: the exact inverse of the reduced matrix it is set up with.
+    """Precondition in Python: the exact inverse of the reduced matrix it is set up with.
 
     A back-substitution for every change of the active set would dominate the step. When the right-hand side is the
     residual F(y) of the current iterate, A⁻¹ F is known to be y - A⁻¹ b. Another right-hand side, or the same set once
@@ -98,7 +98,7 @@ class ReducedInverse:
         self._free, self._held = np.zeros(0), self._zero > 0.0
 
     def start(self, step: StepProblem) -> Array:
-        """z with the predicted contacts held."""
+        """Return z with the predicted contacts held."""
         system = self._scaled.system
         self._free = self._inverse.unheld(system.load(step.b))
         predicted = system.predicted(step)
@@ -108,7 +108,7 @@ class ReducedInverse:
         return self._inverse.hold(self._free, self._held, step.bound)
 
     def apply(self, pc: Any, r: Any, y: Any) -> None:
-        """y = H_II⁻¹ r."""
+        """Compute y = H_II⁻¹ r."""
         matrix: ShellMatrix = pc.getOperators()[1].getPythonContext()
         scaled = self._scaled
         if self._is_residual(r.array_r, matrix):
@@ -127,7 +127,7 @@ class ReducedInverse:
 
 
 class FactorisedDriver(SnesDriver):
-    """SNES with the one factorisation."""
+    """Run SNES with the one factorisation."""
 
     def __init__(self, scaled: ScaledStep, layers: OptionLayers, settings: OneFactorisation) -> None:
         jacobian = ShellJacobian(scaled)
@@ -139,7 +139,7 @@ class FactorisedDriver(SnesDriver):
 
 @dataclass(frozen=True)
 class OneFactorisation:
-    """SNES VINEWTONRSLS on the one factorisation of A. Iterations are those of SNES.
+    """Solve by SNES VINEWTONRSLS on the one factorisation of A. Iterations are those of SNES.
 
     It starts from the solution on a predicted contact set, so that a right prediction costs one back-substitution and
     no iteration.
@@ -160,13 +160,13 @@ class OneFactorisation:
             whole("OneFactorisation", name, getattr(self, name))
 
     def defaults(self, ranks: int) -> Options:
-        """Options before the user's."""
+        """Return the options that come before the user's."""
         return NEWTON_OPTIONS
 
     def driver(self, scaled: ScaledStep, layers: OptionLayers) -> FactorisedDriver:
-        """The SNES object."""
+        """Return the SNES object."""
         return FactorisedDriver(scaled, layers, self)
 
     def start(self, driver: FactorisedDriver, system: BoundedSystem, step: StepProblem) -> Array:
-        """The solution with the predicted contacts held."""
+        """Return the solution with the predicted contacts held."""
         return driver.inverse.start(step)

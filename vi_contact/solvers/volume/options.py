@@ -1,7 +1,7 @@
 """PETSc options of the volume route: one prefix, three layers, and refusal of combinations known to give wrong answers.
 
 Layers, the later wins: the method's defaults, ``petsc_options`` of the settings, PETSc's own database (command line,
-PETSC_OPTIONS). SNES VI reads its options again whenever the active set changes (P4), so they stay in the database for
+PETSC_OPTIONS). SNES VI reads its options again whenever the active set changes, so they stay in the database for
 as long as a solve runs and are taken out afterwards: two solvers with one prefix do not meet.
 """
 
@@ -21,7 +21,8 @@ DIRECT = ("lu", "cholesky")
 
 
 class OptionLayers:
-    """Defaults and the user's own options under a prefix; ``in_force`` puts them into PETSc's database for a while."""
+    """Hold defaults and the user's own options under a prefix; ``in_force`` puts them into PETSc's database for a
+    while."""
 
     def __init__(self, prefix: str, defaults: Options, own: Options) -> None:
         self.prefix = prefix
@@ -56,12 +57,12 @@ class OptionLayers:
                 database.delValue(self.prefix + key)
 
     def chosen(self, key: str) -> str:
-        """The value in force; call inside ``in_force``."""
+        """Return the value in force; call inside ``in_force``."""
         return str(PETSc.Options(self.prefix).getString(key, ""))
 
 
 def refuse(combination: str, reason: str, remedy: str) -> None:
-    """InputError of an unsound choice."""
+    """Raise InputError of an unsound choice."""
     raise InputError(f"{combination} is refused because {reason}: {remedy}")
 
 
@@ -76,7 +77,7 @@ SYMMETRIC_KSP = ("cg", "pipecg", "groppcg", "cgne", "cr", "minres", "symmlq", "n
 
 
 def check_reduced(snes: Any, layers: OptionLayers) -> None:
-    """Refuse what does not work on the reduced systems of VINEWTONRSLS (P5, P6, P20)."""
+    """Refuse what does not work on the reduced systems of VINEWTONRSLS."""
     _check_type(snes, "vinewtonrsls", layers)
     pc, ksp = snes.ksp.pc.getType(), snes.ksp.getType()
     if pc in REDUCED_PC:
@@ -87,7 +88,7 @@ def check_reduced(snes: Any, layers: OptionLayers) -> None:
 
 
 def check_own_inverse(snes: Any, layers: OptionLayers) -> None:
-    """The one-factorisation path brings its own preconditioner."""
+    """Raise InputError for a preconditioner: the one-factorisation path brings its own."""
     _check_type(snes, "vinewtonrsls", layers)
     pc = snes.ksp.pc.getType()
     if pc != "python":
@@ -97,7 +98,7 @@ def check_own_inverse(snes: Any, layers: OptionLayers) -> None:
 
 
 def check_semismooth(snes: Any, layers: OptionLayers) -> None:
-    """Refuse what needs a symmetric matrix: the Jacobian D_a + D_b A of VINEWTONSSLS is not (P8)."""
+    """Refuse what needs a symmetric matrix: the Jacobian D_a + D_b A of VINEWTONSSLS is not."""
     _check_unsymmetric(snes, layers, "vinewtonssls", "vinewtonssls", "the semismooth Jacobian")
 
 

@@ -3,7 +3,7 @@
     A x = b - B_nᵀ r_n,    0 <= r_n  ⊥  bound - B_n x + compliance r_n / scale >= 0
 
 In the rotated basis every condition is a bound on one unknown, which is all that SNES-VI and TAO know of contact. With
-friction the tangential reactions become bounded unknowns too (volume_friction.py); then there is nothing to minimise,
+friction the tangential reactions become bounded unknowns too (``friction``); then there is nothing to minimise,
 and only SNES can do it. Reference: PETSc manual, chapters SNES (variational inequalities) and TAO.
 """
 
@@ -36,20 +36,20 @@ __all__ = ["OneFactorisation", "ReducedNewton", "SemismoothNewton", "TaoTron", "
 
 
 class Driver(Protocol):
-    """A PETSc solver bound to a ScaledStep."""
+    """Run a PETSc solver bound to a ScaledStep."""
 
     solver: Any
     reasons: type
 
     def run(self) -> tuple[Array, Array, int, int]:
-        """(y, F(y), PETSc's reason, iterations) of the scaled step."""
+        """Return (y, F(y), PETSc's reason, iterations) of the scaled step."""
         ...
 
     def destroy(self) -> None: ...
 
 
 class Method(Protocol):
-    """How the bounded problem is solved: settings that make a driver and choose where it starts.
+    """Say how the bounded problem is solved: settings that make a driver and choose where it starts.
 
     One that ``carries_friction`` is a FrictionMethod.
     """
@@ -63,7 +63,7 @@ class Method(Protocol):
 
 
 class FrictionMethod(Method, Protocol):
-    """A method that carries friction: its settings for the larger system."""
+    """Solve with friction too: its settings for the larger system."""
 
     def friction_defaults(self) -> Options: ...
     def friction_driver(self, scaled: ScaledFrictionStep, layers: OptionLayers) -> Any: ...
@@ -71,7 +71,7 @@ class FrictionMethod(Method, Protocol):
 
 @dataclass(frozen=True)
 class Volume:
-    """Settings of the volume route.
+    """Hold the settings of the volume route.
 
     Attributes:
         method: OneFactorisation (fast), ReducedNewton (the reference), SemismoothNewton or TaoTron.
@@ -95,7 +95,8 @@ class Volume:
                              "1e-9")
 
     def check(self, problem: ContactProblem) -> None:
-        """InputError for friction that the method cannot carry, without a tangent, or of a wrong number of values."""
+        """Raise InputError for friction that the method cannot carry, without a tangent, or of a wrong number of
+        values."""
         if not problem.frictional:
             return
         surface, law = problem.surface, problem.friction
@@ -109,12 +110,12 @@ class Volume:
         law.limit(np.zeros(surface.count), surface.weights, 1.0)
 
     def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> PreparedVolume:
-        """The solver for one effective matrix; collective. InputError for options that cannot work."""
+        """Return the solver for one effective matrix; collective. InputError for options that cannot work."""
         return PreparedVolume(self, A, surface, scale)
 
 
 class PreparedVolume:
-    """A PETSc solver bound to A; ``snes`` or ``tao`` is the PETSc object. ``close`` frees it.
+    """Run a PETSc solver bound to A; ``snes`` or ``tao`` is the PETSc object. ``close`` frees it.
 
     Without ``close`` it is freed at the first ``prepare`` after its last reference: destruction is collective, and
     Python's is not, so petsc4py only puts it aside.
@@ -148,12 +149,12 @@ class PreparedVolume:
 
     @property
     def snes(self) -> Any:
-        """The SNES object; None when the method is TAO's or the solver is closed."""
+        """Return the SNES object; None when the method is TAO's or the solver is closed."""
         return self._petsc("SNES")
 
     @property
     def tao(self) -> Any:
-        """The TAO object; None when the method is SNES's or the solver is closed."""
+        """Return the TAO object; None when the method is SNES's or the solver is closed."""
         return self._petsc("TAO")
 
     def _petsc(self, kind: str) -> Any:
@@ -171,7 +172,7 @@ class PreparedVolume:
             self._friction = None
 
     def solve(self, step: StepProblem) -> StepResult:
-        """The step; StepFailure with PETSc's reason when it does not converge."""
+        """Return the step; StepFailure with PETSc's reason when it does not converge."""
         try:
             return self._solve(step) if step.slip0 is None else self._friction_method().solve(step)
         except PETSc.Error as error:

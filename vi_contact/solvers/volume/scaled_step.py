@@ -1,6 +1,6 @@
 """One step in the numbers PETSc computes with, and the test that decides when it is solved.
 
-PETSc's VI and bound-constrained solvers carry absolute tolerances in unknown units (solver notes P1, P18). They are
+PETSc's VI and bound-constrained solvers carry absolute tolerances in unknown units. They are
 handed z / x_ref and (A z - b) / r_ref instead, with powers of two for x_ref and r_ref, so that both are near one in
 any system of units and scaling loses no digit: a bound stays exactly a bound.
 """
@@ -21,7 +21,7 @@ ROUND_OFF = 1e-14  # backward error |A z - b| / (|A| |z| + |b|), largest entries
 
 
 class ScaledStep:
-    """F(y) = (A x_ref y - b) / r_ref with bounds on y, for the step set last."""
+    """Evaluate F(y) = (A x_ref y - b) / r_ref with bounds on y, for the step set last."""
 
     def __init__(self, system: BoundedSystem, tolerance: float) -> None:
         self.system, self.tolerance = system, tolerance
@@ -52,16 +52,16 @@ class ScaledStep:
         return b_max * bb / bAb if bAb > 0.0 else 0.0
 
     def residual(self, y: Array) -> Array:
-        """F(y)."""
+        """Return F(y)."""
         return np.asarray((self.system.apply(y * self.x_ref) - self.b) / self.r_ref)
 
     def function(self, _solver: Any, y: Any, F: Any) -> None:
-        """F(y) as a PETSc callback (SNES function, TAO gradient)."""
+        """Evaluate F(y) as a PETSc callback (SNES function, TAO gradient)."""
         self.last = self.residual(y.array_r)
         F.array[:] = self.last
 
     def objective(self, _solver: Any, y: Any, G: Any) -> float:
-        """f(y) - f(origin) and the gradient F(y), for TAO; f(y) = ½ y·Hy - y·b/r_ref, H = A x_ref / r_ref.
+        """Return f(y) - f(origin) and the gradient F(y), for TAO; f(y) = ½ y·Hy - y·b/r_ref, H = A x_ref / r_ref.
 
         A line search compares values, which agree in all their digits where the gradient still has eight to lose.
         """
@@ -76,12 +76,14 @@ class ScaledStep:
         self._zero = y, self.residual(y)
 
     def active(self, y: Array, F: Array) -> Mask:
-        """(local) the natural map's choice: where the reaction exceeds the remaining gap."""
+        """Return (local) what the natural map chooses: where the reaction exceeds the remaining gap."""
         i = self.system.bounded
         return np.asarray((self.upper[i] - y[i] < -F[i]) | (self.lower[i] == self.upper[i]))
 
     def errors(self, y: Array, F: Array) -> tuple[float, float, float]:
-        """Largest |F| off the active set and |gap| on it, relative as in the certificate; backward error of F."""
+        """Return the largest |F| off the active set and |gap| on it, relative as in the certificate; backward error of
+        F.
+        """
         system, i = self.system, self.system.bounded
         active = self.active(y, F)
         gap = (self.upper[i] - y[i])[active]
@@ -102,9 +104,10 @@ class ScaledStep:
         )
 
     def verdict(self, y: Array, F: Array) -> int:
-        """A SNES convergence reason: 0 to go on, 2 solved to round-off, 4 below the tolerance and no longer improving.
+        """Return a SNES convergence reason: 0 to go on, 2 solved to round-off, 4 below the tolerance and no longer
+        improving.
 
-        PETSc's own tests are relative to the first residual, which a good prediction makes unreachable (P2).
+        PETSc's own tests are relative to the first residual, which a good prediction makes unreachable.
         """
         force, gap, backward = self.errors(y, F)
         if np.isnan(force):
@@ -118,14 +121,14 @@ class ScaledStep:
         return 0
 
     def accepts(self, y: Array, F: Array) -> bool:
-        """True below the tolerance: a solver whose line search fails at the floor of round-off is done."""
+        """Return True below the tolerance: a solver whose line search fails at the floor of round-off is done."""
         force, gap, _ = self.errors(y, F)
         self._worst = max(force, gap)
         return self._worst <= self.tolerance
 
     @property
     def worst(self) -> float:
-        """The larger error found last."""
+        """Return the larger error found last."""
         return self._worst
 
 

@@ -25,7 +25,7 @@ from .friction_system import ScaledFrictionStep
 from .options import OptionLayers, Options, check_friction, check_reduced, check_semismooth
 from .scaled_step import ScaledStep
 
-# Line search: `bt` throttles changes of the active set, 16 to 50 iterations instead of 5 to 7 (P3).
+# Line search: `bt` throttles changes of the active set, 16 to 50 iterations instead of 5 to 7.
 # Tolerances: ours decide (ScaledStep.verdict); one of these set by the user stops earlier, relative to |b|.
 NEWTON_OPTIONS: Options = {
     "snes_linesearch_type": "none",
@@ -38,12 +38,12 @@ NEWTON_OPTIONS: Options = {
 MUMPS_OPTIONS: Options = {
     "ksp_type": "preonly",
     "pc_factor_mat_solver_type": "mumps",
-    "mat_mumps_icntl_20": 0,  # distributed right-hand sides crash (P12)
+    "mat_mumps_icntl_20": 0,  # distributed right-hand sides crash
 }
 
 
 class Jacobian(Protocol):
-    """The matrix of F for SNES: ``rescale`` when the units of a step change, ``evaluate`` as the SNES callback."""
+    """Hold the matrix of F for SNES: ``rescale`` when the units of a step change, ``evaluate`` as the SNES callback."""
 
     mat: Any
 
@@ -53,13 +53,13 @@ class Jacobian(Protocol):
 
 
 class Preconditioner(Protocol):
-    """A PETSc preconditioner in Python."""
+    """Provide a PETSc preconditioner in Python."""
 
     def apply(self, pc: Any, r: Any, y: Any) -> None: ...
 
 
 class SnesDriver:
-    """A SNES object bound to a scaled step; ``solver`` is the PETSc object."""
+    """Run a SNES object bound to a scaled step; ``solver`` is the PETSc object."""
 
     reasons = PETSc.SNES.ConvergedReason
 
@@ -78,7 +78,7 @@ class SnesDriver:
         self._lower, self._upper = self._y.duplicate(), self._y.duplicate()
         self.solver = PETSc.SNES().create(scaled.system.comm)
         self.solver.setOptionsPrefix(layers.prefix)
-        self.solver.setType(snes_type)  # before the convergence test, which it would overwrite (P7)
+        self.solver.setType(snes_type)  # before the convergence test, which it would overwrite
         self._test = Test(scaled)
         self.solver.setFunction(weakly(scaled.function), self._F)
         self.solver.setJacobian(weakly(jacobian.evaluate), jacobian.mat)
@@ -91,7 +91,7 @@ class SnesDriver:
         layers.apply(self.solver, check)
 
     def run(self) -> tuple[Array, Array, int, int]:
-        """(y, F(y), PETSc's reason, iterations) of the scaled step."""
+        """Return (y, F(y), PETSc's reason, iterations) of the scaled step."""
         scaled, snes = self._scaled, self.solver
         self._jacobian.rescale(scaled.x_ref / scaled.r_ref)
         self._y.array[:] = scaled.start
@@ -108,13 +108,14 @@ class SnesDriver:
 
 
 class Test:
-    """The SNES convergence test: our verdict, or a tolerance that the user set, which then counts relative to |b|."""
+    """Test the convergence of SNES: our verdict, or a tolerance that the user set, which then counts relative to |b|.
+    """
 
     def __init__(self, scaled: ScaledStep) -> None:
         self._scaled, self._first = scaled, 0.0
 
     def reason(self, snes: Any, iteration: int, norms: tuple[float, float, float]) -> int:
-        """PETSc's reason to stop, 0 to go on."""
+        """Return PETSc's reason to stop, 0 to go on."""
         reason = self._scaled.verdict(snes.getSolution().array_r, snes.getFunction()[0].array_r)
         if reason:
             return reason
@@ -129,7 +130,7 @@ class Test:
 
 
 def weakly(method: Callable[..., Any]) -> Callable[..., Any]:
-    """The bound method without keeping its object alive: what PETSc may hold.
+    """Return the bound method without keeping its object alive: what PETSc may hold.
 
     petsc4py frees a solver late and all at once; whatever PETSc object only its callbacks kept alive would then be lost
     to the clean-up and never be freed.
@@ -145,13 +146,13 @@ def weakly(method: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def write_bounds(scaled: ScaledStep, lower: Any, upper: Any) -> None:
-    """The bounds of a step in PETSc's vectors; only PETSc's own infinities mean no bound (P9)."""
+    """Write the bounds of a step into PETSc's vectors; only PETSc's own infinities mean no bound."""
     lower.array[:] = np.maximum(scaled.lower, PETSc.NINFINITY)
     upper.array[:] = np.minimum(scaled.upper, PETSc.INFINITY)
 
 
 class AssembledJacobian:
-    """H = A x_ref / r_ref as an AIJ matrix, symmetric positive definite."""
+    """Assemble H = A x_ref / r_ref as an AIJ matrix, symmetric positive definite."""
 
     def __init__(self, system: BoundedSystem) -> None:
         self._A = system.assembled()
@@ -167,7 +168,7 @@ class AssembledJacobian:
             self.mat.setOption(PETSc.Mat.Option.SPD, True)
 
     def evaluate(self, snes: Any, y: Any, J: Any, P: Any) -> None:
-        """Constant."""
+        """Do nothing: the matrix is constant."""
 
     def _copy(self) -> None:
         self._A.copy(self.mat, structure=PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
@@ -181,21 +182,22 @@ class AssembledJacobian:
 
 
 class SemismoothJacobian(AssembledJacobian):
-    """H again for every iteration: VINEWTONSSLS overwrites it by D_a + D_b H, which is not symmetric (P8)."""
+    """Assemble H anew for every iteration: VINEWTONSSLS overwrites it by D_a + D_b H, which is not symmetric."""
 
     def rescale(self, ratio: float) -> None:
         """Take the units of a step."""
         self._ratio = ratio
 
     def evaluate(self, snes: Any, y: Any, J: Any, P: Any) -> None:
-        """A fresh copy."""
+        """Make a fresh copy."""
         self._copy()
         self.mat.setOption(PETSc.Mat.Option.SYMMETRIC, False)
 
 
 @dataclass(frozen=True)
 class ReducedNewton:
-    """SNES VINEWTONRSLS, Cholesky by MUMPS on each reduced matrix: the reference. Iterations are factorisations.
+    """Solve by SNES VINEWTONRSLS, Cholesky by MUMPS on each reduced matrix: the reference. Iterations are
+    factorisations.
 
     Other linear solvers by ``petsc_options``, e.g. {"ksp_type": "cg", "pc_type": "hypre"}; gamg, mg and fieldsplit are
     refused, they do not survive the reduction. With friction LU in the place of Cholesky.
@@ -204,33 +206,35 @@ class ReducedNewton:
     carries_friction: ClassVar[bool] = True
 
     def defaults(self, ranks: int) -> Options:
-        """Options before the user's."""
+        """Return the options that come before the user's."""
         return {**NEWTON_OPTIONS, **MUMPS_OPTIONS, "pc_type": "cholesky"}
 
     def driver(self, scaled: ScaledStep, layers: OptionLayers) -> SnesDriver:
-        """The SNES object."""
+        """Return the SNES object."""
         return SnesDriver(
             scaled, layers, AssembledJacobian(scaled.system), snes_type="vinewtonrsls", check=check_reduced
         )
 
     def start(self, driver: SnesDriver, system: BoundedSystem, step: StepProblem) -> Array:
-        """The guess with the predicted contacts on their bounds."""
+        """Return the guess with the predicted contacts on their bounds."""
         return system.start(step)
 
     def friction_defaults(self) -> Options:
-        """Options before the user's: LU, the system with friction is not symmetric. Its zeros on the diagonal delay
-        pivots, for which MUMPS on several ranks needs room: it stops with INFOG(1) = -9 when it has only the usual."""
+        """Return options before the user's: LU, the system with friction is not symmetric. Its zeros on the diagonal
+        delay pivots, for which MUMPS on several ranks needs room: it stops with INFOG(1) = -9 when it has only the
+        usual."""
         return {**NEWTON_OPTIONS, **MUMPS_OPTIONS, "pc_type": "lu", "mat_mumps_icntl_14": 200}
 
     def friction_driver(self, scaled: ScaledFrictionStep, layers: OptionLayers) -> SnesDriver:
-        """The SNES object of a step with friction."""
+        """Return the SNES object of a step with friction."""
         jacobian = FrictionJacobian(scaled)
         return SnesDriver(scaled, layers, jacobian, snes_type="vinewtonrsls", check=check_friction)
 
 
 @dataclass(frozen=True)
 class SemismoothNewton:
-    """SNES VINEWTONSSLS, LU by MUMPS: a diagnostic. Its iterates may penetrate by about 1e-13 of the displacement.
+    """Solve by SNES VINEWTONSSLS, LU by MUMPS: a diagnostic. Its iterates may penetrate by about 1e-13 of the
+    displacement.
 
     With springs 1e6 times stiffer or softer than the body its line search fails or not, as rounding will have it.
     """
@@ -238,15 +242,15 @@ class SemismoothNewton:
     carries_friction: ClassVar[bool] = False
 
     def defaults(self, ranks: int) -> Options:
-        """Options before the user's."""
+        """Return the options that come before the user's."""
         return {**NEWTON_OPTIONS, **MUMPS_OPTIONS, "snes_linesearch_type": "bt", "pc_type": "lu"}
 
     def driver(self, scaled: ScaledStep, layers: OptionLayers) -> SnesDriver:
-        """The SNES object."""
+        """Return the SNES object."""
         return SnesDriver(
             scaled, layers, SemismoothJacobian(scaled.system), snes_type="vinewtonssls", check=check_semismooth
         )
 
     def start(self, driver: SnesDriver, system: BoundedSystem, step: StepProblem) -> Array:
-        """The guess with the predicted contacts on their bounds."""
+        """Return the guess with the predicted contacts on their bounds."""
         return system.start(step)

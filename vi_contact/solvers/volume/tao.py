@@ -1,6 +1,6 @@
 """PETSc TAO on the same bounds: minimise ½ xᵀA x - bᵀx subject to x_n <= bound, as a second opinion.
 
-TAO's tolerances and trust regions are absolute (P18), which the scaled step makes harmless; its own convergence tests
+TAO's tolerances and trust regions are absolute, which the scaled step makes harmless; its own convergence tests
 are replaced by ``ScaledStep.verdict``.
 """
 
@@ -44,7 +44,7 @@ def check_tao(tao: Any, layers: OptionLayers) -> None:
 
 
 class TaoDriver:
-    """A TAO object bound to a scaled step; ``solver`` is the PETSc object."""
+    """Run a TAO object bound to a scaled step; ``solver`` is the PETSc object."""
 
     reasons = PETSc.TAO.Reason
 
@@ -65,7 +65,7 @@ class TaoDriver:
         layers.apply(self.solver, check_tao)
 
     def run(self) -> tuple[Array, Array, int, int]:
-        """(y, F(y), PETSc's reason, iterations) of the scaled step."""
+        """Return (y, F(y), PETSc's reason, iterations) of the scaled step."""
         scaled, tao = self._scaled, self.solver
         self._hessian.rescale(scaled.x_ref / scaled.r_ref)
         y = np.clip(scaled.start, scaled.lower, scaled.upper)
@@ -90,13 +90,13 @@ class TaoDriver:
 
 
 class Test:
-    """The TAO convergence test: PETSc's own, which only the user's tolerances switch on, then our verdict."""
+    """Test the convergence of TAO: PETSc's own, which only the user's tolerances switch on, then our verdict."""
 
     def __init__(self, scaled: ScaledStep) -> None:
         self._scaled = scaled
 
     def reason(self, tao: Any) -> int | None:
-        """PETSc's reason to stop, None to go on."""
+        """Return PETSc's reason to stop, None to go on."""
         if tao.getConvergedReason():
             return None
         y = tao.getSolution().array_r
@@ -108,7 +108,8 @@ class Test:
 
 @dataclass(frozen=True)
 class TaoTron:
-    """TAO TRON: trust region Newton with projected searches; conjugate gradients with incomplete Cholesky inside.
+    """Solve by TAO TRON: trust region Newton with projected searches; conjugate gradients with incomplete Cholesky
+    inside.
 
     Slow, or a StepFailure, with springs more than about 1e3 times stiffer than the body: they shrink its trust region.
     """
@@ -116,13 +117,13 @@ class TaoTron:
     carries_friction: ClassVar[bool] = False
 
     def defaults(self, ranks: int) -> Options:
-        """Options before the user's."""
+        """Return the options that come before the user's."""
         return tao_options(ranks)
 
     def driver(self, scaled: ScaledStep, layers: OptionLayers) -> TaoDriver:
-        """The TAO object."""
+        """Return the TAO object."""
         return TaoDriver(scaled, layers)
 
     def start(self, driver: TaoDriver, system: BoundedSystem, step: StepProblem) -> Array:
-        """The guess with the predicted contacts on their bounds."""
+        """Return the guess with the predicted contacts on their bounds."""
         return system.start(step)
