@@ -22,6 +22,7 @@ CLEAN = (  # rooms that keep the rules; one a line
     "fem",
     "ground_motion",
     "meshes",
+    "models",
     "plots",
     "soil",
 )
