@@ -66,6 +66,10 @@ class Static(Law):
     def slope(weights): return weights
 class Property(Law):
     slope = property(lambda self: 1.0)
+class Compiled(Law):
+    slope = dict
+class Number(Law):
+    at = 3.0
 class Hinted(Law):
     def __init__(self, mu: Nowhere): pass
 class Still:
@@ -130,7 +134,7 @@ def test_a_case_file_alone_imports_nothing(folder: Path, capsys: pytest.CaptureF
 def test_classes_of_allowed_packages(folder: Path, monkeypatch: pytest.MonkeyPatch,
                                      capsys: pytest.CaptureFixture[str]) -> None:
     """By the module that defines it or the package that hands it on; keys without type hints come as they are."""
-    for name in ("pack.laws:Law", "pack:Law", "pack.laws:Static"):
+    for name in ("pack.laws:Law", "pack:Law", "pack.laws:Static", "pack.laws:Compiled"):
         for allow in (("pack",), ("other", "pack.laws", "pack")):
             case = read_case(folder / "case.toml", law(name, "friction.plain=[1, 'a']"), allow=allow)
             made = case.nodes["friction"].build({})
@@ -178,8 +182,9 @@ def test_installed_packages_register_an_entry_point(folder: Path) -> None:
     ("pack.laws:Half", "which has no method slope, at, as FrictionLaw must: see docs/reference/api.md"),
     ("pack.laws:Property", "which has no method slope"),
     ("pack.laws:Short", "which cannot be called as limit(r_n, weights, scale)"),
+    ("pack.laws:Number", "which has no method at, as FrictionLaw must"),
     ("pack.laws:Hinted", "whose arguments cannot be read (name 'Nowhere' is not defined): correct the type hints"),
-], ids=range(39))
+], ids=range(40))
 def test_names_that_are_refused(folder: Path, name: str, words: str) -> None:
     assert words in said(folder, *law(f'"{name}"'))
     assert imported() <= {"pack", "pack.laws", "harmless_friend"} and not list(folder.rglob("harm"))

@@ -17,7 +17,7 @@ def defect(cls: type, kind: Any) -> str:
     if not is_protocol(kind):
         return "" if issubclass(cls, kind) else f"is no {kind.__name__}"
     methods = dict(_asked(kind, isfunction))
-    missing = [name for name in methods if not isfunction(_plain(cls, name))]
+    missing = [name for name in methods if not callable(_plain(cls, name))]
     if missing:
         return f"has no method {', '.join(missing)}"
     wrong = [f"{name}{_shown(asked)}" for name, asked in methods.items() if not _takes(cls, name, asked)]
@@ -54,6 +54,8 @@ def _takes(cls: type, name: str, asked: Callable[..., Any]) -> bool:
         signature(_plain(cls, name)).bind(*(one for one in parameters if one.name not in named), **named)
     except TypeError:
         return False
+    except ValueError:  # compiled, and without a signature
+        pass
     return True
 
 
