@@ -25,6 +25,7 @@ CLEAN = (  # rooms that keep the rules; one a line
     "models",
     "plots",
     "soil",
+    "studies",
 )
 CIPHERS = re.compile(
     r"\bV\d+\.\d+\b|\bP([3-9]|[12]\d)\b|\bB\d{1,2}\b|(?i:\bseed[ _-]?00\d|\bdesign ideas? \d|\bsolver notes\b"

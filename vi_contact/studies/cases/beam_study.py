@@ -26,7 +26,7 @@ HISTORY, SHAPES = "history.csv", "shapes.npz"
 
 @dataclass(frozen=True)
 class BeamStudy:
-    """Data of the beam in SI units, by default those of the source (docs/theory/beam.md).
+    """Hold data of the beam in SI units, by default those of the source (docs/theory/beam.md).
 
     Normal force: a ``reading`` of the source's, "A", "B", "C" (default) or "none"; or ``force``, constant [N]; or
     ``rod``: that of the beam as a rod under so many N/m along it, with ``gap`` to the wall [m]. mu: a constant

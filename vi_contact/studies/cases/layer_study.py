@@ -27,7 +27,7 @@ NOTE = "e: Newton's; e_p: Poisson's with the boundary force; t_c, t_f: end of co
 
 @dataclass(frozen=True)
 class LayerStudy:
-    """A particle of ``mass`` [kg] that enters the layer of ``width`` b [m] with ``speed`` [m/s].
+    """Send a particle of ``mass`` [kg] into the layer of ``width`` b [m] with ``speed`` [m/s].
 
     Every pair of ``k`` [N/m] and ``c`` [N] is run; a ``restitution`` finds one pair instead, with the greatest
     compression at ``deepest`` times b. start: where the force is complete [m] (default b); law_speed: V of the law

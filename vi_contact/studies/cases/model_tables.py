@@ -1,4 +1,4 @@
-"""Models that a case file may name instead of mesh, material, system and contact."""
+"""Build the models that a case file may name instead of mesh, material, system and contact."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .table_calls import GIVEN, Callee
 
 @dataclass(frozen=True)
 class Parts:
-    """What a problem is made of.
+    """Hold what a problem is made of.
 
     tags: groups of the mesh; weighted: it carries its weight, and starts from its equilibrium; recorders: of a case
     that names none; firm: the same body on supports that hold static loads, for the gravity stage, where its own do

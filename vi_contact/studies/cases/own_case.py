@@ -25,7 +25,7 @@ STUDIES = {"beam": callee(BeamStudy), "layer": callee(LayerStudy)}
 
 
 class Study(Protocol):
-    """What such a table makes."""
+    """Compute and draw what such a table says."""
 
     def run(self, folder: Path) -> str:
         """Write what is found into the folder; return it as text."""
@@ -38,7 +38,7 @@ class Study(Protocol):
 
 @dataclass(frozen=True)
 class OwnCase:
-    """A case file of one of STUDIES, read and checked; ``path``, ``tables``, ``settings`` as those of ``Case``."""
+    """Hold a case file of one of STUDIES, read and checked; ``path``, ``tables``, ``settings`` as in ``Case``."""
 
     path: Path
     tables: Mapping[str, Any]

@@ -23,8 +23,8 @@ OF_OWN: dict[str, dict[str, str]] = {"beam": {"dt": "beam.dt"}, "layer": {}}  # 
 
 @dataclass(frozen=True)
 class ShortOptions:
-    """What people change most. motion: record files joined by commas, the first one horizontal, the last one of two
-    vertical; scale: a factor on what shakes; solver, scheme: names of case files; None: as the case says."""
+    """Hold what people change most. motion: record files joined by commas, the first one horizontal, the last one of
+    two vertical; scale: a factor on what shakes; solver, scheme: names of case files; None: as the case says."""
 
     motion: str | None = None
     scale: float | None = None
