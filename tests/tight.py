@@ -13,6 +13,7 @@ import os
 import re
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import suppress
 from math import nan
 from operator import add, mul, sub, truediv
 
@@ -33,7 +34,8 @@ def number(node: ast.expr) -> float:
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
         return -number(node.operand)
     if isinstance(node, ast.BinOp) and type(node.op) in ARITHMETIC:
-        return float(ARITHMETIC[type(node.op)](number(node.left), number(node.right)))
+        with suppress(ZeroDivisionError, OverflowError):
+            return float(ARITHMETIC[type(node.op)](number(node.left), number(node.right)))
     return nan
 
 

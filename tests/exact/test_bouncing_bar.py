@@ -71,7 +71,8 @@ def test_bar_obeys_its_equations(height):
     bar = BouncingBar(height=height)
     until = 6.0
     x, t = LENGTH * (0.1 + 0.8 * RANDOM.random(2000)), until * (0.1 + 0.8 * RANDOM.random(2000))
-    assert wave_defect(bar.displacement, length=LENGTH, c=C, until=until, force=-G) < 2e-13
+    round_off = 16 * np.finfo(float).eps * G * until**2  # the largest of the terms that cancel, five of them
+    assert wave_defect(bar.displacement, length=LENGTH, c=C, until=until, force=-G) < round_off
     assert derivative_defect(bar.displacement, bar.velocity, x=x, t=t, h=(0.0, 1e-5)) < 1e-8
     assert derivative_defect(bar.displacement, bar.strain, x=x, t=t, h=(1e-4, 0.0)) < 1e-8
     p, y = bar.force(t), bar.foot(t)
