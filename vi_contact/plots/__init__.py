@@ -16,6 +16,7 @@ _CONTENTS = {
     "layer": ("plot_particle",),
     "records": ("plot_motion", "plot_spectra"),
     "report": ("plot_report",),
+    "run_pictures": ("draw_run",),
     "spectra": ("plot_loop", "plot_transfer"),
 }
 __all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)
