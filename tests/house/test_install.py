@@ -3,10 +3,17 @@
 from __future__ import annotations
 
 import sys
+import tomllib
+from fnmatch import fnmatch
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import pytest
+
+from vi_contact.studies.cases.library import FOLDER
+
+ROOT = Path(__file__).resolve().parents[2]
 
 MINIMUM = {
     "numpy": (1, 24), "scipy": (1, 10), "h5py": (3, 7), "matplotlib": (3, 6), "tqdm": (4, 64),
@@ -40,3 +47,15 @@ def test_compiled_form_gives_area_of_unit_square(comm: Any) -> None:
     one = fem.Constant(square, 1.0)
     area = comm.allreduce(fem.assemble_scalar(fem.form(one * ufl.dx)), op=MPI.SUM)
     assert area == pytest.approx(1.0, rel=1e-14)
+
+
+@pytest.mark.serial
+def test_the_cases_that_ship_are_installed() -> None:
+    """pip installs files that are no modules only where pyproject.toml names them."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    patterns = project["tool"]["setuptools"]["package-data"]["vi_contact.studies.cases"]
+    files = sorted(path.relative_to(FOLDER.parent).as_posix() for path in FOLDER.rglob("*") if path.is_file())
+    assert len(files) == 4 and all(any(fnmatch(file, one) for one in patterns) for file in files)
+    others = [path for path in (ROOT / "vi_contact").rglob("*") if path.is_file() and "__pycache__" not in path.parts
+              and path.suffix not in (".py", ".toml", ".typed")]
+    assert not others, others
