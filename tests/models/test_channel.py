@@ -13,15 +13,15 @@ from channel_runs import CHANNEL, DT, FRICTION, SCHEME, follow, model
 from mpi4py import MPI
 
 import vi_contact as vc
+from vi_contact import fem
 from vi_contact.cli.entry import main
 from vi_contact.core.errors import InputError
 from vi_contact.core.units import STANDARD_GRAVITY
 from vi_contact.meshes.channel import ChannelMesh
 from vi_contact.meshes.extract import arrays_from_script
-from vi_contact.models.channel.model import BODIES, REFERENCE, Channel, build
+from vi_contact.models.channel.model import BODIES, REFERENCE, Channel, build, staged
 from vi_contact.models.channel.points import SoilProbe
 from vi_contact.models.channel.sides import DashpotSides, Fixed, Rollers, TiedSides
-from vi_contact.models.channel.stages import at_rest
 from vi_contact.studies.cases.case import read_case
 from vi_contact.studies.cases.library import located
 from vi_contact.studies.cases.short_settings import ShortOptions
@@ -291,8 +291,10 @@ def test_waves_from_below_from_options(sides):
 
 def test_at_rest_before_the_shaking():
     """Python's way to the same: ends that hold no static load come after the gravity stage, and stay at rest."""
-    one = at_rest(Channel(ChannelMesh(size=1.0)), COMM, sides=DashpotSides(), excitation=())
-    solution = vc.simulate(one.problem, scheme=SCHEME, dt=DT, steps=2, state=one.start, record=one.model.recorders(),
+    model, firm = staged(Channel(ChannelMesh(size=1.0)), COMM, sides=DashpotSides(), weighing=("channel",), base=None)
+    static = firm.problem(excitation=())
+    problem, start = fem.release(static, vc.static_equilibrium(static), model.problem(excitation=()))
+    solution = vc.simulate(problem, scheme=SCHEME, dt=DT, steps=2, state=start, record=model.recorders(),
                            progress=False)
     size = np.abs(solution.history["u_y_1"]).max()
     assert size > 0.0 and max(np.ptp(solution.history[name]) for name in ("u_x_1", "u_y_1")) < 1e-10 * size

@@ -1,14 +1,14 @@
-"""Bury a channel of reinforced concrete in soil, and shake it: the value, its contact problem, sides and stages.
+"""Bury a channel of reinforced concrete in soil, and shake it: the value, its contact problem and its sides.
 
-``build`` makes the model of a ``Channel``; its ``problem(…)`` is marched. ``at_rest`` does so after the gravity stage.
+``build`` makes the model of a ``Channel``; its ``problem(…)`` is marched. ``staged`` makes that of
+its gravity stage, too, where sides or base hold no static load: ``fem.release`` goes from the one to the other.
 """
 
-from .model import Channel, ChannelModel, build, weighted
+from .model import Channel, ChannelModel, build, staged, weighted
 from .points import Openings, SoilProbe
 from .sides import DashpotSides, Fixed, FreeFieldSides, RockBelow, Rollers, Sides, TiedSides
-from .stages import AtRest, at_rest
 
 __all__ = [
-    "AtRest", "Channel", "ChannelModel", "DashpotSides", "Fixed", "FreeFieldSides", "Openings", "RockBelow", "Rollers",
-    "Sides", "SoilProbe", "TiedSides", "at_rest", "build", "weighted",
+    "Channel", "ChannelModel", "DashpotSides", "Fixed", "FreeFieldSides", "Openings", "RockBelow", "Rollers",
+    "Sides", "SoilProbe", "TiedSides", "build", "staged", "weighted",
 ]

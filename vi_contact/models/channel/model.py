@@ -196,6 +196,17 @@ def build(
     return ChannelModel(channel, mesh, tags, system, joined_surfaces(*pairs).with_frictionless_corners())
 
 
+def staged(
+    channel: Channel, comm: Any, *, sides: Sides | None, weighing: Sequence[str], base: BaseMotion | RockBelow | None
+) -> tuple[ChannelModel, ChannelModel | None]:
+    """Return the model, and on its mesh the one for its gravity stage where its own supports hold no static load."""
+    ends = sides or Rollers()
+    if ends.firm and (base is None or not base.lets_waves_in):
+        return build(channel, comm, sides=ends, weighing=weighing, base=base), None
+    firm = build(channel, comm, sides=ends if ends.firm else None, weighing=weighing)
+    return build(channel, comm, sides=ends, weighing=weighing, base=base, meshed=(firm.mesh, firm.tags)), firm
+
+
 def weighted(system: SemiDiscreteSystem, weighing: Sequence[str]) -> SemiDiscreteSystem:
     """Return the system with the weight of some of BODIES, ∫ rho g v of their own mass matrix."""
     for name in weighing:

@@ -65,7 +65,7 @@ def bedrock(
 
 class Sides(Protocol):
     """Give the conditions at the ends of the layer. ``firm``: whether they hold static loads; others need a gravity
-    stage on firm ones (``at_rest``)."""
+    stage on firm ones (``staged``)."""
 
     @property
     def firm(self) -> bool: ...

@@ -15,7 +15,6 @@ from ...laws.materials import LinearElastic
 from ...models import wall
 from ...models.channel import model as channel
 from ...models.channel.sides import FreeFieldSides, Sides, bedrock
-from ...models.channel.stages import staged
 from ...run.recorders import Contact, Energy, Probe
 from .table_calls import GIVEN, Callee
 
@@ -57,7 +56,7 @@ def _channel(
         surface = model.surface.bilateral_everywhere() if held else model.surface
         return Parts(model.system, surface, model.tags, bool(weighing), model.recorders(), firm, bottom is not None)
 
-    model, firm = staged(shape, comm, sides=ends, weighing=weighing, base=bottom)
+    model, firm = channel.staged(shape, comm, sides=ends, weighing=weighing, base=bottom)
     return parts(model, None if firm is None else parts(firm))
 
 
