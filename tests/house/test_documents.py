@@ -176,7 +176,7 @@ def test_names_are_public(document: Path) -> None:
 
 
 CIPHERS = r"\b[Ss]eed 00\d|\bV\d+\.\d|\bP(?:[3-9]|[12]\d)\b|\b[Dd]esign idea|\b[Ss]olver notes|\bseismic\.md"
-REGISTERS = {"verification.md", "sources.md", "petsc.md", "api.md"}  # these explain the names, or quote docstrings
+REGISTERS = {"verification.md", "sources.md", "petsc.md"}  # these explain the names
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
