@@ -85,7 +85,10 @@ def test_the_outline_runs_down_along_and_up(run: Any) -> None:
     """Left wall 0 to 3 m, base to 7 m, right wall to 10 m; conditions at a corner in the order of their sides."""
     model, _, _ = run
     found = outline(model)
-    np.testing.assert_allclose(found.arc, model.arc, atol=1e-12)
+    places = dict(zip(model.sides, (model.surface.points[mask].T for mask in model.sides.values()), strict=True))
+    for side, arc in (("left", 8.0 - places["left"][1]), ("base", places["base"][0] - 7.0),
+                      ("right", places["right"][1] + 2.0)):
+        np.testing.assert_allclose(found.arc[model.sides[side]], arc, atol=1e-12)
     for name, side in (("left wall", "left"), ("base", "base"), ("right wall", "right")):
         assert np.array_equal(found.sides[name], model.sides[side])
     assert [name for name, _ in found.along()] == ["left wall", "base", "right wall"]

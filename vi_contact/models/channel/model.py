@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.algebra import Array, Mask
+from ...core.algebra import Mask
 from ...core.errors import InputError
 from ...core.problem import ContactProblem
 from ...core.protocols import Excitation, FrictionLaw, Frictionless, ImpactLaw, MassLaw
@@ -139,18 +139,6 @@ class ChannelModel:
         """Return masks (m,) of the contact conditions of each of SIDES."""
         normals = {"base": (0.0, -1.0), "left": (-1.0, 0.0), "right": (1.0, 0.0)}
         return {side: self.surface.normals @ normals[side] > 0.5 for side in SIDES}
-
-    @cached_property
-    def arc(self) -> Array:
-        """Return the places (m,) of the contact conditions along the channel's outline, from the surface down the left
-        wall, along the base and up the right wall [m]. The corners' two conditions are at one place."""
-        shape, points = self.channel.shape, self.surface.points
-        down, along, up = shape.y[3] - points[:, 1], points[:, 0] - shape.x[1], points[:, 1] - shape.y[1]
-        return np.select(
-            [self.sides["left"], self.sides["base"]],
-            [down, shape.height + along],
-            shape.height + shape.outer_width + up,
-        )
 
 
 def build(
