@@ -15,7 +15,8 @@ SQUARE = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)]
 def test_a_square():
     """Normals point out, tau = (-n_2, n_1), sides are labelled, lengths and area add up."""
     mesh = polygon(SQUARE, 0.2)
-    assert len(mesh) == 20 and mesh.area == pytest.approx(1.0) and mesh.lumped.sum() == pytest.approx(4.0)
+    lengths = mesh.node_lengths(np.ones(len(mesh), bool))
+    assert len(mesh) == 20 and mesh.area == pytest.approx(1.0) and lengths.sum() == pytest.approx(4.0)
     for side, normal in enumerate([(0, -1), (1, 0), (0, 1), (-1, 0)]):
         assert np.allclose(mesh.normals[mesh.labels == side], normal)
     assert np.allclose(mesh.tangents, np.stack([-mesh.normals[:, 1], mesh.normals[:, 0]], axis=1))

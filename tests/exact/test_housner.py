@@ -24,11 +24,10 @@ def test_numbers_of_the_example():
 
 
 def test_periods():
-    """V3.1: slender and with the sine."""
+    """V3.1: slender."""
     phi = (0.1, 0.25, 0.5, 0.75, 0.9)
-    slender, full = zip(*((BLOCK.period(f * ALPHA), BLOCK.full_period(f * ALPHA)) for f in phi), strict=True)
+    slender = [BLOCK.period(f * ALPHA) for f in phi]
     assert slender == pytest.approx((0.695673, 1.184459, 1.961214, 3.072872, 4.457509), abs=6e-7)
-    assert full == pytest.approx((0.697577, 1.186885, 1.963458, 3.074511, 4.458821), abs=6e-7)
     assert BLOCK.period(1e-14) == pytest.approx(4.0 / BLOCK.p * math.sqrt(2e-14 / ALPHA), rel=1e-9)
 
 
@@ -74,8 +73,7 @@ def test_history_solves_the_slender_equation(phi0):
 
 def test_history_ends_at_rest():
     """The impacts accumulate at a finite time."""
-    end = BLOCK.rest_time(0.5 * ALPHA)
-    assert end == pytest.approx(BLOCK.impact_times(0.5 * ALPHA, 2000)[-1], rel=1e-12)
+    end = BLOCK.impact_times(0.5 * ALPHA, 2000)[-1]
     assert BLOCK.free_rocking(0.5 * ALPHA, [end + 1e-9, 2.0 * end]).tolist() == [0.0, 0.0]
     assert BLOCK.free_rocking(0.5 * ALPHA, 0.0) == pytest.approx(0.5 * ALPHA, rel=1e-14)
 

@@ -115,11 +115,6 @@ class BoundaryMesh:
                     mass[c, np.arange(n), a, c, self.elements[:, b]] = self.lengths * P1_MASS[a, b]
         return mass.reshape(4 * n, 2 * n)
 
-    @property
-    def lumped(self) -> Array:
-        """Return (n,) length that belongs to each node, half of its two elements [m]."""
-        return self.node_lengths(np.ones(len(self), bool))
-
     def elements_where(self, chosen: Callable[[Array], ArrayLike]) -> NDArray[np.bool_]:
         """Return (n,) elements with both ends where `chosen`((m, 2) points) is true."""
         function("BoundaryMesh.elements_where", "chosen", chosen, "give a function of points (m, 2)")

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from ..core.algebra import Array
 from ..core.checks import attributes, function, instance, number, shape_of, whole
@@ -100,19 +100,6 @@ class ConvolutionQuadrature:
         owner = "ConvolutionQuadrature"
         step = number(owner, "the time step dt", dt, positive=True, unit="s")
         return Frequencies(self.method, step, whole(owner, "the number of time steps", steps, least=1))
-
-    def weights(self, transfer: Callable[[complex], ArrayLike], *, dt: float, steps: int) -> Array:
-        """Return (steps, ...) W with u(t_(k+1)) = sum_(l<=k) W[k-l] g[l], g the mean of the input over each step.
-
-        transfer(s) is the transfer function C, a number or an array, analytic for Re s > 0 and real for real s.
-        """
-        function("ConvolutionQuadrature.weights", "transfer", transfer, "give a function of the frequency s")
-        table = self.frequencies(dt=dt, steps=steps)
-        sums = [
-            sum(a * np.asarray(transfer(complex(s))) for a, s in zip(*rows, strict=True))
-            for rows in zip(table.held_factors, table.s, strict=True)
-        ]
-        return table.contour.backward(np.array(sums))
 
     def substep_means(self, forces: Callable[[float, int], Array], *, dt: float, steps: int) -> Array:
         """Return (steps, stages, ...) mean loads between stages, from forces(dt, steps) -> (steps, ...) means.

@@ -86,13 +86,6 @@ class ObliqueImpact:
         return self.pressure * self.duration, -self.traction * self.duration
 
     @property
-    def mean_velocity(self) -> tuple[float, float]:
-        """Return the mean (u_n', u_t') after contact [m/s]: speed_n up, speed_t - 2 mu speed_n if it slipped."""
-        normal, tangential = self.impulses
-        mass = self.material.rho * self.height
-        return -self.speed_n + normal / mass, self.speed_t + tangential / mass
-
-    @property
     def friction_work(self) -> float:
         """Return the energy lost to friction [J/m²]: traction · v_b · duration."""
         return self.traction * self.slip_speed * self.duration

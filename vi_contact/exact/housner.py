@@ -16,7 +16,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.integrate import quad
 
 from ..core.algebra import Array
 from ..core.checks import attributes
@@ -78,20 +77,6 @@ class HousnerBlock:
         """Return (4/p) arcosh(1/(1 - phi0)), free rocking without loss, slender [s]."""
         return float(_period(self._phi(theta0))) / self.p
 
-    def full_period(self, theta0: float) -> float:
-        """Return four times the fall from theta0 to 0 in the equation with the sine [s].
-
-        (4/p) integral over theta of 1/sqrt(2 (cos(alpha - theta0) - cos(alpha - theta))), theta = theta0 (1 - s²).
-        """
-        start = self.alpha - theta0
-        self._phi(theta0)
-
-        def rate(s: float) -> float:
-            half = 0.5 * theta0 * s * s
-            return 2.0 * theta0 * s / math.sqrt(4.0 * math.sin(start + half) * math.sin(half)) if s else 0.0
-
-        return 4.0 / self.p * float(quad(rate, 0.0, 1.0, epsabs=0.0, epsrel=1e-12)[0])
-
     def amplitudes(self, theta0: float, impacts: int) -> Array:
         """Return the largest |theta| after 0, 1, ... impacts, slender, shape (impacts + 1,) [rad].
 
@@ -103,10 +88,6 @@ class HousnerBlock:
         """Return times of the first impacts (impacts,), slender [s]: a quarter period, half ones of phi_1, ..."""
         halves = 0.5 * _period(self._amplitudes(theta0, impacts)[:-1]) / self.p
         return np.cumsum(halves) - 0.5 * halves[:1]
-
-    def rest_time(self, theta0: float) -> float:
-        """Return the limit of the impact times, when the block has come to rest, slender [s]."""
-        return float(self.impact_times(theta0, self._impacts())[-1])
 
     def free_rocking(self, theta0: float, t: ArrayLike) -> Array:
         """Return theta(t) [rad] after release at t = 0, slender, with impacts; shape of t [s] >= 0.

@@ -43,13 +43,6 @@ class SlidingBlock:
             return 0.0
         return 0.5 * a * duration**2 * (a / self.onset_acceleration - 1.0) if self.mu else math.inf
 
-    def stop_time(self, acceleration: float, duration: float) -> float:
-        """Return the time from which the block slides no more [s]: t1 a/(mu g), 0 if |a| <= mu g."""
-        a = abs(acceleration)
-        if a <= self.onset_acceleration:
-            return 0.0
-        return duration * a / self.onset_acceleration if self.mu else math.inf
-
     def history(self, times: ArrayLike, acceleration: ArrayLike) -> tuple[Array, Array]:
         """Return (u, u') at `times`, from rest, for an acceleration that is linear between them; exact to round-off.
 
