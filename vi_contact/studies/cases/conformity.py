@@ -54,7 +54,7 @@ def _takes(cls: type, name: str, asked: Callable[..., Any]) -> bool:
         signature(_plain(cls, name)).bind(*(one for one in parameters if one.name not in named), **named)
     except TypeError:
         return False
-    except ValueError:  # compiled, and without a signature
+    except (ValueError, NameError):  # compiled, and without a signature; type hints that Python 3.14 cannot resolve
         pass
     return True
 

@@ -8,8 +8,8 @@ The module is an allowed package or lies below one, by whole names: "pack" allow
 The class is defined in an allowed package, too: what a module merely imports for its own use is not what it offers, and
 "pack.tools:Popen" would start programs wherever pack.tools uses ``subprocess``. A package may hand on its own classes,
 "pack:Law" from "pack.laws". And the class has all methods of the protocol that the table asks for, which is looked up
-before an object is made. Python searches its own path, never the folder of the case file, where whoever
-wrote the file could have put a module of a trusted name.
+before an object is made. Python searches its own path; the folder of the case file is not added to it,
+since whoever wrote the file could have put a module of a trusted name there.
 """
 
 from __future__ import annotations
