@@ -1,4 +1,4 @@
-"""The demos of the boundary layer and ``vi-contact layer``: key numbers, figures, one sentence for bad input."""
+"""The demos of the boundary layer and ``vi-contact run layer``: key numbers, figures, one sentence for bad input."""
 
 from __future__ import annotations
 
