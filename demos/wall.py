@@ -88,7 +88,7 @@ def compare_schemes(model: wall_model.WallModel, case: str, steps: int, refined:
     for name, impact, finer in (
         ("source's rule, its dt", vc.Inelastic(), 1),
         (f"source's rule, dt/{refined}", vc.Inelastic(), refined),
-        (f"default scheme, dt/{refined}", vc.NoImpact(), refined),  # no impact law, no scheme: trapezoidal, massless
+        (f"default scheme, dt/{refined}", None, refined),  # no impact law, no scheme: trapezoidal, massless
     ):
         problem = model.problem(case, excitation=model.harmonic(AMPLITUDE), impact=impact)
         runs[name] = vc.simulate(

@@ -19,7 +19,7 @@ _CONTENTS = {
     ),
     "core.protocols": ("Frictionless",),
     "laws.friction": ("Coulomb", "ExponentialDecay", "SlipRateCoulomb", "StaticKinetic", "Tresca"),
-    "laws.impact": ("ComponentReset", "Elastic", "Inelastic", "MassProjection", "Newton", "NoImpact"),
+    "laws.impact": ("ComponentReset", "Elastic", "ImpulseUpdate", "Inelastic", "Newton"),
     "laws.mass": ("ConsistentMass", "Redistributed"),
     "laws.weight": ("with_weight",),
     "laws.excitation": ("FullSine", "HalfSine", "Harmonic", "Rectangular", "Ricker", "Tabulated"),

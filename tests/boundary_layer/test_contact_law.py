@@ -22,7 +22,7 @@ from vi_contact.core.state_checks import initial_state
 from vi_contact.exact.bar import ThrownBar
 from vi_contact.laws.excitation import Harmonic
 from vi_contact.laws.friction import Coulomb
-from vi_contact.laws.impact import Inelastic, NoImpact
+from vi_contact.laws.impact import Inelastic
 from vi_contact.laws.mass import ConsistentMass
 from vi_contact.run.march import march
 from vi_contact.run.simulate import simulate
@@ -251,7 +251,7 @@ def test_wall_tends_to_the_exact_inequality(comm):
     from vi_contact.models.wall import Wall, build
 
     model = build(Wall(), comm)
-    exact = model.problem("b", impact=NoImpact(), mass=ConsistentMass())
+    exact = model.problem("b", impact=None, mass=ConsistentMass())
     dt, steps = model.time_step() / 10.0, 220
 
     def displacements(problem, scheme):

@@ -15,7 +15,7 @@ from vi_contact.core.algebra import EffectiveMatrix, SerialMatrix
 from vi_contact.core.state_checks import initial_state
 from vi_contact.core.step import Report, StepProblem, StepResult
 from vi_contact.core.verify import energies, energy_balance, kkt_residual
-from vi_contact.laws.impact import ComponentReset, Elastic, Inelastic, MassProjection, Newton
+from vi_contact.laws.impact import ComponentReset, Elastic, ImpulseUpdate, Inelastic, Newton
 from vi_contact.schemes.linear_multistep import LinearMultistep
 from vi_contact.schemes.ss22 import SS22
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
@@ -159,9 +159,9 @@ def test_nan_and_nothing():
 IMPACTS: dict[str, Any] = {
     "none": None,
     "reset": Inelastic(ComponentReset()),
-    "projection": Inelastic(MassProjection()),
+    "projection": Inelastic(ImpulseUpdate()),
     "newton": Newton(0.5),
-    "elastic": Elastic(MassProjection()),
+    "elastic": Elastic(ImpulseUpdate()),
 }
 
 
@@ -200,7 +200,7 @@ def test_V97_ledger_closes(scheme, damping, impact):
     assert (totals["impact"] != 0.0) == (impact is not None)
     if scheme is HALF:
         assert abs(totals["algorithmic"]) <= 1e-12 * biggest  # the midpoint rule has no algorithmic loss
-    if isinstance(impact, Inelastic) and isinstance(impact.reading, MassProjection):
+    if isinstance(impact, Inelastic) and isinstance(impact.update, ImpulseUpdate):
         assert totals["impact"] > 0.0
 
 

@@ -159,9 +159,9 @@ def test_defaults_of_a_problem():
     """V4.2: a_g = 2 sin(2 pi 2 t), dt = 1/80 s, the inelastic rule as an M-orthogonal impulse on consistent mass."""
     problem = model().problem()
     assert problem.excitation == vc.Harmonic(2.0, 2.0, direction=(1.0, 0.0)) and DT == 1.0 / 80.0
-    assert isinstance(problem.impact.reading, vc.MassProjection) and problem.mass == vc.ConsistentMass()
+    assert isinstance(problem.impact.update, vc.ImpulseUpdate) and problem.mass == vc.ConsistentMass()
     assert not problem.frictional and not problem.surface.bilateral.any()
-    other = model().problem(bilateral=True, friction=FRICTION, impact=vc.NoImpact(), excitation=())
+    other = model().problem(bilateral=True, friction=FRICTION, impact=None, excitation=())
     assert other.mass is None and other.surface.bilateral.all() and other.frictional and other.excitations == ()
 
 
@@ -237,7 +237,7 @@ def test_the_case_that_ships_is_the_channel_of_the_figures():
     assert (given["soil"], given["concrete"], given["damping"]) == (CHANNEL.soil, CHANNEL.concrete, CHANNEL.damping)
     assert case.nodes["escalation"].build({})[0] == REFERENCE
     impact = case.nodes["impact"].build({})
-    assert isinstance(impact, vc.Inelastic) and isinstance(impact.reading, vc.MassProjection)
+    assert isinstance(impact, vc.Inelastic) and isinstance(impact.update, vc.ImpulseUpdate)
 
 
 def built_in(*given, **short):

@@ -16,7 +16,7 @@ import pytest
 from marched_chain import NEWMARK, chain, difference, equal_files, round_off, rubbing_box, run, run_wall, wall
 
 from vi_contact.core.errors import InputError
-from vi_contact.laws.impact import Inelastic, MassProjection
+from vi_contact.laws.impact import ImpulseUpdate, Inelastic
 from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.run.recorders import Contact, Energy
 from vi_contact.run.simulate import simulate
@@ -29,7 +29,7 @@ from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 @pytest.mark.slow
 @pytest.mark.serial
 @pytest.mark.parametrize("scheme", [ZienkiewiczWoodTaylor(0.5), SS22(), NEWMARK], ids=repr)
-@pytest.mark.parametrize("impact", [Inelastic(), Inelastic(MassProjection())], ids=["reset", "projection"])
+@pytest.mark.parametrize("impact", [Inelastic(), Inelastic(ImpulseUpdate())], ids=["reset", "projection"])
 def test_restart_to_the_last_bit(tmp_path: Path, scheme: Any, impact: Any) -> None:
     """A run continued from its checkpoint has the state and the histories of the straight run, byte for byte."""
     problem = chain(impact=impact)

@@ -14,7 +14,7 @@ from vi_contact.core.errors import InputError
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.step import Report, State
 from vi_contact.laws.excitation import Harmonic
-from vi_contact.laws.impact import Inelastic, MassProjection, Newton
+from vi_contact.laws.impact import ImpulseUpdate, Inelastic, Newton
 from vi_contact.run.march import march
 from vi_contact.run.recorders import Contact, Energy, Probe, Steps
 from vi_contact.run.simulate import simulate
@@ -57,7 +57,7 @@ def ledger_defect(found: dict[str, Array]) -> Array:
     ],
     ids=repr,
 )
-@pytest.mark.parametrize("impact", [None, Inelastic(), Inelastic(MassProjection()), Newton(0.5)], ids=repr)
+@pytest.mark.parametrize("impact", [None, Inelastic(), Inelastic(ImpulseUpdate()), Newton(0.5)], ids=repr)
 def test_v9_7_ledger_closes(scheme: Any, impact: Any) -> None:
     """V9.7: W + E(0) = E + D_damping + D_contact + D_impact + D_algorithmic to 1e-10 max E, walls on both sides."""
     problem = chain_problem(
@@ -129,7 +129,7 @@ def test_v9_2_newmark_gains_at_release() -> None:
 @pytest.mark.parametrize("reading", ["literal", "projection"])
 def test_v9_6_impact_loss(reading: str) -> None:
     """V9.6: ½ v⁻ᵀMv⁻ - ½ v⁺ᵀMv⁺ step by step; for the M-projection and e = 0 it is ½ |v⁻ - v⁺|²_M >= 0."""
-    law = Inelastic() if reading == "literal" else Inelastic(MassProjection())
+    law = Inelastic() if reading == "literal" else Inelastic(ImpulseUpdate())
     problem = chain_problem(10, gap=1e-3, excitation=SHAKE, impact=law, consistent=True, stiffness=1e4)
     M = problem.equations.M.csr.toarray()
     found = history(problem, ZienkiewiczWoodTaylor())["loss_impact"]

@@ -22,7 +22,7 @@ from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.state_checks import initial_state
 from vi_contact.core.step import Report
-from vi_contact.laws.impact import Inelastic, MassProjection
+from vi_contact.laws.impact import ImpulseUpdate, Inelastic
 from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.run.march import March
 from vi_contact.run.recorders import Energy
@@ -318,7 +318,7 @@ def test_every_closure_happens_in_a_shortest_step(scheme):
 @pytest.mark.parametrize("scheme", SCHEMES, ids=repr)
 def test_rejected_attempts_leave_no_trace(scheme):
     """Given the accepted sizes as a constant dt each, the run is the same to the last bit."""
-    problem = shaken(Inelastic(MassProjection()))
+    problem = shaken(Inelastic(ImpulseUpdate()))
     reports = list(run(problem, scheme, dt=HalvedAtImpact(5e-3, 2), steps=60))
     first = next(i for i, report in enumerate(reports) if report.new.t - report.old.t < 4e-3)
     state = reports[first - 1].new

@@ -25,7 +25,7 @@ from vi_contact.core.step import Report, State
 from vi_contact.core.verify import energies, energy_balance
 from vi_contact.exact.columns import ObliqueImpact
 from vi_contact.laws.friction import Coulomb
-from vi_contact.laws.impact import Inelastic, MassProjection
+from vi_contact.laws.impact import ImpulseUpdate, Inelastic
 from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.run.files.checkpoint import Problem, RestartPoint, read_checkpoint, write_checkpoint
 from vi_contact.run.static import static_equilibrium
@@ -137,7 +137,7 @@ def test_ledger_closes(given: Any, mass: Any, scheme: Any) -> None:
 
 @pytest.mark.slow
 @schemes
-@pytest.mark.parametrize("impact", [None, Inelastic(), Inelastic(MassProjection())], ids=["free", "reset", "project"])
+@pytest.mark.parametrize("impact", [None, Inelastic(), Inelastic(ImpulseUpdate())], ids=["free", "reset", "project"])
 def test_ledger_closes_with_damping_and_base_motion(scheme: Any, impact: Any) -> None:
     """V9.7, also when impact laws change velocities and accelerations restart; on massless nodes the same loads."""
     assert changes(run(shaken(impact), scheme, dt=0.005, steps=300)) > 8

@@ -17,7 +17,7 @@ from vi_contact.core.problem import ContactProblem
 from vi_contact.core.state_checks import initial_state
 from vi_contact.core.step import State
 from vi_contact.laws.excitation import Harmonic
-from vi_contact.laws.impact import Inelastic, NoImpact
+from vi_contact.laws.impact import Inelastic
 from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.run.recorders import Contact
 from vi_contact.run.time_steps import HalvedAtImpact
@@ -82,11 +82,6 @@ def test_what_cannot_work_is_refused(problem, words):
     if "bilateral" in words:
         problem = replace(problem, surface=surface.bilateral_everywhere())
     with pytest.raises(InputError, match=words):
-        INELASTIC.check(problem)
-
-
-def test_no_impact_law_is_no_law():
-    for problem in (thrown(impact=NoImpact(), **MASS), thrown(**MASS)):
         INELASTIC.check(problem)
 
 

@@ -13,7 +13,7 @@ from vi_contact.core.algebra import Array, Mask
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.step import State
 from vi_contact.core.verify import energy_balance
-from vi_contact.laws.impact import Inelastic, MassProjection
+from vi_contact.laws.impact import ImpulseUpdate, Inelastic
 from vi_contact.models.wall import Wall, WallModel, build
 from vi_contact.run.march import march
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
@@ -81,5 +81,5 @@ def follow(
 
 @cache
 def history(case: str, *, projection: bool = False, **one: Any) -> History:
-    reading = MassProjection() if projection else None
+    reading = ImpulseUpdate() if projection else None
     return follow(problem(case, reading=reading, **one), dt=model(**one).time_step())

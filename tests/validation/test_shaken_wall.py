@@ -17,7 +17,7 @@ from wall_runs import POINTS, SCHEME, follow, history, model, problem
 from vi_contact.core.algebra import Array, EffectiveMatrix
 from vi_contact.core.problem import ContactProblem
 from vi_contact.engineering.modal import lowest_frequency
-from vi_contact.laws.impact import MassProjection
+from vi_contact.laws.impact import ImpulseUpdate
 from vi_contact.laws.materials import LinearElastic
 from vi_contact.models.wall import Wall
 from vi_contact.run.cross_check import cross_check
@@ -255,7 +255,7 @@ def test_statement_5_energy_is_lost_in_contact_only(projection):
     """Undamped and no longer shaken: constant in free flight to 1e-12, lost in contact. The M-orthogonal reset and the
     step itself never create energy (V9.1, V9.6); the literal reset of components may, step by step."""
     dt = model().time_step()
-    reading = MassProjection() if projection else None
+    reading = ImpulseUpdate() if projection else None
     shaken = follow(problem("a", reading=reading), dt=dt, steps=37)
     impact = problem("a", reading=reading).impact
     quiet = model().problem("a", excitation=(), impact=impact)

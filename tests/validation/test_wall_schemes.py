@@ -9,7 +9,7 @@ import pytest
 from mpi4py import MPI
 
 import vi_contact as vc
-from vi_contact.laws.impact import Inelastic, NoImpact
+from vi_contact.laws.impact import Inelastic
 from vi_contact.laws.mass import ConsistentMass
 from vi_contact.models.wall import Wall, WallModel, build
 from vi_contact.run.recorders import Contact, Energy, Probe
@@ -36,7 +36,7 @@ def wall() -> WallModel:
 def run(model: WallModel, case: str, name: str, *, refined: int = 1, steps: int = 400, record: Any = ()) -> Solution:
     """All recorders unless told which."""
     scheme = SCHEMES[name]
-    law: dict[str, Any] = {"impact": NoImpact(), "mass": scheme.mass} if name in MASSLESS else {
+    law: dict[str, Any] = {"impact": None, "mass": scheme.mass} if name in MASSLESS else {
         "impact": Inelastic(), "mass": ConsistentMass()}
     return simulate(
         model.problem(case, **law), scheme=scheme,
@@ -83,7 +83,7 @@ def test_schemes_agree_when_dt_is_fine() -> None:
 def test_the_default_needs_no_names() -> None:
     """A problem without impact law and mass gets the default scheme, on redistributed mass."""
     model = wall()
-    problem: Any = model.problem("b", impact=NoImpact())
+    problem: Any = model.problem("b", impact=None)
     chosen = simulate(problem, dt=model.time_step(), steps=30, progress=False)
     named = simulate(problem, scheme=Trapezoidal(), dt=model.time_step(), steps=30, progress=False)
     assert np.array_equal(chosen.state.u, named.state.u)

@@ -24,7 +24,6 @@ from ..core.checks import instance
 from ..core.errors import InputError, StepFailure
 from ..core.problem import ContactProblem
 from ..core.step import State, StepProblem, StepResult
-from ..laws.impact import NoImpact
 from ..schemes.midpoint import Midpoint
 from ..solvers.condensed import Condensed
 from .contact_law import ContactLayer
@@ -60,7 +59,7 @@ class BoundaryLayer(Midpoint):
         surface = problem.surface
         if problem.frictional:
             raise InputError(f"BoundaryLayer is a law without friction: leave {problem.friction} out")
-        if problem.impact is not None and not isinstance(problem.impact, NoImpact):
+        if problem.impact is not None:
             raise InputError(f"BoundaryLayer makes the rebound itself: leave the impact law {problem.impact} out")
         if np.any(surface.bilateral) or np.any(surface.compliance != 0.0):
             raise InputError("BoundaryLayer needs unilateral contact on rigid supports: leave held points, springs out")

@@ -20,7 +20,7 @@ _WORDS = {  # option and its value -> what to write instead
     "--gravity none": "--set 'model.weighing=[]'", "--contact bilateral": "--set model.held=true",
     "--contact sliding": "",
     "--contact coulomb": "--set friction.type=Coulomb", "--base relative": "", "--projection":
-    "--set impact.reading.type=MassProjection", "--base prescribed": "--set model.base=prescribed",
+    "--set impact.update.type=ImpulseUpdate", "--base prescribed": "--set model.base=prescribed",
     "--base compliant": "--set model.base=compliant", "--sides rollers": "", "--sides tied":
     "--set model.sides.type=TiedSides", "--sides fixed": "--set model.sides.type=Fixed", "--sides free-field":
     "--set model.sides.type=FreeFieldSides", "--sides dashpots": "--set model.sides.type=DashpotSides",

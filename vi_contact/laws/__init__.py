@@ -7,7 +7,7 @@ from ..core.lazy import lazy
 _CONTENTS = {
     "excitation": ("FullSine", "HalfSine", "Harmonic", "Rectangular", "Ricker", "Tabulated"),
     "friction": ("Coulomb", "ExponentialDecay", "SlipRateCoulomb", "StaticKinetic", "Tresca"),
-    "impact": ("ComponentReset", "Elastic", "Inelastic", "MassProjection", "Newton", "NoImpact"),
+    "impact": ("ComponentReset", "Elastic", "ImpulseUpdate", "Inelastic", "Newton"),
     "mass": ("ConsistentMass", "Redistributed"),
     "materials": ("LinearElastic", "MassProportional", "NoDamping", "PlaneStrain", "PlaneStress", "Rayleigh", "Solid"),
     "weight": ("with_weight",),

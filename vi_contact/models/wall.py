@@ -116,18 +116,19 @@ class WallModel:
         case: str,
         *,
         excitation: Excitation | Sequence[Excitation] | None = None,
-        impact: ImpactLaw | None = None,
+        impact: ImpactLaw | None = Inelastic(),
         mass: MassLaw | None = None,
     ) -> ContactProblem:
         """Set up the wall in a case; by default the harmonic of Fig. 3 and the source's inelastic impact on its mass.
 
-        Schemes with massless contact nodes take no impact law: give impact=NoImpact(), and leave mass to them.
+        Schemes with massless contact nodes take no impact law: give impact=None, and leave mass to them. An impact law
+        runs on consistent mass unless another is given.
         """
         return ContactProblem(
             self.system,
             self.surface(case),
-            impact=Inelastic() if impact is None else impact,
-            mass=ConsistentMass() if impact is None and mass is None else mass,
+            impact=impact,
+            mass=ConsistentMass() if impact is not None and mass is None else mass,
             excitation=self.harmonic() if excitation is None else excitation,
         )
 

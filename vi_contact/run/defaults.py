@@ -7,7 +7,6 @@ from dataclasses import replace
 from ..core.problem import ContactProblem
 from ..core.state_checks import check_problem_given
 from ..core.step import Scheme
-from ..laws.impact import NoImpact
 from ..laws.mass import ConsistentMass
 from ..schemes.trapezoidal import Trapezoidal
 from ..schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
@@ -24,7 +23,6 @@ def with_defaults(problem: ContactProblem, scheme: Scheme | None) -> tuple[Conta
     check_problem_given("march", problem)
     check_scheme("march", scheme)
     if scheme is None:
-        lawless = problem.impact is None or isinstance(problem.impact, NoImpact)
         massive = problem.mass is not None and isinstance(problem.mass, ConsistentMass)
-        scheme = Trapezoidal() if lawless and not massive else ZienkiewiczWoodTaylor()
+        scheme = Trapezoidal() if problem.impact is None and not massive else ZienkiewiczWoodTaylor()
     return (problem if problem.mass is not None else replace(problem, mass=scheme.mass)), scheme

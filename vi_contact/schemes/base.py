@@ -12,7 +12,6 @@ from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.protocols import MassLaw
 from ..core.step import State, StepProblem, StepResult
-from ..laws.impact import NoImpact
 from ..laws.mass import ConsistentMass, Redistributed
 
 log = logging.getLogger(__name__)
@@ -123,7 +122,7 @@ def needs_mass(name: str, problem: ContactProblem) -> None:
 
 def needs_no_impact_law(problem: ContactProblem) -> None:
     """Raise InputError for an impact law on massless contact nodes: there is no momentum that it could change."""
-    if has_massless_contact(problem) and problem.impact is not None and not isinstance(problem.impact, NoImpact):
+    if has_massless_contact(problem) and problem.impact is not None:
         raise InputError(
             f"the impact law {problem.impact} acts on the mass of contact nodes and this problem has none there: leave "
             "the law out, or give the problem mass=ConsistentMass()"

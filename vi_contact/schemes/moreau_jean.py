@@ -37,7 +37,6 @@ from ..core.checks import flag, real, shown
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.step import Balance, State, StepProblem, StepResult
-from ..laws.impact import NoImpact
 from .base import SingleStep, stepped
 
 ROUND_OFF = 1e-12  # of the largest displacement: smaller gaps are closed
@@ -82,7 +81,7 @@ class MoreauJean(SingleStep):
                 "MoreauJean stops velocities and springs do not: use ContactStabilisedNewmark() or Midpoint() on "
                 "elastic supports"
             )
-        if problem.impact is not None and not isinstance(problem.impact, NoImpact):
+        if problem.impact is not None:
             raise InputError(
                 f"MoreauJean has its own restitution coefficient and {problem.impact} would act on top of it: leave "
                 "the impact law out, and give MoreauJean(e=…)"

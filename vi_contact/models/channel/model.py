@@ -26,7 +26,7 @@ from ...fem.contact.pairs import contact_pair
 from ...fem.loads import Prescribed, as_tuple
 from ...fem.mesh import build_mesh
 from ...laws.excitation import Harmonic
-from ...laws.impact import Inelastic, MassProjection
+from ...laws.impact import ImpulseUpdate, Inelastic
 from ...laws.mass import ConsistentMass
 from ...laws.materials import Damping, LinearElastic, NoDamping, PlaneStrain
 from ...laws.weight import own_weight
@@ -106,7 +106,7 @@ class ChannelModel:
         friction: FrictionLaw | None = None,
         bilateral: bool = False,
         excitation: Excitation | Sequence[Excitation] | None = None,
-        impact: ImpactLaw | None = None,
+        impact: ImpactLaw | None = Inelastic(ImpulseUpdate()),
         mass: MassLaw | None = None,
     ) -> ContactProblem:
         """Set up channel and soil under the harmonic motion, sliding freely; with the inelastic impact rule, as an
@@ -115,15 +115,15 @@ class ChannelModel:
         Args:
             friction: Coulomb(mu) for instance.
             bilateral: soil and channel cannot part, but slide as before: the linear comparison run of Fig. 9.
-            impact, mass: schemes with massless contact nodes take no impact law: give impact=NoImpact(), and leave
-                mass to them.
+            impact, mass: schemes with massless contact nodes take no impact law: give impact=None, and leave mass to
+                them. An impact law runs on consistent mass unless another is given.
         """
         return ContactProblem(
             self.system,
             self.surface.bilateral_everywhere() if bilateral else self.surface,
             friction=friction or Frictionless(),
-            impact=Inelastic(MassProjection()) if impact is None else impact,
-            mass=ConsistentMass() if impact is None and mass is None else mass,
+            impact=impact,
+            mass=ConsistentMass() if impact is not None and mass is None else mass,
             excitation=self.channel.harmonic() if excitation is None else excitation,
         )
 

@@ -18,7 +18,7 @@ from ...core import ContactSurface, Excitation, FrictionLaw, ImpactLaw, MassLaw,
 from ...fem import BodyForce, Cells, CompliantBase, Dashpots, Facets, Prescribed, Traction
 from ...fem.contact.matching import Matching
 from ...ground_motion import Record, synthetic
-from ...laws.impact import Reading
+from ...laws.impact import VelocityUpdate
 from ...laws.materials import Damping, LinearElastic, Section
 from ...meshes.gmsh_session import MeshScript
 from ...models import channel
@@ -38,7 +38,7 @@ from .table_calls import Callee, callee
 
 _KINDS: Mapping[ModuleType, tuple[Any, ...]] = {  # room -> the kinds of things it lists
     core: (Obstacle, FrictionLaw),
-    laws: (LinearElastic, Section, Damping, FrictionLaw, ImpactLaw, Reading, MassLaw, Excitation),
+    laws: (LinearElastic, Section, Damping, FrictionLaw, ImpactLaw, VelocityUpdate, MassLaw, Excitation),
     ground_motion: (Excitation,),
     meshes: (MeshScript,),
     fem: (Prescribed, Traction, BodyForce, Dashpots, Matching, Recorder, FieldWriter),
