@@ -9,12 +9,12 @@ from collections import deque
 import numpy as np
 import pytest
 from fem_problems import linear
+from packet import WavePacket
 from soil import SOIL, burst, energies, history, strip
 
 import vi_contact as vc
 from vi_contact import exact, fem, soil
 from vi_contact.core.errors import InputError
-from vi_contact.exact.packet import WavePacket
 
 HEIGHT, CELLS = 20.0, 80  # of 0.25 m
 WAVES = {"S": (SOIL.c_s, (1.0, 0.0)), "P": (SOIL.c_p, (0.0, 1.0))}

@@ -43,7 +43,6 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "exact/test_surface_waves.py": "exact.site_response",
     "fem/test_assembly.py": "fem.assembly_checks",
     "fem/test_corners.py": "core.corners laws.mass_transfer",
-    "fem/test_dashpots.py": "exact.packet",
     "fem/test_pairs.py": "fem.contact.matching",
     "fem/test_section_forces.py":
         "fem.contact.frames fem.output.cuts fem.output.nodal_work fem.output.reactions laws.weight",
@@ -74,7 +73,6 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
         "studies.cases.short_settings",
     "models/test_wall.py": "core.units",
     "plots/test_plots_channel.py": "plots.channel plots.channel_mesh plots.channel_run",
-    "plots/test_plots_friction.py": "plots.friction",
     "plots/test_report.py": "cli.report plots.spectra run.files.reading",
     "run/test_cross_check.py": "run.compare_runs",
     "run/test_folder.py": "core.files run.files.history run.files.stored_rows run.files.table run.files.tally",

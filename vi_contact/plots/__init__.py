@@ -10,7 +10,6 @@ _CONTENTS = {
     "channel_mesh": ("animate",),
     "channel_run": ("illustrate",),
     "deformed": ("read_frames", "read_tractions"),
-    "friction": ("plot_hysteresis", "plot_states"),
     "histories": ("plot_certificate", "plot_contact", "plot_energy", "plot_excitation", "plot_points", "plot_runs"),
     "ida": ("plot_ida",),
     "layer": ("plot_particle",),

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core.algebra import Array
-from ..laws.materials import LinearElastic
-from .surface_waves import dashpot_energy
+from vi_contact.core.algebra import Array
+from vi_contact.exact.surface_waves import dashpot_energy
+from vi_contact.laws.materials import LinearElastic
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..core.algebra import Array
-from ..core.errors import InputError
-from .histories import History, canvas, cell_edges, length_unit, panels, save, scaled
+from vi_contact.core.algebra import Array
+from vi_contact.core.errors import InputError
+from vi_contact.plots.histories import History, canvas, cell_edges, length_unit, panels, save, scaled
 
 OPEN, STICK, SLIP = 1, 2, 3  # as contact_status in fields.xdmf
 _COLOURS = {OPEN: ("open", "white"), STICK: ("stick", "tab:blue"), SLIP: ("slip", "tab:orange")}
