@@ -34,6 +34,7 @@ from vi_contact.core.surfaces import empty_surface  # noqa: E402
 from vi_contact.exact import dashpot_energy  # noqa: E402
 from vi_contact.fem.compat import geometry_dofmap  # noqa: E402
 from vi_contact.meshes.block import BlockMesh  # noqa: E402
+from vi_contact.soil import FreeField  # noqa: E402
 
 NU = 0.25
 LENGTH = 2.5  # of the packet, in wavelengths
@@ -84,7 +85,7 @@ def shaken_box(sides: str, distance: float) -> np.ndarray:
     boundary: dict[str, Any] = {
         "rollers": {"prescribed": [fem.Prescribed(one, components=(1,)) for one in ends]},
         "tied": {"tied": fem.Tied(*ends)},
-        "free field": {"dashpots": [soil.FreeField(one, base=SHAKE) for one in ends]},
+        "free field": {"dashpots": [FreeField(one, base=SHAKE) for one in ends]},
         "dashpots": {"dashpots": [fem.Dashpots(one) for one in ends]},
         "free": {},
     }[sides]
