@@ -86,8 +86,9 @@ def test_the_outline_runs_down_along_and_up(run: Any) -> None:
     model, _, _ = run
     found = outline(model)
     places = dict(zip(model.sides, (model.surface.points[mask].T for mask in model.sides.values()), strict=True))
-    for side, arc in (("left", 8.0 - places["left"][1]), ("base", places["base"][0] - 7.0),
-                      ("right", places["right"][1] + 2.0)):
+    x, y = SHAPE.x, SHAPE.y
+    for side, arc in (("left", y[3] - places["left"][1]), ("base", 3.0 + places["base"][0] - x[1]),
+                      ("right", 7.0 + places["right"][1] - y[1])):
         np.testing.assert_allclose(found.arc[model.sides[side]], arc, atol=1e-12)
     for name, side in (("left wall", "left"), ("base", "base"), ("right wall", "right")):
         assert np.array_equal(found.sides[name], model.sides[side])

@@ -105,6 +105,11 @@ class ContactSurface:
         values[self.slots] = np.where(self.tangents >= 0, x[self.tangents], 0.0)
         return self.comm.sum(values)
 
+    def slip(self, u: Array, t: float) -> Array:
+        """Return the tangential displacements on the obstacle (m, d - 1) [m], those of open points too."""
+        there = self.tangential_values(u)
+        return there if self.slide is None else there - self.slide(t)
+
     def reaction_load(self, r_n: Array, rows: int, r_t: Array | None = None) -> Array:
         """Return B_nᵀ r_n + B_tᵀ r_t: the owned part of the contact reaction on the unknowns [N]."""
         load = np.zeros(rows)

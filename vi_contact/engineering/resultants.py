@@ -223,10 +223,8 @@ class Resultants:
 
     def _row(self, state: State) -> Row:
         surface, part = self._surface, self._part
-        u_n, slip = surface.normal_values(state.u), surface.tangential_values(state.u)
+        u_n, slip = surface.normal_values(state.u), surface.slip(state.u, state.t)
         gap = surface.gap(state.t) - u_n + surface.compliance * state.r_n
-        if surface.slide is not None:
-            slip = slip - surface.slide(state.t)
         r_t = None if state.r_t is None else state.r_t[None]
         series = part.opening(state.active[None], gap[None], slip[None]) | part.resultants(state.r_n[None], r_t)
         found: dict[str, Any] = {quantity: float(values[0]) for quantity, values in series.items()}

@@ -218,9 +218,7 @@ class Contact:
 
     def _friction(self, state: State) -> dict[str, Any]:
         surface, system = self._surface, self._problem.system
-        slip = surface.tangential_values(state.u)
-        if surface.slide is not None:
-            slip = slip - surface.slide(state.t)
+        slip = surface.slip(state.u, state.t)
         r_t = np.zeros_like(slip) if state.r_t is None else state.r_t
         load = surface.reaction_load(np.zeros(surface.count), system.rows, r_t)
         force = 0.0 - surface.comm.sum(system.influence.T @ surface.along_axes(load))

@@ -163,9 +163,7 @@ class FrameWriter:
     def _rubbing(self, state: State) -> list[Array]:
         """Tangential traction and slip at the owned nodes, (k, d) each."""
         surface = self._problem.surface
-        slip = surface.tangential_values(state.u)
-        if surface.slide is not None:
-            slip = slip - surface.slide(state.t)
+        slip = surface.slip(state.u, state.t)
         r_t = np.zeros_like(slip) if state.r_t is None else state.r_t
         return [self._along_axes(values) for values in (r_t / surface.weights[:, None], slip)]
 
