@@ -31,7 +31,9 @@ GROWN = 1e12  # change over the first one: diverged
 
 @dataclass(frozen=True)
 class SpaceTimeUzawa:
-    """Hold settings. tolerance: relative change of the multiplier to stop at (the source's 1e-n); rho > 0 [N/m²] or
+    """Solve the whole history at once, or window by window.
+
+    tolerance: relative change of the multiplier to stop at (the source's 1e-n); rho > 0 [N/m²] or
     None: 1/lambda_max(W[0]); window: steps that are solved at once, all of them if None. The run's ``iterations`` has
     one entry per window, ``history`` the relative changes.
 

@@ -121,7 +121,7 @@ class HousnerBlock:
         return theta0 / self.alpha
 
     def _impacts(self) -> int:
-        """Number of impacts after which phi is below REST, from any angle."""
+        """Return the number of impacts after which phi is below REST, from any angle."""
         return math.ceil(math.log(REST) / math.log(self.energy_ratio))
 
     def _amplitudes(self, theta0: float, impacts: int) -> Array:

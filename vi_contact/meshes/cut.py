@@ -1,5 +1,4 @@
-"""Make joints and cracks: nodes along an inner boundary are doubled (cut open) or those of two bodies made one
-(welded).
+"""Make joints and cracks: nodes along an inner boundary are doubled, or those of two bodies welded into one.
 
 Two bodies that may part need nodes of their own on either side. A mesh of one geometry, fragmented along the joint and
 conforming there, gets them by `CutOpen`; bodies meshed one by one have them already.
@@ -154,8 +153,7 @@ def _on_first_side(
 def _doubled(
     arrays: MeshArrays, nodes: Rows, sides: Rows, owner: Rows, one: Rows, other: Rows
 ) -> tuple[Rows, npt.NDArray[np.float64]]:
-    """Return (cells, points): each of the nodes gets a node for every part of the cells around it; parts hang together
-    through the facets (rows `one`, `other` of sides)."""
+    """Give each node a copy for every part of its cells that facets (rows `one`, `other`) connect: (cells, points)."""
     n = len(arrays.points)
     around, column = np.nonzero(np.isin(arrays.cells, nodes))
     node = arrays.cells[around, column]

@@ -75,8 +75,7 @@ class DiskMesh:
 
 
 def _mirror_nodes(model: Any) -> npt.NDArray[np.int_]:
-    """Add the mirror images of all nodes off the axis to a surface; image[tag] is the tag of the image,
-    the tag itself on the axis."""
+    """Add the mirror images of all nodes off the axis to a surface; return image[tag], the tag itself on the axis."""
     tags, points, _ = model.mesh.getNodes()
     tags, points = np.asarray(tags, dtype=int), np.reshape(points, (-1, 3))
     off = points[:, 0] > 1e-9 * float(np.max(points[:, 0]))

@@ -1,5 +1,4 @@
-"""Turn plain arrays into a Gmsh model: changed meshes (vi_contact.meshes.cut) are written and built like
-any other."""
+"""Turn plain arrays into a Gmsh model: meshes that ``cut`` changed are written and built like any other."""
 
 from __future__ import annotations
 

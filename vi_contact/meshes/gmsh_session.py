@@ -113,7 +113,7 @@ def _zeroed_memory() -> Iterator[None]:
 
 @contextmanager
 def _silent_stderr() -> Iterator[None]:
-    """Silence the complaint that Gmsh writes from C++, past sys.stderr."""
+    """Suppress the complaint that Gmsh writes from C++, past sys.stderr."""
     kept, sink = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     os.dup2(sink, 2)
     try:
