@@ -4,24 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
-from ..core.algebra import Array
-from ..run.files.reading import RunFolder
+from ..core.surfaces import ContactSurface
+from ..run.files.reading import ContactGeometry, RunFolder
 from .channel_run import SOIL, illustrate, of_channel
 from .histories import History, plain, plot_certificate, plot_contact, plot_energy, plot_excitation, plot_points
 from .maps import arc_position
-
-
-class ContactPoints(Protocol):
-    """Say where contact points are: a surface's, or those of a run folder."""
-
-    @property
-    def points(self) -> Array: ...
-    @property
-    def normals(self) -> Array: ...
 
 
 def draw_run(run: RunFolder, out: Path, *, title: str, unilateral: Sequence[str] | None = None) -> list[Path]:
@@ -34,7 +24,7 @@ def draw_run(run: RunFolder, out: Path, *, title: str, unilateral: Sequence[str]
 
 
 def draw_histories(
-    history: History, contact: ContactPoints | None, out: Path, *, title: str,
+    history: History, contact: ContactSurface | ContactGeometry | None, out: Path, *, title: str,
     unilateral: Sequence[str] | None = None, reference: History | None = None,
 ) -> list[Path]:
     """Draw the pictures of recorded histories, each where there is something to draw; ``reference``: in grey."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from ...core.algebra import Comm, SerialComm
 from ...core.errors import InputError
@@ -24,18 +24,6 @@ if TYPE_CHECKING:
 STUDIES = {"beam": callee(BeamStudy), "layer": callee(LayerStudy)}
 
 
-class Study(Protocol):
-    """Compute and draw what such a table says."""
-
-    def run(self, folder: Path) -> str:
-        """Write what is found into the folder; return it as text."""
-        ...
-
-    def draw(self, folder: Path) -> list[Path]:
-        """Draw the pictures of a run from its folder; return their files."""
-        ...
-
-
 @dataclass(frozen=True)
 class OwnCase:
     """Hold a case file of one of STUDIES, read and checked; ``path``, ``tables``, ``settings`` as in ``Case``."""
@@ -45,9 +33,9 @@ class OwnCase:
     settings: tuple[str, ...]
     node: Call = field(repr=False)
 
-    def study(self) -> Study:
+    def study(self) -> BeamStudy | LayerStudy:
         """Return what its table makes; InputError for values out of range."""
-        made: Study = self.node.build({})
+        made: BeamStudy | LayerStudy = self.node.build({})
         return made
 
     def run(self, comm: Comm, out: str | Path) -> str:
