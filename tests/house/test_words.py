@@ -17,14 +17,19 @@ CLEAN = (  # rooms that keep the rules; one a line
     "beam",
     "bem",
     "boundary_layer",
+    "core",
     "engineering",
     "exact",
     "fem",
     "ground_motion",
+    "laws",
     "meshes",
     "models",
     "plots",
+    "run",
+    "schemes",
     "soil",
+    "solvers",
     "studies",
 )
 CIPHERS = re.compile(
@@ -47,7 +52,7 @@ Keep
 Leave Let Limit List Listen Load Locate Log Look
 Make Map March Mark Mask Match Measure Mesh Minimise Mirror Model Move Multiply
 Name Normalise Note Number
-Obtain Offer Open Order
+Obtain Offer Open Order Overwrite
 Pad Pair Parse Partition Pass Pick Place Plan Plot Point Pose Post Precondition Predict Prepare Prescribe Press Print
 Process Produce Project Propose Prove Provide Pull Push Put
 Raise Ramp Read Rebuild Recognise Record Reduce Refer Refine Refuse Register Relax Release Remember Remove Rename
