@@ -270,7 +270,7 @@ def test_support_stiffness():
     system, tags = body()
     surface = contact_surface(system, tags["bottom"], obstacle=Touching())
     for stiffness in (0.0, -1.0, float("nan"), float("inf")):
-        with pytest.raises(InputError, match=f"support stiffness is {stiffness}: give a positive foundation modulus"):
+        with pytest.raises(InputError, match=f"foundation modulus is {stiffness}; give a finite number above zero"):
             surface.on_springs(stiffness)
 
 

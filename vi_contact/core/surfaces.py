@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from .algebra import Array, Comm, Indices, Mask, Matrix
-from .checks import function, real, shown
+from .checks import function, number, shown
 from .companion import Companion
 from .errors import InputError
 
@@ -170,8 +170,7 @@ class ContactSurface:
 
         Each point presses a fictitious spring k = stiffness * weight, whose far end obeys the unilateral law.
         """
-        if not 0.0 < real(stiffness) < np.inf:
-            raise InputError(f"support stiffness is {shown(stiffness)}: give a positive foundation modulus in Pa/m")
+        stiffness = number("on_springs", "the foundation modulus", stiffness, positive=True, unit="Pa/m")
         return replace(self, compliance=1.0 / (stiffness * self.weights))
 
 

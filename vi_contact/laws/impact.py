@@ -43,7 +43,7 @@ class VelocityUpdate(Protocol):
 
 @dataclass(frozen=True)
 class ComponentReset:
-    """Overwrite the normal components: the literal rule of the boundary method.
+    """Set the normal components: the literal rule of the boundary method.
 
     At a corner with oblique faces of which some only are closed the velocity of the node changes along the normals of
     these, and with it the normal components on its other faces, as at any other node.

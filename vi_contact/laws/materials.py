@@ -75,16 +75,6 @@ class LinearElastic:
         """Return the shear wave speed sqrt(shear_modulus / rho) [m/s]."""
         return math.sqrt(self.shear_modulus / self.rho)
 
-    @property
-    def c_p_plane_stress(self) -> float:
-        """Return the pressure wave speed in a thin plate, sqrt(E / (rho (1 - nu²))) [m/s]."""
-        return math.sqrt(self.E / (self.rho * (1.0 - self.nu**2)))
-
-    @property
-    def c_bar(self) -> float:
-        """Return the wave speed in a thin bar, sqrt(E / rho) [m/s]."""
-        return math.sqrt(self.E / self.rho)
-
 
 class Section(Protocol):
     """Say how the body is cut out of space: integrals over the mesh are multiplied by `thickness` [m] (1 for a solid).

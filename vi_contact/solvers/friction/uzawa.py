@@ -19,8 +19,7 @@ from typing import ClassVar
 import numpy as np
 
 from ...core.algebra import Array, Mask
-from ...core.checks import attributes, real, shown
-from ...core.errors import InputError
+from ...core.checks import attributes
 from .problem import FrictionResult, ScaledDelassus
 
 
@@ -38,9 +37,8 @@ class Uzawa:
     rho: float | None = None
 
     def __post_init__(self) -> None:
-        attributes(self, positive=("tolerance",), counts=("max_iterations",))
-        if self.rho is not None and not 0.0 < real(self.rho) < np.inf:
-            raise InputError(f"Uzawa: rho is {shown(self.rho)}; give a positive number, or None for an automatic one")
+        positive = ("tolerance",) if self.rho is None else ("tolerance", "rho")
+        attributes(self, positive=positive, counts=("max_iterations",))
 
     def prepare(self, G: Array, bilateral: Mask) -> PreparedUzawa:
         """Check and scale G (m d, m d)."""
