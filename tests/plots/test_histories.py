@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from vi_contact.plots import histories as plotting
+from vi_contact.plots import maps
 
 pytestmark = pytest.mark.serial
 pytest.importorskip("matplotlib")
@@ -48,7 +49,8 @@ def figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
         seen.append(figure)
         return save(figure, path)
 
-    monkeypatch.setattr(plotting, "save", keep)
+    for module in (plotting, maps):
+        monkeypatch.setattr(module, "save", keep)
     return seen
 
 
@@ -59,7 +61,7 @@ DRAW = {
     "excitation": plotting.plot_excitation,
     "energy": plotting.plot_energy,
     "certificate": plotting.plot_certificate,
-    "contact": lambda h, path: plotting.plot_contact(h, path, position=np.linspace(0.75, 8.25, 11)),
+    "contact": lambda h, path: maps.plot_contact(h, path, position=np.linspace(0.75, 8.25, 11)),
 }
 PANELS = {"points": 3, "excitation": 1, "energy": 2, "certificate": 2, "contact": 3}  # the colour bar is an axis too
 
@@ -127,7 +129,7 @@ def test_nothing_happened(tmp_path):
 
 def test_one_contact_point_is_visible(tmp_path, figures):
     """A map of one row has a height."""
-    plotting.plot_contact(history(m=1), tmp_path / "c.png", position=np.array([4.0]))
+    maps.plot_contact(history(m=1), tmp_path / "c.png", position=np.array([4.0]))
     mesh = figures[0].axes[0].collections[0]
     corners = mesh.get_coordinates()
     assert corners.shape[0] == 2 and np.ptp(corners[:, :, 1]) > 0.0
@@ -136,7 +138,7 @@ def test_one_contact_point_is_visible(tmp_path, figures):
 def test_held_points_that_pull_are_not_called_open(tmp_path, figures):
     h = history()
     h["pressure"] -= 1e5
-    plotting.plot_contact(h, tmp_path / "c.png", position=np.linspace(0.75, 8.25, 11))
+    maps.plot_contact(h, tmp_path / "c.png", position=np.linspace(0.75, 8.25, 11))
     low, high = figures[0].axes[0].collections[0].get_clim()
     assert low == -high == -np.abs(h["pressure"]).max() / 1e3
     assert "negative: pull" in figures[0].axes[-1].get_ylabel()
@@ -152,7 +154,7 @@ def test_the_users_matplotlib_is_left_alone(tmp_path):
 
 def test_contact_map_is_sorted_by_position(tmp_path, figures):
     h = history()
-    plotting.plot_contact(h, tmp_path / "c.png", position=np.linspace(8.25, 0.75, 11))
+    maps.plot_contact(h, tmp_path / "c.png", position=np.linspace(8.25, 0.75, 11))
     drawn = np.asarray(figures[0].axes[0].collections[0].get_array()).reshape(11, 401)
     np.testing.assert_allclose(drawn, h["pressure"][:, ::-1].T / 1e3)
     assert "[kPa]" in figures[0].axes[-1].get_ylabel()

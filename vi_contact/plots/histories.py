@@ -187,37 +187,6 @@ def plot_runs(
     return save(figure, path)
 
 
-def plot_contact(history: History, path: str | Path, *, position: Array, axis_label: str = "position [m]") -> Path:
-    """Map the contact pressure over position and time, and the uplift ratio. ``position``: (m,) of the points.
-
-    Open points are white; held points that pull are blue.
-    """
-    figure, (top, bottom) = panels(2, (9.0, 6.0), height_ratios=(3, 1))
-    t, order = history["t"], np.argsort(position)
-    pressure, unit = scaled(np.reshape(history["pressure"], (len(t), -1))[:, order], "Pa")
-    colours, low, high = _pressure_scale(pressure)
-    top.grid(False)
-    image = top.pcolormesh(
-        cell_edges(t), cell_edges(position[order]), pressure.T, cmap=colours, vmin=low, vmax=high, rasterized=True
-    )
-    meaning = "white: open" if low > 0.0 else "negative: pull"
-    figure.colorbar(image, ax=top, label=f"contact pressure [{unit}] ({meaning})")
-    top.set(ylabel=axis_label, title="Contact pressure")
-    bottom.plot(t, history["contact_uplift"], color="black", lw=0.9)
-    bottom.set(ylabel="uplift ratio [-]", ylim=(-0.05, 1.05))
-    return save(figure, path)
-
-
-def _pressure_scale(pressure: Array) -> tuple[Any, float, float]:
-    """(colours, lowest, highest): from white upwards, or to both sides of white where points are held."""
-    import matplotlib
-
-    size = float(np.max(np.abs(pressure), initial=0.0)) or 1.0
-    if np.any(pressure < 0.0):
-        return matplotlib.colormaps["RdBu_r"], -size, size
-    return matplotlib.colormaps["magma_r"].with_extremes(under="white"), 1e-9 * size, size
-
-
 def cell_edges(centres: Array) -> Array:
     """Return the borders of cells around their centres; a single cell is as wide as its distance from zero, or one."""
     if len(centres) == 1:

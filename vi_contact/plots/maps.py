@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..core.algebra import Array, Indices
-from .histories import cell_edges, scaled
+from .histories import History, cell_edges, panels, save, scaled
 
 STRAIGHT = 1e-6  # of its length: what a line of points may deviate
 ROWS = 1200  # of a map: more instants than a page has dots are gathered
@@ -68,18 +69,40 @@ def draw_map(
     axis: Any, t: Array, position: Array, values: Array, unit: str, *, title: str, axis_label: str, colours: str
 ) -> None:
     """Draw values (rows, m) as colours, zero white; points at the same place (corners) side by side in their order."""
-    import matplotlib
+    image, prefixed, _ = _coloured(axis, t, position, values, unit, colours)
+    axis.figure.colorbar(image, ax=axis, pad=0.02, fraction=0.06)
+    axis.set(xlabel="time [s]", ylabel=axis_label)
+    axis.set_title(f"{title} [{prefixed}] (white: none)", loc="left")
+
+
+def plot_contact(history: History, path: str | Path, *, position: Array, axis_label: str = "position [m]") -> Path:
+    """Draw a map of contact pressure over position and time, and the uplift ratio. ``position``: (m,) of the points.
+
+    Open points are white; held points that pull are blue.
+    """
+    figure, (top, bottom) = panels(2, (9.0, 6.0), height_ratios=(3, 1))
+    pressure = np.reshape(history["pressure"], (len(history["t"]), -1))
+    image, unit, pulling = _coloured(top, history["t"], position, pressure, "Pa", "magma_r")
+    meaning = "negative: pull" if pulling else "white: open"
+    figure.colorbar(image, ax=top, label=f"contact pressure [{unit}] ({meaning})")
+    top.set(ylabel=axis_label, title="Contact pressure")
+    bottom.plot(history["t"], history["contact_uplift"], color="black", lw=0.9)
+    bottom.set(ylabel="uplift ratio [-]", ylim=(-0.05, 1.05))
+    return save(figure, path)
+
+
+def _coloured(axis: Any, t: Array, position: Array, values: Array, unit: str, colours: str) -> tuple[Any, str, bool]:
+    """(image, unit with its prefix, whether some values are negative): from white upwards, or to both sides of it."""
+    from matplotlib import colormaps
 
     order = np.argsort(position, kind="stable")
     shown, prefixed = scaled(values[:, order], unit)
     size = float(np.nanmax(np.abs(shown), initial=0.0)) or 1.0
     pulling = bool(np.any(shown < 0.0))
-    palette = matplotlib.colormaps["RdBu_r" if pulling else colours].with_extremes(under="white")
+    palette = colormaps["RdBu_r" if pulling else colours].with_extremes(under="white")
     low = -size if pulling else 1e-9 * size
     axis.grid(False)
     image = axis.pcolormesh(
         cell_edges(t), cell_edges(position[order]), shown.T, cmap=palette, vmin=low, vmax=size, rasterized=True
     )
-    axis.figure.colorbar(image, ax=axis, pad=0.02, fraction=0.06)
-    axis.set(xlabel="time [s]", ylabel=axis_label)
-    axis.set_title(f"{title} [{prefixed}] (white: none)", loc="left")
+    return image, prefixed, pulling

@@ -10,8 +10,8 @@ import numpy as np
 from ..core.surfaces import ContactSurface
 from ..run.files.reading import ContactGeometry, RunFolder
 from .channel_run import SOIL, illustrate, of_channel
-from .histories import History, plain, plot_certificate, plot_contact, plot_energy, plot_excitation, plot_points
-from .maps import arc_position
+from .histories import History, plain, plot_certificate, plot_energy, plot_excitation, plot_points
+from .maps import arc_position, plot_contact
 
 
 def draw_run(run: RunFolder, out: Path, *, title: str, unilateral: Sequence[str] | None = None) -> list[Path]:
