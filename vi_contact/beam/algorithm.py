@@ -97,8 +97,7 @@ class BeamRun:
 
 @dataclass(frozen=True)
 class BeamStep:
-    """Hold the end of a step: time t [s], y and w there, increment of y, slip of the tip; |r_N| [N], mu and load
-    [N/m]."""
+    """Hold the end of a step: t [s], y and w there, increment of y, slip of the tip; |r_N| [N], mu and load [N/m]."""
 
     t: float
     y: Array

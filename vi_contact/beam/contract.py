@@ -72,8 +72,7 @@ class BeamSpace:
         return np.zeros(self.unknowns, dtype=np.int64)
 
     def find_nodes(self, points: Array) -> Indices:
-        """Return the nearest nodes; InputError for points off the axis, beyond the tip or at the clamp (it has
-        none)."""
+        """Return the nearest nodes; InputError for points off the axis, beyond the tip or at the clamp."""
         points = np.asarray(points, dtype=float)
         start, end = 0.5 * float(self.x[0]), float(self.x[-1])
         off = points[:, 0] < start, points[:, 0] > end * (1.0 + 1e-12), np.any(points[:, 1:] != 0.0, axis=1)

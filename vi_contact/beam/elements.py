@@ -33,8 +33,7 @@ S, W = 0.5 * (_POINTS + 1.0), 0.5 * _WEIGHTS
 
 @dataclass(frozen=True)
 class Elements:
-    """Describe ``count`` equal elements. ``reduced_shear``: shear energy by one point; ``published_end``: see the
-    module.
+    """Describe ``count`` equal elements. ``reduced_shear``: shear energy by one point; ``published_end``: see above.
 
     The source has Elements(1000, reduced_shear=False, published_end=True). InputError for fewer than two elements, and
     for a published end with reduced shear, which the source does not have.

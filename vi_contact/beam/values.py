@@ -80,8 +80,7 @@ def _zero(x: Array) -> Array:
 
 @dataclass(frozen=True)
 class Start:
-    """Give initial values as functions of x: displacement u [m], velocity v [m/s], rotation theta, its rate omega
-    [1/s]."""
+    """Give initial values as functions of x: displacement u [m], velocity v [m/s], rotation theta, rate omega [1/s]."""
 
     u: Profile = field(default=_zero)
     v: Profile = field(default=_zero)
@@ -93,8 +92,7 @@ class Start:
             function("Start", name, getattr(self, name), "give a function of the positions x")
 
     def at(self, name: str, x: Array) -> Array:
-        """Return one of the four fields at the nodes; InputError unless it gives finite numbers, one each or one for
-        all."""
+        """Return a field at the nodes; InputError unless it gives finite numbers, one for each node or one for all."""
         values = getattr(self, name)(x)
         shape = () if shape_of(values) == () else x.shape
         return np.broadcast_to(array("Start", f"what {name}(x) returns", values, shape), x.shape).copy()

@@ -43,8 +43,7 @@ class LayerContact:
 
 @dataclass(frozen=True)
 class Trajectory:
-    """Hold times (m,), coordinates (m, n_q), velocities (m, n), distances and reactions lambda (m,) [N]; the contacts
-    that were completed."""
+    """Hold times (m,), coordinates (m, n_q), velocities (m, n), distances, reactions (m,) [N]; completed contacts."""
 
     t: Array
     q: Array

@@ -117,8 +117,7 @@ def dof_to_node(space: Any) -> Indices:
 
 
 def cell_blocks(space: Any) -> Indices:
-    """Return the local blocks of unknowns of each local cell of a P1/Q1 space (owned, ghosts), (n_cells,
-    n_vertices)."""
+    """Return the local blocks of unknowns of each cell of a P1/Q1 space (owned, then ghosts), (n_cells, n_vertices)."""
     return _as_table(space.dofmap.list, space.mesh)
 
 

@@ -27,7 +27,7 @@ Value = tuple[float, ...] | Field
 
 
 def evaluate(name: str, value: Value, points: Array, t: float, comm: Comm) -> Array:
-    """Evaluate the value at this rank's points, (k, d); collective. InputError, on all ranks, for NaN or a wrong
+    """Evaluate the value at this rank's points, (k, d); collective. InputError, on all ranks, for NaN or another
     shape."""
     result, defect = evaluate_here(name, value, points, t)
     refuse([defect], comm)
@@ -93,8 +93,7 @@ class Prescribed:
 
     @property
     def companions(self) -> tuple[Any, ...]:
-        """Return the motions that are marched beside the run: objects whose methods are given, such as
-        ``BaseMotion``."""
+        """Return the motions that are marched beside the run: objects whose methods are given, as ``BaseMotion``."""
         owners = {id(owner): owner for owner in (getattr(value, "__self__", None) for value in self.motions)}
         return tuple(one for owner in owners.values() for one in getattr(owner, "companions", ()))
 

@@ -1,5 +1,4 @@
-"""Implement the algebra protocol on PETSc matrices, on any number of ranks: MUMPS factorises, vectors are numpy
-arrays."""
+"""Implement the algebra protocol on PETSc matrices, on any number of ranks; MUMPS factorises, vectors are of numpy."""
 
 from __future__ import annotations
 

@@ -33,8 +33,7 @@ def steklov(mesh: BoundaryMesh, material: LinearElastic, *, dt: float, steps: in
 
 
 def pressed(operator: PoincareSteklov, *, pressure: Load, top: int, contact: Mask, **more: Any) -> BoundaryProblem:
-    """Set up a body under pressure(t) [Pa] on the elements ``top``; contact: mask of elements; more: fixed,
-    prescribed."""
+    """Set up a body under pressure(t) [Pa] on elements ``top``; contact: mask of elements; more: fixed, prescribed."""
     instance("pressed", "operator", operator, PoincareSteklov, "give steklov(...)")
     function("pressed", "pressure", pressure, "give a function of the time in Pa")
     blocks, mesh = operator.blocks, operator.mesh

@@ -98,8 +98,7 @@ class EmbeddedModel:
 
 
 def build(embedded: Embedded, comm: Any, *, mesh: Callable[[], Any] | None = None) -> EmbeddedModel:
-    """Build mesh, system and contact surface; collective. ``mesh``: makes another mesh with the same groups of cells
-    and boundaries."""
+    """Build mesh, system and contact surface; collective. ``mesh``: makes another mesh with the same groups."""
     box = embedded.box
     built, tags = build_mesh((mesh or embedded.mesh)(), comm)
     around = embedded.block or box.material

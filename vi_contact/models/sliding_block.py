@@ -47,8 +47,7 @@ class SlidingBody:
 
 @dataclass(frozen=True)
 class SlidingModel:
-    """Hold the model. ``problem``: the block on moving ground; ``rest``: standing still; ``centre``: middle, for
-    probes."""
+    """Hold the model. ``problem``: the block on moving ground; ``rest``: standing still; ``centre``: for probes."""
 
     body: SlidingBody
     problem: ContactProblem

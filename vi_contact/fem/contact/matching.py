@@ -22,8 +22,8 @@ DISTANCE_ROWS = 256  # rows of the tables of distances
 
 @dataclass(frozen=True, eq=False)
 class Side:
-    """Hold a boundary that may touch another, the same on every rank: its name, nodes, and facets as rows of places
-    among the nodes."""
+    """Hold a boundary that may touch another, the same on every rank: name, nodes, facets as rows of places among
+    them."""
 
     name: str
     nodes: Nodes

@@ -104,8 +104,8 @@ def side_of(space: FemSpace, facets: Facets) -> Side:
 
 
 def _faces(space: FemSpace, one: Side, around: Boundary, angle: float) -> list[tuple[Side, Array]]:
-    """The smooth faces of side 1, each with its own normals and weights, and the nodes' normals over the whole side.
-    Collective."""
+    """Return the smooth faces of side 1 with their own normals and weights, and the nodes' normals over the whole
+    side."""
     nodes, facet = split(space, around, one.nodes, angle)
     if len(nodes.numbers) == len(one.nodes.numbers):
         return [(one, one.nodes.normals)]

@@ -145,8 +145,7 @@ class FrameWriter:
                 path.unlink()
 
     def write(self, state: State, acceleration: Array, report: Report | None = None) -> None:
-        """Write a frame of the state, of the acceleration of its step, both in the rotated basis, and of its report.
-        Collective."""
+        """Write a frame of state, acceleration of its step (both in the rotated basis) and report. Collective."""
         problem, space = self._problem, self._space
         moving = [
             space.expand(problem.cartesian(x), state.t, derivative)

@@ -128,8 +128,7 @@ class ChannelModel:
         )
 
     def recorders(self) -> tuple[Recorder, ...]:
-        """Return recorders: energy, contact, probes on channel (u_x_1, ...) and soil (u_x_1_soil, ...), openings of
-        sides."""
+        """Return recorders: energy, contact, probes on channel (u_x_1, ...) and soil (u_x_1_soil, ...), openings."""
         probes = self.channel.probes()
         soil = SoilProbe({f"{label}_soil": point for label, point in probes.items()})
         return Energy(), Contact(), Probe(probes), soil, Openings(self.sides)

@@ -31,8 +31,7 @@ class SoilProbe(Probe):
 
 
 def touched_nodes(surface: ContactSurface, nodes: Indices) -> Indices:
-    """Return the numbers of the nodes of side 2 that face nodes of side 1 (the nearest where sides are divided
-    differently)."""
+    """Return the numbers of the nodes of side 2 that face nodes of side 1 (the nearest where divisions differ)."""
     faced: dict[int, int] = {}
     for part in surface.parts if isinstance(surface, FemSurface) else ():
         if part.facing is not None:
