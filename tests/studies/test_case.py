@@ -26,6 +26,7 @@ from vi_contact.models.wall import Wall, build
 from vi_contact.soil import FreeField, upgoing
 from vi_contact.solvers.friction.problem import FrictionMethod
 from vi_contact.studies import Case, read_case, run_case
+from vi_contact.studies.cases.short_settings import REFERENCE, ShortOptions
 from vi_contact.studies.cases.toml_file import with_settings
 from vi_contact.studies.cases.vocabulary import names_of, words
 
@@ -416,6 +417,48 @@ def test_settings() -> None:
 
 
 @pytest.mark.serial
+def test_short_options_are_settings() -> None:
+    """What replaces comes before --set, what acts on the result after it; KEY= takes a key away."""
+    tables = {"excitation": [{"type": "Harmonic", "amplitude": 2.0, "direction": [1.0, 0.0]}], "impact": {"type": "X"},
+              "run": {"dt": 0.1, "t_end": 1.0}, "model": {"type": "Channel"}}
+    given = ["excitation.1.amplitude=3", "run.dt=0.2"]
+    short = ShortOptions(scale=2.0, dt=0.5, steps=7, scheme="Newmark", solver="Hildreth", cross_check=True)
+    made = with_settings(tables, short.settings(tables, given))
+    assert made["excitation"][0]["amplitude"] == 6.0 and made["run"] == {"dt": 0.2, "steps": 7}
+    assert "impact" not in made and made["scheme"] == {"type": "Newmark"}
+    solver = made["solver"]
+    assert solver["primary"] == {"type": "Condensed", "method": {"type": "Hildreth"}}
+    assert solver["others"] == [REFERENCE]
+    shaken = with_settings(tables, ShortOptions(motion="h.at2,v.at2", scale=3.0).settings(tables))
+    assert [one["direction"] for one in shaken["excitation"]] == [[1.0, 0.0], [0.0, 1.0]]
+    assert [one["scale"] for one in shaken["excitation"]] == [3.0, 3.0] and shaken["run"] == {"dt": 0.1}
+    assert shaken["excitation"][1]["record"] == {"path": str(Path("v.at2").absolute())}
+    assert shaken["model"]["sides"] == {"type": "TiedSides"} and tables["run"]["t_end"] == 1.0
+    for wrong, said in (
+        (ShortOptions(scale=2.0), "nothing shakes it"), (ShortOptions(motion="a,b,c"), "give FILE, or FILE,FILE"),
+    ):
+        with pytest.raises(InputError, match=said):
+            wrong.settings({"mesh": {}})
+    with pytest.raises(InputError, match=r"\[beam\] has no use for --steps"):
+        ShortOptions(steps=3).settings({"beam": {}})
+    assert ShortOptions(dt=0.1).settings({"beam": {}}, ["beam.E=1"]) == ["beam.dt=0.1", "beam.E=1"]
+
+
+def test_what_follows_from_the_first_mode() -> None:
+    """Harmonic and time step by the body's lowest frequency; where it is not known yet, a sentence."""
+    settings = ["excitation.1={type='FirstModeHarmonic', amplitude=2, ratio=0.25}", "fields=", "run.steps=2",
+                "run.dt={type='FirstModePeriod', parts=10}"]
+    case = read_case(WALL, settings)
+    case.check()
+    problem = case.problem(MPI.COMM_WORLD)
+    f1 = engineering.lowest_frequency(problem.system)
+    assert problem.excitations == (vc.Harmonic(2.0, 0.25 * f1, direction=(1.0, 0.0)),)
+    solution = case.run(MPI.COMM_WORLD, progress=False)
+    assert solution.history["t"] == pytest.approx(np.array([0.0, 1.0, 2.0]) / (10.0 * f1), rel=1e-14)
+    with pytest.raises(InputError, match="asks for the excitations, not known yet"):
+        read_case(WALL, [*settings, "system.dashpots=[{type='FreeField', facets='back'}]"]).problem(MPI.COMM_WORLD)
+
+
 def test_the_command_runs_checks_and_restarts(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """20 steps at once are 10 steps, then --restart; case.toml in the folder tells the settings."""
     whole, parts = tmp_path / "whole", tmp_path / "parts"

@@ -100,7 +100,7 @@ def plot_points(
             kind = " (contact point)"
             axis.axhline(0.0, color="tab:red", lw=0.8, ls="--")
         axis.set_ylabel(f"$u_{component}$ [{unit}]")
-        axis.set_title(f"point {label}{kind}", fontsize=9, loc="left")
+        axis.set_title(f"point {plain(label)}{kind}", fontsize=9, loc="left")
     if reference is not None:
         axes[0].legend(fontsize=8, ncol=2, loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
     figure.suptitle(title)

@@ -193,17 +193,21 @@ class Case:
         if "model" in self.nodes:
             first = self._run.get("dt")
             dt = first.value if isinstance(first, Value) else None
-            shaking = () if needs_body(self.nodes.get("excitation", Value(()))) else self.excitations()
-            parts: Parts = self._made("model", comm=comm, excitations=shaking, run_dt=dt)
+            parts: Parts = self._made("model", comm=comm, run_dt=dt, **self._shaking())
             return parts
         mesh, tags = self._mesh(comm)
-        system = self._made("system", mesh=mesh, tags=tags, excitations=self.excitations())
+        system = self._made("system", mesh=mesh, tags=tags, **self._shaking())
         system = self._made("gravity", system=system) if "gravity" in self.nodes else system
         surfaces = self._several("contact", system=system, tags=tags)
         surface = joined_surfaces(*surfaces) if len(surfaces) > 1 else (*surfaces, None)[0]
         if surface is None:
             surface = empty_surface(system.algebra.comm, system.space.dimension)
         return Parts(system, surface, tags, "gravity" in self.nodes)
+
+    def _shaking(self) -> dict[str, Any]:
+        """Return the excitations for what is built before the system is; none where they need it themselves."""
+        early = "excitation" not in self.nodes or not needs_body(self.nodes["excitation"])
+        return {"excitations": self.excitations()} if early else {}
 
     def _mesh(self, comm: Any) -> tuple[Any, Tags]:
         """Return the mesh and its groups, all those that the tables name among them."""

@@ -160,7 +160,7 @@ class Call:
     def build(self, context: Context) -> Any:
         lacking = [name for name in self.callee.given if name not in context]
         if lacking:
-            raise self.spot.inside(f"{self.callee.name} asks for the {lacking[0]}, which is made later: give a number")
+            raise self.spot.inside(f"{self.callee.name} asks for the {lacking[0]}, not known yet: give numbers")
         supplied = {name: context[name] for name in self.callee.given}
         arguments = {name: node.build(context) for name, node in self.arguments.items()}
         try:
