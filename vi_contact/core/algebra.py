@@ -1,4 +1,4 @@
-"""Linear algebra on distributed vectors, seen as numpy arrays of the entries this rank owns.
+"""Do linear algebra on distributed vectors, seen as numpy arrays of the entries this rank owns.
 
 Everything above this file (schemes, condensed solver, recorders) is written against the protocols below and never
 asks how many ranks there are. ``SerialAlgebra`` (scipy) serves one process and needs no finite element package;

@@ -1,4 +1,4 @@
-"""Checks of what a user gives: one sentence that names the owner, the field, the value and the remedy.
+"""Check what a user gives: one sentence that names the owner, the field, the value and the remedy.
 
 Every constructor and every entry point of the package asks here, before any work is done. A check returns the value in
 the type that the caller goes on with, so that one line reads and checks an argument.

@@ -1,4 +1,4 @@
-"""Corners: nodes with a contact condition for each of several faces, what is special about them.
+"""Treat corners: nodes with a contact condition for each of several faces.
 
 With the directions n_i of a node its unknowns are û_i = n_i·u, and a force on them is Σ f̂_i n_i. Where the directions
 are oblique, with the cosines G_ij = n_i·n_j, a change of velocity along one normal changes the others' û too, Δû = G a,

@@ -1,4 +1,4 @@
-"""The ways a run stops early: wrong input, a time step that no method could certify, or somebody asked it to."""
+"""Name the ways a run stops early: wrong input, a step that no method could certify, or somebody asked it to."""
 
 from __future__ import annotations
 

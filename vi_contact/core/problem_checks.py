@@ -1,4 +1,4 @@
-"""Checks of the parts of a contact problem: kinds of objects, sizes, and what was made for what.
+"""Check the parts of a contact problem: kinds of objects, sizes, and what was made for what.
 
 Identity counts: a surface that ``fem`` made carries the space it was made on, and only systems of that space take it.
 Sizes are compared on all ranks together, so that all of them raise the same sentence.

@@ -1,4 +1,4 @@
-"""The semi-discrete equations of motion M u'' + C u' + K u = f(t) and the loads on their right-hand side."""
+"""Hold the semi-discrete equations of motion M u'' + C u' + K u = f(t) and the loads on their right-hand side."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Checks that ship with the package: the certificate of a step and the energy balance of a step."""
+"""Verify a step: its certificate, and its energy balance. These checks ship with the package."""
 
 from __future__ import annotations
 

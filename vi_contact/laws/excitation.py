@@ -1,4 +1,4 @@
-"""What shakes the body: scalar ground accelerations a(t) [m/s²] along a fixed direction.
+"""Shake the body: scalar ground accelerations a(t) [m/s²] along a fixed direction.
 
 An excitation is a frozen value with `acceleration(t)` (a float), `direction` (a tuple of d components) and `duration`
 (the time [s] after which it is zero, or negligible, for good); called, it returns the vector a(t) · direction of shape

@@ -1,4 +1,4 @@
-"""Friction laws: how large the tangential reaction may be, and the projection onto that disk.
+"""Bound friction: how large the tangential reaction may be, and the projection onto that disk.
 
 With r_n >= 0 the normal reaction of a contact node and r_t its tangential reaction (d - 1 components), every law says
 

@@ -1,4 +1,4 @@
-"""Which mass matrix the equations of motion use: the consistent one, or one without inertia at the contact nodes.
+"""Choose the mass matrix of the equations of motion: consistent, or without inertia at the contact nodes.
 
 With mass at the contact nodes every closure is an impact of that mass: forces ring and, with contact in the
 acceleration balance, energy grows. Without it the contact unknowns follow the body statically (Khenous, Laborde and

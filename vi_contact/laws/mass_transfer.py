@@ -1,4 +1,4 @@
-"""Velocities of contact nodes from those of the nodes behind them: how redistributed mass leaves the contact surface.
+"""Give contact nodes the velocity of the nodes behind them: how redistributed mass leaves the contact surface.
 
 A massless unknown i at node c, with direction q_i, gets the velocity of the rigid motion a that fits its neighbours J
 best, weighted with their entries w_J of the mass matrix:

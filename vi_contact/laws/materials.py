@@ -1,4 +1,4 @@
-"""What a body is made of: isotropic elasticity, the section it is cut to, and the damping of its motion.
+"""Describe what a body is made of: isotropic elasticity, the section it is cut to, and the damping of its motion.
 
 Everything here is a frozen value checked when it is built; SI units throughout; no finite element is needed.
 """

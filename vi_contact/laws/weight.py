@@ -1,4 +1,4 @@
-"""The weight of a body as a load on its unknowns."""
+"""Make the weight of a body a load on its unknowns."""
 
 from __future__ import annotations
 

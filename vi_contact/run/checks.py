@@ -1,5 +1,4 @@
-"""Check what marches a problem: scheme, solvers, tolerance, the state it starts from, and its time steps.
-"""
+"""Check what marches a problem: scheme, solvers, tolerance, the state it starts from, and its time steps."""
 
 from __future__ import annotations
 

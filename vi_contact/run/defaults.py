@@ -1,4 +1,4 @@
-"""What a run uses when its user leaves time scheme or mass matrix open."""
+"""Choose what a run uses when its user leaves time scheme or mass matrix open."""
 
 from __future__ import annotations
 

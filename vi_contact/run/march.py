@@ -1,4 +1,4 @@
-"""The one time loop: ``march`` is a generator over certified steps."""
+"""March: the one time loop, a generator over certified steps."""
 
 from __future__ import annotations
 

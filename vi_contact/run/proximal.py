@@ -1,4 +1,4 @@
-"""The static stage of a body that contact alone holds (floating: a block standing on the ground): K is singular.
+"""Solve the static stage of a body that contact alone holds (floating: a block standing on the ground): K is singular.
 
 Its equilibrium is the limit of the proximal-point iteration (Martinet 1970; Rockafellar, SIAM J. Control Optim. 14,
 1976, thm 1), solved for the increment d = u_{k+1} - u_k and with the reactions of u_k (``correction``):

@@ -1,4 +1,4 @@
-"""The bodies of a system as rigid ones: what of their motion nothing but contact holds, and whether forces balance it.
+"""Treat the bodies of a system as rigid: what of their motion contact alone holds, and whether forces balance it.
 
 Every body is asked by itself, in its own unknowns (``problem.turned``): with w a rigid motion of it and K w = 0, a
 static stage asks for w·(f - B_nᵀ r_n - B_tᵀ r_t) = 0, the sums of forces and moments. No stiffness enters it.

@@ -1,4 +1,4 @@
-"""A run under way: the loop over certified steps, with everything that has to happen when it ends, well or badly."""
+"""Run the loop over certified steps, with everything that has to happen when it ends, well or badly."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``simulate``: march, listen with recorders, and keep everything in a folder that a crash cannot spoil."""
+"""Simulate: march, listen with recorders, and keep everything in a folder that a crash cannot spoil."""
 
 from __future__ import annotations
 

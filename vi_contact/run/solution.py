@@ -1,4 +1,4 @@
-"""What a run leaves behind: histories, the final state and a summary in figures."""
+"""Hold what a run leaves behind: histories, the final state and a summary in figures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where a run starts: the initial state of the data, or the equilibrium of a static (gravity) stage with contact."""
+"""Find where a run starts: the equilibrium of a static (gravity) stage with contact."""
 
 from __future__ import annotations
 

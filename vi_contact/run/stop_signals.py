@@ -1,4 +1,4 @@
-"""Signals that ask a run to end: noted when they come, acted on between two steps, by all ranks together.
+"""Note signals that ask a run to end when they come; act on them between two steps, on all ranks together.
 
 Ctrl-C (SIGINT), a scheduler's or container's end of time (SIGTERM), a closed terminal (SIGHUP). PETSc has handlers of
 its own for some of them, which print pages and stop; those of the run come after them and win.

@@ -1,4 +1,4 @@
-"""How long the steps of a run are: a constant dt [s], a ``Schedule`` of them, or a step halved where contact closes.
+"""Plan how long the steps of a run are: a constant dt [s], a ``Schedule``, or steps halved where contact closes.
 
 Changing dt changes neither u nor v, and so no energy. A scheme that carries its past, like LinearMultistep, restarts it
 from u and v (``Scheme.start``). ``steps``, ``t_end``, ``checkpoint_every`` and progress count *base steps*: those

@@ -1,4 +1,4 @@
-"""The nearest admissible displacement in the norm of the mass matrix: what keeps contact forces from ringing.
+"""Find the nearest admissible displacement in the norm of the mass matrix: it keeps contact forces from ringing.
 
     u_p = argmin ½ (u - u_f)ᵀ M (u - u_f)  over  B_n u <= gap0  (= on bilateral rows)
     that is    M w = -B_nᵀ q,    0 <= q  ⊥  gap0 - B_n u_f - B_n w >= 0,    u_p = u_f + w

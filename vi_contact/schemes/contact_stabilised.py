@@ -1,4 +1,4 @@
-"""Contact-stabilised Newmark: the predictor is made admissible first, so that contact forces do not ring.
+"""Step by contact-stabilised Newmark: the predictor is made admissible first, so that contact forces do not ring.
 
     u_p = argmin ½ (u - u0 - dt v0)ᵀ M (u - u0 - dt v0)  over  gap(u) >= 0           (schemes.admissible_predictor)
     M (u1 - u_p) = -½ dt² [K ½(u0 + u1) + C (u1 - u0)/dt - f(t0 + ½ dt) + B_nᵀ r̄_n + B_tᵀ r̄_t],    gap(u1) >= 0

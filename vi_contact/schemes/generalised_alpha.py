@@ -1,4 +1,4 @@
-"""The generalised-alpha method of Chung and Hulbert, the core of HHT and Newmark too.
+"""Step by the generalised-alpha method of Chung and Hulbert, the core of HHT and Newmark too.
 
     u1 = u0 + dt v0 + dt² ((½ - beta) a0 + beta a1),    v1 = v0 + dt ((1 - gamma) a0 + gamma a1)
     M a_m + C v_f + K u_f = (1 - alpha_f) f1 + alpha_f f0 - B_nᵀ r_n,f - B_tᵀ r_t,f

@@ -1,4 +1,4 @@
-"""The method of Hilber, Hughes and Taylor: Newmark's step with the forces, but not the inertia, taken before its end.
+"""Step by the method of Hilber, Hughes and Taylor: Newmark's, with the forces but not the inertia before its end.
 
     M a1 + C v_f + K u_f = (1 + alpha) f1 - alpha f0 - B_nᵀ r_n,f - B_tᵀ r_t,f,    (…)_f = (1 + alpha) (…)1 - alpha (…)0
     beta = ¼ (1 - alpha)²,    gamma = ½ - alpha;    contact and friction conditions at the end of the step

@@ -1,4 +1,4 @@
-"""The implicit midpoint rule, with the contact condition at the end of the step.
+"""Step by the implicit midpoint rule, with the contact condition at the end of the step.
 
     u1 - u0 = ½ dt (v0 + v1)
     M (v1 - v0)/dt + ½ C (v0 + v1) + ½ K (u0 + u1) = f(t0 + ½ dt) - B_nᵀ r̄_n - B_tᵀ r̄_t

@@ -1,4 +1,4 @@
-"""Moreau and Jean's time stepping: contact and impact as impulses on velocities.
+"""Step by Moreau and Jean's method: contact and impact are impulses on velocities.
 
     v_θ = (1 - theta) v0 + theta v1,    u1 = u0 + dt v_θ
     M (v1 - v0) + dt C v_θ + dt K ((1 - theta) u0 + theta u1) = dt ((1 - theta) f0 + theta f1) - B_nᵀ P_n - B_tᵀ P_t

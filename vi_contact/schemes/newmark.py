@@ -1,4 +1,4 @@
-"""Newmark's method: the equation of motion, with contact in it, at the end of the step.
+"""Step by Newmark's method: the equation of motion, with contact in it, holds at the end of the step.
 
     u1 = u0 + dt v0 + dt² ((½ - beta) a0 + beta a1),    v1 = v0 + dt ((1 - gamma) a0 + gamma a1)
     M a1 + C v1 + K u1 = f1 - B_nᵀ r_n1 - B_tᵀ r_t1

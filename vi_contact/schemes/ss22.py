@@ -1,4 +1,4 @@
-"""SS22, the single-step form of the Zienkiewicz-Wood-Taylor method with two general weights theta1, theta2.
+"""Step by SS22, the single-step form of the Zienkiewicz-Wood-Taylor method with two weights theta1, theta2.
 
     u(tau) = u0 + v0 tau + ½ alpha tau²,  weighted residual with mean values of tau/dt (theta1) and (tau/dt)² (theta2):
     (M + theta1 dt C + ½ theta2 dt² K) alpha = f(t0 + theta1 dt) - C v0 - K (u0 + theta1 dt v0) - B_nᵀ r̄_n - B_tᵀ r̄_t

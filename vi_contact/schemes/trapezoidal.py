@@ -1,4 +1,4 @@
-"""The trapezoidal rule on redistributed mass: the default for dynamic contact.
+"""Step by the trapezoidal rule on redistributed mass: the default for dynamic contact.
 
     (u1 - u0)/dt = ½ (v0 + v1)
     M (v1 - v0)/dt + C (u1 - u0)/dt + ½ K (u0 + u1) = ½ (f0 + f1) - ½ B_nᵀ(r0 + r1) - ½ B_tᵀ(r0 + r1)

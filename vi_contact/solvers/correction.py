@@ -1,4 +1,4 @@
-"""Residual correction: what an answer leaves over is a step of its own, small, and solved by the same solver.
+"""Correct residuals: what an answer leaves over is a step of its own, small, and solved by the same solver.
 
 The answer (x0, r0) stays, but for a share s of its reactions. The contract of ``step.py`` for d = x - x0 and
 q = r - (1 - s) r0 is the contract again, because reactions that obey the laws form a cone at every point:

@@ -1,4 +1,4 @@
-"""Checkpoints: the state of a run in numbers that do not depend on the ranks, so that any number of them can go on.
+"""Write and read checkpoints: the state of a run in numbers that do not depend on the ranks that go on with it.
 
 ``checkpoint.npz`` holds t, k, u, v, the reactions, active and the scheme's memory, vectors in the order of
 ``space.ids`` (the rotated basis has the same numbers as the system's own), the base steps done, what problem it is of

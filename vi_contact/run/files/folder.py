@@ -1,4 +1,4 @@
-"""The folder a run writes into, and how several ranks write without losing data or waiting for each other for ever.
+"""Make the folder a run writes into, so that no data are lost and no rank waits for another for ever.
 
 Only rank 0 touches the disk. Whatever it does there goes through ``on_root``: a failure is told to all ranks, which
 then raise the same sentence together. Files that must be whole are written beside their name and renamed.

@@ -1,4 +1,4 @@
-"""The files that keep the rows of a run from the step they were computed in; the memory need not hold them.
+"""Keep the rows of a run in files from the step they were computed in; the memory need not hold them.
 
 ``history.csv``      one line per step with all numbers, written through at once: a killed run loses nothing.
 ``columns.json``     unit and meaning of every column.

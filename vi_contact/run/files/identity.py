@@ -1,4 +1,4 @@
-"""What makes two runs runs of the same problem, in few numbers that any ranks, machine or release give alike.
+"""Tell what makes two runs runs of the same problem, in few numbers that any ranks, machine or release give alike.
 
 Matrices and loads are seen through vectors w made of the numbers of the unknowns: wᵀMw, wᵀKw, wᵀCw, w·f(t). Such
 numbers depend neither on the ranks nor on their order, and round-off changes them in the last digits only; they are

@@ -1,4 +1,4 @@
-"""What a run tells while it works: ``run.log`` through the logging module, and progress with the time that is left."""
+"""Tell what a run does while it works: ``run.log`` through the logging module, and progress with the time left."""
 
 from __future__ import annotations
 

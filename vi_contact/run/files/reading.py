@@ -1,4 +1,4 @@
-"""What a run left in its folder, read back: histories, units, facts and the geometry of the contact points."""
+"""Read what a run left in its folder: histories, units, facts and the geometry of the contact points."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The rows that an earlier run left in its folder, read block by block: what a restart goes on from.
+"""Read the rows that an earlier run left in its folder, block by block: what a restart goes on from.
 
 Numbers are in history.csv, arrays in history.h5 and, of later steps, in history.journal. What was read is known by a
 checksum over lines and arrays, which the checkpoint keeps.

@@ -1,4 +1,4 @@
-"""The histories of a run in memory: compact columns, and of a run with a folder only so much of them."""
+"""Hold the histories of a run in memory: compact columns, and of a run with a folder only so much of them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the histories say about a run, gathered block by block, so that no history has to be kept for it."""
+"""Gather what the histories say about a run, block by block, so that no history has to be kept for it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Everything a run writes while it works, in one place: histories, fields, checkpoints, log and summary."""
+"""Write everything a run writes while it works, in one place: histories, fields, checkpoints, log and summary."""
 
 from __future__ import annotations
 

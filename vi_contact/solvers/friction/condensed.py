@@ -1,4 +1,4 @@
-"""Friction on the condensed route: the Delassus operator of normal and tangential contact unknowns together.
+"""Condense with friction: the Delassus operator of normal and tangential contact unknowns together.
 
 With the unit vectors E of the normal and F of the tangential unknowns, x_free = A⁻¹b and D = [E F]:
 

@@ -1,4 +1,4 @@
-"""Faster fixed-point iterations: the next point x from the points tried so far and their images g(x).
+"""Extrapolate fixed-point iterations: the next point x from the points tried so far and their images g(x).
 
     plain       x <- g(x)
     Aitken      x <- x + omega f,  f = g(x) - x;      omega <- -omega f_old·(f - f_old)/|f - f_old|²

@@ -1,4 +1,4 @@
-"""Alternation with given forces: the normal problem with r_t given, then the tangential problem with r_n given.
+"""Alternate with given forces: the normal problem with r_t given, then the tangential problem with r_n given.
 
 The boundary method (docs/reference/sources.md [1]) carries tangential forces C_T that are given (eq. 6); they enter the
 right-hand side, gamma of eq. 40, and what is left is the minimum of eq. 42 over normal reactions. With friction C_T is

@@ -1,4 +1,4 @@
-"""The linear problems of semismooth Newton with friction, and how one is solved with the factor of another.
+"""Solve the linear problems of semismooth Newton with friction, one with the factor of another.
 
 With the rows R that must hold, r = fixed + P z and w = q + G fixed:
 

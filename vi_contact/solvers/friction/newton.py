@@ -1,4 +1,4 @@
-"""Semismooth Newton for contact with friction: the default. In 2D it is an active-set method and ends exactly.
+"""Solve contact with friction by semismooth Newton: the default. In 2D it is an active-set method and ends exactly.
 
 With y = r - w of the last iterate every node is open (y_n <= 0) or closed, and sticks (|y_t| <= limit) or slips along
 n = y_t/|y_t|. The next iterate solves the linear problem of these states, Newton's step for the natural map (2) of

@@ -1,4 +1,4 @@
-"""Nonsmooth Gauss-Seidel for contact with friction: one node after another, each solved exactly.
+"""Solve contact with friction by nonsmooth Gauss-Seidel: one node after another, each solved exactly.
 
 Given the reactions of all other nodes, a node is open, or it sticks, or it slips:
 

@@ -1,4 +1,4 @@
-"""The small problem of a step with friction, its residual, and the scaling all its methods share.
+"""Pose the small problem of a step with friction: its residual, and the scaling all its methods share.
 
     w = q + G r;    0 <= r_n  perpendicular to  w_n >= 0   (bilateral rows: w_n = 0, r_n free)
     |r_t| <= limit(r_n) = cohesion + slope max(r_n, 0),    r_t = -limit w_t/|w_t| where w_t is not zero          (1)

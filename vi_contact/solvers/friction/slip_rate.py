@@ -1,4 +1,4 @@
-"""Friction coefficients that depend on the slip rate of the step itself: an outer iteration over ordinary problems.
+"""Iterate over friction coefficients that depend on the slip rate of the step itself: ordinary problems in turn.
 
     mu <- mu(|v|),    v = rate_factor w_t(mu),    w_t(mu): slip of the step with the coefficients mu given           (1)
 

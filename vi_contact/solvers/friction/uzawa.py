@@ -1,4 +1,4 @@
-"""Uzawa's method: a gradient step on the reactions, then the projection onto the friction cone's cross-section.
+"""Solve by Uzawa's method: a gradient step on the reactions, then the projection onto the cone's cross-section.
 
 Aimi, Di Credico and Gimperlein (CMAME 427, 2024), "Uzawa algorithm", with Lambda = r, U - G the gap and slip, here -w =
 -(q + G r):

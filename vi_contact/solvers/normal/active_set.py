@@ -1,4 +1,4 @@
-"""The primal-dual active-set method with a finite fallback: the default for dense contact problems.
+"""Solve dense contact problems by the primal-dual active-set method with a finite fallback: the default.
 
 Guess which rows are active, solve  G_aa r_a = -q_a  with r = 0 elsewhere, move every row with the wrong sign (r < 0 in
 the set, w < 0 out of it) to the other side, repeat until no sign is wrong: then r solves the problem exactly. This is

@@ -1,4 +1,4 @@
-"""The linear complementarity problem of one contact step, its residual, and the scaling all its methods share.
+"""Pose the linear complementarity problem of one contact step: its residual, and the scaling all its methods share.
 
     w = q + G r;    unilateral rows: 0 <= r  perpendicular to  w >= 0;    bilateral rows: w = 0, r free        (1)
 

@@ -1,4 +1,4 @@
-"""Projected conjugate gradients (MPRGP) for large contact sets: the Delassus operator is only applied.
+"""Solve large contact sets by projected conjugate gradients (MPRGP): the Delassus operator is only applied.
 
 min ½ rᵀG r + qᵀr over r >= 0 (bilateral rows unbounded), by Dostál's "modified proportioning with
 reduced gradient projections" (Z. Dostál, Optimal Quadratic Programming Algorithms, Springer 2009, algorithm 5.8).

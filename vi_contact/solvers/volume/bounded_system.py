@@ -1,4 +1,4 @@
-"""The step as a problem with simple bounds: what every PETSc method of the volume route sees.
+"""Write the step as a problem with simple bounds: what every PETSc method of the volume route sees.
 
     lower <= z <= upper,   A z - b >= 0 where z = lower,  <= 0 where z = upper,  = 0 elsewhere
 

@@ -1,4 +1,4 @@
-"""PETSc's reasons for stopping, in words, and the StepFailure made of them.
+"""Put PETSc's reasons for stopping into words, and make StepFailures of them.
 
 PETSc 3.25 has other names for some reasons and other words for some errors; both are settled here.
 """

@@ -1,4 +1,4 @@
-"""Friction on the volume route: Coulomb's law as a sequence of Tresca problems on all unknowns, by SNES.
+"""Solve friction on the volume route: Coulomb's law as a sequence of Tresca problems on all unknowns, by SNES.
 
     s <- cohesion + slope max(r_n(s), 0)
 

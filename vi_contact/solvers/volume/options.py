@@ -1,4 +1,4 @@
-"""PETSc options of the volume route: one prefix, three layers, and refusal of combinations known to give wrong answers.
+"""Hold PETSc's options: one prefix, three layers; refuse combinations that are known to give wrong answers.
 
 Layers, the later wins: the method's defaults, ``petsc_options`` of the settings, PETSc's own database (command line,
 PETSC_OPTIONS). SNES VI reads its options again whenever the active set changes, so they stay in the database for

@@ -1,4 +1,4 @@
-"""The volume route: the one-step problem solved on all unknowns by PETSc's VI and bound-constrained solvers.
+"""Solve the step on all unknowns, by PETSc's solvers for variational inequalities and bounds: the volume route.
 
     A x = b - B_nᵀ r_n,    0 <= r_n  ⊥  bound - B_n x + compliance r_n / scale >= 0
 

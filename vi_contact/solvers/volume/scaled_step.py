@@ -1,4 +1,4 @@
-"""One step in the numbers PETSc computes with, and the test that decides when it is solved.
+"""Scale one step to the numbers PETSc computes with, and decide when it is solved.
 
 PETSc's VI and bound-constrained solvers carry absolute tolerances in unknown units. They are
 handed z / x_ref and (A z - b) / r_ref instead, with powers of two for x_ref and r_ref, so that both are near one in

@@ -1,4 +1,4 @@
-"""PETSc SNES for variational inequalities on all unknowns, and its two assembled methods.
+"""Solve variational inequalities on all unknowns by PETSc SNES, with two assembled methods.
 
 ``ReducedNewton`` is VINEWTONRSLS, which without a line search is the primal-dual active set method: solve with the
 active points held, project, read the next active set off the signs of the residual. ``SemismoothNewton`` is

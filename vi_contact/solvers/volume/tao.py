@@ -1,4 +1,4 @@
-"""PETSc TAO on the same bounds: minimise ½ xᵀA x - bᵀx subject to x_n <= bound, as a second opinion.
+"""Solve by PETSc TAO on the same bounds: minimise ½ xᵀA x - bᵀx subject to x_n <= bound, as a second opinion.
 
 TAO's tolerances and trust regions are absolute, which the scaled step makes harmless; its own convergence tests
 are replaced by ``ScaledStep.verdict``.
