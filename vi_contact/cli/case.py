@@ -12,7 +12,7 @@ from .options import add_restart
 
 
 def add_case_commands(commands: Any) -> None:
-    """Adds ``run`` and ``cases`` to the commands of the top parser."""
+    """Add ``run`` and ``cases`` to the commands of the top parser."""
     run = commands.add_parser(
         "run", help="run a case: one that ships with the package, or a TOML file",
         description="Run a case. The short options and --set change what it says; 'vi-contact cases' lists those that "
@@ -49,7 +49,7 @@ def _cases(options: argparse.Namespace) -> str:
 
 
 def add_allow(command: argparse.ArgumentParser) -> None:
-    """Adds ``--allow``."""
+    """Add ``--allow``."""
     command.add_argument("--allow", action="append", default=[], metavar="PACKAGE",
                          help="the case may name classes of this Python package, as package.module:Name, and so run "
                          "its code; repeatable (docs/guide/extend.md)")

@@ -23,7 +23,7 @@ PETSc (for example -vi_contact_volume_snes_monitor)."""
 
 
 def parser() -> argparse.ArgumentParser:
-    """All commands and options."""
+    """Build the parser of all commands and options."""
     top = Parser(prog="vi-contact", description=_DESCRIPTION)
     top.add_argument("--version", action="version", version=f"vi-contact {__version__}")
     commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
@@ -35,7 +35,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 def split_petsc(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
-    """(our own arguments, PETSc options): the latter are ``-vi_contact_... [value]``, our PETSc prefixes."""
+    """Return (our own arguments, PETSc options); the latter are ``-vi_contact_... [value]``, our PETSc prefixes."""
     own: list[str] = []
     petsc: list[str] = []
     taking = False
@@ -53,7 +53,7 @@ def split_petsc(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs a command; prints its text, or one sentence on standard error and returns 1; 128 + n after signal n."""
+    """Run a command and print its text, or one sentence on standard error and return 1; 128 + n after signal n."""
     own, petsc = split_petsc(sys.argv[1:] if arguments is None else arguments)
     try:
         refuse_retired(own)

@@ -24,7 +24,7 @@ OUT_OF_MEMORY = (
 
 
 def check_words(arguments: Sequence[str]) -> None:
-    """InputError for words that no shell can give and no file can be called, and for empty names of outputs."""
+    """Raise InputError for words that no shell can give or file can have as a name, and for empty names of outputs."""
     for word in arguments:
         if "\0" in word:
             raise InputError(f"{shown(word)} holds the character NUL: leave it out")
@@ -36,14 +36,14 @@ def check_words(arguments: Sequence[str]) -> None:
 
 
 class Parser(argparse.ArgumentParser):
-    """argparse's parser, whose sentences stay short where a word is long."""
+    """Parse as argparse does, with sentences that stay short where a word is long."""
 
     def error(self, message: str) -> NoReturn:
         super().error(shorten(" ".join(part[:SHOWN] for part in message.split()), 400, placeholder=" …"))
 
 
 def told(run: Callable[[], Any], spelling: Mapping[str, str]) -> Any:
-    """What the call returns; ViContactError of one sentence for errors of memory, files and sizes of numbers.
+    """Return what the call returns; ViContactError of one sentence for errors of memory, files and sizes of numbers.
 
     spelling: argument -> option: what sentences call units= is --units here.
     """
@@ -63,7 +63,7 @@ def told(run: Callable[[], Any], spelling: Mapping[str, str]) -> Any:
 
 
 def printable(text: str) -> str:
-    """The text without what standard output cannot write, as names of files that are no UTF-8."""
+    """Return the text without what standard output cannot write, such as names of files that are no UTF-8."""
     encoding = sys.stdout.encoding or "utf-8"
     return text.encode(encoding, "backslashreplace").decode(encoding)
 

@@ -13,7 +13,7 @@ from .case import add_allow
 
 
 def add_ida_commands(commands: Any) -> None:
-    """Adds ``ida`` to the commands of the top parser."""
+    """Add ``ida`` to the commands of the top parser."""
     sentence = "incremental dynamic analysis: a case file under many records, each at many intensities"
     one = commands.add_parser("ida", help=sentence, description=sentence[0].upper() + sentence[1:] + ".")
     one.add_argument("case", help="case file shaken by GroundMotions (docs/guide/studies.md)")

@@ -24,7 +24,7 @@ _ACTIONS = {
 
 
 def add_motion_commands(commands: Any) -> None:
-    """Adds ``motion`` with its actions to the commands of the top parser."""
+    """Add ``motion`` with its actions to the commands of the top parser."""
     actions = commands.add_parser("motion", help="ground motion files").add_subparsers(
         dest="action", required=True, metavar="ACTION"
     )
@@ -103,7 +103,7 @@ def _add_spectrum(one: argparse.ArgumentParser) -> None:
 
 
 def acceleration(text: str) -> float:
-    """Metres per second squared of "3.0", "0.3g", "0.3 g" or "300gal"."""
+    """Read metres per second squared from "3.0", "0.3g", "0.3 g" or "300gal"."""
     from ..ground_motion.record import UNITS, canonical_units
 
     match = _QUANTITY.fullmatch(text.strip())

@@ -16,14 +16,14 @@ PICTURES = (".png", ".pdf", ".svg")
 
 
 def add_restart(options: Any, where: str) -> None:
-    """The options that continue a run."""
+    """Add the options that continue a run."""
     options.add_argument("--restart", action="store_true", help=f"continue the run in {where} from its checkpoint")
     options.add_argument("--restart-changed", action="store_true", dest="changed",
                          help="the same, also when the problem is another one than that of the checkpoint")
 
 
 def spaced(option: str, values: Sequence[float]) -> Any:
-    """FROM, TO, N of an option as N logarithmically spaced numbers; InputError for others, before memory is taken."""
+    """Read FROM, TO, N as N logarithmically spaced numbers; InputError for others, before memory is taken."""
     import numpy as np
 
     first, last, count = values
@@ -35,7 +35,7 @@ def spaced(option: str, values: Sequence[float]) -> Any:
 def output_file(
     path: str | Path, *, reads: Iterable[str | Path] = (), picture: bool = False, made: bool = False
 ) -> Path:
-    """The file that a command is about to write, checked before any work is done.
+    """Return the file that a command is about to write, checked before any work is done.
 
     reads: files of its input, which it must not overwrite; picture: whether its name says the format of a picture;
     made: whether the command makes a folder that does not exist.
@@ -58,7 +58,7 @@ def output_file(
 
 
 def table_beside_picture(path: str | Path, *, reads: Iterable[str | Path] = ()) -> Path:
-    """The table that a command is about to write, with a picture of the same name beside it. InputError as above."""
+    """Return the table that a command is about to write, a picture of the same name beside it. InputError as above."""
     out = output_file(path, reads=reads)
     if out.suffix.lower() in PICTURES:
         raise InputError(f"{out}: the table would be overwritten by its picture; give a name such as {out.stem}.csv")

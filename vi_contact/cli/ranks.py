@@ -10,7 +10,7 @@ PATIENCE = 30.0  # seconds between the first rank that has failed and the last
 
 
 def rank() -> int:
-    """This process's rank, without importing MPI for commands that do not use it."""
+    """Return this process's rank, without importing MPI for commands that do not use it."""
     world = _world()
     return 0 if world is None else int(world.rank)
 

@@ -21,7 +21,7 @@ _ACTIONS = {
 
 
 def add_report_commands(commands: Any) -> None:
-    """Adds ``report`` and ``post`` to the commands of the top parser."""
+    """Add ``report`` and ``post`` to the commands of the top parser."""
     report = commands.add_parser(
         "report", help="one page about a run, and its pictures", description="One page about a run, from the files in "
         "its folder alone, and beside it its peak values in peaks.csv and its pictures."
