@@ -128,7 +128,7 @@ class _Solvers:
         self._solvers: dict[float, CertifiedSolver] = {}
 
     def keep(self, sizes: Sequence[float]) -> None:
-        """Frees the factors of every other dt."""
+        """Free the factors of every other dt."""
         self._matrices = {dt: A for dt, A in self._matrices.items() if dt in sizes}
         self._solvers = {dt: solver for dt, solver in self._solvers.items() if dt in sizes}
 

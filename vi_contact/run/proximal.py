@@ -87,7 +87,7 @@ class Proximal:
         self._stiffen(1.0)
 
     def _stiffen(self, factor: float) -> None:
-        """Takes P so many times as strong, and factorises."""
+        """Take P so many times as strong, and factorise."""
         algebra = self._system.algebra
         self._strength = factor
         self._springs = algebra.combine([(factor, self._weak)])

@@ -179,7 +179,7 @@ class Session:
         return Problem.of(self.problem, self.scheme, self.time_steps, start, start + self.step_plan.length)
 
     def _rescue(self, writer: Writer, status: str, reason: str, seconds: float) -> None:
-        """Saves what there is. A checkpoint of the last base step only on one rank: others might not come."""
+        """Save what there is. A checkpoint of the last base step only on one rank: others might not come."""
         with suppress(Exception):
             if self.problem.system.algebra.comm.size == 1:
                 self._checkpoint(writer)

@@ -156,7 +156,7 @@ def _source(restart: bool | str | Path, folder: Path | None) -> Path | None:
 def _started(
     problem: ContactProblem, recorders: Sequence[Recorder], state: State, resumed: Mapping[str, Any] | None = None
 ) -> tuple[Columns, Row]:
-    """Starts the recorders: their columns, and the row of the state. InputError when two record the same column."""
+    """Start the recorders: their columns, and the row of the state. InputError when two record the same column."""
     row: dict[str, Any] = {}
     columns: dict[str, tuple[str, str]] = {}
     for recorder in recorders:
@@ -169,7 +169,7 @@ def _started(
 
 
 def _restored(table: Table, stored: StoredRows, comm: Comm) -> Row:
-    """Puts the rows of an earlier run into the table, on every rank; the last of them. Collective."""
+    """Put the rows of an earlier run into the table, on every rank; the last of them. Collective."""
     blocks = stored.blocks()
     last: Row = {}
     while True:

@@ -35,9 +35,9 @@ def admissible(problem: ContactProblem, state: State, u: Array, dt: float) -> tu
     closed = (gap < 0.0) | (surface.bilateral & rigid)
     if np.isnan(gap).any() or not np.any(gap[closed] != 0.0):
         return u, closed  # nothing in the way; of NaN the step itself tells
-    bounds: ContactProblem = system.cached("mass projection bounds", lambda: _rigid_part(problem))
+    bounds: ContactProblem = system.cached("admissible predictor, bounds", lambda: _rigid_part(problem))
     solver: CertifiedSolver = system.cached(
-        "mass projection", lambda: CertifiedSolver(bounds, mass_matrix(problem), 1.0, [Condensed()], TOLERANCE)
+        "admissible predictor", lambda: CertifiedSolver(bounds, mass_matrix(problem), 1.0, [Condensed()], TOLERANCE)
     )
     step = StepProblem(
         A=mass_matrix(problem),

@@ -132,7 +132,7 @@ def equilibrated(problem: ContactProblem, state: State) -> State:
     if layer is None:
         return state
     load = system.load(state.t) - system.K @ np.where(layer, 0.0, state.u)
-    A = system.cached("contact layer", lambda: EffectiveMatrix(system.algebra.block(system.K, layer), system.algebra))
+    A = system.cached("massless block", lambda: EffectiveMatrix(system.algebra.block(system.K, layer), system.algebra))
     surface = _within(problem.surface, layer)
     step = StepProblem(
         A=A,

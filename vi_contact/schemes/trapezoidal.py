@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from ..core.algebra import EffectiveMatrix
+from ..core.algebra import Array, EffectiveMatrix
 from ..core.problem import ContactProblem
 from ..core.protocols import MassLaw
 from ..core.step import Balance, State, StepProblem, StepResult
@@ -49,14 +49,14 @@ class Trapezoidal:
         return self._with_force(problem, state)
 
     def _with_force(self, problem: ContactProblem, state: State) -> State:
-        """Keeps f - K u - Bᵀr of the state: the next step starts with it."""
+        """Keep f - K u - Bᵀr of the state: the next step starts with it."""
         system = problem.equations
         reaction = problem.surface.reaction_load(state.r_n, system.rows, state.r_t)
         return replace(state, memory={"force": system.load(state.t) - system.K @ state.u - reaction})
 
-    def jump(self, problem: ContactProblem, state: State, v: object, dt: float) -> State:
+    def jump(self, problem: ContactProblem, state: State, v: Array, dt: float) -> State:
         """Return the state with the new velocity; forces do not depend on it."""
-        return replace(state, v=v)  # type: ignore[arg-type]
+        return replace(state, v=v)
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
         """Return A = 4/dt² M + 2/dt C + K."""

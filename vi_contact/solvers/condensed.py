@@ -160,7 +160,7 @@ class PreparedCondensed:
         r_n, r_t = small.r[:, 0].copy(), small.r[:, 1:].copy()
         if small.r.any():
             x = self._corrected(x, r_n, step, r_t)
-            self.friction.held(x, step, small)
+            self.friction.hold_sticking(x, step, small)
         name = f"condensed {type(self._settings.friction_method).__name__}"
         return StepResult(x, r_n, small.active, small.iterations, name, r_t=r_t, history=small.history)
 

@@ -75,7 +75,7 @@ def _is_there(path: Path, file: Any) -> bool:
 
 
 def _release(folder: Path, file: Any) -> None:
-    """Removes the file while it is locked: who opens it in the meantime finds it gone and makes a new one."""
+    """Remove the file while it is locked: who opens it in the meantime finds it gone and makes a new one."""
     _held.pop(folder.resolve(), None)
     (folder / LOCK).unlink(missing_ok=True)
     file.close()

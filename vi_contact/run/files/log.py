@@ -23,7 +23,7 @@ SHARE, SECONDS = 0.1, 30.0  # a line in the log for every tenth of the run, or t
 
 
 class _LogFile(logging.FileHandler):
-    """Keeps the error of a line that could not be written, for the run to raise on all ranks."""
+    """Keep the error of a line that could not be written, for the run to raise on all ranks."""
 
     error: OSError | None = None
 

@@ -88,7 +88,7 @@ class CondensedFriction:
         w = q[:, 1:] + (self.delassus @ found.r.ravel()).reshape(q.shape)[:, 1:]
         return np.where(((found.r[:, 0] > 0.0) & ~found.stick)[:, None], -w, 0.0)
 
-    def held(self, x: Array, step: StepProblem, small: FrictionResult) -> None:
+    def hold_sticking(self, x: Array, step: StepProblem, small: FrictionResult) -> None:
         """Put the tangential unknowns of sticking points where they were, which removes round-off only."""
         surface = self._surface
         there = (surface.tangents >= 0) & small.stick[surface.slots][:, None]
