@@ -239,7 +239,7 @@ def whole(node: Def) -> str:
 def first_paragraph(where: Module, node: Def) -> str:
     """Return it on one line; where it refers to the module's equations, after that of the module."""
     words = documentation(node).split("\n\n")[0]
-    if words.startswith("See the module"):
+    if "the module's equations" in words:
         words = documentation(where.tree).split("\n\n")[0] + " " + words
     return re.sub(r"\s+", " ", words)
 
