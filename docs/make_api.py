@@ -240,8 +240,9 @@ def first_paragraph(where: Module, node: Def) -> str:
     """Return it on one line; where it refers to the module's equations, after that of the module."""
     words = documentation(node).split("\n\n")[0]
     if "the module's equations" in words:
-        words = documentation(where.tree).split("\n\n")[0] + " " + words
-    return re.sub(r"\s+", " ", words)
+        more = words.removeprefix("Step by the module's equations.")
+        words = documentation(where.tree).split("\n\n")[0] + " " + more
+    return re.sub(r"\s+", " ", words).strip()
 
 
 def entry(where: Module, name: str) -> str:
