@@ -202,6 +202,7 @@ def test_cases_are_listed(capsys):
     assert (Path(folder.removeprefix("the files: ")) / "wall.toml").is_file()
 
 
+@pytest.mark.slow
 def test_the_beam_needs_no_finite_elements(tmp_path):
     """Nor do the layer and their reports: what they import is numpy, scipy and matplotlib."""
     blocked = "import sys\nfor name in ('dolfinx', 'petsc4py', 'mpi4py', 'gmsh'): sys.modules[name] = None\n"

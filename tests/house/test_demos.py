@@ -72,6 +72,7 @@ def test_the_wall_demo(comm: Any, shared_tmp: Path) -> None:
         assert column(shared_tmp / case, "contact_active").max() > 0
 
 
+@pytest.mark.slow
 @pytest.mark.serial
 def test_the_command_line_of_the_wall_demo(tmp_path: Path) -> None:
     """README's command: the run, both routes to every step, its report; numbers of the case that ships."""
