@@ -69,8 +69,7 @@ class Factor(Protocol):
 
     def solve_units(self, owned: Indices, slots: Indices, m: int) -> Array:
         """Return the columns A^-1 e_j for m unit vectors: e_{slots[k]} has its one in row ``owned[k]`` of the owning
-        rank. Returns the owned rows, shape (rows, m).
-        """
+        rank. Returns the owned rows, shape (rows, m)."""
         ...
 
 

@@ -42,8 +42,7 @@ def refuse_rubbing(surface: ContactSurface) -> None:
 
 def with_open_faces(surface: ContactSurface, v: Array, target: Array) -> Array:
     """Return the target normal velocities (m,), NaN for open faces, with those that oblique open faces get from the
-    closed faces of their nodes, whose velocity changes along the normals of these. Collective.
-    """
+    closed faces of their nodes, whose velocity changes along the normals of these. Collective."""
     corners = oblique_corners(surface)
     if not corners:
         return target

@@ -66,8 +66,7 @@ class LinearElastic:
     @property
     def c_p(self) -> float:
         """Return the pressure wave speed sqrt((lame_lambda + 2 shear_modulus) / rho) [m/s] in a solid or in plane
-        strain.
-        """
+        strain."""
         return math.sqrt((self.lame_lambda + 2.0 * self.shear_modulus) / self.rho)
 
     @property
@@ -181,8 +180,8 @@ class Rayleigh:
         with w_i = 2 pi f_i.
 
         alpha = 2 w1 w2 (w2 xi1 - w1 xi2) / (w2² - w1²), beta = 2 (w2 xi2 - w1 xi1) / (w2² - w1²); for equal ratios xi
-        alpha = 2 xi w1 w2 / (w1 + w2) and beta = 2 xi / (w1 + w2). 5 % at 1 and 10 Hz: 0.5712 1/s and 1.4469e-3 s
-       . Raises InputError when f1 = f2 or when the solution needs a negative coefficient.
+        alpha = 2 xi w1 w2 / (w1 + w2) and beta = 2 xi / (w1 + w2). 5 % at 1 and 10 Hz: 0.5712 1/s and 1.4469e-3 s.
+       Raises InputError when f1 = f2 or when the solution needs a negative coefficient.
         """
         for name, f in (("f1", f1), ("f2", f2)):
             number("Rayleigh.from_frequencies", f"the frequency {name} [Hz]", f, positive=True)

@@ -105,8 +105,7 @@ class CrossChecked:
     def report(self) -> Mapping[str, Mapping[str, float]]:
         """Return, by method, relative differences in u, r_n and, with friction, r_t, iterations per step: what
         summary.json shows. A name that comes again gets a number. Opinions: impulse and mean displacement over the
-        whole run.
-        """
+        whole run."""
         names = [one.method for one in self.found]
         return {
             name if names.count(name) == 1 else f"{name} #{rank}": {"u": one.relative_u, "r_n": one.relative_r_n}

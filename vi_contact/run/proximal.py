@@ -194,8 +194,7 @@ class Proximal:
     def _ahead(self, old: _Motion, new: _Motion, result: StepResult) -> float:
         """How many times d to go further at once: the sum of the steps to come when each is ‖d_new‖/‖d_old‖ of the
         one before (Aitken), or only to the next contact. 0 unless d_new and d_old are parallel, to the accuracy which
-        that distance needs. Any start of the next step will do, so nothing but the speed depends on it.
-        """
+        that distance needs. Any start of the next step will do, so nothing but the speed depends on it."""
         if new.pace == 0.0 or not np.array_equal(old.active, new.active):
             return 0.0
         surface, ratio = self.step.surface, new.pace / old.pace

@@ -14,12 +14,14 @@ order 2 with amplification rho_inf at infinite frequency and the least damping o
 alpha_m = (2 rho - 1)/(1 + rho), alpha_f = rho/(1 + rho), beta = ¼ (1 - alpha_m + alpha_f)².
 
 Start, and restart after every velocity jump: the acceleration that fits (``consistent_data``). Unknowns without mass
-(mass.Redistributed) have no acceleration, the mean velocity of the step, and are in equilibrium at its ends. Energy:
-the ledger closes with the weights of the equation above, its algorithmic part is the damping of high frequencies.
-Contact stands in the balance of forces and on consistent mass creates energy when it opens, which the damping makes up
-for only while dt does not resolve the highest frequency of the mesh: docs/guide/schemes.md has numbers. Impulses: sum
-of dt r_n,f over a contact with free flight before and after is the change of momentum; in single steps it is not,
-unless the member is Newmark. Source: Chung and Hulbert, J. Appl. Mech. 60 (1993) 371-375.
+(mass.Redistributed) have no acceleration, the mean velocity of the step, and are in equilibrium at its ends.
+Energy: the ledger closes with the weights of the equation above, its algorithmic part is the damping of high
+frequencies. Contact stands in the balance of forces and on consistent mass creates energy when it opens, which the
+damping makes up for only while dt does not resolve the highest frequency of the mesh: docs/guide/schemes.md has
+numbers.
+Impulses: sum of dt r_n,f over a contact with free flight before and after is the change of momentum; in single steps it
+is not, unless the member is Newmark.
+Source: Chung and Hulbert, J. Appl. Mech. 60 (1993) 371-375.
 """
 
 from __future__ import annotations
@@ -75,8 +77,7 @@ class AlphaStep(BalanceStep, ABC):
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
         """Return the state with massless nodes in equilibrium and its acceleration; once, not on restarts and changes
-        of dt.
-        """
+        of dt."""
         if np.array_equal(state.memory.get("of", ()), self._mark(state.t)):
             return state
         state = equilibrated(problem, state)
@@ -104,8 +105,7 @@ class AlphaStep(BalanceStep, ABC):
 
     def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem:
         """Return the step with b = f1 - C v1 - (M a_m - alpha_f (f0 - C v0 - K u0 - Bᵀr0))/(1 - alpha_f), all for u1 =
-        0.
-        """
+        0."""
         system, w = problem.equations, self.weights
         v, a = self._known(state, dt)
         b = system.load(state.t + dt)

@@ -110,8 +110,7 @@ class MoreauJean(SingleStep):
 
     def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem:
         """Return the step with b = M v0 + dt (f_θ - K (u0 + theta (1 - theta) dt v0) - (1 - theta) C v0), and the bound
-        on velocities.
-        """
+        on velocities."""
         system, surface, left = problem.equations, problem.surface, 1.0 - self.theta
         force = self._load(problem, state.t, dt) - system.K @ (state.u + self.theta * left * dt * state.v)
         if system.C is not None:

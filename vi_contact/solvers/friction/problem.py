@@ -155,8 +155,7 @@ class ScaledProblem:
         w: Array | None = None,
     ) -> FrictionResult:
         """Return the result in newtons; StepFailure when the residual is above ``tolerance`` and above rounding. ``w``
-        of r, when it is known.
-        """
+        of r, when it is known."""
         inside = self.admissible(r)
         if w is None or not np.array_equal(inside, r):
             w = self.w(inside)
@@ -205,7 +204,6 @@ class ScaledDelassus:
 
 def observed_contraction(history: Any) -> float:
     """Return the mean factor between successive changes, of those above rounding (1e-10 of the first); NaN for fewer
-    than two.
-    """
+    than two."""
     changes = [change for change in history if change > 1e-10 * history[0]]
     return float((changes[-1] / changes[0]) ** (1.0 / (len(changes) - 1))) if len(changes) > 1 else float("nan")

@@ -183,8 +183,7 @@ def largest_eigenvalue(G: Any, size: int) -> float:
 
 def cholesky(G: Array) -> Array:
     """Return the lower Cholesky factor (LAPACK dpotrf); InputError with the row at which G stops being positive
-    definite.
-    """
+    definite."""
     if not G.size:  # LAPACK takes no empty matrix
         return G
     factor, info = lapack.dpotrf(G, lower=1, clean=0)

@@ -137,8 +137,7 @@ class BoundedSystem:
 
 def renumbered(comm: Comm, old_size: int, new_size: int, columns: Any) -> tuple[int, Indices, int]:
     """Return the first global number of this rank, global column numbers and total, where every rank's part grows at
-    its end.
-    """
+    its end."""
     sizes = np.zeros((comm.size, 2))
     sizes[comm.rank] = old_size, new_size
     sizes = comm.sum(sizes)

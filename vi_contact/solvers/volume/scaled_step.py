@@ -82,8 +82,7 @@ class ScaledStep:
 
     def errors(self, y: Array, F: Array) -> tuple[float, float, float]:
         """Return the largest |F| off the active set and |gap| on it, relative as in the certificate; backward error of
-        F.
-        """
+        F."""
         system, i = self.system, self.system.bounded
         active = self.active(y, F)
         gap = (self.upper[i] - y[i])[active]
