@@ -83,7 +83,7 @@ def _report(options: argparse.Namespace) -> str:
         return _listed(draw_study(folder, tables))
     run = read_run(folder)
     out = output_file(options.out or folder / "report.pdf", picture=True)
-    title = options.title or tables.get("title") or f"Run {folder.resolve().name}"
+    title = str(options.title or tables.get("title") or f"Run {folder.resolve().name}")
     shown = None if options.show is None else [one.split(",") for one in options.show]
     page = plot_report(run, out, title=title, columns=shown)
     table = write_peaks(out.with_name("peaks.csv"), peaks(run.history, run.columns))
@@ -103,7 +103,7 @@ def _contact_labels(model: Any) -> list[str] | None:
         from ..models.wall import CASES
     except ImportError:  # without DOLFINx
         return None
-    return [str(number) for number in CASES.get(model.get("case", "b"), range(1, 13))]
+    return [str(number) for number in CASES.get(str(model.get("case", "b")), range(1, 13))]
 
 
 def _peaks(options: argparse.Namespace) -> str:

@@ -31,8 +31,8 @@ def located(case: str) -> Path:
         return Path(case)
     names = [path.stem for path in sorted(FOLDER.glob("*.toml"))]
     if case not in names:
-        raise InputError(f"there is no built-in case {shown(case)}: {nearest(case, names)}; a file ends "
-                         "in .toml")
+        raise InputError(f"there is no built-in case {shown(case)}: {nearest(case, names)}; a file ends in "
+                         ".toml")
     return FOLDER / f"{case}.toml"
 
 
