@@ -181,7 +181,7 @@ class Rayleigh:
 
         alpha = 2 w1 w2 (w2 xi1 - w1 xi2) / (w2² - w1²), beta = 2 (w2 xi2 - w1 xi1) / (w2² - w1²); for equal ratios xi
         alpha = 2 xi w1 w2 / (w1 + w2) and beta = 2 xi / (w1 + w2). 5 % at 1 and 10 Hz: 0.5712 1/s and 1.4469e-3 s.
-       Raises InputError when f1 = f2 or when the solution needs a negative coefficient.
+        Raises InputError when f1 = f2 or when the solution needs a negative coefficient.
         """
         for name, f in (("f1", f1), ("f2", f2)):
             number("Rayleigh.from_frequencies", f"the frequency {name} [Hz]", f, positive=True)
