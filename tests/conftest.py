@@ -153,7 +153,7 @@ def _seconds_by_file(stats: dict[str, list[Any]]) -> list[tuple[float, str]]:
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:
     """Tell the slowest files, and leave the counts where tests/run.sh sums them."""
-    if "PYTEST_XDIST_WORKER" in os.environ:  # the process that started the workers tells it of all
+    if hasattr(terminalreporter.config, "workerinput"):  # the process that started the workers tells it of all
         return
     stats = terminalreporter.stats
     times = [f"{total:8.1f} s  {file}" for total, file in _seconds_by_file(stats)]

@@ -15,7 +15,8 @@ import pytest
 import vi_contact
 from vi_contact.cli import ranks as cli_ranks
 from vi_contact.cli.entry import main, split_petsc
-from vi_contact.core.errors import InputError
+from vi_contact.cli.errors import told
+from vi_contact.core.errors import InputError, ViContactError
 
 pytestmark = pytest.mark.serial
 ROOT = Path(vi_contact.__file__).parent.parent
@@ -212,3 +213,15 @@ def test_the_beam_needs_no_finite_elements(tmp_path):
             done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=False)
             assert (done.returncode, done.stderr) == (0, ""), done.stderr
     assert (tmp_path / "beam" / "tip.png").is_file() and (tmp_path / "layer" / "particle.png").is_file()
+
+
+def test_a_library_that_is_missing_is_named():
+    """A Python without DOLFINx: one sentence, not a traceback; a module of the user's own keeps its traceback."""
+
+    def missing(name):
+        raise ModuleNotFoundError(f"No module named '{name}'", name=name)
+
+    with pytest.raises(ViContactError, match=r"^this needs ufl, which this Python does not find: install it"):
+        told(lambda: missing("ufl"), {})
+    with pytest.raises(ModuleNotFoundError, match="No module named 'mine'"):
+        told(lambda: missing("mine"), {})

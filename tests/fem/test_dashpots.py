@@ -9,8 +9,8 @@ from collections import deque
 import numpy as np
 import pytest
 from fem_problems import linear
-from packet import WavePacket
 from soil import SOIL, burst, energies, history, strip
+from wave_packet import WavePacket
 
 import vi_contact as vc
 from vi_contact import exact, fem, soil

@@ -17,6 +17,7 @@ from ..core.files import sentence
 PETSC_ERR_MEM = 55  # of petscsystypes.h
 _ARGUMENT = re.compile(r"(?<= )(\w++)= ?")
 _MEMORY = ("out of memory", "cannot allocate memory", "unable to allocate", "memory allocation failed", "bad_alloc")
+LIBRARIES = ("dolfinx", "ufl", "basix", "petsc4py", "mpi4py", "h5py", "gmsh", "matplotlib", "tqdm")
 OUT_OF_MEMORY = (
     "out of memory: take a coarser mesh, fewer steps or samples, or more ranks on more machines; what a run has "
     "written is kept, and --restart continues it"
@@ -80,6 +81,8 @@ def _sentence(error: Exception) -> str | None:
         return OUT_OF_MEMORY
     if isinstance(error, OSError):
         return sentence(error)
+    if isinstance(error, ModuleNotFoundError) and error.name in LIBRARIES:
+        return f"this needs {error.name}, which this Python does not find: install it (docs/start/install.md)"
     if isinstance(error, OverflowError | FloatingPointError):
         return f"a number grew beyond those of the machine ({error}): check the sizes and units of what was given"
     return None

@@ -1,8 +1,8 @@
 """Check a mesh file on its way to Gmsh: only what is certainly a mesh, under a name and in a folder of our own.
 
-Gmsh runs as a script whatever it does not recognise as a mesh, and a script may run any command of the shell. It decides
-by the name of a file, else by the first word in it, and it runs FILE.opt beside a mesh too. So a mesh file is read only
-if its first bytes are those of Gmsh's own format, and from a copy called mesh.msh, alone in a new folder.
+Gmsh runs as a script whatever it does not recognise as a mesh, and a script may run any command of the shell. It
+decides by the name of a file, else by the first word in it, and it runs FILE.opt beside a mesh too. So a mesh file is
+read only if its first bytes are those of Gmsh's own format, and from a copy called mesh.msh, alone in a new folder.
 """
 
 from __future__ import annotations
