@@ -282,7 +282,7 @@ def test_uzawa_step_size() -> None:
     with pytest.raises(StepFailure, match="Uzawa.*stopped after"):
         Uzawa(rho=3.0 / values[-1], max_iterations=500).prepare(G, np.ones(8, dtype=bool)).solve(q, cohesion, cohesion)
     for rho in (0.0, -1.0, np.nan):
-        with pytest.raises(InputError, match="give a positive number, or None"):
+        with pytest.raises(InputError, match="give a finite number above zero"):
             Uzawa(rho=rho)
 
 

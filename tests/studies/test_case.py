@@ -444,6 +444,7 @@ def test_short_options_are_settings() -> None:
     assert ShortOptions(dt=0.1).settings({"beam": {}}, ["beam.E=1"]) == ["beam.dt=0.1", "beam.E=1"]
 
 
+@pytest.mark.serial
 def test_what_follows_from_the_first_mode() -> None:
     """Harmonic and time step by the body's lowest frequency; where it is not known yet, a sentence."""
     settings = ["excitation.1={type='FirstModeHarmonic', amplitude=2, ratio=0.25}", "fields=", "run.steps=2",
@@ -459,6 +460,7 @@ def test_what_follows_from_the_first_mode() -> None:
         read_case(WALL, [*settings, "system.dashpots=[{type='FreeField', facets='back'}]"]).problem(MPI.COMM_WORLD)
 
 
+@pytest.mark.serial
 def test_the_command_runs_checks_and_restarts(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """20 steps at once are 10 steps, then --restart; case.toml in the folder tells the settings."""
     whole, parts = tmp_path / "whole", tmp_path / "parts"
