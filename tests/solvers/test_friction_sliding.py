@@ -90,6 +90,7 @@ def slid(comm: Any, scale: float, *, cells: int = 4, steps: int = 300) -> tuple[
     return float((v[-1] - v[-51]) / (50 * dt)), float(friction), u[49::50]
 
 
+@pytest.mark.slow
 def test_incline_slides_alike_in_every_unit(comm: Any) -> None:
     """g (sin - mu cos) to 1e-9 at 1, 0.1 and 0.01 times the length; the same dimensionless motion to 1e-9."""
     expected = G * (sin(SLOPE) - 0.5 * cos(SLOPE))
@@ -101,6 +102,7 @@ def test_incline_slides_alike_in_every_unit(comm: Any) -> None:
         assert np.abs(u - first).max() <= 1e-9 * first.max()
 
 
+@pytest.mark.slow
 def test_friction_force_does_not_depend_on_the_number_of_points(comm: Any) -> None:
     """4, 8 and 16 elements along the base in full sliding: mu times the normal weight, 1e-6 asked, 1e-9 found."""
     for cells in (4, 8, 16):
