@@ -14,7 +14,6 @@ import argparse
 import math
 import os
 import sys
-from collections import deque
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -25,12 +24,12 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "support")]
 
 import numpy as np  # noqa: E402
+from fem_problems import linear  # noqa: E402
 from mpi4py import MPI  # noqa: E402
-from wave_packet import WavePacket  # noqa: E402
+from wave_packet import energy_sent_back  # noqa: E402
 
 import vi_contact as vc  # noqa: E402
 from vi_contact import fem  # noqa: E402
-from vi_contact.core.surfaces import empty_surface  # noqa: E402
 from vi_contact.exact import dashpot_energy  # noqa: E402
 from vi_contact.fem.compat import geometry_dofmap  # noqa: E402
 from vi_contact.meshes.block import BlockMesh  # noqa: E402
@@ -43,33 +42,6 @@ CONCRETE = vc.LinearElastic(E=3.0e10, nu=0.2, rho=2400.0)
 DEPTH, BOX, H = 10.0, (6.0, 4.0), 1.0  # m: soil, box, cells
 DT, STEPS = 5e-3, 400
 SHAKE = vc.Ricker(1.0, 4.0)
-
-
-def linear(system: Any, **data: Any) -> vc.ContactProblem:
-    """Without contact."""
-    return vc.ContactProblem(system, empty_surface(system.algebra.comm, 2), **data)
-
-
-def reflected(wave: str, angle: float, cells: int) -> tuple[float, float]:
-    """(measured share of the energy, that of the packet in theory) at ``angle`` [degrees]."""
-    material, slope = vc.LinearElastic(E=1.0, nu=NU, rho=1.0), math.radians(angle)
-    period = 1.0 / math.sin(slope)
-    nx = round(cells * period)
-    ny = round(12.0 * LENGTH * nx / period)
-    packet = WavePacket(material, wave, slope, period, LENGTH, 5.0 * LENGTH)
-    strip = BlockMesh(lengths=(period, ny * period / nx), divisions=(nx, ny))
-    mesh, tags = fem.build_mesh(strip, MPI.COMM_WORLD)
-    system = fem.assemble(
-        mesh, material, tied=fem.Tied(tags["left"], tags["right"]),
-        dashpots=[fem.Dashpots(tags["top"]), fem.Dashpots(tags["bottom"])],
-        initial_displacement=lambda x: packet.motion(x)[0], initial_velocity=lambda x: packet.motion(x)[1],
-    )
-    dt = 0.5 * period / nx / packet.speed
-    steps = round(11.5 * LENGTH / (packet.speed * math.cos(slope)) / dt)
-    ((state, _),) = deque(vc.march(linear(system), dt=dt, steps=steps), maxlen=1)
-    left = system.kinetic_energy(state.v) + system.strain_energy(state.u)
-    before = system.kinetic_energy(system.v0) + system.strain_energy(system.u0)
-    return left / before, packet.reflected()
 
 
 def shaken_box(sides: str, distance: float) -> np.ndarray:
@@ -101,8 +73,9 @@ def dashpot_table(angles: Sequence[float], cells: int) -> None:
     for angle in angles:
         row = [f"{angle:g}°"]
         for wave in "PS":
-            exact = dashpot_energy(vc.LinearElastic(E=1.0, nu=NU, rho=1.0), math.radians(angle), wave=wave)
-            measured, packet = reflected(wave, angle, cells)
+            material, slope = vc.LinearElastic(E=1.0, nu=NU, rho=1.0), math.radians(angle)
+            exact = dashpot_energy(material, slope, wave=wave)
+            measured, packet = energy_sent_back(MPI.COMM_WORLD, material, wave, slope, length=LENGTH, cells=cells)
             row += [f"{exact:.5f}", f"{packet:.5f}", f"{measured:.5f}"]
         print("| " + " | ".join(row) + " |", flush=True)
 

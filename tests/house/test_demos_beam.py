@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from demo_runs import demo
 
 from vi_contact import beam, cli
 from vi_contact.plots import histories as plotting
@@ -20,19 +20,10 @@ pytestmark = pytest.mark.serial
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def demo() -> Any:
-    """The module demos/timoshenko_beam.py."""
-    spec = spec_from_file_location("demo_timoshenko_beam", ROOT / "demos" / "timoshenko_beam.py")
-    assert spec is not None and spec.loader is not None
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 @pytest.mark.slow
 def test_the_timoshenko_beam_demo(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """V6.1's invariants for every reading, two routes to the exact law, order 1 in eps, figures 8.1 to 8.9."""
-    numbers = demo().main(quick=True, out=tmp_path, progress=False)
+    numbers = demo("timoshenko_beam").main(quick=True, out=tmp_path, progress=False)
     for case in (f"a2 {viscosity} {name}" for viscosity in ("0.001", "2") for name in ("none", "A", "B", "C")):
         assert numbers[f"{case}: defect"] <= 1e-8 and numbers[f"{case}: largest rise"] < 0.0
         assert 0.0 < numbers[f"{case}: energy"] < 20.8396

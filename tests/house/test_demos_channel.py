@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from demo_runs import demo
 
 ROOT = Path(__file__).resolve().parents[2]
 FIGURES = (
@@ -16,19 +16,10 @@ FIGURES = (
 )
 
 
-def demo() -> Any:
-    """The module demos/channel.py."""
-    spec = spec_from_file_location("demo_channel", ROOT / "demos" / "channel.py")
-    assert spec is not None and spec.loader is not None
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 @pytest.mark.slow
 def test_the_channel_demo(comm: Any, shared_tmp: Path) -> None:
     """V4.2: openings alternate, the corners rock, unilateral exceeds bilateral; both routes agree; all files."""
-    module = demo()
+    module = demo("channel")
     numbers = module.main(quick=True, out=shared_tmp, progress=False)
     comm.Barrier()  # rank 0 draws
     sliding, coulomb, bilateral = module.RUNS

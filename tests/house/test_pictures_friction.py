@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from kept_figures import keep_figures
 from rubbing import rubbing_block
 
 from demos.pictures import friction as plotting_friction
@@ -41,15 +42,7 @@ def cycles(n: int = 401, m: int = 6) -> dict[str, Any]:
 @pytest.fixture
 def figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """The figures that were saved, kept open to be looked into."""
-    seen: list[Any] = []
-    save = plotting_friction.save
-
-    def keep(figure: Any, path: Any) -> Path:
-        seen.append(figure)
-        return save(figure, path)
-
-    monkeypatch.setattr(plotting_friction, "save", keep)
-    return seen
+    return keep_figures(monkeypatch, plotting_friction)
 
 
 def test_loop_of_a_slider(figures: list[Any], tmp_path: Path) -> None:

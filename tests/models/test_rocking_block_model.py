@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
+from demo_runs import demo
 from mpi4py import MPI
 
 import vi_contact as vc
@@ -95,19 +94,10 @@ def test_impacts_of_a_history():
     assert times == pytest.approx([1.0 + 0.2 / 0.20001, 6.5]) and peaks == pytest.approx([0.4, 0.3])
 
 
-def demo() -> Any:
-    """The module demos/rocking_block.py."""
-    spec = spec_from_file_location("demo_rocking_block", ROOT / "demos" / "rocking_block.py")
-    assert spec is not None and spec.loader is not None
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 @pytest.mark.slow
 def test_demo(shared_tmp, comm):
     """The quick demo: key numbers of V3.1, run folders and figures."""
-    numbers = demo().main(quick=True, out=shared_tmp, progress=False)
+    numbers = demo("rocking_block").main(quick=True, out=shared_tmp, progress=False)
     comm.Barrier()  # rank 0 draws
     assert 0.0 < numbers["certificate"] <= 1e-9
     assert numbers["worst_time_error"] < 0.02 and numbers["first_impact"] == pytest.approx(0.490304, rel=0.01)

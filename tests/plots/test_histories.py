@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import warnings
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from kept_figures import keep_figures
 
 from vi_contact.plots import histories as plotting
 from vi_contact.plots import maps
@@ -42,16 +42,7 @@ def history(n: int = 401, m: int = 11) -> dict[str, Any]:
 @pytest.fixture
 def figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """The figures that were saved, kept open to be looked into."""
-    seen: list[Any] = []
-    save = plotting.save
-
-    def keep(figure: Any, path: Any) -> Path:
-        seen.append(figure)
-        return save(figure, path)
-
-    for module in (plotting, maps):
-        monkeypatch.setattr(module, "save", keep)
-    return seen
+    return keep_figures(monkeypatch, plotting, maps)
 
 
 DRAW = {

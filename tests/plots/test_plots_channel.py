@@ -8,14 +8,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from kept_figures import keep_figures
 
 import vi_contact as vc
+from demos.pictures import channel as own_pictures
 from demos.pictures.channel import plot_beside, plot_layout, plot_moments
 from vi_contact import fem
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.channel import ChannelMesh
 from vi_contact.models.channel.model import Channel, ChannelModel, build
-from vi_contact.plots import histories as plotting
+from vi_contact.plots import channel as pictures
 from vi_contact.plots.channel import (
     SHOWN,
     Outline,
@@ -56,15 +58,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[ChannelModel, Any, Pa
 @pytest.fixture
 def figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """The figures that were saved, kept open to be looked into."""
-    seen: list[Any] = []
-
-    def keep(figure: Any, path: Any) -> Path:
-        seen.append(figure)
-        return plotting.save(figure, path)
-
-    for module in ("vi_contact.plots.channel", "demos.pictures.channel"):
-        monkeypatch.setattr(f"{module}.save", keep)
-    return seen
+    return keep_figures(monkeypatch, pictures, own_pictures)
 
 
 def outline(model: ChannelModel) -> Outline:

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from fem_problems import linear
 
+from vi_contact import fem
 from vi_contact.core.algebra import Array
 from vi_contact.exact.surface_waves import dashpot_energy
 from vi_contact.laws.materials import LinearElastic
+from vi_contact.meshes.block import BlockMesh
+from vi_contact.run.march import march
 
 
 @dataclass(frozen=True)
@@ -67,3 +73,27 @@ class WavePacket:
         ]
         energies = weights**2 * (k_y**2 + (2.0 * math.pi / self.period) ** 2)
         return float(np.sum(energies * shares) / np.sum(energies))
+
+
+def energy_sent_back(
+    comm: Any, material: LinearElastic, wave: str, angle: float, *, length: float, cells: int
+) -> tuple[float, float]:
+    """Send a packet up a periodic strip between dashpots; return the share of energy left, and the theory's.
+
+    angle [rad] from the vertical; length of the packet in wavelengths; cells per wavelength. Collective.
+    """
+    period = 1.0 / math.sin(angle)  # wavelength 1
+    nx = round(cells * period)
+    ny = round(12.0 * length * nx / period)
+    packet = WavePacket(material, wave, angle, period, length, 5.0 * length)
+    mesh, tags = fem.build_mesh(BlockMesh(lengths=(period, ny * period / nx), divisions=(nx, ny)), comm)
+    system = fem.assemble(
+        mesh, material, tied=fem.Tied(tags["left"], tags["right"]),
+        dashpots=[fem.Dashpots(tags["top"]), fem.Dashpots(tags["bottom"])],
+        initial_displacement=lambda x: packet.motion(x)[0], initial_velocity=lambda x: packet.motion(x)[1],
+    )
+    dt = 0.5 * period / nx / packet.speed
+    steps = round(11.5 * length / (packet.speed * math.cos(angle)) / dt)
+    ((state, _),) = deque(march(linear(system), dt=dt, steps=steps), maxlen=1)
+    left = system.kinetic_energy(state.v) + system.strain_energy(state.u)
+    return left / (system.kinetic_energy(system.v0) + system.strain_energy(system.u0)), packet.reflected()

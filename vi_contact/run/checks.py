@@ -16,7 +16,6 @@ from .time_steps import TimeSteps
 
 SCHEME = ("check", "start", "jump", "effective_matrix", "step", "finish", "balance")
 SLACK = 10.0  # of the tolerance, and of the largest displacement: what a state may penetrate
-SAME = 1e-12  # relative difference of time steps that were computed in two ways
 
 
 def check_scheme(owner: str, value: Any) -> None:
