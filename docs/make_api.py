@@ -12,7 +12,7 @@ import ast
 import inspect
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
@@ -257,26 +257,25 @@ def entry(where: Module, name: str) -> str:
     return f"- **`{call}`** {first_paragraph(there, node)}{more}"
 
 
+def listed(classes: Iterable[tuple[str, Iterable[str]]]) -> Iterator[tuple[Module, ast.ClassDef, str]]:
+    """Yield the module, the definition and the heading of every class of a list."""
+    for path, names in classes:
+        for name in names:
+            where, node = definition(module(path), name)
+            assert isinstance(node, ast.ClassDef)
+            yield where, node, f"### `{name}` (`vi_contact.{path}`)\n"
+
+
 def contract() -> Iterator[str]:
     """Yield the protocols with every method, then the values they exchange, and the whole of every docstring."""
     yield "## The contract\n"
-    for path, names in CONTRACT:
-        for name in names:
-            where, node = definition(module(path), name)
-            assert isinstance(node, ast.ClassDef)
-            yield f"### `{name}` (`vi_contact.{path}`)\n"
-            yield f"{whole(node)}\n"
-            for one in methods(node):
-                yield f"#### `{function(where, one, 1)}`\n"
-                yield f"{whole(one)}\n"
+    for where, node, heading in listed(CONTRACT):
+        yield from (heading, f"{whole(node)}\n")
+        for one in methods(node):
+            yield from (f"#### `{function(where, one, 1)}`\n", f"{whole(one)}\n")
     yield "## Values of the contract\n"
-    for path, names in VALUES:
-        for name in names:
-            where, node = definition(module(path), name)
-            assert isinstance(node, ast.ClassDef)
-            yield f"### `{name}` (`vi_contact.{path}`)\n"
-            yield f"`{constructor(where, node)}`\n"
-            yield f"{whole(node)}\n"
+    for where, node, heading in listed(VALUES):
+        yield from (heading, f"`{constructor(where, node)}`\n", f"{whole(node)}\n")
 
 
 def short_names() -> Iterator[str]:

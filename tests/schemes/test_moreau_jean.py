@@ -11,11 +11,11 @@ from bar import bar, bouncing, energy, period_three, run, thrown
 from chain import chain_problem
 from energy_checks import course
 from oscillator import FAR, amplification, observed_order
+from scheme_checks import check_positive_homogeneity, check_restart_from_bare_states
 
 from vi_contact.core.errors import InputError
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.state_checks import initial_state
-from vi_contact.core.step import State
 from vi_contact.laws.excitation import Harmonic
 from vi_contact.laws.impact import Inelastic
 from vi_contact.laws.mass import ConsistentMass, Redistributed
@@ -267,25 +267,11 @@ def test_halved_steps_take_the_drift_with_them():
 
 
 def test_a_restart_needs_nothing_but_displacement_and_velocity():
-    """To the last bit, from a state stripped of reactions and contact set, in the middle of the contact."""
-    problem = thrown(50, **MASS)
-    whole = [report.new for report in run(problem, INELASTIC, dt=1 / 150, steps=150)]
-    half = whole[99]
-    assert half.active[0] and not half.memory
-    bare = State(half.t, half.k, half.u, half.v, np.zeros(1), np.zeros(1, dtype=bool))
-    again = [report.new for report in run(problem, INELASTIC, dt=1 / 150, steps=50, state=bare)]
-    for one, two in zip(whole[100:], again, strict=True):
-        assert np.array_equal(one.u, two.u) and np.array_equal(one.v, two.v) and one.r_n == two.r_n
+    check_restart_from_bare_states(INELASTIC)
 
 
 def test_positive_homogeneity():
-    """A millionth of gap and velocity gives a millionth of everything: the predictor has no absolute tolerance."""
-    small = {"gap": 5e-6, "v0": lambda x: np.full_like(x, -1e-5)}
-    problems = (thrown(30, **MASS), bar(30, **small, **MASS))
-    large, little = (list(run(problem, INELASTIC, dt=1 / 90, steps=130)) for problem in problems)
-    for one, two in zip(large, little, strict=True):
-        np.testing.assert_allclose(1e6 * two.new.u, one.new.u, atol=1e-9 * 5.0)
-        np.testing.assert_allclose(1e6 * two.new.r_n, one.new.r_n, atol=1e-9 * 300.0)
+    check_positive_homogeneity(INELASTIC)
 
 
 def test_a_weight_at_rest_stays_at_rest():
