@@ -39,7 +39,7 @@ fill_tree() {
 }
 
 # in_tree FOLDER bash -c "$as_user" - COMMAND…: as an ordinary user, who does not own the clone.
-as_user='id vi >/dev/null 2>&1 || useradd -m vi; exec runuser -u vi -- env HOME=/home/vi "$@"'
+as_user='id vi >/dev/null 2>&1 || useradd -m vi; exec runuser -u vi -- env HOME=~vi "$@"'
 
 # in_tree FOLDER COMMAND…: in namespaces of its own, so that its mounts and its processes end with it, however it ends.
 # The time it may take is what is left of the budget.
