@@ -14,7 +14,7 @@ from vi_contact.meshes.extract import arrays_from_file, arrays_from_script
 from vi_contact.meshes.from_arrays import add_arrays
 from vi_contact.meshes.gmsh_session import session, write
 from vi_contact.meshes.rows import cell_sides, number_alike
-from vi_contact.meshes.two_blocks import Blocks, TwoBlocks, main
+from vi_contact.meshes.two_blocks import Blocks, TwoBlocks
 
 gmsh = pytest.importorskip("gmsh")
 pytestmark = pytest.mark.serial
@@ -216,13 +216,15 @@ def test_bodies_of_gmsh_geometry():
 def test_two_blocks_by_itself(tmp_path):
     """The script writes what the class builds; wrong sizes end with a sentence."""
     target = tmp_path / "blocks.msh"
-    sizes = ["--lower", "2", "1", "--upper", "1", "1", "--divisions", "4", "2", "3", "2", "--offset", "0.5"]
-    main([*sizes, "-o", str(target)])
+    script = os.path.join(os.path.dirname(__file__), "..", "..", "meshes", "two_blocks.py")
+
+    def run(*options: str) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, script, *options, "-o", str(target)]
+        return subprocess.run(command, capture_output=True, text=True, check=False, env=dict(os.environ))
+
+    done = run("--lower", "2", "1", "--upper", "1", "1", "--divisions", "4", "2", "3", "2", "--offset", "0.5")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
     read = arrays_from_file(target)
     assert read.points.shape == (15 + 12, 2) and set(read.cell_groups) == {"lower", "upper"}
-    script = os.path.join(os.path.dirname(__file__), "..", "..", "meshes", "two_blocks.py")
-    done = subprocess.run(
-        [sys.executable, script, "--lower", "-1", "1", "-o", str(target)], capture_output=True, text=True, check=False,
-        env=dict(os.environ),
-    )
+    done = run("--lower", "-1", "1")
     assert done.returncode == 1 and "must be positive numbers of metres" in done.stderr

@@ -9,10 +9,9 @@ eighth, "cut" (y = R).
 
 from __future__ import annotations
 
-import argparse
 import math
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,7 +24,7 @@ if not __package__:  # run as a file of the source tree, maybe not installed
 
 from vi_contact.core.checks import MOST_CELLS, counted
 from vi_contact.core.errors import InputError
-from vi_contact.meshes.gmsh_session import write
+from vi_contact.meshes.command_line import run_script
 
 _TRIANGLE = 2  # Gmsh's number
 _SIZES = {  # the size field alone decides
@@ -142,26 +141,9 @@ def _sizes_by_field(gmsh: Any) -> Iterator[None]:
             gmsh.option.setNumber(option, value)
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Write a ball to a file: `ball.py --radius 0.01 --size 2e-5 --foot 2e-4 -o ball.msh`."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
-    parser.add_argument("--radius", type=float, required=True, help="[m]")
-    parser.add_argument("--size", type=float, required=True, help="of the cells at the foot [m]")
-    parser.add_argument("--foot", type=float, required=True, help="distance from the lowest point [m]")
-    parser.add_argument("--growth", type=float, default=0.3, help="of the cell size per distance")
-    parser.add_argument("--coarsest", type=float, help="cell size [m], default a quarter of the radius")
-    parser.add_argument("--eighth", action="store_true", help="the lower half of the quarter")
-    parser.add_argument("-o", "--output", default="ball.msh")
-    given = parser.parse_args(arguments)
-    try:
-        ball = BallMesh(
-            radius=given.radius, size=given.size, foot=given.foot, growth=given.growth, coarsest=given.coarsest,
-            eighth=given.eighth,
-        )
-        write(ball, given.output)
-    except InputError as error:
-        sys.exit(str(error))
-
-
-if __name__ == "__main__":
-    main()
+if __name__ == "__main__":  # ball.py --radius 0.01 --size 2e-5 --foot 2e-4 -o ball.msh
+    run_script(
+        BallMesh, radius="[m]", size="of the cells at the foot [m]", foot="distance from the lowest point [m]",
+        growth="of the cell size per distance", coarsest="cell size [m], a quarter of the radius unless given",
+        eighth="the lower half of the quarter",
+    )

@@ -7,7 +7,6 @@ front towards the viewer). A bar has the first two, a rectangle four, a box six.
 
 from __future__ import annotations
 
-import argparse
 import math
 import sys
 from collections.abc import Callable, Sequence
@@ -22,7 +21,7 @@ if not __package__:  # run as a file of the source tree, maybe not installed
 
 from vi_contact.core.checks import MOST_CELLS, counted
 from vi_contact.core.errors import InputError
-from vi_contact.meshes.gmsh_session import write
+from vi_contact.meshes.command_line import run_script
 from vi_contact.meshes.grid import Array, add_grid, lattice
 
 SIDES = (("left", "right"), ("bottom", "top"), ("back", "front"))
@@ -86,23 +85,8 @@ def _turn(nodes: Array, angle: float) -> Array:
     return turned
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Write a block to a file: `block.py --lengths 2 1 --divisions 4 2 --simplices -o block.msh`."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
-    parser.add_argument("--lengths", type=float, nargs="+", default=[1.0, 1.0], help="one to three lengths [m]")
-    parser.add_argument("--divisions", type=int, nargs="+", default=[1, 1], help="cells along each length")
-    parser.add_argument("--simplices", action="store_true", help="triangles or tetrahedra")
-    parser.add_argument("--angle", type=float, default=0.0, help="rotation about the origin [rad]")
-    parser.add_argument("-o", "--output", default="block.msh")
-    given = parser.parse_args(arguments)
-    try:
-        block = BlockMesh(
-            lengths=tuple(given.lengths), divisions=tuple(given.divisions), simplices=given.simplices, angle=given.angle
-        )
-        write(block, given.output)
-    except InputError as error:
-        sys.exit(str(error))
-
-
-if __name__ == "__main__":
-    main()
+if __name__ == "__main__":  # block.py --lengths 2 1 --divisions 4 2 --simplices -o block.msh
+    run_script(
+        BlockMesh, lengths="one to three lengths [m]", divisions="cells along each length",
+        simplices="triangles or tetrahedra", angle="rotation about the origin [rad]",
+    )

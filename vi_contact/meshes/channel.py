@@ -10,7 +10,6 @@ first.
 
 from __future__ import annotations
 
-import argparse
 import math
 import sys
 from collections.abc import Sequence
@@ -24,8 +23,8 @@ if not __package__:  # run as a file of the source tree, maybe not installed
 from vi_contact.core.checks import MOST_CELLS, counted
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.channel_grid import channel_grid
+from vi_contact.meshes.command_line import run_script
 from vi_contact.meshes.from_arrays import add_arrays
-from vi_contact.meshes.gmsh_session import write
 
 Outline = list[tuple[float, float]]
 
@@ -121,25 +120,10 @@ def _add_body(
     model.setPhysicalName(2, model.addPhysicalGroup(2, [surface]), name)
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Write a channel to a file: `channel.py --width 24 --depth 8 --size 0.25 --far 1 --triangles -o channel.msh`."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
-    for name, meaning in (
-        ("width", "of the layer"), ("depth", "of the layer"), ("outer_width", "of the channel"),
-        ("height", "of the channel"), ("wall", "thickness"), ("slab", "thickness"), ("size", "of the cells"),
-        ("left", "x of the channel's left side (default: in the middle)"), ("far", "cells at bedrock and sides"),
-    ):
-        default = getattr(ChannelMesh, name)
-        parser.add_argument(f"--{name.replace('_', '-')}", type=float, default=default, help=f"{meaning} [m]")
-    parser.add_argument("--triangles", action="store_true", help="instead of quadrilaterals")
-    parser.add_argument("-o", "--output", default="channel.msh")
-    given = vars(parser.parse_args(arguments))
-    output = given.pop("output")
-    try:
-        write(ChannelMesh(**given), output)
-    except InputError as error:
-        sys.exit(str(error))
-
-
-if __name__ == "__main__":
-    main()
+if __name__ == "__main__":  # channel.py --width 24 --depth 8 --size 0.25 --far 1 --triangles -o channel.msh
+    run_script(
+        ChannelMesh, width="of the layer [m]", depth="of the layer [m]", outer_width="of the channel [m]",
+        height="of the channel [m]", wall="thickness [m]", slab="thickness [m]", size="of the cells [m]",
+        left="x of the channel's left side [m], in the middle unless given", far="cells at bedrock and sides [m]",
+        triangles="instead of quadrilaterals",
+    )

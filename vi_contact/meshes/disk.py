@@ -7,10 +7,8 @@ arc within an angle of the lowest point: the contact side) and "rest". Symmetric
 
 from __future__ import annotations
 
-import argparse
 import math
 import sys
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,7 +21,7 @@ if not __package__:  # run as a file of the source tree, maybe not installed
 
 from vi_contact.core.checks import MOST_CELLS, counted
 from vi_contact.core.errors import InputError
-from vi_contact.meshes.gmsh_session import write
+from vi_contact.meshes.command_line import run_script
 
 _LINE, _TRIANGLE = 1, 2  # Gmsh's numbers
 
@@ -99,19 +97,5 @@ def _name(model: Any, dimension: int, name: str, entities: list[int]) -> None:
     model.setPhysicalName(dimension, model.addPhysicalGroup(dimension, entities), name)
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Write a disk to a file: `disk.py --radius 0.5 --size 0.04 -o disk.msh`."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
-    parser.add_argument("--radius", type=float, required=True, help="[m]")
-    parser.add_argument("--size", type=float, required=True, help="of the cells [m]")
-    parser.add_argument("--foot", type=float, default=math.pi / 3.0, help="half the angle of the contact side [rad]")
-    parser.add_argument("-o", "--output", default="disk.msh")
-    given = parser.parse_args(arguments)
-    try:
-        write(DiskMesh(radius=given.radius, size=given.size, foot=given.foot), given.output)
-    except InputError as error:
-        sys.exit(str(error))
-
-
-if __name__ == "__main__":
-    main()
+if __name__ == "__main__":  # disk.py --radius 0.5 --size 0.04 -o disk.msh
+    run_script(DiskMesh, radius="[m]", size="of the cells [m]", foot="half the angle of the contact side [rad]")

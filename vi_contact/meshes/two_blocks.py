@@ -7,9 +7,8 @@ Physical groups of a body called "lower": cells "lower"; boundary "lower_left", 
 
 from __future__ import annotations
 
-import argparse
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -21,7 +20,7 @@ if not __package__:  # run as a file of the source tree, maybe not installed
 
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.block import SIDES, BlockMesh
-from vi_contact.meshes.gmsh_session import write
+from vi_contact.meshes.command_line import run_script
 from vi_contact.meshes.grid import add_grid
 
 
@@ -82,30 +81,23 @@ class TwoBlocks:
         self.blocks().build(gmsh)
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Write two blocks to a file: `two_blocks.py --lower 2 1 --upper 1 1 --divisions 8 4 5 5 --offset 0.5`."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
-    parser.add_argument("--lower", type=float, nargs="+", default=[1.0, 1.0], help="lengths of the lower block [m]")
-    parser.add_argument("--upper", type=float, nargs="+", default=[1.0, 1.0], help="lengths of the upper block [m]")
-    parser.add_argument("--divisions", type=int, nargs="+", default=[1, 1, 1, 1], help="of the lower, of the upper")
-    parser.add_argument("--offset", type=float, nargs="+", default=[0.0, 0.0], help="of the upper block, x and z [m]")
-    parser.add_argument("--gap", type=float, default=0.0, help="between them [m]")
-    parser.add_argument("--simplices", action="store_true", help="triangles or tetrahedra")
-    parser.add_argument("--angle", type=float, default=0.0, help="rotation about the origin [rad]")
-    parser.add_argument("-o", "--output", default="two_blocks.msh")
-    given = parser.parse_args(arguments)
-    half = len(given.divisions) // 2
-    sizes = ((given.lower, given.divisions[:half]), (given.upper, given.divisions[half:]))
-    try:
-        lower, upper = (
-            BlockMesh(lengths=tuple(lengths), divisions=tuple(divisions), simplices=given.simplices)
-            for lengths, divisions in sizes
-        )
-        offset = (*given.offset, 0.0)
-        write(TwoBlocks(lower=lower, upper=upper, offset=offset, gap=given.gap, angle=given.angle), given.output)
-    except InputError as error:
-        sys.exit(str(error))
+def _on_top(
+    lower: tuple[float, ...] = (1.0, 1.0), upper: tuple[float, ...] = (1.0, 1.0),
+    divisions: tuple[int, ...] = (1, 1, 1, 1), offset: tuple[float, ...] = (0.0, 0.0), gap: float = 0.0,
+    simplices: bool = False, angle: float = 0.0,
+) -> TwoBlocks:
+    """Return two blocks of these lengths [m], the first half of the divisions those of the lower one."""
+    half = len(divisions) // 2
+    blocks = [
+        BlockMesh(lengths=lengths, divisions=parts, simplices=simplices)
+        for lengths, parts in ((lower, divisions[:half]), (upper, divisions[half:]))
+    ]
+    return TwoBlocks(lower=blocks[0], upper=blocks[1], offset=(*offset, 0.0), gap=gap, angle=angle)
 
 
-if __name__ == "__main__":
-    main()
+if __name__ == "__main__":  # two_blocks.py --lower 2 1 --upper 1 1 --divisions 8 4 5 5 --offset 0.5
+    run_script(
+        _on_top, lower="lengths of the lower block [m]", upper="lengths of the upper block [m]",
+        divisions="of the lower, of the upper", offset="of the upper block, x and z [m]", gap="between them [m]",
+        simplices="triangles or tetrahedra", angle="rotation about the origin [rad]",
+    )

@@ -7,10 +7,8 @@ defaults are the mesh of the published example: 8 x 12 cells, 40 boundary nodes 
 
 from __future__ import annotations
 
-import argparse
 import math
 import sys
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,7 +19,7 @@ if not __package__:  # run as a file of the source tree, maybe not installed
 from vi_contact.core.checks import MOST_CELLS, counted
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.block import check_box
-from vi_contact.meshes.gmsh_session import write
+from vi_contact.meshes.command_line import run_script
 from vi_contact.meshes.grid import add_grid, lattice
 
 _PUBLISHED = (8, 12)
@@ -77,25 +75,8 @@ def _build_irregular(wall: WallMesh, gmsh: Any, size: float) -> None:
     model.mesh.generate(2)
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Write a wall to a file: `wall.py --height 9 --width 6 --divisions 8 12 --triangles -o wall.msh`."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
-    parser.add_argument("--height", type=float, default=9.0, help="[m]")
-    parser.add_argument("--width", type=float, default=6.0, help="[m]")
-    parser.add_argument("--divisions", type=int, nargs=2, help="cells along width and height (default: 8 12)")
-    parser.add_argument("--size", type=float, help="cell size of an irregular mesh [m]")
-    parser.add_argument("--triangles", action="store_true", help="instead of quadrilaterals")
-    parser.add_argument("-o", "--output", default="wall.msh")
-    given = parser.parse_args(arguments)
-    try:
-        divisions = (given.divisions[0], given.divisions[1]) if given.divisions else None
-        wall = WallMesh(
-            height=given.height, width=given.width, divisions=divisions, size=given.size, triangles=given.triangles
-        )
-        write(wall, given.output)
-    except InputError as error:
-        sys.exit(str(error))
-
-
-if __name__ == "__main__":
-    main()
+if __name__ == "__main__":  # wall.py --height 9 --width 6 --divisions 8 12 --triangles -o wall.msh
+    run_script(
+        WallMesh, height="[m]", width="[m]", divisions="cells along width and height, 8 12 unless given",
+        size="cell size of an irregular mesh [m]", triangles="instead of quadrilaterals",
+    )
