@@ -16,7 +16,7 @@ from ...core.algebra import Array, Mask, max_abs
 from ...core.checks import attributes
 from .extrapolation import Extrapolation, Plain, accelerated
 from .newton import FrictionNewton
-from .problem import FrictionMethod, FrictionResult, ScaledDelassus, inner_method, observed_contraction
+from .problem import FrictionMethod, FrictionResult, ScaledDelassus, inner_method
 
 
 @dataclass(frozen=True)
@@ -71,15 +71,12 @@ class PreparedFixedPoint:
             history.append(change / size)
             limit = np.maximum(unit * sequence.next(limit / unit, new / unit), 0.0)
             found = self._tresca.solve(q, limit, constant, found.r)
-        return step.result(
-            found.r / self.delassus.scale,
-            iterations=len(history) + 1,
-            method=self.method,
-            tolerance=100.0 * self.method.tolerance,
-            history=tuple(history),
-        )
+        tolerance = 100.0 * self.method.tolerance
+        return step.result(self.method, tolerance, (found.r / self.delassus.scale, len(history) + 1, history))
 
 
 def contraction(result: FrictionResult) -> float:
-    """Return the observed factor between successive changes of the thresholds; NaN when there were fewer than two."""
-    return observed_contraction(result.history)
+    """Return the observed mean factor between successive changes of the thresholds, of those above rounding (1e-10 of
+    the first); NaN when there were fewer than two."""
+    changes = [change for change in result.history if change > 1e-10 * result.history[0]]
+    return float((changes[-1] / changes[0]) ** (1.0 / (len(changes) - 1))) if len(changes) > 1 else float("nan")

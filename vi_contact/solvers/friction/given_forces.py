@@ -14,7 +14,8 @@ under Coulomb's when coupling and friction are moderate, linearly. ``extrapolati
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import ClassVar
+from functools import partial
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from ...core.checks import attributes
 from ..normal.active_set import ActiveSet
 from .extrapolation import Extrapolation, Plain, accelerated
 from .newton import FrictionNewton
-from .problem import FrictionMethod, FrictionResult, ScaledDelassus, inner_method
+from .problem import FrictionMethod, Iterated, PreparedFriction, ScaledDelassus, ScaledProblem, inner_method
 
 
 @dataclass(frozen=True)
@@ -45,45 +46,32 @@ class GivenForces:
         inner_method("GivenForces", "tangential", self.tangential)
         accelerated("GivenForces", self.extrapolation)
 
-    def prepare(self, G: Array, bilateral: Mask) -> PreparedGivenForces:
+    def prepare(self, G: Array, bilateral: Mask) -> PreparedFriction:
         """Check and scale G (m d, m d)."""
-        return PreparedGivenForces(self, G, bilateral)
-
-
-class PreparedGivenForces:
-    """Solve for one G and many right-hand sides."""
-
-    def __init__(self, method: GivenForces, G: Array, bilateral: Mask) -> None:
-        self.method = method
-        self.delassus = ScaledDelassus(G, bilateral)
-        d, matrix = self.delassus.dimension, self.delassus.matrix
-        self._normal = ActiveSet().prepare(matrix[::d, ::d].copy(), bilateral)
+        delassus = ScaledDelassus(G, bilateral)
+        d, matrix = delassus.dimension, delassus.matrix
+        normal = ActiveSet().prepare(matrix[::d, ::d].copy(), bilateral)
         apart = matrix.copy()  # normal unknowns out of reach of the tangential problem
         apart[::d], apart[:, ::d] = 0.0, 0.0
         np.fill_diagonal(apart[::d, ::d], 1.0)
-        self._tangential = method.tangential.prepare(apart, np.zeros_like(bilateral))
+        tangential = self.tangential.prepare(apart, np.zeros_like(bilateral))
+        return PreparedFriction(self, 100.0 * self.tolerance, delassus, partial(self._loop, normal, tangential))
 
-    def solve(self, q: Array, cohesion: Array, slope: Array, guess: Array | Mask | None = None) -> FrictionResult:
-        """Solve the small problem; see PreparedFriction."""
-        step = self.delassus.problem(q, cohesion, slope)
-        r = step.start(guess)
-        sequence, history, none = self.method.extrapolation.start(), [1.0], np.zeros(step.count)
-        while step.unit > 0.0 and self.method.tolerance < history[-1] and len(history) <= self.method.max_iterations:
+    def _loop(self, normal: Any, tangential: Any, step: ScaledProblem, r: Array) -> Iterated:
+        """Alternate the two prepared problems."""
+        sequence, none = self.extrapolation.start(), np.zeros(step.count)
+        history: list[float] = []
+        while step.unit > 0.0 and len(history) < self.max_iterations:
             given, active = r[:, 1:].copy(), r[:, 0] > 0.0
             r[:, 0] = 0.0
-            r[:, 0] = self._normal.solve(step.w(r)[:, 0], active).r
+            r[:, 0] = normal.solve(step.w(r)[:, 0], active).r
             r[:, 1:] = 0.0
             w = step.w(r)
             w[:, 0] = np.inf
-            r[:, 1:] = self._tangential.solve(w, step.limit(r[:, 0]), none).r[:, 1:]
+            r[:, 1:] = tangential.solve(w, step.limit(r[:, 0]), none).r[:, 1:]
             size = max(max_abs(r[:, 1:]), max_abs(given))
             history.append(max_abs(r[:, 1:] - given) / size if size else 0.0)
-            if history[-1] > self.method.tolerance:
-                r[:, 1:] = sequence.next(given.ravel(), r[:, 1:].ravel()).reshape(given.shape)
-        return step.result(
-            r,
-            iterations=len(history) - 1,
-            method=self.method,
-            tolerance=100.0 * self.method.tolerance,
-            history=tuple(history[1:]),
-        )
+            if history[-1] <= self.tolerance:
+                break
+            r[:, 1:] = sequence.next(given.ravel(), r[:, 1:].ravel()).reshape(given.shape)
+        return r, len(history), history

@@ -16,34 +16,43 @@ which asks K0⁻¹ for one column per difference, once, and for the solution of 
 from __future__ import annotations
 
 from collections import OrderedDict
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from scipy.linalg import lapack
 
 from ...core.algebra import Array, Indices, Mask
+from .problem import ScaledProblem
 
 KEPT = 8  # factors
 LARGE = 150  # unknowns from which (2) is faster, as measured
 SHARE = 0.125  # of them, differences up to which it is
 
 
-class NodeStates(Protocol):
-    """Hold the states of m nodes: ``closed``, ``stick`` and, in 3D, ``turns``, slip along an unknown direction (m,).
+class States:
+    """Find the states of m nodes at y; a node that turned back since ``before`` sticks first.
 
-    Slip reactions are fixed + growth r_n direction, (m, d - 1) with ``growth`` (m,); ``fixed`` (m, d). ``turning``:
-    (|y_t| - limit)/limit of nodes that turn. ``exact``: none does, and the linear problem depends on ``key`` only.
+    Masks (m,) ``closed``, ``stick`` and, in 3D, ``turns``, slip along an unknown direction. Slip reactions are
+    fixed + growth r_n direction, (m, d - 1) with ``growth`` (m,); ``fixed`` (m, d). ``turning``: (|y_t| - limit)/limit
+    of nodes that turn. ``exact``: none does, and the linear problem depends on ``key`` only.
     """
 
-    closed: Mask
-    stick: Mask
-    turns: Mask
-    direction: Array
-    growth: Array
-    turning: Array
-    fixed: Array
-    exact: bool
-    key: bytes
+    def __init__(self, step: ScaledProblem, y: Array, before: States | None) -> None:
+        m, d = y.shape
+        limit = step.limit(y[:, 0])
+        size = np.linalg.norm(y[:, 1:], axis=1)
+        self.closed: Mask = (y[:, 0] > 0.0) | step.delassus.bilateral
+        back = np.zeros(m, dtype=bool) if before is None else np.sum(before.direction * y[:, 1:], axis=1) < 0.0
+        self.stick: Mask = ((size <= limit) | back) & (limit > 0.0)
+        slip = ~self.stick & (limit > 0.0)
+        self.direction: Array = np.zeros((m, d - 1))
+        np.divide(y[:, 1:], size[:, None], out=self.direction, where=slip[:, None])
+        self.growth = np.where(slip & (y[:, 0] > 0.0), step.slope, 0.0)
+        self.turns: Mask = slip if d == 3 else np.zeros(m, dtype=bool)
+        self.exact = not self.turns.any()
+        self.turning = size[self.turns] / limit[self.turns] - 1.0
+        self.fixed = np.column_stack([np.zeros(m), np.where(slip, step.cohesion, 0.0)[:, None] * self.direction])
+        self.key = b"".join(part.tobytes() for part in (self.closed, self.stick, self.direction, self.growth))
 
 
 class Factors:
@@ -53,7 +62,7 @@ class Factors:
         self.G = G
         self._kept: OrderedDict[bytes, Factored] = OrderedDict()
 
-    def of(self, states: NodeStates, reduced: Reduced) -> Factored:
+    def of(self, states: States, reduced: Reduced) -> Factored:
         """Return the factor, made when it is not kept."""
         if states.exact and states.key in self._kept:
             self._kept.move_to_end(states.key)
@@ -76,7 +85,7 @@ class LinearProblems:
         self._bordered: set[bytes] = set()
         self._solved: set[bytes] = set()
 
-    def solve(self, states: NodeStates, w: Array) -> Array | None:
+    def solve(self, states: States, w: Array) -> Array | None:
         """Return r; None when the problem is singular, or exact and solved before. What (2) has solved without success,
         (1) solves once more."""
         if states.key in self._solved:
@@ -101,7 +110,7 @@ class Reduced:
     z: normals of closed nodes, each with the slip reaction that grows with it, tangents of sticking nodes, turns.
     """
 
-    def __init__(self, states: NodeStates) -> None:
+    def __init__(self, states: States) -> None:
         m, d = self._shape = states.fixed.shape
         places = np.arange(m * d).reshape(m, d)
         self.closed, self._turning = states.closed, states.turning

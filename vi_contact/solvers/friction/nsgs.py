@@ -22,7 +22,7 @@ from scipy.optimize import brentq
 
 from ...core.algebra import Array, Mask
 from ...core.checks import attributes
-from .problem import FrictionResult, ScaledDelassus, ScaledProblem
+from .problem import Iterated, PreparedFriction, ScaledDelassus, ScaledProblem, iterated
 
 
 @dataclass(frozen=True)
@@ -39,60 +39,28 @@ class NSGS:
     def __post_init__(self) -> None:
         attributes(self, positive=("tolerance",), counts=("max_iterations",))
 
-    def prepare(self, G: Array, bilateral: Mask) -> PreparedNSGS:
+    def prepare(self, G: Array, bilateral: Mask) -> PreparedFriction:
         """Check and scale G (m d, m d)."""
-        return PreparedNSGS(self, G, bilateral)
+        return PreparedFriction(self, self.tolerance, ScaledDelassus(G, bilateral), self._loop)
+
+    def _loop(self, step: ScaledProblem, r: Array) -> Iterated:
+        return iterated(step, r, sweeper(step), self.tolerance, self.max_iterations)
 
 
-class PreparedNSGS:
-    """Solve for one G and many right-hand sides."""
+def sweeper(step: ScaledProblem) -> Callable[[Array, Array], Array]:
+    """Return one sweep: r, and w that it does not need, -> r."""
+    d, matrix = step.delassus.dimension, step.delassus.matrix
+    nodes = [_Node(step, i) for i in range(step.count)]
 
-    def __init__(self, method: NSGS, G: Array, bilateral: Mask) -> None:
-        self.method = method
-        self.delassus = ScaledDelassus(G, bilateral)
+    def sweep(r: Array, w: Array) -> Array:
+        flat = r.copy().ravel()
+        for i, node in enumerate(nodes):
+            rows = slice(i * d, (i + 1) * d)
+            flat[rows] = 0.0
+            flat[rows] = node.solve(step.q[i] + matrix[rows] @ flat)
+        return flat.reshape(r.shape)
 
-    def solve(self, q: Array, cohesion: Array, slope: Array, guess: Array | Mask | None = None) -> FrictionResult:
-        """Solve the small problem; see PreparedFriction."""
-        step = self.delassus.problem(q, cohesion, slope)
-        r = step.start(guess if step.unit > 0.0 else None)
-        history: list[float] = []
-        nodes = _nodes(step) if step.unit > 0.0 else []
-        while step.unit > 0.0 and len(history) < self.method.max_iterations:
-            r = _sweep(step, nodes, r)
-            residual = step.residual(r, step.w(r))
-            history.append(residual / step.unit)
-            if residual <= max(self.method.tolerance * step.unit, step.rounding(r)):
-                break
-        return step.result(
-            r,
-            iterations=len(history),
-            method=self.method,
-            tolerance=self.method.tolerance,
-            history=tuple(history),
-        )
-
-
-def sweeps(step: ScaledProblem, r: Array, number: int) -> Array:
-    """Return r after so many sweeps."""
-    nodes = _nodes(step)
-    for _ in range(number):
-        r = _sweep(step, nodes, r)
-    return r
-
-
-def _nodes(step: ScaledProblem) -> list[_Node]:
-    return [_Node(step, i) for i in range(step.count)]
-
-
-def _sweep(step: ScaledProblem, nodes: list[_Node], r: Array) -> Array:
-    d = step.delassus.dimension
-    matrix, flat = step.delassus.matrix, r.copy().ravel()
-    for i, node in enumerate(nodes):
-        rows = slice(i * d, (i + 1) * d)
-        here = flat[rows].copy()
-        flat[rows] = 0.0
-        flat[rows] = node.solve(step.q[i] + matrix[rows] @ flat, here)
-    return flat.reshape(r.shape)
+    return sweep
 
 
 class _Node:
@@ -106,7 +74,7 @@ class _Node:
         self.cohesion, self.slope = float(step.cohesion[i]), float(step.slope[i])
         self.bilateral = bool(step.delassus.bilateral[i])
 
-    def solve(self, q: Array, old: Array) -> Array:
+    def solve(self, q: Array) -> Array:
         """The reactions of the node when all others give it q."""
         q_n, q_t = float(q[0]), q[1:]
         if not self.bilateral:

@@ -19,6 +19,7 @@ the mean of G_tt to the same power: reactions and displacements are then both in
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Protocol
@@ -30,6 +31,8 @@ from ...core.checks import provides
 from ...core.errors import InputError, StepFailure
 from ...laws.friction import project
 from ..normal.lcp import EPS, check_gap, energy_scale
+
+Iterated = tuple[Array, int, Sequence[float]]  # scaled r, iterations, history
 
 
 @dataclass(frozen=True)
@@ -50,17 +53,6 @@ class FrictionResult:
     history: tuple[float, ...] = ()
 
 
-class PreparedFriction(Protocol):
-    """Solve (1) for one G."""
-
-    def solve(self, q: Array, cohesion: Array, slope: Array, guess: Array | Mask | None = None) -> FrictionResult:
-        """Return q (m, d), cohesion (m,) [as r], slope (m,). ``guess``: predicted contact set (m,), or reactions (m,
-        d).
-
-        Raises StepFailure when the tolerance is not reached."""
-        ...
-
-
 class FrictionMethod(Protocol):
     """Solve (1): FrictionNewton, NSGS, FixedPoint, GivenForces or Uzawa."""
 
@@ -69,8 +61,9 @@ class FrictionMethod(Protocol):
         """Say True: that tells such a method from those for the problem without friction."""
         ...
 
-    def prepare(self, G: Array, bilateral: Mask) -> PreparedFriction:
-        """Check G (m d, m d) and scale it, once for many right-hand sides; ``bilateral`` (m,)."""
+    def prepare(self, G: Array, bilateral: Mask) -> Any:
+        """Return ``PreparedFriction`` or its like: check G (m d, m d) and scale it, once for many right-hand sides;
+        ``bilateral`` (m,)."""
         ...
 
 
@@ -144,22 +137,11 @@ class ScaledProblem:
             r *= -(self.q[carried] @ r[carried]) / np.vdot(self.moved(r), r)
         return r
 
-    def result(
-        self,
-        r: Array,
-        *,
-        iterations: int,
-        method: object,
-        tolerance: float,
-        history: tuple[float, ...] = (),
-        w: Array | None = None,
-    ) -> FrictionResult:
-        """Return the result in newtons; StepFailure when the residual is above ``tolerance`` and above rounding. ``w``
-        of r, when it is known."""
-        inside = self.admissible(r)
-        if w is None or not np.array_equal(inside, r):
-            w = self.w(inside)
-        r = inside
+    def result(self, method: object, tolerance: float, found: Iterated) -> FrictionResult:
+        """Return the result in newtons; StepFailure when the residual is above ``tolerance`` and above rounding."""
+        r, iterations, history = found
+        r = self.admissible(r)
+        w = self.w(r)
         residual, unit = self.residual(r, w), self.unit or 1.0
         rounding = self.rounding(r)
         if not residual <= max(tolerance * unit, rounding):
@@ -170,7 +152,8 @@ class ScaledProblem:
         still = np.linalg.norm(w[:, 1:], axis=1) <= 4.0 * max(residual, rounding)
         active = (r[:, 0] > 0.0) | self.delassus.bilateral
         stick = still & (self.limit(r[:, 0]) > 0.0)
-        return FrictionResult(r * self.delassus.scale, active, stick, iterations, residual / unit, method, history)
+        r = r * self.delassus.scale
+        return FrictionResult(r, active, stick, iterations, residual / unit, method, tuple(history))
 
 
 class ScaledDelassus:
@@ -202,8 +185,37 @@ class ScaledDelassus:
         return ScaledProblem(self, q * self.scale, cohesion / tangential, slope * (normal / tangential))
 
 
-def observed_contraction(history: Any) -> float:
-    """Return the mean factor between successive changes, of those above rounding (1e-10 of the first); NaN for fewer
-    than two."""
-    changes = [change for change in history if change > 1e-10 * history[0]]
-    return float((changes[-1] / changes[0]) ** (1.0 / (len(changes) - 1))) if len(changes) > 1 else float("nan")
+@dataclass(frozen=True)
+class PreparedFriction:
+    """Solve (1) for one G and many right-hand sides.
+
+    ``loop``: (problem, where to start) -> r, refused when its residual is above ``tolerance``.
+    """
+
+    method: object
+    tolerance: float
+    delassus: ScaledDelassus
+    loop: Callable[[ScaledProblem, Array], Iterated]
+
+    def solve(self, q: Array, cohesion: Array, slope: Array, guess: Array | Mask | None = None) -> FrictionResult:
+        """Return the answer for q (m, d), cohesion (m,) [as r], slope (m,). ``guess``: predicted contact set (m,), or
+        reactions (m, d). StepFailure when the tolerance is not reached."""
+        step = self.delassus.problem(q, cohesion, slope)
+        found = self.loop(step, step.start(guess if step.unit > 0.0 else None))
+        return step.result(self.method, self.tolerance, found)
+
+
+def iterated(
+    step: ScaledProblem, r: Array, update: Callable[[Array, Array], Array], tolerance: float, most: int
+) -> Iterated:
+    """Update r <- update(r, w) until the residual, the history, is at ``tolerance`` or at rounding."""
+    w = step.w(r)
+    history: list[float] = []
+    while step.unit > 0.0 and len(history) < most:
+        r = update(r, w)
+        w = step.w(r)
+        residual = step.residual(r, w)
+        history.append(residual / step.unit)
+        if not np.isfinite(residual) or residual <= max(tolerance * step.unit, step.rounding(r)):
+            break
+    return r, len(history), history

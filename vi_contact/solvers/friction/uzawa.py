@@ -20,7 +20,7 @@ import numpy as np
 
 from ...core.algebra import Array, Mask
 from ...core.checks import attributes
-from .problem import FrictionResult, ScaledDelassus
+from .problem import Iterated, PreparedFriction, ScaledDelassus, ScaledProblem, iterated
 
 
 @dataclass(frozen=True)
@@ -40,42 +40,21 @@ class Uzawa:
         positive = ("tolerance",) if self.rho is None else ("tolerance", "rho")
         attributes(self, positive=positive, counts=("max_iterations",))
 
-    def prepare(self, G: Array, bilateral: Mask) -> PreparedUzawa:
+    def prepare(self, G: Array, bilateral: Mask) -> PreparedFriction:
         """Check and scale G (m d, m d)."""
-        return PreparedUzawa(self, G, bilateral)
+        delassus = ScaledDelassus(G, bilateral)
+        rho = self.rho or best_step(delassus.matrix)
+
+        def loop(step: ScaledProblem, r: Array) -> Iterated:
+            def project(r: Array, w: Array) -> Array:
+                return step.admissible(r - rho * w)
+
+            return iterated(step, r, project, self.tolerance, self.max_iterations)
+
+        return PreparedFriction(self, self.tolerance, delassus, loop)
 
 
-class PreparedUzawa:
-    """Solve for one G and many right-hand sides. ``rho`` is the one in use."""
-
-    def __init__(self, method: Uzawa, G: Array, bilateral: Mask) -> None:
-        self.method = method
-        self.delassus = ScaledDelassus(G, bilateral)
-        self.rho = method.rho or self._best()
-
-    def _best(self) -> float:
-        """2/(lambda_min + lambda_max)."""
-        if not self.delassus.count:
-            return 1.0
-        values = np.linalg.eigvalsh(self.delassus.matrix)
-        return float(2.0 / (values[0] + values[-1]))
-
-    def solve(self, q: Array, cohesion: Array, slope: Array, guess: Array | Mask | None = None) -> FrictionResult:
-        """Solve the small problem; see PreparedFriction."""
-        step = self.delassus.problem(q, cohesion, slope)
-        r, history = step.start(guess if step.unit > 0.0 else None), [1.0]
-        w = step.w(r)
-        while step.unit > 0.0 and len(history) <= self.method.max_iterations:
-            r = step.admissible(r - self.rho * w)
-            w = step.w(r)
-            residual = step.residual(r, w)
-            history.append(residual / step.unit)
-            if not np.isfinite(residual) or residual <= max(self.method.tolerance * step.unit, step.rounding(r)):
-                break
-        return step.result(
-            r,
-            iterations=len(history) - 1,
-            method=self.method,
-            tolerance=self.method.tolerance,
-            history=tuple(history[1:]),
-        )
+def best_step(matrix: Array) -> float:
+    """Return rho = 2/(lambda_min + lambda_max)."""
+    values = np.linalg.eigvalsh(matrix) if matrix.size else np.ones(1)
+    return float(2.0 / (values[0] + values[-1]))
