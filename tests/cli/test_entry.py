@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import vi_contact
-from vi_contact.cli import ranks as cli_ranks
+from vi_contact.cli import errors as cli_errors
 from vi_contact.cli.entry import main, split_petsc
 from vi_contact.cli.errors import told
 from vi_contact.core.errors import InputError, ViContactError
@@ -149,7 +149,7 @@ def test_a_rank_that_fails_alone_ends_the_others(monkeypatch, capsys, error, oth
         raise error
 
     monkeypatch.setitem(sys.modules, "mpi4py.MPI", SimpleNamespace(COMM_WORLD=World))
-    monkeypatch.setattr(cli_ranks, "PATIENCE", 0.0)
+    monkeypatch.setattr(cli_errors, "PATIENCE", 0.0)
     monkeypatch.setattr("vi_contact.cli.entry.parser", lambda: SimpleNamespace(
         parse_args=lambda words: SimpleNamespace(run=fails)))
     if others == "wait":
@@ -176,24 +176,13 @@ def test_petsc_options_are_told_from_ours():
     assert split_petsc(["run", "--out", "x"]) == (["run", "--out", "x"], [])
 
 
-@pytest.mark.parametrize(("old", "new"), [
-    ("wall", "run wall, and"), ("beam --t-end 0.5 --exact", "run beam --set beam.t_end=0.5 --set beam.exact=true,"),
-    ("layer --k 1 2 --c 0", "run layer --set 'layer.k=[1, 2]' --set layer.c=0,"),
-    ("wall --case b --motion h --vertical v --scale 2 --gravity --cross-check",
-     "run wall --motion h,v --set model.case=b --scale 2 --set model.weight=true --cross-check,"),
-    ("channel --contact coulomb --mu 0.5 --size 0.25 --far 1 --sides tied --gravity all",
-     "run channel --set friction.type=Coulomb --set friction.mu=0.5 --set model.size=0.25 --set model.far=1 "
-     "--set model.sides.type=TiedSides --set model.weighing='[\"channel\",\"soil\"]',"),
-    ("wall --scheme trapezoidal --solver volume-reference --divisions 4 6 --pga=3",
-     "run wall --scheme Trapezoidal --solver ReducedNewton --set 'model.divisions=[4, 6]' "
-     "--set excitation.1.record.processing.pga=3,"),
-    ("channel --damping 0.05 1 10", "run channel, and for its pictures vi-contact report DIR; for --damping see"),
-])
-def test_old_commands_name_the_new_ones(old, new, capsys):
-    """One sentence with the user's own options in today's words; nothing is computed."""
+@pytest.mark.parametrize("old", ["wall", "channel --size 0.25", "beam --t-end 0.5 --exact", "layer --k 1 2"])
+def test_old_commands_name_the_new_ones(old, capsys):
+    """One sentence, and where their options went; nothing is computed."""
     assert main(old.split()) == 1
     said = capsys.readouterr().err
-    assert f"give vi-contact {new}" in said and said.startswith("vi-contact: '") and said.count("\n") == 1
+    assert f"give vi-contact run {old.split()[0]}, and" in said and "CHANGELOG.md" in said
+    assert said.startswith("vi-contact: '") and said.count("\n") == 1
 
 
 def test_cases_are_listed(capsys):

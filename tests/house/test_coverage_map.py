@@ -29,7 +29,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
         "boundary_layer.trajectory",
     "boundary_layer/test_contact_law.py": "boundary_layer.layer boundary_layer.scheme",
     "cli/test_fuzz_cli.py": "cli.errors",
-    "cli/test_entry.py": "cli.options cli.ranks cli.retired studies.cases.library studies.cases.own_case",
+    "cli/test_entry.py": "cli.options studies.cases.library studies.cases.own_case",
     "cli/test_motion.py": "plots.records",
     "core/test_friction_certificate.py": "core.certificate core.protocols",
     "core/test_identity.py": "run.checks",

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 from .. import schemes
 from ..core.errors import InputError
+from ..studies.cases.library import FOLDER, builtin_cases, located
+from ..studies.cases.short_settings import ShortOptions
+from ..studies.cases.toml_file import read_toml
 from .options import add_restart
 
 
@@ -42,8 +46,6 @@ def add_case_commands(commands: Any) -> None:
 
 
 def _cases(options: argparse.Namespace) -> str:
-    from ..studies.cases.library import FOLDER, builtin_cases
-
     lines = [f"{name:<10} {title}" for name, title in builtin_cases().items()]
     return "\n".join([*lines, f"the files: {FOLDER}"])
 
@@ -56,34 +58,27 @@ def add_allow(command: argparse.ArgumentParser) -> None:
 
 
 def _run(options: argparse.Namespace) -> str:
-    from ..studies.cases.library import located
     from ..studies.cases.own_case import OwnCase, open_case
-    from ..studies.cases.short_settings import ShortOptions
-    from ..studies.cases.toml_file import read_toml, with_settings
 
     comm, path = _world(), located(options.case)
     if options.steps is not None and options.steps < 1:
         raise InputError(f"--steps {options.steps}: give at least one step")
-    short = ShortOptions(**{name: getattr(options, name) for name in ShortOptions.__dataclass_fields__})
-    case = open_case(path, short.settings(with_settings(read_toml(path), ()), options.settings), options.allow)
+    short = ShortOptions(**{one.name: getattr(options, one.name) for one in fields(ShortOptions)})
+    case = open_case(path, short.settings(read_toml(path), options.settings), options.allow)
     name = case.tables.get("title") or path.stem
     restart = options.restart or options.changed
-    if isinstance(case, OwnCase):
+    out = options.out or (None if isinstance(case, OwnCase) else case.out) or Path("results") / path.stem
+    if options.check:
+        case.check(comm)
+        said = f"{options.case}: {name}: the file is in order"
+    elif isinstance(case, OwnCase):
         if restart:
             raise InputError(f"{path}: this case keeps no checkpoint: leave --restart away, it takes seconds")
-        if options.check:
-            case.study()
-            return f"{options.case}: {name}: the file is in order" if comm.rank == 0 else ""
-        out = options.out or Path("results") / path.stem
-        found = case.run(comm, out)
-        return f"{name}\n{found}\noutput: {out}" if comm.rank == 0 else ""
-    if options.check:
-        case.check()
-        case.check_mesh(comm)
-        return f"{options.case}: {name}: the file is in order" if comm.rank == 0 else ""
-    out = options.out or case.out or Path("results") / path.stem
-    solution = case.run(comm, out=out, restart=restart, progress=not options.quiet, changed=options.changed)
-    return f"{name}\n{solution.summary()}\noutput: {out}" if comm.rank == 0 else ""
+        said = f"{name}\n{case.run(comm, out)}\noutput: {out}"
+    else:
+        found = case.run(comm, out=out, restart=restart, progress=not options.quiet, changed=options.changed)
+        said = f"{name}\n{found.summary()}\noutput: {out}"
+    return said if comm.rank == 0 else ""
 
 
 def _world() -> Any:

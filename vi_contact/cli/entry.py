@@ -7,19 +7,18 @@ import sys
 import traceback
 from collections.abc import Sequence
 
-from ..core.errors import Interrupted, ViContactError
+from ..core.errors import InputError, Interrupted, ViContactError
 from ..core.version import __version__
 from .case import add_case_commands
-from .errors import Parser, check_words, printable, told
+from .errors import Parser, check_words, fail_together, printable, rank, told
 from .ida import add_ida_commands
 from .motion import add_motion_commands
-from .ranks import fail_together, rank
 from .report import add_report_commands
-from .retired import refuse_retired
 
 _DESCRIPTION = """Dynamic unilateral contact of elastic structures: exact non-penetration, a closed energy ledger and a
 certificate for every time step. Run under "mpirun -n N" for any number of ranks. Options -vi_contact_volume_... go to
 PETSc (for example -vi_contact_volume_snes_monitor)."""
+_PETSC = "-vi_contact_"
 
 
 def parser() -> argparse.ArgumentParser:
@@ -38,18 +37,18 @@ def split_petsc(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
     """Return (our own arguments, PETSc options); the latter are ``-vi_contact_... [value]``, our PETSc prefixes."""
     own: list[str] = []
     petsc: list[str] = []
-    taking = False
-    for argument in arguments:
-        if argument.startswith("-vi_contact_"):
-            petsc.append(argument)
-            taking = True
-        elif taking and not argument.startswith("-"):
-            petsc.append(argument)
-            taking = False
-        else:
-            own.append(argument)
-            taking = False
+    for before, argument in zip(["", *arguments], arguments, strict=False):
+        value = before.startswith(_PETSC) and not argument.startswith("-")
+        (petsc if value or argument.startswith(_PETSC) else own).append(argument)
     return own, petsc
+
+
+def refuse_retired(arguments: Sequence[str]) -> None:
+    """Raise InputError for a command of before that is a case now, with the command in its place."""
+    if arguments and arguments[0] in ("wall", "channel", "beam", "layer"):
+        old = arguments[0]
+        raise InputError(f"'{old}' is a case now: give vi-contact run {old}, and for its pictures vi-contact report "
+                         f"DIR; vi-contact run --help and the table of options in CHANGELOG.md tell the rest")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

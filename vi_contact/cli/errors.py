@@ -1,4 +1,4 @@
-"""Errors of the machine and of libraries that are no defect of the package, told in one sentence as its own are."""
+"""Tell errors in one sentence, those of the machine and of libraries too, and end a command on all its ranks."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import argparse
 import errno
 import re
 import sys
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from textwrap import shorten
 from typing import Any, NoReturn
@@ -14,6 +15,7 @@ from ..core.checks import SHOWN, shown
 from ..core.errors import InputError, ViContactError
 from ..core.files import sentence
 
+PATIENCE = 30.0  # seconds between the first rank that has failed and the last
 PETSC_ERR_MEM = 55  # of petscsystypes.h
 _ARGUMENT = re.compile(r"(?<= )(\w++)= ?")
 _MEMORY = ("out of memory", "cannot allocate memory", "unable to allocate", "memory allocation failed", "bad_alloc")
@@ -105,3 +107,28 @@ def _chain(error: BaseException | None) -> Iterator[BaseException]:
         seen.add(id(error))
         yield error
         error = error.__cause__ or error.__context__
+
+
+def rank() -> int:
+    """Return this process's rank, without importing MPI for commands that do not use it."""
+    world = _world()
+    return 0 if world is None else int(world.rank)
+
+
+def fail_together(text: str) -> None:
+    """Return when all ranks have come here; else say what stopped this one alone and end the others, which wait for it
+    in a collective call. Collective, but for that."""
+    world = _world()
+    if world is None or world.size == 1:
+        return
+    request, end = world.Ibarrier(), time.monotonic() + PATIENCE
+    while not request.Test():
+        if time.monotonic() > end:
+            print(f"vi-contact: rank {world.rank} of {world.size} stopped alone: {text}", file=sys.stderr, flush=True)
+            world.Abort(1)
+        time.sleep(0.02)
+
+
+def _world() -> Any:
+    """MPI's communicator of all ranks; None where MPI has not been started."""
+    return sys.modules["mpi4py.MPI"].COMM_WORLD if "mpi4py.MPI" in sys.modules else None

@@ -3,49 +3,52 @@
 from __future__ import annotations
 
 import argparse
-import csv
 import re
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..core.errors import InputError
-from .options import output_file, spaced
+from ..core.files import write_csv
+from ..ground_motion import EC8Spectrum, Processing, Record, pga, read_record, record_info, response_spectrum
+from ..ground_motion.formats.reader import LARGEST_PEAK
+from ..ground_motion.formats.writer import write_at2, write_columns, write_path_series
+from ..ground_motion.record import UNITS, canonical_units
+from ..plots.records import plot_motion, plot_spectra
+from .options import add_actions, output_file, spaced
 
 _FORMATS = {".at2": "at2", ".th": "path", ".g3": "path", ".acc": "path"}
 _QUANTITY = re.compile(r"([-+]?[\d.]++(?:[eE][-+]?\d++)?)(.*+)")
 _SHOWN = (0.1, 0.2, 0.5, 1.0, 2.0)  # periods of the printed table [s]
 _SPELLING = {"units": "--units", "dt": "--dt", "channel": "--channel", "largest": "--largest", "resample_dt": "--even"}
-_ACTIONS = {
-    "info": "what a record file holds: units, peaks, intensities, duration, drift",
-    "convert": "process a record and write it as columns, PEER AT2 or OpenSees path series",
-    "plot": "picture of acceleration, velocity, displacement and Husid's curve",
-    "spectrum": "response spectra as CSV and picture, with the spectrum of Eurocode 8",
-}
 
 
 def add_motion_commands(commands: Any) -> None:
     """Add ``motion`` with its actions to the commands of the top parser."""
-    actions = commands.add_parser("motion", help="ground motion files").add_subparsers(
-        dest="action", required=True, metavar="ACTION"
-    )
-    parsers = {}
-    for name, sentence in _ACTIONS.items():
-        parsers[name] = actions.add_parser(name, help=sentence, description=sentence[0].upper() + sentence[1:] + ".")
-        several = {"nargs": "+"} if name in ("info", "spectrum") else {}
-        parsers[name].add_argument(
-            "file", help="AT2, COSMOS/CSMIP V2, SMC, K-NET, ESM, AFAD, SimCenter, columns, path series", **several
-        )
+    parsers = add_actions(commands, "motion", "ground motion files", {
+        "info": (_info, "what a record file holds: units, peaks, intensities, duration, drift"),
+        "convert": (_convert, "process a record and write it as columns, PEER AT2 or OpenSees path series"),
+        "plot": (_plot, "picture of acceleration, velocity, displacement and Husid's curve"),
+        "spectrum": (_spectrum, "response spectra as CSV and picture, with the spectrum of Eurocode 8"),
+    })
+    for name, one in parsers.items():
+        one.set_defaults(spelling=_SPELLING)
+        one.add_argument("file", nargs="+" if name in ("info", "spectrum") else None,
+                         help="AT2, COSMOS/CSMIP V2, SMC, K-NET, ESM, AFAD, SimCenter, columns, path series")
     parsers["convert"].add_argument("out", help="file to write")
     for one in parsers.values():
         _add_reading(one)
         _add_processing(one)
-    _add_convert(parsers["convert"])
+    convert = parsers["convert"].add_argument_group("output")
+    convert.add_argument("--to", choices=("columns", "at2", "path"),
+                         help="format (default by the name: .at2, .th .g3 .acc: path series, else columns)")
+    convert.add_argument("--out-units", metavar="UNITS", help="default g in AT2, else m/s2")
     plot = parsers["plot"].add_argument_group("output")
     plot.add_argument("--out", metavar="PNG", help="picture (default: name of the record file with .png, here)")
     plot.add_argument("--out-units", default="m/s2", metavar="UNITS", help="of the accelerations drawn (default m/s2)")
     _add_spectrum(parsers["spectrum"])
-    for name, run in (("info", _info), ("convert", _convert), ("plot", _plot), ("spectrum", _spectrum)):
-        parsers[name].set_defaults(run=run, spelling=_SPELLING)
 
 
 def _add_reading(one: argparse.ArgumentParser) -> None:
@@ -53,7 +56,7 @@ def _add_reading(one: argparse.ArgumentParser) -> None:
     group.add_argument("--units", help="m/s2, cm/s2, gal, g, ...: required where the file does not say")
     group.add_argument("--dt", type=float, help="time step [s], where the file does not say")
     group.add_argument("--channel", type=int, metavar="K", help="which one of a file that holds several, from 1")
-    group.add_argument("--largest", type=acceleration, metavar="A",
+    group.add_argument("--largest", type=acceleration, default=LARGEST_PEAK, metavar="A",
                        help="accept peaks up to this (default 10g: beyond it the units are doubted)")
     group.add_argument("--even", type=float, metavar="DT", help="bring uneven times of a column file to this step [s]")
 
@@ -62,7 +65,7 @@ def _add_processing(one: argparse.ArgumentParser) -> None:
     group = one.add_argument_group("processing, in this order", "accelerations as 3.0 (m/s2) or with units, as 0.3g")
     group.add_argument("--trim", type=float, nargs=2, metavar=("START", "END"), help="keep this part [s]")
     group.add_argument("--pad", type=float, nargs=2, metavar=("BEFORE", "AFTER"), help="add zeros [s]")
-    group.add_argument("--remove-mean", action="store_true", help="remove the mean")
+    group.add_argument("--remove-mean", action="store_true", dest="mean", help="remove the mean")
     group.add_argument("--taper", type=float, nargs="?", const=0.05, metavar="PART",
                        help="cosine taper over this part of the duration at each end (0.05 if no number follows)")
     group.add_argument("--low", type=float, metavar="HZ", help="Butterworth high-pass corner")
@@ -78,13 +81,6 @@ def _add_processing(one: argparse.ArgumentParser) -> None:
     scale.add_argument("--arias", type=float, metavar="I", help="scale to this Arias intensity [m/s]")
     scale.add_argument("--psa", nargs=2, metavar=("A", "T"),
                        help="scale to this pseudo-acceleration (5 %% damping) at period T [s]")
-
-
-def _add_convert(one: argparse.ArgumentParser) -> None:
-    group = one.add_argument_group("output")
-    group.add_argument("--to", choices=("columns", "at2", "path"),
-                       help="format (default by the name: .at2, .th .g3 .acc: path series, else columns)")
-    group.add_argument("--out-units", metavar="UNITS", help="default g in AT2, else m/s2")
 
 
 def _add_spectrum(one: argparse.ArgumentParser) -> None:
@@ -104,8 +100,6 @@ def _add_spectrum(one: argparse.ArgumentParser) -> None:
 
 def acceleration(text: str) -> float:
     """Read metres per second squared from "3.0", "0.3g", "0.3 g" or "300gal"."""
-    from ..ground_motion.record import UNITS, canonical_units
-
     match = _QUANTITY.fullmatch(text.strip())
     try:
         if match is None:
@@ -115,23 +109,16 @@ def acceleration(text: str) -> float:
         raise argparse.ArgumentTypeError(f"{text!r} is no acceleration such as 3.0 or 0.3g") from None
 
 
-def _read(options: argparse.Namespace, path: str) -> Any:
-    """The record of a file after the processing asked for."""
-    from ..ground_motion import Processing, read_record
-    from ..ground_motion.formats.reader import LARGEST_PEAK
-
-    steps = Processing(
-        trim=options.trim, pad=options.pad, mean=options.remove_mean, taper=options.taper, low=options.low,
-        high=options.high, order=options.order, causal=options.causal, resample=options.resample,
-        baseline=options.baseline, scale=options.scale, pga=options.pga, arias=options.arias, psa=_psa(options.psa),
-    )
-    record = read_record(path, options.units, dt=options.dt, channel=options.channel, resample_dt=options.even,
-                         largest=LARGEST_PEAK if options.largest is None else options.largest)
-    return steps(record)
+def _read(options: argparse.Namespace, path: str) -> Record:
+    """Return the record of a file after the processing asked for."""
+    asked = {one.name: getattr(options, one.name) for one in fields(Processing)}
+    steps = Processing(**asked | {"psa": _psa(options.psa)})
+    return steps(read_record(path, options.units, dt=options.dt, channel=options.channel, resample_dt=options.even,
+                             largest=options.largest))
 
 
 def _psa(words: list[str] | None) -> tuple[float, float] | None:
-    """The two words after --psa as acceleration and period."""
+    """Return the two words after --psa as acceleration and period."""
     if words is None:
         return None
     try:
@@ -141,14 +128,10 @@ def _psa(words: list[str] | None) -> tuple[float, float] | None:
 
 
 def _info(options: argparse.Namespace) -> str:
-    from ..ground_motion import record_info
-
     return "\n\n".join(record_info(_read(options, path)) for path in options.file)
 
 
 def _convert(options: argparse.Namespace) -> str:
-    from ..ground_motion import pga, write_at2, write_columns, write_path_series
-
     output_file(options.out, reads=[options.file])
     record = _read(options, options.file)
     form = options.to or _FORMATS.get(Path(options.out).suffix.lower(), "columns")
@@ -163,9 +146,6 @@ def _convert(options: argparse.Namespace) -> str:
 
 
 def _plot(options: argparse.Namespace) -> str:
-    from ..ground_motion.record import canonical_units
-    from ..plots.records import plot_motion
-
     out = output_file(options.out or Path(options.file).stem + ".png", reads=[options.file], picture=True)
     record = _read(options, options.file)
     units = canonical_units("--out-units", options.out_units)
@@ -173,11 +153,7 @@ def _plot(options: argparse.Namespace) -> str:
 
 
 def _spectrum(options: argparse.Namespace) -> str:
-    import numpy as np
 
-    from ..ground_motion import response_spectrum
-    from ..ground_motion.record import UNITS, canonical_units
-    from ..plots.records import plot_spectra
 
     units = canonical_units("--out-units", options.out_units)
     target = _target(options)
@@ -193,9 +169,9 @@ def _spectrum(options: argparse.Namespace) -> str:
             steps[label] = record.dt
             at = response_spectrum(record, np.array(_SHOWN), damping=damping).psa / UNITS[units]
             rows.append(f"{label:<44}" + "".join(f"{value:>10.4g}" for value in at))
-    stem = Path(options.file[0]).stem + "_spectrum"
-    table = output_file(options.csv or stem + ".csv", reads=options.file)
-    picture = output_file(options.png or stem + ".png", reads=options.file, picture=True)
+    stem = Path(options.file[0]).stem
+    table = output_file(options.csv or f"{stem}_spectrum.csv", reads=options.file)
+    picture = output_file(options.png or f"{stem}_spectrum.png", reads=options.file, picture=True)
     if table == picture:
         raise InputError(f"{table}: the table would be overwritten by its picture; give each a name of its own")
     _write_csv(table, spectra, target)
@@ -207,9 +183,7 @@ def _spectrum(options: argparse.Namespace) -> str:
 
 
 def _target(options: argparse.Namespace) -> Any:
-    """The Eurocode 8 spectrum asked for, at the first damping, or None."""
-    from ..ground_motion import EC8Spectrum
-
+    """Return the Eurocode 8 spectrum asked for, at the first damping, or None."""
     if (options.ec8 is None) != (options.ag is None):
         raise InputError("--ec8 and --ag belong together: give the ground type and the design ground acceleration")
     if options.ec8 is None:
@@ -218,14 +192,12 @@ def _target(options: argparse.Namespace) -> Any:
 
 
 def _write_csv(path: Path, spectra: Any, target: Any) -> None:
-    """One row for each record, damping and period, in SI units."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(["record", "damping", "period_s", "sd_m", "sv_m/s", "sa_m/s2", "psv_m/s", "psa_m/s2"]
-                        + ([] if target is None else ["ec8_m/s2"]))
-        for label, spectrum in spectra.items():
-            columns = [spectrum.periods, spectrum.displacement, spectrum.velocity, spectrum.acceleration, spectrum.psv,
-                       spectrum.psa] + ([] if target is None else [target.acceleration(spectrum.periods)])
-            name = label.rpartition(",")[0]
-            writer.writerows([name, spectrum.damping, *(f"{value:.8g}" for value in row)]
-                             for row in zip(*columns, strict=True))
+    """Write one row for each record, damping and period, in SI units."""
+    rows = []
+    for label, one in spectra.items():
+        columns = [one.periods, one.displacement, one.velocity, one.acceleration, one.psv, one.psa]
+        columns += [] if target is None else [target.acceleration(one.periods)]
+        rows += [[label.rpartition(",")[0], one.damping, *(f"{value:.8g}" for value in row)]
+                 for row in zip(*columns, strict=True)]
+    header = ["record", "damping", "period_s", "sd_m", "sv_m/s", "sa_m/s2", "psv_m/s", "psa_m/s2"]
+    write_csv(path, header if target is None else [*header, "ec8_m/s2"], rows)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import argparse
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,18 @@ def add_restart(options: Any, where: str) -> None:
                          help="the same, also when the problem is another one than that of the checkpoint")
 
 
+def add_actions(
+    commands: Any, name: str, sentence: str, actions: Mapping[str, tuple[Callable[[argparse.Namespace], str], str]]
+) -> dict[str, argparse.ArgumentParser]:
+    """Add a command with its actions, name -> (what it calls, what it does), and return their parsers by name."""
+    group = commands.add_parser(name, help=sentence).add_subparsers(dest="action", required=True, metavar="ACTION")
+    parsers = {}
+    for action, (run, told) in actions.items():
+        parsers[action] = group.add_parser(action, help=told, description=told[0].upper() + told[1:] + ".")
+        parsers[action].set_defaults(run=run)
+    return parsers
+
+
 def spaced(option: str, values: Sequence[float]) -> Any:
     """Read FROM, TO, N as N logarithmically spaced numbers; InputError for others, before memory is taken."""
     import numpy as np
@@ -32,20 +45,17 @@ def spaced(option: str, values: Sequence[float]) -> Any:
     return np.geomspace(first, last, counted(option, f"N = {count:g}", count, "numbers", most=MOST_SPACED))
 
 
-def output_file(
-    path: str | Path, *, reads: Iterable[str | Path] = (), picture: bool = False, made: bool = False
-) -> Path:
+def output_file(path: str | Path, *, reads: Iterable[str | Path] = (), picture: bool = False) -> Path:
     """Return the file that a command is about to write, checked before any work is done.
 
-    reads: files of its input, which it must not overwrite; picture: whether its name says the format of a picture;
-    made: whether the command makes a folder that does not exist.
+    reads: files of its input, which it must not overwrite; picture: whether its name says the format of a picture.
     InputError for a folder, a file in no folder, one of ``reads``, or a name without the ending of a picture.
     """
     out = Path(path)
     try:
         with suppress(FileNotFoundError):
             out.stat()  # is_dir alone hides from Python 3.14 on what OSError says
-        fits = (out.parent.is_dir() or (made and not out.parent.exists())) and not out.is_dir()
+        fits = out.parent.is_dir() and not out.is_dir()
     except (OSError, ValueError):  # a name that is too long or holds NUL, a folder that may not be looked into
         fits = False
     if not fits:

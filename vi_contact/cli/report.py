@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import argparse
-import csv
-import io
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from ..core.errors import InputError, ViContactError
-from .options import output_file, spaced, table_beside_picture
+from ..core.errors import InputError
+from ..core.files import write_csv
+from ..engineering import floor_spectrum, hysteresis, peaks, recorded_motion, transfer_function, write_peaks
+from ..plots.records import plot_spectra
+from ..plots.spectra import plot_loop, plot_transfer
+from ..run.files.folder import FILES
+from ..studies.cases.library import read_copy
+from .options import add_actions, output_file, spaced, table_beside_picture
 
-_ACTIONS = {
-    "peaks": "largest and smallest value of every column, as a table",
-    "spectrum": "floor response spectra of recorded accelerations, as CSV and picture",
-    "transfer": "transfer function of two recorded accelerations, as CSV and picture",
-    "loop": "a force over a deformation, with the work in it, as CSV and picture",
-}
+if TYPE_CHECKING:
+    from ..run.files.reading import RunFolder
 
 
 def add_report_commands(commands: Any) -> None:
@@ -32,18 +32,16 @@ def add_report_commands(commands: Any) -> None:
     report.add_argument("--show", metavar="COLUMN[,COLUMN...]", action="append",
                         help="a panel with these columns, of one unit; repeat for more (default: the page chooses)")
     report.set_defaults(run=_report)
-    actions = commands.add_parser("post", help="numbers and pictures from the folder of a run").add_subparsers(
-        dest="action", required=True, metavar="ACTION"
-    )
-    parsers = {}
-    for name, sentence in _ACTIONS.items():
-        one = actions.add_parser(name, help=sentence, description=sentence[0].upper() + sentence[1:] + ".")
+    parsers = add_actions(commands, "post", "numbers and pictures from the folder of a run", {
+        "peaks": (_peaks, "largest and smallest value of every column, as a table"),
+        "spectrum": (_spectrum, "floor response spectra of recorded accelerations, as CSV and picture"),
+        "transfer": (_transfer, "transfer function of two recorded accelerations, as CSV and picture"),
+        "loop": (_loop, "a force over a deformation, with the work in it, as CSV and picture"),
+    })
+    for name, one in parsers.items():
         one.add_argument("folder", metavar="DIR", help="output folder of a run")
         one.add_argument("--out", metavar="CSV", help=f"default DIR/{name}.csv; a picture goes beside it")
-        parsers[name] = one
     _add_actions(parsers)
-    for name, run in (("peaks", _peaks), ("spectrum", _spectrum), ("transfer", _transfer), ("loop", _loop)):
-        parsers[name].set_defaults(run=run)
 
 
 def _add_actions(parsers: dict[str, argparse.ArgumentParser]) -> None:
@@ -66,11 +64,8 @@ def _add_actions(parsers: dict[str, argparse.ArgumentParser]) -> None:
 
 
 def _report(options: argparse.Namespace) -> str:
-    from ..engineering.peak_values import peaks, write_peaks
     from ..plots.report import plot_report
     from ..plots.run_pictures import draw_run
-    from ..run.files.reading import read_run
-    from ..studies.cases.library import read_copy
 
     folder = Path(options.folder)
     tables = read_copy(folder)
@@ -81,7 +76,7 @@ def _report(options: argparse.Namespace) -> str:
             if getattr(options, option) is not None:
                 raise InputError(f"the report of this case is pictures in its folder: leave --{option} away")
         return _listed(draw_study(folder, tables))
-    run = read_run(folder)
+    run = _run(options)
     out = output_file(options.out or folder / "report.pdf", picture=True)
     title = str(options.title or tables.get("title") or f"Run {folder.resolve().name}")
     shown = None if options.show is None else [one.split(",") for one in options.show]
@@ -89,6 +84,12 @@ def _report(options: argparse.Namespace) -> str:
     table = write_peaks(out.with_name("peaks.csv"), peaks(run.history, run.columns))
     drawn = draw_run(run, out.parent, title=title, unilateral=_contact_labels(tables.get("model")))
     return f"report: {page}\ntable: {table}\n{_listed(drawn)}"
+
+
+def _run(options: argparse.Namespace) -> RunFolder:
+    from ..run.files.reading import read_run  # late: h5py, which records do not need
+
+    return read_run(options.folder)
 
 
 def _listed(pictures: Sequence[Path]) -> str:
@@ -107,10 +108,7 @@ def _contact_labels(model: Any) -> list[str] | None:
 
 
 def _peaks(options: argparse.Namespace) -> str:
-    from ..engineering.peak_values import peaks, write_peaks
-    from ..run.files.reading import read_run
-
-    run = read_run(options.folder)
+    run = _run(options)
     rows = peaks(run.history, run.columns, options.columns or None)
     table = write_peaks(_table_path(options), rows)
     lines = [f"{row.name:<28}{row.unit:>6}{row.max:>13.4e}{row.t_max:>10.4g}{row.min:>13.4e}{row.t_min:>10.4g}"
@@ -120,22 +118,16 @@ def _peaks(options: argparse.Namespace) -> str:
 
 
 def _spectrum(options: argparse.Namespace) -> str:
-    from ..engineering.floor_spectra import floor_spectrum, recorded_motion
-    from ..plots.records import plot_spectra
-    from ..run.files.reading import read_run
-
-    run, periods = read_run(options.folder), spaced("--periods", options.periods)
-    table = _table_path(options)
+    run, periods, table = _run(options), spaced("--periods", options.periods), _table_path(options)
     spectra = {
         name: floor_spectrum(run.history, name, periods, damping=options.damping, relative=options.relative)
         for name in options.columns
     }
-    rows = [
+    write_csv(table, ["column", "damping", "period_s", "sd_m", "sv_m/s", "sa_m/s2", "psa_m/s2"], (
         [name, options.damping, *(f"{x:.8g}" for x in row)]
         for name, one in spectra.items()
         for row in zip(one.periods, one.displacement, one.velocity, one.acceleration, one.psa, strict=True)
-    ]
-    _write(table, ["column", "damping", "period_s", "sd_m", "sv_m/s", "sa_m/s2", "psa_m/s2"], rows)
+    ))
     dt = {name: recorded_motion(run.history, name).dt for name in spectra}
     kind = "relative" if options.relative else "absolute"
     title = f"Response spectra of {kind} motions, {100.0 * options.damping:g} %"
@@ -144,54 +136,29 @@ def _spectrum(options: argparse.Namespace) -> str:
 
 
 def _transfer(options: argparse.Namespace) -> str:
-    from ..engineering.floor_spectra import transfer_function
-    from ..plots.spectra import plot_transfer
-    from ..run.files.reading import read_run
-
-    run, table = read_run(options.folder), _table_path(options)
+    run, table = _run(options), _table_path(options)
     given = None if options.frequencies is None else spaced("--frequencies", options.frequencies)
     found = transfer_function(
         run.history, options.surface, options.base, bandwidth=options.bandwidth or None, frequencies=given
     )
-    _write(table, ["frequency_Hz", "amplitude"], ([f"{x:.8g}" for x in row] for row in
-                                                  zip(found.frequencies, found.amplitude, strict=True)))
+    rows = zip(found.frequencies, found.amplitude, strict=True)
+    write_csv(table, ["frequency_Hz", "amplitude"], ([f"{x:.8g}" for x in row] for row in rows))
     picture = plot_transfer(found, table.with_suffix(".png"), title=f"|{options.surface}| / |{options.base}|")
     frequency, amplitude = found.peak
     return f"largest: {amplitude:.4g} at {frequency:.4g} Hz\ntable: {table}\npicture: {picture}"
 
 
 def _loop(options: argparse.Namespace) -> str:
-    from ..engineering.peak_values import hysteresis
-    from ..plots.spectra import plot_loop
-    from ..run.files.reading import read_run
-
-    run, table = read_run(options.folder), _table_path(options)
+    run, table = _run(options), _table_path(options)
     loop = hysteresis(run.history, options.deformation, options.force, sign=-1.0 if options.turn else 1.0)
-    _write(table, ["t_s", options.deformation, options.force, "work"],
-           ([repr(float(x)) for x in row]
-            for row in zip(run.history["t"], loop.deformation, loop.force, loop.work, strict=True)))
-    picture = plot_loop(loop, table.with_suffix(".png"),
-                        x=(options.deformation, run.columns[options.deformation][0]),
-                        y=(options.force, run.columns[options.force][0]))
+    write_csv(table, ["t_s", options.deformation, options.force, "work"],
+              zip(run.history["t"], loop.deformation, loop.force, loop.work, strict=True))
+    x, y = ((name, run.columns[name][0]) for name in (options.deformation, options.force))
+    picture = plot_loop(loop, table.with_suffix(".png"), x=x, y=y)
     return f"work: {loop.work[-1]:.6g} J, secant stiffness {loop.stiffness:.6g}\ntable: {table}\npicture: {picture}"
 
 
 def _table_path(options: argparse.Namespace) -> Path:
-    from ..run.files.folder import FILES
-
     folder = Path(options.folder)
     path = options.out or folder / f"{options.action}.csv"
     return table_beside_picture(path, reads=[folder / name for name in FILES])
-
-
-def _write(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
-    from ..core.files import sentence, write_atomically
-
-    text = io.StringIO(newline="")
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(header)
-    writer.writerows(rows)
-    try:
-        write_atomically(path, text.getvalue().encode())
-    except OSError as error:
-        raise ViContactError(sentence(error)) from error

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import csv
 import errno
+import io
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, TypeVar
@@ -72,6 +74,17 @@ def write_all(file: Any, data: bytes) -> None:
     view = memoryview(data)
     while view:
         view = view[file.write(view) :]
+
+
+def write_csv(path: str | Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> Path:
+    """Write a table as a whole and return its path: numbers to the last bit, None empty. ViContactError if it fails."""
+    text = io.StringIO(newline="")
+    csv.writer(text, lineterminator="\n").writerows([header, *rows])
+    try:
+        write_atomically(Path(path), text.getvalue().encode())
+    except OSError as error:
+        raise ViContactError(sentence(error)) from error
+    return Path(path)
 
 
 def to_json(facts: Mapping[str, Any]) -> str:

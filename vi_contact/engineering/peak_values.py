@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from pathlib import Path
 
 import numpy as np
 
 from ..core.algebra import Array
 from ..core.checks import instance, number, several
-from ..core.errors import InputError, ViContactError
-from ..core.files import sentence, write_atomically
+from ..core.errors import InputError
+from ..core.files import write_csv
 from ..core.step import Columns
 
 HEADER = ("name", "quantity", "unit", "max", "t_max", "min", "t_min")
@@ -46,35 +44,21 @@ def peaks(history: Mapping[str, Array], columns: Columns, names: Sequence[str] |
         names = [name for name in columns if name not in _NOT_PEAKS and name in history and history[name].ndim == 1]
     found = []
     for name in several("peaks", "names", names, "give a list of columns, or None"):
-        values = column_of(history, name)
-        unit, quantity = columns[name][0], columns[name][1] + (GROWS if _depends_on_dt(name) else "")
-        if np.isnan(values).all():
-            found.append(Peak(name, quantity, unit, *[float("nan")] * 4))
-            continue
-        high, low = int(np.nanargmax(values)), int(np.nanargmin(values))
-        t = history["t"]
-        found.append(Peak(name, quantity, unit, *(float(x) for x in (values[high], t[high], values[low], t[low]))))
+        values, t = column_of(history, name), history["t"]
+        unit, quantity = columns[name]
+        if name.startswith(("a_x_", "a_y_", "a_z_")):
+            quantity += GROWS
+        numbers = [float("nan")] * 4
+        if not np.isnan(values).all():
+            high, low = int(np.nanargmax(values)), int(np.nanargmin(values))
+            numbers = [float(x) for x in (values[high], t[high], values[low], t[low])]
+        found.append(Peak(name, quantity, unit, *numbers))
     return found
-
-
-def _depends_on_dt(name: str) -> bool:
-    """Tell whether the peaks of a column grow without bound as dt falls: accelerations of a body that strikes."""
-    return name.startswith(("a_x_", "a_y_", "a_z_"))
 
 
 def write_peaks(path: str | Path, rows: Sequence[Peak]) -> Path:
     """Write ``peaks.csv``: name, quantity (its meaning), unit, max, t_max [s], min, t_min [s], to the last bit."""
-    text = io.StringIO(newline="")
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(HEADER)
-    for row in rows:
-        numbers = (repr(x) for x in (row.max, row.t_max, row.min, row.t_min))
-        writer.writerow([row.name, row.quantity, row.unit, *numbers])
-    try:
-        write_atomically(Path(path), text.getvalue().encode())
-    except OSError as error:
-        raise ViContactError(sentence(error)) from error
-    return Path(path)
+    return write_csv(path, HEADER, map(astuple, rows))
 
 
 @dataclass(frozen=True)

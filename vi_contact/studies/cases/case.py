@@ -108,12 +108,17 @@ class Case:
         """Return what shakes the body; record files are read here."""
         return self._several("excitation", **context)
 
-    def check(self) -> None:
-        """Make everything that needs no mesh, so that a wrong value or record file is told at once; InputError."""
+    def check(self, comm: Any = None) -> None:
+        """Make everything that needs no mesh, so that a wrong value or record file is told at once; InputError.
+
+        With a communicator also the mesh, if the case has one, and look up every group of it that is named; collective.
+        """
         for table in ("material", *TABLES[TABLES.index("friction") :]):
             if table in self.nodes and not needs_body(self.nodes[table]):
                 self._made(table)
         self._check_steps()
+        if comm is not None and "mesh" in self.nodes:
+            self._mesh(comm)
 
     def _check_steps(self) -> None:
         if needs_body(self.nodes["run"]):
@@ -124,11 +129,6 @@ class Case:
             step_plan(own["dt"], steps, own.get("t_end"))
         except InputError as error:
             raise InputError(f"{self.path}: [run] {error}") from None
-
-    def check_mesh(self, comm: Any) -> None:
-        """Make or read the mesh and look up every group that the tables name; InputError. Collective."""
-        if "mesh" in self.nodes:
-            self._mesh(comm)
 
     def problem(self, comm: Any) -> ContactProblem:
         """Return the contact problem; collective."""

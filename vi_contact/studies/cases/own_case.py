@@ -38,6 +38,10 @@ class OwnCase:
         made: BeamStudy | LayerStudy = self.node.build({})
         return made
 
+    def check(self, comm: Comm) -> None:
+        """Make the study; InputError for values out of range."""
+        self.study()
+
     def run(self, comm: Comm, out: str | Path) -> str:
         """Run it on rank 0, whatever the number of ranks; return what it found, as text. Collective."""
         return on_root(comm, lambda: self._alone(Path(out))) or ""
