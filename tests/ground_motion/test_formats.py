@@ -177,10 +177,10 @@ def test_esm_in_g_windows_line_ends_and_first_key_unlike_event_name(tmp_path):
 
 
 @pytest.mark.parametrize("text, words", [
-    (esm(count=12), ["line 10", "NDATA is 12 but 11 values"]),
-    (esm(count="many"), ["line 10", "NDATA is 'many'"]),
+    (esm(count=12), ["line 10", "12 samples are announced but 11 follow"]),
+    (esm(count="many"), ["line 10", "'many' of NDATA is not a number"]),
     (esm(step=""), ["does not give SAMPLING_INTERVAL_S"]),
-    (esm(step="0,005 s"), ["line 9", "SAMPLING_INTERVAL_S is '0,005 s'"]),
+    (esm(step="0,005 s"), ["line 9", "'0,005 s' of SAMPLING_INTERVAL_S is not a number"]),
     (esm(kind="VELOCITY", units="cm/s"), ["line 14", "holds velocity", ".ACC.ASC"]),
     (esm(units="cm/s"), ["line 12", "'cm/s' is not a unit"]),
     (esm().replace("101.000000", "1O1.000000"), ["line 23", "'1O1.000000' is not a number"]),
@@ -203,7 +203,7 @@ def test_afad_columns_are_channels(channel, name, samples, tmp_path):
     (AFAD.replace("0.780000 ", " "), ["line 11", "2 values"], {"channel": 1}),
     (AFAD.replace("0.780000", "0.78O000"), ["line 11", "'0.78O000' is not a number"], {"channel": 1}),
     (AFAD.replace("N-S  ", "N  "), ["no line 'N-S E-W U-D'"], {"channel": 1}),
-    (AFAD.replace(": 0.01", ": often"), ["line 6", "SAMPLING INTERVAL (SEC) is 'often'"], {"channel": 1}),
+    (AFAD.replace(": 0.01", ": often"), ["line 6", "'often' of SAMPLING INTERVAL (SEC) is"], {"channel": 1}),
     (AFAD.replace("NUMBER", "Numbers"), ["does not give NUMBER OF DATA"], {"channel": 1}),
 ], ids=lambda value: value[-1] if isinstance(value, list) else "")
 def test_bad_afad_is_refused_in_one_sentence(text, words, options, tmp_path):

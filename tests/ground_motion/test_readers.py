@@ -109,8 +109,8 @@ def test_columns_after_a_mark_are_not_taken_for_rows(tmp_path):
 
 
 @pytest.mark.parametrize("text, options, words", [
-    (peer("NPTS= 12, DT= .02"), {}, ["line 4", "12", "11 values"]),
-    (peer("NPTS= 10, DT= .02"), {}, ["line 4", "10", "11 values"]),
+    (peer("NPTS= 12, DT= .02"), {}, ["line 4", "12 samples", "11 follow"]),
+    (peer("NPTS= 10, DT= .02"), {}, ["line 4", "10 samples", "11 follow"]),
     (peer("NPTS= 11, DT= .02").replace("0.0", "0.x", 1), {}, ["line 5", "is not a number"]),
     (peer("NPTS= 11, DT= .02", 8, "{:10.5f}").replace("0.50000", "*******"), {},
      ["line 5", "'*******' is not a number"]),

@@ -51,7 +51,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "ground_motion/test_formats.py": "ground_motion.formats.at2 ground_motion.formats.writer",
     "ground_motion/test_processing.py": "ground_motion.baseline ground_motion.chain",
     "ground_motion/test_readers.py":
-        "ground_motion.formats.afad ground_motion.formats.columns ground_motion.formats.commas "
+        "ground_motion.formats.afad ground_motion.formats.columns "
         "ground_motion.formats.cosmos ground_motion.formats.esm ground_motion.formats.knet "
         "ground_motion.formats.reader ground_motion.formats.simcenter ground_motion.formats.smc "
         "ground_motion.formats.text",

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from ...core.errors import InputError
-from ..record import UNITS, Record, file_dt, file_units
-from .text import TextFile, filled_lines, header_number
+from ..record import Record
+from .text import TextFile
 
 COMPONENTS = ("N-S", "E-W", "U-D")
 
@@ -16,35 +14,28 @@ def recognises(text: TextFile) -> bool:
     return text.lines[0].strip().upper().startswith("STRONG GROUND MOTION RECORDS OF TURK")
 
 
-def read(text: TextFile, units: str | None = None, dt: float | None = None, channel: int | None = None) -> Record:
+def read(text: TextFile) -> Record:
     """Return the record of one component; channel: 1 (N-S), 2 (E-W) or 3 (U-D). Nothing is subtracted.
 
     Raises InputError naming the file, mostly with a line: no channel chosen, an entry of the header missing or no
     number, a row that has not three numbers, a number of rows unlike "NUMBER OF DATA".
     """
-    if channel not in (1, 2, 3):
-        raise InputError(f"{text.path}: the file holds 3 channels (1: N-S, 2: E-W, 3: U-D); pass channel=")
+    channel = text.chosen(COMPONENTS)
     start = next((k + 1 for k, line in enumerate(text.heads) if line.split() == list(COMPONENTS)), None)
     if start is None:
         raise InputError(f"{text.path}: no line 'N-S E-W U-D' announces the columns; get the complete file")
-    header = {}
-    for index, line in enumerate(text.heads[:start - 1]):
-        key, colon, value = line.partition(":")
-        if colon:
-            header[" ".join(key.split()).upper()] = index, " ".join(value.split())
-    count, step = header_number(text, header, "NUMBER OF DATA"), header_number(text, header, "SAMPLING INTERVAL (SEC)")
-    data = filled_lines(text, start)
-    rows = list(zip(data, text.rows(data), strict=True))
-    for index, row in rows:
+    notes = [" ".join(line.split()) for line in text.heads[:start - 1]]
+    parts = ((index, note.partition(":")) for index, note in enumerate(notes))
+    header = {key.strip().upper(): (index, value.strip()) for index, (key, colon, value) in parts if colon}
+    data = text.filled(start)
+    samples = []
+    for index, row in zip(data, text.rows(data), strict=True):
         if len(row) != 3:
             raise InputError(f"{text.at(index)}: {len(row)} values instead of N-S, E-W and U-D; get the file again")
-    if len(rows) != count:
-        raise InputError(f"{text.at(header['NUMBER OF DATA'][0])}: {count:g} samples are announced but {len(rows)} "
-                         "follow; get the complete file")
-    name = file_units(text.path, "gal", units)
-    samples = np.array([row[channel - 1] for _, row in rows])
-    lines = tuple(" ".join(line.split()) for line in text.heads[:start - 1] if line.strip())
+        samples.append(row[channel])
+    text.refuse_other_count(text.entry(header, "NUMBER OF DATA")[0], text.entry_number(header, "NUMBER OF DATA"),
+                            len(samples))
     station, date = (header.get(key, (0, ""))[1] for key in ("STATION ID", "EARTHQUAKE DATE"))
-    return Record(acceleration=UNITS[name] * samples, dt=file_dt(text.path, step, dt), source=text.path, units=name,
-                  title=f"{date} {station} {COMPONENTS[channel - 1]}".strip(),
-                  format="AFAD", sha256=text.sha256, notes=lines, station=station, component=COMPONENTS[channel - 1])
+    return text.record(samples, units="gal", dt=text.entry_number(header, "SAMPLING INTERVAL (SEC)"), format="AFAD",
+                       title=f"{date} {station} {COMPONENTS[channel]}".strip(), station=station,
+                       notes=tuple(filter(None, notes)), component=COMPONENTS[channel])

@@ -9,12 +9,11 @@ short and lack its line end.
 from __future__ import annotations
 
 import re
-
-import numpy as np
+from itertools import pairwise
 
 from ...core.errors import InputError
-from ..record import UNITS, Record, file_dt, file_units
-from .text import NUMBER, TextFile, filled_lines, stated_count, stated_number
+from ..record import Record
+from .text import NUMBER, TextFile
 
 HEADER_LINES = 8
 """NPTS and DT are looked for in this many first lines."""
@@ -36,12 +35,18 @@ def begin_data(text: TextFile) -> int | None:
 
 
 def recognises(text: TextFile) -> bool:
-    """Tell whether the first lines say NPTS, outside "#" comments, or there is a `*** Begin data ***` line."""
+    """Tell whether the first lines say NPTS, outside "#" comments, or a `*** Begin data ***` line stands before rows of
+    accelerations, and not before times and accelerations."""
+    start = begin_data(text)
+    if start is not None:
+        rows = list(text.rows(text.filled(start)))
+        pairs = all(len(row) == 2 for row in rows)
+        return not (pairs and all(after[0] > before[0] >= 0.0 for before, after in pairwise(rows)))
     header = [line for line in text.heads[:HEADER_LINES] if not line.startswith("#")]
-    return any(_NPTS.search(line) or _VALUES_FIRST.search(line) for line in header) or begin_data(text) is not None
+    return any(_NPTS.search(line) or _VALUES_FIRST.search(line) for line in header)
 
 
-def read(text: TextFile, units: str | None = None, dt: float | None = None) -> Record:
+def read(text: TextFile) -> Record:
     """Return the record of an AT2 file; units and dt are needed only where the file does not state them.
 
     Raises InputError naming the file, mostly with a line: number of values unlike NPTS, no or contradicting time step
@@ -49,17 +54,15 @@ def read(text: TextFile, units: str | None = None, dt: float | None = None) -> R
     """
     npts, stated_dt, npts_line, start = _header(text)
     header = [" ".join(line.split()) for line in text.heads[:start] if line.strip()]
-    name = file_units(text.path, _stated_units(header), units)
-    values = [value for row in text.rows(filled_lines(text, start)) for value in row]
-    if npts is not None and len(values) != npts:
-        raise InputError(f"{text.at(npts_line)}: NPTS is {npts} but {len(values)} values follow; "
-                         "get the complete file or correct NPTS")
+    values = text.values(start)
+    if npts is not None:
+        text.refuse_other_count(npts_line, npts, len(values))
     title = next((line for line in header if not line.upper().startswith("PEER")), "")
-    return Record(acceleration=UNITS[name] * np.array(values), dt=file_dt(text.path, stated_dt, dt), title=title,
-                  source=text.path, format="PEER AT2", units=name, sha256=text.sha256, notes=tuple(header))
+    units = next((match[1] for match in map(_UNITS.search, header) if match), None)
+    return text.record(values, units=units, dt=stated_dt, title=title, format="PEER AT2", notes=tuple(header))
 
 
-def _header(text: TextFile) -> tuple[int | None, float | None, int, int]:
+def _header(text: TextFile) -> tuple[float | None, float | None, int, int]:
     """Return NPTS, DT, the index of the NPTS line and the index of the first data line."""
     npts, dt, npts_line, start = None, None, 0, begin_data(text)
     last = 0
@@ -68,12 +71,12 @@ def _header(text: TextFile) -> tuple[int | None, float | None, int, int]:
         if npts is not None and (both or count):
             raise InputError(f"{text.at(index)}: NPTS is stated a second time; give one record")
         if both:
-            npts, dt = stated_count(text, index, both[1]), stated_number(text, index, both[2])
+            npts, dt = text.number(index, both[1]), text.number(index, both[2])
             npts_line = last = index
         if count:
-            npts, npts_line, last = stated_count(text, index, count[1]), index, index
+            npts, npts_line, last = text.number(index, count[1]), index, index
         if step:
-            dt, last = stated_number(text, index, step[1]), index
+            dt, last = text.number(index, step[1]), index
     if start is None:
         start = last + 1
     return npts, dt if dt is not None else _prose_dt(text, start), npts_line, start
@@ -81,11 +84,6 @@ def _header(text: TextFile) -> tuple[int | None, float | None, int, int]:
 
 def _prose_dt(text: TextFile, start: int) -> float | None:
     """Return the time step of a sentence "1559 points at equal spacing of 0.02 sec", if there is exactly one."""
-    found = {stated_number(text, index, match[1]) for index in range(start) for pattern in _PROSE_DT
+    found = {text.number(index, match[1]) for index in range(start) for pattern in _PROSE_DT
              for match in pattern.finditer(text.heads[index])}
     return found.pop() if len(found) == 1 else None
-
-
-def _stated_units(header: list[str]) -> str | None:
-    """Return what follows "units of" or "units are" in the header, or None."""
-    return next((match[1] for match in map(_UNITS.search, header) if match), None)

@@ -9,22 +9,21 @@ that ends in `*** Begin data ***` is skipped too. The units are never guessed.
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 
 import numpy as np
 
 from ...core.algebra import Array
 from ...core.checks import counted, number
 from ...core.errors import InputError
-from ..record import UNITS, Record, file_dt, file_units
+from ..record import Record
 from .at2 import begin_data
-from .text import TextFile, filled_lines
+from .text import TextFile
 
 JITTER = 1e-6
 """Relative difference between time steps that still counts as rounding."""
 
 
-def read(text: TextFile, units: str | None = None, dt: float | None = None, resample_dt: float | None = None) -> Record:
+def read(text: TextFile) -> Record:
     """Return the record of a column file; `units` is required, `dt` too when there is no time column.
 
     Uneven times are refused unless resample_dt [s] is given: then straight lines between the samples are read off at
@@ -33,34 +32,21 @@ def read(text: TextFile, units: str | None = None, dt: float | None = None, resa
     Raises InputError naming file and line for missing units, ragged rows, words that are not numbers, times that do
     not increase, uneven times.
     """
-    lines, table = _table(text, series=dt is not None)
-    name = file_units(text.path, None, units)
-    notes: tuple[str, ...] = ()
-    if table.shape[1] == 1:
-        step, samples = file_dt(text.path, None, dt), table[:, 0]
-    else:
-        times, samples = table[:, 0], table[:, 1]
+    lines, table = _table(text, series=text.dt is not None)
+    comments = tuple(line.lstrip("# ").rstrip() for line in text.heads if line.startswith("#"))
+    notes, step, samples = comments, None, table[:, -1]
+    if table.shape[1] == 2:
+        times = table[:, 0]
         uneven = _uneven_line(text, lines, times)
         if uneven is None:
-            step = file_dt(text.path, (times[-1] - times[0]) / (times.size - 1), dt)
+            step = (times[-1] - times[0]) / (times.size - 1)
         else:
-            step, samples = _evened(uneven, times, samples, resample_dt)
+            step, samples = _evened(uneven, times, samples, text.resample_dt)
             notes += (f"uneven times interpolated linearly to a step of {step:g} s",)
         if times[0] != 0.0:
             notes += (f"the first time in the file is {times[0]:g} s and is t = 0 here",)
-    comments = tuple(line.lstrip("# ").rstrip() for line in text.heads if line.startswith("#"))
-    return Record(acceleration=UNITS[name] * samples, dt=step, title=comments[0] if comments else "", source=text.path,
-                  format="columns", units=name, sha256=text.sha256, notes=comments + notes)
-
-
-def follow_begin_data(text: TextFile) -> bool:
-    """Tell whether times and accelerations, and not rows of accelerations, follow a `*** Begin data ***` line."""
-    start = begin_data(text)
-    if start is None:
-        return False
-    rows = list(text.rows(filled_lines(text, start)))
-    times = [row[0] for row in rows]
-    return all(len(row) == 2 for row in rows) and all(after > before >= 0.0 for before, after in pairwise(times))
+    return text.record(samples, units=None, dt=step, title=comments[0] if comments else "", format="columns",
+                       notes=notes)
 
 
 def _table(text: TextFile, *, series: bool) -> tuple[list[int], Array]:
@@ -68,8 +54,7 @@ def _table(text: TextFile, *, series: bool) -> tuple[list[int], Array]:
 
     series: rows of more than two values, the last perhaps shorter, are one column written in rows.
     """
-    filled = filled_lines(text, begin_data(text) or 0)
-    lines = [index for index in filled if not text.lines[index].lstrip().startswith("#")]
+    lines = [index for index in text.filled(begin_data(text) or 0) if not text.lines[index].lstrip().startswith("#")]
     rows = list(text.rows(lines))
     if series and rows and len(rows[0]) > 2:
         return lines, np.array([value for row in rows for value in row])[:, None]

@@ -12,12 +12,9 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-import numpy as np
-
-from ...core.algebra import Array
 from ...core.errors import InputError
-from ..record import UNITS, Record, file_dt, file_units
-from .text import NUMBER, TextFile, stated_count, stated_number
+from ..record import Record
+from .text import NUMBER, TextFile
 
 STEP = 33
 """Place of the time step among the real header values of COSMOS, from 0."""
@@ -65,7 +62,7 @@ def recognises(text: TextFile) -> bool:
     return _FIRST.search(text.heads[0]) is not None
 
 
-def read(text: TextFile, units: str | None = None, dt: float | None = None, channel: int | None = None) -> Record:
+def read(text: TextFile) -> Record:
     """Return the record of one channel; channel: 1 for the first of the file, required where it holds several.
 
     Raises InputError naming the file, mostly with a line: no acceleration in it, several channels, samples missing,
@@ -74,19 +71,17 @@ def read(text: TextFile, units: str | None = None, dt: float | None = None, chan
     blocks = _blocks(text)
     if not blocks:
         raise InputError(f"{text.at(0)}: no block of accelerations follows; get the corrected accelerations (V2)")
-    block = _chosen(text, blocks, channel)
+    block = blocks[text.chosen([_component(text, block) for block in blocks])]
     line = text.heads[block.line]
     if _UNEVEN.search(line):
         raise InputError(f"{text.at(block.line)}: the samples are unequally spaced; get the corrected file (V2)")
     stated = next((match[1] for match in (pattern.search(line) for pattern in _UNITS) if match), None)
-    name = file_units(text.at(block.line), stated, units)
     words, comments = _words(text, block)
     cosmos = "format v" in text.heads[0].lower()
     event = next(filter(_EVENT.match, words), " ".join(words[1:2] if cosmos else words[2:3]))
-    return Record(acceleration=UNITS[name] * _samples(text, block), dt=file_dt(text.path, _step(text, block), dt),
-                  title=event, source=text.path, units=name, sha256=text.sha256,
-                  format="COSMOS" if cosmos else "CSMIP", notes=(*words, *comments),
-                  station=_station(text, block), component=_component(text, block))
+    return text.record(_samples(text, block), units=stated, dt=_step(text, block), line=block.line, title=event,
+                       format="COSMOS" if cosmos else "CSMIP", notes=(*words, *comments),
+                       station=_station(text, block), component=_component(text, block))
 
 
 def _blocks(text: TextFile) -> list[Block]:
@@ -97,7 +92,7 @@ def _blocks(text: TextFile) -> list[Block]:
         form = _FORMAT.search(text.heads[index]) if announced else None
         if announced and (form or _SPACED.search(text.heads[index])):
             count, quantity = announced
-            per_line, width = (stated_count(text, index, part or "1") for part in form.groups()) if form else (8, 10)
+            per_line, width = (int(text.number(index, part or "1")) for part in form.groups()) if form else (8, 10)
             block = Block(index, range(start, index), count, max(per_line, 1), max(width, 1))
             if quantity == "accel":
                 found.append(block)
@@ -116,7 +111,7 @@ def _announced(text: TextFile, index: int) -> tuple[int, str] | None:
     quantity = _QUANTITY.search(line, count.end()) if count else None
     if count is None or quantity is None or not _SAMPLES.search(line, quantity.end()):
         return None
-    return stated_count(text, index, count[1]), quantity[1].lower()
+    return int(text.number(index, count[1])), quantity[1].lower()
 
 
 def _words(text: TextFile, block: Block) -> tuple[list[str], list[str]]:
@@ -127,47 +122,38 @@ def _words(text: TextFile, block: Block) -> tuple[list[str], list[str]]:
     return [entry for entry in header[:next(numbers, len(header))] if entry], [entry for entry in comments if entry]
 
 
-def _chosen(text: TextFile, blocks: list[Block], channel: int | None) -> Block:
-    """Return the block of a channel, or raise InputError that lists them when there are several and none is named."""
-    names = ", ".join(f"{k}: {_component(text, block) or 'unnamed'}" for k, block in enumerate(blocks, 1))
-    if channel is None and len(blocks) > 1:
-        raise InputError(f"{text.path}: the file holds {len(blocks)} channels ({names}); pass channel=")
-    if channel is not None and not 1 <= channel <= len(blocks):
-        raise InputError(f"{text.path}: there is no channel {channel}; the file holds {names}")
-    return blocks[(channel or 1) - 1]
-
-
-def _samples(text: TextFile, block: Block) -> Array:
-    """Return the samples in the file's units, shape (count,)."""
+def _samples(text: TextFile, block: Block) -> list[float]:
+    """Return the samples in the file's units."""
     marks = ((index, _UNKNOWN.search(text.heads[index])) for index in block.header)
-    unknown = next((stated_number(text, index, mark[1]) for index, mark in marks if mark), None)
+    unknown = next((text.number(index, mark[1]) for index, mark in marks if mark), None)
     values: list[float] = []
     for index in range(block.line + 1, block.end):
         row = text.fixed(index, block.width) if index < len(text.lines) else []
-        if len(row) != min(block.per_line, block.count - len(values)):
-            raise InputError(f"{text.at(block.line)}: {block.count} samples are announced but line {index + 1} holds "
-                             f"{len(row)} of them instead of {min(block.per_line, block.count - len(values))}; get the "
-                             "complete file")
+        wanted = min(block.per_line, block.count - len(values))
+        if len(row) != wanted:
+            raise InputError(f"{text.at(block.line)}: {block.count:g} samples are announced but line {index + 1} holds "
+                             f"{len(row)} of them instead of {wanted:g}; get the complete file")
         if unknown in row:
             raise InputError(f"{text.at(index)}: a sample is marked as unknown ({unknown:g}); use another record")
         values += row
-    return np.array(values)
+    return values
 
 
 def _step(text: TextFile, block: Block) -> float | None:
     """Return the time step stated with the samples, in the text of the header or among its real numbers."""
     rate = _RATE.search(text.heads[block.line])
-    if rate and stated_number(text, block.line, rate[1]) > 0.0:
-        return 1.0 / stated_number(text, block.line, rate[1])
+    if rate and text.number(block.line, rate[1]) > 0.0:
+        return 1.0 / text.number(block.line, rate[1])
     for index in (block.line, *block.header):
         spaced = _SPACED.search(text.heads[index])
         if spaced:
-            return stated_number(text, index, spaced[1])
+            return text.number(index, spaced[1])
     for index in block.header:
         reals, form = _REALS.match(text.heads[index]), _FORMAT.search(text.heads[index])
         if reals and form:
-            rows = range(index + 1, min(index + 1 + stated_count(text, index, reals[2]), block.line))
-            values = [value for row in rows for value in text.fixed(row, max(stated_count(text, index, form[2]), 1))]
+            rows = range(index + 1, min(index + 1 + int(text.number(index, reals[2])), block.line))
+            width = max(int(text.number(index, form[2])), 1)
+            values = [value for row in rows for value in text.fixed(row, width)]
             return values[STEP] if len(values) > STEP and values[STEP] > 0.0 else None
     return None
 

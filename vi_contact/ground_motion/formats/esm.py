@@ -7,13 +7,10 @@ from __future__ import annotations
 
 import re
 
-import numpy as np
-
 from ...core.errors import InputError
-from ..record import UNITS, Record, file_dt, file_units
-from .text import TextFile, filled_lines, header_number
+from ..record import Record
+from .text import TextFile
 
-NEEDED = ("SAMPLING_INTERVAL_S", "NDATA", "UNITS")
 _KEY = re.compile(r"[A-Z][A-Z0-9_/^ ]*+")
 
 
@@ -24,33 +21,26 @@ def recognises(text: TextFile) -> bool:
     return entries[0] is not None and any(entry is not None and entry[0] in keys for entry in entries)
 
 
-def read(text: TextFile, units: str | None = None, dt: float | None = None) -> Record:
+def read(text: TextFile) -> Record:
     """Return the record of an ESM ASCII file; units and dt are only checked.
 
     Raises InputError naming the file, mostly with a line: a velocity or displacement file, a needed entry missing or no
     number, a word between the samples, a number of samples unlike NDATA.
     """
     header, start = _header(text)
-    for key in NEEDED:
-        if not header.get(key, (0, ""))[1]:
-            raise InputError(f"{text.path}: the header does not give {key}; get the complete file")
     index, kind = header.get("DATA_TYPE", (0, "ACCELERATION"))
     if kind and "ACCELERATION" not in kind.upper():
         raise InputError(f"{text.at(index)}: the file holds {kind.lower()}; get the file of accelerations (.ACC.ASC)")
-    count, step = header_number(text, header, "NDATA"), header_number(text, header, "SAMPLING_INTERVAL_S")
-    values = [value for row in text.rows(filled_lines(text, start)) for value in row]
-    if len(values) != count:
-        raise InputError(f"{text.at(header['NDATA'][0])}: NDATA is {count:g} but {len(values)} values follow; get the "
-                         "complete file")
-    name = file_units(text.at(header["UNITS"][0]), header["UNITS"][1], units)
+    values = text.values(start)
+    text.refuse_other_count(text.entry(header, "NDATA")[0], text.entry_number(header, "NDATA"), len(values))
+    line, units = text.entry(header, "UNITS")
     value = {key: content for key, (_, content) in header.items()}
     station = ".".join(filter(None, (value.get("NETWORK"), value.get("STATION_CODE"))))
     title = " ".join(filter(None, (value.get("EVENT_NAME"), value.get("EVENT_DATE_YYYYMMDD"),
                                    value.get("EVENT_TIME_HHMMSS"), station, value.get("STREAM"))))
     notes = tuple(f"{key}: {content}" for key, content in value.items() if content and not key.startswith("USER"))
-    return Record(acceleration=UNITS[name] * np.array(values), dt=file_dt(text.path, step, dt), title=title,
-                  source=text.path, format="ESM", units=name, sha256=text.sha256, notes=notes, station=station,
-                  component=value.get("STREAM", ""))
+    return text.record(values, units=units, line=line, dt=text.entry_number(header, "SAMPLING_INTERVAL_S"),
+                       format="ESM", title=title, notes=notes, station=station, component=value.get("STREAM", ""))
 
 
 def _header(text: TextFile) -> tuple[dict[str, tuple[int, str]], int]:

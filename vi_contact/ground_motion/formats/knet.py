@@ -11,8 +11,8 @@ import re
 import numpy as np
 
 from ...core.errors import InputError
-from ..record import UNITS, Record, file_dt, file_units
-from .text import NUMBER, TextFile, filled_lines, stated_number
+from ..record import Record, canonical_units
+from .text import NUMBER, TextFile
 
 KEYS = ("Origin Time", "Station Code", "Record Time", "Sampling Freq(Hz)", "Duration Time(s)", "Dir.", "Scale Factor",
         "Max. Acc. (gal)", "Memo.")
@@ -27,7 +27,7 @@ def recognises(text: TextFile) -> bool:
     return text.lines[0].startswith("Origin Time") and any(line.startswith("Scale Factor") for line in text.heads[:20])
 
 
-def read(text: TextFile, units: str | None = None, dt: float | None = None) -> Record:
+def read(text: TextFile) -> Record:
     """Return the record of a K-NET or KiK-net file, its mean removed; units and dt are only checked.
 
     Raises InputError naming the file, mostly with a line: an entry of the header is missing or no number, words
@@ -39,32 +39,31 @@ def read(text: TextFile, units: str | None = None, dt: float | None = None) -> R
         raise InputError(f"{text.path}: the header has no line {missing[0]!r}; get the complete file")
     scale, unit = _scale(text, header["Scale Factor"])
     frequency = _number(text, header["Sampling Freq(Hz)"], "Sampling Freq(Hz)")
-    counts = [value for row in text.rows(filled_lines(text, header["Memo."] + 1)) for value in row]
+    counts = text.values(header["Memo."] + 1)
     seconds = _number(text, header["Duration Time(s)"], "Duration Time(s)")
     if not abs(len(counts) - seconds * frequency) <= 0.5:
         raise InputError(f"{text.at(header['Duration Time(s)'])}: {seconds:g} s at {frequency:g} Hz are announced but "
                          f"{len(counts)} samples follow; get the complete file")
-    name = file_units(text.at(header["Scale Factor"]), unit, units)
-    samples = UNITS[name] * scale * (np.array(counts) - np.mean(counts))
+    name = canonical_units(text.at(header["Scale Factor"]), unit)
     lines = tuple(" ".join(line.split()) for line in text.heads[:header["Memo."]])
     value = {key: text.heads[index][len(key):].strip() for key, index in header.items()}
-    return Record(acceleration=samples, dt=file_dt(text.path, 1.0 / frequency, dt), source=text.path,
-                  title=f"{value['Origin Time']}, {value['Station Code']} {value['Dir.']}", format="K-NET", units=name,
-                  sha256=text.sha256, notes=(*lines, f"mean of {scale * np.mean(counts):.6g} {name} removed"),
-                  station=value["Station Code"], component=value["Dir."])
+    return text.record(np.array(counts) - np.mean(counts), units=name, line=header["Scale Factor"], scale=scale,
+                       dt=1.0 / frequency, format="K-NET", station=value["Station Code"], component=value["Dir."],
+                       title=f"{value['Origin Time']}, {value['Station Code']} {value['Dir.']}",
+                       notes=(*lines, f"mean of {scale * np.mean(counts):.6g} {name} removed"))
 
 
 def _scale(text: TextFile, index: int) -> tuple[float, str]:
     """Return the size of a count, and its unit, of "Scale Factor      3920(gal)/6182761"."""
     match = _SCALE.search(text.heads[index])
-    if match is None or stated_number(text, index, match[3]) == 0.0:
+    if match is None or text.number(index, match[3]) == 0.0:
         raise InputError(f"{text.at(index)}: the scale factor is not like '3920(gal)/6182761'; get the file again")
-    return stated_number(text, index, match[1]) / stated_number(text, index, match[3]), match[2]
+    return text.number(index, match[1]) / text.number(index, match[3]), match[2]
 
 
 def _number(text: TextFile, index: int, key: str) -> float:
     """Return the positive number after a key, "Hz" allowed."""
     match = _FREQUENCY.match(text.heads[index][len(key):].strip())
-    if match is None or stated_number(text, index, match[1]) <= 0.0:
+    if match is None or text.number(index, match[1]) <= 0.0:
         raise InputError(f"{text.at(index)}: {key!r} gives no positive number; get the file again")
-    return stated_number(text, index, match[1])
+    return text.number(index, match[1])

@@ -13,7 +13,7 @@ from ...core.units import STANDARD_GRAVITY
 from ..processing import resampled
 from ..record import Record
 from . import afad, at2, columns, cosmos, esm, knet, simcenter, smc
-from .text import TextFile, load_text
+from .text import load_text
 
 SEVERAL = (cosmos, afad, simcenter)
 """Formats whose files may hold several components."""
@@ -38,11 +38,12 @@ def read_record(path: str | os.PathLike[str], units: str | None = None, *, dt: f
     where the motion is that strong.
     Raises InputError with one sentence that names the file and, where there is one, the line.
     """
-    text = load_text(path)
-    if channel is not None and not any(several.recognises(text) for several in SEVERAL):
+    text = load_text(path, units=units, dt=dt, resample_dt=resample_dt, channel=channel)
+    reader = next((one for one in (*SEVERAL, smc, knet, esm, at2) if one.recognises(text)), columns)
+    if channel is not None and reader not in SEVERAL:
         raise InputError(f"{text.path}: channel={channel} was passed but the file holds one record; leave channel out")
     number("read_record", "largest", largest, positive=True, unit="m/s²")
-    record = _read(text, units, dt, resample_dt, channel)
+    record = reader.read(text)
     _refuse_improbable(record, largest)
     if resample_dt is not None and not math.isclose(record.dt, resample_dt, rel_tol=1e-9):
         record = resampled(record, resample_dt)
@@ -59,16 +60,3 @@ def _refuse_improbable(record: Record, largest: float) -> None:
     if not STEPS[0] <= record.dt <= STEPS[1]:
         raise InputError(f"{record.source}: a time step of {record.dt:g} s is none of a ground motion; give seconds "
                          f"from {STEPS[0]:g} to {STEPS[1]:g}, or make a Record of the samples")
-
-
-def _read(text: TextFile, units: str | None, dt: float | None, resample_dt: float | None,
-          channel: int | None) -> Record:
-    for several in SEVERAL:
-        if several.recognises(text):
-            return several.read(text, units, dt, channel)
-    for reader in (smc, knet, esm):
-        if reader.recognises(text):
-            return reader.read(text, units, dt)
-    if at2.recognises(text) and not columns.follow_begin_data(text):
-        return at2.read(text, units, dt)
-    return columns.read(text, units, dt, resample_dt)

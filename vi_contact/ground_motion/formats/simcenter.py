@@ -10,11 +10,9 @@ from __future__ import annotations
 import json
 from typing import Any
 
-import numpy as np
-
 from ...core.checks import shown
 from ...core.errors import InputError
-from ..record import UNITS, Record, file_dt, file_units
+from ..record import Record
 from .text import HEAD, TextFile
 
 
@@ -23,19 +21,14 @@ def recognises(text: TextFile) -> bool:
     return text.lines[0].lstrip().startswith("{") and any('"timeSeries"' in line for line in text.lines)
 
 
-def read(text: TextFile, units: str | None = None, dt: float | None = None, channel: int | None = None) -> Record:
+def read(text: TextFile) -> Record:
     """Return the record of one time series; units are required, channel (from 1) where there are several.
 
     Raises InputError naming the file, and the line where it is not JSON: no series, several and none chosen, a velocity
     or displacement, a factor, data that are not numbers, no step.
     """
     event, series = _series(text)
-    names = ", ".join(f"{k}: {_text(one.get('name')) or 'unnamed'}" for k, one in enumerate(series, 1))
-    if channel is None and len(series) > 1:
-        raise InputError(f"{text.path}: the file holds {len(series)} channels ({names}); pass channel=")
-    if channel is not None and not 1 <= channel <= len(series):
-        raise InputError(f"{text.path}: there is no channel {channel}; the file holds {names}")
-    chosen = series[(channel or 1) - 1]
+    chosen = series[text.chosen([_text(one.get("name")) for one in series])]
     name = _text(chosen.get("name"))
     patterns = event.get("pattern") or event.get("patterns")
     for pattern in patterns if isinstance(patterns, list) else []:
@@ -52,10 +45,8 @@ def read(text: TextFile, units: str | None = None, dt: float | None = None, chan
     step = chosen.get("dT", event.get("dT"))
     if step is not None and not _is_number(step):
         raise InputError(f"{text.path}: \"dT\" of time series {name!r} is {shown(step)}; give a number of seconds")
-    unit = file_units(text.path, None, units)
     title = _text(event.get("description")) or _text(event.get("name"))
-    return Record(acceleration=UNITS[unit] * np.array(data, dtype=float), dt=file_dt(text.path, step, dt), title=title,
-                  source=text.path, format="SimCenter", units=unit, sha256=text.sha256, component=name)
+    return text.record(data, units=None, dt=step, title=title, format="SimCenter", component=name)
 
 
 def _series(text: TextFile) -> tuple[dict[str, Any], list[dict[str, Any]]]:

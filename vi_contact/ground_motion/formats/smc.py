@@ -9,11 +9,8 @@ from __future__ import annotations
 
 import re
 
-import numpy as np
-
-from ...core.algebra import Array
 from ...core.errors import InputError
-from ..record import UNITS, Record, file_dt, file_units
+from ..record import Record
 from .text import TextFile
 
 TEXT_LINES, INTEGER_LINES, REAL_LINES = 11, 6, 10
@@ -32,7 +29,7 @@ def recognises(text: TextFile) -> bool:
     return _KIND.match(text.heads[0]) is not None
 
 
-def read(text: TextFile, units: str | None = None, dt: float | None = None) -> Record:
+def read(text: TextFile) -> Record:
     """Return the record of an SMC file; dt is needed only where the file leaves its sampling rate undefined.
 
     Raises InputError naming the file, mostly with a line: a type other than corrected acceleration, a short file,
@@ -47,15 +44,14 @@ def read(text: TextFile, units: str | None = None, dt: float | None = None) -> R
     if not 0 <= integers[COMMENTS] < len(text.lines) or any(not line.startswith("|") for line in comments):
         raise InputError(f"{text.at(TEXT_LINES + 1)}: the header announces {integers[COMMENTS]:g} comment lines but "
                          "as many lines starting with '|' do not follow; get the file again")
-    name = file_units(text.path, "cm/s2", units)
     rate = reals[SAMPLING_RATE]
     stated = 1.0 / rate if 0.0 < rate < UNDEFINED else None
     direction = _direction(integers)
     notes = ((f"component: {direction}",) if direction else ()) + _problem(integers)
     notes += tuple(line[1:].strip() for line in comments if line[1:].strip())
-    return Record(acceleration=UNITS[name] * _samples(text, start, int(integers[SAMPLES])),
-                  dt=file_dt(text.path, stated, dt), title=_title(text), source=text.path, format="USGS SMC",
-                  units=name, sha256=text.sha256, notes=notes, station=_station(text), component=direction)
+    title = "; ".join(" ".join(text.heads[index].split()) for index in (3, 5) if text.heads[index].strip(" *"))
+    return text.record(_samples(text, start, integers[SAMPLES]), units="cm/s2", dt=stated, format="USGS SMC",
+                       title=title, notes=notes, station=_station(text), component=direction)
 
 
 def _refuse_other_kinds(text: TextFile) -> None:
@@ -79,23 +75,16 @@ def _fields(text: TextFile, start: int, lines: int, width: int, per_line: int) -
     return values
 
 
-def _samples(text: TextFile, start: int, count: int) -> Array:
-    """Return the samples in cm/s², shape (count,)."""
+def _samples(text: TextFile, start: int, count: float) -> list[float]:
+    """Return the samples in cm/s²."""
     values: list[float] = []
     for index in range(start, len(text.lines)):
         row = text.fixed(index, SAMPLE_WIDTH)
         if any(abs(value) >= UNDEFINED for value in row):
             raise InputError(f"{text.at(index)}: a sample is marked as undefined; fill the gap or use another record")
         values += row
-    if len(values) != count:
-        raise InputError(f"{text.at(TEXT_LINES + 2)}: the header announces {count} samples but {len(values)} follow; "
-                         "get the complete file")
-    return np.array(values)
-
-
-def _title(text: TextFile) -> str:
-    """Return the event (text line 4) and station (text line 6), blanks squeezed."""
-    return "; ".join(" ".join(text.heads[index].split()) for index in (3, 5) if text.heads[index].strip(" *"))
+    text.refuse_other_count(TEXT_LINES + 2, count, len(values))
+    return values
 
 
 def _direction(integers: list[float]) -> str:
