@@ -6,9 +6,9 @@ Displacements and velocities are those of the equations: relative to the ground 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -36,34 +36,27 @@ class Steps:
     acceleration."""
 
     def __init__(self, dimension: int) -> None:
-        self._dimension = dimension
+        self._axes = AXES[:dimension]
 
     def columns(self) -> Columns:
         """Name t, k, iterations, certificate, escalated, a_g_x, …"""
-        axes = AXES[: self._dimension]
-        ground = {f"a_g_{axis}": ("m/s²", f"ground acceleration along {axis} at time t") for axis in axes}
         return {
             "t": ("s", "time at the end of the step"),
             "k": ("-", "number of the step"),
             "iterations": ("-", "iterations of the solver in this step"),
             "certificate": ("-", "worst dimensionless residual of the inequality problem of this step"),
             "escalated": ("-", "1 when the step needed another solver than the first, else 0"),
-        } | ground
+        } | {f"a_g_{axis}": ("m/s²", f"ground acceleration along {axis} at time t") for axis in self._axes}
 
-    def _row(self, state: State, iterations: int, certificate: float, escalated: bool) -> Row:
+    def _row(self, state: State, iterations: int = 0, certificate: float = 0.0, escalated: bool = False) -> Row:
         ground = self._problem.ground_acceleration(state.t)
-        return {
-            "t": state.t,
-            "k": state.k,
-            "iterations": int(iterations),
-            "certificate": certificate,
-            "escalated": int(escalated),
-        } | {f"a_g_{axis}": float(value) for axis, value in zip(AXES, ground, strict=False)}
+        values = (state.t, state.k, int(iterations), certificate, int(escalated), *ground.tolist())
+        return dict(zip(self.columns(), values, strict=True))
 
     def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
         """Return the initial row: no iterations and no certificate were needed, so zeros."""
         self._problem = problem
-        return self._row(state, 0, 0.0, False)
+        return self._row(state)
 
     def row(self, report: Report) -> Row:
         return self._row(report.new, report.result.iterations, report.certificate.worst, report.escalated)
@@ -81,31 +74,29 @@ class Energy:
     one more after an impact.
     """
 
-    _TERMS = (
-        "work_input", "loss_damping", "loss_contact", "loss_friction", "loss_impact", "loss_algorithmic",
-        "energy_defect",
-    )
+    _COLUMNS: ClassVar[Columns] = {
+        "energy_kinetic": ("J", "kinetic energy after the impact law, ½ vᵀMv"),
+        "energy_strain": ("J", "strain energy ½ uᵀKu"),
+        "work_input": ("J", "work of loads, ground motion and prescribed motions since the start"),
+        "loss_damping": ("J", "work of viscous damping since the start"),
+        "loss_contact": ("J", "work done on the support by the contact reactions since the start"),
+        "loss_friction": ("J", "work of friction since the start"),
+        "loss_impact": ("J", "kinetic energy taken by the impact law since the start, signed"),
+        "loss_algorithmic": ("J", "numerical dissipation of the time scheme since the start"),
+        "energy_defect": ("J", "what the ledger cannot explain since the start"),
+    }
+    _SUMS = tuple(_COLUMNS)[2:]
 
     def columns(self) -> Columns:
         """Name energy_kinetic, energy_strain, work_input, loss_*, energy_defect."""
-        return {
-            "energy_kinetic": ("J", "kinetic energy after the impact law, ½ vᵀMv"),
-            "energy_strain": ("J", "strain energy ½ uᵀKu"),
-            "work_input": ("J", "work of loads, ground motion and prescribed motions since the start"),
-            "loss_damping": ("J", "work of viscous damping since the start"),
-            "loss_contact": ("J", "work done on the support by the contact reactions since the start"),
-            "loss_friction": ("J", "work of friction since the start"),
-            "loss_impact": ("J", "kinetic energy taken by the impact law since the start, signed"),
-            "loss_algorithmic": ("J", "numerical dissipation of the time scheme since the start"),
-            "energy_defect": ("J", "what the ledger cannot explain since the start"),
-        }
+        return self._COLUMNS
 
     def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
         """Return the energies of the initial state; works and losses are zero, or those of the run that is continued.
         """
         self._problem = problem
         self._now = energies(problem.equations, state.u, state.v)
-        self._sums = {term: 0.0 if resumed is None else float(resumed[term]) for term in self._TERMS}
+        self._sums = {term: 0.0 if resumed is None else float(resumed[term]) for term in self._SUMS}
         return self._row()
 
     def _row(self) -> Row:
@@ -122,7 +113,7 @@ class Energy:
         self._now = free if new.v is report.v_minus else self._after_impact(free, new.v)
         impact = free.kinetic - self._now.kinetic
         losses = (step.input, step.damping, step.contact, step.friction, impact, step.algorithmic, step.defect)
-        for term, loss in zip(self._TERMS, losses, strict=True):
+        for term, loss in zip(self._SUMS, losses, strict=True):
             self._sums[term] += loss
         return self._row()
 
@@ -146,87 +137,62 @@ class Contact:
     """
 
     def __init__(self) -> None:
-        self._dimension = len(AXES)
-        self._frictional = False
+        self._axes, self._frictional = AXES, False
 
     def columns(self) -> Columns:
         """Name contact_uplift, contact_resultant, … and the arrays pressure, gap, active. Call ``start`` first."""
-        axes = AXES[: self._dimension]
+        axes = self._axes
         force = {f"contact_force_{a}": ("N", f"contact force on the body along {a}, -Σ r_n n_{a}") for a in axes}
         place = {f"contact_{a}": ("m", f"{a} of the point of action, Σ r_n {a} / Σ r_n; nan while open") for a in axes}
-        return (
-            {
-                "contact_uplift": ("-", "uplift ratio: share of the contact surface, by weight, that is open"),
-                "contact_active": ("-", "number of closed contact points"),
-                "contact_resultant": ("N", "sum of the normal reactions Σ r_n"),
-            }
-            | force
-            | place
-            | {
-                "contact_min_gap": ("m", "smallest gap; nan without contact points"),
-                "contact_max_pressure": ("Pa", "largest contact pressure; nan without contact points"),
-                "pressure": ("Pa", "contact pressure r_n / weight of every contact point"),
-                "gap": ("m", "gap of every contact point"),
-                "active": ("-", "whether the contact point is closed"),
-            }
-            | (self._friction_columns() if self._frictional else {})
-        )
-
-    def _friction_columns(self) -> dict[str, tuple[str, str]]:
-        axes = AXES[: self._dimension]
-        return {f"friction_force_{a}": ("N", f"friction force on the body along {a}") for a in axes} | {
+        friction = {f"friction_force_{a}": ("N", f"friction force on the body along {a}") for a in axes} | {
             "contact_max_slip": ("m", "largest tangential displacement on the support; nan without contact points"),
             "traction_t": ("Pa", "tangential reaction r_t / weight of every contact point, in its nodal tangents"),
             "slip": ("m", "tangential displacement of every contact point, in its nodal tangents"),
         }
+        return {
+            "contact_uplift": ("-", "uplift ratio: share of the contact surface, by weight, that is open"),
+            "contact_active": ("-", "number of closed contact points"),
+            "contact_resultant": ("N", "sum of the normal reactions Σ r_n"),
+            **force, **place,
+            "contact_min_gap": ("m", "smallest gap; nan without contact points"),
+            "contact_max_pressure": ("Pa", "largest contact pressure; nan without contact points"),
+            "pressure": ("Pa", "contact pressure r_n / weight of every contact point"),
+            "gap": ("m", "gap of every contact point"),
+            "active": ("-", "whether the contact point is closed"),
+        } | (friction if self._frictional else {})
 
     def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
         """Return the row of the initial contact: of a gravity stage, or open."""
-        self._problem, self._surface = problem, problem.surface
-        self._dimension = problem.surface.points.shape[1]
-        self._frictional = problem.frictional
+        self._problem, self._frictional = problem, problem.frictional
+        self._axes = AXES[: problem.surface.points.shape[1]]
         return self._row(state)
 
     def row(self, report: Report) -> Row:
         return self._row(report.new)
 
     def _row(self, state: State) -> Row:
-        surface, r_n = self._surface, state.r_n
+        surface, r_n = self._problem.surface, state.r_n
         gap = surface.gap(state.t) - surface.normal_values(state.u) + surface.compliance * r_n
         pressure = r_n / surface.weights
         total, resultant = float(surface.weights.sum()), float(r_n.sum())
         closed = float(surface.weights[state.active].sum())
         force = 0.0 - r_n @ surface.normals  # not -(…): no negative zeros
-        place = r_n @ surface.points / resultant if resultant else np.full(self._dimension, np.nan)
-        return (
-            {
-                "contact_uplift": 1.0 - closed / total if total else 1.0,
-                "contact_active": int(state.active.sum()),
-                "contact_resultant": resultant,
-            }
-            | {f"contact_force_{axis}": float(value) for axis, value in zip(AXES, force, strict=False)}
-            | {f"contact_{axis}": float(value) for axis, value in zip(AXES, place, strict=False)}
-            | {
-                "contact_min_gap": float(gap.min()) if len(gap) else np.nan,
-                "contact_max_pressure": float(pressure.max()) if len(gap) else np.nan,
-                "pressure": pressure,
-                "gap": gap,
-                "active": state.active,
-            }
-            | (self._friction(state) if self._frictional else {})
-        )
+        place = r_n @ surface.points / resultant if resultant else np.full(len(self._axes), np.nan)
+        values = [
+            1.0 - closed / total if total else 1.0, int(state.active.sum()), resultant, *force.tolist(), *place.tolist(),
+            float(gap.min()) if len(gap) else np.nan, float(pressure.max()) if len(gap) else np.nan,
+            pressure, gap, state.active, *(self._friction(state) if self._frictional else ()),
+        ]
+        return dict(zip(self.columns(), values, strict=True))
 
-    def _friction(self, state: State) -> dict[str, Any]:
-        surface, system = self._surface, self._problem.system
+    def _friction(self, state: State) -> list[Any]:
+        surface, system = self._problem.surface, self._problem.system
         slip = surface.slip(state.u, state.t)
         r_t = np.zeros_like(slip) if state.r_t is None else state.r_t
         load = surface.reaction_load(np.zeros(surface.count), system.rows, r_t)
         force = 0.0 - surface.comm.sum(system.influence.T @ surface.along_axes(load))
-        return {f"friction_force_{axis}": float(value) for axis, value in zip(AXES, force, strict=False)} | {
-            "contact_max_slip": float(np.linalg.norm(slip, axis=1).max()) if len(slip) else np.nan,
-            "traction_t": r_t / surface.weights[:, None],
-            "slip": slip,
-        }
+        largest = float(np.linalg.norm(slip, axis=1).max()) if len(slip) else np.nan
+        return [*force.tolist(), largest, r_t / surface.weights[:, None], slip]
 
 
 @dataclass
@@ -256,58 +222,40 @@ class Probe:
         if len({len(point) for point in self.points.values()}) > 1:
             raise InputError("the probe points have different numbers of coordinates: give one per dimension")
 
-    def _quantities(self) -> dict[str, tuple[str, str]]:
-        """Letter -> (unit, meaning) of what is recorded."""
-        found = {"u": ("m", "displacement")}
-        if self.velocity:
-            found["v"] = ("m/s", "velocity after the impact law")
-        if self.acceleration:
-            found["a"] = ("m/s²", "absolute acceleration, mean of the step")
-        return found
-
     def columns(self) -> Columns:
         """Name u_x_<label>, …"""
+        quantities = {"u": ("m", "displacement")}
+        if self.velocity:
+            quantities["v"] = ("m/s", "velocity after the impact law")
+        if self.acceleration:
+            quantities["a"] = ("m/s²", "absolute acceleration, mean of the step")
         return {
             f"{letter}_{axis}_{label}": (unit, f"{meaning} along {axis} at point {label}")
-            for letter, (unit, meaning) in self._quantities().items()
+            for letter, (unit, meaning) in quantities.items()
             for label, point in self.points.items()
             for axis in AXES[: len(point)]
         }
 
     def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
         """Find the nodes."""
-        self._problem = problem
-        dimension = problem.system.space.dimension
-        points = np.array(list(self.points.values()), dtype=float).reshape(len(self.points), -1)
-        if len(points) and points.shape[1] != dimension:
+        self._problem, dimension = problem, problem.system.space.dimension
+        points = np.array(list(self.points.values()), dtype=float)
+        if points.shape[1] != dimension:
             raise InputError(f"a probe point has {points.shape[1]} coordinates: give {dimension}")
-        self._nodes = problem.system.space.find_nodes(points) if len(points) else np.zeros(0, dtype=int)
-        row = self._row(state)
-        if self.acceleration:
-            ground = problem.ground_acceleration(state.t)
-            row |= self._named("a", np.tile(ground, (len(points), 1)))
-        return row
+        self._nodes = problem.system.space.find_nodes(points)
+        return self._row(state, lambda: np.tile(problem.ground_acceleration(state.t), (len(points), 1)))
 
     def row(self, report: Report) -> Row:
-        row = self._row(report.new)
-        if self.acceleration:
-            problem = self._problem
-            ground = 0.5 * (problem.ground_acceleration(report.old.t) + problem.ground_acceleration(report.new.t))
-            row |= self._named("a", self._sample(report.balance.a, report.new.t, 2) + ground)
-        return row
+        old, new, ground = report.old.t, report.new.t, self._problem.ground_acceleration
+        return self._row(report.new, lambda: self._sample(report.balance.a, new, 2) + 0.5 * (ground(old) + ground(new)))
 
-    def _row(self, state: State) -> dict[str, float]:
-        row = self._named("u", self._sample(state.u, state.t, 0))
+    def _row(self, state: State, acceleration: Callable[[], Array]) -> Row:
+        values = [self._sample(state.u, state.t, 0)]
         if self.velocity:
-            row |= self._named("v", self._sample(state.v, state.t, 1))
-        return row
+            values.append(self._sample(state.v, state.t, 1))
+        if self.acceleration:
+            values.append(acceleration())
+        return dict(zip(self.columns(), np.concatenate(values, axis=None).tolist(), strict=True))
 
     def _sample(self, x: Array, t: float, derivative: int) -> Array:
         return self._problem.system.space.sample(self._problem.cartesian(x), self._nodes, t, derivative)
-
-    def _named(self, letter: str, values: Array) -> dict[str, float]:
-        return {
-            f"{letter}_{axis}_{label}": float(value)
-            for label, row in zip(self.points, values, strict=True)
-            for axis, value in zip(AXES, row, strict=False)
-        }
