@@ -32,7 +32,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "cli/test_entry.py": "cli.options studies.cases.library studies.cases.own_case",
     "cli/test_motion.py": "plots.records",
     "core/test_friction_certificate.py": "core.certificate core.protocols",
-    "core/test_identity.py": "run.checks",
+    "core/test_identity.py": "run.method",
     "core/test_step.py": "core.errors core.problem",
     "core/test_surfaces.py": "core.obstacles",
     "engineering/test_resultants.py":

@@ -17,7 +17,7 @@ from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.step import PreparedSolver, Scheme, Solver, State, StepProblem, StepResult
 from ..core.surfaces import ContactSurface
-from .checks import check_solver
+from .method import check_solver
 from .compare_runs import Reference, RunComparison, RunDifference
 from .march import march
 from .time_steps import TimeSteps

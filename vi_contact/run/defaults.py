@@ -10,7 +10,7 @@ from ..core.step import Scheme
 from ..laws.mass import ConsistentMass
 from ..schemes.trapezoidal import Trapezoidal
 from ..schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
-from .checks import check_scheme
+from .method import check_scheme
 
 
 def with_defaults(problem: ContactProblem, scheme: Scheme | None) -> tuple[ContactProblem, Scheme]:

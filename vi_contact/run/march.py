@@ -14,7 +14,7 @@ from ..core.state_checks import initial_state, start_time
 from ..core.step import Report, Scheme, Solver, State
 from ..solvers.certified import TOLERANCE, CertifiedSolver
 from ..solvers.condensed import Condensed
-from .checks import bind_companions, check_methods, check_state
+from .method import bind_companions, check_methods, check_state
 from .defaults import with_defaults
 from .time_steps import StepPlan, TimeSteps, step_plan
 

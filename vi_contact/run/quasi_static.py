@@ -23,7 +23,7 @@ from ..core.problem import ContactProblem
 from ..core.state_checks import check_problem_given, check_sizes, initial_state
 from ..core.step import Solver, State
 from ..solvers.certified import TOLERANCE
-from .checks import check_methods
+from .method import check_methods
 from .static import Equilibria
 
 

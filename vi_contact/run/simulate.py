@@ -16,7 +16,7 @@ from ..core.state_checks import initial_state, start_time
 from ..core.step import Columns, Recorder, Row, Scheme, Solver, State
 from ..solvers.certified import TOLERANCE
 from ..solvers.condensed import Condensed
-from .checks import bind_companions, check_methods, check_state
+from .method import bind_companions, check_methods, check_state
 from .defaults import with_defaults
 from .files.checkpoint import RestartPoint, read_checkpoint
 from .files.folder import run_folder

@@ -13,7 +13,7 @@ from ..core.state_checks import check_problem_given, initial_state
 from ..core.step import Solver, State, StepProblem, StepResult
 from ..solvers.certified import TOLERANCE, CertifiedSolver, refuse_nan
 from ..solvers.condensed import Condensed
-from .checks import check_methods
+from .method import check_methods
 from .proximal import Proximal
 
 ADVICE = "try another solver, or smaller load steps, and check the data"
