@@ -25,6 +25,7 @@ from vi_contact.core.step import Report
 from vi_contact.laws.impact import ImpulseUpdate, Inelastic
 from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.run.march import March
+from vi_contact.run.method import Method
 from vi_contact.run.recorders import Energy
 from vi_contact.run.simulate import simulate
 from vi_contact.run.time_steps import HalvedAtImpact, Schedule, StepPlan, step_plan
@@ -433,10 +434,8 @@ PLANS = [THREE, HalvedAtImpact(5e-3, 3), HalvedAtImpact(Schedule(((5e-3, 0.31), 
 def test_restart_with_a_plan_to_the_last_bit(tmp_path: Path, scheme: Any, plan: Any):
     """From checkpoints here and there, also right after halved steps: state and files of the straight run."""
     straight = run_chain(tmp_path / "straight", 200, scheme=scheme, dt=plan)
-    loop = March(
-        chain(), scheme=scheme, solvers=[Condensed()], step_plan=step_plan(plan, 199, None), dt=plan,
-        state=initial_state(chain()), tolerance=1e-9,
-    )
+    method = Method(chain(), scheme, [Condensed()], plan, tolerance=1e-9)
+    loop = March(method, step_plan(plan, 199, None), initial_state(chain()))
     halved = [loop.base for _ in loop if loop.ended and loop.dt < step_plan(plan, 199, None).dt(loop.base - 1)]
     assert bool(halved) == isinstance(plan, HalvedAtImpact)
     stops = sorted({50, 75, 101, 150, *halved[:2]})

@@ -6,9 +6,9 @@ from ..core.lazy import lazy
 
 _CONTENTS = {
     "cross_check": ("CrossChecked", "cross_check"),
-    "defaults": ("with_defaults",),
     "files.reading": ("RunFolder", "read_run"),
     "march": ("march",),
+    "method": ("with_defaults",),
     "quasi_static": ("quasi_static",),
     "recorders": ("Contact", "Energy", "Probe"),
     "simulate": ("simulate",),

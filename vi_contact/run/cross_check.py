@@ -17,9 +17,9 @@ from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.step import PreparedSolver, Scheme, Solver, State, StepProblem, StepResult
 from ..core.surfaces import ContactSurface
-from .method import check_solver
 from .compare_runs import Reference, RunComparison, RunDifference
 from .march import march
+from .method import check_solver
 from .time_steps import TimeSteps
 
 REFERENCE = ("name", "times", "impulse", "mean_towards")

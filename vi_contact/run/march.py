@@ -10,12 +10,10 @@ import numpy as np
 from ..core.algebra import EffectiveMatrix
 from ..core.problem import ContactProblem
 from ..core.protocols import Impact
-from ..core.state_checks import initial_state, start_time
+from ..core.state_checks import initial_state
 from ..core.step import Report, Scheme, Solver, State
 from ..solvers.certified import TOLERANCE, CertifiedSolver
-from ..solvers.condensed import Condensed
-from .method import bind_companions, check_methods, check_state
-from .defaults import with_defaults
+from .method import Method, checked_method
 from .time_steps import StepPlan, TimeSteps, step_plan
 
 
@@ -33,7 +31,7 @@ def march(
 ) -> Iterator[tuple[State, Report]]:
     """Yield (state, report) after every certified step.
 
-    ``scheme`` None, and the mass matrix of a problem that does not name one: see ``run.defaults.with_defaults``, whose
+    ``scheme`` None, and the mass matrix of a problem that does not name one: see ``run.method.with_defaults``, whose
     problem is ``report.problem``. ``solver`` None is Condensed().
 
     ``dt`` [s] is constant, or a Schedule, or HalvedAtImpact. ``steps`` and ``t_end`` count base steps: the halves of
@@ -42,16 +40,12 @@ def march(
     StepFailure with step, time, residuals and advice. ``state`` continues from a static stage or a checkpoint.
     InputError, at the call, for arguments of the wrong kind, and a state of another problem or inside the obstacle.
     """
-    check_methods("march", solver, escalation, tolerance)
-    problem, scheme = with_defaults(problem, scheme)
-    plan = step_plan(dt, steps, t_end, start_time("march", state))
-    bind_companions(problem, scheme, dt)
-    if state is None:
-        state = initial_state(problem)
-    else:
-        check_state("march", problem, state, dt=plan.dt(0), tolerance=tolerance, scheme=scheme)
-    solvers = [Condensed() if solver is None else solver, *escalation]
-    return iter(March(problem, scheme=scheme, solvers=solvers, step_plan=plan, dt=dt, state=state, tolerance=tolerance))
+    solvers = solver, escalation
+    method = checked_method(
+        "march", problem, scheme, solvers, dt, steps=steps, t_end=t_end, state=state, tolerance=tolerance
+    )
+    state = initial_state(method.problem) if state is None else state
+    return iter(March(method, step_plan(dt, steps, t_end, state.t), state))
 
 
 class March:
@@ -62,30 +56,17 @@ class March:
         dt: the length of this step [s]. halved: attempts that were thrown away.
     """
 
-    def __init__(
-        self,
-        problem: ContactProblem,
-        *,
-        scheme: Scheme,
-        solvers: Sequence[Solver],
-        step_plan: StepPlan,
-        dt: TimeSteps,
-        state: State,
-        tolerance: float,
-        base: int = 0,
-        halved: int = 0,
-    ) -> None:
-        scheme.check(problem)
-        self._problem, self._scheme, self._step_plan, self._plan = problem, scheme, step_plan, dt
-        self._solvers = _Solvers(problem, scheme, solvers, tolerance)
-        self._state = state
+    def __init__(self, method: Method, step_plan: StepPlan, state: State, base: int = 0, halved: int = 0) -> None:
+        self._method, self._step_plan, self._state = method, step_plan, state
+        self._matrices: dict[float, EffectiveMatrix] = {}
+        self._solvers: dict[float, CertifiedSolver] = {}
         self.base, self.halved, self.ended, self.dt = base, halved, True, float("nan")
 
     def __iter__(self) -> Iterator[tuple[State, Report]]:
         while self.base < self._step_plan.steps:
             dt = self._step_plan.dt(self.base)
-            bind_companions(self._problem, self._scheme, self._plan)  # another run of the problem may be under way
-            self._solvers.keep([dt / 2**level for level in range(self._step_plan.halvings + 1)])
+            self._method.bind()  # another run of the problem may be under way
+            self._free_all_but([dt / 2**level for level in range(self._step_plan.halvings + 1)])
             self._state, self.dt = self._restarted(dt), dt
             levels = [0]  # how often the parts of the base step that are left were halved
             while levels:
@@ -99,51 +80,32 @@ class March:
                 self.base += self.ended
                 yield report.new, report
 
+    def _free_all_but(self, sizes: Sequence[float]) -> None:
+        """Free matrices and factors of every other dt."""
+        self._matrices = {dt: A for dt, A in self._matrices.items() if dt in sizes}
+        self._solvers = {dt: solver for dt, solver in self._solvers.items() if dt in sizes}
+
     def _restarted(self, dt: float) -> State:
         """The state, with a past for this dt."""
-        return self._state if dt == self.dt else self._scheme.start(self._problem, self._state, dt)
+        method = self._method
+        return self._state if dt == self.dt else method.scheme.start(method.problem, self._state, dt)
 
     def _attempt(self, dt: float, *, final: bool) -> Report | None:
         """A step of dt; None when it closes a point and is to be halved: nothing has happened then."""
-        problem, scheme, state = self._problem, self._scheme, self._restarted(dt)
-        A = self._solvers.matrix(dt)
+        problem, scheme, state = self._method.problem, self._method.scheme, self._restarted(dt)
+        if dt not in self._matrices:
+            self._matrices[dt] = scheme.effective_matrix(problem, dt)
+        A = self._matrices[dt]
         step = scheme.step(problem, state, A, dt)
-        result, certificate, escalated = self._solvers.get(dt, step.scale).solve(step)
+        if dt not in self._solvers:
+            self._solvers[dt] = CertifiedSolver(problem, A, step.scale, self._method.solvers, self._method.tolerance)
+        result, certificate, escalated = self._solvers[dt].solve(step)
         if not final and np.any(result.active & ~state.active):
             return None
         free = scheme.finish(problem, state, step, result, dt)
         new = after_impact(problem, scheme, state, free, dt)
         averages = partial(scheme.balance, problem, state, free, dt)
         return Report(problem, state, new, free.v, step, result, certificate, averages, escalated)
-
-
-class _Solvers:
-    """One effective matrix and certified solver for every dt in use."""
-
-    def __init__(
-        self, problem: ContactProblem, scheme: Scheme, solvers: Sequence[Solver], tolerance: float
-    ) -> None:
-        self._problem, self._scheme, self._settings, self._tolerance = problem, scheme, solvers, tolerance
-        self._matrices: dict[float, EffectiveMatrix] = {}
-        self._solvers: dict[float, CertifiedSolver] = {}
-
-    def keep(self, sizes: Sequence[float]) -> None:
-        """Free the factors of every other dt."""
-        self._matrices = {dt: A for dt, A in self._matrices.items() if dt in sizes}
-        self._solvers = {dt: solver for dt, solver in self._solvers.items() if dt in sizes}
-
-    def matrix(self, dt: float) -> EffectiveMatrix:
-        """A, made when first needed."""
-        if dt not in self._matrices:
-            self._matrices[dt] = self._scheme.effective_matrix(self._problem, dt)
-        return self._matrices[dt]
-
-    def get(self, dt: float, scale: float) -> CertifiedSolver:
-        """The solver, prepared when first needed."""
-        if dt not in self._solvers:
-            A = self.matrix(dt)
-            self._solvers[dt] = CertifiedSolver(self._problem, A, scale, self._settings, self._tolerance)
-        return self._solvers[dt]
 
 
 def after_impact(problem: ContactProblem, scheme: Scheme, old: State, new: State, dt: float) -> State:

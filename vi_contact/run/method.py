@@ -1,7 +1,9 @@
-"""Check what marches a problem: scheme, solvers, tolerance, the state it starts from, and its time steps."""
+"""Choose and check how a problem is marched: scheme, solvers, tolerance, time steps, the state it starts from."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -10,18 +12,69 @@ from ..core.algebra import max_abs
 from ..core.checks import provides, real, several, shown
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
-from ..core.state_checks import check_sizes
-from ..core.step import Scheme, State
-from .time_steps import TimeSteps
+from ..core.state_checks import check_problem_given, check_sizes, start_time
+from ..core.step import Scheme, Solver, State
+from ..laws.mass import ConsistentMass
+from ..schemes.trapezoidal import Trapezoidal
+from ..schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
+from ..solvers.condensed import Condensed
+from .time_steps import TimeSteps, step_plan
 
 SCHEME = ("check", "start", "jump", "effective_matrix", "step", "finish", "balance")
 SLACK = 10.0  # of the tolerance, and of the largest displacement: what a state may penetrate
 
 
-def check_scheme(owner: str, value: Any) -> None:
-    """Raise InputError unless it is a time scheme, or None."""
-    if value is not None:
-        provides(owner, "scheme", value, SCHEME, "give a time scheme, such as Trapezoidal(), or None")
+@dataclass(frozen=True)
+class Method:
+    """Hold how a problem is marched: scheme, solver and those of its escalation, time steps [s] as they were asked for,
+    and what a certificate may not exceed."""
+
+    problem: ContactProblem
+    scheme: Scheme
+    solvers: Sequence[Solver]
+    dt: TimeSteps
+    tolerance: float
+
+    def bind(self) -> None:
+        """Hand scheme and time steps to the motions that are marched beside the run, unless they have them."""
+        for companion in (*self.problem.system.companions, *self.problem.surface.companions):
+            companion.bind(self.scheme, self.dt)
+
+
+def checked_method(
+    owner: str, problem: ContactProblem, scheme: Scheme | None, solvers: tuple[Solver | None, Sequence[Solver]],
+    dt: TimeSteps, *, steps: int | None, t_end: float | None, state: State | None, tolerance: float,
+) -> Method:
+    """Return the method with its defaults; ``solvers``: the first one, None for Condensed(), and the escalation.
+
+    InputError for arguments of the wrong kind, and a state of another problem or inside the obstacle. Collective.
+    """
+    check_methods(owner, *solvers, tolerance)
+    problem, scheme = with_defaults(problem, scheme)
+    first, others = solvers
+    method = Method(problem, scheme, [Condensed() if first is None else first, *others], dt, tolerance)
+    size = step_plan(dt, steps, t_end, start_time(owner, state)).dt(0)
+    method.bind()
+    scheme.check(problem)
+    method.solvers[0].check(problem)
+    if state is not None:
+        check_state(owner, problem, state, dt=size, tolerance=tolerance, scheme=scheme)
+    return method
+
+
+def with_defaults(problem: ContactProblem, scheme: Scheme | None) -> tuple[ContactProblem, Scheme]:
+    """Return the problem with a mass matrix and the scheme to run it with.
+
+    Without a scheme: the trapezoidal rule on redistributed mass; with an impact law, or with mass at the contact nodes
+    asked for, the Zienkiewicz-Wood-Taylor step at phi = ½, which never gains energy. Without a mass: the scheme's own
+    choice.
+    """
+    check_problem_given("march", problem)
+    if scheme is None:
+        massive = problem.mass is not None and isinstance(problem.mass, ConsistentMass)
+        scheme = Trapezoidal() if problem.impact is None and not massive else ZienkiewiczWoodTaylor()
+    provides("march", "scheme", scheme, SCHEME, "give a time scheme, such as Trapezoidal(), or None")
+    return (problem if problem.mass is not None else replace(problem, mass=scheme.mass)), scheme
 
 
 def check_solver(owner: str, value: Any, meaning: str = "solver") -> None:
@@ -57,9 +110,3 @@ def check_state(owner: str, problem: ContactProblem, state: State, *, dt: float,
             f"{owner}: the state lies {-gap[worst]:.3g} m inside the obstacle at ({where}): start from one with every "
             "gap >= 0"
         )
-
-
-def bind_companions(problem: ContactProblem, scheme: Scheme, dt: TimeSteps) -> None:
-    """Hand scheme and time steps to the motions that are marched beside the run; nothing to do when they have them."""
-    for companion in (*problem.system.companions, *problem.surface.companions):
-        companion.bind(scheme, dt)

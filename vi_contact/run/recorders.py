@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..core.algebra import Array
+from ..core.algebra import Array, Indices
 from ..core.checks import array, attributes, column_name, instance
 from ..core.errors import InputError, StepFailure
 from ..core.problem import ContactProblem
@@ -179,7 +179,8 @@ class Contact:
         force = 0.0 - r_n @ surface.normals  # not -(…): no negative zeros
         place = r_n @ surface.points / resultant if resultant else np.full(len(self._axes), np.nan)
         values = [
-            1.0 - closed / total if total else 1.0, int(state.active.sum()), resultant, *force.tolist(), *place.tolist(),
+            1.0 - closed / total if total else 1.0, int(state.active.sum()), resultant,
+            *force.tolist(), *place.tolist(),
             float(gap.min()) if len(gap) else np.nan, float(pressure.max()) if len(gap) else np.nan,
             pressure, gap, state.active, *(self._friction(state) if self._frictional else ()),
         ]
@@ -242,8 +243,11 @@ class Probe:
         points = np.array(list(self.points.values()), dtype=float)
         if points.shape[1] != dimension:
             raise InputError(f"a probe point has {points.shape[1]} coordinates: give {dimension}")
-        self._nodes = problem.system.space.find_nodes(points)
+        self._nodes = self._found(problem, points)
         return self._row(state, lambda: np.tile(problem.ground_acceleration(state.t), (len(points), 1)))
+
+    def _found(self, problem: ContactProblem, points: Array) -> Indices:
+        return problem.system.space.find_nodes(points)
 
     def row(self, report: Report) -> Row:
         old, new, ground = report.old.t, report.new.t, self._problem.ground_acceleration

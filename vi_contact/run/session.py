@@ -15,17 +15,17 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..core.errors import Interrupted
-from ..core.problem import ContactProblem
-from ..core.step import Recorder, Report, Scheme, Solver, State, StepResult
+from ..core.step import Recorder, Report, State, StepResult
 from .files.checkpoint import Problem, RestartPoint
 from .files.log import Progress, versions
 from .files.table import Table
 from .files.writer import Writer
 from .march import March
+from .method import Method
 from .recorders import refuse_overflow
 from .solution import Solution, energy_warning, sampling_warning
 from .stop_signals import StopSignals
-from .time_steps import StepPlan, TimeSteps, described, longest
+from .time_steps import StepPlan, described, longest
 
 log = logging.getLogger(__name__)
 TIMED = 10_000  # the last steps, of which seconds_per_step is the median
@@ -40,7 +40,7 @@ class Comparison(Protocol):
 
 @dataclass
 class Session:
-    """Hold a run under way: the arguments of ``simulate`` that hold for all of it, and where it is.
+    """Hold a run under way: what of the arguments of ``simulate`` holds for all of it, and where it is.
 
     Attributes:
         recorders: the user's, after those of every run.
@@ -48,20 +48,14 @@ class Session:
         resumed_from: the step of the checkpoint that it continues, None for a new run.
     """
 
-    problem: ContactProblem
-    scheme: Scheme
-    solver: Solver
-    time_steps: TimeSteps
-    escalation: Sequence[Solver]
-    tolerance: float
+    method: Method
+    recorders: Sequence[Recorder]
+    table: Table
+    step_plan: StepPlan
+    place: RestartPoint
     checkpoint_every: int
     cross_check: Comparison | None
     progress: bool
-    changed: bool
-    recorders: Sequence[Recorder]
-    table: Table = field(init=False)
-    step_plan: StepPlan = field(init=False)
-    place: RestartPoint = field(init=False)
     resumed_from: int | None = None
     last: Report | None = None
     dt: float = float("nan")
@@ -71,22 +65,22 @@ class Session:
     @property
     def root(self) -> bool:
         """Say whether this is rank 0, the one that speaks."""
-        return self.problem.system.algebra.comm.rank == 0
+        return self.method.problem.system.algebra.comm.rank == 0
 
     def settings(self) -> dict[str, Any]:
         """Return what was asked for, for log and summary."""
-        checked = None if self.cross_check is None else getattr(self.solver, "primary", self.solver)
+        method, problem, solver = self.method, self.method.problem, self.method.solvers[0]
         return {
-            "scheme": repr(self.scheme),
-            "mass": repr(self.problem.mass),
-            "solver": repr(self.solver if checked is None else checked),
-            "dt": described(self.time_steps),
-            "tolerance": self.tolerance,
-            "ranks": self.problem.system.algebra.comm.size,
-            "unknowns": self.problem.system.space.unknowns,
-            "contact_points": self.problem.surface.count,
-            "boundaries": list(self.problem.system.notes),
-            "sampling": sampling_warning(self.problem.excitations, longest(self.time_steps)) or "",
+            "scheme": repr(method.scheme),
+            "mass": repr(problem.mass),
+            "solver": repr(solver if self.cross_check is None else getattr(solver, "primary", solver)),
+            "dt": described(method.dt),
+            "tolerance": method.tolerance,
+            "ranks": problem.system.algebra.comm.size,
+            "unknowns": problem.system.space.unknowns,
+            "contact_points": problem.surface.count,
+            "boundaries": list(problem.system.notes),
+            "sampling": sampling_warning(problem.excitations, longest(method.dt)) or "",
         }
 
     @property
@@ -122,10 +116,7 @@ class Session:
 
     def _march(self, writer: Writer, signals: StopSignals) -> None:
         place = self.place
-        loop = March(
-            self.problem, scheme=self.scheme, solvers=[self.solver, *self.escalation], step_plan=self.step_plan,
-            dt=self.time_steps, state=place.state, tolerance=self.tolerance, base=place.base, halved=place.halved,
-        )
+        loop = March(self.method, self.step_plan, place.state, place.base, place.halved)
         worst, begin = 0.0, time.perf_counter()
         with Progress(self.left, shown=self.progress and self.root) as progress:
             for state, report in loop:
@@ -144,7 +135,7 @@ class Session:
 
     def _stop_if_asked(self, writer: Writer, signals: StopSignals) -> None:
         """Interrupted on all ranks, with a checkpoint, when a signal has reached one of them. Collective."""
-        number = signals.asked(self.problem.system.algebra.comm)
+        number = signals.asked(self.method.problem.system.algebra.comm)
         if number:
             self._checkpoint(writer)
             where = f"after step {self.place.state.k}, t = {self.place.state.t:.6g} s"
@@ -175,13 +166,13 @@ class Session:
     @cached_property
     def _problem(self) -> Problem:
         """What the run is of, for its checkpoints. Collective."""
-        start = self.place.t_start
-        return Problem.of(self.problem, self.scheme, self.time_steps, start, start + self.step_plan.length)
+        method, start = self.method, self.place.t_start
+        return Problem.of(method.problem, method.scheme, method.dt, start, start + self.step_plan.length)
 
     def _rescue(self, writer: Writer, status: str, reason: str, seconds: float) -> None:
         """Save what there is. A checkpoint of the last base step only on one rank: others might not come."""
         with suppress(Exception):
-            if self.problem.system.algebra.comm.size == 1:
+            if self.method.problem.system.algebra.comm.size == 1:
                 self._checkpoint(writer)
         facts: dict[str, Any] = {"status": status, "reason": reason, "steps": self.place.state.k}
         with suppress(Exception):
@@ -222,13 +213,13 @@ class Session:
         """Median time of right-hand side, one back-substitution and update with the same A, from the last state [s]."""
         if self.last is None or not self.last.step.A.factorised:  # none is made for this: it may not fit
             return float("nan")
-        dt, old, A = self.dt, self.last.old, self.last.step.A
-        none = np.zeros(self.problem.surface.count)
+        problem, scheme, dt, old, A = self.method.problem, self.method.scheme, self.dt, self.last.old, self.last.step.A
+        none = np.zeros(problem.surface.count)
         found = []
         for _ in range(LINEAR_STEPS + 1):
             begin = time.perf_counter()
-            step = self.scheme.step(self.problem, old, A, dt)
+            step = scheme.step(problem, old, A, dt)
             x = A.factor.solve(step.b)
-            self.scheme.finish(self.problem, old, step, StepResult(x, none, none.astype(bool), 0, "linear"), dt)
+            scheme.finish(problem, old, step, StepResult(x, none, none.astype(bool), 0, "linear"), dt)
             found.append(time.perf_counter() - begin)
         return float(np.median(found[1:]))  # the first is slower

@@ -12,18 +12,16 @@ from ..core.checks import flag, instance, provides, several, whole
 from ..core.errors import InputError
 from ..core.files import on_root
 from ..core.problem import ContactProblem
-from ..core.state_checks import initial_state, start_time
+from ..core.state_checks import initial_state
 from ..core.step import Columns, Recorder, Row, Scheme, Solver, State
 from ..solvers.certified import TOLERANCE
-from ..solvers.condensed import Condensed
-from .method import bind_companions, check_methods, check_state
-from .defaults import with_defaults
 from .files.checkpoint import RestartPoint, read_checkpoint
 from .files.folder import run_folder
 from .files.lock import locked
 from .files.stored_rows import StoredRows
 from .files.table import Block, Table
 from .files.writer import FieldWriter, Writer
+from .method import Method, checked_method
 from .recorders import Contact, Energy, Steps
 from .session import Comparison, Session
 from .solution import Solution
@@ -56,7 +54,7 @@ def simulate(
 
     Args:
         scheme: None is the trapezoidal rule on redistributed mass, with an impact law the Zienkiewicz-Wood-Taylor step;
-            a problem that names no mass matrix gets the one of the scheme (``run.defaults.with_defaults``).
+            a problem that names no mass matrix gets the one of the scheme (``run.method.with_defaults``).
         solver: Condensed() when None.
         dt: time step [s], or a plan: Schedule, HalvedAtImpact. ``steps``, t_end and checkpoint_every count base steps.
         record: recorders, (Energy(), Contact()) when None; time, iterations and certificate are always recorded.
@@ -79,47 +77,35 @@ def simulate(
             is in the folder then, and summary.json says why the run ended.
     """
     _check_outputs(record, out, restart, checkpoint_every, (progress, changed), fields, cross_check)
-    check_methods("simulate", solver, escalation, tolerance)
-    problem, scheme = with_defaults(problem, scheme)
-    solver = Condensed() if solver is None else solver
-    first = step_plan(dt, steps, t_end, start_time("simulate", state)).dt(0)
-    bind_companions(problem, scheme, dt)
-    scheme.check(problem)
-    solver.check(problem)
-    if state is not None:
-        check_state("simulate", problem, state, dt=first, tolerance=tolerance, scheme=scheme)
-    folder = None if out is None else run_folder(problem.system.algebra.comm, out)
+    solvers = solver, escalation
+    method = checked_method(
+        "simulate", problem, scheme, solvers, dt, steps=steps, t_end=t_end, state=state, tolerance=tolerance
+    )
+    problem, comm = method.problem, method.problem.system.algebra.comm
+    folder = None if out is None else run_folder(comm, out)
+    source = _source(restart, folder)
     recorders: list[Any] = [Steps(problem.system.influence.shape[1])]
     recorders += (Energy(), Contact()) if record is None else record
-    session = Session(
-        problem, scheme, solver, dt, escalation, tolerance, checkpoint_every, cross_check, progress, changed, recorders
-    )
-    source = _source(restart, folder)
-    with locked(problem.system.algebra.comm, folder):
-        stored = _prepare(session, source, state, steps, t_end, on_disk=folder is not None)
-        return session.go(Writer(problem, folder, fields, session.table, stored))
+    with locked(comm, folder):
+        place, checksum = _place(method, source, state, changed)
+        plan = step_plan(dt, steps, t_end, place.t_start)
+        place = replace(place, state=method.scheme.start(problem, place.state, plan.dt(place.base)))
+        table = Table(*_started(problem, recorders, place.state), on_disk=folder is not None)
+        stored = None if source is None else StoredRows(source, table, place.state.k, checksum)
+        if stored is not None:
+            _started(problem, recorders, place.state, _restored(table, stored, comm))
+        session = Session(
+            method, recorders, table, plan, place, checkpoint_every, cross_check, progress,
+            resumed_from=None if stored is None else stored.k,
+        )
+        return session.go(Writer(problem, folder, fields, table, stored))
 
 
-def _prepare(
-    session: Session, source: Path | None, state: State | None, steps: int | None, t_end: float | None, *, on_disk: bool
-) -> StoredRows | None:
-    """Put the session at its first step, or at the checkpoint in ``source``; return the rows before it. Collective."""
-    problem, scheme, dt, recorders = session.problem, session.scheme, session.time_steps, session.recorders
-    checksum = ""
+def _place(method: Method, source: Path | None, state: State | None, changed: bool) -> tuple[RestartPoint, str]:
+    """Where the run begins, and the checksum of the rows before it: at a state, or the checkpoint in ``source``."""
     if source is None:
-        place = RestartPoint.first(initial_state(problem) if state is None else state)
-    else:
-        place, checksum = read_checkpoint(source, problem, scheme=scheme, dt=dt, changed=session.changed)
-    session.step_plan = step_plan(dt, steps, t_end, place.t_start)
-    begun = scheme.start(problem, place.state, session.step_plan.dt(place.base))
-    session.place = place = replace(place, state=begun)
-    session.table = table = Table(*_started(problem, recorders, begun), on_disk=on_disk)
-    if source is None:
-        return None
-    session.resumed_from = place.state.k
-    stored = StoredRows(source, table, place.state.k, checksum)
-    _started(problem, recorders, begun, _restored(table, stored, problem.system.algebra.comm))
-    return stored
+        return RestartPoint.first(initial_state(method.problem) if state is None else state), ""
+    return read_checkpoint(source, method.problem, scheme=method.scheme, dt=method.dt, changed=changed)
 
 
 def _check_outputs(

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.algebra import Indices, Mask
+from ...core.algebra import Array, Indices, Mask
 from ...core.errors import InputError
 from ...core.problem import ContactProblem
 from ...core.step import Columns, Report, Row, State
@@ -24,10 +24,8 @@ class SoilProbe(Probe):
     InputError for a point that is not at the interface.
     """
 
-    def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
-        row = dict(super().start(problem, state, resumed))
-        self._nodes = touched_nodes(problem.surface, self._nodes)
-        return row | self._row(state)
+    def _found(self, problem: ContactProblem, points: Array) -> Indices:
+        return touched_nodes(problem.surface, super()._found(problem, points))
 
 
 def touched_nodes(surface: ContactSurface, nodes: Indices) -> Indices:

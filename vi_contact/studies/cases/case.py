@@ -31,10 +31,10 @@ from ...laws.materials import LinearElastic
 from ...laws.weight import with_weight
 from ...meshes.gmsh_session import MeshScript
 from ...run.cross_check import CrossChecked
-from ...run.defaults import with_defaults
 from ...run.files.folder import run_folder
 from ...run.files.lock import locked
 from ...run.files.writer import FieldWriter
+from ...run.method import with_defaults
 from ...run.recorders import Contact, Energy, Steps
 from ...run.simulate import Solution, simulate
 from ...run.static import static_equilibrium
