@@ -15,9 +15,7 @@ from vi_contact.solvers.normal.lcp import (
     Operator,
     check_gap,
     check_operator,
-    complementarity,
     energy_scale,
-    violation,
 )
 
 
@@ -50,12 +48,17 @@ class LCP:
         d = self._scale
         q, bilateral = self.q * d, self.bilateral
         reaction = r / d
-        unit = violation(q, bilateral) or max_abs(q[np.isfinite(q)]) or max_abs(reaction) or 1.0
-        return complementarity(reaction, self.w(r) * d, bilateral) / unit
+        violation = _complementarity(np.zeros_like(q), q, bilateral)
+        unit = violation or max_abs(q[np.isfinite(q)]) or max_abs(reaction) or 1.0
+        return _complementarity(reaction, self.w(r) * d, bilateral) / unit
 
     @cached_property
     def _scale(self) -> Array:
         return energy_scale(self.G)
+
+
+def _complementarity(r: Array, w: Array, bilateral: Mask) -> float:
+    return max_abs(np.where(bilateral, w, np.minimum(r, w)))
 
 
 def solve(method: Any, problem: LCP, *, guess: Array | Mask | None = None) -> LCPResult:

@@ -30,7 +30,7 @@ from ...core.algebra import Array, Mask, max_abs
 from ...core.checks import provides
 from ...core.errors import InputError, StepFailure
 from ...laws.friction import project
-from ..normal.lcp import EPS, check_gap, energy_scale
+from ..normal.lcp import EPS, check_gap, energy_scale, scaled_symmetric
 
 Iterated = tuple[Array, int, Sequence[float]]  # scaled r, iterations, history
 
@@ -164,17 +164,11 @@ class ScaledDelassus:
         d = G.shape[0] // m if m else 1
         if G.ndim != 2 or G.shape != (m * d, m * d):
             raise InputError(f"The Delassus operator has shape {G.shape} for {m} points: give m d rows, node by node.")
-        if not np.isfinite(G).all():
-            raise InputError("The Delassus operator contains NaN or infinity: check the factorisation it came from.")
         scale = energy_scale(G).reshape(m, d)
         if d > 1:
             scale[:, 1:] = np.mean(scale[:, 1:] ** -2.0, axis=1)[:, None] ** -0.5
         self.scale, self.bilateral, self.count, self.dimension = scale, bilateral.copy(), m, d
-        matrix = scale.ravel()[:, None] * G * scale.ravel()
-        if max_abs(matrix - matrix.T) > 1e-8:
-            raise InputError("The Delassus operator is not symmetric: use a symmetric effective matrix A.")
-        self.matrix = np.ascontiguousarray(0.5 * (matrix + matrix.T))
-        self.norm = float(np.abs(self.matrix).sum(axis=1).max(initial=0.0))
+        self.matrix, self.norm = scaled_symmetric(G, scale.ravel())
 
     def problem(self, q: Array, cohesion: Array, slope: Array) -> ScaledProblem:
         """Return problem (1) in scaled numbers."""

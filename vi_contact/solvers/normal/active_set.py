@@ -22,7 +22,7 @@ from scipy.linalg import lapack
 
 from ...core.algebra import Array, Mask
 from ...core.checks import attributes
-from .lcp import LCPResult, check_guess, cholesky, failure, scaled_dense
+from .lcp import Found, PreparedLCP, ScaledLCP, cholesky, failure, scaled_dense
 
 PATIENCE = 10  # Júdice and Pires, Comput. Oper. Res. 21, 1994
 
@@ -42,46 +42,41 @@ class ActiveSet:
     def __post_init__(self) -> None:
         attributes(self, positive=("tolerance",), counts=("max_iterations",))
 
-    def prepare(self, G: Array, bilateral: Mask) -> PreparedActiveSet:
-        """Check and factor G (m, m) once for many right-hand sides. InputError when it is not SPD."""
-        return PreparedActiveSet(self, G, bilateral)
+    def prepare(self, G: Array, bilateral: Mask) -> PreparedLCP:
+        """Check and factor G (m, m) once for many right-hand sides. InputError when it is not SPD.
 
-
-
-class PreparedActiveSet:
-    """Solve for one G and many q. Remembers the factor of the last set: a step on the same set costs triangular solves
-    only."""
-
-    def __init__(self, method: ActiveSet, G: Array, bilateral: Mask) -> None:
-        self.method = method
-        self._scaled = scaled_dense(G, bilateral)
-        cholesky(self._scaled.matrix)  # if the whole is positive definite, so is every part
-        self._factor = _Factor(np.zeros(bilateral.size, dtype=bool), self._scaled.matrix)
-
-    def solve(self, q: Array, guess: Array | Mask | None = None) -> LCPResult:
-        """Solve the problem of q (m,) [m]. ``guess``: the active set, or reactions whose signs tell it; None: q < 0.
-
-        Raises StepFailure when no set fits within ``max_iterations`` or G is too ill-conditioned for ``tolerance``.
+        The factor of the last set is remembered: a step on the same set costs triangular solves only.
         """
-        scaled = self._scaled
-        gap = scaled.gap(q)
-        unit = scaled.violation(gap)
-        if unit == 0.0:
-            return scaled.no_contact(self.method)
-        r, w, history = self._search(self._start(gap, guess), gap)
-        residual = scaled.complementarity(r, w) / unit
-        if residual > self.method.tolerance:
-            advice = "G is too ill-conditioned; remove contacts that nearly depend on others"
-            raise failure(self.method, iterations=len(history), residual=residual, advice=advice)
-        return scaled.result(r, residual, iterations=len(history), method=self.method, history=history)
+        scaled = scaled_dense(G, bilateral)
+        cholesky(scaled.matrix)  # if the whole is positive definite, so is every part
+        return PreparedLCP(self, scaled, _Sets(self, scaled).search)
 
-    def _start(self, gap: Array, guess: Array | Mask | None) -> Mask:
-        active = gap < 0.0 if guess is None else (check_guess(guess, gap.size) > 0) & (gap < np.inf)
-        return active | self._scaled.bilateral if self._scaled.any_bilateral else active
 
-    def _search(self, active: Mask, gap: Array) -> tuple[Array, Array, tuple[float, ...]]:
-        """The r and w of the first set without wrong signs, and how many rows changed sides in each change."""
+class _Sets:
+    """The sets of one G, with the factor of the last one."""
+
+    def __init__(self, method: ActiveSet, scaled: ScaledLCP) -> None:
+        self.method, self._scaled, self._bilateral = method, scaled, scaled.bilateral
+        self._factor = _Factor(np.zeros(scaled.bilateral.size, dtype=bool), scaled.matrix)
+
+    def search(self, gap: Array, guess: Array | Mask | None, unit: float) -> Found:
+        """Start from the guess, or the signs of guessed reactions; without one, from gap < 0."""
+        active = gap < 0.0 if guess is None else (guess > 0) & (gap < np.inf)
         history: list[float] = []
+        r, w = self._exchange(active | self._bilateral, gap, history)
+        residual = self._scaled.complementarity(r, w) / unit
+        if len(history) > self.method.max_iterations:
+            history.pop()
+            advice = "take a smaller step of time or load, or raise max_iterations"
+        elif residual > self.method.tolerance:
+            advice = "G is too ill-conditioned; remove contacts that nearly depend on others"
+        else:
+            return r, residual, len(history), history
+        raise failure(self.method, iterations=len(history), residual=residual, advice=advice)
+
+    def _exchange(self, active: Mask, gap: Array, history: list[float]) -> tuple[Array, Array]:
+        """The r and w of the first set without wrong signs; adds to ``history`` how many rows changed sides in each
+        change."""
         seen: set[bytes] = set()
         fewest, patience = gap.size + 1, PATIENCE
         while True:
@@ -89,20 +84,22 @@ class PreparedActiveSet:
             wrong = self._wrong(active, r, w)
             count = int(np.count_nonzero(wrong))
             if count == 0:
-                return *self._cut(r, w, gap), tuple(history)
+                return self._cut(r, w, gap)
             fewest, patience = (count, PATIENCE) if count < fewest else (fewest, patience - 1)
             if patience == 0 or active.tobytes() in seen:
-                return *self._descend(self._positive(r), gap, history), tuple(history)
+                return self._descend(self._positive(r), gap, history)
             seen.add(active.tobytes())
-            self._count(history, count, r, w, gap)
+            history.append(float(count))
+            if len(history) > self.method.max_iterations:
+                return r, w
             active = active ^ wrong
 
     def _descend(self, r: Array, gap: Array, history: list[float]) -> tuple[Array, Array]:
         """Lawson–Hanson from an admissible r; adds to ``history``."""
-        active = (r > 0.0) | self._scaled.bilateral
+        active = (r > 0.0) | self._bilateral
         while True:
             target, w = self._on_set(active, gap)
-            leaving = active & ~self._scaled.bilateral & (target < 0.0)
+            leaving = active & ~self._bilateral & (target < 0.0)
             if leaving.any():  # go only as far as the first reaction that vanishes
                 share = np.full(r.size, np.inf)
                 share[leaving] = r[leaving] / (r[leaving] - target[leaving])
@@ -113,19 +110,10 @@ class PreparedActiveSet:
                 if not self._wrong(active, r, w).any():
                     return r, w
                 change = np.arange(r.size) == np.argmin(np.where(active, np.inf, w))
-            self._count(history, int(np.count_nonzero(change)), r, w, gap)
+            history.append(float(np.count_nonzero(change)))
+            if len(history) > self.method.max_iterations:
+                return r, w
             active = active ^ change
-
-    def _count(self, history: list[float], rows: int, r: Array, w: Array, gap: Array) -> None:
-        """Record a change of the set, or raise StepFailure when there have been too many."""
-        if len(history) == self.method.max_iterations:
-            raise failure(
-                self.method,
-                iterations=len(history),
-                residual=self._scaled.complementarity(r, w) / self._scaled.violation(gap),
-                advice="take a smaller step of time or load, or raise max_iterations",
-            )
-        history.append(float(rows))
 
     def _on_set(self, active: Mask, gap: Array) -> tuple[Array, Array]:
         if self._factor.key != active.tobytes():
@@ -134,12 +122,10 @@ class PreparedActiveSet:
 
     def _wrong(self, active: Mask, r: Array, w: Array) -> Mask:
         """Rows whose sign is wrong by more than rounding: grazing rows (r = w = 0) fit either side."""
-        wrong: Mask = np.where(active, r, w) < -self._scaled.rounding(r)
-        return wrong & ~self._scaled.bilateral if self._scaled.any_bilateral else wrong
+        return np.asarray((np.where(active, r, w) < -self._scaled.rounding(r)) & ~self._bilateral)
 
     def _positive(self, r: Array) -> Array:
-        cut: Array = np.maximum(r, 0.0)
-        return np.where(self._scaled.bilateral, r, cut) if self._scaled.any_bilateral else cut
+        return np.where(self._bilateral, r, np.maximum(r, 0.0))
 
     def _cut(self, r: Array, w: Array, gap: Array) -> tuple[Array, Array]:
         """Cut reactions that are negative by rounding, so that r >= 0 holds exactly."""

@@ -18,7 +18,7 @@ from scipy.linalg import lapack
 
 from ...core.algebra import Array, Mask, max_abs
 from ...core.checks import attributes
-from .lcp import EPS, LCPResult, cholesky, failure, scaled_dense
+from .lcp import EPS, Found, PreparedLCP, ScaledLCP, cholesky, failure, scaled_dense
 
 
 @dataclass(frozen=True)
@@ -38,35 +38,26 @@ class Hildreth:
     def __post_init__(self) -> None:
         attributes(self, positive=("tolerance",), counts=("max_sweeps",), flags=("primal", "record"))
 
-    def prepare(self, G: Array, bilateral: Mask) -> PreparedHildreth:
+    def prepare(self, G: Array, bilateral: Mask) -> PreparedLCP:
         """Check G (m, m), and invert it for the primal form. InputError when it is not SPD."""
-        return PreparedHildreth(self, G, bilateral)
+        scaled = scaled_dense(G, bilateral)
+        return PreparedLCP(self, scaled, _Sweeps(self, scaled).search)
 
 
+class _Sweeps:
+    """Of one G: min ½ xᵀHx + cᵀx over x >= lower, with H scaled to unit diagonal, for x = s or x = r."""
 
-class PreparedHildreth:
-    """Solve for one G and many q: min ½ xᵀHx + cᵀx over x >= lower, with H scaled to unit diagonal, for x = s or x = r.
-    """
-
-    def __init__(self, method: Hildreth, G: Array, bilateral: Mask) -> None:
-        self.method = method
-        self._scaled = scaled_dense(G, bilateral)
-        factor = cholesky(self._scaled.matrix)
+    def __init__(self, method: Hildreth, scaled: ScaledLCP) -> None:
+        self.method, self._scaled, bilateral = method, scaled, scaled.bilateral
+        factor = cholesky(scaled.matrix)
         self._H: Array
-        self._H, self._unit = _inverse(factor) if method.primal else (self._scaled.matrix, np.ones(bilateral.size))
+        self._H, self._unit = _inverse(factor) if method.primal else (scaled.matrix, np.ones(bilateral.size))
         fixed = bilateral & method.primal  # s = -q there; in the dual form r is free there
         self._rows = [(i, self._H[i]) for i in np.flatnonzero(~fixed).tolist()]
 
-    def solve(self, q: Array, guess: Array | Mask | None = None) -> LCPResult:
-        """Solve the problem of q (m,) [m]. ``guess``: reactions of a similar problem, or their active set; None: zero.
-
-        Raises StepFailure after ``max_sweeps``.
-        """
+    def search(self, gap: Array, guess: Array | Mask | None, unit: float) -> Found:
+        """Sweep from the guess; without one, from zero."""
         scaled, method = self._scaled, self.method
-        gap = scaled.gap(q)
-        unit = scaled.violation(gap)
-        if unit == 0.0:
-            return scaled.no_contact(method)
         lower = self._lower(gap)
         x = self._start(gap, lower, guess)
         gradient = self._gradient(x, gap)
@@ -81,7 +72,7 @@ class PreparedHildreth:
             r = self._reaction(np.array(x), np.array(lower), gradient)
             error = scaled.complementarity(r, gap + scaled.matrix @ r)
             if error <= max(method.tolerance * unit, self._rounding(x, r)):
-                return scaled.result(r, error / unit, iterations=sweeps, method=method, history=tuple(history))
+                return r, error / unit, sweeps, history
         raise failure(
             method,
             iterations=method.max_sweeps,

@@ -15,7 +15,8 @@ resolve. Gaps that are far from closing do not enter it: a wide gap does not blu
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -25,6 +26,7 @@ from ...core.algebra import Array, Mask, max_abs
 from ...core.errors import InputError, StepFailure
 
 EPS = float(np.finfo(float).eps)
+Found = tuple[Array, float, int, Sequence[float]]  # scaled r, residual over the unit, iterations, history
 
 
 class Operator(Protocol):
@@ -57,25 +59,15 @@ class LCPResult:
 class ScaledLCP:
     """Hold d G d with its scale d: what the methods work on. Everything here is in sqrt(J) or dimensionless."""
 
-    matrix: Any
     scale: Array
-    bilateral: Mask
+    matrix: Any
     norm: float  # of the matrix: bounds the growth of rounding errors
-    any_bilateral: bool = field(init=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "any_bilateral", bool(self.bilateral.any()))
-
-    def gap(self, q: Array) -> Array:
-        """Return the scaled gap; InputError for NaN, -inf, or +inf in a bilateral row."""
-        check_gap(q, self.bilateral)
-        return q * self.scale
+    bilateral: Mask
 
     def reaction(self, guess: Array | Mask | None, q: Array) -> Array:
         """Return a start for iterative methods: the guess itself, one Jacobi step on a guessed set, or zero."""
         if guess is None:
             return np.zeros(q.size)
-        guess = check_guess(guess, q.size)
         start = np.where(guess, np.where(np.isfinite(q), -q, 0.0), 0.0) if guess.dtype == bool else guess / self.scale
         if not np.isfinite(start).all():
             raise InputError("The guessed reactions contain NaN or infinity: pass finite numbers or None.")
@@ -86,33 +78,35 @@ class ScaledLCP:
         return 4.0 * EPS * self.norm * max_abs(r)
 
     def complementarity(self, r: Array, w: Array) -> float:
-        """Return what the function of the same name does, for the rows of this problem."""
-        return complementarity(r, w, self.bilateral) if self.any_bilateral else max_abs(np.minimum(r, w))
-
-    def violation(self, q: Array) -> float:
-        """Return what the function of the same name does, for the rows of this problem."""
-        return violation(q, self.bilateral) if self.any_bilateral else max(0.0, -float(q.min(initial=0.0)))
-
-    def result(
-        self, r: Array, residual: float, *, iterations: int, method: object, history: tuple[float, ...] = ()
-    ) -> LCPResult:
-        """Return the result in newtons."""
-        active = (r > 0.0) | self.bilateral
-        return LCPResult(r * self.scale, active, iterations, residual, method, history)
-
-    def no_contact(self, method: object) -> LCPResult:
-        """Return r = 0, the solution when nothing is violated."""
-        return self.result(np.zeros(self.scale.size), 0.0, iterations=0, method=method)
+        """Return max |min(r, w)| over unilateral rows, max |w| over bilateral ones."""
+        return max_abs(np.where(self.bilateral, w, np.minimum(r, w)))
 
 
-def complementarity(r: Array, w: Array, bilateral: Mask) -> float:
-    """Return max |min(r, w)| over unilateral rows, max |w| over bilateral ones."""
-    return max_abs(np.where(bilateral, w, np.minimum(r, w)))
+@dataclass(frozen=True)
+class PreparedLCP:
+    """Solve problem (1) for one G and many q. ``search``: (scaled gap, guess, unit of the residual) -> what was found.
+    """
 
+    method: object
+    scaled: ScaledLCP
+    search: Callable[[Array, Array | Mask | None, float], Found]
 
-def violation(q: Array, bilateral: Mask) -> float:
-    """Return what complementarity() gives for r = 0."""
-    return max(0.0, float(np.where(bilateral, np.abs(q), -q).max(initial=0.0)))
+    def solve(self, q: Array, guess: Array | Mask | None = None) -> LCPResult:
+        """Solve the problem of q (m,) [m]. ``guess``: reactions of a similar problem, or their active set.
+
+        Raises StepFailure where the method does not reach its tolerance; InputError for NaN, -inf, or +inf in a
+        bilateral row, and for a guess that has not one entry a row.
+        """
+        scaled = self.scaled
+        check_gap(q, scaled.bilateral)
+        if guess is not None and guess.shape != q.shape:
+            raise InputError(f"The guess has shape {guess.shape} but there are {q.size} rows: pass a mask or all "
+                             "reactions.")
+        gap = q * scaled.scale
+        unit = scaled.complementarity(np.zeros(q.size), gap)
+        r, residual, iterations, history = self.search(gap, guess, unit) if unit else (np.zeros(q.size), 0.0, 0, ())
+        active = (r > 0.0) | scaled.bilateral
+        return LCPResult(r * scaled.scale, active, iterations, residual, self.method, tuple(history))
 
 
 def scaled_dense(G: Array, bilateral: Mask) -> ScaledLCP:
@@ -120,14 +114,17 @@ def scaled_dense(G: Array, bilateral: Mask) -> ScaledLCP:
     check_operator(G, bilateral)
     if not isinstance(G, np.ndarray):
         raise InputError("This method needs the Delassus operator as an array: form it, or use ProjectedCG.")
-    if not np.isfinite(G).all():
-        raise InputError("The Delassus operator contains NaN or infinity: check the factorisation it came from.")
     d = energy_scale(G)
+    return ScaledLCP(d, *scaled_symmetric(G, d), bilateral.copy())
+
+
+def scaled_symmetric(G: Array, d: Array) -> tuple[Array, float]:
+    """Return d G d and its norm; InputError when it is not symmetric (to 1e-8)."""
     matrix = np.ascontiguousarray(d[:, None] * G * d)
     if max_abs(matrix - matrix.T) > 1e-8:
         raise InputError("The Delassus operator is not symmetric: use a symmetric effective matrix A.")
     matrix = 0.5 * (matrix + matrix.T)
-    return ScaledLCP(matrix, d, bilateral.copy(), float(np.abs(matrix).sum(axis=1).max(initial=0.0)))
+    return matrix, float(np.abs(matrix).sum(axis=1).max(initial=0.0))
 
 
 def scaled_operator(G: Operator, bilateral: Mask) -> ScaledLCP:
@@ -136,7 +133,7 @@ def scaled_operator(G: Operator, bilateral: Mask) -> ScaledLCP:
     d = energy_scale(G)
     matrix = _Applied(G, d)
     norm = largest_eigenvalue(matrix, d.size) if hasattr(G, "diagonal") else 1.0  # by the choice of d
-    return ScaledLCP(matrix, d, bilateral.copy(), norm)
+    return ScaledLCP(d, matrix, norm, bilateral.copy())
 
 
 class _Applied:
@@ -154,6 +151,8 @@ def energy_scale(G: Array | Operator) -> Array:
     if not hasattr(G, "diagonal"):
         size = int(G.shape[0])
         return np.full(size, largest_eigenvalue(G, size) ** -0.5)
+    if isinstance(G, np.ndarray) and not np.isfinite(G).all():
+        raise InputError("The Delassus operator contains NaN or infinity: check the factorisation it came from.")
     diagonal = np.asarray(G.diagonal(), dtype=float)
     wrong = np.flatnonzero(~(diagonal > 0.0))
     if wrong.size:
@@ -209,13 +208,6 @@ def check_gap(q: Array, bilateral: Mask) -> None:
         raise InputError(f"q has shape {q.shape} but the Delassus operator has {bilateral.size} rows: they must match.")
     if not np.isfinite(q).all() and not np.where(bilateral, np.isfinite(q), q > -np.inf).all():
         raise InputError("q contains NaN, -inf, or +inf in a bilateral row: only +inf in unilateral rows is allowed.")
-
-
-def check_guess(guess: Array | Mask, size: int) -> Array | Mask:
-    """Raise InputError unless the guess, a boolean mask or reactions in newtons, has one entry a row."""
-    if guess.shape != (size,):
-        raise InputError(f"The guess has shape {guess.shape} but there are {size} rows: pass a mask or all reactions.")
-    return guess
 
 
 def failure(method: object, *, iterations: int, residual: float, advice: str) -> StepFailure:

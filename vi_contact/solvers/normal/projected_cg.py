@@ -11,13 +11,14 @@ a step that would leave the quadrant is cut at the boundary and followed by a pr
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from ...core.algebra import Array, Mask
 from ...core.checks import attributes
 from ...core.errors import InputError
-from .lcp import LCPResult, Operator, ScaledLCP, failure, largest_eigenvalue, scaled_dense, scaled_operator
+from .lcp import Found, Operator, PreparedLCP, ScaledLCP, failure, largest_eigenvalue, scaled_dense, scaled_operator
 
 PROPORTION = 1.0  # Gamma; any positive number works, 1 is Dostál's choice
 STEP = 1.5  # of the expansion, in units of 1/‖G‖: less than 2 converges; the rest is for the error of the estimate
@@ -36,53 +37,38 @@ class ProjectedCG:
     def __post_init__(self) -> None:
         attributes(self, positive=("tolerance",), counts=("max_iterations",))
 
-    def prepare(self, G: Array | Operator, bilateral: Mask) -> PreparedCG:
-        """Estimate ‖G‖ by power iteration. G (m, m): an array, or anything with ``shape`` and ``@``."""
-        return PreparedCG(self, G, bilateral)
+    def prepare(self, G: Array | Operator, bilateral: Mask) -> PreparedLCP:
+        """Estimate ‖G‖ by power iteration. G (m, m): an array, or anything with ``shape`` and ``@``.
 
-
-
-class PreparedCG:
-    """Solve for one G and many q. Works on d G d: with a diagonal that is Jacobi preconditioning, which keeps the
-    bounds."""
-
-    def __init__(self, method: ProjectedCG, G: Array | Operator, bilateral: Mask) -> None:
-        self.method = method
-        if isinstance(G, np.ndarray):
-            self._scaled = scaled_dense(G, bilateral)
-            self._norm = largest_eigenvalue(self._scaled.matrix, bilateral.size)
-        else:
-            self._scaled = scaled_operator(G, bilateral)
-            self._norm = self._scaled.norm
-
-    def solve(self, q: Array, guess: Array | Mask | None = None) -> LCPResult:
-        """Solve the problem of q (m,) [m]. ``guess``: reactions of a similar problem, or their active set; None: zero.
-
-        Raises StepFailure after ``max_iterations``, InputError when G proves not to be positive definite.
+        Works on d G d: with a diagonal that is Jacobi preconditioning, which keeps the bounds. Solving raises
+        InputError when G proves not to be positive definite.
         """
-        scaled, method = self._scaled, self.method
-        gap = scaled.gap(q)
-        unit = scaled.violation(gap)
-        if unit == 0.0:
-            return scaled.no_contact(method)
-        face = _Face(scaled, gap, STEP / self._norm)
-        tolerance = method.tolerance * face.projected_norm()  # at r = 0, whatever the guess
+        if isinstance(G, np.ndarray):
+            scaled = scaled_dense(G, bilateral)
+            norm = largest_eigenvalue(scaled.matrix, bilateral.size)
+        else:
+            scaled = scaled_operator(G, bilateral)
+            norm = scaled.norm
+        return PreparedLCP(self, scaled, partial(self._search, scaled, norm))
+
+    def _search(self, scaled: ScaledLCP, norm: float, gap: Array, guess: Array | Mask | None, unit: float) -> Found:
+        """Go from the guess; without one, from zero."""
+        face = _Face(scaled, gap, STEP / norm)
+        tolerance = self.tolerance * face.projected_norm()  # at r = 0, whatever the guess
         face.move_to(scaled.reaction(guess, gap))
         history: list[float] = []
-        while len(history) <= method.max_iterations:
+        while len(history) <= self.max_iterations:
             norm = face.projected_norm()
             if norm <= tolerance or norm <= face.rounding():
                 face.move_to(face.r)  # the gradient afresh: its updates accumulate rounding errors
                 norm = face.projected_norm()
                 if norm <= max(tolerance, face.rounding()):
-                    residual = face.complementarity() / unit
-                    count = len(history)
-                    return scaled.result(face.r, residual, iterations=count, method=method, history=tuple(history))
+                    return face.r, face.complementarity() / unit, len(history), history
             history.append(norm)
             face.advance()
         raise failure(
-            method,
-            iterations=method.max_iterations,
+            self,
+            iterations=self.max_iterations,
             residual=face.complementarity() / unit,
             advice="G is ill-conditioned; raise max_iterations, or form G and use ActiveSet",
         )
