@@ -11,8 +11,6 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,6 +23,7 @@ if not __package__:  # run as a file of the source tree, maybe not installed
 from vi_contact.core.checks import MOST_CELLS, counted
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.command_line import run_script
+from vi_contact.meshes.gmsh_session import options
 
 _TRIANGLE = 2  # Gmsh's number
 _SIZES = {  # the size field alone decides
@@ -77,7 +76,7 @@ class BallMesh:
         model.mesh.field.setString(field, "F", self._size_field())
         model.mesh.field.setAsBackgroundMesh(field)
         sphere = _name_sides(model, volume, self.radius)
-        with _sizes_by_field(gmsh):
+        with options(gmsh, _SIZES):
             model.mesh.generate(3)
         _add_foot(model, sphere, self.foot)
 
@@ -126,19 +125,6 @@ def _add_foot(model: Any, sphere: int, foot: float) -> None:
     entity = model.addDiscreteEntity(2)
     model.mesh.addElementsByType(entity, _TRIANGLE, [], triangles[near].reshape(-1))
     model.setPhysicalName(2, model.addPhysicalGroup(2, [entity]), "foot")
-
-
-@contextmanager
-def _sizes_by_field(gmsh: Any) -> Iterator[None]:
-    """Set options for the length of a with-block."""
-    kept = {option: gmsh.option.getNumber(option) for option in _SIZES}
-    for option, value in _SIZES.items():
-        gmsh.option.setNumber(option, value)
-    try:
-        yield
-    finally:
-        for option, value in kept.items():
-            gmsh.option.setNumber(option, value)
 
 
 if __name__ == "__main__":  # ball.py --radius 0.01 --size 2e-5 --foot 2e-4 -o ball.msh

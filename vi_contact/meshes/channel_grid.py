@@ -5,13 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from vi_contact.meshes.extract import MeshArrays
 from vi_contact.meshes.grid import Array
-from vi_contact.meshes.rows import Rows
-
-Mask = npt.NDArray[np.bool_]
+from vi_contact.meshes.rows import Mask, Rows
 
 
 def channel_grid(x: Sequence[float], y: Sequence[float], size: float, *, triangles: bool = False) -> MeshArrays:
@@ -27,21 +24,20 @@ def channel_grid(x: Sequence[float], y: Sequence[float], size: float, *, triangl
     inside = (x[2] < right) & (right < x[3]) & (up > y[2])
     bodies = [_body(xs, ys, kept, 0.5 * (x[1] + x[4]), triangles) for kept in (notch & ~inside, ~notch)]
     (points, cells, corner), (soil_points, soil_cells, soil_corner) = bodies
-    facets = {f"channel_{side}": _along(xs, ys, corner, *line) for side, line in _interface(x, y).items()}
-    facets |= {
-        "channel_top": np.concatenate([_along(xs, ys, corner, x[i : i + 2], y[3:]) for i in (1, 3)]),
-        "channel_inside": np.concatenate(
-            [_along(xs, ys, corner, *line) for line in ((x[2:3], y[2:]), (x[2:4], y[2:3]), (x[3:4], y[2:]))]
-        ),
+    interface = {"left": [(x[1:2], y[1:])], "base": [(x[1:5], y[1:2])], "right": [(x[4:5], y[1:])]}
+    channel_lines = {f"channel_{side}": line for side, line in interface.items()} | {
+        "channel_top": [(x[1:3], y[3:]), (x[3:5], y[3:])],
+        "channel_inside": [(x[2:3], y[2:]), (x[2:4], y[2:3]), (x[3:4], y[2:])],
     }
-    soil = {f"soil_{side}": _along(xs, ys, soil_corner, *line) for side, line in _interface(x, y).items()}
-    soil |= {
-        "bedrock": _along(xs, ys, soil_corner, (x[0], x[5]), y[:1]),
-        "left_side": _along(xs, ys, soil_corner, x[:1], (y[0], y[3])),
-        "right_side": _along(xs, ys, soil_corner, x[5:], (y[0], y[3])),
-        "surface": np.concatenate([_along(xs, ys, soil_corner, x[i : i + 2], y[3:]) for i in (0, 4)]),
+    soil_lines = {f"soil_{side}": line for side, line in interface.items()} | {
+        "bedrock": [(x, y[:1])], "left_side": [(x[:1], y)], "right_side": [(x[5:], y)],
+        "surface": [(x[:2], y[3:]), (x[4:], y[3:])],
     }
-    facets |= {name: rows + len(points) for name, rows in soil.items()}
+    soil_corner = np.where(soil_corner < 0, -1, soil_corner + len(points))
+    facets = {
+        name: np.concatenate([_along(xs, ys, number, *line) for line in lines])
+        for number, table in ((corner, channel_lines), (soil_corner, soil_lines)) for name, lines in table.items()
+    }
     channel = np.arange(len(cells) + len(soil_cells)) < len(cells)
     return MeshArrays(
         "triangle" if triangles else "quadrilateral",
@@ -50,11 +46,6 @@ def channel_grid(x: Sequence[float], y: Sequence[float], size: float, *, triangl
         {"channel": channel, "soil": ~channel},
         facets,
     )
-
-
-def _interface(x: Sequence[float], y: Sequence[float]) -> dict[str, tuple[Sequence[float], Sequence[float]]]:
-    """Return side -> (range of x, range of y); one number for a line."""
-    return {"left": (x[1:2], (y[1], y[3])), "base": ((x[1], x[4]), y[1:2]), "right": (x[4:5], (y[1], y[3]))}
 
 
 def _divided(places: Sequence[float], size: float) -> Array:
@@ -84,7 +75,7 @@ def _body(xs: Array, ys: Array, kept: Mask, middle: float, triangles: bool) -> t
 
 
 def _along(xs: Array, ys: Array, number: Rows, x: Sequence[float], y: Sequence[float]) -> Rows:
-    """Return the facets of a body on a straight line, between the two values of its longer range."""
+    """Return the facets of a body on a straight line: from x[0] to x[-1] at one y, or from y[0] to y[-1] at one x."""
     i, j = (np.flatnonzero((line >= ends[0]) & (line <= ends[-1])) for line, ends in ((xs, x), (ys, y)))
     nodes = number[np.ix_(i, j)].reshape(-1)
     return np.column_stack([nodes[:-1], nodes[1:]])

@@ -8,11 +8,10 @@ of a facet do.
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
-from vi_contact.meshes.rows import Rows, cell_sides, found_in, number_alike
+from vi_contact.meshes.rows import Mask, Rows, cell_sides, found_in, number_alike
 
 _ROUND_OFF = 1024 * np.finfo(float).eps
 
@@ -39,10 +38,8 @@ def check_cells(points: Array, cells: Rows, cell: str, source: str) -> None:
     noise = _ROUND_OFF * np.abs(points).max() * longest ** (d - 1)  # error of det from the rounding of coordinates
     flat = np.abs(det).min(axis=1) <= noise
     twisted = ~flat & (det.min(axis=1) < 0.0) & (det.max(axis=1) > 0.0)
-    for bad, what in ((flat, "no volume"), (twisted, "crossing sides")):
-        if bad.any():
-            where = _at(points, cells, bad)
-            raise InputError(f"{_count(bad, 'cell')} of {source} {_have(bad)} {what}, {where}: mesh it again")
+    _refuse(flat, "no volume", points, cells, source)
+    _refuse(twisted, "crossing sides", points, cells, source)
 
 
 def check_folds(points: Array, cells: Rows, cell: str, source: str) -> None:
@@ -55,23 +52,18 @@ def check_folds(points: Array, cells: Rows, cell: str, source: str) -> None:
     wrong = (count > 2) | ((count == 2) & (balance != 0.0))
     bad = np.zeros(len(cells), dtype=bool)
     bad[owner[wrong[number]]] = True
-    if bad.any():
-        raise InputError(
-            f"{_count(bad, 'cell')} of {source} {_have(bad)} a neighbour on the same side of a common facet,"
-            f" {_at(points, cells, bad)}: the mesh is folded, mesh it again"
-        )
+    _refuse(bad, "a neighbour on the same side of a common facet", points, cells, source)
 
 
 def check_sides(groups: dict[str, Rows], cells: Rows, cell: str, source: str) -> None:
     """Raise InputError if a facet of a group, given as rows of points, is no side of a cell."""
     sides, *named = number_alike(cell_sides(cells, cell)[0], *groups.values())
     for name, numbers in zip(groups, named, strict=True):
-        missing = ~found_in(numbers, sides)
-        if missing.any():
-            are = "is" if missing.sum() == 1 else "are"
+        if missing := int(np.sum(~found_in(numbers, sides))):
+            facets = "1 facet that is" if missing == 1 else f"{missing} facets that are"
             raise InputError(
-                f"boundary group '{name}' of {source} has {_count(missing, 'facet')} that {are} no side of a cell:"
-                " remove duplicate nodes, and curves or surfaces that do not bound the named cells"
+                f"boundary group '{name}' of {source} has {facets} no side of a cell: remove duplicate nodes, and"
+                " curves or surfaces that do not bound the named cells"
             )
 
 
@@ -85,15 +77,9 @@ def _normals(x: Array) -> Array:
     return np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
 
 
-def _count(bad: npt.NDArray[np.bool_], what: str) -> str:
-    n = int(bad.sum())
-    return f"{n} {what}" if n == 1 else f"{n} {what}s"
-
-
-def _have(bad: npt.NDArray[np.bool_]) -> str:
-    return "has" if bad.sum() == 1 else "have"
-
-
-def _at(points: Array, cells: Rows, bad: npt.NDArray[np.bool_]) -> str:
-    centre = points[cells[bad.argmax()]].mean(axis=0)
-    return f"first at ({', '.join(f'{c:.6g}' for c in centre)})"
+def _refuse(bad: Mask, what: str, points: Array, cells: Rows, source: str) -> None:
+    """Raise InputError that counts the bad cells and says where the first one is."""
+    if bad.any():
+        count, have = ("1 cell", "has") if bad.sum() == 1 else (f"{bad.sum()} cells", "have")
+        where = ", ".join(f"{x:.6g}" for x in points[cells[bad.argmax()]].mean(axis=0))
+        raise InputError(f"{count} of {source} {have} {what}, first at ({where}): mesh it again")

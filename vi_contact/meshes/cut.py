@@ -11,17 +11,15 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.extract import MeshArrays
 from vi_contact.meshes.from_arrays import Source, add_arrays, arrays_of
-from vi_contact.meshes.rows import Rows, cell_sides, number_alike
-
-Mask = npt.NDArray[np.bool_]
+from vi_contact.meshes.rows import Mask, Rows, cell_sides, number_alike
 
 
 @dataclass(frozen=True)
@@ -73,9 +71,7 @@ def cut_open(
     one, other = order[inner], order[inner + 1]  # rows of sides: the two of every inner facet
     cut = np.isin(side[one], wanted)
     if cut.sum() < len(np.unique(wanted)):
-        raise InputError(
-            f"boundary group '{group}' is not between cells everywhere: cut only boundaries inside the mesh"
-        )
+        raise InputError(f"boundary group '{group}' is not between cells everywhere: cut only inner boundaries")
     first = _on_first_side(arrays, group, owner[one[cut]], owner[other[cut]], inside, towards)
     cells, points = _doubled(arrays, np.unique(facets), sides, owner, one[~cut], other[~cut])
 
@@ -152,7 +148,7 @@ def _on_first_side(
 
 def _doubled(
     arrays: MeshArrays, nodes: Rows, sides: Rows, owner: Rows, one: Rows, other: Rows
-) -> tuple[Rows, npt.NDArray[np.float64]]:
+) -> tuple[Rows, Array]:
     """Give each node a copy for every part of its cells that facets (rows `one`, `other`) connect: (cells, points)."""
     n = len(arrays.points)
     around, column = np.nonzero(np.isin(arrays.cells, nodes))

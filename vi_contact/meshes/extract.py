@@ -13,19 +13,16 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.checks import Array, check_cells, check_folds, check_sides
 from vi_contact.meshes.gmsh_session import MeshScript, session
 from vi_contact.meshes.mesh_file import safe_copy
-from vi_contact.meshes.rows import Rows, number_alike
+from vi_contact.meshes.rows import GMSH_NUMBERS, Mask, Rows, number_alike
 
-Mask = npt.NDArray[np.bool_]
-
-_CELLS = {1: "interval", 2: "triangle", 3: "quadrilateral", 4: "tetrahedron", 5: "hexahedron"}
-_FACET = {1: 15, 2: 1, 3: 1, 4: 2, 5: 3}  # Gmsh's element numbers: cell -> its facet
+_Elements = dict[int, tuple[Rows, Rows]]
+"""Gmsh's number of a type -> node tags (n, n_vertices) of its elements, and the entity (n,) that holds each."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,14 +38,6 @@ class MeshArrays:
     cells: Rows
     cell_groups: dict[str, Mask]
     facet_groups: dict[str, Rows]
-
-
-@dataclass(frozen=True, eq=False)
-class _Elements:
-    """Hold elements of one type: Gmsh's node tags (n, n_vertices) and the entity (n,) that holds each."""
-
-    nodes: Rows
-    entity: Rows
 
 
 def arrays_from_file(path: str | Path) -> MeshArrays:
@@ -85,32 +74,29 @@ def extract(gmsh: Any, source: str) -> MeshArrays:
     body, sides = _named_entities(model, d), _named_entities(model, d - 1)
     if both := body.keys() & sides.keys():
         raise InputError(f"{source} calls both cells and facets '{min(both)}': give one of the groups another name")
-    elements = _elements(model, d, _union(body) or [entity for _, entity in model.getEntities(d)])
-    kind = _first_order(model, elements, d, source)
-    tags, cells = np.unique(elements[kind].nodes, return_inverse=True)
+    named = sorted({entity for entities in body.values() for entity in entities})
+    elements = _elements(model, d, named or [entity for _, entity in model.getEntities(d)])
+    cell, number = _first_order(model, elements, d, source)
+    nodes, entity = elements[number]
+    tags, cells = np.unique(nodes, return_inverse=True)
     points = _flat(_coordinates(model, tags, source), d, source)
-    cells = cells.reshape(elements[kind].nodes.shape).astype(np.int64)
+    cells = cells.reshape(nodes.shape).astype(np.int64)
     kept, position = _without_repeats(cells)
     cells = cells[kept]
-    check_cells(points, cells, _CELLS[kind], source)
-    check_folds(points, cells, _CELLS[kind], source)
-    cell_groups = {name: np.zeros(len(cells), dtype=bool) for name in body}
+    check_cells(points, cells, cell, source)
+    check_folds(points, cells, cell, source)
+    cell_groups = {} if body else {"all": np.ones(len(cells), dtype=bool)}
     for name, entities in body.items():
-        cell_groups[name][position[np.isin(elements[kind].entity, entities)]] = True
+        cell_groups[name] = np.zeros(len(cells), dtype=bool)
+        cell_groups[name][position[np.isin(entity, entities)]] = True
     facet_groups = {}
     for name, entities in sides.items():
         what = f"boundary group '{name}' of {source}"
-        facets = _facets(model, entities, _FACET[kind], tags, points, what)
+        facets = _facets(model, entities, GMSH_NUMBERS[cell][1], tags, points, what)
         if len(facets):
             facet_groups[name] = facets
-    check_sides(facet_groups, cells, _CELLS[kind], source)
-    return MeshArrays(
-        cell=_CELLS[kind],
-        points=points,
-        cells=cells,
-        cell_groups=cell_groups or {"all": np.ones(len(cells), dtype=bool)},
-        facet_groups=facet_groups,
-    )
+    check_sides(facet_groups, cells, cell, source)
+    return MeshArrays(cell, points, cells, cell_groups, facet_groups)
 
 
 def _named_entities(model: Any, dim: int) -> dict[str, list[int]]:
@@ -122,27 +108,23 @@ def _named_entities(model: Any, dim: int) -> dict[str, list[int]]:
     return groups
 
 
-def _union(groups: dict[str, list[int]]) -> list[int]:
-    return sorted({entity for entities in groups.values() for entity in entities})
-
-
-def _elements(model: Any, dim: int, entities: Iterable[int]) -> dict[int, _Elements]:
-    """Return the elements of the entities, by Gmsh's element number."""
+def _elements(model: Any, dim: int, entities: Iterable[int]) -> _Elements:
+    """Return the elements of the entities."""
     parts: dict[int, list[tuple[Rows, int]]] = {}
     for entity in entities:
         kinds, tags, nodes = model.mesh.getElements(dim, entity)
         for kind, tag, node in zip(kinds, tags, nodes, strict=True):
             parts.setdefault(int(kind), []).append((np.asarray(node, dtype=np.int64).reshape(len(tag), -1), entity))
     return {
-        kind: _Elements(
+        kind: (
             np.concatenate([rows for rows, _ in found]), np.concatenate([np.full(len(rows), e) for rows, e in found])
         )
         for kind, found in parts.items()
     }
 
 
-def _first_order(model: Any, elements: dict[int, _Elements], dim: int, source: str) -> int:
-    """Return the one type of cell there is."""
+def _first_order(model: Any, elements: _Elements, dim: int, source: str) -> tuple[str, int]:
+    """Return the one type of cell there is: UFL's name and Gmsh's number."""
     if dim == 0 or not elements:
         raise InputError(f"{source} has no cells: mesh the geometry in Gmsh before saving it")
     names = {kind: model.mesh.getElementProperties(kind)[0] for kind in elements}
@@ -153,9 +135,10 @@ def _first_order(model: Any, elements: dict[int, _Elements], dim: int, source: s
         )
     if len(elements) > 1:
         raise InputError(f"{source} mixes cells ({', '.join(sorted(names.values()))}): mesh it with cells of one type")
-    if (kind := next(iter(elements))) not in _CELLS:
-        raise InputError(f"{source} has cells of type {names[kind]}: use {', '.join(_CELLS.values())} cells")
-    return kind
+    known = {number: cell for cell, (number, _) in GMSH_NUMBERS.items()}
+    if (only := next(iter(elements))) not in known:
+        raise InputError(f"{source} has cells of type {names[only]}: use {', '.join(known.values())} cells")
+    return known[only], only
 
 
 def _coordinates(model: Any, tags: Rows, source: str) -> Array:
@@ -203,7 +186,7 @@ def _facets(model: Any, entities: list[int], kind: int, tags: Rows, points: Arra
         return np.empty((0, 1), dtype=np.int64)
     if list(found) != [kind]:
         raise InputError(f"{what} is not of the shapes of the cells' sides: mesh body and boundary together")
-    nodes = found[kind].nodes
+    nodes, _ = found[kind]
     place = np.minimum(np.searchsorted(tags, nodes), len(tags) - 1)
     rows = np.where(tags[place] == nodes, place, -1)
     if (rows < 0).any():

@@ -6,17 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from vi_contact.meshes.extract import MeshArrays, arrays_from_file, arrays_from_script
 from vi_contact.meshes.gmsh_session import MeshScript
-from vi_contact.meshes.rows import Rows, number_alike
+from vi_contact.meshes.rows import GMSH_NUMBERS, Mask, Rows, number_alike
 
 Source = MeshScript | str | Path
-
-_TYPES = {  # Gmsh's numbers of a cell and of its side
-    "interval": (1, 15), "triangle": (2, 1), "quadrilateral": (3, 1), "tetrahedron": (4, 2), "hexahedron": (5, 3),
-}
 
 
 def arrays_of(source: Source) -> MeshArrays:
@@ -27,7 +22,7 @@ def arrays_of(source: Source) -> MeshArrays:
 def add_arrays(gmsh: Any, arrays: MeshArrays) -> None:
     """Add a mesh to the empty current model: its points in order, a discrete entity for every set of groups."""
     d = arrays.points.shape[1]
-    cell, side = _TYPES[arrays.cell]
+    cell, side = GMSH_NUMBERS[arrays.cell]
     points = np.zeros((len(arrays.points), 3))
     points[:, :d] = arrays.points
     home = gmsh.model.addDiscreteEntity(d)  # holds the nodes
@@ -36,7 +31,7 @@ def add_arrays(gmsh: Any, arrays: MeshArrays) -> None:
     _add_groups(gmsh, d - 1, side, *_members(arrays.facet_groups))
 
 
-def _members(groups: dict[str, Rows]) -> tuple[Rows, dict[str, npt.NDArray[np.bool_]]]:
+def _members(groups: dict[str, Rows]) -> tuple[Rows, dict[str, Mask]]:
     """Return the rows of all groups, each once, and which of them are in each group."""
     if not groups:
         return np.zeros((0, 1), dtype=np.int64), {}
@@ -46,7 +41,7 @@ def _members(groups: dict[str, Rows]) -> tuple[Rows, dict[str, npt.NDArray[np.bo
     return rows, {name: np.isin(unique, own) for name, own in zip(groups, numbers, strict=True)}
 
 
-def _add_groups(gmsh: Any, dim: int, kind: int, rows: Rows, groups: dict[str, npt.NDArray[np.bool_]]) -> None:
+def _add_groups(gmsh: Any, dim: int, kind: int, rows: Rows, groups: dict[str, Mask]) -> None:
     """Add the physical groups of elements that may be in several."""
     if not groups:
         return

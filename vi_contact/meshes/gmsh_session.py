@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import inspect
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Protocol
@@ -13,7 +13,7 @@ from typing import Any, Protocol
 from vi_contact.core.errors import InputError
 
 M_PERTURB = -6  # of malloc.h
-_OPTIONS = {
+_OPTIONS: dict[str, float] = {
     "General.Terminal": 0,
     "General.NumThreads": 1,  # with the seed: the same mesh every time
     "Mesh.RandomSeed": 1,
@@ -47,20 +47,29 @@ def session(name: str = "vi_contact") -> Iterator[Any]:
     if not borrowed:
         _initialise(gmsh)
     current = gmsh.model.getCurrent()
-    options = {option: gmsh.option.getNumber(option) for option in _OPTIONS}
     try:
-        for option, value in _OPTIONS.items():
-            gmsh.option.setNumber(option, value)
-        gmsh.model.add(name)
-        yield gmsh
+        with options(gmsh, _OPTIONS):
+            gmsh.model.add(name)
+            yield gmsh
     finally:
         if borrowed:
             gmsh.model.remove()
             gmsh.model.setCurrent(current)
-            for option, value in options.items():
-                gmsh.option.setNumber(option, value)
         else:
             gmsh.finalize()
+
+
+@contextmanager
+def options(gmsh: Any, wanted: Mapping[str, float]) -> Iterator[None]:
+    """Set Gmsh's options for the length of a with-block."""
+    kept = {option: gmsh.option.getNumber(option) for option in wanted}
+    try:
+        for option, value in wanted.items():
+            gmsh.option.setNumber(option, value)
+        yield
+    finally:
+        for option, value in kept.items():
+            gmsh.option.setNumber(option, value)
 
 
 def write(mesh: MeshScript, path: str | Path) -> None:

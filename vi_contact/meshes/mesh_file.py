@@ -28,18 +28,17 @@ def safe_copy(file: Path, folder: Path) -> Path:
     InputError for a file that is missing, empty, no MSH file (a script most of all), cut short, or that announces more
     nodes or cells than it has bytes.
     """
+    copy = folder / "mesh.msh"
     try:
         there = file.is_file()
-    except OSError as error:  # a name that is too long, a folder that may not be looked into
-        raise InputError(f"mesh file {shown(str(file))} cannot be read ({error.strerror}): check the path") from None
+        if there:
+            shutil.copyfile(file, copy)
+    except OSError as error:  # a name that is too long, what may not be looked into
+        why = f"{error.strerror}): check the path and its permissions"
+        raise InputError(f"mesh file {shown(str(file))} cannot be read ({why}") from None
     if not there:
         what = str(file) if "\0" not in str(file) else shown(str(file))
         raise InputError(f"mesh file {what} does not exist: check the path or write it with a script of folder meshes")
-    copy = folder / "mesh.msh"
-    try:
-        shutil.copyfile(file, copy)
-    except OSError as error:
-        raise InputError(f"mesh file {file} cannot be read ({error.strerror}): check its permissions") from None
     if copy.stat().st_size == 0:
         raise InputError(f"mesh file {file} is empty: write it again")
     with open(copy, "rb") as opened, mmap.mmap(opened.fileno(), 0, access=mmap.ACCESS_READ) as data:

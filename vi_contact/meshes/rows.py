@@ -6,6 +6,12 @@ import numpy as np
 import numpy.typing as npt
 
 Rows = npt.NDArray[np.int64]
+Mask = npt.NDArray[np.bool_]
+
+GMSH_NUMBERS = {
+    "interval": (1, 15), "triangle": (2, 1), "quadrilateral": (3, 1), "tetrahedron": (4, 2), "hexahedron": (5, 3),
+}
+"""Gmsh's numbers of a cell, called by UFL's name, and of its side."""
 
 _SIDES: dict[str, list[tuple[int, ...]]] = {
     "interval": [(0,), (1,)],
@@ -38,7 +44,7 @@ def number_alike(*tables: Rows) -> list[Rows]:
     return np.split(numbers.astype(np.int64), np.cumsum([len(table) for table in tables])[:-1])
 
 
-def found_in(numbers: Rows, among: Rows) -> npt.NDArray[np.bool_]:
+def found_in(numbers: Rows, among: Rows) -> Mask:
     """Tell which of the numbers (>= 0) occur among the others."""
     known = np.zeros(max(numbers.max(initial=0), among.max(initial=0)) + 1, dtype=bool)
     known[among] = True
