@@ -107,11 +107,11 @@ def test_ball_script_runs_by_file(tmp_path):
 @pytest.mark.parametrize(
     ("wrong", "word"),
     [
-        ({"size": 0.0}, "0 < size <= foot < radius"),
-        ({"foot": 0.02}, "0 < size <= foot < radius"),
-        ({"radius": float("nan")}, "0 < size <= foot < radius"),
-        ({"growth": 0.0}, "growth 0.0 of the cells of a ball must be positive"),
-        ({"coarsest": 1.0e-5}, "coarsest cell 1e-05 m must lie between the size"),
+        ({"size": 0.0}, "size is 0.0; give a finite number above zero"),
+        ({"foot": 0.02}, "they must be size <= foot < radius"),
+        ({"radius": float("nan")}, "radius is nan; give a finite number above zero"),
+        ({"growth": 0.0}, "growth is 0.0; give a finite number above zero"),
+        ({"coarsest": 1.0e-5}, "coarsest cell 1e-05 m: they must be"),
     ],
 )
 def test_sizes_that_make_no_ball_are_refused(wrong, word):

@@ -94,9 +94,9 @@ def test_the_mesh_of_a_symmetric_layer_is_symmetric(triangles):
         ({"wall": 2.0}, "does not fit a layer 8.0 m deep"),
         ({"height": 8.0}, "soil under it"),
         ({"left": 20.0}, "needs soil on both sides"),
-        ({"size": 0.0}, "size is 0.0 m"),
+        ({"size": 0.0}, "size is 0.0; give a finite number above zero"),
         ({"size": 0.5, "far": 0.25}, "at least those at it, 0.5 m"),
-        ({"depth": float("nan")}, "depth is nan m"),
+        ({"depth": float("nan")}, "depth is nan; give a finite"),
     ],
 )
 def test_no_such_mesh(wrong, sentence):

@@ -20,7 +20,7 @@ import numpy as np
 if not __package__:  # run as a file of the source tree, maybe not installed
     sys.path[0] = str(Path(__file__).resolve().parents[2])
 
-from vi_contact.core.checks import MOST_CELLS, counted
+from vi_contact.core.checks import MOST_CELLS, attributes, counted
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.command_line import run_script
 from vi_contact.meshes.gmsh_session import options
@@ -53,14 +53,10 @@ class BallMesh:
     eighth: bool = False
 
     def __post_init__(self) -> None:
-        sizes = (self.size, self.foot, self.radius)
-        if not all(math.isfinite(length) for length in sizes) or not 0.0 < self.size <= self.foot < self.radius:
-            raise InputError(f"ball of radius {self.radius} m, cell size {self.size} m, foot {self.foot} m: they must"
-                             " be 0 < size <= foot < radius")
-        if not (math.isfinite(self.growth) and self.growth > 0.0):
-            raise InputError(f"growth {self.growth} of the cells of a ball must be positive: give 0.1 to 0.5")
-        if not self.size <= self._largest <= self.radius:
-            raise InputError(f"coarsest cell {self.coarsest} m must lie between the size {self.size} m and the radius")
+        attributes(self, positive=("radius", "size", "foot", "growth"))
+        if not (self.size <= self.foot < self.radius and self.size <= self._largest <= self.radius):
+            raise InputError(f"ball of radius {self.radius} m, cell size {self.size} m, foot {self.foot} m, coarsest"
+                             f" cell {self._largest} m: they must be size <= foot < radius, size <= coarsest <= radius")
         cells = (self.foot / self.size) ** 3 + (self.radius / self._largest) ** 3
         counted("ball", f"a cell size of {self.size} m", cells, "cells", most=MOST_CELLS)
 

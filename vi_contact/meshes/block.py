@@ -57,7 +57,10 @@ class BlockMesh:
             nodes = nodes + np.asarray(self.corner)
         if self.deform is not None:
             nodes = np.asarray(self.deform(nodes.reshape(-1, nodes.shape[-1]))).reshape(nodes.shape)
-        return _turn(nodes, self.angle)
+        if self.angle:
+            x, y, c, s = nodes[..., 0], nodes[..., 1], math.cos(self.angle), math.sin(self.angle)
+            nodes = np.concatenate([np.stack([c * x - s * y, s * x + c * y], axis=-1), nodes[..., 2:]], axis=-1)
+        return nodes
 
     def build(self, gmsh: Any) -> None:
         """Add the block to Gmsh's current model."""
@@ -73,16 +76,6 @@ def check_box(lengths: Sequence[float], divisions: Sequence[int]) -> None:
     if not all(n == n // 1 and n >= 1 for n in divisions):
         raise InputError(f"divisions {tuple(divisions)} must be whole numbers of cells, at least 1")
     counted("mesh", f"divisions {tuple(divisions)}", math.prod(divisions), "cells", most=MOST_CELLS)
-
-
-def _turn(nodes: Array, angle: float) -> Array:
-    if not angle:
-        return nodes
-    c, s = math.cos(angle), math.sin(angle)
-    turned = nodes.copy()
-    turned[..., 0] = c * nodes[..., 0] - s * nodes[..., 1]
-    turned[..., 1] = s * nodes[..., 0] + c * nodes[..., 1]
-    return turned
 
 
 if __name__ == "__main__":  # block.py --lengths 2 1 --divisions 4 2 --simplices -o block.msh

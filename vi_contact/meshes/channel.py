@@ -20,7 +20,7 @@ from typing import Any
 if not __package__:  # run as a file of the source tree, maybe not installed
     sys.path[0] = str(Path(__file__).resolve().parents[2])
 
-from vi_contact.core.checks import MOST_CELLS, counted
+from vi_contact.core.checks import MOST_CELLS, attributes, counted
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.channel_grid import channel_grid
 from vi_contact.meshes.command_line import run_script
@@ -51,10 +51,8 @@ class ChannelMesh:
     triangles: bool = False
 
     def __post_init__(self) -> None:
-        lengths = {name: getattr(self, name) for name in ("width", "depth", "outer_width", "height", "wall", "slab")}
-        for name, length in (lengths | {"size": self.size, "far": self.far}).items():
-            if length is not None and not (math.isfinite(length) and length > 0.0):
-                raise InputError(f"channel: {name} is {length} m, give a positive number of metres")
+        given = () if self.far is None else ("far",)
+        attributes(self, positive=("width", "depth", "outer_width", "height", "wall", "slab", "size", *given))
         if not (2.0 * self.wall < self.outer_width and self.slab < self.height < self.depth):
             raise InputError(
                 f"channel {self.outer_width} x {self.height} m with walls of {self.wall} m and a slab of {self.slab} m "

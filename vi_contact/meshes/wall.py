@@ -7,7 +7,6 @@ defaults are the mesh of the published example: 8 x 12 cells, 40 boundary nodes 
 
 from __future__ import annotations
 
-import math
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -44,9 +43,9 @@ class WallMesh:
         if self.divisions is not None and self.size is not None:
             raise InputError("a wall takes either divisions or a cell size: leave one of them out")
         check_box((self.width, self.height), self.divisions or _PUBLISHED)
-        if self.size is not None and not (math.isfinite(self.size) and 0.0 < self.size <= min(self.width, self.height)):
-            raise InputError(f"cell size {self.size} m must be positive and no larger than the wall's sides")
         if self.size is not None:
+            if not 0.0 < self.size <= min(self.width, self.height):
+                raise InputError(f"cell size {self.size} m must be positive and no larger than the wall's sides")
             cells = self.width / self.size * (self.height / self.size)
             counted("wall", f"a cell size of {self.size} m", cells, "cells", most=MOST_CELLS)
 
