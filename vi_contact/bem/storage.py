@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Any
 
@@ -10,38 +9,32 @@ import numpy as np
 
 from ..core import checks
 from ..core.errors import InputError
+from ..core.files import hdf5_atomically
 from ..laws.materials import LinearElastic
 from .boundary_mesh import BoundaryMesh
 from .boundary_operators import check_body
-from .element_pairs import ElementPairs
 from .energetic import EnergeticBlocks, energetic_blocks
 from .quadrature import Orders
 
 FORMAT = "vi_contact boundary element blocks, 2"
-EARLIER = "vi_contact boundary element blocks, 1"  # the same numbers but for thin and sharp bodies
 EQUAL = 1e-12  # relative difference up to which geometry, speeds and time step count as equal
 
 
 def save_blocks(path: str | Path, blocks: EnergeticBlocks) -> None:
     """Write the blocks; an existing file is replaced once the new one is complete."""
-    import h5py
-
     checks.instance("save_blocks", "blocks", blocks, EnergeticBlocks, "give those of energetic_blocks")
-    target = checks.path("save_blocks", "path", path)
-    if not target.parent.is_dir():
-        raise InputError(f"save_blocks: there is no folder {checks.shown(str(target.parent))}; make it first")
-    unfinished = target.with_name(f"{target.name}.{os.getpid()}.part")
-    mesh = blocks.mesh
+    target, mesh = _target("save_blocks", path), blocks.mesh
+
+    def fill(file: Any) -> None:
+        file.attrs.update(format=FORMAT, c_p=blocks.c_p, c_s=blocks.c_s, dt=blocks.dt, exterior=mesh.exterior)
+        file["points"], file["loop_sizes"] = mesh.points, np.array(mesh.loop_sizes)
+        file["single"], file["double"] = blocks.single, blocks.double
+        if blocks.hyper is not None:
+            file["hyper"] = blocks.hyper
+
     try:
-        with h5py.File(unfinished, "w") as file:
-            file.attrs.update(format=FORMAT, c_p=blocks.c_p, c_s=blocks.c_s, dt=blocks.dt, exterior=mesh.exterior)
-            file["points"], file["loop_sizes"] = mesh.points, np.array(mesh.loop_sizes)
-            file["single"], file["double"] = blocks.single, blocks.double
-            if blocks.hyper is not None:
-                file["hyper"] = blocks.hyper
-        unfinished.replace(target)
+        hdf5_atomically(target, fill)
     except OSError as error:
-        unfinished.unlink(missing_ok=True)
         raise InputError(f"save_blocks: {target.name} cannot be written ({checks.shown(str(error))}); give a file in a "
                          "folder with room that may be written to") from error
 
@@ -78,11 +71,8 @@ def load_blocks(
 def _read(
     name: str, file: Any, mesh: BoundaryMesh, material: LinearElastic, dt: float, steps: int, hyper: bool
 ) -> EnergeticBlocks:
-    if file.attrs.get("format") not in (FORMAT, EARLIER):
+    if file.attrs.get("format") != FORMAT:
         raise InputError(f"{name}: no boundary element blocks of this version; give a file written by save_blocks")
-    if file.attrs["format"] == EARLIER and ElementPairs(mesh).close.any():
-        raise InputError(f"{name} was written by an earlier version, whose integrals were wrong for bodies as thin or "
-                         "sharp as this one; assemble the operator and save it again")
     different = [*_differences(file, mesh, material, dt), *_missing(file, steps, hyper)]
     if different:
         raise InputError(f"{name} holds the operator of another problem ({'; '.join(different)}); "
@@ -100,13 +90,18 @@ def stored_blocks(
     path: str | Path, mesh: BoundaryMesh, material: LinearElastic, *, dt: float, steps: int, hyper: bool = True
 ) -> EnergeticBlocks:
     """Load the blocks if the file exists, else compute and save them."""
-    if checks.path("stored_blocks", "path", path).exists():
+    if _target("stored_blocks", path).exists():
         return load_blocks(path, mesh, material, dt=dt, steps=steps, hyper=hyper)
-    if not Path(path).parent.is_dir():
-        raise InputError(f"stored_blocks: there is no folder {checks.shown(str(Path(path).parent))}; make it first")
     blocks = energetic_blocks(mesh, material, dt=dt, steps=steps, hyper=hyper)
     save_blocks(path, blocks)
     return blocks
+
+
+def _target(owner: str, path: str | Path) -> Path:
+    target = checks.path(owner, "path", path)
+    if not target.parent.is_dir():
+        raise InputError(f"{owner}: there is no folder {checks.shown(str(target.parent))}; make it first")
+    return target
 
 
 def _differences(file: Any, mesh: BoundaryMesh, material: LinearElastic, dt: float) -> list[str]:
