@@ -25,11 +25,11 @@ from typing import Any
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ[name] = "1"
 ROOT = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "bem"), str(ROOT / "tests" / "support")]
 
 import numpy as np  # noqa: E402
 from plane_waves import MATERIAL, SQUARE, pulse  # noqa: E402
-from test_bem_energetic import echoes, smooth_integral, smooth_load  # noqa: E402
+from test_energetic import echoes, smooth_integral, smooth_load  # noqa: E402
 
 from vi_contact import Tresca, bem  # noqa: E402
 from vi_contact.bem.contact import BoundaryContact  # noqa: E402
@@ -50,10 +50,9 @@ def discretised(method: str, k: int) -> tuple[Problem, Callable[[Forces], np.nda
     if method == "energetic":
         operator = bem.PoincareSteklov(bem.energetic_blocks(mesh, MATERIAL, dt=dt, steps=steps), MATERIAL.rho)
         return lambda *a, **more: bem.BoundaryProblem(operator, *a, **more), lambda forces: forces(dt, steps)
-    quadrature = bem.ConvolutionQuadrature(getattr(bem, method)())
-    transformed = bem.convolution_operator(mesh, MATERIAL, quadrature=quadrature, dt=dt, steps=steps)
+    transformed = bem.convolution_operator(mesh, MATERIAL, method=getattr(bem, method)(), dt=dt, steps=steps)
     return (lambda *a, **more: bem.ConvolutionProblem(transformed, *a, **more),
-            lambda forces: quadrature.substep_means(forces, dt=dt, steps=steps))
+            transformed.frequencies.substep_means)
 
 
 def row(method: str, k: int) -> dict[str, float]:

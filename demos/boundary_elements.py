@@ -267,6 +267,6 @@ def table(numbers: dict[str, float]) -> str:
 
 
 # Things to try: ELEMENTS of twice the number; bem.SpaceTimeUzawa(rho=...), whose iterations depend on rho;
-# bem.ConvolutionQuadrature instead of the energetic method; vc.cross_check(..., references=[run]).
+# bem.convolution_operator instead of the energetic method; vc.cross_check(..., references=[run]).
 if __name__ == "__main__":
     main()

@@ -15,7 +15,7 @@ from vi_contact.bem import (
     BoundaryProblem,
     ConvolutionOperator,
     ConvolutionProblem,
-    ConvolutionQuadrature,
+    Frequencies,
     Galerkin,
     LaplaceKernels,
     PoincareSteklov,
@@ -40,8 +40,7 @@ METHODS = {"BDF2": BDF2(), "trapezoid": Trapezoid(), "Radau": RadauIIA()}
 def operators() -> dict[tuple[str, int], ConvolutionOperator]:
     """Squares of 5 and 10 elements a side, c_P dt = h, six crossings of the square."""
     return {
-        (name, k): convolution_operator(polygon(SQUARE, 1.0 / k), MATERIAL, quadrature=ConvolutionQuadrature(method),
-                                        dt=1.0 / k, steps=6 * k)
+        (name, k): convolution_operator(polygon(SQUARE, 1.0 / k), MATERIAL, method=method, dt=1.0 / k, steps=6 * k)
         for name, method in METHODS.items() for k in (5, 10)
     }
 
@@ -69,8 +68,7 @@ def rod(operator: ConvolutionOperator, load) -> ConvolutionProblem:
     def forces(dt: float, steps: int) -> np.ndarray:
         return traction_forces(mesh, lambda x, n, t: n * load(t), dt=dt, steps=steps, elements=mesh.labels == 2)
 
-    quadrature = ConvolutionQuadrature(operator.frequencies.method)
-    means = quadrature.substep_means(forces, dt=operator.dt, steps=operator.steps)
+    means = operator.frequencies.substep_means(forces)
     return ConvolutionProblem(operator, means, fixed, contact=mesh.labels == 0)
 
 
@@ -85,7 +83,6 @@ def top_error(operator: ConvolutionOperator, load, integral) -> float:
 def test_weights_of_an_oscillator(name, order):
     """C(s) = 1/(s² + 0.6 s + 9) under sin⁴ t against the exact answer: the order of the method; held g: order 2."""
     w2, damping, end, errors, held = 9.0, 0.6, 4.0, [], []
-    quadrature = ConvolutionQuadrature(METHODS[name])
 
     def transfer(s):
         return 1.0 / (s**2 + damping * s + w2)
@@ -97,10 +94,10 @@ def test_weights_of_an_oscillator(name, order):
     for steps in (80, 160):
         dt = end / steps
         exact = oscillator(w2, damping, dt * np.arange(1, steps + 1))
-        table = quadrature.frequencies(dt=dt, steps=steps)
-        weights = table.contour.backward((table.held_factors * transfer(table.s)).sum(axis=1))
+        table = Frequencies(METHODS[name], dt, steps)
+        weights = table.backward((table.held_factors * transfer(table.s)).sum(axis=1))
         held.append(np.abs(np.convolve(weights, means(dt, steps))[:steps] - exact).max() / np.abs(exact).max())
-        modes = table.s * transfer(table.s) * table.impulses(quadrature.substep_means(means, dt=dt, steps=steps))
+        modes = table.s * transfer(table.s) * table.impulses(table.substep_means(means))
         errors.append(np.abs(table.at_ends(modes) - exact).max() / np.abs(exact).max())
     assert errors[1] < 6e-3 and np.log2(errors[0] / errors[1]) > order - 0.1
     assert held[1] < 6e-3 and np.log2(held[0] / held[1]) > 1.9
@@ -162,8 +159,7 @@ def test_rod_under_a_step(operators, name, top, pressure, greatest):
 def test_small_steps_stay_bounded(method, ratio, end):
     """B11: the rod (top exactly 1 at most) with |s| h/c_S up to 100; fewer points on touching elements give 250."""
     dt = 0.5 * ratio
-    operator = convolution_operator(polygon(SQUARE, 0.5), MATERIAL, quadrature=ConvolutionQuadrature(method), dt=dt,
-                                    steps=round(end / dt))
+    operator = convolution_operator(polygon(SQUARE, 0.5), MATERIAL, method=method, dt=dt, steps=round(end / dt))
     motion = rod(operator, smooth_load).solve()
     assert np.abs(motion.displacement[motion.times > end - 10.0, 1]).max() < 1.25
 
@@ -256,15 +252,14 @@ def test_prescribed_motion_gives_the_forces_back(operators, name):
 
 def test_density_and_the_unsymmetric_form(operators):
     """Twice the density at the same speeds halves the compliance; the unsymmetric form converges to the same rod."""
-    mesh, quadrature = operators["BDF2", 5].mesh, ConvolutionQuadrature(BDF2())
+    mesh = operators["BDF2", 5].mesh
     heavy = LinearElastic.from_wave_speeds(1.0, 0.5, 2.0)
     light, twice = (
-        rod(convolution_operator(mesh, material, quadrature=quadrature, dt=0.2, steps=8), smooth_load).condensed()
+        rod(convolution_operator(mesh, material, method=BDF2(), dt=0.2, steps=8), smooth_load).condensed()
         for material in (MATERIAL, heavy)
     )
     assert np.allclose(2.0 * twice.W, light.W)
-    other = convolution_operator(polygon(SQUARE, 0.1), MATERIAL, quadrature=ConvolutionQuadrature(Trapezoid()), dt=0.1,
-                                 steps=60, symmetric=False)
+    other = convolution_operator(polygon(SQUARE, 0.1), MATERIAL, method=Trapezoid(), dt=0.1, steps=60, symmetric=False)
     assert top_error(other, smooth_load, smooth_integral) < 0.04
 
 
@@ -272,19 +267,19 @@ def test_errors(operators):
     """One sentence each, naming the thing and the remedy."""
     operator = operators["BDF2", 5]
     n, steps = len(operator.mesh), operator.steps
-    forces, bdf2 = np.zeros((steps, 2, n)), ConvolutionQuadrature(BDF2())
+    forces = np.zeros((steps, 2, n))
     with pytest.raises(InputError, match="give BDF2"):
-        ConvolutionQuadrature("bdf2")
+        Frequencies("bdf2", 0.1, 3)
     with pytest.raises(InputError, match="above zero"):
-        bdf2.frequencies(dt=-1.0, steps=3)
+        Frequencies(BDF2(), -1.0, 3)
     for count in (0, 2.5):
         with pytest.raises(InputError, match="at least 1"):
-            bdf2.frequencies(dt=0.1, steps=count)
+            Frequencies(BDF2(), 0.1, count)
     for dt, remedy in ((1e-3, "enlarge"), (10.0, "reduce")):
         with pytest.raises(InputError, match=remedy):
-            convolution_operator(operator.mesh, MATERIAL, quadrature=bdf2, dt=dt, steps=3)
+            convolution_operator(operator.mesh, MATERIAL, method=BDF2(), dt=dt, steps=3)
     with pytest.raises(InputError, match=r"0.3, too small for Trapezoid.* needs 0.5"):
-        convolution_operator(operator.mesh, MATERIAL, quadrature=ConvolutionQuadrature(Trapezoid()), dt=0.06, steps=3)
+        convolution_operator(operator.mesh, MATERIAL, method=Trapezoid(), dt=0.06, steps=3)
     with pytest.raises(InputError, match="forces has shape"):
         ConvolutionProblem(operator, forces[1:])
     with pytest.raises(InputError, match="prescribed has shape"):

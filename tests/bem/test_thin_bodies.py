@@ -11,7 +11,6 @@ from vi_contact.bem import (
     BoundaryMesh,
     BoundaryProblem,
     ConvolutionProblem,
-    ConvolutionQuadrature,
     Marching,
     Orders,
     PoincareSteklov,
@@ -135,9 +134,8 @@ def test_thin_rod_by_convolution_quadrature(ratio):
     """The same rod of h/20 with Radau IIA: 2 % off the exact one, with small steps too."""
     h = 0.2
     mesh, dt, steps = slab(h / 20, h), h * ratio, round(1.2 / (h * ratio))
-    quadrature = ConvolutionQuadrature()
-    operator = convolution_operator(mesh, MATERIAL, quadrature=quadrature, dt=dt, steps=steps)
-    forces = quadrature.substep_means(lambda dt, steps: pulled(mesh, dt, steps)[0], dt=dt, steps=steps)
+    operator = convolution_operator(mesh, MATERIAL, dt=dt, steps=steps)
+    forces = operator.frequencies.substep_means(lambda dt, steps: pulled(mesh, dt, steps)[0])
     motion = ConvolutionProblem(operator, forces, pulled(mesh, dt, 1)[1]).solve()
     assert error(motion.displacement, motion.times, mesh) < 0.02
 

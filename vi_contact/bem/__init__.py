@@ -5,7 +5,7 @@ from .boundary_operators import Galerkin, OperatorMatrices
 from .contact import BoundaryContact, Conditions, conditions_on
 from .contact_run import ContactLedger, ContactRun, ledger, march_contact
 from .convolution_operator import ConvolutionOperator, ConvolutionProblem, convolution_operator
-from .convolution_quadrature import ConvolutionQuadrature, Frequencies
+from .convolution_quadrature import BDF2, Frequencies, RadauIIA, Trapezoid
 from .energetic import EnergeticBlocks, Marching, energetic_blocks
 from .fundamental_solution import LaplaceKernels, TimeKernels
 from .interior import interior_displacement
@@ -14,16 +14,15 @@ from .poincare_steklov import BoundaryMotion, BoundaryProblem, CondensedComplian
 from .quadrature import Orders
 from .radial_table import RadialTable
 from .storage import load_blocks, save_blocks, stored_blocks
-from .time_methods import BDF2, RadauIIA, TimeMethod, Trapezoid
 from .two_bodies import TwoBodies
 from .uzawa_space_time import SpaceTimeUzawa
 
 __all__ = [
     "BDF2", "BoundaryContact", "BoundaryMesh", "BoundaryMotion", "BoundaryProblem", "CondensedCompliance",
-    "Conditions", "ContactLedger", "ContactRun", "ConvolutionOperator", "ConvolutionProblem",
-    "ConvolutionQuadrature", "EnergeticBlocks", "Frequencies", "Galerkin", "LaplaceKernels", "Marching",
-    "OperatorMatrices", "Orders", "PoincareSteklov", "RadauIIA", "RadialTable", "SpaceTimeUzawa",
-    "TimeKernels", "TimeMethod", "Trapezoid", "TwoBodies", "circle", "conditions_on", "convolution_operator",
+    "Conditions", "ContactLedger", "ContactRun", "ConvolutionOperator", "ConvolutionProblem", "EnergeticBlocks",
+    "Frequencies", "Galerkin", "LaplaceKernels", "Marching", "OperatorMatrices", "Orders", "PoincareSteklov",
+    "RadauIIA", "RadialTable", "SpaceTimeUzawa", "TimeKernels", "Trapezoid", "TwoBodies", "circle", "conditions_on",
+    "convolution_operator",
     "energetic_blocks", "from_segments", "interior_displacement", "ledger", "load_blocks", "march_contact",
     "polygon", "save_blocks", "smooth_curve", "stored_blocks", "traction_forces",
 ]

@@ -19,7 +19,7 @@ from ..core.errors import InputError
 from ..laws.materials import LinearElastic
 from .boundary_mesh import BoundaryMesh
 from .boundary_operators import check_body
-from .convolution_quadrature import ConvolutionQuadrature, Frequencies
+from .convolution_quadrature import Frequencies, RadauIIA, TimeMethod
 from .energetic import NUMBERS, check_time_step
 from .fundamental_solution import LaplaceKernels
 from .poincare_steklov import BodyProblem, BoundaryMotion, CondensedCompliance
@@ -80,28 +80,27 @@ def convolution_operator(
     mesh: BoundaryMesh,
     material: LinearElastic,
     *,
-    quadrature: ConvolutionQuadrature,
     dt: float,
     steps: int,
+    method: TimeMethod = RadauIIA(),
     symmetric: bool = True,
     orders: Orders = ORDERS,
 ) -> ConvolutionOperator:
-    """Assemble S for `steps` time steps of dt [s]; memory 96 steps stages n² bytes.
+    """Assemble S for `steps` time steps of dt [s]; method: BDF2(), Trapezoid() or RadauIIA(); 96 steps stages n² bytes.
 
     Raises InputError for a time step too small (c_P dt/h < 0.05, for the trapezoidal rule 0.5) or too large (> 8) for
     the mesh, or for less than one step.
     """
     check_body(mesh, material, orders)
-    instance("convolution_operator", "quadrature", quadrature, ConvolutionQuadrature, "give a ConvolutionQuadrature()")
     flag("convolution_operator", "symmetric", symmetric)
-    table = quadrature.frequencies(dt=dt, steps=steps)
+    table = Frequencies(method, dt, steps)
     counted("convolution_operator", f"{table.s.size} frequencies of {len(mesh)} elements",
             24 * table.s.size * len(mesh) ** 2, "numbers", most=NUMBERS)
     check_time_step(mesh, material.c_p, dt)
     ratio = material.c_p * dt / float(mesh.lengths.max())
-    if ratio < quadrature.method.smallest_ratio * (1.0 - 1e-9):
-        raise InputError(f"convolution_operator: c_P dt / h is {ratio:.3g}, too small for {quadrature.method}, which "
-                         f"needs {quadrature.method.smallest_ratio:g}; enlarge the time step or refine the mesh")
+    if ratio < method.smallest_ratio * (1.0 - 1e-9):
+        raise InputError(f"convolution_operator: c_P dt / h is {ratio:.3g}, too small for {method}, which "
+                         f"needs {method.smallest_ratio:g}; enlarge the time step or refine the mesh")
     n, rho, count = len(mesh), material.rho, table.s.size
     galerkin = RadialTable(mesh, material.c_s, PANEL * material.c_s * dt, orders)
     steklov, to_traction = np.empty((count, 2 * n, 2 * n), complex), np.empty((count, 4 * n, 2 * n), complex)
@@ -120,7 +119,7 @@ class ConvolutionProblem(BodyProblem):
     """Describe what BoundaryProblem is for the energetic method: a body with supports, loads and perhaps contact.
 
     forces: nodal forces of the loads [N/m], (steps, 2, n) means over the steps, or (steps, stages, 2, n) means between
-    the stages (ConvolutionQuadrature.substep_means); fixed: (2, n) mask of supported unknowns; prescribed: their
+    the stages (Frequencies.substep_means); fixed: (2, n) mask of supported unknowns; prescribed: their
     displacement (steps, 2, n) [m] at the ends of the steps, zero if None; contact: (n,) mask of the elements of the
     contact boundary. Everything else is free of traction. Raises InputError for wrong shapes and what is no mask.
     """
@@ -158,7 +157,7 @@ class ConvolutionProblem(BodyProblem):
             inverse = np.linalg.solve(matrices[:, free][:, :, free], units[None])[:, places]
             at_z[np.ix_(moving, moving)] = np.einsum("i,icd->cd", factors, inverse)
         u_free = self.solve().displacement.reshape(len(self.times), -1)[:, unknowns]
-        return self._compliance(table.contour.backward(transform), u_free)
+        return self._compliance(table.backward(transform), u_free)
 
     def _displacement_modes(self, impulses: NDArray) -> NDArray:
         """Return (L, stages, 2n) displacements at the frequencies; prescribed ones move evenly during each step."""
