@@ -31,7 +31,7 @@ from .quadrature import Orders, point_sets
 
 TURN = np.array([[0.0, -1.0], [1.0, 0.0]])  # M u = TURN du/dtau
 SLOPE = np.array([-1.0, 1.0])  # derivative of the two shape functions times the length
-N_SINGLE, N_DOUBLE, N_HYPER = 3, 8, 10
+N_SINGLE, N_DOUBLE = 3, 8
 
 
 def check_body(mesh: BoundaryMesh, material: LinearElastic, orders: Orders) -> None:
@@ -44,10 +44,10 @@ def check_body(mesh: BoundaryMesh, material: LinearElastic, orders: Orders) -> N
 
 @dataclass(frozen=True)
 class OperatorMatrices:
-    """Hold single (4n, 4n) <V p, psi>, double (4n, 2n) <K u, psi>, hyper (2n, 2n) <D u, v>; None if not asked."""
+    """Hold single (4n, 4n) <V p, psi>, double (4n, 2n) <K u, psi>, hyper (2n, 2n) <D u, v>, None if not asked."""
 
-    single: NDArray | None
-    double: NDArray | None
+    single: NDArray
+    double: NDArray
     hyper: NDArray | None
 
 
@@ -65,28 +65,20 @@ class Galerkin:
         self.pairs = ElementPairs(mesh)
 
     def assemble(self, kernels: Callable[[Array], KernelSet], fronts: Sequence[float] = ()) -> OperatorMatrices:
-        """Return the matrices of the operators whose kernels are not None."""
-        moments, which = self._moments(kernels, fronts)
-        parts: list[NDArray | None] = []
-        for method, count in ((self._single, N_SINGLE), (self._double, N_DOUBLE), (self._hyper, N_HYPER)):
-            present = which[len(parts)]
-            parts.append(method(moments[:count]) if present else None)
-            moments = moments[count if present else 0 :]
-        return OperatorMatrices(*parts)
+        """Return the matrices of the operators that the kernels have."""
+        single, double, hyper = np.split(self._moments(kernels, fronts), (N_SINGLE, N_SINGLE + N_DOUBLE))
+        return OperatorMatrices(self._single(single), self._double(double), self._hyper(hyper) if len(hyper) else None)
 
-    def _moments(self, kernels: Callable, fronts: Sequence[float]) -> tuple[NDArray, tuple[bool, ...]]:
+    def _moments(self, kernels: Callable, fronts: Sequence[float]) -> NDArray:
         """Return (k, pairs, 2, 2) integrals [m²] of the stacked kernels against phi_a(x) phi_b(y)."""
-        total, which = None, (False, False, False)
+        total: NDArray = np.empty(0)
         for points in point_sets(self.pairs, fronts, self.orders):
-            kernel_set = kernels(points.r)
-            values = integrands(kernel_set, points.d, points.r)
-            if total is None:
+            values = integrands(kernels(points.r), points.d, points.r)
+            if not len(total):
                 total = np.zeros((len(values), len(self.pairs), 4), values.dtype)
-                which = (kernel_set.single is not None, kernel_set.double is not None, kernel_set.hyper is not None)
             total[:, points.pairs] += points.integrate(values)
-        assert total is not None
         total *= (np.hypot(*self.pairs.a) * np.hypot(*self.pairs.b))[:, None]
-        return total.reshape(len(total), -1, 2, 2), which
+        return total.reshape(len(total), -1, 2, 2)
 
     def _single(self, moments: NDArray) -> NDArray:
         n, e, f = len(self.mesh), self.pairs.first, self.pairs.second
@@ -174,15 +166,12 @@ def _tensor(m: NDArray) -> NDArray:
 
 
 def integrands(kernels: KernelSet, d: Array, r: Array) -> NDArray:
-    """Return (k, m) integrands of the wanted operators at d = x - y, in the order their methods read them."""
+    """Return (k, m) integrands of the operators at d = x - y, in the order their methods read them."""
     xx, xy, yy = d[0] ** 2 / r**2, d[0] * d[1] / r**2, d[1] ** 2 / r**2
-    rows: list[NDArray] = []
-    if kernels.single is not None:
-        g1, g2 = kernels.single
-        rows += [g1 - g2 * xx, -g2 * xy, g1 - g2 * yy]
-    if kernels.double is not None:
-        phi, dphi, ddiff, g1, g2 = kernels.double
-        rows += [dphi * d[0], dphi * d[1], ddiff * d[0], ddiff * d[1], phi, g1 - g2 * xx, -g2 * xy, g1 - g2 * yy]
+    g1, g2 = kernels.single
+    rows = [g1 - g2 * xx, -g2 * xy, g1 - g2 * yy]
+    phi, dphi, ddiff, g1, g2 = kernels.double
+    rows += [dphi * d[0], dphi * d[1], ddiff * d[0], ddiff * d[1], phi, g1 - g2 * xx, -g2 * xy, g1 - g2 * yy]
     if kernels.hyper is not None:
         phi, dphi, ddiff, g1, g2, inertia_p, inertia_s = kernels.hyper
         rows += [inertia_p, inertia_s, phi, g1 - g2 * xx, -g2 * xy, g1 - g2 * yy,

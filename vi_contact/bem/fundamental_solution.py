@@ -62,10 +62,10 @@ class HypersingularKernels(NamedTuple):
 
 
 class KernelSet(NamedTuple):
-    """Hold what the Galerkin layer integrates; an operator whose kernels are None is not assembled."""
+    """Hold what the Galerkin layer integrates; without kernels of its own the hypersingular operator is left out."""
 
-    single: SingleLayerKernels | None = None
-    double: DoubleLayerKernels | None = None
+    single: SingleLayerKernels
+    double: DoubleLayerKernels
     hyper: HypersingularKernels | None = None
 
 

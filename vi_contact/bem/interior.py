@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.sparse import csc_matrix
 
 from ..core.algebra import Array
 from ..core.checks import array, instance, integers, shape_of
@@ -15,6 +14,7 @@ from .boundary_mesh import BoundaryMesh
 from .boundary_operators import N_SINGLE, double_local, integrands, joined_at_nodes
 from .fundamental_solution import TimeKernels
 from .poincare_steklov import BoundaryMotion, PoincareSteklov
+from .quadrature import at_points
 from .rules import pieces, roots, smoothed, stretched
 
 ORDER, CLOSEST = 8, 1e-3  # points a piece; least distance from the boundary in element lengths
@@ -88,9 +88,7 @@ def _moments(mesh: BoundaryMesh, x: Array, t: float, c_p: float, c_s: float) -> 
         heard = r < c_p * t
         d, r, eta, owner, weight = d[:, heard], r[heard], eta[heard], owner[heard], weight[heard]
         values = integrands(kernels(r), d, r)
-        shapes = np.stack([1.0 - eta, eta], axis=1) * weight[:, None]
-        rows = 2 * owner[:, None] + np.arange(2)
-        matrix = csc_matrix((shapes.ravel(), rows.ravel(), np.arange(0, 2 * len(r) + 1, 2)), (2 * count * n, len(r)))
+        matrix = at_points(np.stack([1.0 - eta, eta], axis=1) * weight[:, None], owner, count * n)
         yield np.asarray(matrix @ values.T).T.reshape(len(values), count * n, 2)
 
 

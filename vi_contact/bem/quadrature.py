@@ -69,15 +69,29 @@ class PointSet:
 
     def integrate(self, values: NDArray) -> NDArray:
         """Return (k, p, 4) integrals of (k, m) values times phi_a(xi) phi_b(eta), [2 a + b], phi = 1 - x, x."""
-        shapes = np.stack(
-            [(1 - self.xi) * (1 - self.eta), (1 - self.xi) * self.eta, self.xi * (1 - self.eta), self.xi * self.eta], 1
-        ) * self.weight[:, None]
         if self.owner is None:
-            return values.reshape(len(values), len(self.pairs), -1) @ shapes
-        rows = 4 * self.owner[:, None] + np.arange(4)
-        columns = np.arange(0, 4 * len(self.owner) + 1, 4)
-        matrix = csc_matrix((shapes.ravel(), rows.ravel(), columns), shape=(4 * len(self.pairs), len(self.owner)))
-        return np.asarray(matrix @ values.T).T.reshape(len(values), len(self.pairs), 4)
+            return values.reshape(len(values), len(self.pairs), -1) @ self._weighted
+        return np.asarray(self.shapes() @ values.T).T.reshape(len(values), len(self.pairs), 4)
+
+    def shapes(self) -> csc_matrix:
+        """Return (4 p, m) weighted shape functions: their product with values at the points integrates them."""
+        count = len(self.pairs)
+        owner = np.repeat(np.arange(count), len(self.weight)) if self.owner is None else self.owner
+        weighted = np.tile(self._weighted, (count, 1)) if self.owner is None else self._weighted
+        return at_points(weighted, owner, count)
+
+    @property
+    def _weighted(self) -> Array:
+        """Return (m, 4) weight times phi_a(xi) phi_b(eta), or one block of them."""
+        xi, eta = self.xi, self.eta
+        return np.stack([(1 - xi) * (1 - eta), (1 - xi) * eta, xi * (1 - eta), xi * eta], 1) * self.weight[:, None]
+
+
+def at_points(weighted: Array, owner: Index, count: int) -> csc_matrix:
+    """Return (k count, m) that adds up values at m points times k weighted shape functions (m, k) of their owners."""
+    k = weighted.shape[1]
+    rows, columns = k * owner[:, None] + np.arange(k), np.arange(0, weighted.size + 1, k)
+    return csc_matrix((weighted.ravel(), rows.ravel(), columns), shape=(k * count, len(owner)))
 
 
 def point_sets(pairs: ElementPairs, fronts: Sequence[float], orders: Orders = Orders()) -> Iterator[PointSet]:

@@ -24,7 +24,7 @@ from ..core.checks import counted, number
 from .boundary_mesh import BoundaryMesh
 from .boundary_operators import Galerkin
 from .fundamental_solution import TWO_PI, KernelSet
-from .quadrature import Orders, PointSet, point_sets
+from .quadrature import Orders, point_sets
 
 POINTS = 16  # Chebyshev points of a panel
 PANELS = 100_000  # of equal width
@@ -63,7 +63,7 @@ class RadialTable(Galerkin):
         blocks: list[list[csr_matrix]] = [[] for _ in range(6)]
         poles, order = [], []
         for points in point_sets(self.pairs, (), self.orders):
-            shapes, inverse = _shapes(points), 1.0 / points.r**2
+            shapes, inverse = points.shapes(), 1.0 / points.r**2
             interpolation = self.interpolation(points.r)
             for block, factor in zip(blocks, _factors(points.d, inverse), strict=True):
                 block.append(shapes.multiply(factor).tocsr() @ interpolation)
@@ -74,7 +74,7 @@ class RadialTable(Galerkin):
         matrices = [vstack(block).tocsr()[back].multiply(jacobian[:, None]).tocsr() for block in blocks]
         return matrices, np.concatenate(poles, axis=1)[:, back] * jacobian
 
-    def _moments(self, kernels: Callable, fronts: Sequence[float]) -> tuple[NDArray, tuple[bool, ...]]:
+    def _moments(self, kernels: Callable, fronts: Sequence[float]) -> NDArray:
         kernel_set: KernelSet = kernels(self.nodes)
         assert kernel_set.hyper is not None and not len(fronts)
         phi, dphi, ddiff, g1, g2, inertia_p, inertia_s = kernel_set.hyper
@@ -86,7 +86,7 @@ class RadialTable(Galerkin):
         normal = [along[0][0] + self._pole[0], along[1][0] + self._pole[1]]
         gradient = [along[0][1], along[1][1]]
         rows = [*tensor, *normal, *gradient, phi, *tensor, inertia_p, inertia_s, phi, *tensor, *normal, *gradient]
-        return np.stack(rows).reshape(len(rows), -1, 2, 2), (True, True, True)
+        return np.stack(rows).reshape(len(rows), -1, 2, 2)
 
 
 def _product(matrix: csr_matrix, columns: list[NDArray]) -> NDArray:
@@ -97,16 +97,3 @@ def _product(matrix: csr_matrix, columns: list[NDArray]) -> NDArray:
 
 def _factors(d: Array, inverse: Array) -> tuple[Array, ...]:
     return np.ones_like(inverse), d[0] ** 2 * inverse, d[0] * d[1] * inverse, d[1] ** 2 * inverse, d[0], d[1]
-
-
-def _shapes(points: PointSet) -> csr_matrix:
-    """Return (4 pairs, m) weighted shape functions: their product with values at the points integrates them."""
-    xi, eta, weight, owner = points.xi, points.eta, points.weight, points.owner
-    if owner is None:
-        repeats = len(points.pairs)
-        owner = np.repeat(np.arange(repeats), len(xi))
-        xi, eta, weight = np.tile(xi, repeats), np.tile(eta, repeats), np.tile(weight, repeats)
-    values = np.stack([(1 - xi) * (1 - eta), (1 - xi) * eta, xi * (1 - eta), xi * eta], axis=1) * weight[:, None]
-    rows, columns = 4 * owner[:, None] + np.arange(4), np.repeat(np.arange(len(owner))[:, None], 4, axis=1)
-    shape = (4 * len(points.pairs), len(owner))
-    return csr_matrix((values.ravel(), (rows.ravel(), columns.ravel())), shape=shape)
