@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
 
@@ -25,7 +24,7 @@ HISTORY, SHAPES = "history.csv", "shapes.npz"
 
 
 @dataclass(frozen=True)
-class BeamStudy:
+class BeamStudy(TimoshenkoBeam):
     """Hold data of the beam in SI units, by default those of the source (docs/theory/beam.md).
 
     Normal force: a ``reading`` of the source's, "A", "B", "C" (default) or "none"; or ``force``, constant [N]; or
@@ -34,13 +33,6 @@ class BeamStudy:
     [m per step]. free_end: a tip that may turn and shear without locking, not the source's last rotation function.
     """
 
-    length: float = 5.0
-    rho: float = 1.0
-    area: float = 1.0
-    inertia: float = 1.0
-    E: float = 100.0
-    G: float = 100.0
-    shear_factor: float = 1.0
     viscosity: float = 0.001
     reading: str | None = None
     force: float | None = None
@@ -61,16 +53,15 @@ class BeamStudy:
     @cached_property
     def stepper(self) -> BeamStepper:
         """Return the beam with its force and its friction; InputError for numbers out of range."""
-        beam = TimoshenkoBeam(
-            self.length, self.rho, self.area, self.inertia, self.E, self.G, self.shear_factor, self.viscosity
-        )
+        beam = TimoshenkoBeam(*(getattr(self, one.name) for one in fields(TimoshenkoBeam)))
         counted("beam", f"elements {self.elements}", self.elements, "elements", most=100_000)
         elements = Elements(self.elements) if self.free_end else published_elements(self.elements)
         law = ExactFriction() if self.exact else RegularisedFriction(self.eps)
         if not self.dt > 0.0 or not self.t_end >= self.dt:
             raise InputError(f"dt is {self.dt:g} s and t_end {self.t_end:g} s: give 0 < dt <= t_end")
         counted("beam", f"t_end {self.t_end:g} at dt {self.dt:g}", self.t_end / self.dt, "steps")
-        mu = published_mu if self.mu is None else _constant(self.mu)
+        constant = self.mu
+        mu = published_mu if constant is None else lambda t, rate: constant
         return BeamStepper(beam, elements, self.dt, self._force(elements), mu, law)
 
     @property
@@ -113,10 +104,6 @@ class BeamStudy:
             plot_tips({"tip": run}, folder / "tip.png", title="Motion of the tip"),
             plot_shapes(run, folder / "shapes.png", span=(0.0, end), title="The beam"),
         ]
-
-
-def _constant(mu: float) -> Callable[[float, float], float]:
-    return lambda t, rate: mu
 
 
 def read_beam_run(folder: Path) -> BeamRun:
