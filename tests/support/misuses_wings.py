@@ -89,7 +89,7 @@ def operators() -> Table:
     fields = {"fixed": MASK, "contact": MASK, "prescribed": but(histories, "none")}
     return [
         (bem.energetic_blocks, body | {"dt": 0.5, "steps": 2}, BODY | {
-            "dt": POSITIVE | {"small": 1e-6, "great": 50.0}, "steps": STEPS | {"endless": 10**12}, "hyper": FLAG,
+            "dt": POSITIVE | {"small": 1e-6, "great": 50.0}, "steps": STEPS | {"endless": 10**12},
             "orders": OTHER | {"numbers": (4, 8)}}),
         (bem.convolution_operator, body | {"dt": 0.5, "steps": 2}, BODY | {
             "method": OTHER | {"class": bem.BDF2}, "dt": POSITIVE, "steps": STEPS, "symmetric": FLAG}),

@@ -16,7 +16,7 @@ from ..core.verify import kkt_residual
 from ..solvers.certified import TOLERANCE
 from ..solvers.condensed import Condensed
 from .contact import BoundaryContact
-from .poincare_steklov import BoundaryMotion
+from .poincare_steklov import BoundaryMotion, work
 
 
 def march_contact(
@@ -107,8 +107,7 @@ class ContactRun:
     @property
     def work(self) -> Array:
         """Return (steps,) work of all contact forces on the body up to each time [J/m]."""
-        increments = np.diff(self.displacement, axis=0, prepend=0.0)
-        return np.cumsum((self.forces * increments).sum(axis=1))
+        return work(self.forces, self.displacement)
 
     @property
     def friction_loss(self) -> Array:
@@ -151,12 +150,9 @@ def ledger(run: ContactRun, motion: BoundaryMotion, loads: Array, *, supported: 
                          "motion of this run, BoundaryProblem.solve(run.forces)")
     if supported is not None:
         mask("ledger", "supported", supported, motion.displacement.shape[1:])
-    increments = np.diff(motion.displacement, axis=0, prepend=0.0)
-    support = np.zeros(len(run.times))
-    if supported is not None:
-        support = np.cumsum((motion.forces * increments * supported).sum(axis=(1, 2)))
-        loads = np.where(supported, 0.0, loads)
-    load = np.cumsum((loads * increments).sum(axis=(1, 2)))
+    held = np.zeros(loads.shape[1:], bool) if supported is None else supported
+    support = work(np.where(held, motion.forces, 0.0), motion.displacement)
+    load = work(np.where(held, 0.0, loads), motion.displacement)
     return ContactLedger(motion.work, load, run.work, support, run.friction_loss)
 
 

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, lu_factor, lu_solve
 
 from ..core.algebra import Array
-from ..core.checks import array, attributes, counted, flag, instance, mask, number, shape_of, whole
+from ..core.checks import array, attributes, counted, instance, mask, number, shape_of, whole
 from ..core.errors import InputError
 from ..laws.materials import LinearElastic
 from .boundary_mesh import BoundaryMesh
@@ -38,7 +38,7 @@ SMALLEST_RATIO, GREATEST_RATIO = 0.05, 8.0  # limits of c_P dt / h
 class EnergeticBlocks:
     """Hold the blocks of density 1; they depend on the mesh, the wave speeds and the time step only.
 
-    single: (steps, 4n, 4n); double: (steps, 4n, 2n); hyper: (steps, 2n, 2n), None for the unsymmetric form alone.
+    single: (steps, 4n, 4n); double: (steps, 4n, 2n); hyper: (steps, 2n, 2n).
     """
 
     mesh: BoundaryMesh
@@ -47,7 +47,7 @@ class EnergeticBlocks:
     dt: float
     single: Array
     double: Array
-    hyper: Array | None
+    hyper: Array
 
     def __post_init__(self) -> None:
         instance("EnergeticBlocks", "mesh", self.mesh, BoundaryMesh, "give a BoundaryMesh")
@@ -56,7 +56,7 @@ class EnergeticBlocks:
         shapes = {"single": (*steps, 4 * n, 4 * n), "double": (*steps, 4 * n, 2 * n), "hyper": (*steps, 2 * n, 2 * n)}
         for name, shape in shapes.items():
             found = shape_of(getattr(self, name))
-            if found != shape and not (name == "hyper" and self.hyper is None):
+            if found != shape:
                 raise InputError(f"EnergeticBlocks: {name} has shape {found}; a mesh of {n} elements needs {shape}: "
                                  "use energetic_blocks(...)")
 
@@ -78,32 +78,28 @@ def check_time_step(mesh: BoundaryMesh, c_p: float, dt: float) -> None:
 
 
 def energetic_blocks(
-    mesh: BoundaryMesh, material: LinearElastic, *, dt: float, steps: int, hyper: bool = True, orders: Orders = Orders()
+    mesh: BoundaryMesh, material: LinearElastic, *, dt: float, steps: int, orders: Orders = Orders()
 ) -> EnergeticBlocks:
-    """Assemble the blocks of `steps` time steps of dt [s]; memory 224 steps n² bytes (192 without `hyper`).
+    """Assemble the blocks of `steps` time steps of dt [s]; memory 224 steps n² bytes.
 
     Raises InputError for a time step far too small or large for the mesh, and for a body too thin or sharp for it.
     """
     check_body(mesh, material, orders)
-    flag("boundary elements", "hyper", hyper)
     steps = whole("boundary elements", "the number of time steps", steps, least=1)
     counted("boundary elements", f"{steps} steps of {len(mesh)} elements", 28 * steps * len(mesh) ** 2, "numbers",
             most=NUMBERS)
     check_time_step(mesh, material.c_p, dt)
     galerkin, n, c_p, c_s = Galerkin(mesh, material.c_s, orders), len(mesh), material.c_p, material.c_s
-    single, double = np.empty((steps, 4 * n, 4 * n)), np.empty((steps, 4 * n, 2 * n))
-    curved = np.empty((steps, 2 * n, 2 * n)) if hyper else None
-    a, b, c = np.zeros_like(single[0]), np.zeros_like(double[0]), np.zeros((2 * n, 2 * n))
-    change = np.zeros_like(c)
+    single, double, hyper = (np.empty((steps, rows, columns)) for rows, columns in (
+        (4 * n, 4 * n), (4 * n, 2 * n), (2 * n, 2 * n)))
+    a, b, c, change = (np.zeros_like(blocks[0]) for blocks in (single, double, hyper, hyper))
     for j in range(steps):
         t = (j + 1) * dt
-        now = galerkin.assemble(TimeKernels(t, c_p, c_s, hyper), (c_s * t, c_p * t))
-        single[j], double[j] = now.single - a, (now.double - b) / dt
-        a, b = now.single, now.double
-        if curved is not None and now.hyper is not None:
-            curved[j] = (now.hyper - c - change) / dt**2
-            change, c = now.hyper - c, now.hyper
-    return EnergeticBlocks(mesh, c_p, c_s, dt, single, double, curved)
+        now = galerkin.assemble(TimeKernels(t, c_p, c_s), (c_s * t, c_p * t))
+        assert now.hyper is not None
+        single[j], double[j], hyper[j] = now.single - a, (now.double - b) / dt, (now.hyper - c - change) / dt**2
+        a, b, c, change = now.single, now.double, now.hyper, now.hyper - c
+    return EnergeticBlocks(mesh, c_p, c_s, dt, single, double, hyper)
 
 
 @dataclass(frozen=True)
@@ -127,9 +123,6 @@ class Marching:
 
     def __init__(self, blocks: EnergeticBlocks, fixed: NDArray[np.bool_], *, symmetric: bool = True) -> None:
         instance("Marching", "blocks", blocks, EnergeticBlocks, "give those of energetic_blocks")
-        if symmetric and blocks.hyper is None:
-            raise InputError("these boundary element blocks have no hypersingular operator; assemble them with "
-                             "hyper=True or use the unsymmetric form")
         fixed = mask("Marching", "fixed", fixed, (2 * len(blocks.mesh),))
         self.blocks, self.symmetric, self.free = blocks, symmetric, ~fixed
         self.mass = blocks.mesh.mass
@@ -138,7 +131,7 @@ class Marching:
         self.left = self.right.T if symmetric else self.mass.T
         self.v0_right = cho_solve(self.v0, self.right)
         self.s0 = self.left @ self.v0_right
-        if blocks.hyper is not None and symmetric:
+        if symmetric:
             self.s0 -= blocks.hyper[0]
             self.s0 = 0.5 * (self.s0 + self.s0.T)
         self.factor = lu_factor(self.s0[np.ix_(self.free, self.free)]) if self.free.any() else None
@@ -173,15 +166,12 @@ class Marching:
 
     def _past_first(self, k: int, p: Array, u: Array) -> Array:
         """Return the sum over earlier steps of V p - K u."""
-        if k == 0:
-            return np.zeros(p.shape[1:])
         return summed(self.blocks.single[k:0:-1], p[:k]) - summed(self.blocks.double[k:0:-1], u[:k])
 
     def _past_second(self, k: int, p: Array, q: Array, u: Array) -> Array:
         """Return the sum over earlier steps of K' p - D u; q are the jumps of p. Zero in the unsymmetric form."""
         if k == 0 or not self.symmetric:
             return np.zeros(u.shape[1:])
-        assert self.blocks.hyper is not None
         adjoint = summed(self.blocks.double[k:0:-1].swapaxes(1, 2), q[:k]) - self.blocks.double[0].T @ p[k - 1]
         return adjoint - summed(self.blocks.hyper[k:0:-1], u[:k])
 

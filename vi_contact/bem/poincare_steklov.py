@@ -48,17 +48,11 @@ class PoincareSteklov:
     def apply(self, displacement: ArrayLike) -> Array:
         """Return (steps, 2, n) nodal forces [N/m] of displacements (steps, 2, n) at t_1, t_2, ...; 0 at t_0."""
         u = self._history("displacement", displacement)
-        everything = np.ones(2 * len(self.mesh), bool)
-        flat = u.reshape(len(u), -1, 1)
-        motion = Marching(self.blocks, everything, symmetric=self.symmetric).run(np.zeros_like(flat), flat)
-        return self.rho * motion.forces.reshape(u.shape)
+        return BoundaryProblem(self, np.zeros_like(u), np.ones(u.shape[1:], bool), u).solve().forces
 
     def solve(self, forces: ArrayLike) -> Array:
         """Return (steps, 2, n) displacements under nodal forces (steps, 2, n): the inverse, no support anywhere."""
-        f = self._history("forces", forces)
-        free = np.zeros(2 * len(self.mesh), bool)
-        motion = Marching(self.blocks, free, symmetric=self.symmetric).run(f.reshape(len(f), -1, 1) / self.rho)
-        return motion.displacement.reshape(f.shape)
+        return BoundaryProblem(self, self._history("forces", forces)).solve().displacement
 
     def _history(self, meaning: str, value: ArrayLike) -> Array:
         return array("PoincareSteklov", meaning, value, (None, 2, len(self.mesh)))
@@ -80,8 +74,13 @@ class BoundaryMotion:
     @property
     def work(self) -> Array:
         """Return (steps,) work of all forces up to each time [J/m], the energy of the body (symmetric form: >= 0)."""
-        increments = np.diff(self.displacement, axis=0, prepend=0.0)
-        return np.cumsum((self.forces * increments).sum(axis=(1, 2)))
+        return work(self.forces, self.displacement)
+
+
+def work(forces: Array, displacement: Array) -> Array:
+    """Return (steps,) work up to each time of forces during the steps, displacements at their ends; 0 at t_0."""
+    terms = forces * np.diff(displacement, axis=0, prepend=0.0)
+    return np.cumsum(terms.sum(axis=tuple(range(1, terms.ndim))))
 
 
 @dataclass(frozen=True)

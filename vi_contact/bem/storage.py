@@ -28,9 +28,7 @@ def save_blocks(path: str | Path, blocks: EnergeticBlocks) -> None:
     def fill(file: Any) -> None:
         file.attrs.update(format=FORMAT, c_p=blocks.c_p, c_s=blocks.c_s, dt=blocks.dt, exterior=mesh.exterior)
         file["points"], file["loop_sizes"] = mesh.points, np.array(mesh.loop_sizes)
-        file["single"], file["double"] = blocks.single, blocks.double
-        if blocks.hyper is not None:
-            file["hyper"] = blocks.hyper
+        file["single"], file["double"], file["hyper"] = blocks.single, blocks.double, blocks.hyper
 
     try:
         hdf5_atomically(target, fill)
@@ -40,17 +38,16 @@ def save_blocks(path: str | Path, blocks: EnergeticBlocks) -> None:
 
 
 def load_blocks(
-    path: str | Path, mesh: BoundaryMesh, material: LinearElastic, *, dt: float, steps: int, hyper: bool = True
+    path: str | Path, mesh: BoundaryMesh, material: LinearElastic, *, dt: float, steps: int
 ) -> EnergeticBlocks:
     """Load the first `steps` blocks of a file written by save_blocks.
 
     Raises InputError, naming what differs, when the file belongs to another mesh, material or time step, holds fewer
-    steps or lacks the hypersingular operator, or is no such file.
+    steps, or is no such file.
     """
     import h5py
 
     checks.path("load_blocks", "path", path)
-    checks.flag("load_blocks", "hyper", hyper)
     check_body(mesh, material, Orders())
     steps = checks.whole("load_blocks", "steps", steps, least=1)
     dt = checks.number("load_blocks", "dt", dt, positive=True, unit="s")
@@ -60,7 +57,7 @@ def load_blocks(
         raise InputError(f"{Path(path).name}: no readable HDF5 file; assemble the operator and save it") from error
     with file:
         try:
-            return _read(Path(path).name, file, mesh, material, dt, steps, hyper)
+            return _read(Path(path).name, file, mesh, material, dt, steps)
         except InputError:
             raise
         except (KeyError, ValueError, TypeError, OSError, AttributeError) as error:
@@ -69,30 +66,27 @@ def load_blocks(
 
 
 def _read(
-    name: str, file: Any, mesh: BoundaryMesh, material: LinearElastic, dt: float, steps: int, hyper: bool
+    name: str, file: Any, mesh: BoundaryMesh, material: LinearElastic, dt: float, steps: int
 ) -> EnergeticBlocks:
     if file.attrs.get("format") != FORMAT:
         raise InputError(f"{name}: no boundary element blocks of this version; give a file written by save_blocks")
-    different = [*_differences(file, mesh, material, dt), *_missing(file, steps, hyper)]
+    different = _differences(file, mesh, material, dt, steps)
     if different:
         raise InputError(f"{name} holds the operator of another problem ({'; '.join(different)}); "
                          "assemble the operator of this one")
     n = len(mesh)
     shapes = {"single": (steps, 4 * n, 4 * n), "double": (steps, 4 * n, 2 * n), "hyper": (steps, 2 * n, 2 * n)}
-    wanted = ("single", "double", "hyper") if hyper else ("single", "double")
-    found = {key: checks.array(name, key, file[key][:steps], shapes[key]) for key in wanted}
-    return EnergeticBlocks(
-        mesh, material.c_p, material.c_s, dt, found["single"], found["double"], found.get("hyper")
-    )
+    found = {key: checks.array(name, key, file[key][:steps], shape) for key, shape in shapes.items()}
+    return EnergeticBlocks(mesh, material.c_p, material.c_s, dt, **found)
 
 
 def stored_blocks(
-    path: str | Path, mesh: BoundaryMesh, material: LinearElastic, *, dt: float, steps: int, hyper: bool = True
+    path: str | Path, mesh: BoundaryMesh, material: LinearElastic, *, dt: float, steps: int
 ) -> EnergeticBlocks:
     """Load the blocks if the file exists, else compute and save them."""
     if _target("stored_blocks", path).exists():
-        return load_blocks(path, mesh, material, dt=dt, steps=steps, hyper=hyper)
-    blocks = energetic_blocks(mesh, material, dt=dt, steps=steps, hyper=hyper)
+        return load_blocks(path, mesh, material, dt=dt, steps=steps)
+    blocks = energetic_blocks(mesh, material, dt=dt, steps=steps)
     save_blocks(path, blocks)
     return blocks
 
@@ -104,7 +98,7 @@ def _target(owner: str, path: str | Path) -> Path:
     return target
 
 
-def _differences(file: Any, mesh: BoundaryMesh, material: LinearElastic, dt: float) -> list[str]:
+def _differences(file: Any, mesh: BoundaryMesh, material: LinearElastic, dt: float, steps: int) -> list[str]:
     points = file["points"][:]
     if points.shape != mesh.points.shape:
         return [f"{len(points)} elements, here {len(mesh)}"]
@@ -117,10 +111,6 @@ def _differences(file: Any, mesh: BoundaryMesh, material: LinearElastic, dt: flo
         different.append("other points of the boundary")
     if bool(file.attrs["exterior"]) != mesh.exterior:
         different.append("the other side of the boundary")
+    if len(file["single"]) < steps:
+        different.append(f"{len(file['single'])} time steps, here {steps}")
     return different
-
-
-def _missing(file: Any, steps: int, hyper: bool) -> list[str]:
-    there = len(file["single"])
-    missing = [f"{there} time steps, here {steps}"] if there < steps else []
-    return missing + (["no hypersingular operator"] if hyper and "hyper" not in file else [])
