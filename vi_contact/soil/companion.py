@@ -14,10 +14,14 @@ from functools import cached_property
 from math import inf
 from typing import Any
 
-from ..core.algebra import Array
+import numpy as np
+
+from ..core.algebra import Array, SerialAlgebra, SerialComm, SerialMatrix
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.step import Scheme, State
+from ..core.surfaces import empty_surface
+from ..core.system import Load, SemiDiscreteSystem
 from ..laws.mass import ConsistentMass
 from ..run.march import march
 from ..run.time_steps import LARGEST, HalvedAtImpact, Schedule, TimeSteps
@@ -34,8 +38,6 @@ class CompanionRun:
     def __init__(self, name: str, problem: Callable[[], ContactProblem]) -> None:
         self.name, self._make = name, problem
         self._bound: tuple[Scheme, TimeSteps] | None = None
-        self._steps: Iterator[tuple[State, Any]] = iter(())
-        self._t, self._u, self._v = [0.0], [], []  # type: ignore[var-annotated]
 
     @cached_property
     def _problem(self) -> ContactProblem:
@@ -52,7 +54,9 @@ class CompanionRun:
             raise InputError(f"{self.name} is marched beside the run and needs its time steps beforehand, but the run "
                              f"has {dt!r}: give dt as a number or a Schedule")
         self._bound = scheme, dt
-        self._steps = march(self._problem, scheme=scheme, dt=_endless(dt), steps=LARGEST)
+        self._steps: Iterator[tuple[State, Any]] = march(
+            self._problem, scheme=scheme, dt=_endless(dt), steps=LARGEST
+        )
         system = self._problem.system
         self._t, self._u, self._v = [0.0], [system.u0.copy()], [system.v0.copy()]
 
@@ -74,6 +78,32 @@ class CompanionRun:
             return self._u[k], self._v[k]
         w = (t - self._t[k]) / (self._t[k + 1] - self._t[k])
         return (1.0 - w) * self._u[k] + w * self._u[k + 1], (1.0 - w) * self._v[k] + w * self._v[k + 1]
+
+
+class _Nowhere:
+    """Describe unknowns without a place: nobody asks a companion for points."""
+
+    def __init__(self, dimension: int, unknowns: int) -> None:
+        self.dimension, self.unknowns = dimension, unknowns
+        self.ids, self.bodies = np.arange(unknowns), np.zeros(unknowns, dtype=np.int64)
+        self.coordinates = np.zeros((unknowns, dimension))
+
+    def find_nodes(self, points: Array) -> np.ndarray:
+        return np.zeros(len(points), dtype=np.int64)
+
+    def sample(self, u: Array, nodes: np.ndarray, t: float, derivative: int = 0) -> Array:
+        return np.tile(u[: self.dimension], (len(nodes), 1))
+
+
+def linear_problem(M: Any, C: Any | None, K: Any, load: Load, dimension: int) -> ContactProblem:
+    """Return M u'' + C u' + K u = f, sparse matrices, at rest and without contact, ``dimension`` unknowns a node."""
+    n = M.shape[0]
+    system = SemiDiscreteSystem(
+        algebra=SerialAlgebra(), M=SerialMatrix(M), C=None if C is None else SerialMatrix(C), K=SerialMatrix(K),
+        load=load, influence=np.tile(np.eye(dimension), (n // dimension, 1)), u0=np.zeros(n), v0=np.zeros(n),
+        space=_Nowhere(dimension, n), floating=True,
+    )
+    return ContactProblem(system, empty_surface(SerialComm(), dimension))
 
 
 def _endless(dt: float | Schedule) -> float | Schedule:

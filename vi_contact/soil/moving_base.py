@@ -21,40 +21,14 @@ from typing import ClassVar
 import numpy as np
 import scipy.sparse as sp
 
-from ..core.algebra import Array, SerialAlgebra, SerialComm, SerialMatrix
+from ..core.algebra import Array
 from ..core.checks import provides
 from ..core.errors import InputError
-from ..core.problem import ContactProblem
 from ..core.problem_checks import EXCITATION
 from ..core.protocols import Excitation
-from ..core.surfaces import ContactSurface, empty_surface
+from ..core.surfaces import ContactSurface
 from ..core.system import Load, SemiDiscreteSystem
-from .companion import CompanionRun
-
-
-class PointSpace:
-    """Describe one point that moves in every direction."""
-
-    def __init__(self, dimension: int) -> None:
-        self.dimension = self.unknowns = dimension
-
-    @property
-    def ids(self) -> np.ndarray:
-        return np.arange(self.dimension)
-
-    @property
-    def coordinates(self) -> Array:
-        return np.zeros((self.dimension, self.dimension))
-
-    @property
-    def bodies(self) -> np.ndarray:
-        return np.zeros(self.dimension, dtype=np.int64)
-
-    def find_nodes(self, points: Array) -> np.ndarray:
-        return np.zeros(len(points), dtype=np.int64)
-
-    def sample(self, u: Array, nodes: np.ndarray, t: float, derivative: int = 0) -> Array:
-        return np.tile(u, (len(nodes), 1))
+from .companion import CompanionRun, linear_problem
 
 
 @dataclass(frozen=True)
@@ -134,10 +108,5 @@ def base_motion(excitation: Excitation | Sequence[Excitation]) -> BaseMotion:
         raise InputError("base_motion needs one or more excitations with directions of the same number of components")
     d = sizes.pop()
     forces = tuple((np.asarray(one.direction, dtype=float), one.acceleration) for one in excitations)
-    system = SemiDiscreteSystem(
-        algebra=SerialAlgebra(), M=SerialMatrix(sp.identity(d)), C=None, K=SerialMatrix(sp.csr_matrix((d, d))),
-        load=Load(np.zeros(d), forces), influence=np.eye(d), u0=np.zeros(d), v0=np.zeros(d), space=PointSpace(d),
-        floating=True,
-    )
-    problem = ContactProblem(system, empty_surface(SerialComm(), d))
+    problem = linear_problem(sp.identity(d), None, sp.csr_matrix((d, d)), Load(np.zeros(d), forces), d)
     return BaseMotion(excitations, CompanionRun("base_motion", lambda: problem))

@@ -16,13 +16,12 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from ..core.algebra import Array, SerialAlgebra, SerialComm, SerialMatrix
+from ..core.algebra import Array
 from ..core.checks import array, shown
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
-from ..core.surfaces import empty_surface
-from ..core.system import Load, SemiDiscreteSystem
-from .moving_base import PointSpace
+from ..core.system import Load
+from .companion import linear_problem
 
 
 @dataclass(frozen=True)
@@ -45,22 +44,18 @@ class SoilColumn:
 
     def matrices(self) -> tuple[sp.csr_matrix, sp.csr_matrix, sp.csr_matrix]:
         """Return (M, C, K) of all nodes; unknown 2 i + c is component c of node i."""
-        mass, damping, stiffness = [], [], []
-        for e, length in enumerate(np.diff(self.heights)):
-            m = self.rho[e] * length / 6.0 * np.kron([[2.0, 1.0], [1.0, 2.0]], np.eye(2))
-            moduli = np.diag([self.shear[e], self.lame[e] + 2.0 * self.shear[e]])
-            k = np.kron([[1.0, -1.0], [-1.0, 1.0]], moduli) / length
-            mass.append(m)
-            stiffness.append(k)
-            damping.append(self.alpha[e] * m + self.beta[e] * k)
-        return self._sum(mass), self._sum(damping), self._sum(stiffness)
+        rho, length, alpha, beta = (x[:, None, None] for x in (self.rho, np.diff(self.heights), self.alpha, self.beta))
+        moduli = np.tile(np.column_stack([self.shear, self.lame + 2.0 * self.shear]), 2)[:, None, :]
+        m = rho * length / 6.0 * np.kron([[2.0, 1.0], [1.0, 2.0]], np.eye(2))
+        k = np.kron([[1.0, -1.0], [-1.0, 1.0]], np.eye(2)) * moduli / length
+        return self._sum(m), self._sum(alpha * m + beta * k), self._sum(k)
 
-    def _sum(self, blocks: list[Array]) -> sp.csr_matrix:
-        """Element matrices (4, 4) in their places."""
+    def _sum(self, blocks: Array) -> sp.csr_matrix:
+        """Element matrices (n, 4, 4) in their places."""
         places = 2 * np.arange(len(blocks))[:, None] + np.arange(4)
         rows, columns = np.repeat(places, 4, axis=1).ravel(), np.tile(places, (1, 4)).ravel()
         size = 2 * len(self.heights)
-        return sp.csr_matrix((np.array(blocks).ravel(), (rows, columns)), shape=(size, size))
+        return sp.csr_matrix((blocks.ravel(), (rows, columns)), shape=(size, size))
 
     def on_rigid_base(
         self, acceleration: Callable[[float], Array], velocity: Callable[[float], Array] | None = None
@@ -76,7 +71,7 @@ class SoilColumn:
         def load(t: float) -> Array:
             return np.asarray(inertia @ acceleration(t) + (0.0 if velocity is None else drag @ velocity(t)))
 
-        return _linear(M[2:, 2:], C[2:, 2:], K[2:, 2:], load)
+        return linear_problem(M[2:, 2:], C[2:, 2:], K[2:, 2:], Load(np.zeros(len(inertia)), general=(load,)), 2)
 
     def on_dashpots(self, shear: float, normal: float, upgoing: Callable[[float], Array]) -> ContactProblem:
         """Return the system of all nodes, node 0 on dashpots of these impedances [Pa s/m], with the upgoing wave (2,)
@@ -90,28 +85,9 @@ class SoilColumn:
             force[:2] = 2.0 * impedance * upgoing(t)
             return force
 
-        return _linear(M, C + foot, K, load)
+        return linear_problem(M, C + foot, K, Load(np.zeros(C.shape[0]), general=(load,)), 2)
 
     def stress(self, u: Array) -> Array:
         """Return (sigma_xx, sigma_xy) [Pa] of every element, (n, 2), of nodal displacements (n+1, 2)."""
         strain = np.diff(u, axis=0) / np.diff(self.heights)[:, None]
         return np.column_stack([self.lame * strain[:, 1], self.shear * strain[:, 0]])
-
-
-class ColumnSpace(PointSpace):
-    """Give the column two unknowns per node; there are no contact points to ask for."""
-
-    def __init__(self, unknowns: int) -> None:
-        super().__init__(2)
-        self.unknowns = unknowns
-
-
-def _linear(M: sp.csr_matrix, C: sp.csr_matrix, K: sp.csr_matrix, load: Callable[[float], Array]) -> ContactProblem:
-    """The system at rest, without contact."""
-    n = M.shape[0]
-    system = SemiDiscreteSystem(
-        algebra=SerialAlgebra(), M=SerialMatrix(M), C=SerialMatrix(C), K=SerialMatrix(K),
-        load=Load(np.zeros(n), general=(load,)), influence=np.tile(np.eye(2), (n // 2, 1)),
-        u0=np.zeros(n), v0=np.zeros(n), space=ColumnSpace(n), floating=True,
-    )
-    return ContactProblem(system, empty_surface(SerialComm(), 2))

@@ -7,13 +7,10 @@ expects the *within* motion, a compliant base the *upgoing* one (Mejia and Dawso
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from ..core.algebra import Array
-from ..core.checks import flag, provides, real, shown
-from ..core.errors import InputError
+from ..core.checks import flag, number, provides
 from ..core.problem_checks import EXCITATION
 from ..core.protocols import Excitation
 from ..ground_motion import Record
@@ -65,8 +62,6 @@ def upgoing(
     excitation = GroundMotion(motion, direction=direction) if isinstance(motion, Record) else motion
     if dt is None and isinstance(excitation, GroundMotion):
         dt = excitation.record.dt
-    step = real(dt)
-    if not 0.0 < step < math.inf:
-        raise InputError(f"upgoing: dt is {shown(dt)}; give the step in seconds with which {type(excitation).__name__} "
-                         "is to be integrated")
+    unit = f"seconds, the step with which {type(excitation).__name__} is to be integrated"
+    step = number("upgoing", "dt", dt, positive=True, unit=unit)
     return UpgoingVelocity(excitation, step, 0.5 if outcrop else 1.0)
