@@ -18,7 +18,7 @@ from vi_contact.core.step import Recorder, Scheme, Solver
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.mass import ConsistentMass
 from vi_contact.studies import read_case
-from vi_contact.studies.cases.conformity import defect
+from vi_contact.studies.cases.own_classes import defect
 from vi_contact.studies.cases.vocabulary import words
 from vi_contact.studies.ida.runs import OneRun, Shaking
 

@@ -203,6 +203,26 @@ def nodal_frames(directions: Array) -> Array:
     return frames
 
 
+def block_of(frame: Array) -> tuple[int, Array]:
+    """Return (c, Q): a nodal frame with the contact direction in column c, so that component c is the normal unknown.
+
+    c is the direction's largest component. Axes at right angles to the direction keep their own columns: these are the
+    components that may be prescribed.
+    """
+    d = len(frame)
+    direction = frame[:, 0]
+    normal = int(np.argmax(np.abs(direction)))
+    others = [c for c in range(d) if c != normal]
+    block = np.empty((d, d))
+    block[:, normal] = direction
+    if np.count_nonzero(direction) == 1:
+        block[:, others] = np.eye(d)[:, others]
+    else:
+        others.sort(key=lambda c: abs(direction[c]))  # the first tangent is made of the axis least aligned
+        block[:, others] = frame[:, 1:]
+    return normal, block
+
+
 def empty_surface(comm: Comm, dimension: int) -> ContactSurface:
     """Return a surface without any contact: the linear comparison case."""
     none = np.zeros(0, dtype=np.int64)

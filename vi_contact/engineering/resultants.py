@@ -24,7 +24,7 @@ from ..core.checks import array, column_name, function, instance, provides
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.step import AXES, Columns, Report, Row, State
-from ..core.surfaces import nodal_frames
+from ..core.surfaces import block_of, nodal_frames
 
 Where = Callable[[Array, Array], Mask]
 
@@ -145,20 +145,10 @@ class Part:
 def tangent_vectors(normals: Array) -> Array:
     """Return the tangents (m, d, d - 1) of contact directions (m, d), in which surfaces have slip and r_t.
 
-    A direction along an axis has the other axes; another one has the tangents of ``nodal_frames``, in three dimensions
-    in the order of the axes that they are nearest to (``fem.contact.frames``). Points with several directions are not
-    covered: in the plane nothing rubs there.
+    Points with several directions are not covered: in the plane nothing rubs there.
     """
-    m, d = normals.shape
-    tangents = np.empty((m, d, max(d - 1, 0)))
-    for k, (direction, frame) in enumerate(zip(normals, nodal_frames(normals), strict=True)):
-        c = int(np.argmax(np.abs(direction)))
-        if np.count_nonzero(direction) == 1:
-            tangents[k] = np.delete(np.eye(d), c, axis=1)
-            continue
-        others = sorted((i for i in range(d) if i != c), key=lambda i: abs(direction[i]))
-        tangents[k] = frame[:, 1:][:, np.argsort(others)]
-    return tangents
+    blocks = (block_of(frame) for frame in nodal_frames(normals))
+    return np.array([np.delete(block, column, axis=1) for column, block in blocks])
 
 
 _MEANING = {
@@ -175,8 +165,7 @@ _MEANING = {
 }
 
 
-def unit_and_meaning(quantity: str, name: str) -> tuple[str, str]:
-    """Return (unit, meaning) of a quantity of a part."""
+def _unit_and_meaning(quantity: str, name: str) -> tuple[str, str]:
     kind, _, axis = quantity.partition("_")
     if kind == "force":
         return "N", f"contact force on the body along {axis}, part {name}"
@@ -210,7 +199,7 @@ class Resultants:
 
     def columns(self) -> Columns:
         """Call ``start`` first."""
-        return {f"{quantity}_{self.name}": unit_and_meaning(quantity, self.name) for quantity in self._quantities}
+        return {f"{quantity}_{self.name}": _unit_and_meaning(quantity, self.name) for quantity in self._quantities}
 
     def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
         """Find the part once, and return the row of the state, a static one or the start of a run."""

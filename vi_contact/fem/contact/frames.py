@@ -20,7 +20,7 @@ from petsc4py import PETSc
 from ...core.algebra import Array, Indices, Mask
 from ...core.corners import PARALLEL, at_right_angles
 from ...core.errors import InputError
-from ...core.surfaces import ContactSurface, nodal_frames
+from ...core.surfaces import ContactSurface, block_of, nodal_frames
 from ..petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc
 from ..space import FemSpace
 
@@ -144,26 +144,6 @@ class NodalFrames:
                 "dimensions: take the corner for smooth (a larger feature_angle=), or leave the node out of some of "
                 "its surfaces (points=)"
             )
-
-
-def block_of(frame: Array) -> tuple[int, Array]:
-    """Return (c, Q): a nodal frame with the contact direction in column c, so that component c is the normal unknown.
-
-    c is the direction's largest component. Axes at right angles to the direction keep their own columns: these are the
-    components that may be prescribed.
-    """
-    d = len(frame)
-    direction = frame[:, 0]
-    normal = int(np.argmax(np.abs(direction)))
-    others = [c for c in range(d) if c != normal]
-    block = np.empty((d, d))
-    block[:, normal] = direction
-    if np.count_nonzero(direction) == 1:
-        block[:, others] = np.eye(d)[:, others]
-    else:
-        others.sort(key=lambda c: abs(direction[c]))  # the first tangent is made of the axis least aligned
-        block[:, others] = frame[:, 1:]
-    return normal, block
 
 
 def corner_of(directions: Array) -> tuple[list[int], Array]:

@@ -49,12 +49,14 @@ from .table_functions import MeshFile
 from .toml_file import read_toml, with_settings
 from .vocabulary import words
 
-_HINTS: dict[str, Any] = {
+_TABLES: dict[str, Any] = {  # in the order in which they are read: type of what a table makes, or the one call it is
     "title": str,
     "model": Parts,
     "mesh": MeshScript | MeshFile,
     "material": Mapping[str, LinearElastic],
+    "system": callee(assemble),
     "contact": ContactSurface | Sequence[ContactSurface],
+    "gravity": callee(with_weight),
     "friction": FrictionLaw,
     "impact": ImpactLaw,
     "mass": MassLaw,
@@ -62,19 +64,13 @@ _HINTS: dict[str, Any] = {
     "scheme": Scheme,
     "solver": Solver,
     "escalation": Solver | Sequence[Solver],
+    "run": replace(
+        callee(simulate, only=("dt", "t_end", "steps", "tolerance", "checkpoint_every", "out")), function=dict
+    ),
     "record": Recorder | Sequence[Recorder],
     "fields": FieldWriter,
 }
-_CALLED: dict[str, Callee] = {  # tables that always call the same function
-    "system": callee(assemble),
-    "gravity": callee(with_weight),
-    "run": replace(
-        callee(simulate, only=("dt", "t_end", "steps", "tolerance", "checkpoint_every", "out")),
-        function=dict,
-    ),
-}
-TABLES = ("format", "title", "model", "mesh", "material", "system", "contact", "gravity", "friction", "impact", "mass",
-           "excitation", "scheme", "solver", "escalation", "run", "record", "fields")
+_OF_A_BODY = ("material", "system", "contact", "gravity")  # which a model has itself
 
 
 @dataclass(frozen=True)
@@ -113,8 +109,8 @@ class Case:
 
         With a communicator also the mesh, if the case has one, and look up every group of it that is named; collective.
         """
-        for table in ("material", *TABLES[TABLES.index("friction") :]):
-            if table in self.nodes and not needs_body(self.nodes[table]):
+        for table, node in self.nodes.items():
+            if table not in ("title", "model", "mesh", "system", "contact", "gravity") and not needs_body(node):
                 self._made(table)
         self._check_steps()
         if comm is not None and "mesh" in self.nodes:
@@ -256,34 +252,31 @@ def read_case(path: str | Path, settings: Sequence[str] = (), *, allow: Sequence
     tables = with_settings(read_toml(path), settings)
     allowed = packages(allow)
     known = words(base_folder(path), allowed)
-    file = str(path)
     check_format(path, tables)
     for name in tables:
-        if name not in TABLES:
-            raise InputError(f"{file}: unknown table [{name}]: {nearest(name, dict.fromkeys(TABLES))}")
+        if name not in ("format", *_TABLES):
+            raise InputError(f"{path}: unknown table [{name}]: {nearest(name, ('format', *_TABLES))}")
     if ("model" in tables) == ("mesh" in tables):
-        raise InputError(f"{file}: give either [mesh], the problem table by table, or [model], a model by its name")
-    for name in ("material", "system", "contact", "gravity"):
+        raise InputError(f"{path}: give either [mesh], the problem table by table, or [model], a model by its name")
+    for name in _OF_A_BODY:
         if "model" in tables and name in tables:
-            raise InputError(f"{file}: [{name}] is part of the model: leave it out, or replace [model] by [mesh]")
-    given = tables if "model" in tables else {"system": {}} | tables
-    given = {"run": {}} | given
-    order = sorted(given.keys() - {"format"}, key=TABLES.index)  # materials are known before the system names them
-    nodes = {name: _node(name, given, Spot(file, "", name), known) for name in order}
+            raise InputError(f"{path}: [{name}] is part of the model: leave it out, or replace [model] by [mesh]")
+    given = {"run": {}} | ({} if "model" in tables else {"system": {}}) | tables
+    nodes = {name: _node(name, given, Spot(str(path), "", name), known) for name in _TABLES if name in given}
     return Case(path, tables, tuple(settings), nodes, allowed)
 
 
 def _node(name: str, tables: Mapping[str, Any], spot: Spot, known: Words) -> Node:
-    value = tables[name]
-    if name in _CALLED:
+    value, asked = tables[name], _TABLES[name]
+    if isinstance(asked, Callee):
         if not isinstance(value, dict):
             raise spot.wrong("is no table: give its keys below it")
         if name == "system":
             value = _with_materials(value, tables.get("material", {}))
-        return arguments(value, _CALLED[name], spot, known)
-    node = read(value, _HINTS[name], spot, known)
+        return arguments(value, asked, spot, known)
+    node = read(value, asked, spot, known)
     if name == "material" and isinstance(node, Named):
-        known.named[LinearElastic] = dict(node.items)
+        known.named[LinearElastic] = dict(node.items)  # before the system names them
     return node
 
 
@@ -293,11 +286,3 @@ def _with_materials(system: Mapping[str, Any], materials: Mapping[str, Any]) -> 
     if "material" in system or not names:
         return system
     return {"material": names[0] if len(names) == 1 else [[name, name] for name in names]} | dict(system)
-
-
-def run_case(
-    path: str | Path, comm: Any, *, settings: Sequence[str] = (), allow: Sequence[str] = (),
-    out: str | Path | None = None, restart: bool | str | Path = False, progress: bool = True,
-) -> Solution:
-    """Run a case file: ``read_case(path, settings, allow=allow).run(comm, …)``."""
-    return read_case(path, settings, allow=allow).run(comm, out=out, restart=restart, progress=progress)

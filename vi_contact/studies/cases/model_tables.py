@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
-from inspect import signature
-from typing import Any, get_type_hints
+from dataclasses import dataclass, replace
+from typing import Any
 
 from ...core.protocols import Excitation
 from ...core.step import Recorder
@@ -16,7 +15,7 @@ from ...models import wall
 from ...models.channel import model as channel
 from ...models.channel.sides import FreeFieldSides, Sides, bedrock
 from ...run.recorders import Contact, Energy, Probe
-from .table_calls import GIVEN, Callee
+from .table_calls import Callee, callee
 
 
 @dataclass(frozen=True)
@@ -65,27 +64,18 @@ def model(shape: type, build: Callable[..., Parts], inner: str = "") -> Callee:
 
     inner: a field of the shape whose own fields are keys, too.
     """
-    of_shape = _fields(shape)
-    of_inner = _fields(of_shape[inner]) if inner else {}
-    parameters = signature(build).parameters.values()
-    given = tuple(one.name for one in parameters if one.name in GIVEN)
-    extra = {one.name: get_type_hints(build)[one.name] for one in parameters
-             if one.kind is one.KEYWORD_ONLY and one.name not in GIVEN}
+    of_shape, target = callee(shape).hints, callee(build)
+    of_inner = callee(of_shape[inner]).hints if inner else {}
+    extra = {key: hint for key, hint in target.hints.items() if key != "shape"}
 
-    def made(comm: Any, **values: Any) -> Parts:
+    def made(**values: Any) -> Parts:
         own, parts, more = ({key: values[key] for key in names if key in values}
-                            for names in (of_shape, of_inner, (*extra, *given)))
+                            for names in (of_shape, of_inner, (*extra, *target.given)))
         if parts:
             own[inner] = replace(own[inner], **parts) if inner in own else of_shape[inner](**parts)
-        return build(shape(**own), comm, **more)
+        return build(shape(**own), **more)
 
-    return Callee(shape.__name__, made, of_inner | of_shape | extra, given=given)
-
-
-def _fields(shape: type) -> dict[str, Any]:
-    """Return the fields of a dataclass: name -> type."""
-    hints = get_type_hints(shape)
-    return {one.name: hints[one.name] for one in fields(shape)}
+    return Callee(shape.__name__, made, {**of_inner, **of_shape, **extra}, given=target.given)
 
 
 MODELS = {"Wall": model(wall.Wall, _wall), "Channel": model(channel.Channel, _channel, inner="shape")}

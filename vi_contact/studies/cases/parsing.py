@@ -50,21 +50,6 @@ def read(value: Any, hint: Any, spot: Spot, words: Words) -> Node:
     raise spot.wrong(f"is {_shown(value)}: give {_expected(members, words)}")
 
 
-def call(
-    table: Mapping[str, Any], choices: Mapping[str, Callee], default: str | None, kinds: Sequence[Any], spot: Spot,
-    words: Words,
-) -> Call:
-    """Return the call of a table, whose ``type`` is one of the choices, or names a class of others of these kinds."""
-    chosen = table.get("type", default)
-    if isinstance(chosen, str) and ":" in chosen:
-        return arguments(table, own_class(chosen, kinds, words.allowed, spot), spot, words)
-    if chosen is None:
-        raise spot.inside(f"has no type: give type = one of {', '.join(choices)}")
-    if not isinstance(chosen, str) or chosen not in choices:
-        raise spot.inside(f"has the unknown type {_shown(chosen)}: {nearest(chosen, choices)}")
-    return arguments(table, choices[chosen], spot, words)
-
-
 def arguments(table: Mapping[str, Any], target: Callee, spot: Spot, words: Words) -> Call:
     """Return the call of this function with the keys of the table."""
     given = {key: value for key, value in table.items() if key != "type"}
@@ -158,19 +143,29 @@ def _items(value: list[Any], kinds: tuple[Any, ...], fixed: bool, spot: Spot, wo
 
 def _table(value: dict[str, Any], members: list[Any], spot: Spot, words: Words) -> Node:
     choices: dict[str, Callee] = {}
-    default: str | None = None
     for member in members:
-        found = _choices(member, words)
-        choices |= found
-        default = default or words.default.get(member)
+        choices |= _choices(member, words)
     if choices:
-        default = default or (next(iter(choices)) if len(choices) == 1 else None)
-        return call(value, choices, default, members, spot, words)
+        only = next(iter(choices)) if len(choices) == 1 else None
+        default = next((words.default[member] for member in members if member in words.default), only)
+        chosen = _chosen(value.get("type", default), choices, members, spot, words)
+        return arguments(value, chosen, spot, words)
     for member in members:
         if get_origin(member) in (Mapping, dict):
             kind = get_args(member)[1]
             return Named({key: read(one, kind, spot.at(key), words) for key, one in value.items()})
     raise spot.wrong(f"is a table: give {_expected(members, words)}")
+
+
+def _chosen(word: Any, choices: Mapping[str, Callee], kinds: Sequence[Any], spot: Spot, words: Words) -> Callee:
+    """Return what the ``type`` of a table calls: one of the choices, or a class of others of these kinds."""
+    if isinstance(word, str) and ":" in word:
+        return own_class(word, kinds, words.allowed, spot)
+    if word is None:
+        raise spot.inside(f"has no type: give type = one of {', '.join(choices)}")
+    if not isinstance(word, str) or word not in choices:
+        raise spot.inside(f"has the unknown type {_shown(word)}: {nearest(word, choices)}")
+    return choices[word]
 
 
 def _choices(member: Any, words: Words) -> Mapping[str, Callee]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -123,26 +124,25 @@ def _tables(value: Any) -> list[dict[str, Any]]:
 
 
 def _scheme(name: str) -> dict[str, Any]:
-    """Return the table of a scheme."""
     from ...core.step import Scheme
     from .vocabulary import names_of  # late: it needs the finite elements, which not every case does
 
-    if name not in names_of(Scheme) and ":" not in name:  # package.module:Name
-        raise InputError(f"unknown scheme {shown(name)}: {nearest(name, names_of(Scheme))}")
-    return {"type": name}
+    return _named("scheme", name, dict.fromkeys(names_of(Scheme), ()))
 
 
 def _solver(name: str) -> dict[str, Any]:
-    """Return the table of a solver, or of the solver that a method belongs to."""
     from ...solvers.condensed import SmallMethod
     from ...solvers.volume.route import Method
     from .vocabulary import names_of
 
-    methods = {"Condensed": names_of(SmallMethod), "Volume": names_of(Method)}
+    return _named("solver", name, {"Condensed": names_of(SmallMethod), "Volume": names_of(Method)})
+
+
+def _named(kind: str, name: str, methods: Mapping[str, Sequence[str]]) -> dict[str, Any]:
+    """Return the table of one of the keys, or of the one that a method belongs to; a class of others has a colon."""
     for owner, names in methods.items():
         if name in names:
             return {"type": owner, "method": {"type": name}}
-    if name not in methods and ":" not in name:  # package.module:Name
-        names = (*methods, *methods["Condensed"], *methods["Volume"])
-        raise InputError(f"unknown solver {shown(name)}: {nearest(name, names)}")
+    if name not in methods and ":" not in name:
+        raise InputError(f"unknown {kind} {shown(name)}: {nearest(name, [*methods, *chain(*methods.values())])}")
     return {"type": name}

@@ -7,6 +7,7 @@ import math
 import re
 import tomllib
 from collections.abc import Sequence
+from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,6 @@ _TOO_DEEP = "is nested too deep: give tables and lists as docs/guide/studies.md 
 _TOO_LONG = "holds a whole number beyond 64 bits: write it with a point, as 1.0e30"
 _PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+"""
 _CHAIN = re.compile(rf"(?<![\w-])(?:{_PART}){{{DEPTH}}}")  # a key of many parts
-_REASON = re.compile(r"^(.*) \(at (?:line (\d+), column (\d+)|end of document)\)", re.DOTALL)
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:
@@ -27,8 +27,6 @@ def read_toml(path: str | Path) -> dict[str, Any]:
         with open(path, "rb") as file:
             data = file.read(BYTES + 1)
         text = data.decode("utf-8")
-    except FileNotFoundError:
-        raise InputError(f"{path}: there is no such file; give the path of a case file") from None
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); give the path of a case file") from None
     except UnicodeDecodeError as error:
@@ -38,16 +36,14 @@ def read_toml(path: str | Path) -> dict[str, Any]:
     if _CHAIN.search(text):  # before tomllib, whose time grows as the square of the parts of a key
         raise InputError(f"{path}: {_TOO_DEEP}")
     try:
-        return checked(tomllib.loads(text), str(path))
+        tables = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        reason, place = _reason(str(error), text)
-        raise InputError(f"{path}, {place}: {reason}; correct the TOML there") from None
+        raise InputError(f"{path}: {error}; correct the TOML there") from None
     except RecursionError:
         raise InputError(f"{path}: {_TOO_DEEP}") from None
-    except InputError:
-        raise
     except ValueError:  # a number of more digits than Python reads
         raise InputError(f"{path}: {_TOO_LONG}") from None
+    return checked(tables, str(path))
 
 
 def checked(tables: dict[str, Any], source: str) -> dict[str, Any]:
@@ -78,16 +74,6 @@ def _defect(value: Any, depth: int) -> str:
     return "holds the character NUL: leave it out" if isinstance(value, str) and "\0" in value else ""
 
 
-def _reason(said: str, text: str) -> tuple[str, str]:
-    """Return (what is wrong, "line 3, column 7") of tomllib's sentence."""
-    found = _REASON.fullmatch(said)
-    if found is None:
-        return said, f"line {text.count(chr(10)) + 1}"
-    if found[2] is None:
-        return found[1], f"line {max(len(text.splitlines()), 1)} (its end)"
-    return found[1], f"line {found[2]}, column {found[3]}"
-
-
 def with_settings(tables: dict[str, Any], settings: Sequence[str]) -> dict[str, Any]:
     """Return a copy of the tables with KEY=VALUE settings made; what is missing on the way to a key is added.
 
@@ -95,7 +81,7 @@ def with_settings(tables: dict[str, Any], settings: Sequence[str]) -> dict[str, 
     TOML is text; none at all takes the key away. Raises InputError for a setting without "=", an entry that is not
     there, a way through a plain value.
     """
-    result = _copied(tables)
+    result = deepcopy(tables)
     for setting in settings:
         key, equals, value = setting.partition("=")
         if key.count(".") > DEPTH:
@@ -105,12 +91,6 @@ def with_settings(tables: dict[str, Any], settings: Sequence[str]) -> dict[str, 
         new = _value(value.strip()) if value.strip() else None
         _set(result, key.strip().split("."), new, setting)
     return checked(result, "settings")
-
-
-def _copied(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _copied(one) for key, one in value.items()}
-    return [_copied(one) for one in value] if isinstance(value, list) else value
 
 
 def _value(text: str) -> Any:

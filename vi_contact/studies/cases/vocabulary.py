@@ -31,8 +31,8 @@ from ...solvers.friction.extrapolation import Extrapolation
 from ...solvers.friction.problem import FrictionMethod
 from ...solvers.volume.route import Method
 from . import table_functions as plain
-from .conformity import defect, is_protocol
 from .model_tables import MODELS, Parts
+from .own_classes import defect, is_protocol
 from .parsing import Words
 from .table_calls import Callee, callee
 

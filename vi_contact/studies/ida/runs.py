@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import signal
 import subprocess
@@ -22,6 +21,7 @@ from ...core.files import to_json, write_atomically
 from ...ground_motion import Record, scaled
 from ...ground_motion.excitation import GroundMotion
 from ...run.files.folder import CHECKPOINT, SUMMARY
+from ...run.files.reading import read_object
 from ..cases.case import Case, read_case
 from ..cases.toml_file import toml_value
 
@@ -223,10 +223,9 @@ def refuse_mpirun() -> None:
 def read_json(path: Path) -> dict[str, Any] | None:
     """Return a whole JSON object, or None when there is none."""
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
+        return read_object(path)
+    except (OSError, ValueError):
         return None
-    return found if isinstance(found, dict) else None
 
 
 def read_row(path: Path) -> dict[str, Any] | None:
