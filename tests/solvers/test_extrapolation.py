@@ -17,12 +17,12 @@ pytestmark = pytest.mark.serial
 
 def steps(way: Any, g: Callable[[Array], Array], x: Array, *, limit: int = 300) -> int:
     """Images taken until |g(x) - x| <= 1e-12 |g(x)|."""
-    sequence = way.start()
+    following = way.start()
     for count in range(1, limit + 1):
         image = g(x)
         if np.abs(image - x).max() <= 1e-12 * np.abs(image).max():
             return count
-        x = sequence.next(x, image)
+        x = following(x, image)
     return limit + 1
 
 
@@ -52,14 +52,14 @@ def test_plain_steps_where_the_map_expands() -> None:
 
 def test_plain_start_and_memory_of_its_own() -> None:
     """``after`` plain steps first; an image that the caller overwrites later does no harm."""
-    sequence, x = Anderson(depth=2, after=3).start(), np.zeros(2)
+    following, x = Anderson(depth=2, after=3).start(), np.zeros(2)
     image = np.empty(2)
     for _ in range(3):
         image[:] = 0.5 * x + 1.0
-        x = sequence.next(x, image).copy()
+        x = following(x, image).copy()
         assert np.array_equal(x, image)
     image[:] = 0.5 * x + 1.0
-    assert np.allclose(sequence.next(x, image), 2.0, rtol=0.0, atol=1e-14)
+    assert np.allclose(following(x, image), 2.0, rtol=0.0, atol=1e-14)
 
 
 def test_bad_settings() -> None:

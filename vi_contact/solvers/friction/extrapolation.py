@@ -13,6 +13,7 @@ plain again, and what was tried before is forgotten.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -22,19 +23,15 @@ from ...core.algebra import Array
 from ...core.checks import provides, real, shown, whole
 from ...core.errors import InputError
 
-
-class Sequence(Protocol):
-    """Remember one iteration."""
-
-    def next(self, x: Array, image: Array) -> Array:
-        """Return the point to try after x (n,), whose image is g(x) (n,)."""
-        ...
+Next = Callable[[Array, Array], Array]  # x (n,) and its image g(x) -> the point to try after x
 
 
 class Extrapolation(Protocol):
     """Choose the next point: Plain, Aitken or Anderson."""
 
-    def start(self) -> Sequence: ...
+    def start(self) -> Next:
+        """Return what chooses the points of one iteration, which it remembers."""
+        ...
 
 
 def accelerated(owner: str, value: Any) -> None:
@@ -46,15 +43,9 @@ def accelerated(owner: str, value: Any) -> None:
 class Plain:
     """Take the image itself."""
 
-    def start(self) -> Sequence:
-        """Return an empty memory: none is needed."""
-        return _Plain()
-
-
-class _Plain:
-    def next(self, x: Array, image: Array) -> Array:
-        """See Sequence."""
-        return image
+    def start(self) -> Next:
+        """See Extrapolation; nothing is remembered."""
+        return lambda x, image: image
 
 
 @dataclass(frozen=True)
@@ -67,25 +58,21 @@ class Aitken:
         if not 1.0 < real(self.limit) < np.inf:
             raise InputError(f"Aitken: limit is {shown(self.limit)}; give the largest relaxation factor, more than 1")
 
-    def start(self) -> Sequence:
-        """Return an empty memory; the first step is plain."""
-        return _Aitken(self.limit)
+    def start(self) -> Next:
+        """See Extrapolation; the first step is plain."""
+        omega, old = 1.0, None
 
+        def following(x: Array, image: Array) -> Array:
+            nonlocal omega, old
+            f = image - x
+            if old is not None:
+                change = f - old
+                omega, size = -omega * float(old @ change), float(change @ change)
+                omega = float(np.clip(omega / size, 1.0 / self.limit, self.limit)) if omega > 0.0 else 1.0
+            old = f
+            return np.asarray(x + omega * f)
 
-class _Aitken:
-    def __init__(self, limit: float) -> None:
-        self._limit, self._omega = limit, 1.0
-        self._old: Array | None = None
-
-    def next(self, x: Array, image: Array) -> Array:
-        """See Sequence."""
-        f = image - x
-        if self._old is not None:
-            change = f - self._old
-            omega, size = -self._omega * float(self._old @ change), float(change @ change)
-            self._omega = float(np.clip(omega / size, 1.0 / self._limit, self._limit)) if omega > 0.0 else 1.0
-        self._old = f
-        return np.asarray(x + self._omega * f)
+        return following
 
 
 @dataclass(frozen=True)
@@ -99,25 +86,22 @@ class Anderson:
         whole("Anderson", "depth", self.depth, least=1)
         whole("Anderson", "after", self.after)
 
-    def start(self) -> Sequence:
-        """Return an empty memory."""
-        return _Anderson(self)
+    def start(self) -> Next:
+        """See Extrapolation."""
+        count = 0
+        points: list[tuple[Array, Array]] = []  # (f, g)
 
+        def following(x: Array, image: Array) -> Array:
+            nonlocal count, points
+            count += 1
+            new, kept = image - x, points[-self.depth :]
+            if kept and np.array_equal(x, kept[-1][1]) and float(new @ kept[-1][0]) >= float(kept[-1][0] @ kept[-1][0]):
+                kept = []
+            points = [*kept, (new, image.copy())]
+            if count <= self.after or len(points) < 2:
+                return image
+            f, g = (np.column_stack(part) for part in zip(*points, strict=True))
+            gamma, *_ = np.linalg.lstsq(np.diff(f), f[:, -1], rcond=1e-10)
+            return np.asarray(image - np.diff(g) @ gamma)
 
-class _Anderson:
-    def __init__(self, settings: Anderson) -> None:
-        self._settings, self._count = settings, 0
-        self._points: list[tuple[Array, Array]] = []  # (f, g)
-
-    def next(self, x: Array, image: Array) -> Array:
-        """See Sequence."""
-        self._count += 1
-        f_new, kept = image - x, self._points[-self._settings.depth :]
-        if kept and np.array_equal(x, kept[-1][1]) and float(f_new @ kept[-1][0]) >= float(kept[-1][0] @ kept[-1][0]):
-            kept = []
-        self._points = [*kept, (f_new, image.copy())]
-        if self._count <= self._settings.after or len(self._points) < 2:
-            return image
-        f, g = (np.column_stack(part) for part in zip(*self._points, strict=True))
-        gamma, *_ = np.linalg.lstsq(np.diff(f), f[:, -1], rcond=1e-10)
-        return np.asarray(image - np.diff(g) @ gamma)
+        return following

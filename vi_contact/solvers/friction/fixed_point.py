@@ -60,7 +60,7 @@ class PreparedFixedPoint:
         constant = np.zeros_like(slope)
         start = step.start(guess) * self.delassus.scale
         limit, unit = cohesion + slope * np.maximum(start[:, 0], 0.0), self.delassus.scale[:, -1]
-        sequence = self.method.extrapolation.start()
+        following = self.method.extrapolation.start()
         history: list[float] = []
         found = self._tresca.solve(q, limit, constant, start)
         while len(history) < self.method.max_iterations:
@@ -69,7 +69,7 @@ class PreparedFixedPoint:
             if change <= max(self.method.tolerance * size, step.rounding(found.r / self.delassus.scale)):
                 break
             history.append(change / size)
-            limit = np.maximum(unit * sequence.next(limit / unit, new / unit), 0.0)
+            limit = np.maximum(unit * following(limit / unit, new / unit), 0.0)
             found = self._tresca.solve(q, limit, constant, found.r)
         tolerance = 100.0 * self.method.tolerance
         return step.result(self.method, tolerance, (found.r / self.delassus.scale, len(history) + 1, history))

@@ -59,7 +59,7 @@ class GivenForces:
 
     def _loop(self, normal: Any, tangential: Any, step: ScaledProblem, r: Array) -> Iterated:
         """Alternate the two prepared problems."""
-        sequence, none = self.extrapolation.start(), np.zeros(step.count)
+        following, none = self.extrapolation.start(), np.zeros(step.count)
         history: list[float] = []
         while step.unit > 0.0 and len(history) < self.max_iterations:
             given, active = r[:, 1:].copy(), r[:, 0] > 0.0
@@ -73,5 +73,5 @@ class GivenForces:
             history.append(max_abs(r[:, 1:] - given) / size if size else 0.0)
             if history[-1] <= self.tolerance:
                 break
-            r[:, 1:] = sequence.next(given.ravel(), r[:, 1:].ravel()).reshape(given.shape)
+            r[:, 1:] = following(given.ravel(), r[:, 1:].ravel()).reshape(given.shape)
         return r, len(history), history

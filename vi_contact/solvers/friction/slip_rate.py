@@ -49,7 +49,7 @@ class RateIteration:
     ) -> FrictionResult:
         """Iterate from mu (m,), those at rest. ``solved``: the problem of given coefficients, starting from the last
         result; ``image``: the coefficients at its slip rates. StepFailure when the tolerance is not reached."""
-        sequence, spent = self.extrapolation.start(), 0
+        following, spent = self.extrapolation.start(), 0
         history: list[float] = []
         found: FrictionResult | None = None
         while len(history) < self.max_iterations:
@@ -60,7 +60,7 @@ class RateIteration:
             history.append(max_abs(new - mu) / size if size else 0.0)
             if history[-1] <= self.tolerance:
                 return replace(found, iterations=spent, history=tuple(history))
-            mu = np.maximum(sequence.next(mu, new), 0.0)
+            mu = np.maximum(following(mu, new), 0.0)
         raise StepFailure(
             f"{self} stopped with a change of {history[-1] if history else np.inf:.1e} of the friction coefficients: "
             "take a smaller time step, or let mu(v) vary less with the slip rate"

@@ -35,7 +35,7 @@ EXTRAPOLATION = Anderson(depth=5, after=3)
 
 @dataclass(frozen=True)
 class Found:
-    """Hold the solution of a sequence, or of one problem: r_n (m,), slip (L,), zero where points stick, SNES
+    """Hold the solution of a following, or of one problem: r_n (m,), slip (L,), zero where points stick, SNES
     iterations."""
 
     state: FrictionUnknowns
@@ -77,7 +77,7 @@ class VolumeFriction:
 
     def _sequence(self, step: StepProblem, cohesion: Array, slope: Array, before: Found | None) -> Found:
         """Coulomb's problem with a coefficient (m,) that is given, from the solution of another one."""
-        sequence, spent = EXTRAPOLATION.start(), 0
+        following, spent = EXTRAPOLATION.start(), 0
         history: list[float] = []
         limit = cohesion if before is None else cohesion + slope * np.maximum(before.r_n, 0.0)
         if before is None:
@@ -93,7 +93,7 @@ class VolumeFriction:
             if change <= TOLERANCE or (change <= NOISE and history and change >= history[-1]):
                 return Found(found.state, found.r_n, found.active, found.slip, spent, tuple(history))
             history.append(change)
-            limit = np.maximum(sequence.next(limit, new), 0.0)
+            limit = np.maximum(following(limit, new), 0.0)
             start = self._scaled.moved(found.state, found.slip, limit)
         raise StepFailure(
             f"{self._name} stopped after {PROBLEMS} Tresca problems with a change of {history[-1]:.1e} of the friction "
