@@ -8,7 +8,7 @@ the absolute acceleration and f their loads. For a nodal field r, rᵀq is a num
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -43,16 +43,16 @@ class NodalWork:
     """Compute rᵀ(K u + C v + M a - f) for any number of pairs (r, group of cells).
 
     Args:
+        owner: what is recorded, for messages.
         problem: its system is made by ``fem.assemble``; InputError otherwise.
         loads: those given to ``fem.assemble``: what acts on cells of the group belongs to their balance.
         gravity: acceleration (d,) [m/s²] of ``with_weight``, which acts on the mass of the cells.
     """
 
-    def __init__(self, problem: ContactProblem, loads: Loads = (), gravity: Sequence[float] | None = None) -> None:
+    def __init__(self, owner: str, problem: ContactProblem, loads: Loads, gravity: Sequence[float] | None) -> None:
         space = space_of("NodalWork", problem.system)
         known_matrices("reactions and section forces", problem.system, "MCK")
         self._problem, self.space, self._loads = problem, space, as_tuple(loads)
-        check_actions("NodalWork", loads, gravity)
         for facets in (getattr(load, "facets", None) for load in self._loads):
             if facets is not None:
                 facets_of("NodalWork", "the facets of loads", facets, space.mesh)
@@ -66,7 +66,7 @@ class NodalWork:
             compat.compile_form(factor * ufl.inner(self._r, load.acting(g, mesh)) * load.measure(mesh))
             for load in self._loads
         ]
-        self._rows: list[list[Any]] = [[] for _ in range(len(self._forms) + len(self._loads))]
+        self._tell_constant_loads(owner)
 
     def _motions(self) -> tuple[Any, Any | None, Any]:
         """(K r, C r, M r) of the cells inside, as linear forms."""
@@ -77,7 +77,7 @@ class NodalWork:
         damping = inside * (fields["alpha_rho"] * mass + fields["beta"] * strain) * ufl.dx if forms.damped else None
         return inside * strain * ufl.dx, damping, inside * fields["rho"] * mass * ufl.dx
 
-    def known(self, name: str) -> None:
+    def _tell_constant_loads(self, owner: str) -> None:
         """Warn when the system has constant loads and none were given: who forgets the weight measures reactions that
         do not carry it. Collective."""
         system, space = self._problem.system, self.space
@@ -85,26 +85,22 @@ class NodalWork:
         if theirs.any() and not (self._loads or self._gravity.any()) and space.comm.rank == 0:
             text = ", ".join(f"{x:.4g}" for x in theirs)
             log.warning("%s: the system has constant loads of (%s) N in all and none were given: if they act on these "
-                        "elements give the loads of fem.assemble, or the gravity of with_weight", name, text)
+                        "elements give the loads of fem.assemble, or the gravity of with_weight", owner, text)
 
-    def add(self, r: Array, cells: Mask | None = None) -> None:
-        """Add a field r (owned nodes, d) and its group (mask of local cells, ghosts too; all when None). Collective."""
-        self._virtual(r, cells)
-        for rows, form in zip(self._rows, [*self._forms, *self._load_forms], strict=True):
-            if form is not None:
-                rows.append(sp.csr_matrix(compat.assemble_vector(form).array_r))
-        self._stacked: list[Any] | None = None
+    def take(self, fields: Sequence[tuple[Array, Mask | None]]) -> None:
+        """Take every r (owned nodes, d) with its group (mask of local cells, ghosts too; all when None). Collective."""
+        forms = [*self._forms, *self._load_forms]
+        rows: list[list[Any]] = [[] for _ in forms]
+        for r, cells in fields:
+            self._r.x.array[: r.size] = r.ravel()
+            self._r.x.scatter_forward()
+            self._inside.x.array[:] = 1.0 if cells is None else cells
+            for own, form in zip(rows, forms, strict=True):
+                if form is not None:
+                    own.append(sp.csr_matrix(compat.assemble_vector(form).array_r))
+        self._count = len(fields)
+        self._matrices: list[Any] = [sp.vstack(own).tocsr() if own else None for own in rows]
         self._still: dict[int, Array] = {}
-
-    def _virtual(self, r: Array, cells: Mask | None) -> None:
-        self._r.x.array[: r.size] = r.ravel()
-        self._r.x.scatter_forward()
-        self._inside.x.array[:] = 1.0 if cells is None else cells
-
-    def _matrices(self) -> list[Any]:
-        if self._stacked is None:
-            self._stacked = [sp.vstack(rows).tocsr() if rows else None for rows in self._rows]
-        return self._stacked
 
     def at_rest(self, state: State) -> Array:
         """Return the work of a state without acceleration, (count,): a static one, or the start of a run."""
@@ -139,9 +135,8 @@ class NodalWork:
 
     def _sum(self, motion: Sequence[Array], at: Callable[[Callable[[float], Any]], Any]) -> Array:
         """The numbers for nodal u, v, a (owned, d); ``at`` evaluates functions of time."""
-        matrices = self._matrices()
-        total = np.zeros(max(matrix.shape[0] for matrix in matrices if matrix is not None))
-        for matrix, x in zip(matrices, motion, strict=False):
+        total = np.zeros(self._count)
+        for matrix, x in zip(self._matrices, motion, strict=False):
             if matrix is not None:
                 total += matrix @ x.ravel()
         for k, load in enumerate(self._loads):
@@ -150,11 +145,9 @@ class NodalWork:
 
     def _of_load(self, k: int, load: Traction | BodyForce, at: Callable[[Callable[[float], Any]], Any]) -> Array:
         """Return rᵀf on this rank, (count,); what does not change with time is evaluated once."""
-        matrix = self._matrices()[len(self._forms) + k]
-
         def work(t: float) -> Array:
             values = evaluate(type(load).__name__, load.value, self.space.points, t, self.space.comm)
-            return np.asarray(matrix @ values.ravel())
+            return np.asarray(self._matrices[len(self._forms) + k] @ values.ravel())
 
         if load.history is None and not load.is_constant:
             return np.asarray(at(work))
@@ -177,10 +170,3 @@ def rigid_fields(points: Array, centre: Sequence[float]) -> tuple[list[Array], l
         fields += [np.cross(axis, arms) for axis in np.eye(3)]
         names += [f"M_{axis}" for axis in "xyz"]
     return fields, names
-
-
-def check_labels(kind: str, points: Mapping[str, Sequence[float]], dimension: int) -> None:
-    """Raise InputError for a point with a wrong number of coordinates."""
-    for label, point in points.items():
-        if len(point) != dimension:
-            raise InputError(f"{kind} '{label}': a point has {len(point)} coordinates, give {dimension}")

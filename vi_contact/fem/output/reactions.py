@@ -59,40 +59,33 @@ class Reactions:
 
     def columns(self) -> Columns:
         """Call ``start`` first."""
+        force = "N", f"force of boundary {self.name} on the body"
+        moment = "N m", f"moment of boundary {self.name} on the body about its centre"
         found = {}
         for part in self._parts:
-            axis = part.removeprefix("M").removeprefix("_")
-            along = f" along {axis}" if axis else ""
-            turning = part.startswith("M")
-            text = f"moment of boundary {self.name} on the body about its centre" if turning else (
-                f"force of boundary {self.name} on the body"
-            )
-            found[f"reaction_{part}_{self.name}"] = ("N m" if turning else "N", text + along)
+            unit, text = moment if part.startswith("M") else force
+            found[f"reaction_{part}_{self.name}"] = (unit, text if part == "M" else f"{text} along {part[-1]}")
         return found
 
     def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
         """Prepare the work of rigid motions of the held nodes; return the row of the state at rest. Collective."""
-        self._work = NodalWork(problem, self.loads, self.gravity)
-        self._work.known(f"reactions '{self.name}'")
+        owner = f"reactions '{self.name}'"
+        self._work = NodalWork(owner, problem, self.loads, self.gravity)
         space: FemSpace = self._work.space
         if len(self.centre) != space.dimension:
-            raise InputError(f"reactions '{self.name}': the centre has {len(self.centre)} coordinates, give "
-                             f"{space.dimension}")
+            raise InputError(f"{owner}: the centre has {len(self.centre)} coordinates, give {space.dimension}")
         held = np.zeros_like(space.held)
-        facets_of(f"reactions '{self.name}'", "facets", self.facets, space.mesh)
+        facets_of(owner, "facets", self.facets, space.mesh)
         blocks = space.facet_blocks(self.facets.indices)
         held[blocks] = space.held[blocks]
         if not largest(space.comm, held.any()):
             raise InputError(f"nothing is prescribed on boundary group '{self.facets.name}': it has no reactions")
         fields, self._parts = rigid_fields(space.points, self.centre)
-        for field in fields:
-            self._work.add(np.where(held, field, 0.0))
+        self._work.take([(np.where(held, field, 0.0), None) for field in fields])
         return self._named(self._work.at_rest(state))
 
     def row(self, report: Report) -> Row:
         return self._named(self._work.of_step(report))
 
     def _named(self, values: np.ndarray) -> Row:
-        return {
-            f"reaction_{part}_{self.name}": float(value) for part, value in zip(self._parts, values, strict=True)
-        }
+        return dict(zip(self.columns(), values.tolist(), strict=True))

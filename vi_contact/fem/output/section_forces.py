@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...core.checks import array, column_name, instance, several
+from ...core.checks import array, column_name, instance
 from ...core.errors import InputError
 from ...core.problem import ContactProblem
 from ...core.step import Columns, Report, Row, State
 from ..groups import cells_of
 from ..mesh import Cells
 from .cuts import find_cut
-from .nodal_work import Loads, NodalWork, check_actions, check_labels
+from .nodal_work import Loads, NodalWork, check_actions
 
 _QUANTITIES = {
     "N": ("N", "normal force, tension positive,"),
@@ -54,10 +54,7 @@ class SectionForces:
         instance("SectionForces", "cuts", self.cuts, Mapping, "give labels and two ends each, {'base': (a, b)}")
         for label, ends in self.cuts.items():
             column_name("section label", label)
-            for end in several("SectionForces", f"the ends of '{label}'", ends, "give two points"):
-                array("SectionForces", f"an end of '{label}'", end, (None,), unit="metres")
-            if len(ends) != 2:
-                raise InputError(f"SectionForces: '{label}' has {len(ends)} ends; give two points")
+            array("SectionForces", f"the two ends of '{label}'", ends, (2, 2), unit="metres")
         if self.cells is not None:
             cells_of("SectionForces", "cells", self.cells)
         check_actions("SectionForces", self.loads, self.gravity)
@@ -72,20 +69,18 @@ class SectionForces:
 
     def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
         """Find the cuts; return the row of the state at rest, of a static stage for example. Collective."""
-        work = self._work = NodalWork(problem, self.loads, self.gravity)
-        space, signs = work.space, []
+        work = self._work = NodalWork("section forces", problem, self.loads, self.gravity)
+        space, signs, fields = work.space, [], []
         if space.dimension != 2:
             raise InputError(f"section forces are of plane meshes, this one has {space.dimension} dimensions")
-        work.known("section forces")
         for label, ends in self.cuts.items():
-            check_labels("section", {label: ends[0]}, 2)
-            check_labels("section", {label: ends[1]}, 2)
             cut = find_cut(space, label, np.asarray(ends, dtype=float), self.cells)
             arms = space.points - cut.middle
             turn = np.column_stack([-arms[:, 1], arms[:, 0]])
             for field in (np.tile(cut.across, (len(arms), 1)), np.tile(cut.along, (len(arms), 1)), turn):
-                work.add(np.where(cut.nodes[:, None], field, 0.0), cut.cells)
+                fields.append((np.where(cut.nodes[:, None], field, 0.0), cut.cells))
                 signs.append(-1.0 if cut.left else 1.0)
+        work.take(fields)
         self._signs = np.array(signs)
         return self._named(work.at_rest(state))
 
@@ -93,4 +88,4 @@ class SectionForces:
         return self._named(self._work.of_step(report))
 
     def _named(self, values: np.ndarray) -> Row:
-        return dict(zip(self.columns(), (float(value) for value in self._signs * values), strict=True))
+        return dict(zip(self.columns(), (self._signs * values).tolist(), strict=True))
