@@ -320,7 +320,7 @@ def test_bad_settings_are_told(comm: Any, shared_tmp: Path) -> None:
     """every < 1, and a system without finite elements."""
     from chain import chain_problem
 
-    with pytest.raises(InputError, match="XDMF every is 0"):
+    with pytest.raises(InputError, match="XDMF: every is 0"):
         XDMF(every=0)
     if comm.rank == 0:
         with pytest.raises(InputError, match="XDMF needs a system made by fem.assemble"):

@@ -19,15 +19,13 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
-from xml.sax.saxutils import quoteattr
 
 import h5py
 import numpy as np
 import ufl
 
 from ...core.algebra import Array, Indices, Mask
-from ...core.checks import real, shown
-from ...core.errors import InputError
+from ...core.checks import attributes
 from ...core.files import FIELDS, FIELDS_INDEX, hdf5_atomically, on_root, write_atomically
 from ...core.problem import ContactProblem
 from ...core.step import Report, State
@@ -84,8 +82,7 @@ class XDMF:
     every: int = 10
 
     def __post_init__(self) -> None:
-        if not 1.0 <= real(self.every) < np.inf or self.every != int(self.every):
-            raise InputError(f"XDMF every is {shown(self.every)}: give a number of steps >= 1")
+        attributes(self, counts=("every",))
 
     def open(self, problem: ContactProblem, folder: Path, kept: Mapping[int, float]) -> FrameWriter:
         """Write the mesh; go on after the frames of ``kept`` (step -> time) that are in the folder. Collective."""
@@ -105,11 +102,9 @@ class FrameWriter:
         self._von_mises = VonMises(space.forms)
         self._contact_nodes = self._nodes_of_conditions()
         self._type, mine = _cells(space.mesh)
-        original = np.asarray(space.mesh.topology.original_cell_index, dtype=np.int64)
-        self._cell_numbers = _whole(space, original[: len(mine)])
-        self._node_numbers = _whole(space, space.nodes)
-        points = self._by_node(_three(space.points))
-        cells = self._by_cell(mine)
+        self._cell_numbers = np.asarray(space.mesh.topology.original_cell_index[: len(mine)], dtype=np.int64)
+        points = self._by_number(_three(space.points), space.nodes)
+        cells = self._by_number(mine, self._cell_numbers)
         self._shape = (len(points), *cells.shape)
         on_root(space.comm, partial(self._start, points, cells, kept))
 
@@ -120,12 +115,15 @@ class FrameWriter:
         numbers[surface.slots] = self._space.ids[surface.owned] // self._space.dimension
         return np.rint(surface.comm.sum(numbers)).astype(np.int64)
 
-    def _by_node(self, owned: Any) -> Any:
-        """Rows of owned nodes, on rank 0 as rows of all nodes in input order; none elsewhere."""
-        return _ordered(_whole(self._space, owned), self._node_numbers)
-
-    def _by_cell(self, owned: Any) -> Any:
-        return _ordered(_whole(self._space, owned), self._cell_numbers)
+    def _by_number(self, owned: Any, numbers: Indices) -> Any:
+        """Rows of owned nodes or cells, on rank 0 as rows of all in input order; none elsewhere. Collective."""
+        parts = self._space.comm.gather((numbers, owned))
+        if parts is None:
+            return owned[:0]
+        every, rows = (np.concatenate(part) for part in zip(*parts, strict=True))
+        placed = np.empty_like(rows)
+        placed[every] = rows
+        return placed
 
     def _start(self, points: Array, cells: Array, kept: Mapping[int, float]) -> None:
         """Rank 0: the mesh, the index of the frames that are kept, and then no others."""
@@ -151,12 +149,12 @@ class FrameWriter:
             space.expand(problem.cartesian(x), state.t, derivative)
             for derivative, x in enumerate((state.u, state.v, acceleration))
         ]
-        stress = self._by_cell(self._von_mises(moving[0]))
+        stress = self._by_number(self._von_mises(moving[0]), self._cell_numbers)
         slipping = np.zeros(problem.surface.count, dtype=bool)
         if problem.frictional:
             moving += self._rubbing(state)
             slipping = slipping if report is None else slipped(report)
-        vectors = self._by_node(np.hstack([_three(nodal) for nodal in moving]))
+        vectors = self._by_number(np.hstack([_three(nodal) for nodal in moving]), space.nodes)
         on_root(space.comm, partial(self._write, state, vectors, stress, slipping))
 
     def _rubbing(self, state: State) -> list[Array]:
@@ -206,19 +204,20 @@ class FrameWriter:
 
     def _grid(self, k: int, t: float) -> str:
         nodes, cells, corners = self._shape
-        mesh = f"{FIELDS}/mesh.h5"
-        frame = _name(k)
-        attributes = [_attribute(name, "Vector", "Node", _item((nodes, 3), f"{frame}:/{name}")) for name in self._names]
-        for name, center, count, kind in (
-            ("contact_pressure", "Node", nodes, "Float"),
-            ("contact_status", "Node", nodes, "Int"),
-            ("von_mises", "Cell", cells, "Float"),
-        ):
-            attributes.append(_attribute(name, "Scalar", center, _item((count,), f"{frame}:/{name}", kind)))
+        mesh, frame = f"{FIELDS}/mesh.h5", _name(k)
+
+        def attribute(name: str, center: str, *shape: int, number: str = "Float", size: int = 8) -> str:
+            kind, item = "Vector" if len(shape) == 2 else "Scalar", _item(shape, f"{frame}:/{name}", number, size)
+            return f'<Attribute Name="{name}" AttributeType="{kind}" Center="{center}">{item}</Attribute>\n'
+
+        attributes = [attribute(name, "Node", nodes, 3) for name in self._names]
+        attributes.append(attribute("contact_pressure", "Node", nodes))
+        attributes.append(attribute("contact_status", "Node", nodes, number="Int", size=4))
+        attributes.append(attribute("von_mises", "Cell", cells))
         return (
             f'<Grid Name="step {k}" GridType="Uniform"><Time Value="{t!r}"/>\n'
             f'<Topology TopologyType="{self._type}" NumberOfElements="{cells}" NodesPerElement="{corners}">'
-            f'{_item((cells, corners), f"{mesh}:/cells", "Int", 8)}</Topology>\n'
+            f'{_item((cells, corners), f"{mesh}:/cells", "Int")}</Topology>\n'
             f'<Geometry GeometryType="XYZ">{_item((nodes, 3), f"{mesh}:/points")}</Geometry>\n'
             f'{"".join(attributes)}</Grid>\n'
         )
@@ -234,16 +233,10 @@ def _name(k: int) -> str:
     return f"{FIELDS}/frame_{k:06d}.h5"
 
 
-def _item(shape: tuple[int, ...], where: str, kind: str = "Float", precision: int | None = None) -> str:
+def _item(shape: tuple[int, ...], where: str, number: str = "Float", size: int = 8) -> str:
     """A DataItem in an HDF5 file."""
-    size = precision or {"Float": 8, "Int": 4}[kind]
-    dimensions = " ".join(map(str, shape))
-    number = f'NumberType="{kind}" Precision="{size}"'
-    return f'<DataItem Dimensions="{dimensions}" {number} Format="HDF">{where}</DataItem>'
-
-
-def _attribute(name: str, kind: str, center: str, item: str) -> str:
-    return f'<Attribute Name={quoteattr(name)} AttributeType="{kind}" Center="{center}">{item}</Attribute>\n'
+    dimensions, kind = " ".join(map(str, shape)), f'NumberType="{number}" Precision="{size}"'
+    return f'<DataItem Dimensions="{dimensions}" {kind} Format="HDF">{where}</DataItem>'
 
 
 def _three(nodal: Array) -> Array:
@@ -259,16 +252,3 @@ def _cells(mesh: Any) -> tuple[str, Indices]:
     vertices = node_numbers(mesh)[compat.geometry_dofmap(mesh)][: mesh.topology.index_map(dim).size_local]
     kind = _CELLS[dim, vertices.shape[1]]
     return kind, vertices[:, _VTK_ORDER.get(kind, slice(None))]
-
-
-def _whole(space: FemSpace, owned: Any) -> Any:
-    """Rows of all ranks one after the other on rank 0, no rows elsewhere. Collective."""
-    parts = space.comm.gather(owned)
-    return owned[:0] if parts is None else np.concatenate(parts)
-
-
-def _ordered(rows: Any, numbers: Indices) -> Any:
-    """rows[i] goes to place numbers[i]."""
-    placed = np.empty_like(rows)
-    placed[numbers] = rows
-    return placed
