@@ -14,12 +14,12 @@ from vi_contact.ground_motion import (
     arias,
     d5_95,
     integrated,
-    motion_info,
     pga,
     pga_time,
     pgd,
     pgv,
     read_record,
+    record_info,
     resampled,
     scaled,
     scaled_to_pga,
@@ -63,8 +63,8 @@ def test_development_record_agrees_with_the_peak_in_its_own_header():
     assert read_record(shared(LOMA + "b.smc")).notes[0] == "component: vertical, up"
 
 
-def test_motion_info_of_el_centro():
-    text = motion_info(shared(EL_CENTRO))
+def test_record_info_of_el_centro():
+    text = record_info(read_record(shared(EL_CENTRO)))
     for line in ("format              PEER AT2", "samples             1559", "dt                  0.02 s",
                  "duration            31.16 s", "PGA                 3.127 m/s2 = 0.3188 g at t = 2.02 s",
                  "PGV                 0.3614 m/s", "Arias intensity     1.801 m/s", "D5-95               23.84 s",
@@ -73,10 +73,10 @@ def test_motion_info_of_el_centro():
         assert line in text.splitlines()
 
 
-def test_motion_info_lists_every_quantity(tmp_path):
+def test_record_info_lists_every_quantity(tmp_path):
     path = tmp_path / "motion.txt"
     path.write_text("# my record\n0.0 0.0\n0.1 1.0\n0.2 -2.0\n0.3 1.0\n0.4 0.0\n")
-    lines = motion_info(path, "gal").splitlines()
+    lines = record_info(read_record(path, "gal")).splitlines()
     rows = {line[:20].strip(): line[20:] for line in lines}
     assert rows["file"] == str(path) and rows["title"] == "my record"
     assert rows["units"] == "gal (1 gal = 0.01 m/s2)" and rows["samples"] == "5" and rows["duration"] == "0.4 s"
@@ -85,7 +85,7 @@ def test_motion_info_lists_every_quantity(tmp_path):
         "file", "format", "title", "station", "component", "units", "samples", "dt", "duration", "PGA", "PGV", "PGD",
         "Arias intensity", "D5-95", "CAV", "RMS", "Housner intensity", "predominant period", "mean period",
         "final velocity", "final displacement", "sha256", "note"]
-    assert "samples             3" in motion_info(path, "gal", resample_dt=0.2)
+    assert "samples             3" in record_info(read_record(path, "gal", resample_dt=0.2))
 
 
 def test_record_first_sample_is_at_zero_and_the_last_at_n_minus_one():
@@ -103,7 +103,7 @@ def test_record_is_a_read_only_copy():
 
 
 @pytest.mark.parametrize("samples, dt, word", [
-    ([1.0, math.nan], 0.1, "sample 1 is nan"), ([1.0], 0.1, "two"), ([[1.0, 2.0]], 0.1, "shape"),
+    ([1.0, math.nan], 0.1, "acceleration is nan at"), ([1.0], 0.1, "two"), ([[1.0, 2.0]], 0.1, "shape"),
     ([1.0, 2.0], 0.0, "time step"), ([1.0, 2.0], math.nan, "time step"), ([1.0, 2.0], "0.1", "time step"),
 ])
 def test_bad_record_is_refused(samples, dt, word):
@@ -181,5 +181,5 @@ def test_resampling_to_the_same_step_changes_nothing():
 
 @pytest.mark.parametrize("wrong", [np.ones(4) * 1j, ["1", "2"], [None, 1.0], [True, False]])
 def test_samples_are_real_numbers(wrong):
-    with pytest.raises(InputError, match="Record: acceleration is .*; give a row of real numbers"):
+    with pytest.raises(InputError, match="Record: acceleration is .*; give real numbers of shape"):
         Record(acceleration=wrong, dt=0.01)

@@ -7,7 +7,7 @@ from .ec8 import EC8Spectrum
 from .excitation import GroundMotion
 from .formats.reader import read_record
 from .formats.writer import write_at2, write_columns, write_path_series
-from .info import motion_info, record_info
+from .info import record_info
 from .intensity import (
     arias,
     bracketed_duration,
@@ -34,7 +34,7 @@ __all__ = [
     "STANDARD_GRAVITY", "UNITS", "EC8Spectrum", "Envelope", "GroundMotion",
     "KanaiTajimi", "Processing", "Record", "ResponseSpectrum",
     "arias", "baseline_corrected", "bracketed_duration", "cav", "d5_95", "filtered", "fourier_spectrum",
-    "housner_intensity", "husid", "integrated", "mean_period", "motion_info", "padded", "pga", "pga_time", "pgd", "pgv",
+    "housner_intensity", "husid", "integrated", "mean_period", "padded", "pga", "pga_time", "pgd", "pgv",
     "predominant_period", "psa", "read_record", "record_info", "resampled", "response_spectrum", "rms", "scaled",
     "scaled_to_arias", "scaled_to_pga", "scaled_to_psa", "significant_duration", "synthetic", "tapered", "trimmed",
     "without_mean", "write_at2", "write_columns", "write_path_series",

@@ -1,12 +1,8 @@
-"""Tell what a record file holds, as the text printed by `vi-contact motion info FILE`."""
+"""Tell what a record holds, as the text printed by `vi-contact motion info FILE`."""
 
 from __future__ import annotations
 
-import os
-
 from ..core.units import STANDARD_GRAVITY
-from .chain import Processing
-from .formats.reader import LARGEST_PEAK, read_record
 from .intensity import (
     arias,
     cav,
@@ -22,14 +18,6 @@ from .intensity import (
 )
 from .processing import integrated
 from .record import UNITS, Record
-
-
-def motion_info(path: str | os.PathLike[str], units: str | None = None, *, dt: float | None = None,
-                resample_dt: float | None = None, channel: int | None = None,
-                largest: float = LARGEST_PEAK, processing: Processing | None = None) -> str:
-    """Return a table of one quantity a line, after `processing`; other options and InputError: see `read_record`."""
-    record = read_record(path, units, dt=dt, resample_dt=resample_dt, channel=channel, largest=largest)
-    return record_info(record if processing is None else processing(record))
 
 
 def record_info(record: Record) -> str:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
-from numbers import Real
 
 import numpy as np
 
 from ..core.algebra import Array
-from ..core.checks import shown
+from ..core.checks import array, number
 from ..core.errors import InputError
 from ..core.units import STANDARD_GRAVITY
 
@@ -42,23 +40,13 @@ class Record:
     component: str = ""
 
     def __post_init__(self) -> None:
-        kind = np.asarray(self.acceleration).dtype.kind
-        if kind not in "iuf":
-            raise InputError(f"{self._name}: acceleration is {shown(self.acceleration)}; give a row of real numbers")
-        samples = np.array(self.acceleration, dtype=float)
-        if samples.ndim != 1 or samples.size < 2:
-            raise InputError(f"{self._name}: acceleration has shape {samples.shape}; give a row of two or more")
-        if not np.all(np.isfinite(samples)):
-            first = int(np.argmin(np.isfinite(samples)))
-            raise InputError(f"{self._name}: sample {first} is {samples[first]}; give finite accelerations")
-        if not isinstance(self.dt, Real) or not math.isfinite(self.dt) or self.dt <= 0:
-            raise InputError(f"{self._name}: the time step is {self.dt!r}; give a positive number of seconds")
+        owner = self.source or "Record"
+        samples = array(owner, "acceleration", self.acceleration, (None,), unit="m/s2")
+        if samples.size < 2:
+            raise InputError(f"{owner}: acceleration has {samples.size} samples; give two or more")
+        number(owner, "the time step", self.dt, positive=True, unit="seconds")
         samples.flags.writeable = False
         object.__setattr__(self, "acceleration", samples)
-
-    @property
-    def _name(self) -> str:
-        return self.source or "Record"
 
     def changed(self, acceleration: Array, note: str, *, dt: float | None = None) -> Record:
         """Return a record with these samples, and a note of what was done."""
@@ -83,32 +71,3 @@ def canonical_units(source: str, units: str) -> str:
         raise InputError(f"{source}: {units!r} is not a unit of acceleration known here; use a file of accelerations "
                          f"in one of {', '.join(UNITS)}")
     return text
-
-
-def file_units(source: str, stated: str | None, given: str | None) -> str:
-    """Return the units of a file, a key of UNITS: it states `stated`, or the caller says `given` (None: nothing).
-
-    Raises InputError when neither is known, one is not an acceleration, or the two contradict each other.
-    """
-    names = [canonical_units(source, units) for units in (stated, given) if units is not None]
-    if not names:
-        raise InputError(f"{source}: the file does not state its units; pass units= as one of {', '.join(UNITS)}")
-    if len({UNITS[name] for name in names}) > 1:
-        raise InputError(f"{source}: the file states its units as {names[0]} but units={given!r} was passed; "
-                         "leave units out or correct the file")
-    return names[0]
-
-
-def file_dt(source: str, stated: float | None, given: float | None) -> float:
-    """Return the time step [s] of a file that states `stated` (or nothing) when the caller says `given` (or nothing).
-
-    Raises InputError when neither is known or they differ by more than one part in a million.
-    """
-    if stated is None:
-        if given is None:
-            raise InputError(f"{source}: the file does not state its time step; pass dt= in seconds")
-        return given
-    if given is not None and not math.isclose(stated, given, rel_tol=1e-6):
-        raise InputError(f"{source}: the file states a time step of {stated:g} s but dt={given!r} was passed; "
-                         "leave dt out or correct the file")
-    return stated

@@ -15,11 +15,7 @@ def recognises(text: TextFile) -> bool:
 
 
 def read(text: TextFile) -> Record:
-    """Return the record of one component; channel: 1 (N-S), 2 (E-W) or 3 (U-D). Nothing is subtracted.
-
-    Raises InputError naming the file, mostly with a line: no channel chosen, an entry of the header missing or no
-    number, a row that has not three numbers, a number of rows unlike "NUMBER OF DATA".
-    """
+    """Return the record of one component; channel: 1 (N-S), 2 (E-W) or 3 (U-D). Nothing is subtracted."""
     channel = text.chosen(COMPONENTS)
     start = next((k + 1 for k, line in enumerate(text.heads) if line.split() == list(COMPONENTS)), None)
     if start is None:

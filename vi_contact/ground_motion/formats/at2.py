@@ -47,11 +47,7 @@ def recognises(text: TextFile) -> bool:
 
 
 def read(text: TextFile) -> Record:
-    """Return the record of an AT2 file; units and dt are needed only where the file does not state them.
-
-    Raises InputError naming the file, mostly with a line: number of values unlike NPTS, no or contradicting time step
-    or units, a velocity or displacement file, a word that is not a number.
-    """
+    """Return the record of an AT2 file; units and dt are needed only where the file does not state them."""
     npts, stated_dt, npts_line, start = _header(text)
     header = [" ".join(line.split()) for line in text.heads[:start] if line.strip()]
     values = text.values(start)

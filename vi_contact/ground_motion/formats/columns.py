@@ -17,10 +17,7 @@ from ...core.checks import counted, number
 from ...core.errors import InputError
 from ..record import Record
 from .at2 import begin_data
-from .text import TextFile
-
-JITTER = 1e-6
-"""Relative difference between time steps that still counts as rounding."""
+from .text import SAME_STEP, TextFile
 
 
 def read(text: TextFile) -> Record:
@@ -29,8 +26,6 @@ def read(text: TextFile) -> Record:
     Uneven times are refused unless resample_dt [s] is given: then straight lines between the samples are read off at
     resample_dt, or at the nearest whole part of it that is not longer than the usual step, so that reading does not
     alias. The first time of the file becomes t = 0. With dt, rows of three or more values are read one after the other.
-    Raises InputError naming file and line for missing units, ragged rows, words that are not numbers, times that do
-    not increase, uneven times.
     """
     lines, table = _table(text, series=text.dt is not None)
     comments = tuple(line.lstrip("# ").rstrip() for line in text.heads if line.startswith("#"))
@@ -76,7 +71,7 @@ def _uneven_line(text: TextFile, lines: list[int], times: Array) -> str | None:
         k = int(np.argmax(backward)) + 1
         raise InputError(f"{text.at(lines[k])}: time {times[k]:g} s does not come after {times[k - 1]:g} s; "
                          "sort the rows and remove repeated times")
-    odd = np.abs(steps - usual) > JITTER * usual
+    odd = np.abs(steps - usual) > SAME_STEP * usual
     if not np.any(odd):
         return None
     k = int(np.argmax(odd)) + 1
@@ -88,7 +83,7 @@ def _evened(sentence: str, times: Array, samples: Array, resample_dt: float | No
     if resample_dt is None:
         raise InputError(f"{sentence}; pass resample_dt= to interpolate, or correct the time")
     number("read_record", "resample_dt", resample_dt, positive=True, unit="seconds")
-    step = resample_dt / math.ceil(resample_dt / float(np.median(np.diff(times))) * (1.0 - JITTER))
+    step = resample_dt / math.ceil(resample_dt / float(np.median(np.diff(times))) * (1.0 - SAME_STEP))
     asked = (times[-1] - times[0]) / step * (1.0 + 1e-12) + 1.0
     count = counted("read_record", f"resample_dt = {resample_dt!r} s", asked)
     return step, np.interp(times[0] + step * np.arange(count), times, samples)

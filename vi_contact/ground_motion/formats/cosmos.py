@@ -63,11 +63,7 @@ def recognises(text: TextFile) -> bool:
 
 
 def read(text: TextFile) -> Record:
-    """Return the record of one channel; channel: 1 for the first of the file, required where it holds several.
-
-    Raises InputError naming the file, mostly with a line: no acceleration in it, several channels, samples missing,
-    unequal steps, counts instead of accelerations, an unknown sample, text where a number should be.
-    """
+    """Return the record of one channel; channel: 1 for the first of the file, required where it holds several."""
     blocks = _blocks(text)
     if not blocks:
         raise InputError(f"{text.at(0)}: no block of accelerations follows; get the corrected accelerations (V2)")

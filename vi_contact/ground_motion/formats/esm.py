@@ -22,11 +22,7 @@ def recognises(text: TextFile) -> bool:
 
 
 def read(text: TextFile) -> Record:
-    """Return the record of an ESM ASCII file; units and dt are only checked.
-
-    Raises InputError naming the file, mostly with a line: a velocity or displacement file, a needed entry missing or no
-    number, a word between the samples, a number of samples unlike NDATA.
-    """
+    """Return the record of an ESM ASCII file; units and dt are only checked."""
     header, start = _header(text)
     index, kind = header.get("DATA_TYPE", (0, "ACCELERATION"))
     if kind and "ACCELERATION" not in kind.upper():

@@ -14,7 +14,7 @@ from ...core.errors import InputError
 from ..record import Record, canonical_units
 from .text import NUMBER, TextFile
 
-KEYS = ("Origin Time", "Station Code", "Record Time", "Sampling Freq(Hz)", "Duration Time(s)", "Dir.", "Scale Factor",
+KEYS = ("Origin Time", "Station Code", "Dir.", "Record Time", "Sampling Freq(Hz)", "Duration Time(s)", "Scale Factor",
         "Max. Acc. (gal)", "Memo.")
 """Header entries used here; the last one ends the header."""
 
@@ -28,28 +28,23 @@ def recognises(text: TextFile) -> bool:
 
 
 def read(text: TextFile) -> Record:
-    """Return the record of a K-NET or KiK-net file, its mean removed; units and dt are only checked.
-
-    Raises InputError naming the file, mostly with a line: an entry of the header is missing or no number, words
-    between the counts, fewer or more samples than "Duration Time(s)".
-    """
+    """Return the record of a K-NET or KiK-net file, its mean removed; units and dt are only checked."""
     header = {key: index for key in KEYS for index in range(len(text.lines)) if text.heads[index].startswith(key)}
     missing = [key for key in KEYS if key not in header]
     if missing:
         raise InputError(f"{text.path}: the header has no line {missing[0]!r}; get the complete file")
-    scale, unit = _scale(text, header["Scale Factor"])
+    scale, name = _scale(text, header["Scale Factor"])
     frequency = _number(text, header["Sampling Freq(Hz)"], "Sampling Freq(Hz)")
     counts = text.values(header["Memo."] + 1)
     seconds = _number(text, header["Duration Time(s)"], "Duration Time(s)")
     if not abs(len(counts) - seconds * frequency) <= 0.5:
         raise InputError(f"{text.at(header['Duration Time(s)'])}: {seconds:g} s at {frequency:g} Hz are announced but "
                          f"{len(counts)} samples follow; get the complete file")
-    name = canonical_units(text.at(header["Scale Factor"]), unit)
     lines = tuple(" ".join(line.split()) for line in text.heads[:header["Memo."]])
-    value = {key: text.heads[index][len(key):].strip() for key, index in header.items()}
+    time, station, direction = (text.heads[header[key]][len(key):].strip() for key in KEYS[:3])
     return text.record(np.array(counts) - np.mean(counts), units=name, line=header["Scale Factor"], scale=scale,
-                       dt=1.0 / frequency, format="K-NET", station=value["Station Code"], component=value["Dir."],
-                       title=f"{value['Origin Time']}, {value['Station Code']} {value['Dir.']}",
+                       dt=1.0 / frequency, format="K-NET", station=station, component=direction,
+                       title=f"{time}, {station} {direction}",
                        notes=(*lines, f"mean of {scale * np.mean(counts):.6g} {name} removed"))
 
 
@@ -58,7 +53,7 @@ def _scale(text: TextFile, index: int) -> tuple[float, str]:
     match = _SCALE.search(text.heads[index])
     if match is None or text.number(index, match[3]) == 0.0:
         raise InputError(f"{text.at(index)}: the scale factor is not like '3920(gal)/6182761'; get the file again")
-    return text.number(index, match[1]) / text.number(index, match[3]), match[2]
+    return text.number(index, match[1]) / text.number(index, match[3]), canonical_units(text.at(index), match[2])
 
 
 def _number(text: TextFile, index: int, key: str) -> float:

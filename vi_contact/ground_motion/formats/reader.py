@@ -36,7 +36,9 @@ def read_record(path: str | os.PathLike[str], units: str | None = None, *, dt: f
     the record is brought to by `resampled`; it also allows uneven times in a column file. channel: which one, from 1,
     of a file that holds several (SEVERAL). largest: the greatest peak acceleration [m/s²] that is believed; give more
     where the motion is that strong.
-    Raises InputError with one sentence that names the file and, where there is one, the line.
+    Raises InputError with one sentence that names the file and, where there is one, the line: for a velocity or
+    displacement, no or another number of samples than announced, entries of the header or samples that are missing,
+    unknown or no numbers, units or a step that nobody states or that contradict each other.
     """
     text = load_text(path, units=units, dt=dt, resample_dt=resample_dt, channel=channel)
     reader = next((one for one in (*SEVERAL, smc, knet, esm, at2) if one.recognises(text)), columns)

@@ -22,11 +22,7 @@ def recognises(text: TextFile) -> bool:
 
 
 def read(text: TextFile) -> Record:
-    """Return the record of one time series; units are required, channel (from 1) where there are several.
-
-    Raises InputError naming the file, and the line where it is not JSON: no series, several and none chosen, a velocity
-    or displacement, a factor, data that are not numbers, no step.
-    """
+    """Return the record of one time series; units are required, channel (from 1) where there are several."""
     event, series = _series(text)
     chosen = series[text.chosen([_text(one.get("name")) for one in series])]
     name = _text(chosen.get("name"))

@@ -30,11 +30,7 @@ def recognises(text: TextFile) -> bool:
 
 
 def read(text: TextFile) -> Record:
-    """Return the record of an SMC file; dt is needed only where the file leaves its sampling rate undefined.
-
-    Raises InputError naming the file, mostly with a line: a type other than corrected acceleration, a short file,
-    a number of samples unlike the header's, an undefined sample, text where a number should be.
-    """
+    """Return the record of an SMC file; dt is needed only where the file leaves its sampling rate undefined."""
     _refuse_other_kinds(text)
     integers = _fields(text, TEXT_LINES, INTEGER_LINES, INTEGER_WIDTH, 8)
     reals = _fields(text, TEXT_LINES + INTEGER_LINES, REAL_LINES, REAL_WIDTH, 5)
@@ -47,11 +43,12 @@ def read(text: TextFile) -> Record:
     rate = reals[SAMPLING_RATE]
     stated = 1.0 / rate if 0.0 < rate < UNDEFINED else None
     direction = _direction(integers)
-    notes = ((f"component: {direction}",) if direction else ()) + _problem(integers)
-    notes += tuple(line[1:].strip() for line in comments if line[1:].strip())
+    notes = [f"component: {direction}"] if direction else []
+    notes += ["the file carries the agency's problem flag: read its comments"] if integers[PROBLEM] == 1.0 else []
+    notes += [line[1:].strip() for line in comments if line[1:].strip()]
     title = "; ".join(" ".join(text.heads[index].split()) for index in (3, 5) if text.heads[index].strip(" *"))
     return text.record(_samples(text, start, integers[SAMPLES]), units="cm/s2", dt=stated, format="USGS SMC",
-                       title=title, notes=notes, station=_station(text), component=direction)
+                       title=title, notes=tuple(notes), station=_station(text), component=direction)
 
 
 def _refuse_other_kinds(text: TextFile) -> None:
@@ -93,11 +90,6 @@ def _direction(integers: list[float]) -> str:
         return f"vertical, {'up' if integers[VERTICAL] == 0.0 else 'down'}"
     undefined = integers[0]
     return "" if integers[AZIMUTH] == undefined else f"azimuth {integers[AZIMUTH]:g} degrees clockwise from north"
-
-
-def _problem(integers: list[float]) -> tuple[str, ...]:
-    """Return the agency's problem flag, in words."""
-    return ("the file carries the agency's problem flag: read its comments",) if integers[PROBLEM] == 1.0 else ()
 
 
 def _station(text: TextFile) -> str:

@@ -21,7 +21,7 @@ import numpy as np
 from ...core.algebra import Array
 from ...core.checks import LARGEST, shown
 from ...core.errors import InputError
-from ..record import UNITS, Record, file_dt, file_units
+from ..record import UNITS, Record, canonical_units
 
 NUMBER = r"[+-]?(?:(?<![\d.])\d++(?:\.\d*+)?|(?<!\d)\.\d++)(?:[EeDd][+-]?\d++)?"
 """Regular expression of one Fortran or C number: 1, -1., .5, -.123E-02, 1.0D+3. It begins in no middle of digits, so
@@ -29,6 +29,7 @@ that a search takes a time that grows as the line does."""
 
 HEAD = 1000  # characters of a line in which words of a header are looked for
 BYTES = 20 * LARGEST  # of a file: the text of the most numbers that an input may hold
+SAME_STEP = 1e-6  # relative difference between time steps that still counts as rounding
 
 _NUMBER = re.compile(NUMBER)
 _BETWEEN = re.compile(r"[\s,;]+")
@@ -68,9 +69,21 @@ class TextFile:
         None: it does not state them. line: index of the one with the units. told: title, notes, format, station,
         component. Raises InputError for what the file and its caller leave open, or state differently.
         """
-        name = file_units(self.path if line is None else self.at(line), units, self.units)
-        return Record(acceleration=UNITS[name] * scale * np.array(samples, dtype=float), units=name, source=self.path,
-                      dt=file_dt(self.path, dt, self.dt), sha256=self.sha256, **told)
+        place = self.path if line is None else self.at(line)
+        names = [canonical_units(place, one) for one in (units, self.units) if one is not None]
+        step = self.dt if dt is None else dt
+        if not names:
+            raise InputError(f"{place}: the file does not state its units; pass units= as one of {', '.join(UNITS)}")
+        if UNITS[names[0]] != UNITS[names[-1]]:
+            raise InputError(f"{place}: the file states its units as {names[0]} but units={self.units!r} was passed; "
+                             "leave units out or correct the file")
+        if step is None:
+            raise InputError(f"{self.path}: the file does not state its time step; pass dt= in seconds")
+        if self.dt is not None and not math.isclose(step, self.dt, rel_tol=SAME_STEP):
+            raise InputError(f"{self.path}: the file states a time step of {step:g} s but dt={self.dt!r} was passed; "
+                             "leave dt out or correct the file")
+        return Record(acceleration=UNITS[names[0]] * scale * np.array(samples, dtype=float), units=names[0], dt=step,
+                      source=self.path, sha256=self.sha256, **told)
 
     def chosen(self, components: Sequence[str]) -> int:
         """Return which component the caller chose, from 0; InputError that lists them where none or another one is."""
