@@ -82,11 +82,9 @@ class Galerkin:
 
     def _single(self, moments: NDArray) -> NDArray:
         n, e, f = len(self.mesh), self.pairs.first, self.pairs.second
-        matrix = np.empty((2, n, 2, 2, n, 2), moments.dtype)
-        for c in range(2):
-            for k in range(2):
-                matrix[c, e, :, k, f, :] = moments[c + k]
-                matrix[c, f, :, k, e, :] = moments[c + k].swapaxes(1, 2)
+        matrix, values = np.empty((2, n, 2, 2, n, 2), moments.dtype), tensor(moments)
+        matrix[:, e, :, :, f] = values.transpose(2, 0, 3, 1, 4)
+        matrix[:, f, :, :, e] = values.transpose(2, 0, 4, 1, 3)
         return matrix.reshape(4 * n, 4 * n)
 
     def _double(self, moments: NDArray) -> NDArray:
@@ -94,22 +92,17 @@ class Galerkin:
         local = np.empty((2, n, 2, 2, n, 2), moments.dtype)
         swapped = moments.swapaxes(2, 3) * np.array([-1, -1, -1, -1, 1, 1, 1, 1])[:, None, None, None]
         for x, y, m in ((e, f, moments), (f, e, swapped)):
-            values = double_local(self.mesh, self.shear, m, y)
-            for c in range(2):
-                for k in range(2):
-                    local[c, x, :, k, y, :] = values[c, k]
+            local[:, x, :, :, y] = double_local(self.mesh, self.shear, m, y).transpose(2, 0, 3, 1, 4)
         return joined_at_nodes(self.mesh, local, 4).reshape(4 * n, 2 * n)
 
     def _hyper(self, moments: NDArray) -> NDArray:
         n, e, f = len(self.mesh), self.pairs.first, self.pairs.second
-        values = self._hyper_local(moments)
-        local = np.empty((2, n, 2, 2, n, 2), moments.dtype)
+        local, values = np.empty((2, n, 2, 2, n, 2), moments.dtype), self._hyper_local(moments)
         for c in range(2):
             for k in range(2):
                 local[c, e, :, k, f, :] = values[c, k]
                 local[k, f, :, c, e, :] = values[c, k].swapaxes(1, 2)
-        columns = joined_at_nodes(self.mesh, local, 4)
-        return joined_at_nodes(self.mesh, columns, 1).reshape(2 * n, 2 * n)
+        return joined_at_nodes(self.mesh, joined_at_nodes(self.mesh, local, 4), 1).reshape(2 * n, 2 * n)
 
     def _hyper_local(self, m: NDArray) -> NDArray:
         """Return (2, 2, p, 2, 2): component of v on the first element, of u on the second, pair, shape of v, of u."""
@@ -118,7 +111,7 @@ class Galerkin:
         t_x, t_y = mesh.tangents[e].T[:, :, None, None], mesh.tangents[f].T[:, :, None, None]
         dv = SLOPE[:, None] / mesh.lengths[e][:, None, None]
         du = SLOPE / mesh.lengths[f][:, None, None]
-        phi, g = m[2].sum((1, 2))[:, None, None], _tensor(m[3:6].sum((2, 3)))[..., None, None]
+        phi, g = m[2].sum((1, 2))[:, None, None], tensor(m[3:6].sum((2, 3)))[..., None, None]
         sum_u, sum_v = m[6:10].sum(3)[..., None], m[6:10].sum(2)[:, :, None, :]  # summed over shapes of u; of v
         across_x, across_y = (sum_u[:2] * n_x).sum(0), (sum_v[:2] * n_y).sum(0)
         mu, turned = self.shear, TURN.T @ np.moveaxis(g, (0, 1), (-2, -1)) @ TURN
@@ -140,7 +133,7 @@ def double_local(mesh: BoundaryMesh, shear: float, m: NDArray, y: NDArray[np.int
     m: (8, p, a, 2) moments of the stacked kernels of the double layer; shear: c_S².
     """
     normal, slopes = mesh.normals[y].T[:, :, None, None], SLOPE / mesh.lengths[y][:, None, None]
-    phi, g = m[4].sum(2)[..., None], _tensor(m[5:8].sum(3))[..., None]
+    phi, g = m[4].sum(2)[..., None], tensor(m[5:8].sum(3))[..., None]
     by_normal = (m[0:2] * normal).sum(0)
     values = np.empty((2, 2, *m.shape[1:]), m.dtype)
     for c in range(2):
@@ -160,7 +153,7 @@ def joined_at_nodes(mesh: BoundaryMesh, local: NDArray, axis: int) -> NDArray:
     return start + np.take(end, before, axis)
 
 
-def _tensor(m: NDArray) -> NDArray:
+def tensor(m: NDArray) -> NDArray:
     """Return (2, 2, ...) from the components xx, xy, yy."""
     return np.stack([np.stack([m[0], m[1]]), np.stack([m[1], m[2]])])
 

@@ -11,7 +11,7 @@ from ..core.algebra import Array
 from ..core.checks import array, instance, integers, shape_of
 from ..core.errors import InputError
 from .boundary_mesh import BoundaryMesh
-from .boundary_operators import N_SINGLE, double_local, integrands, joined_at_nodes
+from .boundary_operators import N_SINGLE, double_local, integrands, joined_at_nodes, tensor
 from .fundamental_solution import TimeKernels
 from .poincare_steklov import BoundaryMotion, PoincareSteklov
 from .quadrature import at_points
@@ -57,13 +57,10 @@ def _matrices(mesh: BoundaryMesh, x: Array, t: float, c_p: float, c_s: float) ->
     m, n = len(x), len(mesh)
     moments = np.concatenate(list(_moments(mesh, x, t, c_p, c_s)), axis=1)
     point, element = np.repeat(np.arange(m), n), np.tile(np.arange(n), m)
-    single = np.empty((2, m, 2, n, 2))
-    double = np.empty((2, m, 2, n, 2))
-    values = double_local(mesh, c_s**2, moments[N_SINGLE:, :, None, :], element)
-    for c in range(2):
-        for k in range(2):
-            single[c, point, k, element] = moments[c + k]
-            double[c, point, k, element] = values[c, k][:, 0]
+    single, double = np.empty((2, m, 2, n, 2)), np.empty((2, m, 2, n, 2))
+    values = double_local(mesh, c_s**2, moments[N_SINGLE:, :, None, :], element)[..., 0, :]
+    single[:, point, :, element] = tensor(moments[:N_SINGLE]).transpose(2, 0, 1, 3)
+    double[:, point, :, element] = values.transpose(2, 0, 1, 3)
     return single.reshape(2 * m, 4 * n), joined_at_nodes(mesh, double, 3).reshape(2 * m, 2 * n)
 
 

@@ -42,12 +42,12 @@ def traction_forces(
     weight = mesh.lengths[chosen, None] * w
     forces = np.zeros((steps, 2, len(mesh)))
     for k in range(steps):
-        at_times = [_values(traction(places, normals, (k + xt) * dt), (k + xt) * dt, places.shape) for xt in x]
+        at_times = [
+            array(owner, f"the traction at t = {t:.6g} s", traction(places, normals, t), places.shape, unit="Pa")
+            for t in (k + x) * dt
+        ]
         loads = np.tensordot(w, np.stack(at_times), 1).reshape(len(chosen), order, 2) * weight[:, :, None]
         for nodes, shape in ((chosen, 1.0 - x), (mesh.after[chosen], x)):
             forces[k][:, nodes] += np.einsum("eqc,q->ce", loads, shape)
     return forces
 
-
-def _values(values: ArrayLike, t: float, shape: tuple[int, ...]) -> Array:
-    return array("traction_forces", f"the traction at t = {t:.6g} s", values, shape, unit="Pa")

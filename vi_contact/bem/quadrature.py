@@ -211,11 +211,7 @@ def _outer_breaks(pairs: ElementPairs, part: Index, fronts: Sequence[float]) -> 
 
 def _on_one_element(pairs: ElementPairs, chosen: Index, fronts: Sequence[float], order: int) -> Iterator[PointSet]:
     """Integrate once in z = |xi - eta|, on which alone r depends, split at the fronts; two points across are exact."""
-    h = np.hypot(*pairs.a[:, chosen])
-    breaks = np.stack([front / h for front in fronts], axis=1) if len(fronts) else np.empty((len(h), 0))
-    row, low, length = pieces(breaks)
-    heard = (low + 0.5 * length) * h[row] < max(fronts, default=np.inf)
-    row, low, length = row[heard], low[heard], length[heard]
+    row, low, length = _reached(np.hypot(*pairs.a[:, chosen]), fronts)
     x, w = graded(order)
     across, across_weight = gauss(2)
     z = (low[:, None] + length[:, None] * x)[:, :, None]
@@ -225,6 +221,13 @@ def _on_one_element(pairs: ElementPairs, chosen: Index, fronts: Sequence[float],
     owner = np.repeat(row, 2 * order)
     yield _flat(pairs, chosen, np.tile(owner, 2), np.concatenate([large.ravel(), small.ravel()]),
                 np.concatenate([small.ravel(), large.ravel()]), np.tile(weight, 2))
+
+
+def _reached(distance: Array, fronts: Sequence[float]) -> tuple[Index, Array, Array]:
+    """Return the pieces, as of ``pieces``, that the last front has reached, of [0, 1] where r is x times a distance."""
+    row, low, length = pieces(np.array(fronts, float) / distance[:, None])
+    heard = (low + 0.5 * length) * distance[row] < max(fronts, default=np.inf)
+    return row[heard], low[heard], length[heard]
 
 
 def _at_corners(
@@ -253,10 +256,7 @@ def _at_corners(
             ratios, weights = linear(low, length, smoothed(order))
         owner, ratio, outer_weight = np.repeat(row, order), ratios.ravel(), weights.ravel()
         distance = np.sqrt(c0[owner] - 2.0 * ratio * ab[owner] + ratio**2 * c2[owner])
-        reached = np.stack([front / distance for front in fronts], axis=1) if cuts else np.empty((len(ratio), 0))
-        row, low, length = pieces(reached)
-        heard = (low + 0.5 * length) * distance[row] < max(fronts, default=np.inf)
-        row, low, length = row[heard], low[heard], length[heard]
+        row, low, length = _reached(distance, fronts)
         along, weight = linear(low, length, graded(order), outer_weight[row])
         weight, long = (weight * along).ravel(), along.ravel()
         short = (along * ratio[row, None]).ravel()

@@ -34,9 +34,8 @@ from ..core.errors import InputError
 from ..core.surfaces import ContactSurface
 from .layer import Layer, sized
 from .metric import Metric
-from .motion import ConstrainedSystem
 from .particle import damping_ratio
-from .trajectory import layer_motion
+from .trajectory import passage
 
 LEAST_RESTITUTION = 1e-3  # below it the search takes minutes
 DOUBLINGS = 60  # of the damping ratio in search of a rebound
@@ -162,11 +161,4 @@ def contact_layer(
 
 def _rebound(layer: Layer, mass: float, speed: float, metric: Metric) -> float:
     """e of a rigid body."""
-    body = ConstrainedSystem(np.array([[mass]]), lambda q: float(q[0]), lambda q: np.ones(1))
-    found = layer_motion(
-        body, layer, q0=np.array([layer.width]), v0=np.array([-speed]), t_end=1e6 * layer.width / speed,
-        metric=metric, contacts=1, rtol=1e-8,
-    )
-    if not found.contacts:
-        raise InputError("the layer holds the body back for ever: give it more k or less c")
-    return found.contacts[0].restitution
+    return passage(layer, mass, speed, metric, rtol=1e-8).contacts[0].restitution

@@ -98,6 +98,18 @@ def layer_motion(
     return passages.trajectory()
 
 
+def passage(layer: Layer, mass: float, speed: float, metric: Metric, *, rtol: float, refine: int = 1) -> Trajectory:
+    """Return how ``mass`` [kg] on a line crosses the layer, entered with ``speed`` [m/s]; InputError if it stays."""
+    particle = ConstrainedSystem(np.array([[mass]]), lambda q: float(q[0]), lambda q: np.ones(1))
+    found = layer_motion(
+        particle, layer, q0=np.array([layer.width]), v0=np.array([-speed]), t_end=1e6 * layer.width / speed,
+        metric=metric, contacts=1, rtol=rtol, refine=refine,
+    )
+    if not found.contacts:
+        raise InputError("the layer holds the body back for ever: give it more k or less c")
+    return found
+
+
 def _check_options(t_end: float, contacts: int | None, rtol: float, method: str, refine: int) -> None:
     owner = "layer_motion"
     number(owner, "t_end", t_end, positive=True, unit="s")

@@ -12,9 +12,8 @@ from scipy.integrate import cumulative_trapezoid
 
 from ...boundary_layer.layer import Layer
 from ...boundary_layer.metric import Metric
-from ...boundary_layer.motion import ConstrainedSystem
 from ...boundary_layer.particle import ParticleImpact, layer_for
-from ...boundary_layer.trajectory import layer_motion
+from ...boundary_layer.trajectory import passage
 from ...core.checks import check_word
 from ...core.errors import InputError
 from ...core.files import write_atomically
@@ -93,13 +92,7 @@ def _closed(impact: ParticleImpact) -> tuple[float, ...]:
 def _integrated(impact: ParticleImpact, metric: str) -> tuple[float, ...]:
     """Return the same in any reading, from x = b, by integration in time."""
     layer = impact.layer
-    body = ConstrainedSystem(np.array([[impact.mass]]), lambda q: float(q[0]), lambda q: np.ones(1))
-    motion = layer_motion(
-        body, layer, q0=np.array([layer.width]), v0=np.array([-impact.speed]), t_end=1e6 * layer.width / impact.speed,
-        metric=Metric(metric), contacts=1, refine=100,
-    )
-    if not motion.contacts:
-        raise InputError("the particle does not come back in 1e6 b/V: give the layer more k or less c")
+    motion = passage(layer, impact.mass, impact.speed, Metric(metric), rtol=1e-11, refine=100)
     contact = motion.contacts[0]
     force = layer.at(impact.speed).force(motion.rho, motion.v[:, 0])
     impulse = cumulative_trapezoid(force, motion.t, initial=0.0)
