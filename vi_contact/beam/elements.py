@@ -124,11 +124,7 @@ def _uniform(m: int, h: float) -> Array:
 
 def _assembled(inner: Array, last: Array, m: int) -> Any:
     """The (m, m) matrix of m element matrices (2, 2), all ``inner`` but the last; node 0 is clamped."""
-    low, rows, columns, values = np.arange(m), [], [], []
-    for i in range(2):
-        for j in range(2):
-            rows.append(low + i)
-            columns.append(low + j)
-            values.append(np.append(np.full(m - 1, inner[i, j]), last[i, j]))
-    entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
-    return sp.coo_matrix(entries, shape=(m + 1, m + 1)).tocsr()[1:, 1:]
+    middle = np.full(m, inner[1, 1] + inner[0, 0])
+    middle[-2:] = inner[1, 1] + last[0, 0], last[1, 1]
+    below, above = (np.append(np.full(m - 2, inner[at]), last[at]) for at in ((1, 0), (0, 1)))
+    return sp.diags((below, middle, above), (-1, 0, 1)).tocsr()
