@@ -18,6 +18,7 @@ their mean; those of ``MoreauJean`` and ``ContactStabilisedNewmark`` do not.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -39,37 +40,18 @@ class BeamSpace:
     """Say what the unknowns of rod and beam mean, for recorders and writers: displacements (along, across) of nodes.
 
     Nodes at ``x`` (the clamped one left out) on the axis. Unknowns: v_1 … v_n along the axis (n = m, or 1: of the
-    tip alone), then theta_1 … theta_m and u_1 … u_m of a beam, if there is one. Rotations belong to no point.
+    tip alone), then theta_1 … theta_m and u_1 … u_m of a beam, if there is one. Rotations belong to no point. ``ids``:
+    0, 1, …, one process owns all; ``coordinates``: (unknowns, d) [m]; ``bodies``: of every unknown, there is one.
     """
 
     def __init__(self, x: Array, along: int, beam: bool) -> None:
         self.x, self.along, self.beam = x, along, beam
         self.dimension = 2 if beam else 1
-        self.unknowns = along + (2 * len(x) if beam else 0)
-
-    @property
-    def ids(self) -> Indices:
-        """Return 0, 1, …: one process owns all."""
-        return np.arange(self.unknowns)
-
-    @property
-    def _nodes(self) -> Indices:
-        """The node of each unknown."""
-        m = len(self.x)
-        rod = np.arange(m - self.along, m)
-        return np.concatenate([rod, np.arange(m), np.arange(m)]) if self.beam else rod
-
-    @property
-    def coordinates(self) -> Array:
-        """Return the coordinates (unknowns, d) [m]."""
-        places = np.zeros((self.unknowns, self.dimension))
-        places[:, 0] = self.x[self._nodes]
-        return places
-
-    @property
-    def bodies(self) -> Indices:
-        """Return the number of the body of every unknown: there is one."""
-        return np.zeros(self.unknowns, dtype=np.int64)
+        places = np.concatenate([x[len(x) - along :], x, x]) if beam else x[len(x) - along :]
+        self.unknowns = len(places)
+        self.ids: Indices = np.arange(self.unknowns)
+        self.coordinates: Array = places[:, None] * np.eye(1, self.dimension)
+        self.bodies: Indices = np.zeros(self.unknowns, dtype=np.int64)
 
     def find_nodes(self, points: Array) -> Indices:
         """Return the nearest nodes; InputError for points off the axis, beyond the tip or at the clamp."""
@@ -99,7 +81,7 @@ History = Callable[[float], float]
 
 def rod_problem(rod: Rod, elements: Elements, start: Start | None = None) -> ContactProblem:
     """Set up the rod before its wall (2.1)-(2.5). ``start``: u and v along the axis; at rest when None."""
-    _check("rod_problem", elements, start, rod=rod)
+    _check("rod_problem", elements, (start,), rod=rod)
     x = elements.nodes(rod.length)
     start = start or Start()
     return _problem(x, _Part.of_rod(rod, elements, start), None, rod.gap, Frictionless())
@@ -114,13 +96,12 @@ def beam_problem(
     ``friction``: Coulomb or SlipRateCoulomb. Schemes take the force where they take loads: ``Midpoint`` at t + dt/2,
     Algorithm 10 at t. ``load``: uniform, across [N/m].
     """
-    _check("beam_problem", elements, start, beam=beam, friction=friction)
+    _check("beam_problem", elements, (start,), load, beam=beam, friction=friction)
     function("beam_problem", "normal_force", normal_force, "give a function of t that returns |r_N| >= 0 in N")
-    _check_load("beam_problem", load)
     x = elements.nodes(beam.length)
     mass = sp.csr_matrix([[beam.rho * beam.area * beam.length]])
     push, rest = ((np.ones(1), _given("normal_force", normal_force, "N")),), np.zeros(1)
-    point = _Part(mass, None, sp.csr_matrix((1, 1)), push, rest, rest, inertia=mass @ np.ones(1))
+    point = _Part(mass, sp.csr_matrix((1, 1)), 0.0, push, rest, rest, inertia=mass @ np.ones(1))
     return _problem(x, point, _Part.of_beam(beam, elements, start or Start(), load), 0.0, friction)
 
 
@@ -129,9 +110,7 @@ def rubbing_problem(
     start: Start | None = None, load: History | None = None,
 ) -> ContactProblem:
     """Set up rod and beam of one length: the beam rubs with the rod's contact force. InputError for two lengths."""
-    for one in (start, rod_start):
-        _check("rubbing_problem", elements, one, rod=rod, beam=beam, friction=friction)
-    _check_load("rubbing_problem", load)
+    _check("rubbing_problem", elements, (start, rod_start), load, rod=rod, beam=beam, friction=friction)
     if rod.length != beam.length:
         raise InputError(
             f"the rod is {rod.length:g} m long and the beam {beam.length:g} m: they are one body, give one length"
@@ -141,16 +120,20 @@ def rubbing_problem(
     return _problem(x, bar, _Part.of_beam(beam, elements, start or Start(), load), rod.gap, friction)
 
 
+@dataclass(frozen=True)
 class _Part:
     """Matrices, loads, initial values and mass of the unknowns along the axis, or of those across.
 
-    ``inertia`` [kg]: the force on them when unknowns and clamped node are accelerated together by one.
+    C = viscosity K. ``inertia`` [kg]: the force when unknowns and clamped node are accelerated together by one.
     """
 
-    def __init__(
-        self, M: Any, C: Any, K: Any, loads: tuple[tuple[Array, History], ...], u0: Array, v0: Array, inertia: Array
-    ) -> None:
-        self.M, self.C, self.K, self.loads, self.u0, self.v0, self.inertia = M, C, K, loads, u0, v0, inertia
+    M: Any
+    K: Any
+    viscosity: float
+    loads: tuple[tuple[Array, History], ...]
+    u0: Array
+    v0: Array
+    inertia: Array
 
     @classmethod
     def of_rod(cls, rod: Rod, elements: Elements, start: Start) -> _Part:
@@ -160,9 +143,7 @@ class _Part:
         tip[-1] = 1.0
         given = ((uniform, "body_force", rod.body_force, "N/m"), (tip, "end_force", rod.end_force, "N"))
         loads = tuple((vector, _given(name, history, unit)) for vector, name, history, unit in given if history)
-        inertia = rod.rho * rod.area * uniform
-        damper = rod.viscosity * K if rod.viscosity else None
-        return cls(M, damper, K, loads, start.at("u", x), start.at("v", x), inertia)
+        return cls(M, K, rod.viscosity, loads, start.at("u", x), start.at("v", x), rod.rho * rod.area * uniform)
 
     @classmethod
     def of_beam(cls, beam: TimoshenkoBeam, elements: Elements, start: Start, load: History | None) -> _Part:
@@ -170,9 +151,7 @@ class _Part:
         y = np.concatenate([start.at("theta", x), start.at("u", x)])
         w = np.concatenate([start.at("omega", x), start.at("v", x)])
         loads = () if load is None else ((found.load, _given("load", load, "N/m")),)
-        inertia = beam.rho * beam.area * found.load
-        damper = beam.viscosity * found.S if beam.viscosity else None
-        return cls(found.M, damper, found.S, loads, y, w, inertia)
+        return cls(found.M, found.S, beam.viscosity, loads, y, w, beam.rho * beam.area * found.load)
 
 
 def _given(name: str, history: History, unit: str) -> History:
@@ -181,21 +160,20 @@ def _given(name: str, history: History, unit: str) -> History:
     return lambda t: number("beam", f"{name}({t:.6g} s)", history(t), not_negative=pressing, unit=unit)
 
 
-def _check(owner: str, elements: Elements, start: Start | None, **given: Any) -> None:
-    """InputError for what is no element count, start, rod, beam or friction law."""
+def _check(
+    owner: str, elements: Elements, starts: tuple[Start | None, ...], load: History | None = None, **given: Any
+) -> None:
+    """InputError for what is no element count, start, load, rod, beam or friction law."""
     instance(owner, "elements", elements, Elements, "give Elements(count)")
-    if start is not None:
-        instance(owner, "start", start, Start, "give Start(...), or None")
+    for start in starts:
+        instance(owner, "start", start, (Start, type(None)), "give Start(...), or None")
+    if load is not None:
+        function(owner, "load", load, "give a function of t in N/m, or None")
     for name, kind in (("rod", Rod), ("beam", TimoshenkoBeam)):
         if name in given:
             instance(owner, name, given[name], kind, f"give a {kind.__name__}")
     if "friction" in given:
         provides(owner, "friction", given["friction"], ("limit", "slope", "at"), "give a law, for example Coulomb(mu)")
-
-
-def _check_load(owner: str, load: History | None) -> None:
-    if load is not None:
-        function(owner, "load", load, "give a function of t in N/m, or None")
 
 
 def _problem(x: Array, along: _Part, across: _Part | None, gap: float, friction: FrictionLaw) -> ContactProblem:
@@ -208,8 +186,7 @@ def _problem(x: Array, along: _Part, across: _Part | None, gap: float, friction:
             whole = [np.zeros(size) for size in sizes]
             whole[i] = vector
             loads.append((np.concatenate(whole), history))
-    damped = any(part.C is not None for part in parts)
-    dampings = [sp.csr_matrix(part.K.shape) if part.C is None else part.C for part in parts]
+    damped = any(part.viscosity for part in parts)
     influence = np.zeros((space.unknowns, space.dimension))
     influence[: sizes[0], 0] = 1.0
     influence[space.unknowns - len(x) :, -1] = 1.0
@@ -218,7 +195,7 @@ def _problem(x: Array, along: _Part, across: _Part | None, gap: float, friction:
     system = SemiDiscreteSystem(
         algebra=SerialAlgebra(),
         M=M,
-        C=SerialMatrix(sp.block_diag(dampings)) if damped else None,
+        C=SerialMatrix(sp.block_diag([part.viscosity * part.K for part in parts])) if damped else None,
         K=SerialMatrix(sp.block_diag([part.K for part in parts])),
         load=Load(np.zeros(space.unknowns), tuple(loads)),
         influence=influence,
