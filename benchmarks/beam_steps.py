@@ -38,7 +38,7 @@ def best(action: Callable[[], object], repeat: int) -> float:
 
 def runs(count: int) -> list[Callable[[], object]]:
     """What is timed, for so many elements."""
-    elements, body, start = beam.published_elements(count), beam.published_beam(0.001), beam.published_start()
+    elements, body, start = beam.published_elements(count), beam.TimoshenkoBeam(viscosity=0.001), beam.published_start()
     law = vc.Coulomb(0.3)
     problem = beam.beam_problem(body, elements, normal_force=lambda t: 100.0, friction=law, start=start)
 

@@ -56,7 +56,7 @@ def published(count: int, dt: float, out: Path) -> dict[str, float]:
     for viscosity in VISCOSITIES:
         for name, force in forces.items():
             stepper = beam.BeamStepper(
-                beam.published_beam(viscosity), beam.published_elements(count), dt, normal_force=force,
+                beam.TimoshenkoBeam(viscosity=viscosity), beam.published_elements(count), dt, normal_force=force,
                 mu=beam.published_mu, friction=beam.RegularisedFriction(0.002, absolute=1e-10),
             )
             run = beam.run_beam(stepper, beam.published_start(), steps=steps, every=max(1, round(0.02 / dt)))
@@ -82,7 +82,7 @@ def published(count: int, dt: float, out: Path) -> dict[str, float]:
 
 def exact(count: int, dt: float, out: Path) -> dict[str, float]:
     """Run constant force and coefficient: the inequality, by Algorithm 10 and by the contract, and eps -> 0."""
-    body, elements, start = beam.published_beam(VISCOSITIES[0]), beam.Elements(count), beam.published_start()
+    body, elements, start = beam.TimoshenkoBeam(viscosity=VISCOSITIES[0]), beam.Elements(count), beam.published_start()
     steps = round(T_END / dt)
 
     def algorithm(friction: beam.TipFriction) -> beam.BeamRun:
@@ -109,7 +109,7 @@ def exact(count: int, dt: float, out: Path) -> dict[str, float]:
 def rubbing(count: int, dt: float, out: Path, progress: bool) -> dict[str, float]:
     """Run rod and beam as one contact problem, with impulses on velocities: their forces do not ring."""
     problem = beam.rubbing_problem(
-        ROD, beam.published_beam(VISCOSITIES[0]), beam.Elements(count), friction=vc.Coulomb(MU),
+        ROD, beam.TimoshenkoBeam(viscosity=VISCOSITIES[0]), beam.Elements(count), friction=vc.Coulomb(MU),
         start=beam.published_start(),
     )
     solution = vc.simulate(

@@ -34,7 +34,7 @@ def run(
     """The source's beam."""
     given = {"mu": source.published_mu, "friction": source.published_friction()} | stepper
     elements = source.published_elements(m)
-    beam = BeamStepper(source.published_beam(a2), elements, dt=dt, normal_force=force, **given)
+    beam = BeamStepper(TimoshenkoBeam(viscosity=a2), elements, dt=dt, normal_force=force, **given)
     return run_beam(beam, start or source.published_start(), steps=steps)
 
 

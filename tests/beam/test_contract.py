@@ -14,7 +14,7 @@ from vi_contact.beam.algorithm import BeamRun, BeamStepper, run_beam
 from vi_contact.beam.contract import beam_problem, rod_problem, rubbing_problem
 from vi_contact.beam.coupling import rod_forces
 from vi_contact.beam.elements import Elements
-from vi_contact.beam.source_data import published_beam, published_mu, published_start
+from vi_contact.beam.source_data import published_mu, published_start
 from vi_contact.beam.tip import ExactFriction, RegularisedFriction
 from vi_contact.beam.values import Rod, Start, TimoshenkoBeam
 from vi_contact.core.algebra import Array
@@ -23,7 +23,7 @@ from vi_contact.exact import PeriodicBar
 
 pytestmark = pytest.mark.serial
 MU, PUSH = 0.3, 100.0
-BEAM = published_beam(0.001)
+BEAM = TimoshenkoBeam(viscosity=0.001)
 ROD = Rod(viscosity=0.002, gap=0.05, body_force=lambda t: 20.0 * (t < 1.5))
 
 

@@ -5,7 +5,6 @@ from .contract import beam_problem, rod_problem, rubbing_problem
 from .coupling import StepForces, rod_forces
 from .elements import Elements
 from .source_data import (
-    published_beam,
     published_elements,
     published_friction,
     published_mu,
@@ -20,7 +19,7 @@ from .values import Rod, Start, TimoshenkoBeam
 
 __all__ = [
     "BeamRun", "BeamStep", "BeamStepper", "Elements", "ExactFriction", "RegularisedFriction", "Rod", "Slip",
-    "Snapshot", "Start", "StepForces", "TimoshenkoBeam", "TipFriction", "beam_problem", "published_beam",
+    "Snapshot", "Start", "StepForces", "TimoshenkoBeam", "TipFriction", "beam_problem",
     "published_elements", "published_friction", "published_mu", "published_start", "reading_a", "reading_b",
     "reading_c", "readings", "rod_forces", "rod_problem", "rubbing_problem", "run_beam",
 ]

@@ -36,6 +36,10 @@ from .elements import BeamMatrices, Elements, beam_matrices
 from .tip import ExactFriction, Slip, TipFriction
 from .values import Start, TimoshenkoBeam
 
+COLUMNS = (
+    "t", "u_tip", "v_tip", "friction_force", "slip", "normal_force", "mu", "newton", "energy_kinetic", "energy_strain",
+    "work_input", "loss_damping", "loss_friction",
+)
 
 @dataclass(frozen=True)
 class Snapshot:
@@ -183,18 +187,18 @@ def run_beam(stepper: BeamStepper, start: Start, *, steps: int, every: int = 0) 
     instance("run_beam", "stepper", stepper, BeamStepper, "give BeamStepper(...)")
     instance("run_beam", "start", start, Start, "give Start(...)")
     steps, every = whole("run_beam", "steps", steps, least=1), whole("run_beam", "every", every)
-    kept = len(_Ledger.NAMES) * steps + (4 * stepper.elements.count * (steps // every) if every else 0)
+    kept = (len(COLUMNS) + 1) * steps + (4 * stepper.elements.count * (steps // every) if every else 0)
     counted("run_beam", f"a run of {steps} steps", kept, "numbers to keep")
     x = stepper.elements.nodes(stepper.beam.length)
     y = np.concatenate([start.at("theta", x), start.at("u", x)])
     w = np.concatenate([start.at("omega", x), start.at("v", x)])
-    ledger = _Ledger(stepper, y, w)
+    rows: list[tuple[float, ...]] = [(0.0, y[-1], w[-1], *[0.0] * 5, *_energies(stepper, y, w), 0.0, 0.0, 0.0)]
     snapshots = [_snapshot(0.0, y, w)] if every else []
     for k, step in enumerate(islice(stepper.steps(y, w), steps), start=1):
-        ledger.add(step)
+        rows.append(_row(stepper, step))
         if every and k % every == 0:
             snapshots.append(_snapshot(step.t, step.y, step.w))
-    return BeamRun(np.insert(x, 0, 0.0), ledger.columns(), tuple(snapshots))
+    return BeamRun(np.insert(x, 0, 0.0), _history(rows), tuple(snapshots))
 
 
 def _snapshot(t: float, y: Array, w: Array) -> Snapshot:
@@ -204,40 +208,29 @@ def _snapshot(t: float, y: Array, w: Array) -> Snapshot:
     return Snapshot(t, values)
 
 
-class _Ledger:
-    """Rows of the history; the sums of works and losses."""
+def _energies(stepper: BeamStepper, y: Array, w: Array) -> tuple[float, float]:
+    matrices = stepper.matrices
+    return 0.5 * float(w @ (matrices.M @ w)), 0.5 * float(y @ (matrices.S @ y))
 
-    NAMES = (
-        "t", "u_tip", "v_tip", "friction_force", "slip", "normal_force", "mu", "newton", "energy_kinetic",
-        "energy_strain", "work_input", "loss_damping", "loss_friction", "energy_defect",
-    )
 
-    def __init__(self, stepper: BeamStepper, y: Array, w: Array) -> None:
-        self._stepper, self._sums = stepper, np.zeros(3)
-        kinetic, strain = self._energies(y, w)
-        self._start = kinetic + strain
-        self._rows = [(0.0, y[-1], w[-1], 0.0, 0.0, 0.0, 0.0, 0, kinetic, strain, 0.0, 0.0, 0.0, 0.0)]
+def _row(stepper: BeamStepper, step: BeamStep) -> tuple[float, ...]:
+    """Values of a step by COLUMNS, works and losses its own."""
+    matrices, slip, moved = stepper.matrices, step.slip, step.increment
+    kinetic, strain = _energies(stepper, step.y, step.w)
+    work = step.load * float(matrices.load @ moved)
+    viscous = stepper.beam.viscosity / stepper.dt * float(moved @ (matrices.S @ moved))
+    if not np.isfinite(kinetic + strain + work):
+        raise StepFailure(f"t = {step.t:.6g} s: the energy of the beam is no finite number; check the loads and "
+                          "the state at the start")
+    return (step.t, step.y[-1], step.w[-1], slip.force, slip.s, step.normal_force, step.mu, slip.updates, kinetic,
+            strain, work, viscous, slip.force * slip.s)
 
-    def _energies(self, y: Array, w: Array) -> tuple[float, float]:
-        matrices = self._stepper.matrices
-        return 0.5 * float(w @ (matrices.M @ w)), 0.5 * float(y @ (matrices.S @ y))
 
-    def add(self, step: BeamStep) -> None:
-        """The row of a step."""
-        matrices, stepper, slip = self._stepper.matrices, self._stepper, step.slip
-        damping = stepper.beam.viscosity / stepper.dt * float(step.increment @ (matrices.S @ step.increment))
-        self._sums += step.load * float(matrices.load @ step.increment), damping, slip.force * slip.s
-        kinetic, strain = self._energies(step.y, step.w)
-        work, viscous, friction = self._sums
-        if not np.isfinite(kinetic + strain + work):
-            raise StepFailure(f"t = {step.t:.6g} s: the energy of the beam is no finite number; check the loads and "
-                              "the state at the start")
-        defect = kinetic + strain - self._start - (work - viscous - friction)
-        self._rows.append((
-            step.t, step.y[-1], step.w[-1], slip.force, slip.s, step.normal_force, step.mu, slip.updates, kinetic,
-            strain, work, viscous, friction, defect,
-        ))
-
-    def columns(self) -> dict[str, Array]:
-        """Name -> column."""
-        return dict(zip(self.NAMES, np.array(self._rows, dtype=float).T, strict=True))
+def _history(rows: list[tuple[float, ...]]) -> dict[str, Array]:
+    """Columns by name: works and losses since the start, and what the energy lacks."""
+    history = dict(zip(COLUMNS, np.array(rows, dtype=float).T, strict=True))
+    for name in ("work_input", "loss_damping", "loss_friction"):
+        history[name] = np.cumsum(history[name])
+    energy = history["energy_kinetic"] + history["energy_strain"]
+    spent = history["work_input"] - history["loss_damping"] - history["loss_friction"]
+    return history | {"energy_defect": energy - energy[0] - spent}

@@ -15,7 +15,7 @@ from collections.abc import Callable
 from ..core.checks import number
 from .elements import Elements
 from .tip import RegularisedFriction
-from .values import Start, TimoshenkoBeam
+from .values import Start
 
 Force = Callable[[float], float]
 FORCE = 1.0e5  # |r_N(0)| [N]
@@ -46,11 +46,6 @@ def no_force(t: float) -> float:
 def published_mu(t: float, rate: float) -> float:
     """Return mu = |slip rate|/100 [-], rate in m/s."""
     return abs(rate) / 100.0
-
-
-def published_beam(viscosity: float) -> TimoshenkoBeam:
-    """Return the beam with l = 5, rho A = rho I = 1, EI = KAG = 100; viscosity 0.001 or 2 in the source [s]."""
-    return TimoshenkoBeam(viscosity=viscosity)
 
 
 def published_start() -> Start:
