@@ -121,7 +121,7 @@ def test_exit_status_of_the_command_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """One sentence on standard error, 128 + n."""
-    monkeypatch.setattr("vi_contact.cli.entry.rank", lambda: 0)
+    monkeypatch.setattr("vi_contact.cli.entry.world", SerialComm)
     for error, status in ((Interrupted("SIGTERM ended the run", signal.SIGTERM), 143), (KeyboardInterrupt(), 130)):
 
         def stop(*_: Any, error: BaseException = error, **__: Any) -> None:

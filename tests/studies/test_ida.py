@@ -139,7 +139,7 @@ def test_an_interrupted_run_goes_on_and_failures_are_rows(study: Path, tmp_path:
     assert said[0] == "3 runs, 3 of them here, 1 finished before" and len(rows) == 5
     (bad,) = (row for row in rows if row["status"] == "failed")
     assert bad["record"] == "bad" and bad["u_x_top_min"] is None and bad["sa_0.1"] is None
-    assert bad["reason"].endswith("bad.txt, line 2: 'x' is not a number; correct or remove it")
+    assert "bad.txt, line 2: 'x' is not a number" in bad["reason"]
     assert any(line.endswith("] motion_1 x 1: finished") for line in said)
     assert json.loads((folder / "summary.json").read_text(encoding="utf-8"))["restarted_from_step"] == 200
     assert (folder / "history.csv").read_bytes() == expected

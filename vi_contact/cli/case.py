@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from contextlib import suppress
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from ..core.errors import InputError
 from ..studies.cases.library import FOLDER, builtin_cases, located
 from ..studies.cases.short_settings import ShortOptions
 from ..studies.cases.toml_file import read_toml
+from .errors import world
 from .options import add_restart
 
 
@@ -60,33 +62,25 @@ def add_allow(command: argparse.ArgumentParser) -> None:
 def _run(options: argparse.Namespace) -> str:
     from ..studies.cases.own_case import OwnCase, open_case
 
-    comm, path = _world(), located(options.case)
+    with suppress(ImportError):  # the beam and the layer need no MPI
+        import mpi4py.MPI  # noqa: F401
+    comm, path = world(), located(options.case)
     if options.steps is not None and options.steps < 1:
         raise InputError(f"--steps {options.steps}: give at least one step")
     short = ShortOptions(**{one.name: getattr(options, one.name) for one in fields(ShortOptions)})
     case = open_case(path, short.settings(read_toml(path), options.settings), options.allow)
     name = case.tables.get("title") or path.stem
     restart = options.restart or options.changed
+    if isinstance(case, OwnCase) and restart:
+        raise InputError(f"{path}: this case keeps no checkpoint: leave --restart away, it takes seconds")
     out = options.out or (None if isinstance(case, OwnCase) else case.out) or Path("results") / path.stem
     if options.check:
-        case.check(comm)
+        if not isinstance(case, OwnCase):
+            case.check(comm)
         said = f"{options.case}: {name}: the file is in order"
     elif isinstance(case, OwnCase):
-        if restart:
-            raise InputError(f"{path}: this case keeps no checkpoint: leave --restart away, it takes seconds")
         said = f"{name}\n{case.run(comm, out)}\noutput: {out}"
     else:
         found = case.run(comm, out=out, restart=restart, progress=not options.quiet, changed=options.changed)
         said = f"{name}\n{found.summary()}\noutput: {out}"
     return said if comm.rank == 0 else ""
-
-
-def _world() -> Any:
-    """Return all ranks; this process alone without mpi4py, which the beam and the layer do not need."""
-    try:
-        from mpi4py import MPI
-    except ImportError:
-        from ..core.algebra import SerialComm
-
-        return SerialComm()
-    return MPI.COMM_WORLD

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from ..core.errors import InputError, Interrupted, ViContactError
 from ..core.version import __version__
 from .case import add_case_commands
-from .errors import Parser, check_words, fail_together, printable, rank, told
+from .errors import Parser, check_words, fail_together, printable, told, world
 from .ida import add_ida_commands
 from .motion import add_motion_commands
 from .report import add_report_commands
@@ -65,17 +65,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
         text = told(lambda: options.run(options), getattr(options, "spelling", {}))
     except ViContactError as error:
         fail_together(str(error))
-        if rank() == 0:
-            print(f"vi-contact: {error}", file=sys.stderr, flush=True)
-        return 1
+        return _stopped(error, 1)
     except KeyboardInterrupt as error:
         stopped = error if isinstance(error, Interrupted) else Interrupted()
-        if rank() == 0:
-            print(f"vi-contact: {stopped}", file=sys.stderr, flush=True)
-        return 128 + stopped.number
+        return _stopped(stopped, 128 + stopped.number)
     except Exception:
         fail_together(traceback.format_exc())
         raise
     if text:
         print(printable(text))
     return 0
+
+
+def _stopped(error: BaseException, status: int) -> int:
+    """Print the sentence of an error on the first rank; return the status."""
+    if world().rank == 0:
+        print(f"vi-contact: {error}", file=sys.stderr, flush=True)
+    return status

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from textwrap import shorten
 from typing import Any, NoReturn
 
+from ..core.algebra import SerialComm
 from ..core.checks import SHOWN, shown
 from ..core.errors import InputError, ViContactError
 from ..core.files import sentence
@@ -109,26 +110,20 @@ def _chain(error: BaseException | None) -> Iterator[BaseException]:
         error = error.__cause__ or error.__context__
 
 
-def rank() -> int:
-    """Return this process's rank, without importing MPI for commands that do not use it."""
-    world = _world()
-    return 0 if world is None else int(world.rank)
+def world() -> Any:
+    """Return MPI's communicator of all ranks; that of this process alone where MPI has not been started."""
+    return sys.modules["mpi4py.MPI"].COMM_WORLD if "mpi4py.MPI" in sys.modules else SerialComm()
 
 
 def fail_together(text: str) -> None:
     """Return when all ranks have come here; else say what stopped this one alone and end the others, which wait for it
     in a collective call. Collective, but for that."""
-    world = _world()
-    if world is None or world.size == 1:
+    ranks = world()
+    if ranks.size == 1:
         return
-    request, end = world.Ibarrier(), time.monotonic() + PATIENCE
+    request, end = ranks.Ibarrier(), time.monotonic() + PATIENCE
     while not request.Test():
         if time.monotonic() > end:
-            print(f"vi-contact: rank {world.rank} of {world.size} stopped alone: {text}", file=sys.stderr, flush=True)
-            world.Abort(1)
+            print(f"vi-contact: rank {ranks.rank} of {ranks.size} stopped alone: {text}", file=sys.stderr, flush=True)
+            ranks.Abort(1)
         time.sleep(0.02)
-
-
-def _world() -> Any:
-    """MPI's communicator of all ranks; None where MPI has not been started."""
-    return sys.modules["mpi4py.MPI"].COMM_WORLD if "mpi4py.MPI" in sys.modules else None

@@ -13,7 +13,7 @@ from ..engineering import floor_spectrum, hysteresis, peaks, recorded_motion, tr
 from ..plots.records import plot_spectra
 from ..plots.spectra import plot_loop, plot_transfer
 from ..run.files.folder import FILES
-from ..studies.cases.library import read_copy
+from ..studies.cases.library import COPY, read_copy
 from .options import add_actions, output_file, spaced, table_beside_picture
 
 if TYPE_CHECKING:
@@ -70,12 +70,12 @@ def _report(options: argparse.Namespace) -> str:
     folder = Path(options.folder)
     tables = read_copy(folder)
     if "beam" in tables or "layer" in tables:
-        from ..studies.cases.own_case import draw_study
+        from ..studies.cases.own_case import study_of
 
         for option in ("out", "title", "show"):
             if getattr(options, option) is not None:
                 raise InputError(f"the report of this case is pictures in its folder: leave --{option} away")
-        return _listed(draw_study(folder, tables))
+        return _listed(study_of(folder / COPY, tables).draw(folder))
     run = _run(options)
     out = output_file(options.out or folder / "report.pdf", picture=True)
     title = str(options.title or tables.get("title") or f"Run {folder.resolve().name}")

@@ -45,9 +45,8 @@ from .model_tables import Parts
 from .own_classes import packages
 from .parsing import Words, arguments, nearest, read
 from .table_calls import Call, Callee, Named, Node, Spot, Value, callee, groups, needs_body
-from .table_functions import MeshFile
 from .toml_file import read_toml, with_settings
-from .vocabulary import words
+from .vocabulary import MeshFile, words
 
 _TABLES: dict[str, Any] = {  # in the order in which they are read: type of what a table makes, or the one call it is
     "title": str,

@@ -13,9 +13,9 @@ from ...core.files import on_root
 from ...run.files.folder import run_folder
 from .beam_study import BeamStudy
 from .layer_study import LayerStudy
-from .library import COPY, base_folder, check_format, keep_copy
+from .library import base_folder, check_format, keep_copy
 from .parsing import Words, arguments
-from .table_calls import Call, Spot, callee
+from .table_calls import Spot, callee
 from .toml_file import read_toml, with_settings
 
 if TYPE_CHECKING:
@@ -30,28 +30,19 @@ class OwnCase:
 
     path: Path
     tables: Mapping[str, Any]
-    settings: tuple[str, ...]
-    node: Call = field(repr=False)
-
-    def study(self) -> BeamStudy | LayerStudy:
-        """Return what its table makes; InputError for values out of range."""
-        made: BeamStudy | LayerStudy = self.node.build({})
-        return made
-
-    def check(self, comm: Comm) -> None:
-        """Make the study; InputError for values out of range."""
-        self.study()
+    settings: Sequence[str]
+    study: BeamStudy | LayerStudy = field(repr=False)
 
     def run(self, comm: Comm, out: str | Path) -> str:
         """Run it on rank 0, whatever the number of ranks; return what it found, as text. Collective."""
-        return on_root(comm, lambda: self._alone(Path(out))) or ""
 
-    def _alone(self, out: Path) -> str:
-        study = self.study()
-        folder = run_folder(SerialComm(), out)
-        found = study.run(folder)
-        keep_copy(self.path, self.settings, folder, SerialComm())
-        return found
+        def alone() -> str:
+            folder = run_folder(SerialComm(), out)
+            found = self.study.run(folder)
+            keep_copy(self.path, self.settings, folder, SerialComm())
+            return found
+
+        return on_root(comm, alone) or ""
 
 
 def open_case(path: str | Path, settings: Sequence[str] = (), allow: Sequence[str] = ()) -> Case | OwnCase:
@@ -59,18 +50,14 @@ def open_case(path: str | Path, settings: Sequence[str] = (), allow: Sequence[st
     path = Path(path)
     tables = with_settings(read_toml(path), settings)
     if any(name in STUDIES for name in tables):
-        return _own(path, tables, settings)
+        return OwnCase(path, tables, settings, study_of(path, tables))
     from .case import read_case  # late: the others need no finite elements
 
     return read_case(path, settings, allow=allow)
 
 
-def draw_study(folder: Path, tables: Mapping[str, Any]) -> list[Path]:
-    """Draw the pictures of a run folder that one of STUDIES has filled; ``tables``: its case (``read_copy``)."""
-    return _own(folder / COPY, tables, ()).study().draw(folder)
-
-
-def _own(path: Path, tables: Mapping[str, Any], settings: Sequence[str]) -> OwnCase:
+def study_of(path: Path, tables: Mapping[str, Any]) -> BeamStudy | LayerStudy:
+    """Return what the tables of a case of its own make; InputError for other tables and values out of range."""
     check_format(path, tables)
     name = next(one for one in tables if one in STUDIES)
     others = [one for one in tables if one not in ("format", "title", name)]
@@ -80,4 +67,5 @@ def _own(path: Path, tables: Mapping[str, Any], settings: Sequence[str]) -> OwnC
     if not isinstance(table, dict):
         raise InputError(f"{path}: [{name}] is no table: give its keys below it")
     node = arguments(table, STUDIES[name], Spot(str(path), "", name), Words(base_folder(path), {}, {}, (), {}))
-    return OwnCase(path, tables, tuple(settings), node)
+    study: BeamStudy | LayerStudy = node.build({})
+    return study

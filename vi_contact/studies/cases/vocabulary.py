@@ -1,8 +1,8 @@
 """Say the words of case files: which classes and functions a table may call where, all of the public interface.
 
 Rooms list their public classes once, in their ``__init__``; a class is a word wherever it is of the kind that is asked
-for, and so are its named constructors ("GeneralisedAlpha.spectral_radius"). What takes functions has no word, or one in
-``table_functions`` that takes none.
+for, and so are its named constructors ("GeneralisedAlpha.spectral_radius"). What takes functions has no word, or one
+of a function here that takes none.
 """
 
 from __future__ import annotations
@@ -15,22 +15,25 @@ from typing import Any, get_origin, get_type_hints
 
 from ... import core, engineering, fem, ground_motion, laws, meshes, run, schemes, solvers
 from ...core import ContactSurface, Excitation, FrictionLaw, ImpactLaw, MassLaw, Obstacle, Recorder, Scheme, Solver
+from ...core.checks import number
+from ...core.corners import FEATURE_ANGLE
+from ...core.system import SemiDiscreteSystem
 from ...fem import BodyForce, Cells, CompliantBase, Dashpots, Facets, Prescribed, Traction
 from ...fem.contact.matching import Matching
-from ...ground_motion import Record, synthetic
+from ...ground_motion import Processing, Record, read_record, synthetic
+from ...ground_motion.formats.reader import LARGEST_PEAK
 from ...laws.impact import VelocityUpdate
 from ...laws.materials import Damping, LinearElastic, Section
 from ...meshes.gmsh_session import MeshScript
 from ...models import channel
 from ...run import HalvedAtImpact, Schedule
 from ...run.files.writer import FieldWriter
-from ...soil import UpgoingVelocity, upgoing
+from ...soil import FreeField, UpgoingVelocity, upgoing
 from ...solvers import friction, normal, volume
 from ...solvers.condensed import SmallMethod
 from ...solvers.friction.extrapolation import Extrapolation
 from ...solvers.friction.problem import FrictionMethod
 from ...solvers.volume.route import Method
-from . import table_functions as plain
 from .model_tables import MODELS, Parts
 from .own_classes import defect, is_protocol
 from .parsing import Words
@@ -48,18 +51,97 @@ _KINDS: Mapping[ModuleType, tuple[Any, ...]] = {  # room -> the kinds of things 
     engineering: (Recorder,),
     channel: (channel.Sides,),
 }
+
+
+class MeshFile:
+    """Hold what [mesh] makes of type = "read_mesh": the path of a file for ``fem.read_mesh``."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+
+def record(
+    path: Path, units: str | None = None, *, dt: float | None = None, resample_dt: float | None = None,
+    channel: int | None = None, largest: float = LARGEST_PEAK, processing: Processing | None = None,
+) -> Record:
+    """Read a record, ``read_record``, then apply ``processing``."""
+    found = read_record(path, units, dt=dt, resample_dt=resample_dt, channel=channel, largest=largest)
+    return found if processing is None else processing(found)
+
+
+def surface(
+    system: SemiDiscreteSystem, facets: Facets, *, obstacle: Obstacle | None = None,
+    points: Sequence[tuple[float, ...]] | None = None, feature_angle: float = FEATURE_ANGLE, held: bool = False,
+    springs: float | None = None, frictionless_corners: bool = False,
+) -> ContactSurface:
+    """Make a ``contact_surface``; held: ``.bilateral_everywhere()``; springs: ``.on_springs(stiffness)``; the last:
+    ``.with_frictionless_corners()``."""
+    found = fem.contact_surface(system, facets, obstacle=obstacle, points=points, feature_angle=feature_angle)
+    found = found if springs is None else found.on_springs(springs)
+    found = found.with_frictionless_corners() if frictionless_corners else found
+    return found.bilateral_everywhere() if held else found
+
+
+def pair(
+    system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *, matching: Matching | None = None,
+    points: Sequence[tuple[float, ...]] | None = None, feature_angle: float = FEATURE_ANGLE, held: bool = False,
+    frictionless_corners: bool = False,
+) -> ContactSurface:
+    """Make a ``contact_pair``; held: ``.bilateral_everywhere()``; the last: ``.with_frictionless_corners()``."""
+    found = fem.contact_pair(system, facets1, facets2, matching=matching, points=points, feature_angle=feature_angle)
+    found = found.with_frictionless_corners() if frictionless_corners else found
+    return found.bilateral_everywhere() if held else found
+
+
+def first_mode_harmonic(
+    system: SemiDiscreteSystem, *, amplitude: float, ratio: float = 0.5, direction: tuple[float, ...] = (1.0, 0.0)
+) -> laws.Harmonic:
+    """Return the harmonic with ``ratio`` times the lowest frequency of the body without contact."""
+    return laws.Harmonic(amplitude, ratio * engineering.lowest_frequency(system), direction=direction)
+
+
+def first_mode_period(system: SemiDiscreteSystem, *, parts: float) -> float:
+    """Return the time step that divides the body's longest period into so many parts [s]."""
+    return 1.0 / (number("the period", "parts", parts, positive=True) * engineering.lowest_frequency(system))
+
+
+def free_field_sides() -> channel.FreeFieldSides:
+    """Return free-field ends of the channel's layer, on the base that the model has."""
+    return channel.FreeFieldSides(base=())
+
+
+def compliant_base(
+    facets: Facets, *, motion: UpgoingVelocity, material: LinearElastic | None = None, normal: float = 1.0,
+    tangential: float = 1.0,
+) -> CompliantBase:
+    return CompliantBase(facets, material, normal, tangential, motion=motion)
+
+
+def free_field(
+    excitations: Any, facets: Facets, *, base: CompliantBase | None = None,
+    material: LinearElastic | None = None, normal: float = 1.0, tangential: float = 1.0,
+) -> FreeField:
+    """Make a free-field side on the base of the run's excitations, or a compliant one."""
+    foot = excitations if base is None else base
+    return FreeField(facets, material, normal, tangential, base=foot)
+
+
+def slip_rate(mu: laws.ExponentialDecay | laws.StaticKinetic) -> laws.SlipRateCoulomb:
+    return laws.SlipRateCoulomb(mu)
+
+
 _FUNCTIONS: Mapping[Any, Mapping[str, Callable[..., Any]]] = {  # kind -> word -> what it calls
-    plain.MeshFile: {"read_mesh": plain.MeshFile},
-    Dashpots: {"CompliantBase": plain.compliant_base, "FreeField": plain.free_field},
-    CompliantBase: {"CompliantBase": plain.compliant_base},
+    MeshFile: {"read_mesh": MeshFile},
+    Dashpots: {"CompliantBase": compliant_base, "FreeField": free_field},
+    CompliantBase: {"CompliantBase": compliant_base},
     UpgoingVelocity: {"upgoing": upgoing},
-    ContactSurface: {"contact_surface": plain.surface, "contact_pair": plain.pair},
-    channel.Sides: {"FreeFieldSides": plain.free_field_sides},
-    FrictionLaw: {"SlipRateCoulomb": plain.slip_rate},
+    ContactSurface: {"contact_surface": surface, "contact_pair": pair},
+    channel.Sides: {"FreeFieldSides": free_field_sides},
+    FrictionLaw: {"SlipRateCoulomb": slip_rate},
     ImpactLaw: {"Elastic": laws.Elastic},
-    Record: {"read_record": plain.record, "synthetic": synthetic},
-    Excitation: {"FirstModeHarmonic": plain.first_mode_harmonic},
-    Schedule: {"FirstModePeriod": plain.first_mode_period},
+    Record: {"read_record": record, "synthetic": synthetic},
+    Excitation: {"FirstModeHarmonic": first_mode_harmonic},
+    Schedule: {"FirstModePeriod": first_mode_period},
 }
 
 
