@@ -74,7 +74,6 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "models/test_wall.py": "core.units",
     "plots/test_plots_channel.py": "plots.channel plots.channel_mesh plots.channel_run",
     "plots/test_report.py": "cli.report plots.spectra run.files.reading",
-    "run/test_cross_check.py": "run.compare_runs",
     "run/test_folder.py": "core.files run.files.history run.files.stored_rows run.files.table run.files.tally",
     "run/test_fuzz_folders.py": "run.files.writer run.session run.solution",
     "run/test_march.py": "core.state_checks",

@@ -79,9 +79,9 @@ def test_all_routes_agree_at_every_step(name):
     checked = cross_check(problem, scheme=SCHEME, solvers=solvers, dt=dt, steps=steps, state=state)
     assert len({found.method for found in checked.found}) == len(solvers) - 2  # both forms of Hildreth have one name
     for found in checked.found:
-        assert found.relative_u < 1e-9, found.method
-        assert found.relative_r_n < 1e-9, found.method
-        assert found.steps == steps and found.r_ref > 0.0
+        assert found.relative["u"] < 1e-9, found.method
+        assert found.relative["r_n"] < 1e-9, found.method
+        assert found.steps == steps and found.size["r_n"] > 0.0
 
 
 def busiest_step(problem: ContactProblem, dt: float, steps: int) -> StepProblem:

@@ -217,7 +217,7 @@ def test_v4_0_primal_dual_and_active_set_agree(case):
     solvers = (Condensed(), Condensed(Hildreth(primal=True)), Condensed(Hildreth(primal=False)))
     checked = cross_check(problem(case), scheme=SCHEME, solvers=solvers, dt=model().time_step(), steps=60)
     assert checked.worst < 1e-10
-    assert all(found.r_ref > 0.0 and found.steps == 60 for found in checked.found)
+    assert all(found.size["r_n"] > 0.0 and found.steps == 60 for found in checked.found)
 
 
 # The statements about Figs. 4 and 5 -----------------------------------------------------------------------------------

@@ -1,23 +1,26 @@
 """Compare independent routes to the same step, step by step from the same state.
 
 Whole runs of an energy-growing scheme may drift apart by round-off; single steps from one state must not. Answers of
-another method, boundary elements for example, have other steps: ``references`` are compared over the whole run.
+another method, boundary elements for example, have steps and points of their own, so what is compared with
+``references`` are resultants over the whole run: the impulse of the contact forces on the body and the mean
+displacement of its contact boundary towards the support.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from copy import deepcopy
+from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 
-from ..core.algebra import EffectiveMatrix, max_abs
+from ..core.algebra import Array, EffectiveMatrix, largest, max_abs
 from ..core.checks import number, provides, several
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
-from ..core.step import PreparedSolver, Scheme, Solver, State, StepProblem, StepResult
+from ..core.step import PreparedSolver, Report, Scheme, Solver, State, StepProblem, StepResult
 from ..core.surfaces import ContactSurface
-from .compare_runs import Reference, RunComparison, RunDifference
 from .march import march
 from .method import check_solver
 from .time_steps import TimeSteps
@@ -25,44 +28,114 @@ from .time_steps import TimeSteps
 REFERENCE = ("name", "times", "impulse", "mean_towards")
 
 
-@dataclass
-class Disagreement:
-    """Hold the largest differences between a solver and the primary one so far, with the largest values they compare
-    to.
+class Reference(Protocol):
+    """Give another answer to the same problem, from the same initial time on; in the plane per metre of thickness."""
 
-    ``rubbed``: whether there was friction to compare, in one of the ``steps``.
+    @property
+    def name(self) -> str: ...
+    @property
+    def times(self) -> Array:
+        """Return (k,) [s], increasing."""
+        ...
+
+    @property
+    def impulse(self) -> Array:
+        """Return (k, d) of the contact forces of the support on the body up to each time [N s]."""
+        ...
+
+    @property
+    def mean_towards(self) -> Array:
+        """Return (k,) displacement towards the support at each time, mean over the contact boundary [m]."""
+        ...
+
+
+@dataclass(frozen=True)
+class RunDifference:
+    """Hold the largest differences between a run and a reference over their common times, relative.
+
+    The impulse is compared with the largest one, the mean displacement with the largest displacement of any point;
+    ``bound``: up to which they are said to agree.
     """
 
+    name: str
+    impulse: float
+    towards: float
+    bound: float
+
+    @property
+    def worst(self) -> float:
+        """Return the larger of them."""
+        return max(self.impulse, self.towards)
+
+    @property
+    def agrees(self) -> bool:
+        """Say whether both are within the bound."""
+        return self.worst <= self.bound
+
+
+@dataclass
+class RunComparison:
+    """Collect the resultants of a march, report by report, and compare them."""
+
+    times: list[float] = field(default_factory=list)
+    impulse: list[Array] = field(default_factory=list)
+    towards: list[float] = field(default_factory=list)
+    largest: float = 0.0
+
+    def add(self, report: Report) -> None:
+        """Add one more step. Collective."""
+        surface, system, mean = report.problem.surface, report.problem.system, report.balance
+        load = surface.reaction_load(mean.r_n, system.rows, mean.r_t)
+        force = 0.0 - surface.comm.sum(system.influence.T @ surface.along_axes(load))  # on the body [N]
+        if not self.times:
+            self._note(surface, report.old, np.zeros_like(force))
+        self._note(surface, report.new, self.impulse[-1] + (report.new.t - report.old.t) * force)
+        self.largest = max(self.largest, largest(surface.comm, max_abs(report.new.u)))
+
+    def _note(self, surface: ContactSurface, state: State, impulse: Array) -> None:
+        self.times.append(state.t)
+        self.impulse.append(impulse)
+        self.towards.append(float(surface.weights @ surface.normal_values(state.u) / surface.weights.sum()))
+
+    def compare(self, reference: Reference, bound: float) -> RunDifference:
+        """Return the differences. InputError for a reference in other dimensions, without common times, or with NaN."""
+        mine, theirs = np.array(self.impulse), np.asarray(reference.impulse, float)
+        t = np.asarray(reference.times, float)
+        common = (t >= self.times[0]) & (t <= self.times[-1] * (1.0 + 1e-12))
+        if theirs.shape != (len(t), mine.shape[1]) or not common.any() or not np.isfinite(theirs).all():
+            raise InputError(f"{reference.name}: impulses of shape {theirs.shape}, {common.sum()} common times; give "
+                             f"finite ones, {mine.shape[1]} components each, at times of the run")
+        at = np.array([np.interp(t[common], self.times, column) for column in mine.T]).T
+        off = float(np.linalg.norm(at - theirs[common], axis=1).max())
+        size = float(np.linalg.norm(theirs[common], axis=1).max())
+        away = max_abs(np.interp(t[common], self.times, self.towards) - np.asarray(reference.mean_towards)[common])
+        return RunDifference(reference.name, off / (size or 1.0), away / (self.largest or 1.0), bound)
+
+
+@dataclass
+class Disagreement:
+    """Hold how far the answers of a solver are off those of the primary one so far: of u, r_n and, in steps with
+    friction, r_t the largest difference ``off`` and the largest value ``size``."""
+
     method: str = ""
-    x: float = 0.0
-    r_n: float = 0.0
-    r_t: float = 0.0
-    x_ref: float = 0.0
-    r_ref: float = 0.0
-    t_ref: float = 0.0
-    rubbed: bool = False
+    off: dict[str, float] = field(default_factory=lambda: {"u": 0.0, "r_n": 0.0})
+    size: dict[str, float] = field(default_factory=lambda: {"u": 0.0, "r_n": 0.0})
     iterations: int = 0
     steps: int = 0
 
-    @property
-    def relative_u(self) -> float:
-        """Return max |x - x'| / max |x| over all unknowns and steps."""
-        return self.x / self.x_ref if self.x_ref else self.x
+    def add(self, name: str, off: float, size: float) -> None:
+        """Take the differences of one more step, and what they compare to."""
+        self.off[name], self.size[name] = max(self.off.get(name, 0.0), off), max(self.size.get(name, 0.0), size)
 
     @property
-    def relative_r_n(self) -> float:
-        """Return max |r_n - r_n'| / max |r_n| over all conditions and steps."""
-        return self.r_n / self.r_ref if self.r_ref else self.r_n
-
-    @property
-    def relative_r_t(self) -> float:
-        """Return max |r_t - r_t'| / max |r_t| over all conditions and steps; 0 without friction."""
-        return self.r_t / self.t_ref if self.t_ref else self.r_t
+    def relative(self) -> dict[str, float]:
+        """Return max |x - x'| / max |x| over all components and steps, by name; max |x - x'| where x is zero."""
+        return {name: off / (self.size[name] or 1.0) for name, off in self.off.items()}
 
     @property
     def worst(self) -> float:
         """Return the largest of them."""
-        return max(self.relative_u, self.relative_r_n, self.relative_r_t)
+        return max(self.relative.values())
 
 
 @dataclass
@@ -91,7 +164,7 @@ class CrossChecked:
         k, t = self._last
         if step.k == k and step.t < t:
             self.found = self._earlier
-        self._earlier, self._last = [replace(one) for one in self.found], (step.k, step.t)
+        self._earlier, self._last = deepcopy(self.found), (step.k, step.t)
 
     def check(self, problem: ContactProblem) -> None:
         """Raise InputError unless every solver can take the problem."""
@@ -108,9 +181,8 @@ class CrossChecked:
         whole run."""
         names = [one.method for one in self.found]
         return {
-            name if names.count(name) == 1 else f"{name} #{rank}": {"u": one.relative_u, "r_n": one.relative_r_n}
-            | ({"r_t": one.relative_r_t} if one.rubbed else {})
-            | {"iterations_per_step": one.iterations / max(one.steps, 1)}
+            name if names.count(name) == 1 else f"{name} #{rank}":
+            one.relative | {"iterations_per_step": one.iterations / max(one.steps, 1)}
             for rank, (name, one) in enumerate(zip(names, self.found, strict=True), start=1)
         } | {one.name: {"impulse": one.impulse, "towards": one.towards} for one in self.differences}
 
@@ -136,16 +208,12 @@ class PreparedCrossCheck:
         return result
 
     def _compare(self, result: StepResult, other: StepResult, found: Disagreement) -> None:
-        dx, x_ref = self._surface.comm.max(np.array([max_abs(other.x - result.x), max_abs(result.x)]))
-        found.method = other.method
-        found.x, found.x_ref = max(found.x, dx), max(found.x_ref, x_ref)
-        found.r_n = max(found.r_n, max_abs(other.r_n - result.r_n))
-        found.r_ref = max(found.r_ref, max_abs(result.r_n))
+        found.add("u", *self._surface.comm.max(np.array([max_abs(other.x - result.x), max_abs(result.x)])).tolist())
+        found.add("r_n", max_abs(other.r_n - result.r_n), max_abs(result.r_n))
         if result.r_t is not None:
             rubbed = np.zeros_like(result.r_t) if other.r_t is None else other.r_t
-            found.rubbed = True
-            found.r_t = max(found.r_t, max_abs((rubbed - result.r_t).ravel()))
-            found.t_ref = max(found.t_ref, max_abs(result.r_t.ravel()))
+            found.add("r_t", max_abs((rubbed - result.r_t).ravel()), max_abs(result.r_t.ravel()))
+        found.method = other.method
         found.iterations += other.iterations
         found.steps += 1
 

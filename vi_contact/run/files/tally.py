@@ -29,13 +29,14 @@ class Tally:
         self._rows = 0
         self._sums: dict[str, float] = {}
         self._most: dict[str, float] = {}
-        self._least: dict[str, float] = {}
         self._first: dict[str, float] = {}
         self._last: dict[str, float] = {}
 
     def add(self, rows: Mapping[str, Array]) -> None:
         """Add rows, in order: column -> values."""
-        self._last = {name: float(rows[name][-1]) for name in ("t", *dict(LEDGER)) if name in rows}
+        ends = [name for name in ("t", *dict(LEDGER)) if name in rows]
+        self._last = {name: float(rows[name][-1]) for name in ends}
+        self._first = self._first or {name: float(rows[name][0]) for name in ends}
         steps = slice(0 if self._rows else 1, None)
         self._rows += len(rows["t"])
         self._add("iterations", rows["iterations"][steps])
@@ -44,33 +45,22 @@ class Tally:
         self._raise("certificate", rows["certificate"])
         if "contact_uplift" in rows:
             self._raise("uplift", rows["contact_uplift"])
-            gap = np.fmin.reduce(rows["contact_min_gap"])  # nan without contact points
-            self._least["gap"] = float(np.fmin(self._least.get("gap", np.nan), gap))
-            self._add("contact", (rows["contact_active"][steps] > 0).astype(float))
+            self._raise("depth", -rows["contact_min_gap"], np.fmax)  # nan without contact points
+            self._add("contact", np.sign(rows["contact_active"][steps]))
         if "energy_defect" in rows:
-            self._add_energy(rows)
-        self._first = self._first or {name: float(values) for name, values in self._beginning(rows).items()}
-
-    def _add_energy(self, rows: Mapping[str, Array]) -> None:
-        self._raise("energy", rows["energy_kinetic"] + rows["energy_strain"])
-        self._raise("work", np.abs(rows["work_input"]))
-        self._raise("defect", np.abs(rows["energy_defect"]))
-        losses = np.asarray(sum(rows[name] for name, _ in LEDGER if name.startswith("loss_")))
-        self._raise("created", -losses)
-
-    @staticmethod
-    def _beginning(rows: Mapping[str, Array]) -> dict[str, Any]:
-        found = {"t": rows["t"][0]}
-        return found | ({"energy": rows["energy_kinetic"][0] + rows["energy_strain"][0]} if "energy_kinetic" in rows
-                        else {})
+            self._raise("energy", rows["energy_kinetic"] + rows["energy_strain"])
+            self._raise("work", np.abs(rows["work_input"]))
+            self._raise("defect", np.abs(rows["energy_defect"]))
+            self._raise("created", -np.asarray(sum(rows[name] for name, _ in LEDGER if name.startswith("loss_"))))
 
     def _add(self, name: str, values: Array) -> None:
         self._sums[name] = self._sums.get(name, 0.0) + float(np.sum(values))
 
-    def _raise(self, name: str, values: Array) -> None:
-        """The largest so far; NaN stays NaN."""
+    def _raise(self, name: str, values: Array, larger: np.ufunc = np.maximum) -> None:
+        """The largest so far; NaN stays NaN, but is left out with ``np.fmax``."""
         if len(values):
-            self._most[name] = float(np.maximum(self._most.get(name, -np.inf), np.max(values)))
+            found = float(larger.reduce(values))
+            self._most[name] = float(larger(self._most.get(name, found), found))
 
     def facts(self) -> dict[str, Any]:
         """Return the numbers for summary.json."""
@@ -88,18 +78,19 @@ class Tally:
         }
         if "uplift" in most:
             facts["largest_uplift"] = most["uplift"]
-            facts["smallest_gap"] = self._least["gap"]  # negative: gap drift of the scheme
+            facts["smallest_gap"] = -self._most["depth"]  # negative: gap drift of the scheme
             facts["steps_in_contact"] = int(self._sums["contact"])
         return facts | (self._energy() if "defect" in most else {})
 
     def _energy(self) -> dict[str, Any]:
         """The ledger at the end [J], and its largest defect relative to the largest energy or input work of the run."""
         most, last = self._most, self._last
+        start = self._first["energy_kinetic"] + self._first["energy_strain"]
         size = max(most["energy"], most["work"])
         relative = most["defect"] / size if size > 0.0 else most["defect"]
         created = max(0.0, most["created"])
         return {
-            "energy": {"energy_start": self._first["energy"], "energy_max": most["energy"]}
+            "energy": {"energy_start": start, "energy_max": most["energy"]}
             | {name: last[name] for name, _ in LEDGER[:-1]}
             | {"energy_defect_joule": last["energy_defect"], "energy_defect": relative},
             "energy_defect": relative,
