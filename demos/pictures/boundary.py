@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from vi_contact.core.algebra import Array
-from vi_contact.plots.histories import canvas, save, scaled
+from vi_contact.plots.histories import canvas, save, scale
 
 ARROW = 0.3  # length of the longest arrow of a row over the size of its bodies
 
@@ -99,9 +99,7 @@ def plot_panels(rows: Sequence[Sequence[Panel]], path: str | Path, *, title: str
 
 
 def _panel(axis: Any, panel: Panel) -> None:
-    size = np.array([max(float(np.abs(curve.y).max(initial=0.0)) for curve in panel.curves)])
-    shown, unit = scaled(size, panel.unit)
-    factor = shown[0] / size[0] if size[0] else 1.0
+    factor, unit = scale(max(float(np.abs(curve.y).max(initial=0.0)) for curve in panel.curves), panel.unit)
     for curve in panel.curves:
         style = {"ls": "", "marker": ".", "ms": 3.5} if curve.marked else {"lw": 1.1}
         axis.plot(curve.x, factor * curve.y, color=curve.colour, label=curve.label or None, **style)

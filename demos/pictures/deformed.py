@@ -10,7 +10,7 @@ import numpy as np
 
 from vi_contact.core.algebra import Array
 from vi_contact.plots.deformed import StoredFrames, Tractions, read_frames, read_tractions
-from vi_contact.plots.histories import canvas, save, scaled
+from vi_contact.plots.histories import canvas, save, scale, scaled
 
 ARROW = 0.3  # length of the longest arrow over the size of the body
 
@@ -109,9 +109,8 @@ def plot_tractions(
 
     figure, axes = canvas(2, len(folders), (3.8 * len(folders) + 0.5, 5.4), sharex=True, sharey="row")
     runs = {name: read_tractions(folder) for name, folder in folders.items()}
-    size = np.array([max(float(np.abs(run.at(t)).max(initial=0.0)) for run in runs.values() for t in times)])
-    shown, unit = scaled(size, "Pa")
-    factor = shown[0] / size[0] if size[0] else 1.0
+    size = max(float(np.abs(run.at(t)).max(initial=0.0)) for run in runs.values() for t in times)
+    factor, unit = scale(size, "Pa")
     colours = colormaps["viridis"](np.linspace(0.0, 0.85, len(times)))
     for column, (name, tractions) in zip(axes.T, runs.items(), strict=True):
         x, order = tractions.points[:, 0], np.argsort(tractions.points[:, 0])

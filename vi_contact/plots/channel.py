@@ -11,7 +11,7 @@ import numpy as np
 
 from ..core.algebra import Array, Mask
 from ..core.errors import InputError
-from .histories import History, canvas, cell_edges, panels, save, scaled
+from .histories import History, canvas, cell_edges, panels, save, scale, shaken
 from .maps import thinned
 
 SHOWN = {  # panels of plot_openings: point -> outward normal of the channel there
@@ -90,10 +90,9 @@ def plot_openings(history: History, path: str | Path, *, title: str) -> Path:
     }
     metres, unit = unit_of(max(float(np.abs(one).max()) for rows in found.values() for _, one, _ in rows))
     figure, axes = panels(len(found) + 1, (9.0, 9.6))
-    for component, colour in (("x", "black"), ("y", "0.6")):
-        values = history.get(f"a_g_{component}")
-        if values is not None and np.any(values):
-            axes[0].plot(history["t"], values, color=colour, lw=0.9, label=f"$a_{{g,{component}}}$")
+    for component in shaken(history):
+        colour = "black" if component == "x" else "0.6"
+        axes[0].plot(history["t"], history[f"a_g_{component}"], color=colour, lw=0.9, label=f"$a_{{g,{component}}}$")
     axes[0].set_ylabel("acceleration [m/s²]")
     axes[0].set_title("bedrock", fontsize=9, loc="left")
     for axis, (name, rows) in zip(axes[1:], found.items(), strict=True):
@@ -141,19 +140,19 @@ def plot_interface(runs: Mapping[str, History], outline: Outline, path: str | Pa
     arc = outline.arc[parts]
     maps = {name: _reduced(run, parts) for name, run in runs.items()}
     closed = np.concatenate([pressure[pressure > 0.0] for _, pressure, _ in maps.values()])
-    most = np.array([np.percentile(closed, CLIPPED) if len(closed) else 1.0])
-    kilo, unit = scaled(most, "Pa")
+    most = float(np.percentile(closed, CLIPPED)) if len(closed) else 1.0
+    factor, unit = scale(most, "Pa")
     widest = max(float(gap.max()) for *_, gap in maps.values())
     metres, length = unit_of(widest)
     drawn = {
         f"opening [{length}], where open": ("Blues", Normalize(0.0, widest / metres or 1.0), "neither"),
-        f"pressure [{unit}], where closed": ("YlOrRd", PowerNorm(0.5, 0.0, float(kilo[0])), "max"),
+        f"pressure [{unit}], where closed": ("YlOrRd", PowerNorm(0.5, 0.0, factor * most), "max"),
     }
     figure, axes = panels(len(maps), (10.0, 2.9 * len(maps) + 1.0))
     for axis, (name, (t, pressure, gap)) in zip(axes, maps.items(), strict=True):
         axis.grid(False)
         edges = cell_edges(t), np.clip(cell_edges(arc), arc.min(), arc.max())
-        values = np.where(gap > 0.0, gap / metres, np.nan), np.where(gap > 0.0, np.nan, pressure * kilo[0] / most[0])
+        values = np.where(gap > 0.0, gap / metres, np.nan), np.where(gap > 0.0, np.nan, pressure * factor)
         images = [
             axis.pcolormesh(*edges, one.T, cmap=matplotlib.colormaps[colours], norm=norm, rasterized=True)
             for one, (colours, norm, _) in zip(values, drawn.values(), strict=True)
@@ -189,9 +188,7 @@ def plot_envelope(runs: Mapping[str, History], outline: Outline, path: str | Pat
     """Draw along the arc largest pressure and static pressure (dotted), largest opening, and share of time open."""
     keys = ("pressure", "gap", "active")
     rows = {name: [np.reshape(run[key], (len(run["t"]), -1)) for key in keys] for name, run in runs.items()}
-    size = np.array([max(float(pressure.max()) for pressure, *_ in rows.values())])
-    shown, unit = scaled(size, "Pa")
-    factor = shown[0] / size[0] if size[0] else 1.0
+    factor, unit = scale(max(float(pressure.max()) for pressure, *_ in rows.values()), "Pa")
     metres, length = unit_of(max(float(gap.max()) for _, gap, _ in rows.values()))
     figure, axes = canvas(3, 1, (9.0, 8.0), sharex=True)
     axes = axes[:, 0]

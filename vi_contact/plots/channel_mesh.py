@@ -12,7 +12,7 @@ import numpy as np
 from ..core.algebra import Array, Indices, Mask
 from ..core.errors import InputError
 from .deformed import StoredFrames, Tractions, read_frames, read_tractions
-from .histories import History, canvas, scaled
+from .histories import History, canvas, scale
 
 SOIL, CONCRETE, CONTACT = "#efe3c8", "#9aa3ab", "tab:red"
 MAP = "YlOrRd"  # colours of pressures
@@ -69,9 +69,9 @@ class Colours:
         """Make the colours for all pressures [Pa] that are drawn."""
         from matplotlib.colors import PowerNorm
 
-        most = np.array([float(pressures.max(initial=0.0)) or 1.0])
-        shown, unit = scaled(most, "Pa")
-        return cls(float(shown[0] / most[0]), unit, PowerNorm(0.5, 0.0, float(shown[0])))
+        most = float(pressures.max(initial=0.0)) or 1.0
+        factor, unit = scale(most, "Pa")
+        return cls(factor, unit, PowerNorm(0.5, 0.0, factor * most))
 
     def bar(self, figure: Any, axes: Any, shrink: float = 1.0) -> None:
         """Draw the colour bar beside axes."""

@@ -58,12 +58,23 @@ def length_unit(size: float) -> tuple[float, str]:
 
 
 def scaled(values: Array, unit: str) -> tuple[Array, str]:
-    """Return the values over the power of 1000 that fits their size, and the unit with its prefix."""
-    size = float(np.nanmax(np.abs(values), initial=0.0))
+    """Return the values over the power of 1000 that fits their size, and the unit with its prefix; "-" has none."""
+    size = 0.0 if unit == "-" else float(np.nanmax(np.abs(values), initial=0.0))
     for factor, prefix in ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n")):
         if size >= factor:
             return values / factor, prefix + unit
     return values, unit
+
+
+def scale(size: float, unit: str) -> tuple[float, str]:
+    """Return (factor, unit with its prefix) for values up to this size that are drawn together."""
+    shown, prefixed = scaled(np.array([size]), unit)
+    return float(shown[0]) / size if size else 1.0, prefixed
+
+
+def shaken(history: History) -> list[str]:
+    """Return the axes along which the ground was accelerated."""
+    return [axis for axis in "xyz" if np.any(history.get(f"a_g_{axis}", 0.0))]
 
 
 def save(figure: Any, path: str | Path) -> Path:
@@ -110,10 +121,8 @@ def plot_points(
 def plot_excitation(history: History, path: str | Path, *, title: str = "Ground acceleration") -> Path:
     """Draw the ground acceleration components that the run used (Fig. 3)."""
     figure, (axis,) = panels(1, (9.0, 3.0))
-    for component in "xyz":
-        values = history.get(f"a_g_{component}")
-        if values is not None and np.any(values):
-            axis.plot(history["t"], values, lw=0.9, label=f"$a_{{g,{component}}}$")
+    for component in shaken(history):
+        axis.plot(history["t"], history[f"a_g_{component}"], lw=0.9, label=f"$a_{{g,{component}}}$")
     if axis.lines:
         axis.legend()
     axis.set(ylabel="acceleration [m/s²]", title=title)
@@ -136,15 +145,14 @@ def plot_energy(history: History, path: str | Path, *, title: str = "Energy ledg
     """Draw the ledger's terms, and its defect relative to the largest of them."""
     figure, (top, bottom) = panels(2, (9.0, 6.0), height_ratios=(3, 1))
     present = [entry for entry in LEDGER if entry[0] in history and np.any(history[entry[0]])]
-    size = np.array([max((float(np.max(np.abs(history[name]))) for name, *_ in present), default=0.0)])
-    shown, unit = scaled(size, "J")
-    factor = shown[0] / size[0] if size[0] else 1.0
+    size = max((float(np.max(np.abs(history[name]))) for name, *_ in present), default=0.0)
+    factor, unit = scale(size, "J")
     for name, label, colour, style in present:
         top.plot(history["t"], history[name] * factor, color=colour, ls=style, lw=1.0, label=label)
     if present:
         top.legend(fontsize=8, ncol=2)
     top.set(ylabel=f"energy, cumulative work [{unit}]", title=title)
-    log_axis(bottom, history["t"], np.abs(history["energy_defect"]) / (size[0] or 1.0))
+    log_axis(bottom, history["t"], np.abs(history["energy_defect"]) / (size or 1.0))
     bottom.axhline(1e-10, color="tab:red", ls="--", lw=0.8)
     bottom.set(ylabel="relative defect [-]")
     return save(figure, path)
@@ -175,9 +183,8 @@ def plot_runs(
     """Draw the same quantities of several runs, a panel per quantity. quantities: (column, label, SI unit)."""
     figure, axes = panels(len(quantities), (9.0, 2.1 * len(quantities) + 1.2))
     for axis, (column, label, unit) in zip(axes, quantities, strict=True):
-        size = np.array([max(float(np.max(np.abs(run[column]), initial=0.0)) for run in runs.values())])
-        shown, prefixed = scaled(size, unit)
-        factor = shown[0] / size[0] if size[0] else 1.0
+        size = max(float(np.max(np.abs(run[column]), initial=0.0)) for run in runs.values())
+        factor, prefixed = scale(size, unit)
         for name, run in runs.items():
             axis.plot(run["t"], run[column] * factor, lw=0.9, label=name)
         axis.set_ylabel(f"{label} [{prefixed}]")

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..core.algebra import Array
-from .histories import canvas, plain, scaled
+from .histories import canvas, plain, scale
 
 _FRACTILES = (("16 %", "tab:blue", "--"), ("50 %", "black", "-"), ("84 %", "tab:red", "--"))
 
@@ -44,9 +44,8 @@ def plot_ida(panels: Sequence[DemandPanel], path: str | Path, *, intensity: str)
 
 
 def _draw(axis: Any, panel: DemandPanel) -> None:
-    size = np.array([max(float(np.max(np.abs(demand), initial=0.0)) for _, demand in panel.curves.values())])
-    shown, unit = scaled(size, panel.unit) if panel.unit != "-" else (size, "-")
-    factor = shown[0] / size[0] if size[0] else 1.0
+    size = max(float(np.max(np.abs(demand), initial=0.0)) for _, demand in panel.curves.values())
+    factor, unit = scale(size, panel.unit)
     axis.set_xlabel(f"{panel.label} [{unit}]")
     few = len(panel.curves) <= 5
     marks = "osv^D"

@@ -16,8 +16,9 @@ from ..engineering.floor_spectra import recorded_motion
 from ..engineering.peak_values import Peak, peaks
 from ..ground_motion import STANDARD_GRAVITY, Record, response_spectrum
 from ..run.files.reading import RunFolder
-from .histories import LEDGER, STYLE, log_axis, plain_numbers, scaled
+from .histories import LEDGER, STYLE, log_axis, plain_numbers, scaled, shaken
 from .maps import arc_position, draw_map, thinned
+from .records import SAMPLES_A_PERIOD
 
 PAGE = (8.27, 11.69)  # inches, A4
 SIDES, TOP = (0.085, 0.95), 0.87  # of the page's width and height: where the panels are
@@ -37,7 +38,6 @@ _GROUPS = (  # (title, prefixes of columns); the first four that move are drawn
     ("absolute acceleration", ("a_x_", "a_y_", "a_z_")),
     ("contact pressure", ("contact_max_pressure",)),
 )
-SAMPLES_A_PERIOD = 10  # fewer: a spectrum is drawn pale
 _LINES = 4  # of a panel: those that move most
 _PEAKS = (
     "a_g_", "u_", "a_x_", "contact_uplift", "contact_resultant", "contact_max_pressure", "reaction_x_", "reaction_M",
@@ -86,12 +86,12 @@ def plot_report(
 
 
 def _panels_of(run: RunFolder, columns: Sequence[Sequence[str]] | None) -> list[Drawing]:
-    shaken = [f"a_g_{axis}" for axis in "xyz" if np.any(run.history.get(f"a_g_{axis}", 0.0))]
+    ground = [f"a_g_{axis}" for axis in shaken(run.history)]
     panels: list[Drawing] = []
-    if shaken:
-        panels.append(partial(_lines, run=run, names=shaken, title="ground acceleration"))
-    if shaken and len(run.history["t"]) > 2:
-        panels.append(partial(_spectrum, run=run, names=shaken))
+    if ground:
+        panels.append(partial(_lines, run=run, names=ground, title="ground acceleration"))
+    if ground and len(run.history["t"]) > 2:
+        panels.append(partial(_spectrum, run=run, names=ground))
     maps = _maps(run)
     mapped = ("contact pressure",) if maps else ()
     groups = _given(run, columns) if columns is not None else _moving(run, without=mapped)
@@ -151,9 +151,7 @@ def _range(run: RunFolder, name: str) -> float:
 
 def _lines(axis: Any, run: RunFolder, names: Sequence[str], title: str) -> None:
     """Histories in one unit, with a prefix that fits."""
-    values, unit = np.array([run.history[name] for name in names]), run.columns[names[0]][0]
-    if unit != "-":
-        values, unit = scaled(values, unit)
+    values, unit = scaled(np.array([run.history[name] for name in names]), run.columns[names[0]][0])
     for one, name in zip(values, names, strict=True):
         axis.plot(run.history["t"], one, lw=0.7, label=name)
     _label(axis, title)
