@@ -6,7 +6,7 @@ import logging
 import time
 from collections import deque
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from contextlib import closing, suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from signal import Signals
@@ -25,7 +25,7 @@ from .method import Method
 from .recorders import refuse_overflow
 from .solution import Solution, energy_warning, sampling_warning
 from .stop_signals import StopSignals
-from .time_steps import StepPlan, described, longest
+from .time_steps import StepPlan, described, pieces_of
 
 log = logging.getLogger(__name__)
 TIMED = 10_000  # the last steps, of which seconds_per_step is the median
@@ -80,7 +80,7 @@ class Session:
             "unknowns": problem.system.space.unknowns,
             "contact_points": problem.surface.count,
             "boundaries": list(problem.system.notes),
-            "sampling": sampling_warning(problem.excitations, longest(method.dt)) or "",
+            "sampling": sampling_warning(problem.excitations, max(pieces_of(method.dt))[0]) or "",
         }
 
     @property
@@ -118,7 +118,7 @@ class Session:
         place = self.place
         loop = March(self.method, self.step_plan, place.state, place.base, place.halved)
         worst, begin = 0.0, time.perf_counter()
-        with Progress(self.left, shown=self.progress and self.root) as progress:
+        with closing(Progress(self.left, shown=self.progress and self.root)) as progress:
             for state, report in loop:
                 self._keep(state, report, writer)
                 self.dt, self.halved = loop.dt, loop.halved

@@ -71,10 +71,11 @@ def described(plan: TimeSteps) -> float | str:
     return repr(plan) if isinstance(plan, Schedule | HalvedAtImpact) else plan
 
 
-def longest(plan: TimeSteps) -> float:
-    """Return the longest base step of a plan [s]."""
+def pieces_of(plan: TimeSteps) -> tuple[tuple[float, float], ...]:
+    """Return the pieces (dt, until) of base steps that a plan has, endless for a constant dt [s]; InputError for no dt.
+    """
     dt = plan.dt if isinstance(plan, HalvedAtImpact) else plan
-    return max(size for size, _ in dt.pieces) if isinstance(dt, Schedule) else float(dt)
+    return dt.pieces if isinstance(dt, Schedule) else ((_positive(dt), inf),)
 
 
 @dataclass(frozen=True)
@@ -111,8 +112,7 @@ def step_plan(plan: TimeSteps, steps: int | None, t_end: float | None, t0: float
     times, at the end of a piece and of the run alike, and is not made. InputError for more than 1e9 steps.
     """
     halvings = plan.halvings if isinstance(plan, HalvedAtImpact) else 0
-    dt = plan.dt if isinstance(plan, HalvedAtImpact) else plan
-    pieces = dt.pieces if isinstance(dt, Schedule) else ((_positive(dt), inf),)
+    pieces = pieces_of(plan)
     left = _wanted(steps, t_end, t0)
     parts: list[tuple[float, int]] = []
     t, made = t0, 0
@@ -121,7 +121,10 @@ def step_plan(plan: TimeSteps, steps: int | None, t_end: float | None, t0: float
         end = t_end if last and t_end is not None else until
         done = int(min(_reaching(end - t, size), left, LARGEST + 1))
         made += done
-        _refuse_endless(made, size, t_end)
+        if made > LARGEST:
+            goal = "the run" if t_end is None else f"the run to t_end = {t_end:g} s"
+            raise InputError(f"{goal} has more than {LARGEST:.0e} steps of dt = {size:g} s: give a larger dt or end "
+                             "earlier")
         if done or not parts:
             parts.append((size, done))
         t, left = t + done * size, 0 if last else left - done
@@ -136,13 +139,6 @@ def _reaching(span: float, size: float) -> float:
     """How many steps of a size reach over a span, infinite for an endless one."""
     wanted = span / size
     return max(ceil(wanted - max(SLACK, 1e-12 * wanted)), 0) if isfinite(wanted) else inf
-
-
-def _refuse_endless(steps: int, dt: float, t_end: float | None) -> None:
-    """InputError for more steps than any machine takes."""
-    if steps > LARGEST:
-        goal = "the run" if t_end is None else f"the run to t_end = {t_end:g} s"
-        raise InputError(f"{goal} has more than {LARGEST:.0e} steps of dt = {dt:g} s: give a larger dt or end earlier")
 
 
 def _wanted(steps: int | None, t_end: float | None, t0: float) -> float:

@@ -13,7 +13,7 @@ import hashlib
 import os
 import shutil
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
 
@@ -21,13 +21,14 @@ import h5py
 import numpy as np
 
 from ...core.files import hdf5_atomically, to_json, write_all, write_atomically
-from ...core.step import Columns, Row
+from ...core.step import Row
 from ...core.surfaces import ContactSurface
 from .folder import COLUMNS, FORMAT, HISTORY_CSV, HISTORY_H5, JOURNAL
 from .stored_rows import StoredArrays, StoredRows, line_of, read_blocks, record_of
 from .table import Block, Table
 
 STRIDE = 2**20  # bytes that are copied at once
+GEOMETRY = {"points": "m", "normals": "-", "weights": "m²", "gap0": "m", "bilateral": "-"}  # of contact points, units
 GROWTH = 1.25  # history.h5 is rewritten when it has grown by this factor: what is written stays in proportion
 
 
@@ -45,7 +46,8 @@ class HistoryFiles:
         self._rows = self._saved = self._tail = self._last = 0
         self._hash = hashlib.sha256()
         self._journal: Any = None
-        write_atomically(folder / COLUMNS, (to_json(describe(table.columns)) + "\n").encode())
+        columns = {name: {"unit": unit, "meaning": meaning} for name, (unit, meaning) in table.columns.items()}
+        write_atomically(folder / COLUMNS, (to_json(columns) + "\n").encode())
         if stored is None:
             self._csv = open(folder / HISTORY_CSV, "wb", buffering=0)  # noqa: SIM115
             self._write(self._csv, (",".join(table.numbers) + "\n").encode())
@@ -58,13 +60,11 @@ class HistoryFiles:
     def _continue(self, stored: StoredRows) -> None:
         self._rows = self._table.count
         self._replace(stored.blocks())
-        self._hash, self._last, source = stored.hash.copy(), stored.k, stored.folder / HISTORY_CSV
-        if source.resolve() == (self._folder / HISTORY_CSV).resolve():
-            os.truncate(source, stored.length)
-        else:
-            shutil.copyfile(source, self._folder / HISTORY_CSV)
-            os.truncate(self._folder / HISTORY_CSV, stored.length)
-        self._csv = open(self._folder / HISTORY_CSV, "ab", buffering=0)  # noqa: SIM115
+        self._hash, self._last, csv = stored.hash.copy(), stored.k, self._folder / HISTORY_CSV
+        with suppress(shutil.SameFileError):
+            shutil.copyfile(stored.folder / HISTORY_CSV, csv)
+        os.truncate(csv, stored.length)
+        self._csv = open(csv, "ab", buffering=0)  # noqa: SIM115
         self._tail = stored.length
         self._open_journal()
 
@@ -119,7 +119,7 @@ class HistoryFiles:
 
     def _since(self) -> Iterator[Block]:
         """The rows after those of the last history.h5."""
-        with open(self._folder / HISTORY_CSV, "rb") as csv, StoredArrays(self._folder, self._table) as arrays:
+        with open(self._folder / HISTORY_CSV, "rb") as csv, closing(StoredArrays(self._folder, self._table)) as arrays:
             csv.seek(self._tail)
             for _, block in read_blocks(csv, self._table, arrays, first=self._saved):
                 yield block
@@ -147,19 +147,8 @@ class HistoryFiles:
             for name, dataset in found.items():
                 dataset[kept : kept + n] = block[name]
             kept += n
-        self._fill_geometry(file.create_group("contact"))
-
-    def _fill_geometry(self, geometry: h5py.Group) -> None:
-        surface = self._surface
-        arrays: tuple[tuple[str, str, Any], ...] = (
-            ("points", "m", surface.points),
-            ("normals", "-", surface.normals),
-            ("weights", "m²", surface.weights),
-            ("gap0", "m", surface.gap0),
-            ("bilateral", "-", surface.bilateral),
-        )
-        for name, unit, values in arrays:
-            geometry.create_dataset(name, data=values).attrs["unit"] = unit
+        for name, unit in GEOMETRY.items():
+            file.create_dataset(f"contact/{name}", data=getattr(self._surface, name)).attrs["unit"] = unit
 
     def close(self) -> None:
         """Write all rows into history.h5 and leave no journal; what cannot be written stays in the other files."""
@@ -183,8 +172,3 @@ def _copy(old: h5py.Dataset, new: h5py.Dataset, rows: int) -> None:
     for i in range(0, rows, step):
         part = slice(i, min(i + step, rows))
         new[part] = old[part]
-
-
-def describe(columns: Columns) -> dict[str, dict[str, str]]:
-    """Return column -> unit and meaning, as columns.json has it."""
-    return {name: {"unit": unit, "meaning": meaning} for name, (unit, meaning) in columns.items()}

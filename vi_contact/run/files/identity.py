@@ -11,6 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass
+from math import isclose
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from ...core.problem import ContactProblem
 from ...core.step import Scheme
 from ...core.surfaces import ContactSurface
 from ...core.system import SemiDiscreteSystem
-from ..time_steps import HalvedAtImpact, Schedule, TimeSteps, described
+from ..time_steps import TimeSteps, described, pieces_of
 
 SAME = 1e-8  # relative difference of numbers that count as equal: above round-off, below what anybody means to change
 GOLDEN = 0.6180339887498949
@@ -44,7 +45,7 @@ def identity(problem: ContactProblem, scheme: Scheme, dt: TimeSteps, *, start: f
     ``start`` and ``end`` [s]. Collective."""
     system, surface = problem.system, problem.surface
     probes = [probe(np.asarray(system.space.ids), j) for j in range(PROBES)]
-    first = min(end - start, STEPS * _smallest(dt))
+    first = min(end - start, STEPS * min(pieces_of(dt))[0])
     early = [start + first * i / EARLY for i in range(EARLY + 1)]
     times = start + (end - start) * (np.arange(SAMPLES) + probe(np.arange(SAMPLES), 0) + 0.5) / SAMPLES
     return {
@@ -105,20 +106,11 @@ def _same_text(own: str, other: str) -> bool:
     one, two = _NUMBER.split(own), _NUMBER.split(other)
     if len(one) != len(two) or one[::2] != two[::2]:
         return False
-    return all(a == b or _near(a, b) for a, b in zip(one[1::2], two[1::2], strict=True))
-
-
-def _near(a: str, b: str) -> bool:
+    numbers = zip(one[1::2], two[1::2], strict=True)
     try:
-        return abs(float(a) - float(b)) <= SAME * max(abs(float(a)), abs(float(b)))
+        return all(a == b or isclose(float(a), float(b), rel_tol=SAME) for a, b in numbers)
     except ValueError:
         return False
-
-
-def _smallest(dt: TimeSteps) -> float:
-    """The shortest base step of a plan [s]."""
-    plan = dt.dt if isinstance(dt, HalvedAtImpact) else dt
-    return min(size for size, _ in plan.pieces) if isinstance(plan, Schedule) else plan
 
 
 def _dot(system: SemiDiscreteSystem, w: Array, x: Array) -> tuple[float, float]:

@@ -8,12 +8,7 @@ import sys
 import time
 from contextlib import suppress
 from pathlib import Path
-from types import TracebackType
 from typing import Any
-
-import h5py
-import numpy as np
-import scipy
 
 from ...core.version import __version__
 
@@ -69,19 +64,9 @@ class RunLog:
 
 def versions() -> dict[str, str]:
     """Return the version of everything that computes in this process."""
-
-    found = {
-        "vi_contact": __version__,
-        "python": platform.python_version(),
-        "numpy": np.__version__,
-        "scipy": scipy.__version__,
-        "h5py": h5py.__version__,
-    }
-    for name in ("petsc4py", "mpi4py", "dolfinx"):
-        module = sys.modules.get(name)
-        if module is not None:
-            found[name] = str(module.__version__)
-    return found
+    names = [name for name in ("numpy", "scipy", "h5py", "petsc4py", "mpi4py", "dolfinx") if name in sys.modules]
+    own = {"vi_contact": __version__, "python": platform.python_version()}
+    return own | {name: str(sys.modules[name].__version__) for name in names}
 
 
 def clock(seconds: float) -> str:
@@ -105,12 +90,8 @@ class Progress:
 
             self._bar = tqdm(total=total, unit="step", dynamic_ncols=True)
 
-    def __enter__(self) -> Progress:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def close(self) -> None:
+        """Leave the line on the terminal as it is."""
         if self._bar is not None:
             self._bar.close()
 

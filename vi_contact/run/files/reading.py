@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import os
 from collections.abc import Mapping
@@ -18,6 +17,7 @@ from ...core.algebra import Array, Mask
 from ...core.checks import SHOWN, shown
 from ...core.errors import InputError
 from .folder import COLUMNS, HISTORY_CSV, HISTORY_H5, SUMMARY, check_folder_format
+from .stored_rows import numbers_of
 
 BYTES = 100_000_000  # of a JSON file
 DENSEST = 1100  # bytes in memory for one on disk: zeros that are packed
@@ -132,13 +132,10 @@ def _fits(value: Any, kinds: type | tuple[type, ...]) -> bool:
 def _numbers(path: Path) -> dict[str, Array]:
     """Columns of history.csv; a last line that a crash cut short is left out."""
     try:
-        lines = path.read_bytes().decode("utf-8").splitlines(keepends=True)
-        rows = list(csv.reader(line for line in lines if line.endswith("\n")))
-        if any("_" in text for row in rows[1:] for text in row):  # float() would read 1_0 as ten
-            raise ValueError("no number")
-        values = np.array([[float(text) for text in row] for row in rows[1:]]).reshape(len(rows) - 1, len(rows[0]))
-        history = {name: values[:, i] for i, name in enumerate(rows[0])}
-        if not len(values) or len(history) != len(rows[0]):
+        header, *lines = [line for line in path.read_bytes().splitlines(keepends=True) if line.endswith(b"\n")]
+        names = header.decode().strip().split(",")
+        history = dict(zip(names, numbers_of(str(path), lines, len(names), 0).T, strict=True))
+        if not lines or len(history) != len(names):
             raise ValueError("no rows, or two columns of one name")
         if missing := [name for name in _NEEDED if name not in history]:
             raise ValueError(f"no column {missing[0]}")
@@ -146,7 +143,7 @@ def _numbers(path: Path) -> dict[str, Array]:
             raise ValueError("times that do not increase")
     except OSError as error:
         raise InputError(f"'{path}' cannot be read ({error.strerror}): check its permissions") from error
-    except (ValueError, IndexError, csv.Error) as error:
+    except ValueError as error:
         raise InputError(f"'{path}' is damaged ({_short(error)}): restore it or run again") from error
     return history
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
+from contextlib import closing, suppress
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -52,7 +52,7 @@ class StoredRows:
         if not path.is_file():
             raise InputError(f"'{path}' is missing, so the histories cannot be continued: start a new run")
         self.hash = hashlib.sha256()
-        with open(path, "rb") as csv, StoredArrays(self.folder, self._table) as arrays:
+        with open(path, "rb") as csv, closing(StoredArrays(self.folder, self._table)) as arrays:
             header = csv.readline()
             if header.decode(errors="replace").strip() != ",".join(names):
                 raise InputError(f"'{path}' holds other columns than this run records: restart with the same recorders")
@@ -80,7 +80,7 @@ def read_blocks(
     done = first
     while True:
         lines = [line for line in islice(csv, BLOCK) if line.endswith(b"\n")]
-        numbers = _numbers(csv.name, lines, len(table.numbers), done)
+        numbers = numbers_of(csv.name, lines, len(table.numbers), done)
         steps = numbers[:, table.numbers.index("k")]
         if len(steps) and not np.array_equal(steps, steps[0] + np.arange(len(steps))):
             raise InputError(f"the steps in '{csv.name}' after line {done + 1} do not follow each other: restore it or "
@@ -98,8 +98,8 @@ def read_blocks(
             raise InputError(f"'{csv.name}' does not reach step {k} of the checkpoint: restore it or start a new run")
 
 
-def _numbers(path: str, lines: list[bytes], width: int, before: int) -> Array:
-    """The numbers of lines (rows, width); InputError names the first line that holds something else."""
+def numbers_of(path: str, lines: list[bytes], width: int, before: int) -> Array:
+    """Return the numbers of lines (rows, width); InputError names the first line that holds something else."""
     values = np.empty((len(lines), width))
     for i, line in enumerate(lines):
         try:
@@ -115,15 +115,13 @@ class StoredArrays:
     def __init__(self, folder: Path, table: Table) -> None:
         self._path, self._samples = folder / HISTORY_H5, table.arrays
         self._file: Any = None
-        self._journal = _journal(folder / JOURNAL, table.arrays) if table.arrays else np.zeros((0, 1))
         if table.arrays:
+            self._journal = _journal(folder / JOURNAL, table.arrays)
             with suppress(OSError):  # missing or damaged: the journal may still have all
                 self._file = h5py.File(self._path, "r")
 
-    def __enter__(self) -> StoredArrays:
-        return self
-
-    def __exit__(self, *_: object) -> None:
+    def close(self) -> None:
+        """Close history.h5."""
         if self._file is not None:
             self._file.close()
 
