@@ -28,7 +28,7 @@ from vi_contact.plots.channel import (
     plot_rocking,
 )
 from vi_contact.plots.channel_mesh import animate, read_bodies
-from vi_contact.plots.channel_run import film, illustrate
+from vi_contact.plots.run_pictures import film, illustrate
 from vi_contact.run.files.reading import read_run
 from vi_contact.run.static import static_equilibrium
 

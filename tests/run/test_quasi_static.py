@@ -19,8 +19,7 @@ from vi_contact.core.protocols import FrictionLaw
 from vi_contact.core.step import State
 from vi_contact.core.surfaces import ContactSurface
 from vi_contact.laws.friction import Coulomb, ExponentialDecay, SlipRateCoulomb, StaticKinetic, Tresca
-from vi_contact.run.quasi_static import quasi_static
-from vi_contact.run.static import static_equilibrium
+from vi_contact.run.static import quasi_static, static_equilibrium
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.friction.nsgs import NSGS
 

@@ -39,8 +39,7 @@ from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.materials import LinearElastic
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import Blocks
-from vi_contact.run.quasi_static import quasi_static
-from vi_contact.run.static import static_equilibrium
+from vi_contact.run.static import quasi_static, static_equilibrium
 from vi_contact.solvers.condensed import Condensed
 
 pytestmark = pytest.mark.slow

@@ -31,7 +31,7 @@ from vi_contact.meshes.rows import cell_sides
 from vi_contact.models.embedded import CONTACT, Embedded, build
 from vi_contact.models.square import concrete
 from vi_contact.run.march import march
-from vi_contact.run.quasi_static import quasi_static
+from vi_contact.run.static import quasi_static
 from vi_contact.solvers.condensed import Condensed
 
 pytestmark = pytest.mark.serial  # ranks change none of these numbers: cheaper tests show it

@@ -23,8 +23,7 @@ from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import Traction
 from vi_contact.laws.friction import Coulomb, Tresca
 from vi_contact.laws.materials import LinearElastic
-from vi_contact.run.quasi_static import quasi_static
-from vi_contact.run.static import static_equilibrium
+from vi_contact.run.static import quasi_static, static_equilibrium
 from vi_contact.solvers.condensed import Condensed
 
 pytestmark = pytest.mark.slow

@@ -26,8 +26,7 @@ from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import Prescribed, Traction
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.materials import LinearElastic
-from vi_contact.run.quasi_static import quasi_static
-from vi_contact.run.static import static_equilibrium
+from vi_contact.run.static import quasi_static, static_equilibrium
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.friction.fixed_point import FixedPoint
 from vi_contact.solvers.friction.newton import FrictionNewton

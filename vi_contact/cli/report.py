@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 from ..core.errors import InputError
 from ..core.files import write_csv
 from ..engineering import floor_spectrum, hysteresis, peaks, recorded_motion, transfer_function, write_peaks
-from ..plots.records import plot_spectra
-from ..plots.spectra import plot_loop, plot_transfer
+from ..plots.records import plot_loop, plot_spectra, plot_transfer
 from ..run.files.folder import FILES
 from ..studies.cases.library import COPY, read_copy
 from .options import add_actions, output_file, spaced, table_beside_picture

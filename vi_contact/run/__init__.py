@@ -9,11 +9,10 @@ _CONTENTS = {
     "files.reading": ("RunFolder", "read_run"),
     "march": ("march",),
     "method": ("with_defaults",),
-    "quasi_static": ("quasi_static",),
     "recorders": ("Contact", "Energy", "Probe"),
     "simulate": ("simulate",),
     "solution": ("Solution",),
-    "static": ("static_equilibrium",),
+    "static": ("quasi_static", "static_equilibrium"),
     "time_steps": ("HalvedAtImpact", "Schedule"),
 }
 __all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)

@@ -14,7 +14,7 @@ from ..core.files import to_json
 from ..core.protocols import Excitation
 from ..core.step import Columns, State
 from ..ground_motion.excitation import GroundMotion
-from .files.tally import LEDGER
+from .files.table import LEDGER
 
 CREATED = 0.01  # of the largest energy: more than schemes without a fault gain at sensible time steps
 

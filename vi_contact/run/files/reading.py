@@ -141,6 +141,8 @@ def _numbers(path: Path) -> dict[str, Array]:
             raise ValueError(f"no column {missing[0]}")
         if not np.all(np.isfinite(history["t"])) or np.any(np.diff(history["t"]) <= 0.0):
             raise ValueError("times that do not increase")
+    except InputError:
+        raise
     except OSError as error:
         raise InputError(f"'{path}' cannot be read ({error.strerror}): check its permissions") from error
     except ValueError as error:
