@@ -308,7 +308,7 @@ def test_at_rest_before_the_shaking():
         ("model.base=free", "unknown base 'free': choose one of relative, prescribed, compliant"),
         ("model.rock={E=2e10, nu=0.2, rho=2400}", "rock is what is under a compliant base"),
         ("model.wide=3", "unknown key 'wide' for Channel: did you mean width"),
-        ("model.size=-1", "size is -1.0 m"),
+        ("model.size=-1", "size is -1.0; give a finite number"),
     ],
 )
 def test_wrong_options(wrong, sentence):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from ..core.checks import number
 from ..core.errors import InputError
 from .baseline import baseline_corrected
 from .intensity import arias, pga, psa
@@ -97,8 +98,7 @@ def scaled_to_arias(record: Record, target: float) -> Record:
 
 def _ratio(record: Record, name: str, target: float, value: float) -> float:
     """Return target / value."""
-    if not math.isfinite(target) or target <= 0.0:
-        raise InputError(f"{name}: target is {target!r}; give a positive number")
+    number(name, "target", target, positive=True)
     if value == 0.0:
         raise InputError(f"{record.source or 'Record'}: every sample is zero and scaling stays so; use another record")
     return target / value

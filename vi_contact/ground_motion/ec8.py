@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core.algebra import Array
+from ..core.checks import attributes, real
 from ..core.errors import InputError
 
 GROUNDS = {
@@ -40,9 +41,9 @@ class EC8Spectrum:
     plateau: float = 2.5
 
     def __post_init__(self) -> None:
-        if not (self.ag > 0.0 and self.s > 0.0 and 0.0 < self.tb <= self.tc <= self.td and math.isfinite(self.ag)):
-            raise InputError(f"EC8Spectrum: ag={self.ag!r}, s={self.s!r}, tb={self.tb!r}, tc={self.tc!r}, "
-                             f"td={self.td!r}; give positive numbers with tb <= tc <= td")
+        attributes(self, positive=("ag", "s", "tb", "tc"))
+        if not self.tb <= self.tc <= real(self.td):
+            raise InputError(f"{self!r}: give periods with tb <= tc <= td")
         if not 0.0 <= self.damping < 1.0:
             raise InputError(f"EC8Spectrum: damping is {self.damping!r}; give a ratio from 0 to below 1, 0.05 for 5 %")
 

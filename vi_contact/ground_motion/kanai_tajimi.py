@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core.algebra import Array
-from ..core.checks import counted
+from ..core.checks import attributes, counted
 from ..core.errors import InputError
 from .record import Record
 
@@ -30,9 +30,7 @@ class KanaiTajimi:
     zeta_f: float = 0.6
 
     def __post_init__(self) -> None:
-        values = (self.s0, self.omega_g, self.zeta_g, self.zeta_f)
-        if not all(value > 0.0 and math.isfinite(value) for value in values) or not 0.0 <= self.omega_f < math.inf:
-            raise InputError(f"{self!r}: give positive numbers, and omega_f = 0 for no high-pass")
+        attributes(self, positive=("s0", "omega_g", "zeta_g", "zeta_f"), not_negative=("omega_f",))
 
     def density(self, omega: Array) -> Array:
         """Return S(omega) [m²/s³], shape as omega [rad/s]."""

@@ -21,8 +21,7 @@ LARGEST_RATIO = 1000
 
 def scaled(record: Record, *, factor: float) -> Record:
     """Scale every sample by `factor`; a negative one turns the motion round. Raises InputError unless it is finite."""
-    if not math.isfinite(factor):
-        raise InputError(f"scaled: factor is {factor!r}; give a finite number")
+    factor = number("scaled", "factor", factor)
     return record.changed(factor * record.acceleration, f"scaled by {factor:.6g}")
 
 
@@ -155,17 +154,12 @@ def filtered(record: Record, *, low: float | None = None, high: float | None = N
     if causal:
         samples = sosfilt(sections, record.acceleration)
     else:
-        tail = np.zeros(_ringing(record, min(corners)))
+        ringing = 6.0 / (min(corners) * record.dt)  # samples in which the slowest filter dies away: six of its periods
+        counted("filtered", f"a corner of {min(corners):g} Hz", 3.0 * ringing + record.acceleration.size)
+        tail = np.zeros(math.ceil(ringing))
         forward = sosfilt(sections, np.concatenate([tail, record.acceleration, tail]))
         samples = sosfilt(sections, forward[::-1])[::-1][tail.size:tail.size + record.acceleration.size]
     band = " to ".join(f"{corner:g}" for corner in corners)
     kind = "band-pass" if len(corners) == 2 else "high-pass" if low is not None else "low-pass"
     passes = "causal" if causal else "zero phase (two passes)"
     return record.changed(samples, f"Butterworth {kind} {band} Hz, order {order}, {passes}")
-
-
-def _ringing(record: Record, corner: float) -> int:
-    """Return the number of samples in which the slowest filter dies away: six periods of its lowest corner."""
-    asked = 6.0 / (corner * record.dt)
-    counted("filtered", f"a corner of {corner:g} Hz", 3.0 * asked + record.acceleration.size)
-    return math.ceil(asked)

@@ -10,7 +10,6 @@ vibration that follows counts.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -145,29 +144,21 @@ def _peaks(record: Record, omega: Array, zeta: float, parts: int) -> Array:
     """Return the largest |u|, |v| and |u'' + a|, shape (3, m), looked at `parts` times a step."""
     dt = record.dt
     looks = [_Step.after(dt * part / parts, dt, omega, zeta) for part in range(1, parts + 1)]
-    peaks = np.zeros((3, omega.size))
-    x = np.zeros((2, omega.size))
-    for states, a0, a1, after in _march(record, looks[-1], omega.size):
-        x = after
+    peaks, x, step = np.zeros((3, omega.size)), np.zeros((2, omega.size)), looks[-1]
+    for start in range(0, record.acceleration.size - 1, _BLOCK):
+        a = record.acceleration[start:start + _BLOCK + 1]
+        states = np.empty((2, a.size - 1, omega.size))
+        for k in range(a.size - 1):
+            states[:, k] = x
+            x = step.of_u * x[0] + step.of_v * x[1] + step.of_a0 * a[k] + step.of_a1 * a[k + 1]
         for look in looks:
-            peaks = np.maximum(peaks, _sizes(look(states[0], states[1], a0, a1), omega, zeta).max(axis=1))
+            sizes = _sizes(look(states[0], states[1], a[:-1, None], a[1:, None]), omega, zeta)
+            peaks = np.maximum(peaks, sizes.max(axis=1))
     period = 2.0 * math.pi / omega
     for part in range(1, PER_PERIOD + 1):  # free vibration: its first period holds its peaks
         free = _Step.after(period * part / PER_PERIOD, period, omega, zeta)(x[0], x[1], 0.0, 0.0)
         peaks = np.maximum(peaks, _sizes(free, omega, zeta))
     return peaks
-
-
-def _march(record: Record, step: _Step, size: int) -> Iterator[tuple[Array, Array, Array, Array]]:
-    """Yield (states (2, k, m) at the starts of k steps, a0 (k, 1), a1 (k, 1), state after them), from rest."""
-    a, x = record.acceleration, np.zeros((2, size))
-    for start in range(0, a.size - 1, _BLOCK):
-        end = min(start + _BLOCK, a.size - 1)
-        states = np.empty((2, end - start, size))
-        for k in range(start, end):
-            states[:, k - start] = x
-            x = step.of_u * x[0] + step.of_v * x[1] + step.of_a0 * a[k] + step.of_a1 * a[k + 1]
-        yield states, a[start:end, None], a[start + 1:end + 1, None], x
 
 
 def _sizes(x: Array, omega: Array, zeta: float) -> Array:

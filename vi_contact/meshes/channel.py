@@ -26,8 +26,6 @@ from vi_contact.meshes.channel_grid import channel_grid
 from vi_contact.meshes.command_line import run_script
 from vi_contact.meshes.from_arrays import add_arrays
 
-Outline = list[tuple[float, float]]
-
 
 @dataclass(frozen=True, kw_only=True)
 class ChannelMesh:
@@ -102,7 +100,8 @@ def _build_irregular(mesh: ChannelMesh, gmsh: Any, far: float) -> None:
 
 
 def _add_body(
-    model: Any, name: str, outline: Outline, names: Sequence[str], sizes: Sequence[float], mesh: ChannelMesh
+    model: Any, name: str, outline: Sequence[tuple[float, float]], names: Sequence[str], sizes: Sequence[float],
+    mesh: ChannelMesh,
 ) -> None:
     """Add a surface within an outline; its first three curves are the interface, divided alike on both bodies."""
     points = [model.geo.addPoint(*place, 0.0, size) for place, size in zip(outline, sizes, strict=True)]

@@ -42,7 +42,10 @@ def session(name: str = "vi_contact") -> Iterator[Any]:
     A Gmsh the caller has already initialised is borrowed: its models, current model and options are left as they
     were. Raises InputError if Gmsh is not installed.
     """
-    gmsh = _import()
+    try:
+        import gmsh
+    except (ImportError, OSError) as error:  # OSError: the module is there, its library is not
+        raise InputError(f"Gmsh's Python module is missing ({error}): install python3-gmsh") from error
     borrowed = _is_initialised(gmsh)
     if not borrowed:
         _initialise(gmsh)
@@ -82,14 +85,6 @@ def write(mesh: MeshScript, path: str | Path) -> None:
         gmsh.write(str(target))
 
 
-def _import() -> Any:
-    try:
-        import gmsh
-    except (ImportError, OSError) as error:  # OSError: the module is there, its library is not
-        raise InputError(f"Gmsh's Python module is missing ({error}): install python3-gmsh") from error
-    return gmsh
-
-
 def _initialise(gmsh: Any) -> None:
     known = inspect.signature(gmsh.initialize).parameters
     keep_signals = {"interruptible": False} if "interruptible" in known else {}  # or newer Gmsh takes over SIGINT
@@ -97,37 +92,23 @@ def _initialise(gmsh: Any) -> None:
 
 
 def _is_initialised(gmsh: Any) -> bool:
-    """Tell whether Gmsh runs; 4.8 (Debian 12) lists no model before initialize() and complains after finalize()."""
+    """Tell whether Gmsh runs.
+
+    4.8 (Debian 12) lists no model before initialize() and complains after finalize(), from C++ and past sys.stderr, by
+    an option that it has not set yet, and ends the process if that is 4: new memory is zeroed so that it is not.
+    """
     if hasattr(gmsh, "isInitialized"):
         return bool(gmsh.isInitialized())
-    with _silent_stderr(), _zeroed_memory():
-        try:
-            return bool(gmsh.model.list())
-        except Exception:  # the only class Gmsh raises
-            return False
-
-
-@contextmanager
-def _zeroed_memory() -> Iterator[None]:
-    """Zero new memory: Gmsh 4.8 complains by an option that it has not set yet, and ends the process if it is 4."""
-    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)  # of glibc: large new blocks are filled with ~0xFF
-    if mallopt:
-        mallopt(M_PERTURB, 0xFF)
-    try:
-        yield
-    finally:
-        if mallopt:
-            mallopt(M_PERTURB, 0)
-
-
-@contextmanager
-def _silent_stderr() -> Iterator[None]:
-    """Suppress the complaint that Gmsh writes from C++, past sys.stderr."""
+    perturb = getattr(ctypes.CDLL(None), "mallopt", lambda option, value: 0)  # of glibc: 0xFF fills with about 0
     kept, sink = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     os.dup2(sink, 2)
+    perturb(M_PERTURB, 0xFF)
     try:
-        yield
+        return bool(gmsh.model.list())
+    except Exception:  # the only class Gmsh raises
+        return False
     finally:
+        perturb(M_PERTURB, 0)
         os.dup2(kept, 2)
         os.close(kept)
         os.close(sink)
