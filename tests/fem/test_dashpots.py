@@ -143,5 +143,5 @@ def test_held_and_dashed_is_refused(comm):
         fem.assemble(mesh, SOIL, clamped=tags["bottom"], dashpots=fem.Dashpots(tags["bottom"], normal=0.0))
     with pytest.raises(InputError, match="resist nothing"):
         fem.assemble(mesh, SOIL, dashpots=fem.Dashpots(tags["bottom"], normal=0.0, tangential=0.0))
-    with pytest.raises(InputError, match="factor normal is -1"):
+    with pytest.raises(InputError, match="Dashpots: normal is -1"):
         fem.Dashpots(tags["bottom"], normal=-1.0)

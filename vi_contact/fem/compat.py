@@ -136,11 +136,6 @@ def compile_form(ufl_form: ufl.Form) -> Any:
     return fem.form(ufl_form)
 
 
-def assemble_scalar(form: Any, comm: MPI.Comm) -> float:
-    """Assemble the value of a compiled functional, summed over all ranks of `comm`."""
-    return float(comm.allreduce(fem.assemble_scalar(form), op=MPI.SUM))
-
-
 def assemble_matrix(form: Any) -> PETSc.Mat:
     """Assemble the matrix of a compiled bilinear form, without boundary conditions, ready to use."""
     matrix = fem_petsc.assemble_matrix(form)

@@ -18,18 +18,17 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from math import inf
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import ufl
 
 from ..core.algebra import Array
-from ..core.checks import function, instance, real, shown
+from ..core.checks import attributes, function, instance
 from ..core.errors import InputError
 from ..laws.materials import LinearElastic
 from . import compat
-from .groups import facets_of
+from .groups import components_of, facets_of
 from .mesh import Facets
 from .petsc_algebra import PetscMatrix
 from .space import FemSpace
@@ -62,21 +61,14 @@ class Dashpots:
     material: LinearElastic | None = None
     normal: float = 1.0
     tangential: float = 1.0
+    lets_waves_in: ClassVar[bool] = False  # the run's motion does not come in here; displacements would be of space
 
     def __post_init__(self) -> None:
         owner = type(self).__name__
         facets_of(owner, "facets", self.facets)
         if self.material is not None:
             instance(owner, "material", self.material, LinearElastic, "give a LinearElastic, or None")
-        for name in ("normal", "tangential"):
-            value = getattr(self, name)
-            if not 0.0 <= real(value) < inf:
-                raise InputError(f"{owner} factor {name} is {shown(value)}: give zero or a positive number")
-
-    @property
-    def lets_waves_in(self) -> bool:
-        """Return whether the motion of the run comes in here, so that displacements are those of space."""
-        return False
+        attributes(self, not_negative=("normal", "tangential"))
 
     def loads(self, matrix: DashpotMatrix, forms: Any) -> BoundaryLoads:
         """Return what acts on the body here besides the dashpots: nothing. ``forms``: ``ElasticForms``. Collective."""
@@ -93,14 +85,11 @@ class CompliantBase(Dashpots):
     """Put dashpots and an upgoing wave ``motion``: t [s] -> v_up (d,) [m/s], half the outcrop's (``upgoing``)."""
 
     motion: Callable[[float], Array] = field(repr=False)
+    lets_waves_in: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         super().__post_init__()
         function("CompliantBase", "motion", self.motion, "give upgoing(record), or a function of the time [s]")
-
-    @property
-    def lets_waves_in(self) -> bool:
-        return True
 
     def loads(self, matrix: DashpotMatrix, forms: Any) -> BoundaryLoads:
         """Return the load of the upgoing wave, 2 Pᵀ D v_up."""
@@ -146,8 +135,7 @@ class DashpotMatrix:
         for condition in self.space.prescribed:
             both = np.intersect1d(self.dashpots.facets.indices, condition.facets.indices)
             resisted = self._resistance(self._matrix(both)) > NO_RESISTANCE * total
-            held = range(self.space.dimension) if condition.components is None else condition.components
-            if any(resisted[c] for c in held):
+            if any(resisted[c] for c in components_of("prescribed", condition.components, self.space.dimension)):
                 raise InputError(
                     f"boundary '{name}' has dashpots in a direction that is prescribed on '{condition.facets.name}': "
                     "never hold and damp one component, leave out the one or the other"

@@ -5,38 +5,35 @@ Their numbers are local ones of one mesh. On another mesh, or taken for those of
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, cast
 
 from dolfinx.mesh import Mesh
 
 from ..core.checks import array, function, several, shown, whole
 from ..core.errors import InputError
-from .mesh import Cells, Facets
+from .mesh import Cells, Facets, Group
 
-Group = Facets | Cells
+KINDS: dict[type[Group], str] = {Facets: "boundary group", Cells: "cell group"}
 
 
 def facets_of(owner: str, meaning: str, group: Any, mesh: Mesh | None = None) -> Facets:
     """Return the boundary group, of this mesh if one is given; InputError, with the remedy, for anything else."""
-    found: Facets = _group(owner, meaning, group, mesh, Facets, Cells)
-    return found
+    return cast(Facets, _group(owner, meaning, group, mesh, Facets))
 
 
 def cells_of(owner: str, meaning: str, group: Any, mesh: Mesh | None = None) -> Cells:
     """Return the cell group, of this mesh if one is given; InputError, with the remedy, for anything else."""
-    found: Cells = _group(owner, meaning, group, mesh, Cells, Facets)
-    return found
+    return cast(Cells, _group(owner, meaning, group, mesh, Cells))
 
 
-def _group(owner: str, meaning: str, group: Any, mesh: Mesh | None, wanted: type[Group], other: type[Group]) -> Any:
-    kinds = {Facets: "boundary group", Cells: "cell group"}
-    kind = kinds[wanted]
+def _group(owner: str, meaning: str, group: Any, mesh: Mesh | None, wanted: type[Group]) -> Group:
+    kind = KINDS[wanted]
     if isinstance(group, wanted):
         if mesh is None or group.mesh is mesh:
             return group
         raise InputError(f"{owner}: {meaning} is the {kind} '{group.name}' of another mesh; give one of this mesh")
-    if isinstance(group, other):
-        raise InputError(f"{owner}: {meaning} is the {kinds[other]} '{group.name}'; give a {kind}")
+    if isinstance(group, Group):
+        raise InputError(f"{owner}: {meaning} is the {KINDS[type(group)]} '{group.name}'; give a {kind}")
     if hasattr(group, "find") and hasattr(group, "indices"):
         raise InputError(f"{owner}: {meaning} is a DOLFINx MeshTags, with several values; give "
                          f"fem.{wanted.__name__}(name, tags.find(value), mesh) with the value that is meant")
@@ -52,6 +49,14 @@ def field_given(owner: str, meaning: str, value: Any) -> None:
     for one in several(owner, meaning, value, "give numbers, one per dimension, or a function of points and time"):
         if not isinstance(one, float):  # NaN too
             array(owner, f"a component of {meaning}", one, ())
+
+
+def components_of(meaning: str, given: tuple[int, ...] | None, dimension: int) -> tuple[int, ...]:
+    """Return the components that are given, all of them for None; InputError for one that does not exist."""
+    for c in given or ():
+        if not 0 <= c < dimension:
+            raise InputError(f"{meaning} component {c} does not exist: give numbers from 0 to {dimension - 1}")
+    return tuple(range(dimension) if given is None else given)
 
 
 def components_given(owner: str, value: Any) -> None:

@@ -30,7 +30,7 @@ from .space import FemSpace, known_matrices, space_of
 
 
 def geometric_stiffness(problem: ContactProblem, state: State) -> SemiDiscreteSystem:
-    """Return the linearise the problem's system about a static state: K + K_G instead of K, f + K_G u0 instead of f.
+    """Linearise the problem's system about a static state: K + K_G instead of K, f + K_G u0 instead of f.
 
     The state stays an equilibrium with the same reactions, and motions about it feel the geometric stiffness of its
     stresses: (K + K_G) u = f + K_G u0 - B_nᵀ r_n - B_tᵀ r_t. Use it as ``dataclasses.replace(problem, system=...)`` and

@@ -8,9 +8,9 @@ groups as it likes.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +19,7 @@ from mpi4py import MPI
 
 from vi_contact.core.checks import instance, provides, refuse, shown
 from vi_contact.core.errors import InputError
+from vi_contact.core.files import on_root
 from vi_contact.fem import compat
 from vi_contact.fem.compat import Indices
 from vi_contact.fem.petsc_algebra import MpiComm
@@ -35,51 +36,54 @@ _NOWHERE = (np.zeros(0, dtype=np.int32), np.zeros(1, dtype=np.int32))
 
 
 @dataclass(frozen=True, eq=False)
-class Facets:
+class Group:
+    """Name a part of a mesh by local numbers; each is kept once, ascending."""
+
+    name: str
+    indices: Indices
+    mesh: Mesh = field(repr=False)
+    codimension: ClassVar[int]
+
+    def __post_init__(self) -> None:
+        owner = type(self).__name__
+        instance(owner, "name", self.name, str, "give a text")
+        mesh = instance(owner, "mesh", self.mesh, Mesh, "give the DOLFINx mesh that the numbers belong to")
+        count, numbers, defect = local_count(mesh, self.codimension), np.asarray(self.indices), ""
+        if numbers.ndim != 1 or (numbers.dtype.kind not in "iu" and numbers.size):
+            defect = f"{owner}: indices is {shown(self.indices)}; give local numbers, such as tags.find(value) returns"
+        elif numbers.size and not 0 <= numbers.min() <= numbers.max() < count:
+            defect = (f"{owner}: '{self.name}' has numbers from {numbers.min()} to {numbers.max()} but the mesh has "
+                      f"{count} {owner.lower()} here, counted from 0: give numbers of this mesh")
+        refuse([defect], MpiComm(mesh.comm))
+        object.__setattr__(self, "indices", np.unique(numbers).astype(np.int32))
+
+
+@dataclass(frozen=True, eq=False)
+class Facets(Group):
     """Name a part of the boundary or of an inner surface: local facets, ghosts included; kept ascending. Collective.
 
     InputError, on all ranks, for numbers that are no facets of this mesh.
     """
 
-    name: str
-    indices: Indices
-    mesh: Mesh = field(repr=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "indices", _local_numbers(self, 1))
+    codimension: ClassVar[int] = 1
 
 
 @dataclass(frozen=True, eq=False)
-class Cells:
+class Cells(Group):
     """Name a part of the body: local cells, ghosts included; kept ascending. Collective.
 
     InputError, on all ranks, for numbers that are no cells of this mesh.
     """
 
-    name: str
-    indices: Indices
-    mesh: Mesh = field(repr=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "indices", _local_numbers(self, 0))
+    codimension: ClassVar[int] = 0
 
 
-def _local_numbers(group: Facets | Cells, codimension: int) -> Indices:
-    """The numbers of a group, each once, ascending."""
-    owner = type(group).__name__
-    instance(owner, "name", group.name, str, "give a text")
-    mesh = instance(owner, "mesh", group.mesh, Mesh, "give the DOLFINx mesh that the numbers belong to")
+def local_count(mesh: Mesh, codimension: int) -> int:
+    """Return how many cells or facets there are on this rank, ghosts included. Collective."""
     dim = mesh.topology.dim - codimension
     mesh.topology.create_entities(dim)
     local = mesh.topology.index_map(dim)
-    count, numbers, defect = local.size_local + local.num_ghosts, np.asarray(group.indices), ""
-    if numbers.ndim != 1 or (numbers.dtype.kind not in "iu" and numbers.size):
-        defect = f"{owner}: indices is {shown(group.indices)}; give local numbers, such as tags.find(value) returns"
-    elif numbers.size and not 0 <= numbers.min() <= numbers.max() < count:
-        defect = (f"{owner}: '{group.name}' has numbers from {numbers.min()} to {numbers.max()} but the mesh has "
-                  f"{count} {owner.lower()} here, counted from 0: give numbers of this mesh")
-    refuse([defect], MpiComm(mesh.comm))
-    return np.unique(numbers).astype(np.int32)
+    return int(local.size_local + local.num_ghosts)
 
 
 class Tags(dict[str, Any]):
@@ -142,28 +146,12 @@ def _distribute(comm: MPI.Comm, produce: Callable[[], MeshArrays]) -> tuple[Mesh
 
 def _on_root(comm: MPI.Comm, produce: Callable[[], MeshArrays]) -> MeshArrays:
     """The arrays on rank 0; on the others the groups, without points and cells. What rank 0 raises, all ranks raise."""
-    arrays: MeshArrays | None = None
-    outcome: Any = None
-    cause: Exception | None = None
-    if comm.rank == 0:
-        try:
-            arrays = produce()
-            no_points, no_cells = arrays.points[:0], arrays.cells[:0]
-            outcome = MeshArrays(arrays.cell, no_points, no_cells, arrays.cell_groups, arrays.facet_groups)
-        except InputError as error:
-            outcome = error
-        except Exception as error:  # a defect of ours or of a script: the others must not wait for ever
-            outcome, cause = RuntimeError(f"rank 0 has no mesh: {error!r}"), error
-    outcome = comm.bcast(outcome)
-    if isinstance(outcome, Exception):
-        raise outcome from cause
-    return outcome if arrays is None else arrays
+    arrays = on_root(MpiComm(comm), produce)
+    groups = comm.bcast(arrays and replace(arrays, points=arrays.points[:0], cells=arrays.cells[:0]))
+    return arrays or groups
 
 
 def _facet_vertices(mesh: Mesh) -> npt.NDArray[np.int64]:
     """Vertices of every local facet in input numbers, (n_facets, n_facet_vertices)."""
-    dim = mesh.topology.dim - 1
-    mesh.topology.create_entities(dim)
-    facets = mesh.topology.index_map(dim)
-    everyone = np.arange(facets.size_local + facets.num_ghosts, dtype=np.int32)
-    return node_numbers(mesh)[compat.entities_to_geometry(mesh, dim, everyone)]
+    everyone = np.arange(local_count(mesh, 1), dtype=np.int32)
+    return node_numbers(mesh)[compat.entities_to_geometry(mesh, mesh.topology.dim - 1, everyone)]

@@ -17,6 +17,7 @@ from ..core.checks import instance, refuse
 from ..core.errors import InputError
 from ..core.system import SemiDiscreteSystem
 from . import compat
+from .groups import components_of
 from .loads import Prescribed, evaluate_here
 from .mesh import node_numbers
 from .petsc_algebra import MpiComm, PetscMatrix
@@ -29,30 +30,26 @@ def body_numbers(mesh: Any, numbers: Indices) -> Indices:
     numbers: original numbers of the local geometry nodes.
     """
     cells = compat.geometry_dofmap(mesh)
-    n, count = len(numbers), mesh.topology.index_map(mesh.topology.dim).size_local
-    first, others = np.repeat(cells[:, :1], cells.shape[1] - 1, axis=1).ravel(), cells[:, 1:].ravel()
-    graph = sp.coo_matrix((np.ones(len(first)), (first, others)), shape=(n, n))
+    count = mesh.topology.index_map(mesh.topology.dim).size_local
+    first = np.repeat(cells[:, :1], cells.shape[1] - 1, axis=1)
+    part = _smallest(first.ravel(), cells[:, 1:].ravel(), numbers)
+    shared = np.unique(cells[count:])  # nodes of ghost cells: there parts of different ranks meet, and are one body
+    meeting = np.column_stack([numbers[shared], part[shared]])
+    meeting = np.unique(np.concatenate(mesh.comm.allgather(meeting)), axis=0)
+    parts = np.unique(np.concatenate(mesh.comm.allgather(np.unique(part))))
+    index = np.searchsorted(parts, meeting[:, 1])
+    same = np.flatnonzero(meeting[1:, 0] == meeting[:-1, 0])
+    body = _smallest(index[same], index[same + 1], parts)
+    return np.searchsorted(np.unique(body), body[np.searchsorted(parts, part)])
+
+
+def _smallest(first: Any, second: Any, numbers: Indices) -> Indices:
+    """The smallest number (n,) among those that edges first-second join each one to."""
+    graph = sp.coo_matrix((np.ones(len(first)), (first, second)), shape=(len(numbers), len(numbers)))
     _, part = connected_components(graph, directed=False)
     smallest = np.full(part.max(initial=-1) + 1, np.iinfo(np.int64).max)
     np.minimum.at(smallest, part, numbers)
-    shared = np.unique(cells[count:])  # nodes of ghost cells: there parts of different ranks meet
-    names = _joined(mesh.comm, numbers[shared], smallest[part[shared]], smallest)
-    order = np.unique(np.fromiter(names.values(), dtype=np.int64))
-    return np.searchsorted(order, np.array([names[int(name)] for name in smallest], dtype=np.int64)[part])
-
-
-def _joined(comm: Any, shared: Indices, name: Indices, all_names: Indices) -> dict[int, int]:
-    """Name of a part (its smallest node number) -> smallest node number of its whole body: parts of several ranks that
-    have a node in common are one body."""
-    pairs = np.unique(np.concatenate(comm.allgather(np.column_stack([shared, name]))), axis=0)
-    found = np.unique(np.concatenate(comm.allgather(all_names)))
-    index = np.searchsorted(found, pairs[:, 1])
-    same = np.flatnonzero(pairs[1:, 0] == pairs[:-1, 0])
-    graph = sp.coo_matrix((np.ones(len(same)), (index[same], index[same + 1])), shape=(len(found), len(found)))
-    _, body = connected_components(graph, directed=False)
-    smallest = np.full(body.max(initial=-1) + 1, np.iinfo(np.int64).max)
-    np.minimum.at(smallest, body, found)
-    return dict(zip(found.tolist(), smallest[body].tolist(), strict=True))
+    return smallest[part]
 
 
 log = logging.getLogger(__name__)
@@ -105,13 +102,12 @@ class FemSpace:
         self.points = self.all_points[:owned]
         self.size = self._size()
         self.prescribed = prescribed
-        self._where_held = [
-            (self.facet_blocks(condition.facets.indices)[:, None], self._components(condition))
-            for condition in prescribed
-        ]
+        self._where_held: list[tuple[Indices, tuple[int, ...]]] = []
         self.held = np.zeros((owned, self.dimension), dtype=bool)
-        for entries in self._where_held:
-            self.held[entries] = True
+        for one in prescribed:
+            components = components_of("prescribed", one.components, self.dimension)
+            self._where_held.append((self.facet_blocks(one.facets.indices)[:, None], components))
+            self.held[self._where_held[-1]] = True
         pairs = paired(self, tied)
         self.tied_nodes: Indices = np.array([n for pair in pairs for n in (*pair.first, *pair.second)], dtype=np.int64)
         self.tied: Mask = self._followers(pairs)
@@ -129,15 +125,6 @@ class FemSpace:
         low = -self.comm.max(-np.min(self.points, axis=0, initial=np.inf))
         high = self.comm.max(np.max(self.points, axis=0, initial=-np.inf))
         return float(np.linalg.norm(high - low))
-
-    def _components(self, condition: Prescribed) -> list[int]:
-        components = range(self.dimension) if condition.components is None else condition.components
-        for c in components:
-            if not 0 <= c < self.dimension:
-                raise InputError(
-                    f"prescribed component {c} does not exist: give numbers from 0 to {self.dimension - 1}"
-                )
-        return list(components)
 
     def facet_blocks(self, facets: Any) -> Indices:
         """Return the owned blocks (nodes) on the facets, wherever the facets are owned."""
@@ -240,7 +227,7 @@ class FemSpace:
         return force[self.free] if self._P is None else self._P.transpose_apply(force)
 
     def restrict(self, full: Array) -> Array:
-        """Return the restrict nodal values (owned nodes, d) -> free vector."""
+        """Restrict nodal values (owned nodes, d) to the free vector."""
         return full.ravel()[self.free]
 
     # Points ----------------------------------------------------------------------------------------------------------

@@ -19,7 +19,7 @@ from mpi4py import MPI
 
 from ..core.algebra import Array, Indices
 from ..core.errors import InputError
-from .groups import components_given, facets_of
+from .groups import components_given, components_of, facets_of
 from .mesh import Facets
 
 PLACE_TOLERANCE = 1e-6  # of the body's size: nodes farther from the place of their partner have none
@@ -79,10 +79,6 @@ def _pairs(space: BodyNodes, tie: Tied) -> Pairs:
     names = f"'{tie.first.name}' and '{tie.second.name}'"
     if len(first[0]) != len(second[0]) or not len(first[0]):
         raise InputError(f"tied boundaries {names} have {len(first[0])} and {len(second[0])} nodes: mesh them alike")
-    components = tuple(range(space.dimension)) if tie.components is None else tuple(tie.components)
-    for c in components:
-        if not 0 <= c < space.dimension:
-            raise InputError(f"tied component {c} does not exist: give numbers from 0 to {space.dimension - 1}")
     apart = second[1].mean(axis=0) - first[1].mean(axis=0)
     distance = np.linalg.norm(first[1][:, None] + apart - second[1][None, :], axis=2)
     partner = distance.argmin(axis=1)
@@ -91,7 +87,7 @@ def _pairs(space: BodyNodes, tie: Tied) -> Pairs:
         where = ", ".join(f"{x:g}" for x in first[1][worst])
         raise InputError(f"node ({where}) of tied boundaries {names} has no partner at the same height on the other: "
                          "mesh both sides alike")
-    return Pairs(first[0], second[0][partner], components)
+    return Pairs(first[0], second[0][partner], components_of("tied", tie.components, space.dimension))
 
 
 def _nodes(space: BodyNodes, facets: Facets) -> tuple[Indices, Array]:
