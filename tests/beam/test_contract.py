@@ -11,8 +11,7 @@ from energy_checks import rounded
 
 import vi_contact as vc
 from vi_contact.beam.algorithm import BeamRun, BeamStepper, run_beam
-from vi_contact.beam.contract import beam_problem, rod_problem, rubbing_problem
-from vi_contact.beam.coupling import rod_forces
+from vi_contact.beam.contract import beam_problem, rod_forces, rod_problem, rubbing_problem
 from vi_contact.beam.elements import Elements
 from vi_contact.beam.source_data import published_mu, published_start
 from vi_contact.beam.tip import ExactFriction, RegularisedFriction

@@ -17,7 +17,6 @@ TESTS = Path(__file__).parents[1]
 
 COVERS = {  # test file -> modules without a test file of their own; tests reach some of them through their users
     "beam/test_algorithm.py": "beam.source_data beam.tip beam.values",
-    "beam/test_contract.py": "beam.coupling",
     "bem/test_boundary_operators.py": "bem.loops",
     "bem/test_contact.py": "bem.contact_run bem.two_bodies bem.uzawa_space_time",
     "bem/test_convolution.py": "bem.convolution_operator bem.convolution_quadrature bem.radial_table",

@@ -1,8 +1,7 @@
 """Compute rod and Timoshenko beam of Ahn (2012): contact and friction at the tip, with numpy and scipy only."""
 
 from .algorithm import BeamRun, BeamStep, BeamStepper, Snapshot, run_beam
-from .contract import beam_problem, rod_problem, rubbing_problem
-from .coupling import StepForces, rod_forces
+from .contract import StepForces, beam_problem, rod_forces, rod_problem, rubbing_problem
 from .elements import Elements
 from .source_data import (
     published_elements,

@@ -6,7 +6,7 @@ from .contact import BoundaryContact, Conditions, conditions_on
 from .contact_run import ContactLedger, ContactRun, ledger, march_contact
 from .convolution_operator import ConvolutionOperator, ConvolutionProblem, convolution_operator
 from .convolution_quadrature import BDF2, Frequencies, RadauIIA, Trapezoid
-from .energetic import EnergeticBlocks, Marching, energetic_blocks
+from .energetic import EnergeticBlocks, energetic_blocks
 from .fundamental_solution import LaplaceKernels, TimeKernels
 from .interior import interior_displacement
 from .loads import traction_forces
@@ -20,7 +20,7 @@ from .uzawa_space_time import SpaceTimeUzawa
 __all__ = [
     "BDF2", "BoundaryContact", "BoundaryMesh", "BoundaryMotion", "BoundaryProblem", "CondensedCompliance",
     "Conditions", "ContactLedger", "ContactRun", "ConvolutionOperator", "ConvolutionProblem", "EnergeticBlocks",
-    "Frequencies", "Galerkin", "LaplaceKernels", "Marching", "OperatorMatrices", "Orders", "PoincareSteklov",
+    "Frequencies", "Galerkin", "LaplaceKernels", "OperatorMatrices", "Orders", "PoincareSteklov",
     "RadauIIA", "RadialTable", "SpaceTimeUzawa", "TimeKernels", "Trapezoid", "TwoBodies", "circle", "conditions_on",
     "convolution_operator",
     "energetic_blocks", "from_segments", "interior_displacement", "ledger", "load_blocks", "march_contact",

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, lu_factor, lu_solve
 
 from ..core.algebra import Array
-from ..core.checks import array, attributes, counted, instance, mask, number, shape_of, whole
+from ..core.checks import attributes, counted, instance, number, shape_of, whole
 from ..core.errors import InputError
 from ..laws.materials import LinearElastic
 from .boundary_mesh import BoundaryMesh
@@ -102,19 +102,6 @@ def energetic_blocks(
     return EnergeticBlocks(mesh, c_p, c_s, dt, single, double, hyper)
 
 
-@dataclass(frozen=True)
-class BoundaryHistories:
-    """Hold histories on the boundary, last axis R of right-hand sides: at the end of, or as a mean over, each step.
-
-    displacement: (steps, 2n, R) at t_1 ... t_N; traction: (steps, 4n, R) constant in each step; forces: (steps, 2n, R)
-    nodal forces F, reactions at fixed unknowns included. For density 1: divide forces by rho before, multiply after.
-    """
-
-    displacement: Array
-    traction: Array
-    forces: Array
-
-
 class Marching:
     """Solve the block Toeplitz system step by step; the first block is factored once.
 
@@ -122,8 +109,6 @@ class Marching:
     """
 
     def __init__(self, blocks: EnergeticBlocks, fixed: NDArray[np.bool_], *, symmetric: bool = True) -> None:
-        instance("Marching", "blocks", blocks, EnergeticBlocks, "give those of energetic_blocks")
-        fixed = mask("Marching", "fixed", fixed, (2 * len(blocks.mesh),))
         self.blocks, self.symmetric, self.free = blocks, symmetric, ~fixed
         self.mass = blocks.mesh.mass
         self.v0 = cho_factor(0.5 * (blocks.single[0] + blocks.single[0].T))
@@ -136,12 +121,11 @@ class Marching:
             self.s0 = 0.5 * (self.s0 + self.s0.T)
         self.factor = lu_factor(self.s0[np.ix_(self.free, self.free)]) if self.free.any() else None
 
-    def run(self, forces: Array, prescribed: Array | None = None) -> BoundaryHistories:
-        """Return the motion under forces (steps, 2n, R); prescribed: (steps, 2n, R), read at fixed unknowns only."""
-        array("Marching", "forces", forces, (None, 2 * len(self.blocks.mesh), None), unit="N/m")
+    def run(self, forces: Array, prescribed: Array | None = None) -> tuple[Array, Array, Array]:
+        """Return displacements (steps, 2n, R) at the ends of the steps, tractions (steps, 4n, R) and nodal forces
+        (steps, 2n, R) in them, reactions included, for R right-hand sides: forces (steps, 2n, R), and prescribed
+        (steps, 2n, R), read at fixed unknowns only. For density 1: divide forces by rho before, multiply after."""
         steps, unknowns, count = forces.shape
-        if prescribed is not None:
-            array("Marching", "prescribed", prescribed, forces.shape, unit="m")
         if steps > self.blocks.steps:
             raise InputError(f"boundary elements: forces for {steps} steps, but the operator has {self.blocks.steps}; "
                              "assemble it with more steps")
@@ -162,7 +146,7 @@ class Marching:
             if self.symmetric:
                 q[k] = p[k] - p[k - 1] if k else p[k]
             before = before + u[k]
-        return BoundaryHistories(np.cumsum(u, axis=0, out=u), p, total)
+        return np.cumsum(u, axis=0, out=u), p, total
 
     def _past_first(self, k: int, p: Array, u: Array) -> Array:
         """Return the sum over earlier steps of V p - K u."""

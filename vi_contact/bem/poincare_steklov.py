@@ -202,11 +202,9 @@ class BoundaryProblem(BodyProblem):
         """Return the motion under loads and nodal contact forces (steps, 2m), ordered as CondensedCompliance."""
         n, rho = len(self.operator.mesh), self.operator.rho
         prescribed = None if self.prescribed is None else np.asarray(self.prescribed).reshape(-1, 2 * n, 1)
-        motion = self.marching.run(self._loads(contact_forces).reshape(-1, 2 * n, 1) / rho, prescribed)
-        return BoundaryMotion(
-            self.times, motion.displacement.reshape(-1, 2, n), rho * motion.traction.reshape(-1, 2, n, 2),
-            rho * motion.forces.reshape(-1, 2, n),
-        )
+        u, p, forces = self.marching.run(self._loads(contact_forces).reshape(-1, 2 * n, 1) / rho, prescribed)
+        return BoundaryMotion(self.times, u.reshape(-1, 2, n), rho * p.reshape(-1, 2, n, 2),
+                              rho * forces.reshape(-1, 2, n))
 
     def condensed(self) -> CondensedCompliance:
         """Return the compliance of the contact unknowns and their free motion, in one march with 2m + 1 columns."""
@@ -218,5 +216,5 @@ class BoundaryProblem(BodyProblem):
         if self.prescribed is not None:
             prescribed = np.zeros_like(forces)
             prescribed[:, :, -1] = np.asarray(self.prescribed).reshape(steps, -1)
-        u = self.marching.run(forces, prescribed).displacement[:, unknowns]
+        u = self.marching.run(forces, prescribed)[0][:, unknowns]
         return self._compliance(np.ascontiguousarray(u[:, :, :-1]), np.ascontiguousarray(u[:, :, -1]))

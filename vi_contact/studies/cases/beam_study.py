@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ...beam.algorithm import BeamRun, BeamStepper, Snapshot, run_beam
-from ...beam.coupling import rod_forces
+from ...beam.contract import rod_forces
 from ...beam.elements import Elements
 from ...beam.source_data import Force, published_elements, published_mu, published_start, readings
 from ...beam.tip import ExactFriction, RegularisedFriction
