@@ -60,16 +60,15 @@ class Processing:
             record = resampled(record, self.resample)
         if self.baseline is not None:
             record = baseline_corrected(record, degree=self.baseline)
-        return self._scaled(record)
-
-    def _scaled(self, record: Record) -> Record:
         if self.scale is not None:
-            return scaled(record, factor=self.scale)
+            record = scaled(record, factor=self.scale)
         if self.pga is not None:
-            return scaled_to_pga(record, self.pga)
+            record = scaled_to_pga(record, self.pga)
         if self.arias is not None:
-            return scaled_to_arias(record, self.arias)
-        return record if self.psa is None else scaled_to_psa(record, *self.psa)
+            record = scaled_to_arias(record, self.arias)
+        if self.psa is not None:
+            record = scaled_to_psa(record, *self.psa)
+        return record
 
 
 def scaled_to_pga(record: Record, target: float) -> Record:

@@ -55,41 +55,32 @@ class ResponseSpectrum:
         return (2.0 * math.pi / self.periods) ** 2 * self.displacement
 
 
-@dataclass(frozen=True, eq=False)
-class _Step:
-    """Hold the motion after `time` from u, v and the line from a0 to a1 = its value after `length`, for each omega.
+def _factors(time: Array | float, length: Array | float, omega: Array, zeta: float) -> Array:
+    """Return (4, 2, m): what u, v, a0 and a1 add to displacement and velocity after `time`, for each omega.
 
-    x(time) = u·of_u + v·of_v + a0·of_a0 + a1·of_a1, each of shape (2, m): displacement and velocity.
+    From u and v under the line from a0 to a1 = its value after `length`: the exact solution, free vibration about the
+    particular -(a0 + s t)/omega² + 2 zeta s/omega³.
     """
+    root = math.sqrt(1.0 - zeta**2)
+    decay, angle = np.exp(-zeta * omega * time), root * omega * time
+    sine, cosine = np.sin(angle), np.cos(angle)
+    of_u = decay * np.array([cosine + zeta / root * sine, -omega / root * sine])
+    of_v = decay * np.array([sine / (root * omega), cosine - zeta / root * sine])
+    one, zero = np.ones_like(omega), np.zeros_like(omega)
+    constant = np.array([-one / omega**2, zero])  # particular motion under a = 1, at 0 and at `time`
+    ramp0 = np.array([2.0 * zeta / omega**3, -one / omega**2])  # under a = t, at 0
+    ramp = np.array([2.0 * zeta / omega**3 - time / omega**2, -one / omega**2])  # under a = t, at `time`
+    of_one = constant - of_u * constant[0] - of_v * constant[1]
+    of_ramp = ramp - of_u * ramp0[0] - of_v * ramp0[1]
+    small = omega * time < _SMALL
+    of_one = np.where(small, _series(time, omega, zeta, 2), of_one)
+    of_slope = np.where(small, _series(time, omega, zeta, 3), of_ramp) / length
+    return np.array([of_u, of_v, of_one - of_slope, of_slope])
 
-    of_u: Array
-    of_v: Array
-    of_a0: Array
-    of_a1: Array
 
-    @classmethod
-    def after(cls, time: Array | float, length: Array | float, omega: Array, zeta: float) -> _Step:
-        """Return the exact solution: free vibration about the particular -(a0 + s t)/omega² + 2 zeta s/omega³."""
-        root = math.sqrt(1.0 - zeta**2)
-        decay, angle = np.exp(-zeta * omega * time), root * omega * time
-        sine, cosine = np.sin(angle), np.cos(angle)
-        of_u = decay * np.array([cosine + zeta / root * sine, -omega / root * sine])
-        of_v = decay * np.array([sine / (root * omega), cosine - zeta / root * sine])
-        one, zero = np.ones_like(omega), np.zeros_like(omega)
-        constant = np.array([-one / omega**2, zero])  # particular motion under a = 1, at 0 and at `time`
-        ramp0 = np.array([2.0 * zeta / omega**3, -one / omega**2])  # under a = t, at 0
-        ramp = np.array([2.0 * zeta / omega**3 - time / omega**2, -one / omega**2])  # under a = t, at `time`
-        of_one = constant - of_u * constant[0] - of_v * constant[1]
-        of_ramp = ramp - of_u * ramp0[0] - of_v * ramp0[1]
-        small = omega * time < _SMALL
-        of_one = np.where(small, _series(time, omega, zeta, 2), of_one)
-        of_slope = np.where(small, _series(time, omega, zeta, 3), of_ramp) / length
-        return cls(of_u, of_v, of_one - of_slope, of_slope)
-
-    def __call__(self, u: Array, v: Array, a0: Array | float, a1: Array | float) -> Array:
-        """Return (displacement, velocity), shape (2, ..., m)."""
-        parts = [self.of_u[k] * u + self.of_v[k] * v + self.of_a0[k] * a0 + self.of_a1[k] * a1 for k in (0, 1)]
-        return np.array(parts)
+def _moved(factors: Array, u: Array, v: Array, a0: Array | float, a1: Array | float) -> Array:
+    """Return (displacement, velocity), shape (2, ..., m)."""
+    return factors[0] * u + factors[1] * v + factors[2] * a0 + factors[3] * a1
 
 
 def _series(time: Array | float, omega: Array, zeta: float, first: int) -> Array:
@@ -143,20 +134,20 @@ def fourier_spectrum(record: Record) -> tuple[Array, Array]:
 def _peaks(record: Record, omega: Array, zeta: float, parts: int) -> Array:
     """Return the largest |u|, |v| and |u'' + a|, shape (3, m), looked at `parts` times a step."""
     dt = record.dt
-    looks = [_Step.after(dt * part / parts, dt, omega, zeta) for part in range(1, parts + 1)]
-    peaks, x, step = np.zeros((3, omega.size)), np.zeros((2, omega.size)), looks[-1]
+    looks = [_factors(dt * part / parts, dt, omega, zeta) for part in range(1, parts + 1)]
+    peaks, x = np.zeros((3, omega.size)), np.zeros((2, omega.size))
     for start in range(0, record.acceleration.size - 1, _BLOCK):
         a = record.acceleration[start:start + _BLOCK + 1]
         states = np.empty((2, a.size - 1, omega.size))
         for k in range(a.size - 1):
             states[:, k] = x
-            x = step.of_u * x[0] + step.of_v * x[1] + step.of_a0 * a[k] + step.of_a1 * a[k + 1]
+            x = _moved(looks[-1], x[0], x[1], a[k], a[k + 1])
         for look in looks:
-            sizes = _sizes(look(states[0], states[1], a[:-1, None], a[1:, None]), omega, zeta)
-            peaks = np.maximum(peaks, sizes.max(axis=1))
+            seen = _moved(look[:, :, None, :], states[0], states[1], a[:-1, None], a[1:, None])
+            peaks = np.maximum(peaks, _sizes(seen, omega, zeta).max(axis=1))
     period = 2.0 * math.pi / omega
     for part in range(1, PER_PERIOD + 1):  # free vibration: its first period holds its peaks
-        free = _Step.after(period * part / PER_PERIOD, period, omega, zeta)(x[0], x[1], 0.0, 0.0)
+        free = _moved(_factors(period * part / PER_PERIOD, period, omega, zeta), x[0], x[1], 0.0, 0.0)
         peaks = np.maximum(peaks, _sizes(free, omega, zeta))
     return peaks
 

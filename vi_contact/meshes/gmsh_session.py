@@ -48,7 +48,9 @@ def session(name: str = "vi_contact") -> Iterator[Any]:
         raise InputError(f"Gmsh's Python module is missing ({error}): install python3-gmsh") from error
     borrowed = _is_initialised(gmsh)
     if not borrowed:
-        _initialise(gmsh)
+        known = inspect.signature(gmsh.initialize).parameters
+        keep_signals = {"interruptible": False} if "interruptible" in known else {}  # or newer Gmsh takes over SIGINT
+        gmsh.initialize([], readConfigFiles=False, **keep_signals)
     current = gmsh.model.getCurrent()
     try:
         with options(gmsh, _OPTIONS):
@@ -83,12 +85,6 @@ def write(mesh: MeshScript, path: str | Path) -> None:
     with session(target.stem) as gmsh:
         mesh.build(gmsh)
         gmsh.write(str(target))
-
-
-def _initialise(gmsh: Any) -> None:
-    known = inspect.signature(gmsh.initialize).parameters
-    keep_signals = {"interruptible": False} if "interruptible" in known else {}  # or newer Gmsh takes over SIGINT
-    gmsh.initialize([], readConfigFiles=False, **keep_signals)
 
 
 def _is_initialised(gmsh: Any) -> bool:

@@ -53,7 +53,7 @@ class FreeField(Dashpots):
             provides("FreeField", "base", one, EXCITATION, remedy)
 
     @property
-    def ground(self) -> BaseMotion | CompliantBase | GroundFrame:
+    def ground(self) -> CompliantBase | GroundFrame:
         """Return what the column stands on: the base, or the frame of the ground that the excitations shake."""
         if isinstance(self.base, BaseMotion | CompliantBase):
             return self.base

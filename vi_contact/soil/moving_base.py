@@ -44,21 +44,18 @@ class GroundFrame:
 
 
 @dataclass(frozen=True)
-class BaseMotion:
+class BaseMotion(GroundFrame):
     """Hold displacement [m], velocity [m/s] and acceleration [m/s²] of the ground, starting from rest at t = 0.
 
     ``displacement``, ``velocity`` and ``acceleration`` take points (k, d) and t and return (k, d), as
     ``fem.Prescribed`` wants them; ``at(t)`` gives the three vectors.
     """
 
-    excitations: tuple[Excitation, ...]
     path: CompanionRun = field(repr=False)
-    lets_waves_in: ClassVar[bool] = False
 
     def at(self, t: float) -> tuple[Array, Array, Array]:
         """Return (u_g, v_g, a_g) at time t, each (d,)."""
-        u, v = self.path.at(t)
-        return u, v, np.sum([excitation(t) for excitation in self.excitations], axis=0)
+        return *self.path.at(t), super().at(t)[2]
 
     @property
     def companions(self) -> tuple[CompanionRun, ...]:

@@ -32,11 +32,10 @@ def read(text: TextFile) -> Record:
     notes, step, samples = comments, None, table[:, -1]
     if table.shape[1] == 2:
         times = table[:, 0]
-        uneven = _uneven_line(text, lines, times)
-        if uneven is None:
-            step = (times[-1] - times[0]) / (times.size - 1)
-        else:
-            step, samples = _evened(uneven, times, samples, text.resample_dt)
+        step, uneven = _even_step(text, lines, times)
+        if uneven:
+            count = int((times[-1] - times[0]) / step * (1.0 + 1e-12) + 1.0)
+            samples = np.interp(times[0] + step * np.arange(count), times, samples)
             notes += (f"uneven times interpolated linearly to a step of {step:g} s",)
         if times[0] != 0.0:
             notes += (f"the first time in the file is {times[0]:g} s and is t = 0 here",)
@@ -62,8 +61,8 @@ def _table(text: TextFile, *, series: bool) -> tuple[list[int], Array]:
     return lines, np.array(rows)
 
 
-def _uneven_line(text: TextFile, lines: list[int], times: Array) -> str | None:
-    """Return None for equal steps, else the beginning of a sentence about the first step unlike the others."""
+def _even_step(text: TextFile, lines: list[int], times: Array) -> tuple[float, bool]:
+    """Return the time step, and whether samples must be interpolated to it; InputError where nobody asked for that."""
     steps = np.diff(times)
     usual = float(np.median(steps))
     backward = steps <= 0.0
@@ -73,17 +72,12 @@ def _uneven_line(text: TextFile, lines: list[int], times: Array) -> str | None:
                          "sort the rows and remove repeated times")
     odd = np.abs(steps - usual) > SAME_STEP * usual
     if not np.any(odd):
-        return None
-    k = int(np.argmax(odd)) + 1
-    return f"{text.at(lines[k])}: the step to time {times[k]:.9g} s is {steps[k - 1]:.9g} s, others {usual:.9g} s"
-
-
-def _evened(sentence: str, times: Array, samples: Array, resample_dt: float | None) -> tuple[float, Array]:
-    """Step and samples on an equal grid; InputError with the sentence when no resampling was asked for."""
-    if resample_dt is None:
-        raise InputError(f"{sentence}; pass resample_dt= to interpolate, or correct the time")
-    number("read_record", "resample_dt", resample_dt, positive=True, unit="seconds")
-    step = resample_dt / math.ceil(resample_dt / float(np.median(np.diff(times))) * (1.0 - SAME_STEP))
-    asked = (times[-1] - times[0]) / step * (1.0 + 1e-12) + 1.0
-    count = counted("read_record", f"resample_dt = {resample_dt!r} s", asked)
-    return step, np.interp(times[0] + step * np.arange(count), times, samples)
+        return (times[-1] - times[0]) / (times.size - 1), False
+    if text.resample_dt is None:
+        k = int(np.argmax(odd)) + 1
+        raise InputError(f"{text.at(lines[k])}: the step to time {times[k]:.9g} s is {steps[k - 1]:.9g} s, others "
+                         f"{usual:.9g} s; pass resample_dt= to interpolate, or correct the time")
+    wanted = number("read_record", "resample_dt", text.resample_dt, positive=True, unit="seconds")
+    step = wanted / math.ceil(wanted / usual * (1.0 - SAME_STEP))
+    counted("read_record", f"resample_dt = {wanted!r} s", (times[-1] - times[0]) / step)
+    return step, True
