@@ -44,6 +44,12 @@ def whole(owner: str, meaning: str, value: Any, *, least: int = 0, most: int | N
     return int(value)
 
 
+def between(what: str, value: Any, low: float, high: float, remedy: str) -> None:
+    """Raise InputError unless it is a real number from ``low`` to ``high``, both included."""
+    if not low <= real(value) <= high:
+        raise InputError(f"{what} is {shown(value)}: {remedy}")
+
+
 def check_word(name: str, given: object, known: Sequence[str]) -> None:
     """Raise InputError for a word that is not among those known."""
     if given not in known:

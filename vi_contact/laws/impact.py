@@ -22,9 +22,8 @@ from typing import Protocol
 import numpy as np
 
 from ..core.algebra import Array, Factor, Indices, total
-from ..core.checks import function, real, shown
+from ..core.checks import between, function
 from ..core.corners import with_open_faces
-from ..core.errors import InputError
 from ..core.protocols import Impact
 from ..core.surfaces import ContactSurface
 from ..core.system import SemiDiscreteSystem
@@ -116,9 +115,7 @@ class Newton:
     update: VelocityUpdate = field(default_factory=ComponentReset)
 
     def __post_init__(self) -> None:
-        if not 0.0 <= real(self.e) <= 1.0:
-            raise InputError(f"restitution coefficient e is {shown(self.e)}: give a number from 0 (inelastic) to 1 "
-                             "(elastic)")
+        between("restitution coefficient e", self.e, 0.0, 1.0, "give a number from 0 (inelastic) to 1 (elastic)")
         function("Newton", "update", self.update, UPDATE)
 
     def target(self, impact: Impact) -> Array:

@@ -10,12 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from ..core.algebra import Array, Comm, Indices, Mask, Matrix, largest, max_abs, total
-from ..core.checks import provides, real, shown
+from ..core.checks import between
 from ..core.corners import lumped_entries
 from ..core.errors import InputError
 from ..core.surfaces import ContactSurface
@@ -24,11 +23,6 @@ from .mass_transfer import from_neighbours, rigid_motions
 
 LIGHT = 1e-9  # of the diagonal entry of M: a row sum that is no mass
 LARGEST_CORRECTION = 0.35  # of a node's lumped mass: beyond, the mesh is too coarse to move mass about
-
-
-def mass_law(owner: str, value: Any) -> None:
-    """Raise InputError unless it is a mass law."""
-    provides(owner, "mass", value, ("apply",), "give Redistributed() or ConsistentMass()", lacks=("target",))
 
 
 @dataclass(frozen=True)
@@ -61,8 +55,7 @@ class Redistributed:
     lumping: float = 0.4
 
     def __post_init__(self) -> None:
-        if not 0.0 <= real(self.lumping) <= 1.0:
-            raise InputError(f"lumping is {shown(self.lumping)}: give a share from 0 (consistent) to 1 (lumped)")
+        between("lumping", self.lumping, 0.0, 1.0, "give a share from 0 (consistent) to 1 (lumped)")
 
     def apply(self, system: SemiDiscreteSystem, surface: ContactSurface, *, tangential: bool) -> SemiDiscreteSystem:
         if surface.count == 0:
@@ -176,7 +169,12 @@ def _inertia_correction(system: SemiDiscreteSystem, moved: Matrix, inner: Mask, 
     ends = np.cumsum([shape.shape[1] for shape in shapes])[:-1]
     shares = [shape @ c for shape, c in zip(shapes, np.split(coefficients, ends), strict=True)]
     entries = [share if i is j else 0.5 * share for share, (i, j) in zip(shares, pairs, strict=True)]
-    _refuse_coarse(largest(comm, max_abs(np.concatenate(entries))))
+    moved_most = largest(comm, max_abs(np.concatenate(entries)))
+    if moved_most > LARGEST_CORRECTION:
+        raise InputError(
+            f"the mesh is too coarse for redistributed mass, keeping the inertia would change nodal masses by "
+            f"{100 * moved_most:.0f} %: refine it, or give the problem mass=ConsistentMass()"
+        )
     i, j = (np.concatenate([pair[side] for pair in pairs]) for side in (0, 1))
     value = 0.5 * np.concatenate(shares) * nodal[i]
     both = np.concatenate([i, j]), np.concatenate([j, i])
@@ -204,11 +202,3 @@ def _pairs_of_components(system: SemiDiscreteSystem, inner: Mask) -> Iterator[tu
             full = (table[:, c] >= 0) & (table[:, e] >= 0)
             own = table[full, c]
             yield own, own if c == e else table[full, e]
-
-
-def _refuse_coarse(largest: float) -> None:
-    if largest > LARGEST_CORRECTION:
-        raise InputError(
-            f"the mesh is too coarse for redistributed mass, keeping the inertia would change nodal masses by "
-            f"{100 * largest:.0f} %: refine it, or give the problem mass=ConsistentMass()"
-        )

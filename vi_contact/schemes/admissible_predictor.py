@@ -35,7 +35,10 @@ def admissible(problem: ContactProblem, state: State, u: Array, dt: float) -> tu
     closed = (gap < 0.0) | (surface.bilateral & rigid)
     if np.isnan(gap).any() or not np.any(gap[closed] != 0.0):
         return u, closed  # nothing in the way; of NaN the step itself tells
-    bounds: ContactProblem = system.cached("admissible predictor, bounds", lambda: _rigid_part(problem))
+    bounds: ContactProblem = system.cached(  # springs are not bounds here, and nothing rubs
+        "admissible predictor, bounds",
+        lambda: replace(problem, surface=rigid_part(surface), friction=Frictionless()),
+    )
     solver: CertifiedSolver = system.cached(
         "admissible predictor", lambda: CertifiedSolver(bounds, mass_matrix(problem), 1.0, [Condensed()], TOLERANCE)
     )
@@ -55,8 +58,3 @@ def admissible(problem: ContactProblem, state: State, u: Array, dt: float) -> tu
     except StepFailure as failure:
         raise StepFailure(f"the predictor could not be projected onto the admissible set: {failure}") from failure
     return u + result.x, result.active
-
-
-def _rigid_part(problem: ContactProblem) -> ContactProblem:
-    """Springs are not bounds here, and nothing rubs."""
-    return replace(problem, surface=rigid_part(problem.surface), friction=Frictionless())

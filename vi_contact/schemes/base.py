@@ -11,7 +11,7 @@ from ..core.algebra import Array, EffectiveMatrix, Mask
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.protocols import MassLaw
-from ..core.step import State, StepProblem, StepResult
+from ..core.step import Balance, State, StepProblem, StepResult
 from ..laws.mass import ConsistentMass, Redistributed
 
 log = logging.getLogger(__name__)
@@ -26,8 +26,12 @@ class SingleStep:
         return ConsistentMass()
 
     def check(self, problem: ContactProblem) -> None:
-        """Raise InputError for massless contact nodes."""
-        needs_mass(type(self).__name__, problem)
+        """Raise InputError for massless contact nodes: their forces would swing for ever."""
+        if problem.equations.massless is not None:
+            raise InputError(
+                f"{type(self).__name__} needs mass at the contact nodes, whose forces would swing for ever: give the "
+                "problem mass=ConsistentMass(), or use the default scheme Trapezoidal()"
+            )
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
         """Return the state: there is nothing to prepare."""
@@ -48,8 +52,7 @@ class BalanceStep:
 
     def check(self, problem: ContactProblem) -> None:
         """Raise InputError for an impact law on massless contact nodes; warn when they have mass."""
-        needs_no_impact_law(problem)
-        contact_in_the_balance(repr(self), problem)
+        check_balance(repr(self), problem)
 
 
 def position_step(
@@ -87,19 +90,24 @@ def stepped(step: StepProblem, result: StepResult, u: Array, v: Array) -> State:
     return State(step.t, step.k, u, v, result.r_n / step.scale, result.active, r_t=r_t)
 
 
-def has_massless_contact(problem: ContactProblem) -> bool:
-    """Say whether the contact unknowns of the problem carry no inertia."""
-    return problem.equations.massless is not None
+def means(old: State, new: State, dt: float, *, u: Array, f: Array) -> Balance:
+    """Return the equation of a step with mean u and f, mean rates of u and v, and the reactions of the new state."""
+    return Balance(u=u, v=(new.u - old.u) / dt, a=(new.v - old.v) / dt, f=f, r_n=new.r_n, r_t=new.r_t)
 
 
-def contact_in_the_balance(name: str, problem: ContactProblem) -> None:
-    """Warn, once for a problem, of a scheme with contact in the acceleration balance on mass at the contact nodes.
+def check_balance(name: str, problem: ContactProblem) -> None:
+    """Check what schemes with contact in the acceleration balance march.
 
-    Such a scheme creates the energy ½ (r0 g1 - r1 g0) whenever a contact opens.
+    Raises InputError for an impact law on massless contact nodes: there is no momentum that it could change. Warns,
+    once for a problem, of mass at the contact nodes: the energy ½ (r0 g1 - r1 g0) is created whenever a contact opens.
     """
-    surface = problem.surface
-    rigid = bool(np.any(~surface.bilateral & (surface.compliance == 0.0)))
-    if not rigid or has_massless_contact(problem):
+    massless, surface = problem.equations.massless is not None, problem.surface
+    if massless and problem.impact is not None:
+        raise InputError(
+            f"the impact law {problem.impact} acts on the mass of contact nodes and this problem has none there: leave "
+            "the law out, or give the problem mass=ConsistentMass()"
+        )
+    if massless or not np.any(~surface.bilateral & (surface.compliance == 0.0)):
         return
     told = problem.equations.cached(f"told of {name}", list)
     if not told and surface.comm.rank == 0:
@@ -109,21 +117,3 @@ def contact_in_the_balance(name: str, problem: ContactProblem) -> None:
             name,
         )
     told.append(True)
-
-
-def needs_mass(name: str, problem: ContactProblem) -> None:
-    """Raise InputError for a scheme whose contact is an impulse on the contact nodes, when these have no mass."""
-    if has_massless_contact(problem):
-        raise InputError(
-            f"{name} needs mass at the contact nodes, whose forces would swing for ever: give the problem "
-            "mass=ConsistentMass(), or use the default scheme Trapezoidal()"
-        )
-
-
-def needs_no_impact_law(problem: ContactProblem) -> None:
-    """Raise InputError for an impact law on massless contact nodes: there is no momentum that it could change."""
-    if has_massless_contact(problem) and problem.impact is not None:
-        raise InputError(
-            f"the impact law {problem.impact} acts on the mass of contact nodes and this problem has none there: leave "
-            "the law out, or give the problem mass=ConsistentMass()"
-        )

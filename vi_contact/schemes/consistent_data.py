@@ -24,7 +24,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core.algebra import Array, EffectiveMatrix, Mask, Matrix, max_abs
+from ..core.algebra import Array, EffectiveMatrix, Mask, max_abs
 from ..core.problem import ContactProblem
 from ..core.step import PreparedSolver, State, StepProblem
 from ..core.surfaces import ContactSurface
@@ -82,22 +82,14 @@ def _slip_rate(problem: ContactProblem, state: State, dt: float) -> Array | None
     return rate if sliding is None else rate - sliding / dt
 
 
-def without_inertia(problem: ContactProblem, a: Array) -> Array:
-    """Return a, with zero on massless unknowns."""
-    massless = problem.equations.massless
-    return a if massless is None else np.where(massless, 0.0, a)
-
-
 def mass_matrix(problem: ContactProblem) -> EffectiveMatrix:
     """Return M, with ones in place of the empty rows of massless unknowns."""
-    system = problem.equations
-
-    def make() -> EffectiveMatrix:
-        algebra, massless = system.algebra, system.massless
-        regular: Matrix = system.M if massless is None else algebra.with_identity_rows(system.M, massless)
-        return EffectiveMatrix(regular, algebra)
-
-    matrix: EffectiveMatrix = system.cached("mass", make)
+    system, massless = problem.equations, problem.equations.massless
+    if massless is None:
+        matrix: EffectiveMatrix = system.cached("mass", lambda: EffectiveMatrix(system.M, system.algebra))
+    else:
+        regular = system.algebra.with_identity_rows
+        matrix = system.cached("mass", lambda: EffectiveMatrix(regular(system.M, massless), system.algebra))
     return matrix
 
 
@@ -160,7 +152,8 @@ def _within(surface: ContactSurface, layer: Mask) -> ContactSurface:
     return replace(surface, owned=place[surface.owned], tangents=tangents, basis=None, coupling=None, dual=None)
 
 
-def at_rest_between(problem: ContactProblem, old: State, u: Array, v: Array, dt: float) -> Array:
-    """Return v, with the mean velocity of the step on massless unknowns: they have no momentum to carry on."""
+def massless_take(problem: ContactProblem, given: Array | float, x: Array) -> Array:
+    """Return x with these values on massless unknowns: the mean velocity of a step, for they have no momentum to carry
+    on, and no acceleration."""
     massless = problem.equations.massless
-    return v if massless is None else np.where(massless, (u - old.u) / dt, v)
+    return x if massless is None else np.where(massless, given, x)

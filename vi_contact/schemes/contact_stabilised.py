@@ -26,12 +26,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..core.algebra import Array, EffectiveMatrix, Mask
+from ..core.algebra import EffectiveMatrix
 from ..core.checks import flag
 from ..core.problem import ContactProblem
 from ..core.step import Balance, State, StepProblem, StepResult
 from .admissible_predictor import admissible
-from .base import SingleStep, position_step, stepped
+from .base import SingleStep, means, position_step, stepped
 
 
 @dataclass(frozen=True)
@@ -51,15 +51,12 @@ class ContactStabilisedNewmark(SingleStep):
         """Return A = 4/dt² M + 2/dt C + K."""
         return problem.equations.effective(m=4.0 / dt**2, c=2.0 / dt, k=1.0)
 
-    def _predictor(self, problem: ContactProblem, state: State, dt: float) -> tuple[Array, Mask]:
-        """(u_p, the contact set expected at the end of the step)."""
-        u = state.u + dt * state.v
-        return admissible(problem, state, u, dt) if self.projected else (u, state.active)
-
     def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem:
         """Return the step with b of the module's equations."""
         system = problem.equations
-        u_p, active = self._predictor(problem, state, dt)
+        u_p, active = state.u + dt * state.v, state.active
+        if self.projected:
+            u_p, active = admissible(problem, state, u_p, dt)
         b = 2.0 * system.load(state.t + 0.5 * dt) + system.M @ (4.0 / dt**2 * u_p) - system.K @ state.u
         if system.C is not None:
             b += system.C @ (2.0 / dt * state.u)
@@ -71,11 +68,4 @@ class ContactStabilisedNewmark(SingleStep):
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
         """Return the averages of the equation above."""
-        return Balance(
-            u=0.5 * (old.u + new.u),
-            v=(new.u - old.u) / dt,
-            a=(new.v - old.v) / dt,
-            f=problem.equations.load(old.t + 0.5 * dt),
-            r_n=new.r_n,
-            r_t=new.r_t,
-        )
+        return means(old, new, dt, u=0.5 * (old.u + new.u), f=problem.equations.load(old.t + 0.5 * dt))

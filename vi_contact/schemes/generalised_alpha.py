@@ -32,35 +32,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..core.algebra import Array, EffectiveMatrix
-from ..core.checks import real, shown
+from ..core.checks import between, real, shown
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.step import Balance, State, StepProblem, StepResult
 from .base import BalanceStep, position_step
-from .consistent_data import at_rest_between, consistent_acceleration, equilibrated, without_inertia
+from .consistent_data import consistent_acceleration, equilibrated, massless_take
 
 SLACK = 1e-12  # round-off in the conditions of stability
-
-
-@dataclass(frozen=True)
-class Weights:
-    """Hold the four numbers of the module's equations. InputError unless unconditionally stable."""
-
-    alpha_m: float
-    alpha_f: float
-    beta: float
-    gamma: float
-
-    def __post_init__(self) -> None:
-        alpha_m, alpha_f, beta, gamma = (real(getattr(self, name)) for name in self.__dataclass_fields__)
-        least = 0.5 - alpha_m + alpha_f
-        stable = alpha_m <= alpha_f + SLACK and alpha_f <= 0.5 + SLACK and gamma >= least - SLACK
-        if not (stable and np.inf > beta >= 0.5 * gamma - SLACK and np.isfinite(least + gamma)):
-            told = ", ".join(f"{name}={shown(getattr(self, name))}" for name in self.__dataclass_fields__)
-            raise InputError(
-                f"{told} are not unconditionally stable, and contact has no highest frequency to choose dt by: give "
-                "alpha_m <= alpha_f <= 1/2, gamma >= 1/2 - alpha_m + alpha_f, beta >= gamma/2"
-            )
 
 
 class AlphaStep(BalanceStep, ABC):
@@ -69,8 +48,8 @@ class AlphaStep(BalanceStep, ABC):
 
     @property
     @abstractmethod
-    def weights(self) -> Weights:
-        """Return alpha_m, alpha_f, beta, gamma of the member."""
+    def weights(self) -> GeneralisedAlpha:
+        """Return the member of generalised-alpha that it is, with alpha_m, alpha_f, beta and gamma."""
 
     def _mark(self, t: float) -> Array:
         return np.array([self.weights.alpha_m, self.weights.alpha_f, t])
@@ -125,8 +104,8 @@ class AlphaStep(BalanceStep, ABC):
         v += w.gamma / (w.beta * dt) * result.x
         a += result.x / (w.beta * dt**2)
         reaction = problem.surface.reaction_load(result.r_n, len(v), result.r_t)
-        memory = {"a": without_inertia(problem, a), "reaction": reaction, "of": self._mark(step.t)}
-        v = at_rest_between(problem, state, result.x, v, dt)
+        memory = {"a": massless_take(problem, 0.0, a), "reaction": reaction, "of": self._mark(step.t)}
+        v = massless_take(problem, (result.x - state.u) / dt, v)
         return State(step.t, step.k, result.x, v, result.r_n, result.active, memory, result.r_t)
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
@@ -134,13 +113,14 @@ class AlphaStep(BalanceStep, ABC):
         return weighted(problem, old, new, self.weights.alpha_m, self.weights.alpha_f)
 
 
-def weighted(problem: ContactProblem, old: State, new: State, m: float, f: float) -> Balance:
-    """Return (1 - m) and m of the accelerations, (1 - f) and f of everything else at the ends of a step."""
-    load, surface, r0 = problem.equations.load, problem.surface, old.memory["reaction"]
+def weighted(problem: ContactProblem, old: State, new: State, m: float, f: float, level: str = "") -> Balance:
+    """Return (1 - m) and m of the accelerations, (1 - f) and f of everything else at the ends of a step. ``level``: of
+    the memory's names."""
+    load, surface, r0 = problem.equations.load, problem.surface, old.memory[f"reaction{level}"]
     return Balance(
         u=(1.0 - f) * new.u + f * old.u,
         v=(1.0 - f) * new.v + f * old.v,
-        a=(1.0 - m) * new.memory["a"] + m * old.memory["a"],
+        a=(1.0 - m) * new.memory[f"a{level}"] + m * old.memory[f"a{level}"],
         f=(1.0 - f) * load(new.t) + f * load(old.t),
         r_n=(1.0 - f) * new.r_n + f * surface.normal_values(r0),
         r_t=None if new.r_t is None else (1.0 - f) * new.r_t + f * surface.tangential_values(r0),
@@ -157,21 +137,27 @@ class GeneralisedAlpha(AlphaStep):
     gamma: float
 
     def __post_init__(self) -> None:
-        _ = self.weights
+        alpha_m, alpha_f, beta, gamma = (real(getattr(self, name)) for name in self.__dataclass_fields__)
+        least = 0.5 - alpha_m + alpha_f
+        stable = alpha_m <= alpha_f + SLACK and alpha_f <= 0.5 + SLACK and gamma >= least - SLACK
+        if not (stable and np.inf > beta >= 0.5 * gamma - SLACK and np.isfinite(least + gamma)):
+            told = ", ".join(f"{name}={shown(getattr(self, name))}" for name in self.__dataclass_fields__)
+            raise InputError(
+                f"{told} are not unconditionally stable, and contact has no highest frequency to choose dt by: give "
+                "alpha_m <= alpha_f <= 1/2, gamma >= 1/2 - alpha_m + alpha_f, beta >= gamma/2"
+            )
 
     @property
-    def weights(self) -> Weights:
-        """Return what was given."""
-        return Weights(self.alpha_m, self.alpha_f, self.beta, self.gamma)
+    def weights(self) -> GeneralisedAlpha:
+        """Return itself."""
+        return self
 
     @classmethod
     def spectral_radius(cls, rho_inf: float = 0.8) -> GeneralisedAlpha:
         """Return the member of order 2 with this amplification at infinite frequency, 0 (all damped) to 1 (nothing
         damped)."""
-        if not 0.0 <= real(rho_inf) <= 1.0:
-            raise InputError(
-                f"rho_inf is {shown(rho_inf)}: give the amplification at infinite frequency, from 0 to 1 (no damping)"
-            )
+        remedy = "give the amplification at infinite frequency, from 0 to 1 (no damping)"
+        between("rho_inf", rho_inf, 0.0, 1.0, remedy)
         alpha_m, alpha_f = (2.0 * rho_inf - 1.0) / (1.0 + rho_inf), rho_inf / (1.0 + rho_inf)
         apart = alpha_f - alpha_m
         return cls(alpha_m, alpha_f, beta=0.25 * (1.0 + apart) ** 2, gamma=0.5 + apart)

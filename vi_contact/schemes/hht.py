@@ -15,9 +15,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..core.checks import real, shown
-from ..core.errors import InputError
-from .generalised_alpha import AlphaStep, Weights
+from ..core.checks import between
+from .generalised_alpha import AlphaStep, GeneralisedAlpha
 
 
 @dataclass(frozen=True)
@@ -27,10 +26,9 @@ class HHT(AlphaStep):
     alpha: float = -0.1
 
     def __post_init__(self) -> None:
-        if not -1.0 / 3.0 <= real(self.alpha) <= 0.0:
-            raise InputError(f"HHT alpha is {shown(self.alpha)}: give a number from -1/3 to 0, others are not stable")
+        between("HHT alpha", self.alpha, -1.0 / 3.0, 0.0, "give a number from -1/3 to 0, others are not stable")
 
     @property
-    def weights(self) -> Weights:
+    def weights(self) -> GeneralisedAlpha:
         """Return the weights as a generalised-alpha member."""
-        return Weights(0.0, -self.alpha, 0.25 * (1.0 - self.alpha) ** 2, 0.5 - self.alpha)
+        return GeneralisedAlpha(0.0, -self.alpha, 0.25 * (1.0 - self.alpha) ** 2, 0.5 - self.alpha)

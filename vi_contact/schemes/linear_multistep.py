@@ -30,7 +30,8 @@ from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.step import Balance, State, StepProblem, StepResult
 from .base import BalanceStep, position_step
-from .consistent_data import at_rest_between, consistent_acceleration, equilibrated, without_inertia
+from .consistent_data import consistent_acceleration, equilibrated, massless_take
+from .generalised_alpha import weighted
 
 FREQUENCIES = np.logspace(-2.0, 3.0, 61)  # natural frequency times dt, for the stability check
 DAMPING = (0.0, 0.1, 1.0)  # damping ratios, for the stability check
@@ -119,19 +120,14 @@ class LinearMultistep(BalanceStep):
         return self._with_past(state, *consistent_acceleration(problem, state, dt), dt)
 
     def _with_past(self, state: State, a: Array, reaction: Array, dt: float) -> State:
-        past = self._past(state.u, state.v, a, dt)
-        newest = {"a_0": a, "reaction_0": reaction, "dt": np.array([dt]), "t": np.array([state.t])}
-        return replace(state, memory=past | newest)
-
-    def _past(self, u: Array, v: Array, a: Array, dt: float) -> dict[str, Array]:
-        """Levels 1..q before (u, v) under constant acceleration a."""
-        past = {}
+        """Return the state with levels 1..q before it under constant acceleration a."""
+        past = {"a_0": a, "reaction_0": reaction, "dt": np.array([dt]), "t": np.array([state.t])}
         for r in range(1, len(self.a)):
             back = r * dt
-            past[f"u_{r}"] = u - back * v + 0.5 * back**2 * a
-            past[f"v_{r}"] = v - back * a
+            past[f"u_{r}"] = state.u - back * state.v + 0.5 * back**2 * a
+            past[f"v_{r}"] = state.v - back * a
             past[f"a_{r}"] = a
-        return past
+        return replace(state, memory=past)
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
         """Return A of the module's equations."""
@@ -168,20 +164,12 @@ class LinearMultistep(BalanceStep):
         levels = self._levels(state)
         v_known, a_known = self._known(levels, dt)
         v = v_known + self._velocity_factor(dt) * result.x
-        v = at_rest_between(problem, state, result.x, v, dt)
-        a = without_inertia(problem, a_known + self._acceleration_factor(dt) * result.x)
+        v = massless_take(problem, (result.x - state.u) / dt, v)
+        a = massless_take(problem, 0.0, a_known + self._acceleration_factor(dt) * result.x)
         reaction = problem.surface.reaction_load(result.r_n, len(v), result.r_t)
         newest = {"a_0": a, "reaction_0": reaction, "dt": state.memory["dt"], "t": np.array([step.t])}
         return State(step.t, step.k, result.x, v, result.r_n, result.active, levels | newest, result.r_t)
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
         """Return the mean of the equations of motion at both ends of the step, the old end after its impact."""
-        load, surface, r0 = problem.equations.load, problem.surface, old.memory["reaction_0"]
-        return Balance(
-            u=0.5 * (old.u + new.u),
-            v=0.5 * (old.v + new.v),
-            a=0.5 * (old.memory["a_0"] + new.memory["a_0"]),
-            f=0.5 * (load(old.t) + load(new.t)),
-            r_n=0.5 * (surface.normal_values(r0) + new.r_n),
-            r_t=None if new.r_t is None else 0.5 * (surface.tangential_values(r0) + new.r_t),
-        )
+        return weighted(problem, old, new, 0.5, 0.5, "_0")

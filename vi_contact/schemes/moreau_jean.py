@@ -33,13 +33,12 @@ from typing import ClassVar
 import numpy as np
 
 from ..core.algebra import Array, EffectiveMatrix, Mask, largest, max_abs
-from ..core.checks import flag, real, shown
+from ..core.checks import between, flag
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.step import Balance, State, StepProblem, StepResult
-from .base import SingleStep, stepped
-
-ROUND_OFF = 1e-12  # of the largest displacement: smaller gaps are closed
+from .base import SingleStep, means, stepped
+from .consistent_data import ROUND_OFF
 
 
 @dataclass(frozen=True)
@@ -61,10 +60,8 @@ class MoreauJean(SingleStep):
 
     def __post_init__(self) -> None:
         flag("MoreauJean", "allow_energy_gain", self.allow_energy_gain)
-        if not 0.0 <= real(self.e) <= 1.0:
-            raise InputError(f"MoreauJean e is {shown(self.e)}: give a restitution from 0 (inelastic) to 1 (elastic)")
-        if not 0.5 <= real(self.theta) <= 1.0:
-            raise InputError(f"MoreauJean theta is {shown(self.theta)}: give a weight from 0.5 to 1, less is unstable")
+        between("MoreauJean e", self.e, 0.0, 1.0, "give a restitution from 0 (inelastic) to 1 (elastic)")
+        between("MoreauJean theta", self.theta, 0.5, 1.0, "give a weight from 0.5 to 1, less is unstable")
         largest = 1.0 / (1.0 + self.e)
         if self.theta > largest + 1e-12 and not self.allow_energy_gain:
             raise InputError(
@@ -140,14 +137,7 @@ class MoreauJean(SingleStep):
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
         """Return the averages of the equation above."""
-        return Balance(
-            u=old.u + self.theta * (new.u - old.u),
-            v=(new.u - old.u) / dt,
-            a=(new.v - old.v) / dt,
-            f=self._load(problem, old.t, dt),
-            r_n=new.r_n,
-            r_t=new.r_t,
-        )
+        return means(old, new, dt, u=old.u + self.theta * (new.u - old.u), f=self._load(problem, old.t, dt))
 
 
 def _closed(problem: ContactProblem, state: State, dt: float) -> Mask:

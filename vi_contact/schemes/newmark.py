@@ -26,7 +26,7 @@ from dataclasses import dataclass
 
 from ..core.problem import ContactProblem
 from ..core.step import Balance, State
-from .generalised_alpha import AlphaStep, Weights, weighted
+from .generalised_alpha import AlphaStep, GeneralisedAlpha, weighted
 
 
 @dataclass(frozen=True)
@@ -40,9 +40,9 @@ class Newmark(AlphaStep):
         _ = self.weights
 
     @property
-    def weights(self) -> Weights:
+    def weights(self) -> GeneralisedAlpha:
         """Return the weights as a generalised-alpha member."""
-        return Weights(0.0, 0.0, self.beta, self.gamma)
+        return GeneralisedAlpha(0.0, 0.0, self.beta, self.gamma)
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
         """Return the equations of both ends, with the weights that make M a the change of momentum."""

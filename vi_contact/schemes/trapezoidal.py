@@ -19,12 +19,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from ..core.algebra import Array, EffectiveMatrix
+from ..core.checks import provides
 from ..core.problem import ContactProblem
 from ..core.protocols import MassLaw
 from ..core.step import Balance, State, StepProblem, StepResult
-from ..laws.mass import Redistributed, mass_law
-from .base import contact_in_the_balance, needs_no_impact_law, position_step
-from .consistent_data import at_rest_between, equilibrated
+from ..laws.mass import Redistributed
+from .base import check_balance, position_step
+from .consistent_data import equilibrated, massless_take
 
 
 @dataclass(frozen=True)
@@ -34,12 +35,12 @@ class Trapezoidal:
     mass: MassLaw = field(default_factory=Redistributed)
 
     def __post_init__(self) -> None:
-        mass_law("Trapezoidal", self.mass)
+        remedy = "give Redistributed() or ConsistentMass()"
+        provides("Trapezoidal", "mass", self.mass, ("apply",), remedy, lacks=("target",))
 
     def check(self, problem: ContactProblem) -> None:
         """Raise InputError for an impact law on massless contact nodes; warn when they have mass."""
-        needs_no_impact_law(problem)
-        contact_in_the_balance("Trapezoidal()", problem)
+        check_balance("Trapezoidal()", problem)
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
         """Return the state with massless nodes in equilibrium; once, not on restarts and changes of dt."""
@@ -72,7 +73,8 @@ class Trapezoidal:
 
     def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
         """Return the state with v1 = 2 (u1 - u0)/dt - v0; massless unknowns get the mean velocity of the step."""
-        v = at_rest_between(problem, state, result.x, 2.0 / dt * (result.x - state.u) - state.v, dt)
+        mean = (result.x - state.u) / dt
+        v = massless_take(problem, mean, 2.0 / dt * (result.x - state.u) - state.v)
         new = State(step.t, step.k, result.x, v, result.r_n, result.active, r_t=result.r_t)
         return self._with_force(problem, new)
 

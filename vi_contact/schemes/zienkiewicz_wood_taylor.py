@@ -18,11 +18,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..core.algebra import Array, EffectiveMatrix
-from ..core.checks import real, shown
-from ..core.errors import InputError
+from ..core.checks import between
 from ..core.problem import ContactProblem
 from ..core.step import Balance, State, StepProblem, StepResult
-from .base import SingleStep, position_step, stepped
+from .base import SingleStep, means, position_step, stepped
 
 
 @dataclass(frozen=True)
@@ -32,9 +31,7 @@ class ZienkiewiczWoodTaylor(SingleStep):
     phi: float = 0.5
 
     def __post_init__(self) -> None:
-        if not 0.5 <= real(self.phi) <= 1.0:
-            raise InputError(f"ZienkiewiczWoodTaylor phi is {shown(self.phi)}: give a weight from 0.5 to 1, less is "
-                             "unstable")
+        between("ZienkiewiczWoodTaylor phi", self.phi, 0.5, 1.0, "give a weight from 0.5 to 1, less is unstable")
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
         """Return A = M/(phi dt)² + C/(phi dt) + K."""
@@ -61,11 +58,4 @@ class ZienkiewiczWoodTaylor(SingleStep):
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
         """Return the averages of the equation above."""
-        return Balance(
-            u=old.u + self.phi * (new.u - old.u),
-            v=(new.u - old.u) / dt,
-            a=(new.v - old.v) / dt,
-            f=self._load(problem, old, dt),
-            r_n=new.r_n,
-            r_t=new.r_t,
-        )
+        return means(old, new, dt, u=old.u + self.phi * (new.u - old.u), f=self._load(problem, old, dt))
