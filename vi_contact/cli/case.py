@@ -14,7 +14,7 @@ from ..studies.cases.library import FOLDER, builtin_cases, located
 from ..studies.cases.short_settings import ShortOptions
 from ..studies.cases.toml_file import read_toml
 from .errors import world
-from .options import add_restart
+from .options import add_restart, add_settings
 
 
 def add_case_commands(commands: Any) -> None:
@@ -35,10 +35,7 @@ def add_case_commands(commands: Any) -> None:
     short.add_argument("--cross-check", action="store_true", help="solve every step by the other route too and compare")
     run.add_argument("--out", metavar="DIR", help="output folder (default: out of [run], or results/NAME of the case)")
     add_restart(run, "the output folder")
-    run.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
-                     help="replace a value of the case, such as friction.mu=0.5 or excitation.1.scale=2, or take it "
-                     "away (KEY=); repeatable")
-    add_allow(run)
+    add_settings(run)
     run.add_argument("--check", action="store_true", help="read the case and stop: nothing is computed")
     run.add_argument("--quiet", action="store_true", help="no progress line")
     run.set_defaults(run=_run, spelling={"units": "units (--set excitation.1.record.units=UNIT)"})
@@ -50,13 +47,6 @@ def add_case_commands(commands: Any) -> None:
 def _cases(options: argparse.Namespace) -> str:
     lines = [f"{name:<10} {title}" for name, title in builtin_cases().items()]
     return "\n".join([*lines, f"the files: {FOLDER}"])
-
-
-def add_allow(command: argparse.ArgumentParser) -> None:
-    """Add ``--allow``."""
-    command.add_argument("--allow", action="append", default=[], metavar="PACKAGE",
-                         help="the case may name classes of this Python package, as package.module:Name, and so run "
-                         "its code; repeatable (docs/guide/extend.md)")
 
 
 def _run(options: argparse.Namespace) -> str:

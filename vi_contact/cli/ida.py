@@ -9,7 +9,8 @@ from typing import Any
 
 from ..core.checks import shown
 from ..core.errors import InputError, ViContactError
-from .case import add_allow
+from ..studies.cases.library import located
+from .options import add_settings
 
 
 def add_ida_commands(commands: Any) -> None:
@@ -31,9 +32,7 @@ def add_ida_commands(commands: Any) -> None:
     one.add_argument("--jobs", type=int, default=1, metavar="N", help="runs at the same time (default 1)")
     one.add_argument("--part", type=_part, default=(1, 1), metavar="I/N", help="only every N-th run, for job arrays")
     one.add_argument("--launch", default="", metavar="WORDS", help="in front of every run, such as 'mpirun -n 4'")
-    one.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
-                     help="replace a value of the case, as for run; repeatable")
-    add_allow(one)
+    add_settings(one)
     one.set_defaults(run=_ida)
 
 
@@ -53,7 +52,6 @@ def _part(text: str) -> tuple[int, int]:
 
 def _ida(options: argparse.Namespace) -> str:
     from ..studies.cases.case import read_case
-    from ..studies.cases.library import located
     from ..studies.ida.ida import IDA, run_ida
 
     try:

@@ -9,11 +9,23 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..core.checks import counted, shown
 from ..core.errors import InputError
 
 MOST_SPACED = 100_000  # periods or frequencies of a spectrum
 PICTURES = (".png", ".pdf", ".svg")
+
+
+def add_settings(command: argparse.ArgumentParser) -> None:
+    """Add the options that change what a case says, and what it may name."""
+    command.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
+                         help="replace a value of the case, such as friction.mu=0.5 or excitation.1.scale=2, or take "
+                         "it away (KEY=); repeatable")
+    command.add_argument("--allow", action="append", default=[], metavar="PACKAGE",
+                         help="the case may name classes of this Python package, as package.module:Name, and so run "
+                         "its code; repeatable (docs/guide/extend.md)")
 
 
 def add_restart(options: Any, where: str) -> None:
@@ -37,8 +49,6 @@ def add_actions(
 
 def spaced(option: str, values: Sequence[float]) -> Any:
     """Read FROM, TO, N as N logarithmically spaced numbers; InputError for others, before memory is taken."""
-    import numpy as np
-
     first, last, count = values
     if not (0.0 < first < last < math.inf and 2 <= count < math.inf and count == int(count)):
         raise InputError(f"{option} {first:g} {last:g} {count:g}: give FROM below TO and a whole number N from 2 on")
@@ -64,13 +74,4 @@ def output_file(path: str | Path, *, reads: Iterable[str | Path] = (), picture: 
         raise InputError(f"{out}: a picture ends in {', '.join(PICTURES[:-1])} or {PICTURES[-1]}; give it such a name")
     if out.exists() and any(Path(one).exists() and out.samefile(one) for one in reads):
         raise InputError(f"{out} is read by this command, which would overwrite it: give another name for the output")
-    return out
-
-
-def table_beside_picture(path: str | Path, *, reads: Iterable[str | Path] = ()) -> Path:
-    """Return the table that a command is about to write, a picture of the same name beside it. InputError as above."""
-    out = output_file(path, reads=reads)
-    if out.suffix.lower() in PICTURES:
-        raise InputError(f"{out}: the table would be overwritten by its picture; give a name such as {out.stem}.csv")
-    output_file(out.with_suffix(PICTURES[0]))
     return out

@@ -13,7 +13,7 @@ from ..engineering import floor_spectrum, hysteresis, peaks, recorded_motion, tr
 from ..plots.records import plot_loop, plot_spectra, plot_transfer
 from ..run.files.folder import FILES
 from ..studies.cases.library import COPY, read_copy
-from .options import add_actions, output_file, spaced, table_beside_picture
+from .options import PICTURES, add_actions, output_file, spaced
 
 if TYPE_CHECKING:
     from ..run.files.reading import RunFolder
@@ -158,6 +158,10 @@ def _loop(options: argparse.Namespace) -> str:
 
 
 def _table_path(options: argparse.Namespace) -> Path:
+    """Return the table that a command is about to write, a picture of the same name beside it; InputError."""
     folder = Path(options.folder)
-    path = options.out or folder / f"{options.action}.csv"
-    return table_beside_picture(path, reads=[folder / name for name in FILES])
+    out = output_file(options.out or folder / f"{options.action}.csv", reads=[folder / name for name in FILES])
+    if out.suffix.lower() in PICTURES:
+        raise InputError(f"{out}: the table would be overwritten by its picture; give a name such as {out.stem}.csv")
+    output_file(out.with_suffix(PICTURES[0]))
+    return out

@@ -42,7 +42,8 @@ def recorded_motion(history: Mapping[str, Array], column: str, *, relative: bool
     values, t = column_of(history, column), column_of(history, "t")
     if len(t) < 3:
         raise InputError(f"the history has {len(t)} rows: spectra need three or more")
-    ground = _mean_of_steps(np.asarray(history.get(f"a_g_{axis}", np.zeros(len(t))), dtype=float))
+    ground = np.asarray(history.get(f"a_g_{axis}", np.zeros(len(t))), dtype=float)
+    ground = np.append(ground[:1], 0.5 * (ground[1:] + ground[:-1]))  # mean over the step, as probes have it
     if kind == "v":
         values = np.append(0.0, np.diff(values) / np.diff(t)) + ground
     elif column == f"a_g_{axis}":
@@ -57,11 +58,6 @@ def recorded_motion(history: Mapping[str, Array], column: str, *, relative: bool
         values = np.interp(even, t, values)
     frame = "relative" if relative else "absolute"
     return Record(values, dt, title=f"{column}, {frame}", source=column, notes=(f"{frame} acceleration of a run",))
-
-
-def _mean_of_steps(values: Array) -> Array:
-    """Return the means of end values over the steps, as probes have them; row 0 is the state at the start."""
-    return np.append(values[:1], 0.5 * (values[1:] + values[:-1]))
 
 
 def floor_spectrum(

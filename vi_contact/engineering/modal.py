@@ -31,7 +31,7 @@ def lowest_frequency(system: SemiDiscreteSystem, *, max_iterations: int = 2000) 
         last, square = square, dot(mode, force) / norm
         force = inertia / np.sqrt(norm)
         if abs(square - last) <= 1e-15 * square:
-            return float(np.sqrt(square)) / (2.0 * np.pi)
-    if abs(square - last) <= 1e-10 * square:
-        return float(np.sqrt(square)) / (2.0 * np.pi)
-    raise InputError("the lowest frequency did not settle: give the excitation frequency explicitly")
+            break
+    if not abs(square - last) <= 1e-10 * square:
+        raise InputError("the lowest frequency did not settle: give the excitation frequency explicitly")
+    return float(np.sqrt(square)) / (2.0 * np.pi)

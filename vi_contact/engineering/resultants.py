@@ -155,12 +155,12 @@ _MEANING = {
     "uplift": ("-", "uplift ratio 1 - L_contact/L"),
     "opening": ("m", "largest gap"),
     "slip": ("m", "largest tangential displacement on the support"),
-    "N": ("N", "normal force -F·n, compression positive,"),
+    "N": ("N", "normal force -F·n, compression positive"),
     "T": ("N", "tangential force F·t on the body"),
-    "M": ("N m", "moment on the body about the centre, anticlockwise positive,"),
-    "e": ("m", "eccentricity M/N; nan without normal force;"),
-    "height": ("m", "height of the thrust above the centre; nan while open;"),
-    "theta": ("rad", "rocking angle, anticlockwise positive,"),
+    "M": ("N m", "moment on the body about the centre, anticlockwise positive"),
+    "e": ("m", "eccentricity M/N; nan without normal force"),
+    "height": ("m", "height of the thrust above the centre; nan while open"),
+    "theta": ("rad", "rocking angle, anticlockwise positive"),
     "settlement": ("m", "mean displacement towards the support"),
 }
 
@@ -170,7 +170,7 @@ def _unit_and_meaning(quantity: str, name: str) -> tuple[str, str]:
     if kind == "force":
         return "N", f"contact force on the body along {axis}, part {name}"
     unit, text = _MEANING[kind]
-    return unit, f"{text.rstrip(',;')}{f' along {axis}' if axis else ''}, part {name}"
+    return unit, f"{text}{f' along {axis}' if axis else ''}, part {name}"
 
 
 @dataclass

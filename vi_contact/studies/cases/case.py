@@ -44,7 +44,7 @@ from .library import base_folder, check_format, keep_copy
 from .model_tables import Parts
 from .own_classes import packages
 from .parsing import Words, arguments, nearest, read
-from .table_calls import Call, Callee, Named, Node, Spot, Value, callee, groups, needs_body
+from .table_calls import Call, Callee, Group, Named, Node, Spot, Value, callee, needs_body, nodes_in
 from .toml_file import read_toml, with_settings
 from .vocabulary import MeshFile, words
 
@@ -193,10 +193,9 @@ class Case:
         mesh, tags = self._mesh(comm)
         system = self._made("system", mesh=mesh, tags=tags, **self._shaking())
         system = self._made("gravity", system=system) if "gravity" in self.nodes else system
-        surfaces = self._several("contact", system=system, tags=tags)
-        surface = joined_surfaces(*surfaces) if len(surfaces) > 1 else (*surfaces, None)[0]
-        if surface is None:
-            surface = empty_surface(system.algebra.comm, system.space.dimension)
+        none = empty_surface(system.algebra.comm, system.space.dimension)
+        surfaces = self._several("contact", system=system, tags=tags) or (none,)
+        surface = joined_surfaces(*surfaces) if len(surfaces) > 1 else surfaces[0]
         return Parts(system, surface, tags, "gravity" in self.nodes)
 
     def _shaking(self) -> dict[str, Any]:
@@ -209,8 +208,9 @@ class Case:
         script = self._made("mesh")
         mesh, tags = read_mesh(script.path, comm) if isinstance(script, MeshFile) else build_mesh(script, comm)
         for node in self.nodes.values():
-            for group in groups(node):
-                group.build({"tags": tags})
+            for one in nodes_in(node):
+                if isinstance(one, Group):
+                    one.build({"tags": tags})
         return mesh, tags
 
     def _problem(self, parts: Parts) -> ContactProblem:

@@ -29,9 +29,8 @@ def located(case: str) -> Path:
     """Return the file of a case: what ends in ".toml" is a file, all else the name of one that ships."""
     if case.endswith(".toml"):
         return Path(case)
-    names = [path.stem for path in sorted(FOLDER.glob("*.toml"))]
-    if case not in names:
-        raise InputError(f"there is no built-in case {shown(case)}: {nearest(case, names)}; a file ends in "
+    if case not in builtin_cases():
+        raise InputError(f"there is no built-in case {shown(case)}: {nearest(case, builtin_cases())}; a file ends in "
                          ".toml")
     return FOLDER / f"{case}.toml"
 

@@ -1,15 +1,11 @@
-"""Find the classes of others that a case file names as "package.module:Name".
+"""Find the classes of others that a case file names as "package.module:Name", and ask whether they fit.
 
-Importing a module runs it, and a case file may come from anybody. So a case file alone imports nothing: the person who
-starts the run names the packages (``--allow PACKAGE``, ``read_case(path, allow=("package",))``), or has installed one
-that registers an entry point of the group ``vi_contact``. Then three rules hold.
-
-The module is an allowed package or lies below one, by whole names: "pack" allows "pack" and "pack.sub", not "packet".
-The class is defined in an allowed package, too: what a module merely imports for its own use is not what it offers, and
-"pack.tools:Popen" would start programs wherever pack.tools uses ``subprocess``. A package may hand on its own classes,
-"pack:Law" from "pack.laws". And the class has all methods of the protocol that the table asks for, which is looked up
-before an object is made. Python searches its own path; the folder of the case file is not added to it,
-since whoever wrote the file could have put a module of a trusted name there.
+Importing a module runs it, and a case file may come from anybody: alone it imports nothing. Whoever starts the run
+names the packages (``--allow PACKAGE``, ``read_case(path, allow=("package",))``), or has installed one that registers
+an entry point of the group ``vi_contact``. The module is such a package or lies below one, by whole names: "pack"
+allows "pack.sub", not "packet". The class is defined in one, too: "pack.tools:Popen" would start programs wherever
+pack.tools uses ``subprocess``. And it has all methods of the protocol that the table asks for. Python searches its own
+path without the folder of the case file, whose author could have put a module of a trusted name there.
 """
 
 from __future__ import annotations
@@ -51,19 +47,22 @@ def own_class(text: str, kinds: Sequence[Any], allowed: Sequence[str], spot: Spo
     if not asked:
         raise spot.inside(f"has the type '{text}', and takes no classes but its own: leave the type out to see them")
     module, name = found.groups()
-    allowed = (*allowed, *_registered())
+    allowed = (*allowed, *(one.value.partition(":")[0].strip() for one in entry_points(group=GROUP)))
     if not _within(module, allowed):
         package = module.partition(".")[0]
         raise spot.inside(f"has the type '{text}' of the package '{package}', and a case file imports nothing by "
                           f"itself: give --allow {package} if you trust it")
     cls = _imported(module, name, spot)
-    _check(cls, text, asked, allowed, spot)
+    if not isinstance(cls, type):
+        raise spot.inside(f"has the type '{text}', which is no class: give one")
+    if not _within(cls.__module__, allowed):
+        raise spot.inside(f"has the type '{text}', which {cls.__module__} defines: name it there, and allow that "
+                          "package if you trust it")
+    defects = [defect(cls, kind) for kind in asked]
+    if all(defects):
+        raise spot.inside(f"has the type '{text}', which {defects[0]}, as {asked[0].__name__} must: see "
+                          "docs/reference/api.md")
     return _callee(cls, text, asked, spot)
-
-
-def _registered() -> list[str]:
-    """Return the packages whose entry points somebody has installed."""
-    return [one.value.partition(":")[0].strip() for one in entry_points(group=GROUP)]
 
 
 def _within(module: str, allowed: Iterable[str]) -> bool:
@@ -82,18 +81,6 @@ def _imported(module: str, name: str, spot: Spot) -> Any:
 def _line(error: BaseException) -> str:
     """Return what an error says, on one line."""
     return " ".join(str(error).split())[:200]
-
-
-def _check(cls: Any, text: str, asked: Sequence[Any], allowed: Sequence[str], spot: Spot) -> None:
-    if not isinstance(cls, type):
-        raise spot.inside(f"has the type '{text}', which is no class: give one")
-    if not _within(cls.__module__, allowed):
-        raise spot.inside(f"has the type '{text}', which {cls.__module__} defines: name it there, and allow that "
-                          "package if you trust it")
-    defects = [defect(cls, kind) for kind in asked]
-    if all(defects):
-        raise spot.inside(f"has the type '{text}', which {defects[0]}, as {asked[0].__name__} must: see "
-                          "docs/reference/api.md")
 
 
 def _callee(cls: type, text: str, asked: Sequence[Any], spot: Spot) -> Callee:

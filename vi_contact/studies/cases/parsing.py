@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import types
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, is_dataclass
 from difflib import get_close_matches
 from pathlib import Path
@@ -36,7 +36,7 @@ class Words:
 
 def read(value: Any, hint: Any, spot: Spot, words: Words) -> Node:
     """Return the node of a value for a parameter with this hint. InputError when it does not fit."""
-    members = list(_members(hint))
+    members = _members(hint)
     if any(_is_path(member) for member in members):  # a text is the path then, and belongs to the case file's folder
         members = [member for member in members if member is not str]
     if isinstance(value, dict):
@@ -72,13 +72,10 @@ def nearest(word: Any, known: Iterable[str]) -> str:
     return (f"did you mean {' or '.join(near)}? " if near else "") + f"Known: {', '.join(names)}"
 
 
-def _members(hint: Any) -> Iterator[Any]:
-    """Yield the types of a union, or the one type."""
-    if get_origin(hint) in (Union, types.UnionType):
-        for one in get_args(hint):
-            yield from _members(one)
-    elif hint is not type(None):
-        yield hint
+def _members(hint: Any) -> list[Any]:
+    """Return the types of a union, or the one type."""
+    kinds = get_args(hint) if get_origin(hint) in (Union, types.UnionType) else (hint,)
+    return [one for one in kinds if one is not type(None)]
 
 
 def _scalar(value: Any, member: Any, spot: Spot, words: Words) -> Node | None:

@@ -169,18 +169,13 @@ class Call:
             raise self.spot.inside(f"{error}") from error
 
 
-def groups(node: Node) -> Iterator[Group]:
-    """Yield the groups of the mesh that are named in it."""
-    yield from (one for one in _nodes(node) if isinstance(one, Group))
-
-
 def needs_body(node: Node) -> bool:
     """Return whether groups of the mesh are named in it, or the assembled system is asked for."""
     return any(isinstance(one, Group) or (isinstance(one, Call) and "system" in one.callee.given)
-               for one in _nodes(node))
+               for one in nodes_in(node))
 
 
-def _nodes(node: Node) -> Iterator[Node]:
+def nodes_in(node: Node) -> Iterator[Node]:
     """Yield the node and all nodes in it."""
     yield node
     inside: Iterable[Node] = ()
@@ -191,4 +186,4 @@ def _nodes(node: Node) -> Iterator[Node]:
     elif isinstance(node, Named):
         inside = node.items.values()
     for one in inside:
-        yield from _nodes(one)
+        yield from nodes_in(one)

@@ -8,6 +8,7 @@ of a function here that takes none.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType, ModuleType
@@ -53,11 +54,11 @@ _KINDS: Mapping[ModuleType, tuple[Any, ...]] = {  # room -> the kinds of things 
 }
 
 
+@dataclass(frozen=True)
 class MeshFile:
     """Hold what [mesh] makes of type = "read_mesh": the path of a file for ``fem.read_mesh``."""
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
+    path: Path
 
 
 def record(
@@ -167,11 +168,8 @@ def _callees(room: ModuleType, kind: Any) -> Iterator[Callee]:
     for cls in (getattr(room, name) for name in room.__all__):
         if isinstance(cls, type) and not is_protocol(cls) and not defect(cls, kind):
             made = [callee(one, name=one.__qualname__) for one in (cls, *_constructors(cls))]
-            yield from (one for one in made if not any(_function(one.hints[name]) for name in one.required))
-
-
-def _function(hint: Any) -> bool:
-    return get_origin(hint) is Callable
+            yield from (one for one in made
+                        if not any(get_origin(one.hints[name]) is Callable for name in one.required))
 
 
 def _constructors(cls: type) -> Iterator[Any]:

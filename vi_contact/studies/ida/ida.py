@@ -14,6 +14,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -208,7 +209,11 @@ def _tabulated(case: Case, out: Path, measure: Intensity, demands: Sequence[Dema
     }
     rows = []
     for folder, row in found:
-        measured: Row = {measure.name: _intensity(case, row, measure)} | {one.name: None for one in demands}
+        measured: Row = {measure.name: None} | {one.name: None for one in demands}
+        shaking = Shaking(row["record"], tuple(map(Path, row["files"])))
+        if row["scale"] is not None:
+            with suppress(InputError):
+                measured[measure.name] = measure.of(scaled(shaking.record(case), factor=row["scale"]))
         if row["status"] == "finished":
             history, of_column = _history(folder, tuple(one.column for one in demands))
             for one in demands:
@@ -216,16 +221,6 @@ def _tabulated(case: Case, out: Path, measure: Intensity, demands: Sequence[Dema
                 units[one.name] = (of_column[one.column][0], f"{one.meaning}: {of_column[one.column][1]}")
         rows.append({name: measured.get(name, row.get(name)) for name in units})
     return rows, units
-
-
-def _intensity(case: Case, row: Row, measure: Intensity) -> float | None:
-    shaking = Shaking(row["record"], tuple(Path(path) for path in row["files"]))
-    if row["scale"] is None:
-        return None
-    try:
-        return measure.of(scaled(shaking.record(case), factor=row["scale"]))
-    except InputError:
-        return None
 
 
 @cache

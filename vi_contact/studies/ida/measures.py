@@ -12,16 +12,6 @@ from ...core.algebra import Array
 from ...core.errors import InputError
 from ...ground_motion import Record, arias, cav, housner_intensity, pga, pgd, pgv, psa
 
-_MEASURES: dict[str, tuple[Callable[[Record], float], str, str, int]] = {
-    "pga": (pga, "m/s²", "peak ground acceleration", 1),
-    "pgv": (pgv, "m/s", "peak ground velocity", 1),
-    "pgd": (pgd, "m", "peak ground displacement", 1),
-    "arias": (arias, "m/s", "Arias intensity", 2),
-    "cav": (cav, "m/s", "cumulative absolute velocity", 1),
-    "housner": (housner_intensity, "m", "Housner intensity", 1),
-}
-"""Word -> function, unit, meaning, power of the scale with which it grows."""
-
 _WAYS: dict[str, tuple[Callable[[Array], float], str]] = {
     "max": (lambda values: float(np.fmax.reduce(values)), "largest value of"),
     "min": (lambda values: float(np.fmin.reduce(values)), "smallest value of"),
@@ -49,6 +39,16 @@ class Intensity:
         return float((level / value) ** (1.0 / self.degree))
 
 
+_MEASURES = {one.name: one for one in (
+    Intensity("pga", "m/s²", "peak ground acceleration", 1, pga),
+    Intensity("pgv", "m/s", "peak ground velocity", 1, pgv),
+    Intensity("pgd", "m", "peak ground displacement", 1, pgd),
+    Intensity("arias", "m/s", "Arias intensity", 2, arias),
+    Intensity("cav", "m/s", "cumulative absolute velocity", 1, cav),
+    Intensity("housner", "m", "Housner intensity", 1, housner_intensity),
+)}
+
+
 def intensity(text: str) -> Intensity:
     """Return the measure of a word: pga, pgv, pgd, arias, cav, housner, or sa:T (pseudo-acceleration at T s, 5 %)."""
     word, _, period = text.partition(":")
@@ -63,8 +63,7 @@ def intensity(text: str) -> Intensity:
         return Intensity(f"sa_{seconds:g}", "m/s²", meaning, 1, partial(psa, period=seconds))
     if period or word not in _MEASURES:
         raise InputError(f"unknown intensity '{text}': choose one of {', '.join(_MEASURES)}, or sa:T with T in seconds")
-    function, unit, meaning, degree = _MEASURES[word]
-    return Intensity(word, unit, meaning, degree, function)
+    return _MEASURES[word]
 
 
 @dataclass(frozen=True)

@@ -105,15 +105,6 @@ class OneRun:
     folder: Path
     wrong: str = ""
 
-    @property
-    def name(self) -> str:
-        """Return a name for people."""
-        return f"{self.shaking.name} x {self.factor:g}"
-
-    def settings(self) -> tuple[str, ...]:
-        """Return all KEY=VALUE of the run."""
-        return (*self.case.settings, *self.shaking.settings(self.case, self.factor))
-
     def done(self) -> dict[str, Any] | None:
         """Return the row of a run that has finished, or None."""
         row = read_row(self.folder / ROW)
@@ -124,7 +115,8 @@ class OneRun:
     def command(self, launch: Sequence[str]) -> list[str]:
         """Return the command that runs it, from its checkpoint where there is one."""
         own = [sys.executable, "-m", "vi_contact", "run", str(self.case.path), "--out", str(self.folder), "--quiet"]
-        made = [word for setting in self.settings() for word in ("--set", setting)]
+        settings = (*self.case.settings, *self.shaking.settings(self.case, self.factor))
+        made = [word for setting in settings for word in ("--set", setting)]
         made += [word for package in self.case.allowed for word in ("--allow", package)]
         return [*launch, *own, *made, *(["--restart"] if (self.folder / CHECKPOINT).is_file() else [])]
 
