@@ -13,8 +13,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 if not __package__:  # run as a file of the source tree, maybe not installed
     sys.path[0] = str(Path(__file__).resolve().parents[2])
 
@@ -67,13 +65,10 @@ class TwoBlocks:
 
     def blocks(self) -> Blocks:
         """Return both blocks where they are."""
-        d = len(self.lower.lengths)
-        up = 0 if d == 1 else 1
-        corner = np.zeros(d)
-        along = [axis for axis in range(d) if axis != up]
-        corner[along] = self.offset[: len(along)]
-        corner[up] = self.lower.lengths[up] + self.gap
-        upper = replace(self.upper, corner=tuple(corner), angle=self.angle)
+        height = self.lower.lengths[:2][-1] + self.gap
+        x, z = (*self.offset, 0.0, 0.0)[:2]
+        corner = {1: (height,), 2: (x, height), 3: (x, height, z)}[len(self.lower.lengths)]
+        upper = replace(self.upper, corner=corner, angle=self.angle)
         return Blocks({"lower": replace(self.lower, angle=self.angle), "upper": upper})
 
     def build(self, gmsh: Any) -> None:
@@ -92,7 +87,7 @@ def _on_top(
         BlockMesh(lengths=lengths, divisions=parts, simplices=simplices)
         for lengths, parts in ((lower, divisions[:half]), (upper, divisions[half:]))
     ]
-    return TwoBlocks(lower=blocks[0], upper=blocks[1], offset=(*offset, 0.0), gap=gap, angle=angle)
+    return TwoBlocks(lower=blocks[0], upper=blocks[1], offset=offset, gap=gap, angle=angle)
 
 
 if __name__ == "__main__":  # two_blocks.py --lower 2 1 --upper 1 1 --divisions 8 4 5 5 --offset 0.5

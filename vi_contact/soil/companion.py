@@ -54,9 +54,9 @@ class CompanionRun:
             raise InputError(f"{self.name} is marched beside the run and needs its time steps beforehand, but the run "
                              f"has {dt!r}: give dt as a number or a Schedule")
         self._bound = scheme, dt
-        self._steps: Iterator[tuple[State, Any]] = march(
-            self._problem, scheme=scheme, dt=_endless(dt), steps=LARGEST
-        )
+        if isinstance(dt, Schedule):  # the last piece does not end: only the times of a run are asked for
+            dt = Schedule((*dt.pieces[:-1], (dt.pieces[-1][0], inf)))
+        self._steps: Iterator[tuple[State, Any]] = march(self._problem, scheme=scheme, dt=dt, steps=LARGEST)
         system = self._problem.system
         self._t, self._u, self._v = [0.0], [system.u0.copy()], [system.v0.copy()]
 
@@ -104,8 +104,3 @@ def linear_problem(M: Any, C: Any | None, K: Any, load: Load, dimension: int) ->
         space=_Nowhere(dimension, n), floating=True,
     )
     return ContactProblem(system, empty_surface(SerialComm(), dimension))
-
-
-def _endless(dt: float | Schedule) -> float | Schedule:
-    """A plan whose last piece does not end: only the times of a run are asked for."""
-    return Schedule((*dt.pieces[:-1], (dt.pieces[-1][0], inf))) if isinstance(dt, Schedule) else dt

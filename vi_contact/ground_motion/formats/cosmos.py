@@ -10,6 +10,7 @@ Velocities and displacements are skipped.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from ...core.errors import InputError
@@ -71,7 +72,7 @@ def read(text: TextFile) -> Record:
     line = text.heads[block.line]
     if _UNEVEN.search(line):
         raise InputError(f"{text.at(block.line)}: the samples are unequally spaced; get the corrected file (V2)")
-    stated = next((match[1] for match in (pattern.search(line) for pattern in _UNITS) if match), None)
+    stated = next((match[1] for pattern in _UNITS if (match := pattern.search(line))), None)
     words, comments = _words(text, block)
     cosmos = "format v" in text.heads[0].lower()
     event = next(filter(_EVENT.match, words), " ".join(words[1:2] if cosmos else words[2:3]))
@@ -120,8 +121,7 @@ def _words(text: TextFile, block: Block) -> tuple[list[str], list[str]]:
 
 def _samples(text: TextFile, block: Block) -> list[float]:
     """Return the samples in the file's units."""
-    marks = ((index, _UNKNOWN.search(text.heads[index])) for index in block.header)
-    unknown = next((text.number(index, mark[1]) for index, mark in marks if mark), None)
+    unknown = next((text.number(index, mark[1]) for index, mark in _found(text, block.header, _UNKNOWN)), None)
     values: list[float] = []
     for index in range(block.line + 1, block.end):
         row = text.fixed(index, block.width) if index < len(text.lines) else []
@@ -140,13 +140,10 @@ def _step(text: TextFile, block: Block) -> float | None:
     rate = _RATE.search(text.heads[block.line])
     if rate and text.number(block.line, rate[1]) > 0.0:
         return 1.0 / text.number(block.line, rate[1])
-    for index in (block.line, *block.header):
-        spaced = _SPACED.search(text.heads[index])
-        if spaced:
-            return text.number(index, spaced[1])
-    for index in block.header:
-        reals, form = _REALS.match(text.heads[index]), _FORMAT.search(text.heads[index])
-        if reals and form:
+    for index, spaced in _found(text, (block.line, *block.header), _SPACED):
+        return text.number(index, spaced[1])
+    for index, reals in _found(text, block.header, _REALS):
+        if form := _FORMAT.search(text.heads[index]):
             rows = range(index + 1, min(index + 1 + int(text.number(index, reals[2])), block.line))
             width = max(int(text.number(index, form[2])), 1)
             values = [value for row in rows for value in text.fixed(row, width)]
@@ -156,15 +153,16 @@ def _step(text: TextFile, block: Block) -> float | None:
 
 def _component(text: TextFile, block: Block) -> str:
     """Return the direction of the channel, such as "90 Deg" or "UP", from the text of its header."""
-    found = (_CHANNEL.search(text.heads[index]) for index in block.header)
-    named = (" ".join(_FROM.split(match[2], maxsplit=1)[0].split()) for match in found if match)
-    return next(filter(None, named), "")
+    named = (_FROM.split(match[2], maxsplit=1)[0].split() for _, match in _found(text, block.header, _CHANNEL))
+    return " ".join(next(filter(None, named), []))
 
 
 def _station(text: TextFile, block: Block) -> str:
     """Number or code of the station, from the text of the header."""
-    match = next(filter(None, (_STATION.search(text.heads[index]) for index in block.header)), None)
-    if match is None:
-        return ""
-    code = _CODE.search(match[1])
-    return next(iter((code or match)[1].split()), "")
+    named = next((match for _, match in _found(text, block.header, _STATION)), None)
+    return next(iter((_CODE.search(named[1]) or named)[1].split()), "") if named else ""
+
+
+def _found(text: TextFile, indices: Iterable[int], pattern: re.Pattern[str]) -> Iterator[tuple[int, re.Match[str]]]:
+    """Yield those of the lines in which there is the pattern."""
+    return ((index, match) for index in indices if (match := pattern.search(text.heads[index])))

@@ -6,6 +6,7 @@ One value a line. Read DATA_LICENSE and DATA_CITATION, kept in the notes, before
 from __future__ import annotations
 
 import re
+from itertools import takewhile
 
 from ...core.errors import InputError
 from ..record import Record
@@ -23,11 +24,12 @@ def recognises(text: TextFile) -> bool:
 
 def read(text: TextFile) -> Record:
     """Return the record of an ESM ASCII file; units and dt are only checked."""
-    header, start = _header(text)
+    entries = list(takewhile(bool, map(_entry, text.heads)))
+    header = {entry[0]: (index, entry[1]) for index, entry in enumerate(entries) if entry}
     index, kind = header.get("DATA_TYPE", (0, "ACCELERATION"))
     if kind and "ACCELERATION" not in kind.upper():
         raise InputError(f"{text.at(index)}: the file holds {kind.lower()}; get the file of accelerations (.ACC.ASC)")
-    values = text.values(start)
+    values = text.values(len(entries))
     text.refuse_other_count(text.entry(header, "NDATA")[0], text.entry_number(header, "NDATA"), len(values))
     line, units = text.entry(header, "UNITS")
     value = {key: content for key, (_, content) in header.items()}
@@ -37,17 +39,6 @@ def read(text: TextFile) -> Record:
     notes = tuple(f"{key}: {content}" for key, content in value.items() if content and not key.startswith("USER"))
     return text.record(values, units=units, line=line, dt=text.entry_number(header, "SAMPLING_INTERVAL_S"),
                        format="ESM", title=title, notes=notes, station=station, component=value.get("STREAM", ""))
-
-
-def _header(text: TextFile) -> tuple[dict[str, tuple[int, str]], int]:
-    """Return the line index and value of each key, and the index of the first line that is no entry."""
-    header: dict[str, tuple[int, str]] = {}
-    for index, line in enumerate(text.heads):
-        entry = _entry(line)
-        if entry is None:
-            return header, index
-        header[entry[0]] = index, entry[1]
-    return header, len(text.lines)
 
 
 def _entry(line: str) -> tuple[str, str] | None:

@@ -16,13 +16,13 @@ def write_columns(record: Record, path: str | os.PathLike[str], units: str) -> N
     samples, name = _samples(record, units)
     comments = [record.title, f"time [s], acceleration [{name}], dt = {record.dt:.10g} s", *record.notes]
     rows = [f"{time:.10g} {sample}" for time, sample in zip(record.times, samples, strict=True)]
-    _write(path, [f"# {_one_line(comment)}" for comment in comments if comment] + rows)
+    _write(path, [" ".join(["#", *comment.split()]) for comment in comments if comment] + rows)
 
 
 def write_at2(record: Record, path: str | os.PathLike[str], units: str = "g") -> None:
     """Write PEER AT2: four header lines with units, NPTS and DT, then five values a row."""
     samples, name = _samples(record, units)
-    header = ["PEER AT2 format, written by vi_contact", _one_line(record.title) or "record",
+    header = ["PEER AT2 format, written by vi_contact", " ".join(record.title.split()) or "record",
               f"ACCELERATION TIME SERIES IN UNITS OF {name.upper()}",
               f"NPTS= {record.acceleration.size}, DT= {record.dt:.10g} SEC"]
     rows = ["".join(f"{sample:>18}" for sample in samples[k:k + 5]) for k in range(0, len(samples), 5)]
@@ -38,10 +38,6 @@ def _samples(record: Record, units: str) -> tuple[list[str], str]:
     """Return the accelerations in `units` as text, and the key of UNITS."""
     name = canonical_units("output units", units)
     return [f"{value:.{DIGITS - 1}e}" for value in record.acceleration / UNITS[name]], name
-
-
-def _one_line(text: str) -> str:
-    return " ".join(text.split())
 
 
 def _write(path: str | os.PathLike[str], lines: list[str]) -> None:
