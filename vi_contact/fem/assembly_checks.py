@@ -89,19 +89,15 @@ def _contradictions(conditions: Sequence[Prescribed]) -> Iterator[str]:
 
 def check_initial(mesh: Mesh, **values: Any) -> None:
     """Raise InputError unless each is None, a field, or (cells, field) pairs of this mesh."""
-    for name, value in values.items():
-        if value is not None:
-            _check_initial(mesh, f"initial_{name}", value)
-
-
-def _check_initial(mesh: Mesh, name: str, value: Any) -> None:
-    if isinstance(value, Sequence) and value and isinstance(value[0], tuple):
-        for pair in value:
-            cells, one = _pair(name, pair, "give (cells, value) pairs")
-            cells_of(OWNER, f"the cells of {name}", cells, mesh)
-            field_given(OWNER, name, one)
-        return
-    field_given(OWNER, name, value)
+    for name, value in ((f"initial_{name}", value) for name, value in values.items() if value is not None):
+        fields = [value]
+        if isinstance(value, Sequence) and value and isinstance(value[0], tuple):
+            pairs = [_pair(name, pair, "give (cells, value) pairs") for pair in value]
+            fields = [field for _, field in pairs]
+            for cells, _ in pairs:
+                cells_of(OWNER, f"the cells of {name}", cells, mesh)
+        for field in fields:
+            field_given(OWNER, name, field)
 
 
 def _pair(name: str, pair: Any, remedy: str) -> tuple[Any, Any]:

@@ -28,8 +28,8 @@ from vi_contact.meshes.gmsh_session import MeshScript
 from vi_contact.meshes.partition import destinations
 from vi_contact.meshes.rows import found_in, number_alike
 
-_TENSOR_ORDER = {"quadrilateral": [0, 1, 3, 2], "hexahedron": [0, 1, 3, 2, 4, 5, 7, 6]}
-"""DOLFINx's vertices in Gmsh's numbering, where the two differ."""
+TENSOR_ORDER = {"quadrilateral": [0, 1, 3, 2], "hexahedron": [0, 1, 3, 2, 4, 5, 7, 6]}
+"""DOLFINx's vertices in Gmsh's numbering, where the two differ; also in VTK's."""
 
 _NOWHERE = (np.zeros(0, dtype=np.int32), np.zeros(1, dtype=np.int32))
 """Destinations of no cells."""
@@ -131,7 +131,7 @@ def node_numbers(mesh: Mesh) -> npt.NDArray[np.int64]:
 def _distribute(comm: MPI.Comm, produce: Callable[[], MeshArrays]) -> tuple[Mesh, Tags]:
     instance("mesh", "comm", comm, MPI.Comm, "give a communicator, such as MPI.COMM_WORLD")
     arrays = _on_root(comm, produce)
-    vertices = arrays.cells[:, _TENSOR_ORDER.get(arrays.cell, slice(None))]
+    vertices = arrays.cells[:, TENSOR_ORDER.get(arrays.cell, slice(None))]
     where = destinations(arrays.points, arrays.cells, arrays.cell, comm.size) if comm.rank == 0 else _NOWHERE
     mesh = compat.create_mesh(comm, arrays.cell, vertices, arrays.points, where)
     tags = Tags()

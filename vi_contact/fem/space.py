@@ -19,9 +19,9 @@ from ..core.system import SemiDiscreteSystem
 from . import compat
 from .groups import components_of
 from .loads import Prescribed, evaluate_here
-from .mesh import node_numbers
+from .mesh import Facets, node_numbers
 from .petsc_algebra import MpiComm, PetscMatrix
-from .ties import Pairs, Tied, paired
+from .ties import PLACE_TOLERANCE, Pairs, Tied, paired
 
 
 def body_numbers(mesh: Any, numbers: Indices) -> Indices:
@@ -95,11 +95,9 @@ class FemSpace:
         self.comm = MpiComm(mesh.comm)
         self.dimension: int = mesh.geometry.dim
         owned = self.V.dofmap.index_map.size_local
-        geometry_nodes = compat.dof_to_node(self.V)
-        self.all_nodes: Indices = node_numbers(mesh)[geometry_nodes].astype(np.int64)
-        self.all_points: Array = mesh.geometry.x[geometry_nodes][:, : self.dimension]
-        self.nodes = self.all_nodes[:owned]
-        self.points = self.all_points[:owned]
+        geometry_nodes = compat.dof_to_node(self.V)[:owned]
+        self.nodes: Indices = node_numbers(mesh)[geometry_nodes]
+        self.points: Array = mesh.geometry.x[geometry_nodes][:, : self.dimension]
         self.size = self._size()
         self.prescribed = prescribed
         self._where_held: list[tuple[Indices, tuple[int, ...]]] = []
@@ -108,7 +106,7 @@ class FemSpace:
             components = components_of("prescribed", one.components, self.dimension)
             self._where_held.append((self.facet_blocks(one.facets.indices)[:, None], components))
             self.held[self._where_held[-1]] = True
-        pairs = paired(self, tied)
+        pairs = paired(tied, self.dimension, PLACE_TOLERANCE * self.size, self._everywhere)
         self.tied_nodes: Indices = np.array([n for pair in pairs for n in (*pair.first, *pair.second)], dtype=np.int64)
         self.tied: Mask = self._followers(pairs)
         self.free: Mask = ~(self.held | self.tied).ravel()
@@ -130,6 +128,14 @@ class FemSpace:
         """Return the owned blocks (nodes) on the facets, wherever the facets are owned."""
         blocks = compat.facet_dofs(self.V, facets)
         return np.asarray(blocks[blocks < len(self.nodes)], dtype=np.int64)
+
+    def _everywhere(self, facets: Facets) -> tuple[Indices, Array]:
+        """(original numbers, points) of the nodes of facets, ascending, on every rank."""
+        blocks = self.facet_blocks(facets.indices)
+        parts = self.comm.bcast(self.comm.gather((self.nodes[blocks], self.points[blocks])))
+        numbers, points = (np.concatenate(part) for part in zip(*parts, strict=True))
+        order = np.argsort(numbers)
+        return numbers[order], points[order]
 
     def _followers(self, pairs: Sequence[Pairs]) -> Mask:
         """Which owned components follow a node of another boundary; InputError where only one of a pair is held."""
@@ -258,10 +264,8 @@ class FemSpace:
 
     def blocks_of(self, nodes: Indices) -> Indices:
         """Return the owned block of each original node number, -1 when another rank owns it."""
-        order = np.argsort(self.nodes)
-        place = np.searchsorted(self.nodes[order], nodes)
-        place = np.minimum(place, max(len(order) - 1, 0))
-        if len(order) == 0:
+        if not len(self.nodes):
             return np.full(len(nodes), -1)
-        blocks = order[place]
+        order = np.argsort(self.nodes)
+        blocks = order[np.minimum(np.searchsorted(self.nodes, nodes, sorter=order), len(order) - 1)]
         return np.where(self.nodes[blocks] == nodes, blocks, -1)

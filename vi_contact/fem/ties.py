@@ -10,12 +10,10 @@ Source: Zienkiewicz, Bicanic and Shen (1988); compared with others by Kontoe et 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
 
 import numpy as np
-from mpi4py import MPI
 
 from ..core.algebra import Array, Indices
 from ..core.errors import InputError
@@ -23,19 +21,7 @@ from .groups import components_given, components_of, facets_of
 from .mesh import Facets
 
 PLACE_TOLERANCE = 1e-6  # of the body's size: nodes farther from the place of their partner have none
-
-
-class BodyNodes(Protocol):
-    """Hold the nodes of a body on this rank: ``nodes`` their original numbers, ``points`` (n, d) where they are [m]."""
-
-    comm: MPI.Comm
-    dimension: int
-    size: float
-    nodes: Indices
-    points: Array
-
-    def facet_blocks(self, facets: Any) -> Indices:
-        """Return rows of ``points``: the owned nodes of local facets."""
+NodesOf = Callable[[Facets], tuple[Indices, Array]]  # original numbers, ascending, and points of nodes, on every rank
 
 
 @dataclass(frozen=True)
@@ -61,21 +47,21 @@ class Pairs:
     components: tuple[int, ...]
 
 
-def paired(space: BodyNodes, tied: Sequence[Tied]) -> list[Pairs]:
-    """Pair the nodes of every tie. Collective.
+def paired(tied: Sequence[Tied], dimension: int, near: float, nodes: NodesOf) -> list[Pairs]:
+    """Pair the nodes of every tie, those that are ``near`` [m] to the place of their partner. Collective.
 
     InputError when nodes have no partner, when a node is tied twice, or a component that does not exist.
     """
-    found = [_pairs(space, tie) for tie in tied]
-    seconds = [number * space.dimension + c for one in found for number in one.second for c in one.components]
-    firsts = [number * space.dimension + c for one in found for number in one.first for c in one.components]
+    found = [_pairs(tie, dimension, near, nodes) for tie in tied]
+    seconds = [number * dimension + c for one in found for number in one.second for c in one.components]
+    firsts = [number * dimension + c for one in found for number in one.first for c in one.components]
     if len(set(seconds)) < len(seconds) or set(seconds) & set(firsts):
         raise InputError("a node is on several tied boundaries: tie a corner once, and no boundary to two others")
     return found
 
 
-def _pairs(space: BodyNodes, tie: Tied) -> Pairs:
-    first, second = (_nodes(space, facets) for facets in (tie.first, tie.second))
+def _pairs(tie: Tied, dimension: int, near: float, nodes: NodesOf) -> Pairs:
+    first, second = nodes(tie.first), nodes(tie.second)
     names = f"'{tie.first.name}' and '{tie.second.name}'"
     if len(first[0]) != len(second[0]) or not len(first[0]):
         raise InputError(f"tied boundaries {names} have {len(first[0])} and {len(second[0])} nodes: mesh them alike")
@@ -83,17 +69,8 @@ def _pairs(space: BodyNodes, tie: Tied) -> Pairs:
     distance = np.linalg.norm(first[1][:, None] + apart - second[1][None, :], axis=2)
     partner = distance.argmin(axis=1)
     worst = int(distance.min(axis=1).argmax())
-    if distance[worst, partner[worst]] > PLACE_TOLERANCE * space.size or len(set(partner)) < len(partner):
+    if distance[worst, partner[worst]] > near or len(set(partner)) < len(partner):
         where = ", ".join(f"{x:g}" for x in first[1][worst])
         raise InputError(f"node ({where}) of tied boundaries {names} has no partner at the same height on the other: "
                          "mesh both sides alike")
-    return Pairs(first[0], second[0][partner], components_of("tied", tie.components, space.dimension))
-
-
-def _nodes(space: BodyNodes, facets: Facets) -> tuple[Indices, Array]:
-    """(original numbers, points) of the nodes of facets, ascending, on every rank."""
-    blocks = space.facet_blocks(facets.indices)
-    parts = space.comm.bcast(space.comm.gather((space.nodes[blocks], space.points[blocks])))
-    numbers, points = (np.concatenate([part[i] for part in parts]) for i in (0, 1))
-    order = np.argsort(numbers)
-    return numbers[order], points[order]
+    return Pairs(first[0], second[0][partner], components_of("tied", tie.components, dimension))

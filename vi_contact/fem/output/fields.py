@@ -30,7 +30,7 @@ from ...core.files import FIELDS, FIELDS_INDEX, hdf5_atomically, on_root, write_
 from ...core.problem import ContactProblem
 from ...core.step import Report, State
 from .. import compat
-from ..mesh import node_numbers
+from ..mesh import TENSOR_ORDER, node_numbers
 from ..space import FemSpace, known_matrices, space_of
 
 
@@ -62,9 +62,6 @@ class VonMises:
         self._u.x.scatter_forward()
         return np.asarray(compat.assemble_vector(self._form).array_r / self._volume)
 
-
-_VTK_ORDER = {"Quadrilateral": [0, 1, 3, 2], "Hexahedron": [0, 1, 3, 2, 4, 5, 7, 6]}
-"""DOLFINx's vertices in VTK's order, where the two differ."""
 
 _CELLS = {
     (1, 2): "Polyline", (2, 3): "Triangle", (2, 4): "Quadrilateral", (3, 4): "Tetrahedron", (3, 8): "Hexahedron"
@@ -241,9 +238,7 @@ def _item(shape: tuple[int, ...], where: str, number: str = "Float", size: int =
 
 def _three(nodal: Array) -> Array:
     """Rows (k, d) with zeros for the missing axes, (k, 3)."""
-    padded = np.zeros((len(nodal), 3))
-    padded[:, : nodal.shape[1]] = nodal
-    return padded
+    return np.pad(nodal, ((0, 0), (0, 3 - nodal.shape[1])))
 
 
 def _cells(mesh: Any) -> tuple[str, Indices]:
@@ -251,4 +246,4 @@ def _cells(mesh: Any) -> tuple[str, Indices]:
     dim = mesh.topology.dim
     vertices = node_numbers(mesh)[compat.geometry_dofmap(mesh)][: mesh.topology.index_map(dim).size_local]
     kind = _CELLS[dim, vertices.shape[1]]
-    return kind, vertices[:, _VTK_ORDER.get(kind, slice(None))]
+    return kind, vertices[:, TENSOR_ORDER.get(kind.lower(), slice(None))]

@@ -15,7 +15,6 @@ which asks K0⁻¹ for one column per difference, once, and for the solution of 
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from typing import Any
 
 import numpy as np
@@ -55,32 +54,12 @@ class States:
         self.key = b"".join(part.tobytes() for part in (self.closed, self.stick, self.direction, self.growth))
 
 
-class Factors:
-    """Keep the factors of the last sets of states of one G: they save time and change no digit of an answer."""
-
-    def __init__(self, G: Array) -> None:
-        self.G = G
-        self._kept: OrderedDict[bytes, Factored] = OrderedDict()
-
-    def of(self, states: States, reduced: Reduced) -> Factored:
-        """Return the factor, made when it is not kept."""
-        if states.exact and states.key in self._kept:
-            self._kept.move_to_end(states.key)
-            return self._kept[states.key]
-        factored = Factored(reduced, self.G)
-        if states.exact:
-            self._kept[states.key] = factored
-            if len(self._kept) > KEPT:
-                self._kept.popitem(last=False)
-        return factored
-
-
 class LinearProblems:
     """Solve the linear problems of one run of Newton's method. The way of solution depends on this run alone, not on
-    what is kept."""
+    ``kept``, the factors of the last sets of states of one G: they save time and change no digit of an answer."""
 
-    def __init__(self, factors: Factors) -> None:
-        self._factors = factors
+    def __init__(self, G: Array, kept: dict[bytes, Factored]) -> None:
+        self._G, self._kept = G, kept
         self._near: Bordered | None = None
         self._bordered: set[bytes] = set()
         self._solved: set[bytes] = set()
@@ -96,11 +75,14 @@ class LinearProblems:
             self._bordered.add(states.key)
             z = near.solve(reduced, w)
         if z is None:
-            factored = self._factors.of(states, reduced)
+            factored = self._kept.pop(states.key, None) or Factored(reduced, self._G)
             z = factored.solve(-reduced.rows(w)) if factored.sound else None
             if states.exact:
+                self._kept[states.key] = factored  # now the last one
+                if len(self._kept) > KEPT:
+                    del self._kept[next(iter(self._kept))]
                 self._solved.add(states.key)
-                self._near = Bordered(factored, self._factors.G)
+                self._near = Bordered(factored, self._G)
         return None if z is None or not np.isfinite(z).all() else np.asarray(states.fixed + reduced.columns(z))
 
 

@@ -25,12 +25,13 @@ import numpy as np
 
 from ...core.algebra import Array, Mask
 from ...core.checks import attributes
-from .linear import Factors, LinearProblems, States
+from .linear import Factored, LinearProblems, States
 from .nsgs import sweeper
 from .problem import Iterated, PreparedFriction, ScaledDelassus, ScaledProblem
 
 ATTEMPTS = 10  # of Newton, with twice the sweeps before each
 FIRST_SWEEPS = 2
+Kept = dict[bytes, Factored]  # factors by the key of their states
 
 
 @dataclass(frozen=True)
@@ -52,13 +53,13 @@ class FrictionNewton:
     def prepare(self, G: Array, bilateral: Mask) -> PreparedFriction:
         """Check and scale G (m d, m d). Answers depend on their right-hand side alone, not on steps before."""
         delassus = ScaledDelassus(G, bilateral)
-        return PreparedFriction(self, self.tolerance, delassus, partial(self._loop, Factors(delassus.matrix)))
+        return PreparedFriction(self, self.tolerance, delassus, partial(self._loop, {}))
 
-    def _loop(self, factors: Factors, step: ScaledProblem, r: Array) -> Iterated:
+    def _loop(self, kept: Kept, step: ScaledProblem, r: Array) -> Iterated:
         history: list[float] = []
         swept = 0
         for attempt in range(ATTEMPTS if step.unit > 0.0 else 0):
-            r, done = self._newton(factors, step, r - step.w(r), history)
+            r, done = self._newton(kept, step, r - step.w(r), history)
             if done or attempt == ATTEMPTS - 1:
                 break
             sweep, r = sweeper(step), step.admissible(r)
@@ -66,10 +67,10 @@ class FrictionNewton:
                 r, swept = sweep(r, r), swept + 1
         return r, len(history) + swept, history
 
-    def _newton(self, factors: Factors, step: ScaledProblem, y: Array, history: list[float]) -> tuple[Array, bool]:
+    def _newton(self, kept: Kept, step: ScaledProblem, y: Array, history: list[float]) -> tuple[Array, bool]:
         """The best iterate r, and whether it solves the problem to rounding or to the tolerance."""
         best, smallest = np.zeros_like(y), step.unit
-        linear = LinearProblems(factors)
+        linear = LinearProblems(step.delassus.matrix, kept)
         states: States | None = None
         for _ in range(self.max_iterations):
             states = States(step, y, states)
