@@ -16,9 +16,9 @@ def keep_figures(monkeypatch: pytest.MonkeyPatch, *modules: ModuleType) -> list[
     seen: list[Any] = []
     save = histories.save
 
-    def keep(figure: Any, path: Any) -> Path:
+    def keep(figure: Any, *others: Any) -> Path:
         seen.append(figure)
-        return save(figure, path)
+        return save(figure, *others)
 
     for module in modules:
         monkeypatch.setattr(module, "save", keep)

@@ -195,6 +195,6 @@ def check_what_is_drawn(folder: Path) -> None:
 
 @one_rank
 def test_pictures_need_a_run(tmp_path):
-    for read, words in ((read_frames, "no frames in"), (read_tractions, "does not exist")):
+    for read, words in ((read_frames, "no frames in"), (read_tractions, "has no history.csv")):
         with pytest.raises(InputError, match=words):
             read(tmp_path)

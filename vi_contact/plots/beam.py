@@ -34,8 +34,7 @@ def plot_tips(runs: Mapping[str, BeamRun], path: str | Path, *, title: str) -> P
         axis.plot(run.history["t"], run.history["u_tip"], color="black", lw=1.1)
         axis.set_ylabel("tip [m]")
         axis.set_title(label, fontsize=9, loc="left")
-    figure.suptitle(title)
-    return save(figure, path)
+    return save(figure, path, title)
 
 
 def plot_shapes(
@@ -61,5 +60,4 @@ def plot_shapes(
     axes[0, 0].set_ylabel("near the tip")
     axes[1, 0].set_ylabel("whole beam")
     axes[0, 3].legend(*axes[1, 3].get_legend_handles_labels(), bbox_to_anchor=(1.02, 1.0), loc="upper left", fontsize=8)
-    figure.suptitle(title)
-    return save(figure, path)
+    return save(figure, path, title)

@@ -106,8 +106,7 @@ def plot_openings(history: History, path: str | Path, *, title: str) -> Path:
         axis.axhline(0.0, color="0.3", lw=0.6)
         if len(axis.lines) > 1:
             axis.legend(ncol=3, **LEGEND)
-    figure.suptitle(title)
-    return save(figure, path)
+    return save(figure, path, title)
 
 
 def plot_rocking(history: History, path: str | Path, *, title: str, corners: Sequence[str] = ("1", "7")) -> Path:
@@ -127,8 +126,7 @@ def plot_rocking(history: History, path: str | Path, *, title: str, corners: Seq
     top.set_xlim(t[0], t[-1])
     for axis in (top, bottom):
         axis.legend(ncol=3, **LEGEND)
-    figure.suptitle(title)
-    return save(figure, path)
+    return save(figure, path, title)
 
 
 def plot_interface(runs: Mapping[str, History], outline: Outline, path: str | Path, *, title: str) -> Path:
@@ -162,8 +160,7 @@ def plot_interface(runs: Mapping[str, History], outline: Outline, path: str | Pa
         axis.set_title(name, fontsize=10, loc="left")
     for image, (label, (*_, extend)) in zip(images, drawn.items(), strict=True):
         figure.colorbar(image, ax=axes, label=label, pad=0.01, fraction=0.04, aspect=35, extend=extend)
-    figure.suptitle(title)
-    return save(figure, path)
+    return save(figure, path, title)
 
 
 def _reduced(run: History, parts: Any) -> tuple[Array, Array, Array]:
@@ -212,5 +209,4 @@ def plot_envelope(runs: Mapping[str, History], outline: Outline, path: str | Pat
     for name, one in outline.along():
         axes[0].text(float(np.mean(outline.arc[one])), 1.01, name, ha="center", va="bottom", fontsize=9,
                      transform=axes[0].get_xaxis_transform())
-    figure.suptitle(title)
-    return save(figure, path)
+    return save(figure, path, title)

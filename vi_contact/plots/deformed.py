@@ -14,6 +14,7 @@ from ..core.algebra import Array, Indices
 from ..core.errors import InputError
 from ..core.files import FIELDS
 from ..run.files.folder import HISTORY_H5
+from ..run.files.reading import read_run
 
 
 @dataclass(frozen=True)
@@ -55,24 +56,15 @@ class StoredFrames:
 
 def read_tractions(folder: str | Path) -> Tractions:
     """Read tractions from the history of a run in the plane. InputError for a folder without one."""
-    import h5py
-
-    path = Path(folder) / HISTORY_H5
-    if not path.is_file():
-        raise InputError(f"{path} does not exist: give the folder of a finished run with contact in it")
-    with h5py.File(path) as file:
-        if "pressure" not in file or file["contact/points"].shape[1] != 2:
-            raise InputError(f"{path} is not of a body in the plane with the recorder Contact(): run it with both")
-        points, normals, pressure = file["contact/points"][:], file["contact/normals"][:], file["pressure"][:]
-        shear = -file["traction_t"][:, :, 0] if "traction_t" in file else np.zeros_like(pressure)
-        return Tractions(points, normals, _tangents(normals), file["t"][:], pressure, shear)
-
-
-def _tangents(normals: Array) -> Array:
-    """Return the tangents of nodal frames: along an axis where the normal is along the other one, else (-n_y, n_x)."""
-    turned = np.column_stack([-normals[:, 1], normals[:, 0]])
-    axis = np.count_nonzero(normals, axis=1) == 1
-    return np.where(axis[:, None], np.abs(turned), turned)
+    run = read_run(folder)
+    contact, history = run.contact, run.history
+    if contact is None or "pressure" not in history or contact.points.shape[1] != 2:
+        raise InputError(f"'{folder}' is not of a finished run in the plane with Contact(): run it with both")
+    turned = np.column_stack([-contact.normals[:, 1], contact.normals[:, 0]])
+    along = np.count_nonzero(contact.normals, axis=1) == 1  # an axis: tangents of nodal frames are along the other one
+    tangents = np.where(along[:, None], np.abs(turned), turned)
+    shear = -history["traction_t"][:, :, 0] if "traction_t" in history else np.zeros_like(history["pressure"])
+    return Tractions(contact.points, contact.normals, tangents, history["t"], history["pressure"], shear)
 
 
 def read_frames(folder: str | Path) -> StoredFrames:

@@ -77,7 +77,10 @@ def shaken(history: History) -> list[str]:
     return [axis for axis in "xyz" if np.any(history.get(f"a_g_{axis}", 0.0))]
 
 
-def save(figure: Any, path: str | Path) -> Path:
+def save(figure: Any, path: str | Path, title: str | None = None) -> Path:
+    """Save the picture, with a title above all panels if there is one."""
+    if title is not None:
+        figure.suptitle(title)
     figure.align_ylabels()
     figure.savefig(path, dpi=130)
     return Path(path)
@@ -114,8 +117,7 @@ def plot_points(
         axis.set_title(f"point {plain(label)}{kind}", fontsize=9, loc="left")
     if reference is not None:
         axes[0].legend(fontsize=8, ncol=2, loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
-    figure.suptitle(title)
-    return save(figure, path)
+    return save(figure, path, title)
 
 
 def plot_excitation(history: History, path: str | Path, *, title: str = "Ground acceleration") -> Path:

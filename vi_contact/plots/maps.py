@@ -44,15 +44,11 @@ def chain(points: Array) -> Indices:
     """Order the points from the highest (leftmost) one, each time to the nearest that is left."""
     size = float(np.ptp(points, axis=0).max()) or 1.0
     top = points[:, 1] >= points[:, 1].max() - STRAIGHT * size
-    here = int(np.flatnonzero(top)[np.argmin(points[top, 0])])
-    left = np.ones(len(points), dtype=bool)
-    order = [here]
-    left[here] = False
-    while left.any():
-        rest = np.flatnonzero(left)
-        here = int(rest[np.argmin(np.linalg.norm(points[rest] - points[here], axis=1))])
-        order.append(here)
-        left[here] = False
+    order = [int(np.flatnonzero(top)[np.argmin(points[top, 0])])]
+    while len(order) < len(points):
+        way = np.linalg.norm(points - points[order[-1]], axis=1)
+        way[order] = np.inf
+        order.append(int(np.argmin(way)))
     return np.array(order)
 
 

@@ -66,11 +66,11 @@ def plot_spectra(
     plain_numbers(bottom.xaxis)
     shown = np.concatenate([spectrum.periods for spectrum in spectra.values()])
     metres, unit = length_unit(max(float(np.max(spectrum.displacement)) for spectrum in spectra.values()))
+    first = {label: SAMPLES_A_PERIOD * (steps or {}).get(label, 0.0) for label in spectra}  # period that is trusted
     for label, spectrum in spectra.items():
-        trusted = spectrum.periods >= SAMPLES_A_PERIOD * (steps or {}).get(label, 0.0)
         colour = None
         for axis, values in ((top, spectrum.psa / UNITS[units]), (bottom, spectrum.displacement / metres)):
-            known = np.where(trusted, values, np.nan)
+            known = np.where(spectrum.periods >= first[label], values, np.nan)
             (line,) = axis.plot(spectrum.periods, known, lw=1.2, color=colour, label=plain(label))
             colour = line.get_color()
             axis.plot(spectrum.periods, values, lw=0.8, color=colour, alpha=0.35)
@@ -80,8 +80,7 @@ def plot_spectra(
         top.plot(periods, target.acceleration(periods) / UNITS[units], "k--", lw=1.2, label=name)
         code = periods <= 4.0  # beyond, the code gives another displacement spectrum
         bottom.plot(periods[code], target.displacement(periods[code]) / metres, "k--", lw=1.2, label=name)
-    if any(np.min(spectrum.periods) < SAMPLES_A_PERIOD * (steps or {}).get(label, 0.0)
-           for label, spectrum in spectra.items()):
+    if any(np.min(spectrum.periods) < first[label] for label, spectrum in spectra.items()):
         top.plot([], [], color="0.5", lw=0.8, alpha=0.5, label=f"pale: under {SAMPLES_A_PERIOD} samples a period")
     top.legend(fontsize=8)
     for axis in (top, bottom):

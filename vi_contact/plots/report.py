@@ -130,15 +130,17 @@ def _moving(run: RunFolder, without: Sequence[str]) -> list[tuple[str, list[str]
     """Up to four groups, each with the columns of one unit that vary most."""
     groups = []
     for title, prefixes in (group for group in _GROUPS if group[0] not in without):
-        found: list[str] = []
-        for prefix in prefixes:
-            if not found:
-                found = [name for name in run.columns if name.startswith(prefix) and _range(run, name) > 0.0]
+        found = next(filter(None, (_varying(run, prefix) for prefix in prefixes)), [])
         if found:
-            found.sort(key=lambda name: -_range(run, name))
             unit = run.columns[found[0]][0]
             groups.append((title, [name for name in found if run.columns[name][0] == unit][:_LINES]))
     return groups[:4]
+
+
+def _varying(run: RunFolder, prefix: str) -> list[str]:
+    """The columns of this beginning that are not constant, those that vary most first."""
+    names = [name for name in run.columns if name.startswith(prefix) and _range(run, name) > 0.0]
+    return sorted(names, key=lambda name: -_range(run, name))
 
 
 def _range(run: RunFolder, name: str) -> float:
@@ -262,10 +264,7 @@ def header_facts(run: RunFolder) -> list[tuple[str, str]]:
 
 def table_rows(run: RunFolder) -> list[Peak]:
     """Return the peaks on the page: of each kind that engineers ask for those that vary most; peaks.csv has all."""
-    kinds: list[list[str]] = []
-    for prefix in _PEAKS:
-        names = [name for name in run.columns if name.startswith(prefix) and _range(run, name) > 0.0]
-        kinds.append(sorted(names, key=lambda name: -_range(run, name))[:OF_A_KIND])
+    kinds = [_varying(run, prefix)[:OF_A_KIND] for prefix in _PEAKS]
     chosen: list[str] = []
     for place in range(max(map(len, kinds), default=0)):  # the first of every kind before the second of any
         chosen += [names[place] for names in kinds if len(names) > place and names[place] not in chosen]
