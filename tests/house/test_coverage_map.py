@@ -79,7 +79,6 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "run/test_proximal.py": "run.rigid_bodies",
     "run/test_restart_refused.py": "run.files.identity",
     "run/test_simulate.py": "core.version run.files.log",
-    "run/test_stop_signals.py": "run.files.lock",
     "schemes/test_contact_stabilised.py": "schemes.admissible_predictor",
     "schemes/test_trapezoidal.py": "schemes.base",
     "soil/test_free_field.py": "core.companion core.problem_checks soil.companion soil.upgoing_wave",

@@ -364,7 +364,7 @@ def test_memory_does_not_grow_with_steps(tmp_path: Path, monkeypatch: pytest.Mon
     columns = {name: ("-", name) for name in ("t", "k", *made)}
     peaks = {}
     for on_disk in (False, True):
-        table = Table(columns, {"t": 0.0, "k": 0} | made, on_disk=on_disk)
+        table = Table(columns, {"t": 0.0, "k": 0} | made, tmp_path / "history.h5" if on_disk else None)
         tracemalloc.start()
         for k in range(1, 3000):
             table.append({"t": 0.1 * k, "k": k} | made)

@@ -16,6 +16,7 @@ from summaries import summary_of
 
 from vi_contact.core.algebra import EffectiveMatrix
 from vi_contact.core.errors import InputError, StepFailure
+from vi_contact.core.files import to_json
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.step import Report, State, StepProblem, StepResult
 from vi_contact.core.surfaces import ContactSurface
@@ -94,15 +95,15 @@ def test_no_steps() -> None:
     """A run of no steps has the initial row, and no times per step."""
     solution = run(0)
     assert solution.history["t"].tolist() == [0.0]
-    assert np.isnan(solution.seconds_per_step) and np.isnan(solution.seconds_per_linear_step)
-    assert "0 steps" in solution.summary() and json.loads(solution.to_json())["seconds_per_step"] is None
+    assert np.isnan(solution.facts["seconds_per_step"]) and np.isnan(solution.facts["seconds_per_linear_step"])
+    assert "0 steps" in solution.summary() and json.loads(to_json(solution.facts))["seconds_per_step"] is None
 
 
 def test_summary_for_people_and_programs(tmp_path: Path) -> None:
     """Every figure the summary promises, with the values of the histories."""
     solution = run(out=tmp_path)
     found, history = summary_of(tmp_path), solution.history
-    assert found == json.loads(solution.to_json())
+    assert found == json.loads(to_json(solution.facts))
     assert found["status"] == "finished" and found["steps"] == 100 and found["ranks"] == 1
     assert found["unknowns"] == 5 and found["contact_points"] == 2 and found["dt"] == DT
     assert found["worst_certificate"] == history["certificate"].max() <= 1e-9

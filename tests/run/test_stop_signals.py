@@ -22,8 +22,8 @@ from summaries import summary_of
 from vi_contact.cli.entry import main
 from vi_contact.core.algebra import SerialComm
 from vi_contact.core.errors import InputError, Interrupted
-from vi_contact.run.files import lock as folder_lock
-from vi_contact.run.files.lock import locked
+from vi_contact.run.files import folder as folder_lock
+from vi_contact.run.files.folder import locked
 from vi_contact.run.recorders import Contact, Energy
 from vi_contact.run.stop_signals import SIGNALS, StopSignals
 
@@ -237,7 +237,7 @@ def test_a_file_system_without_locks(
     def refuse(*_: Any) -> None:
         raise OSError(95, "Operation not supported")
 
-    monkeypatch.setattr("vi_contact.run.files.lock.fcntl.flock", refuse)
+    monkeypatch.setattr("vi_contact.run.files.folder.fcntl.flock", refuse)
     run(tmp_path, 5)
     assert "file system without locks (Operation not supported)" in caplog.text
 

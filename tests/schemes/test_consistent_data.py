@@ -27,7 +27,8 @@ from vi_contact.exact.columns import ObliqueImpact
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.impact import ImpulseUpdate, Inelastic
 from vi_contact.laws.mass import ConsistentMass, Redistributed
-from vi_contact.run.files.checkpoint import Problem, RestartPoint, read_checkpoint, write_checkpoint
+from vi_contact.run.files.checkpoint import RestartPoint, read_checkpoint, write_checkpoint
+from vi_contact.run.files.identity import identity
 from vi_contact.run.static import static_equilibrium
 from vi_contact.schemes.consistent_data import consistent_acceleration
 from vi_contact.schemes.generalised_alpha import GeneralisedAlpha
@@ -215,7 +216,8 @@ def test_restart_from_a_checkpoint(tmp_path: Path, mass: Any, scheme: Any) -> No
     states = [report.new for report in run(problem, scheme, dt=1 / 60, steps=120)]
     assert any(state.active.any() for state in states[70:90])
     assert all(isinstance(array, np.ndarray) for array in states[80].memory.values())
-    of = Problem.of(problem, scheme, 1 / 60, start=states[0].t, end=states[-1].t)
+    start, end = states[0].t, states[-1].t
+    of = {"run": identity(problem, scheme, 1 / 60, start=start, end=end), "span": (start, end)}
     write_checkpoint(tmp_path, problem, RestartPoint.first(states[80]), of=of)
     state = read_checkpoint(tmp_path, problem, scheme=scheme, dt=1 / 60)[0].state
     again = [report.new for report in run(problem, scheme, dt=1 / 60, steps=39, state=state)]

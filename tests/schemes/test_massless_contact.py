@@ -120,5 +120,5 @@ def test_an_iterative_run_factorises_no_whole_matrix(factorised: Rows) -> None:
     problem = wall()
     solution = simulate(problem, solver=solver, dt=1e-3, steps=3, progress=False)
     assert isinstance(solution.facts["scheme"], str) and "Trapezoidal" in solution.facts["scheme"]
-    assert solution.facts["steps"] == 3 and np.isnan(solution.seconds_per_linear_step) and factorised
+    assert solution.facts["steps"] == 3 and np.isnan(solution.facts["seconds_per_linear_step"]) and factorised
     assert max(factorised) < problem.system.space.unknowns / 2

@@ -173,7 +173,8 @@ class CrossChecked:
 
     def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> PreparedCrossCheck:
         """Return all solvers prepared on the same matrix."""
-        return PreparedCrossCheck(self, A, surface, scale)
+        solvers = [solver.prepare(A, surface, scale) for solver in (self.primary, *self.others)]
+        return PreparedCrossCheck(self, solvers, surface)
 
     def report(self) -> Mapping[str, Mapping[str, float]]:
         """Return, by method, relative differences in u, r_n and, with friction, r_t, iterations per step: what
@@ -192,23 +193,23 @@ class CrossChecked:
         return max((one.worst for one in self.found), default=0.0)
 
 
+@dataclass(frozen=True)
 class PreparedCrossCheck:
-    """Solve the steps of one matrix by all the solvers; see CrossChecked."""
+    """Solve the steps of one matrix by all the solvers, the primary one first; see CrossChecked."""
 
-    def __init__(self, settings: CrossChecked, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> None:
-        self._settings, self._surface = settings, surface
-        self._primary: PreparedSolver = settings.primary.prepare(A, surface, scale)
-        self._others: list[PreparedSolver] = [solver.prepare(A, surface, scale) for solver in settings.others]
+    settings: CrossChecked
+    solvers: Sequence[PreparedSolver]
+    surface: ContactSurface
 
     def solve(self, step: StepProblem) -> StepResult:
-        result = self._primary.solve(step)
-        self._settings.begin(step)
-        for solver, found in zip(self._others, self._settings.found, strict=True):
+        result = self.solvers[0].solve(step)
+        self.settings.begin(step)
+        for solver, found in zip(self.solvers[1:], self.settings.found, strict=True):
             self._compare(result, solver.solve(step), found)
         return result
 
     def _compare(self, result: StepResult, other: StepResult, found: Disagreement) -> None:
-        found.add("u", *self._surface.comm.max(np.array([max_abs(other.x - result.x), max_abs(result.x)])).tolist())
+        found.add("u", *self.surface.comm.max(np.array([max_abs(other.x - result.x), max_abs(result.x)])).tolist())
         found.add("r_n", max_abs(other.r_n - result.r_n), max_abs(result.r_n))
         if result.r_t is not None:
             rubbed = np.zeros_like(result.r_t) if other.r_t is None else other.r_t

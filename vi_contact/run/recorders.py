@@ -17,7 +17,7 @@ from ..core.checks import array, attributes, column_name, instance
 from ..core.errors import InputError, StepFailure
 from ..core.problem import ContactProblem
 from ..core.step import AXES, Columns, Report, Row, State
-from ..core.verify import Energies, energies, energy_balance
+from ..core.verify import energies, energy_balance
 
 
 def refuse_overflow(row: Row) -> None:
@@ -110,18 +110,15 @@ class Energy:
         step = energy_balance(
             self._problem, report.old, before_impact, report.balance, before=self._now, after=free
         )
-        self._now = free if new.v is report.v_minus else self._after_impact(free, new.v)
+        self._now = free
+        if new.v is not report.v_minus:  # the impact law changed it; displacements do not jump
+            momentum = system.M @ new.v
+            self._now = replace(free, momentum=momentum, kinetic=0.5 * system.algebra.dot(new.v, momentum))
         impact = free.kinetic - self._now.kinetic
         losses = (step.input, step.damping, step.contact, step.friction, impact, step.algorithmic, step.defect)
         for term, loss in zip(self._SUMS, losses, strict=True):
             self._sums[term] += loss
         return self._row()
-
-    def _after_impact(self, free: Energies, v: Array) -> Energies:
-        """The energies with the velocity the impact law left; displacements do not jump."""
-        system = self._problem.equations
-        momentum = system.M @ v
-        return replace(free, momentum=momentum, kinetic=0.5 * system.algebra.dot(v, momentum))
 
 
 class Contact:

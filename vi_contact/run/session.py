@@ -16,7 +16,8 @@ import numpy as np
 
 from ..core.errors import Interrupted
 from ..core.step import Recorder, Report, State, StepResult
-from .files.checkpoint import Problem, RestartPoint
+from .files.checkpoint import RestartPoint
+from .files.identity import identity
 from .files.log import Progress, versions
 from .files.table import Table
 from .files.writer import Writer
@@ -112,7 +113,7 @@ class Session:
         if warning and self.root:
             log.warning("%s", warning)
         writer.close(facts)
-        return Solution(self.table.history(writer.history), self.table.columns, self.place.state, facts)
+        return Solution(self.table.history(), self.table.columns, self.place.state, facts)
 
     def _march(self, writer: Writer, signals: StopSignals) -> None:
         place = self.place
@@ -125,7 +126,9 @@ class Session:
                 worst = max(worst, report.certificate.worst)
                 if loop.ended:
                     self.place = replace(place, state=state, base=loop.base, halved=loop.halved)
-                    self._end_base_step(report, writer)
+                    writer.frame(report, self.place.number)
+                    if self.place.number % self.checkpoint_every == 0:
+                        self._checkpoint(writer)
                     if self.root:
                         progress.step(state.k, state.t, iterations=report.result.iterations, worst=worst)
                 self.seconds.append(time.perf_counter() - begin)
@@ -154,20 +157,14 @@ class Session:
         self.table.append(row)  # after the disk: a checkpoint never knows a step that history.csv does not
         self.last = report
 
-    def _end_base_step(self, report: Report, writer: Writer) -> None:
-        """What happens between base steps only."""
-        writer.frame(report, self.place.number)
-        if self.place.number % self.checkpoint_every == 0:
-            self._checkpoint(writer)
-
     def _checkpoint(self, writer: Writer) -> None:
-        writer.checkpoint(self.place, lambda: self._problem)
+        writer.checkpoint(self.place, lambda: self._about)
 
     @cached_property
-    def _problem(self) -> Problem:
+    def _about(self) -> dict[str, Any]:
         """What the run is of, for its checkpoints. Collective."""
-        method, start = self.method, self.place.t_start
-        return Problem.of(method.problem, method.scheme, method.dt, start, start + self.step_plan.length)
+        method, start, end = self.method, self.place.t_start, self.place.t_start + self.step_plan.length
+        return {"run": identity(method.problem, method.scheme, method.dt, start=start, end=end), "span": (start, end)}
 
     def _rescue(self, writer: Writer, status: str, reason: str, seconds: float) -> None:
         """Save what there is. A checkpoint of the last base step only on one rank: others might not come."""

@@ -16,8 +16,7 @@ from ..core.state_checks import initial_state
 from ..core.step import Columns, Recorder, Row, Scheme, Solver, State
 from ..solvers.certified import TOLERANCE
 from .files.checkpoint import RestartPoint, read_checkpoint
-from .files.folder import run_folder
-from .files.lock import locked
+from .files.folder import HISTORY_H5, locked, run_folder
 from .files.stored_rows import StoredRows
 from .files.table import Block, Table
 from .files.writer import FieldWriter, Writer
@@ -90,7 +89,7 @@ def simulate(
         place, checksum = _place(method, source, state, changed)
         plan = step_plan(dt, steps, t_end, place.t_start)
         place = replace(place, state=method.scheme.start(problem, place.state, plan.dt(place.base)))
-        table = Table(*_started(problem, recorders, place.state), on_disk=folder is not None)
+        table = Table(*_started(problem, recorders, place.state), None if folder is None else folder / HISTORY_H5)
         stored = None if source is None else StoredRows(source, table, place.state.k, checksum)
         if stored is not None:
             _started(problem, recorders, place.state, _restored(table, stored, comm))

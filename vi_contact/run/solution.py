@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from ..core.algebra import Array
-from ..core.files import to_json
 from ..core.protocols import Excitation
 from ..core.step import Columns, State
 from ..ground_motion.excitation import GroundMotion
@@ -27,29 +26,13 @@ class Solution:
         history: column -> values, (rows,) or (rows, m) for arrays; row 0 is the initial state.
         columns: column -> (unit, meaning).
         state: the final state, in the rotated basis (``problem.cartesian`` turns it back).
-        facts: what summary.json holds.
+        facts: what summary.json holds; the times of a step are medians in seconds, nan without steps.
     """
 
     history: Mapping[str, Array]
     columns: Columns
     state: State
     facts: Mapping[str, Any]
-
-    @property
-    def seconds_per_step(self) -> float:
-        """Return the median wall time of a step [s]: contact solve, certificate, records and output; nan without steps.
-        """
-        return float(self.facts["seconds_per_step"])
-
-    @property
-    def seconds_per_linear_step(self) -> float:
-        """Return the median wall time of a plain linear step with the same A [s]: right-hand side, back-substitution,
-        update."""
-        return float(self.facts["seconds_per_linear_step"])
-
-    def to_json(self) -> str:
-        """Return the content of summary.json."""
-        return to_json(self.facts)
 
     def summary(self) -> str:
         """Return the run in a few lines for people."""

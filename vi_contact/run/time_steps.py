@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from math import ceil, inf, isfinite
 from typing import Any
 
@@ -32,15 +33,18 @@ class Schedule:
     pieces: tuple[tuple[float, float], ...]
 
     def __post_init__(self) -> None:
-        before, pieces = -inf, []
-        for piece in _pairs(self.pieces):
-            dt, until = _positive(piece[0]), piece[1]
+        try:
+            pairs = [(dt, float(until)) for dt, until in self.pieces]
+        except (TypeError, ValueError, OverflowError):
+            given = shown(self.pieces)
+            raise InputError(f"Schedule pieces are {given}: give pairs ((dt, until), …) in seconds") from None
+        if not pairs:
+            raise InputError("Schedule has no pieces: give at least one (dt, until), (dt, math.inf) for a constant dt")
+        object.__setattr__(self, "pieces", tuple((_positive(dt), until) for dt, until in pairs))
+        for (_, before), (_, until) in pairwise([(0.0, -inf), *self.pieces]):
             if not until > before:
                 raise InputError(f"Schedule: the piece until {until:g} s does not end after {before:g} s: give "
                                  "increasing times, math.inf for the last one only")
-            pieces.append((dt, until))
-            before = until
-        object.__setattr__(self, "pieces", tuple(pieces))
 
 
 @dataclass(frozen=True)
@@ -167,14 +171,3 @@ def _read(check: Callable[..., Any], value: Any, remedy: str, **limits: Any) -> 
         return check("", "", value, **limits)
     except InputError:
         raise InputError(remedy) from None
-
-
-def _pairs(pieces: Any) -> list[tuple[Any, float]]:
-    """The pieces as pairs; InputError when they are something else."""
-    try:
-        pairs = [(dt, float(until)) for dt, until in pieces]
-    except (TypeError, ValueError, OverflowError):
-        raise InputError(f"Schedule pieces are {shown(pieces)}: give pairs ((dt, until), …) in seconds") from None
-    if not pairs:
-        raise InputError("Schedule has no pieces: give at least one (dt, until), (dt, math.inf) for a constant dt")
-    return pairs

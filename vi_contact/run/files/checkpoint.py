@@ -29,7 +29,7 @@ from ...core.problem import ContactProblem
 from ...core.step import Scheme, State
 from ..time_steps import TimeSteps
 from .folder import CHECKPOINT, FORMAT, check_format
-from .identity import FIXED, Identity, difference, identity
+from .identity import FIXED, difference, identity
 
 log = logging.getLogger(__name__)
 Arrays = dict[str, Any]
@@ -62,31 +62,17 @@ class RestartPoint:
         return self.k_start + self.base
 
 
-@dataclass(frozen=True)
-class Problem:
-    """Say what a checkpoint is of: ``facts`` that a restart must have in common with it, functions of time seen between
-    two times [s]."""
-
-    facts: Identity
-    span: tuple[float, float]
-
-    @classmethod
-    def of(cls, problem: ContactProblem, scheme: Scheme, dt: TimeSteps, start: float, end: float) -> Problem:
-        """Return the problem of a run from start to end. Collective."""
-        return cls(identity(problem, scheme, dt, start=start, end=end), (start, end))
-
-
 def write_checkpoint(
-    folder: Path, problem: ContactProblem, place: RestartPoint, *, of: Problem, rows: str = ""
+    folder: Path, problem: ContactProblem, place: RestartPoint, *, of: Mapping[str, Any], rows: str = ""
 ) -> None:
-    """Replace the checkpoint in the folder. ``rows``: checksum of the histories up to here. Collective;
-    ViContactError on all ranks when the disk refuses it."""
+    """Replace the checkpoint in the folder. ``of``: the "run", as ``identity`` sees it over a "span" of times [s];
+    ``rows``: checksum of the histories up to here. Collective; ViContactError on all ranks when the disk refuses it."""
     state = place.state
     vectors, same = _split(problem, state)
     gathered = problem.system.algebra.comm.gather((problem.system.space.ids, vectors))
     about = json.dumps(
-        {"format": FORMAT, "run": of.facts, "span": of.span, "rows": rows, "vectors": sorted(vectors), "t": state.t,
-         "k": state.k, "t_start": place.t_start, "k_start": place.k_start, "base": place.base, "halved": place.halved}
+        {"format": FORMAT, **of, "rows": rows, "vectors": sorted(vectors), "t": state.t, "k": state.k,
+         "t_start": place.t_start, "k_start": place.k_start, "base": place.base, "halved": place.halved}
     )  # json keeps floats to the last bit
 
     def write() -> None:

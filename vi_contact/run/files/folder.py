@@ -1,4 +1,4 @@
-"""Make the folder a run writes into, so that no data are lost and no rank waits for another for ever.
+"""Make and lock the folder a run writes into, so that no data are lost and no rank waits for another for ever.
 
 Only rank 0 touches the disk. Whatever it does there goes through ``on_root``: a failure is told to all ranks, which
 then raise the same sentence together. Files that must be whole are written beside their name and renamed.
@@ -6,8 +6,14 @@ then raise the same sentence together. Files that must be whole are written besi
 
 from __future__ import annotations
 
+import fcntl
 import json
+import logging
 import os
+import socket
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +22,7 @@ from ...core.checks import shown
 from ...core.errors import InputError
 from ...core.files import FIELDS, FIELDS_INDEX, on_root, write_atomically
 
+log = logging.getLogger(__name__)
 FORMAT = 1  # of run folders and checkpoints; what was written before there were numbers counts as it
 
 ABOUT = "format.json"
@@ -24,9 +31,12 @@ COLUMNS = "columns.json"
 HISTORY_CSV = "history.csv"
 HISTORY_H5 = "history.h5"
 JOURNAL = "history.journal"
+LOCK = ".lock"
 LOG = "run.log"
 SUMMARY = "summary.json"
 FILES = (ABOUT, CHECKPOINT, COLUMNS, FIELDS_INDEX, HISTORY_CSV, HISTORY_H5, JOURNAL, LOG, SUMMARY)  # of a run
+_held: dict[Path, int] = {}  # folders that this process has locked -> the thread that did
+
 
 def run_folder(comm: Comm, path: str | Path) -> Path:
     """Make the folder, with parents, and try to write into it, before any work is done; InputError if not."""
@@ -76,3 +86,63 @@ def remove_litter(folder: Path) -> None:
     """Remove what killed processes left of files they were about to replace; with the folder's lock only."""
     for path in [*folder.glob(".*.*[0-9].tmp"), *(folder / FIELDS).glob(".*.*[0-9].tmp")]:
         path.unlink(missing_ok=True)
+
+
+@contextmanager
+def locked(comm: Comm, folder: Path | None) -> Iterator[None]:
+    """Refuse other runs that want the folder, while it lasts, with one sentence on all their ranks. Collective.
+
+    Rank 0 holds a lock (flock) on a file in the folder. What a killed run leaves of it holds nobody up. Within the same
+    thread it may be taken again. On a file system that knows no locks there is none, which is logged.
+    """
+    mine = None if folder is None else on_root(comm, lambda: _take(folder))
+    try:
+        yield
+    finally:
+        if mine is not None and folder is not None:
+            _release(folder, mine)
+
+
+def _take(folder: Path) -> Any:
+    """The open, locked file; None when this thread has the lock already."""
+    if _held.get(folder.resolve()) == threading.get_ident():
+        return None
+    while True:
+        file = open(folder / LOCK, "a+b", buffering=0)  # noqa: SIM115
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise InputError(f"another run writes into '{folder}' ({_owner(file)}): wait until it has ended, or choose "
+                             "another output folder") from None
+        except OSError as error:
+            log.warning("'%s' is on a file system without locks (%s): see to it that no other run writes there",
+                        folder, error.strerror)
+        if _is_there(folder / LOCK, file):
+            break
+        file.close()  # the run that had it has removed it since
+    file.truncate(0)
+    file.write(f"process {os.getpid()} on {socket.gethostname()}".encode())
+    _held[folder.resolve()] = threading.get_ident()
+    return file
+
+
+def _owner(file: Any) -> str:
+    """Who holds it, as it wrote into the file; closes the file."""
+    with file:
+        file.seek(0)
+        return " ".join(file.read(200).decode(errors="replace").split()) or "it has only begun"
+
+
+def _is_there(path: Path, file: Any) -> bool:
+    """Whether the file that is open is still the one of that name."""
+    try:
+        return os.path.samestat(os.stat(path), os.fstat(file.fileno()))
+    except FileNotFoundError:
+        return False
+
+
+def _release(folder: Path, file: Any) -> None:
+    """Remove the file while it is locked: who opens it in the meantime finds it gone and makes a new one."""
+    _held.pop(folder.resolve(), None)
+    (folder / LOCK).unlink(missing_ok=True)
+    file.close()

@@ -154,16 +154,11 @@ class HistoryFiles:
         """Write all rows into history.h5 and leave no journal; what cannot be written stays in the other files."""
         try:
             self.save()
-            self._close()
-            (self._folder / JOURNAL).unlink(missing_ok=True)
         finally:
-            self._close()
-
-    def _close(self) -> None:
-        for file in (self._csv, self._journal):
-            if file is not None:
+            for file in filter(None, (self._csv, self._journal)):
                 with suppress(OSError):
                     file.close()
+        (self._folder / JOURNAL).unlink(missing_ok=True)
 
 
 def _copy(old: h5py.Dataset, new: h5py.Dataset, rows: int) -> None:

@@ -9,7 +9,7 @@ which are compared likewise.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from math import isclose
 from typing import Any
@@ -56,9 +56,9 @@ def identity(problem: ContactProblem, scheme: Scheme, dt: TimeSteps, *, start: f
         "mass": text_of(problem.mass),
         "impact law": text_of(problem.impact),
         "friction law": text_of(problem.friction),
-        "stiffness": [_product(system, system.K, w) for w in probes],
-        "mass matrix": [_product(system, system.M, w) for w in probes],
-        "damping": [] if system.C is None else [_product(system, system.C, w) for w in probes],
+        "stiffness": [_dot(system, w, system.K @ w) for w in probes],
+        "mass matrix": [_dot(system, w, system.M @ w) for w in probes],
+        "damping": [] if system.C is None else [_dot(system, w, system.C @ w) for w in probes],
         "geometry": [_dot(system, probes[0], x) for x in system.space.coordinates.T],
         "load": _loads(system, probes, early, times),
         "excitation": _excitation(problem, times),
@@ -119,10 +119,6 @@ def _dot(system: SemiDiscreteSystem, w: Array, x: Array) -> tuple[float, float]:
     return dot(w, x), float(np.sqrt(dot(w, w) * dot(x, x)))
 
 
-def _product(system: SemiDiscreteSystem, A: Any, w: Array) -> tuple[float, float]:
-    return _dot(system, w, A @ w)
-
-
 def _loads(system: SemiDiscreteSystem, probes: Sequence[Array], early: Sequence[float], times: Array) -> Numbers:
     """The load in the first steps, and the histories of its separable parts through the run."""
     forces = [system.load(t) for t in early]
@@ -137,8 +133,8 @@ def _loads(system: SemiDiscreteSystem, probes: Sequence[Array], early: Sequence[
 def _sampled(values: Array) -> Numbers:
     """Sums of a row of numbers, with weights that see each of them."""
     size = float(np.abs(values).sum())
-    weights: list[Callable[[Any, int], Array]] = [lambda n, j: np.ones(len(n)), probe, probe]
-    return [(float(weight(np.arange(len(values)), j) @ values), size) for j, weight in enumerate(weights)]
+    places = np.arange(len(values))
+    return [(float(w @ values), size) for w in (np.ones(len(values)), probe(places, 1), probe(places, 2))]
 
 
 def _excitation(problem: ContactProblem, times: Array) -> Numbers:

@@ -40,11 +40,11 @@ class Table:
     Attributes:
         columns: column -> (unit, meaning). first: the row it was made with. count: rows so far.
         numbers: columns of history.csv, in order; arrays: the others, which only HDF5 holds, each with a sample.
-        on_disk: whether a folder holds the rows too: beyond KEPT bytes the memory lets go of them.
+        file: the history.h5 of a run with a folder, which has the rows too: beyond KEPT bytes the memory lets them go.
     """
 
-    def __init__(self, columns: Columns, first: Row, *, on_disk: bool = False) -> None:
-        self.columns, self.first, self.on_disk, self.count = columns, first, on_disk, 0
+    def __init__(self, columns: Columns, first: Row, file: Path | None = None) -> None:
+        self.columns, self.first, self.file, self.count = columns, first, file, 0
         self.check(first)
         self.numbers = [name for name in columns if not isinstance(first[name], np.ndarray)]
         self.arrays = {name: np.array(first[name]) for name in columns if isinstance(first[name], np.ndarray)}
@@ -69,6 +69,10 @@ class Table:
         self._open.append(row)
         self.count += 1
         if len(self._open) == BLOCK:
+            self._gather()
+
+    def _gather(self) -> None:
+        if self._open:
             rows, self._open = self._open, []
             self._store(self._columns(rows))
 
@@ -86,7 +90,7 @@ class Table:
     def _store(self, block: Block) -> None:
         self._tally.add(block)
         self._size += sum(values.nbytes for values in block.values())
-        if self.on_disk and self._size > KEPT:
+        if self.file is not None and self._size > KEPT:
             self._kept, self._blocks = False, []
         if self._kept:
             self._blocks.append(block)
@@ -98,14 +102,12 @@ class Table:
             tally.add(self._columns(self._open))
         return tally.facts()
 
-    def history(self, file: Path | None = None) -> Mapping[str, Array]:
+    def history(self) -> Mapping[str, Array]:
         """Return column -> values of all rows: (rows,) float64, or (rows, *shape of the arrays); of too many rows for
-        the memory as they are in ``file``, the history.h5 of the run."""
-        if self._open:
-            rows, self._open = self._open, []
-            self._store(self._columns(rows))
-        if not self._kept and file is not None:
-            return StoredHistory(file, list(self.columns), self.count)
+        the memory as they are in the file."""
+        self._gather()
+        if not self._kept and self.file is not None:
+            return StoredHistory(self.file, list(self.columns), self.count)
         names = [*self.numbers, *self.arrays]
         return {name: np.concatenate([block[name] for block in self._blocks]) for name in names}
 

@@ -15,8 +15,8 @@ from ...core.algebra import Array
 from ...core.files import FIELDS, on_root, to_json, write_atomically
 from ...core.problem import ContactProblem
 from ...core.step import Report, Row, State
-from .checkpoint import Problem, RestartPoint, write_checkpoint
-from .folder import ABOUT, FORMAT, HISTORY_H5, LOG, SUMMARY, clear, remove_litter
+from .checkpoint import RestartPoint, write_checkpoint
+from .folder import ABOUT, FORMAT, LOG, SUMMARY, clear, remove_litter
 from .history import HistoryFiles
 from .log import RunLog, versions
 from .stored_rows import StoredRows, times_of
@@ -109,7 +109,7 @@ class Writer:
         if self._fields is not None and self._settings is not None and number % self._settings.every == 0:
             self._fields.write(report.new, report.balance.a, report)
 
-    def checkpoint(self, place: RestartPoint, of: Callable[[], Problem]) -> None:
+    def checkpoint(self, place: RestartPoint, of: Callable[[], Mapping[str, Any]]) -> None:
         """Write a checkpoint of this place, unless there is one already. ``of``: what problem it is."""
         k = place.state.k
         if self._folder is None or self._saved == k:
@@ -125,11 +125,6 @@ class Writer:
             return ""
         self._files.sync()
         return self._files.checksum(k)
-
-    @property
-    def history(self) -> Path | None:
-        """Say where the histories are."""
-        return None if self._folder is None else self._folder / HISTORY_H5
 
     def close(self, facts: Mapping[str, Any]) -> None:
         """Write the last version of every file."""

@@ -31,8 +31,7 @@ from ...laws.materials import LinearElastic
 from ...laws.weight import with_weight
 from ...meshes.gmsh_session import MeshScript
 from ...run.cross_check import CrossChecked
-from ...run.files.folder import run_folder
-from ...run.files.lock import locked
+from ...run.files.folder import locked, run_folder
 from ...run.files.writer import FieldWriter
 from ...run.method import with_defaults
 from ...run.recorders import Contact, Energy, Steps
