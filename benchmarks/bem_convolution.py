@@ -51,7 +51,7 @@ def discretised(method: str, k: int) -> tuple[Problem, Callable[[Forces], np.nda
         operator = bem.PoincareSteklov(bem.energetic_blocks(mesh, MATERIAL, dt=dt, steps=steps), MATERIAL.rho)
         return lambda *a, **more: bem.BoundaryProblem(operator, *a, **more), lambda forces: forces(dt, steps)
     transformed = bem.convolution_operator(mesh, MATERIAL, method=getattr(bem, method)(), dt=dt, steps=steps)
-    return (lambda *a, **more: bem.ConvolutionProblem(transformed, *a, **more),
+    return (lambda *a, **more: bem.BoundaryProblem(transformed, *a, **more),
             transformed.frequencies.substep_means)
 
 

@@ -12,7 +12,6 @@ import vi_contact as vc
 from vi_contact import solvers
 from vi_contact.bem import (
     BoundaryProblem,
-    ConvolutionProblem,
     PoincareSteklov,
     convolution_operator,
     polygon,
@@ -268,7 +267,7 @@ def test_contact_with_convolution_quadrature(law):
     """The condensed compliance of the other time discretisation serves as well: impulse until t = 4 within 0.5 %."""
     mesh, loads = square().operator.mesh, square().forces[:20]
     operator = convolution_operator(mesh, MATERIAL, dt=0.2, steps=20)
-    problem = ConvolutionProblem(operator, loads, contact=square().contact)
+    problem = BoundaryProblem(operator, loads, contact=square().contact)
     found = march_contact(BoundaryContact(problem.condensed(), friction=LAWS[law]))
     assert found.worst < 1e-12 and found.gap.min() >= 0.0
     assert found.impulse[-1, 1] == pytest.approx(run(law).impulse[19, 1], rel=5e-3)

@@ -14,7 +14,6 @@ from vi_contact.bem import (
     BDF2,
     BoundaryProblem,
     ConvolutionOperator,
-    ConvolutionProblem,
     Frequencies,
     Galerkin,
     LaplaceKernels,
@@ -58,7 +57,7 @@ def smooth_integral(t: np.ndarray) -> np.ndarray:
     return np.where(t <= 0.0, 0.0, np.where(t < 2.0, 0.5 * t - np.sin(np.pi * t) / (2.0 * np.pi), 1.0))
 
 
-def rod(operator: ConvolutionOperator, load) -> ConvolutionProblem:
+def rod(operator: ConvolutionOperator, load) -> BoundaryProblem:
     """The square between rollers on a fixed base, pulled at its top by load(t): a rod with c = 1, length 1."""
     mesh = operator.mesh
     fixed = np.zeros((2, len(mesh)), bool)
@@ -69,7 +68,7 @@ def rod(operator: ConvolutionOperator, load) -> ConvolutionProblem:
         return traction_forces(mesh, lambda x, n, t: n * load(t), dt=dt, steps=steps, elements=mesh.labels == 2)
 
     means = operator.frequencies.substep_means(forces)
-    return ConvolutionProblem(operator, means, fixed, contact=mesh.labels == 0)
+    return BoundaryProblem(operator, means, fixed, contact=mesh.labels == 0)
 
 
 def top_error(operator: ConvolutionOperator, load, integral) -> float:
@@ -224,7 +223,7 @@ def test_contact_runs_on_it(operators, name, tolerance):
     """V7.1: the pressed square with Tresca's friction: no penetration, impulse at t = 4 (4.6737 energetic); Uzawa."""
     operator, mesh = operators[name, 10], operators[name, 10].mesh
     forces = traction_forces(mesh, lambda x, n, t: -n, dt=0.1, steps=60, elements=mesh.labels == 2)
-    problem = ConvolutionProblem(operator, forces, contact=mesh.labels == 0)
+    problem = BoundaryProblem(operator, forces, contact=mesh.labels == 0)
     contact = BoundaryContact(problem.condensed(), friction=Tresca(0.05))
     run = march_contact(contact)
     assert run.impulse[39, 1] == pytest.approx(4.6737, rel=tolerance) and run.gap.min() > -1e-12
@@ -245,7 +244,7 @@ def test_prescribed_motion_gives_the_forces_back(operators, name):
     u = operator.solve(forces)
     assert np.abs(operator.apply(u) - forces).max() < 1e-5 * np.abs(forces).max()
     fixed = np.tile(mesh.nodes_of(mesh.labels == 1), (2, 1))
-    motion = ConvolutionProblem(operator, np.where(fixed, 0.0, forces), fixed, u).solve()
+    motion = BoundaryProblem(operator, np.where(fixed, 0.0, forces), fixed, u).solve()
     assert np.abs(motion.displacement - u).max() < 1e-6 * np.abs(u).max()
     assert np.abs(motion.forces - forces).max() < 1e-5 * np.abs(forces).max()
 
@@ -281,13 +280,13 @@ def test_errors(operators):
     with pytest.raises(InputError, match=r"0.3, too small for Trapezoid.* needs 0.5"):
         convolution_operator(operator.mesh, MATERIAL, method=Trapezoid(), dt=0.06, steps=3)
     with pytest.raises(InputError, match="forces has shape"):
-        ConvolutionProblem(operator, forces[1:])
+        BoundaryProblem(operator, forces[1:])
     with pytest.raises(InputError, match="prescribed has shape"):
-        ConvolutionProblem(operator, forces, prescribed=forces[1:])
+        BoundaryProblem(operator, forces, prescribed=forces[1:])
     for wrong in ("clamped", np.zeros((2, n)), np.arange(n)):
         with pytest.raises(InputError, match="fixed .* give a boolean mask"):
-            ConvolutionProblem(operator, forces, fixed=wrong)
+            BoundaryProblem(operator, forces, fixed=wrong)
     with pytest.raises(InputError, match="contact .* give a boolean mask"):
-        ConvolutionProblem(operator, forces, contact=np.array([1, 2]))
+        BoundaryProblem(operator, forces, contact=np.array([1, 2]))
     with pytest.raises(InputError, match="no contact boundary"):
-        ConvolutionProblem(operator, forces).condensed()
+        BoundaryProblem(operator, forces).condensed()

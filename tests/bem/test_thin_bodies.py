@@ -10,7 +10,6 @@ from plane_waves import MATERIAL, SQUARE
 from vi_contact.bem import (
     BoundaryMesh,
     BoundaryProblem,
-    ConvolutionProblem,
     Orders,
     PoincareSteklov,
     circle,
@@ -136,7 +135,7 @@ def test_thin_rod_by_convolution_quadrature(ratio):
     mesh, dt, steps = slab(h / 20, h), h * ratio, round(1.2 / (h * ratio))
     operator = convolution_operator(mesh, MATERIAL, dt=dt, steps=steps)
     forces = operator.frequencies.substep_means(lambda dt, steps: pulled(mesh, dt, steps)[0])
-    motion = ConvolutionProblem(operator, forces, pulled(mesh, dt, 1)[1]).solve()
+    motion = BoundaryProblem(operator, forces, pulled(mesh, dt, 1)[1]).solve()
     assert error(motion.displacement, motion.times, mesh) < 0.02
 
 

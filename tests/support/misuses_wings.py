@@ -105,7 +105,7 @@ def operators() -> Table:
         (bem.BoundaryProblem, {"operator": steklov, "forces": still},
          fields | {"operator": OTHER | {"blocks": blocks}, "forces": histories}),
         (problem.solve, {}, {"contact_forces": {"text": "up", "nan": np.full((2, 6), nan), "short": np.zeros((2, 5))}}),
-        (bem.ConvolutionProblem, {"operator": wave, "forces": still},
+        (bem.BoundaryProblem, {"operator": wave, "forces": still},
          fields | {"operator": OTHER | {"blocks": blocks}, "forces": histories | {"many": np.zeros((3, 2, 8))}}),
         (bem.Frequencies, {"method": bem.BDF2(), "dt": 0.1, "steps": 2},
          {"method": OTHER | {"class": bem.BDF2}, "dt": POSITIVE, "steps": STEPS}),

@@ -4,7 +4,7 @@ from .boundary_mesh import BoundaryMesh, circle, from_segments, polygon, smooth_
 from .boundary_operators import Galerkin, OperatorMatrices
 from .contact import BoundaryContact, Conditions, conditions_on
 from .contact_run import ContactLedger, ContactRun, ledger, march_contact
-from .convolution_operator import ConvolutionOperator, ConvolutionProblem, convolution_operator
+from .convolution_operator import ConvolutionOperator, convolution_operator
 from .convolution_quadrature import BDF2, Frequencies, RadauIIA, Trapezoid
 from .energetic import EnergeticBlocks, energetic_blocks
 from .fundamental_solution import LaplaceKernels, TimeKernels
@@ -19,7 +19,7 @@ from .uzawa_space_time import SpaceTimeUzawa
 
 __all__ = [
     "BDF2", "BoundaryContact", "BoundaryMesh", "BoundaryMotion", "BoundaryProblem", "CondensedCompliance",
-    "Conditions", "ContactLedger", "ContactRun", "ConvolutionOperator", "ConvolutionProblem", "EnergeticBlocks",
+    "Conditions", "ContactLedger", "ContactRun", "ConvolutionOperator", "EnergeticBlocks",
     "Frequencies", "Galerkin", "LaplaceKernels", "OperatorMatrices", "Orders", "PoincareSteklov",
     "RadauIIA", "RadialTable", "SpaceTimeUzawa", "TimeKernels", "Trapezoid", "TwoBodies", "circle", "conditions_on",
     "convolution_operator",

@@ -1,4 +1,4 @@
-"""Build the Poincaré-Steklov operator of convolution quadrature, its boundary value problems and contact compliance.
+"""Build the Poincaré-Steklov operator of convolution quadrature, for boundary value problems and contact compliance.
 
 At each frequency s the body is a matrix S(s), nodal displacements to nodal forces, in the symmetric form
 (M/2 + K)ᵀ V⁻¹ (M/2 + K) - D or the unsymmetric Mᵀ V⁻¹ (M/2 + K). Every answer is a set of small dense systems, one per
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..core.algebra import Array
-from ..core.checks import array, counted, flag, instance, shape_of
+from ..core.checks import counted, flag, instance, shape_of
 from ..core.errors import InputError
 from ..laws.materials import LinearElastic
 from .boundary_mesh import BoundaryMesh
@@ -22,7 +22,7 @@ from .boundary_operators import check_body
 from .convolution_quadrature import Frequencies, RadauIIA, TimeMethod
 from .energetic import NUMBERS, check_time_step
 from .fundamental_solution import LaplaceKernels
-from .poincare_steklov import BodyProblem, BoundaryMotion, CondensedCompliance
+from .poincare_steklov import applied, freed
 from .quadrature import Orders
 from .radial_table import RadialTable
 
@@ -65,15 +65,50 @@ class ConvolutionOperator:
 
     def apply(self, displacement: ArrayLike) -> Array:
         """Return (steps, 2, n) mean nodal forces [N/m] of displacements (steps, 2, n) at t_1, t_2, ...; 0 at t_0."""
-        shape = (self.steps, 2, len(self.mesh))
-        u = array("ConvolutionOperator.apply", "displacement", displacement, shape, unit="m")
-        everywhere = np.ones((2, len(self.mesh)), bool)
-        return ConvolutionProblem(self, np.zeros_like(u), everywhere, u).solve().forces
+        return applied(self, displacement)
 
     def solve(self, forces: ArrayLike) -> Array:
         """Return (steps, 2, n) displacements under nodal forces (steps, 2, n): the inverse, no support anywhere."""
-        given = array("ConvolutionOperator.solve", "forces", forces, (None, 2, len(self.mesh)), unit="N/m")
-        return ConvolutionProblem(self, given).solve().displacement
+        return freed(self, forces)
+
+    def load_shape(self, dimensions: int) -> tuple[int, ...]:
+        """Return the shape of the nodal forces of a problem; in four dimensions the second is that of the stages."""
+        steps, stages = self.steps, self.frequencies.s.shape[1]
+        return (steps, stages, 2, len(self.mesh)) if dimensions == 4 else (steps, 2, len(self.mesh))
+
+    def motion(self, forces: Array, fixed: Mask, prescribed: Array | None) -> tuple[Array, Array, Array]:
+        """Return what PoincareSteklov.motion does; forces: (steps, stages or 1, 2n)."""
+        table = self.frequencies
+        u = self._displacement_modes(table.impulses(forces), ~fixed, prescribed)
+        over_s = u[..., None] / table.s[..., None, None]
+        traction = table.step_means((self.to_traction @ over_s)[..., 0])
+        reaction = table.step_means((self.steklov @ over_s)[..., 0])
+        widths = np.diff(table.method.abscissae, prepend=0.0) if forces.shape[1] > 1 else np.ones(1)
+        return table.at_ends(u), traction, np.where(fixed, reaction, forces.transpose(0, 2, 1) @ widths)
+
+    def condense(
+        self, forces: Array, fixed: Mask, prescribed: Array | None, unknowns: NDArray[np.int64]
+    ) -> tuple[Array, Array]:
+        """Return W, by frequencies, and u_free of CondensedCompliance for these unknowns."""
+        table, free, moving = self.frequencies, ~fixed, ~fixed[unknowns]
+        places = np.searchsorted(np.flatnonzero(free), unknowns[moving])
+        units = np.eye(int(free.sum()))[:, places]
+        transform = np.zeros((len(table.s), len(unknowns), len(unknowns)), complex)
+        for at_z, matrices, factors in zip(transform, self.steklov, table.held_factors, strict=True):
+            inverse = np.linalg.solve(matrices[:, free][:, :, free], units[None])[:, places]
+            at_z[np.ix_(moving, moving)] = np.einsum("i,icd->cd", factors, inverse)
+        return table.backward(transform), self.motion(forces, fixed, prescribed)[0][:, unknowns]
+
+    def _displacement_modes(self, impulses: NDArray, free: Mask, prescribed: Array | None) -> NDArray:
+        """Return (L, stages, 2n) displacements at the frequencies; prescribed ones move evenly during each step."""
+        table, u = self.frequencies, np.zeros_like(impulses)
+        load = impulses * table.s[..., None]
+        if prescribed is not None:
+            u = table.impulses(np.diff(prescribed * ~free, axis=0, prepend=0.0)[:, None] / table.dt)
+            load = load - (self.steklov @ u[..., None])[..., 0]
+        for at_z, matrices, right in zip(u, self.steklov, load, strict=True):
+            at_z[:, free] = np.linalg.solve(matrices[:, free][:, :, free], right[:, free, None])[..., 0]
+        return u
 
 
 def convolution_operator(
@@ -112,62 +147,3 @@ def convolution_operator(
         steklov[i] = (right.T @ to_traction[i] - rho * unit.hyper) if symmetric else mesh.mass.T @ to_traction[i]
     shape = (*table.s.shape, -1, 2 * n)
     return ConvolutionOperator(mesh, table, steklov.reshape(shape), to_traction.reshape(shape))
-
-
-@dataclass(frozen=True, eq=False)
-class ConvolutionProblem(BodyProblem):
-    """Describe what BoundaryProblem is for the energetic method: a body with supports, loads and perhaps contact.
-
-    forces: nodal forces of the loads [N/m], (steps, 2, n) means over the steps, or (steps, stages, 2, n) means between
-    the stages (Frequencies.substep_means); fixed: (2, n) mask of supported unknowns; prescribed: their
-    displacement (steps, 2, n) [m] at the ends of the steps, zero if None; contact: (n,) mask of the elements of the
-    contact boundary. Everything else is free of traction. Raises InputError for wrong shapes and what is no mask.
-    """
-
-    operator: ConvolutionOperator
-
-    def __post_init__(self) -> None:
-        operator = self.operator
-        instance("ConvolutionProblem", "operator", operator, ConvolutionOperator,
-                 "give one of convolution_operator(...)")
-        n, steps, stages = len(operator.mesh), operator.steps, operator.frequencies.s.shape[1]
-        self._check((steps, stages, 2, n) if len(shape_of(self.forces)) == 4 else (steps, 2, n))
-
-    def solve(self, contact_forces: ArrayLike | None = None) -> BoundaryMotion:
-        """Return the motion under loads and nodal contact forces (steps, 2m), ordered as CondensedCompliance."""
-        table, n = self.operator.frequencies, len(self.operator.mesh)
-        forces = self._loads(contact_forces).reshape(self.operator.steps, -1, 2 * n)
-        u = self._displacement_modes(table.impulses(forces))
-        over_s = u[..., None] / table.s[..., None, None]
-        traction = table.step_means((self.operator.to_traction @ over_s)[..., 0])
-        reaction = table.step_means((self.operator.steklov @ over_s)[..., 0])
-        widths = np.diff(table.method.abscissae, prepend=0.0) if forces.shape[1] > 1 else np.ones(1)
-        total = np.where(self._fixed, reaction, forces.transpose(0, 2, 1) @ widths)
-        return BoundaryMotion(self.times, table.at_ends(u).reshape(-1, 2, n), traction.reshape(-1, 2, n, 2),
-                              total.reshape(-1, 2, n))
-
-    def condensed(self) -> CondensedCompliance:
-        """Return the compliance of the contact unknowns, by frequencies, and their motion without contact."""
-        table, free, unknowns = self.operator.frequencies, ~self._fixed, self._unknowns
-        moving = free[unknowns]
-        places = np.searchsorted(np.flatnonzero(free), unknowns[moving])
-        units = np.eye(int(free.sum()))[:, places]
-        transform = np.zeros((len(table.s), len(unknowns), len(unknowns)), complex)
-        for at_z, matrices, factors in zip(transform, self.operator.steklov, table.held_factors, strict=True):
-            inverse = np.linalg.solve(matrices[:, free][:, :, free], units[None])[:, places]
-            at_z[np.ix_(moving, moving)] = np.einsum("i,icd->cd", factors, inverse)
-        u_free = self.solve().displacement.reshape(len(self.times), -1)[:, unknowns]
-        return self._compliance(table.backward(transform), u_free)
-
-    def _displacement_modes(self, impulses: NDArray) -> NDArray:
-        """Return (L, stages, 2n) displacements at the frequencies; prescribed ones move evenly during each step."""
-        table, free = self.operator.frequencies, ~self._fixed
-        u = np.zeros_like(impulses)
-        load = impulses * table.s[..., None]
-        if self.prescribed is not None:
-            ends = np.asarray(self.prescribed, float).reshape(self.operator.steps, -1) * ~free
-            u = table.impulses(np.diff(ends, axis=0, prepend=0.0)[:, None] / table.dt)
-            load = load - (self.operator.steklov @ u[..., None])[..., 0]
-        for at_z, matrices, right in zip(u, self.operator.steklov, load, strict=True):
-            at_z[:, free] = np.linalg.solve(matrices[:, free][:, :, free], right[:, free, None])[..., 0]
-        return u

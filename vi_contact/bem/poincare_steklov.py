@@ -8,16 +8,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..core.algebra import Array
-from ..core.checks import array, flag, instance, integers, mask, number
+from ..core.checks import array, flag, instance, integers, mask, number, provides, shape_of
 from ..core.errors import InputError
 from .boundary_mesh import BoundaryMesh
 from .energetic import EnergeticBlocks, Marching, summed
+
+if TYPE_CHECKING:
+    from .convolution_operator import ConvolutionOperator
 
 Mask = NDArray[np.bool_]
 
@@ -47,15 +50,39 @@ class PoincareSteklov:
 
     def apply(self, displacement: ArrayLike) -> Array:
         """Return (steps, 2, n) nodal forces [N/m] of displacements (steps, 2, n) at t_1, t_2, ...; 0 at t_0."""
-        u = self._history("displacement", displacement)
-        return BoundaryProblem(self, np.zeros_like(u), np.ones(u.shape[1:], bool), u).solve().forces
+        return applied(self, displacement)
 
     def solve(self, forces: ArrayLike) -> Array:
         """Return (steps, 2, n) displacements under nodal forces (steps, 2, n): the inverse, no support anywhere."""
-        return BoundaryProblem(self, self._history("forces", forces)).solve().displacement
+        return freed(self, forces)
 
-    def _history(self, meaning: str, value: ArrayLike) -> Array:
-        return array("PoincareSteklov", meaning, value, (None, 2, len(self.mesh)))
+    def load_shape(self, dimensions: int) -> tuple[int | None, ...]:
+        """Return the shape of the nodal forces of a problem."""
+        return None, 2, len(self.mesh)
+
+    def motion(self, forces: Array, fixed: Mask, prescribed: Array | None) -> tuple[Array, Array, Array]:
+        """Return displacements (steps, 2n), tractions (steps, 4n) and nodal forces (steps, 2n), reactions included,
+        under forces (steps, 1, 2n) and prescribed displacements (steps, 2n) of the fixed unknowns (2n,)."""
+        given = None if prescribed is None else prescribed[:, :, None]
+        u, p, total = self._marching(fixed).run(forces.swapaxes(1, 2) / self.rho, given)
+        return u[:, :, 0], self.rho * p[:, :, 0], self.rho * total[:, :, 0]
+
+    def condense(
+        self, forces: Array, fixed: Mask, prescribed: Array | None, unknowns: NDArray[np.int64]
+    ) -> tuple[Array, Array]:
+        """Return W and u_free of CondensedCompliance for these unknowns, in one march with 2m + 1 columns."""
+        columns = np.zeros((len(forces), 2 * len(self.mesh), len(unknowns) + 1))
+        columns[0, unknowns, np.arange(len(unknowns))] = 1.0 / self.rho
+        columns[:, :, -1] = forces[:, 0] / self.rho
+        given = None
+        if prescribed is not None:
+            given = np.zeros_like(columns)
+            given[:, :, -1] = prescribed
+        u = self._marching(fixed).run(columns, given)[0][:, unknowns]
+        return np.ascontiguousarray(u[:, :, :-1]), np.ascontiguousarray(u[:, :, -1])
+
+    def _marching(self, fixed: Mask) -> Marching:
+        return Marching(self.blocks, fixed, symmetric=self.symmetric)
 
 
 @dataclass(frozen=True)
@@ -120,18 +147,27 @@ class CondensedCompliance:
 
 
 @dataclass(frozen=True, eq=False)
-class BodyProblem:
-    """Hold what both routes, energetic and convolution quadrature, ask of a body that may come into contact."""
+class BoundaryProblem:
+    """Describe a body with supports, loads and a boundary that may come into contact.
 
-    operator: Any
+    operator: its S, PoincareSteklov or that of convolution_operator; forces: (steps, 2, n) nodal forces of the loads
+    [N/m] (loads.py), means over the steps, or by convolution quadrature also (steps, stages, 2, n), means between the
+    stages (Frequencies.substep_means); fixed: (2, n) supported unknowns; prescribed: (steps, 2, n) their displacement
+    [m] at the ends of the steps, zero if None; contact: (n,) mask of the elements of the contact boundary. Everything
+    else is free of traction. Raises InputError for wrong shapes and what is no mask.
+    """
+
+    operator: PoincareSteklov | ConvolutionOperator
     forces: Array
     fixed: Mask | None = None
     prescribed: Array | None = None
     contact: Mask | None = None
 
-    def _check(self, forces: tuple[int | None, ...]) -> None:
-        owner, n = type(self).__name__, len(self.operator.mesh)
-        object.__setattr__(self, "forces", array(owner, "forces", self.forces, forces, unit="N/m"))
+    def __post_init__(self) -> None:
+        owner, names = "BoundaryProblem", ("load_shape", "motion", "condense")
+        provides(owner, "operator", self.operator, names, "give PoincareSteklov(…) or convolution_operator(…)")
+        n, wanted = len(self.operator.mesh), self.operator.load_shape(len(shape_of(self.forces)))
+        object.__setattr__(self, "forces", array(owner, "forces", self.forces, wanted, unit="N/m"))
         for name, shape in (("fixed", (2, n)), ("contact", (n,))):
             if getattr(self, name) is not None:
                 mask(owner, name, getattr(self, name), shape)
@@ -147,74 +183,44 @@ class BodyProblem:
     def contact_nodes(self) -> NDArray[np.int64]:
         """Return (m,) numbers of the nodes of the contact boundary."""
         if self.contact is None or not np.any(self.contact):
-            raise InputError(f"{type(self).__name__}: no contact boundary; give `contact`, the mask of its elements")
+            raise InputError("BoundaryProblem: no contact boundary; give `contact`, the mask of its elements")
         return np.flatnonzero(self.operator.mesh.nodes_of(self.contact))
 
-    @property
-    def _unknowns(self) -> NDArray[np.int64]:
-        """Return (2m,) contact unknowns, x of all nodes, then y."""
-        return np.concatenate([self.contact_nodes, self.contact_nodes + len(self.operator.mesh)])
-
-    @property
-    def _fixed(self) -> Mask:
-        shape = (2, len(self.operator.mesh))
-        return (np.zeros(shape, bool) if self.fixed is None else np.asarray(self.fixed, bool)).ravel()
-
-    def _loads(self, contact_forces: ArrayLike | None) -> Array:
-        """Return (steps, pieces of a step, 2, n) nodal forces, those of contact (steps, 2m) added."""
-        steps = len(self.forces)
-        forces = np.array(self.forces, float).reshape(steps, -1, 2, len(self.operator.mesh))
+    def _given(self, contact_forces: ArrayLike | None = None) -> tuple[Array, Mask, Array | None]:
+        """Return nodal forces (steps, pieces of a step, 2n), those of contact added; fixed unknowns, their motion."""
+        steps, n = len(self.forces), len(self.operator.mesh)
+        forces = np.array(self.forces, float).reshape(steps, -1, 2, n)
         if contact_forces is not None:
             shape = (steps, 2 * len(self.contact_nodes))
-            given = array(f"{type(self).__name__}.solve", "contact_forces", contact_forces, shape, unit="N/m")
+            given = array("BoundaryProblem.solve", "contact_forces", contact_forces, shape, unit="N/m")
             forces[..., self.contact_nodes] += given.reshape(steps, 1, 2, -1)
-        return forces
+        fixed = np.zeros((2, n), bool) if self.fixed is None else np.asarray(self.fixed, bool)
+        prescribed = None if self.prescribed is None else np.asarray(self.prescribed, float).reshape(steps, -1)
+        return forces.reshape(steps, -1, 2 * n), fixed.ravel(), prescribed
 
-    def _compliance(self, W: Array, u_free: Array) -> CondensedCompliance:
+    def solve(self, contact_forces: ArrayLike | None = None) -> BoundaryMotion:
+        """Return the motion under loads and nodal contact forces (steps, 2m), ordered as CondensedCompliance."""
+        u, p, forces = self.operator.motion(*self._given(contact_forces))
+        n = len(self.operator.mesh)
+        return BoundaryMotion(self.times, u.reshape(-1, 2, n), p.reshape(-1, 2, n, 2), forces.reshape(-1, 2, n))
+
+    def condensed(self) -> CondensedCompliance:
+        """Return the compliance of the contact unknowns and their motion without contact."""
         mesh, nodes, elements = self.operator.mesh, self.contact_nodes, np.asarray(self.contact, bool)
+        W, u_free = self.operator.condense(*self._given(), np.concatenate([nodes, nodes + len(mesh)]))
         return CondensedCompliance(
             W, u_free, nodes, mesh.points[nodes], mesh.node_normals(elements)[nodes],
             mesh.node_lengths(elements)[nodes], self.operator.dt, mesh.node_turns(elements)[nodes],
         )
 
 
-@dataclass(frozen=True, eq=False)
-class BoundaryProblem(BodyProblem):
-    """Describe a body with supports, loads and a boundary that may come into contact.
+def applied(operator: PoincareSteklov | ConvolutionOperator, displacement: ArrayLike) -> Array:
+    """Return the nodal forces (steps, 2, n) of a motion prescribed everywhere."""
+    u = array(type(operator).__name__, "displacement", displacement, operator.load_shape(3), unit="m")
+    return BoundaryProblem(operator, np.zeros_like(u), np.ones(u.shape[1:], bool), u).solve().forces
 
-    operator: its S; forces: (steps, 2, n) nodal forces of the loads [N/m] (loads.py); fixed: (2, n) supported unknowns;
-    prescribed: (steps, 2, n) their displacement [m], zero if None; contact: (n,) mask of the elements of the contact
-    boundary. Everything else is free of traction.
-    """
 
-    operator: PoincareSteklov
-
-    def __post_init__(self) -> None:
-        instance("BoundaryProblem", "operator", self.operator, PoincareSteklov, "give PoincareSteklov(blocks, rho)")
-        self._check((None, 2, len(self.operator.mesh)))
-
-    @cached_property
-    def marching(self) -> Marching:
-        """Return the factored system."""
-        return Marching(self.operator.blocks, self._fixed, symmetric=self.operator.symmetric)
-
-    def solve(self, contact_forces: ArrayLike | None = None) -> BoundaryMotion:
-        """Return the motion under loads and nodal contact forces (steps, 2m), ordered as CondensedCompliance."""
-        n, rho = len(self.operator.mesh), self.operator.rho
-        prescribed = None if self.prescribed is None else np.asarray(self.prescribed).reshape(-1, 2 * n, 1)
-        u, p, forces = self.marching.run(self._loads(contact_forces).reshape(-1, 2 * n, 1) / rho, prescribed)
-        return BoundaryMotion(self.times, u.reshape(-1, 2, n), rho * p.reshape(-1, 2, n, 2),
-                              rho * forces.reshape(-1, 2, n))
-
-    def condensed(self) -> CondensedCompliance:
-        """Return the compliance of the contact unknowns and their free motion, in one march with 2m + 1 columns."""
-        steps, unknowns = len(self.forces), self._unknowns
-        forces = np.zeros((steps, 2 * len(self.operator.mesh), len(unknowns) + 1))
-        forces[0, unknowns, np.arange(len(unknowns))] = 1.0 / self.operator.rho
-        forces[:, :, -1] = self.forces.reshape(steps, -1) / self.operator.rho
-        prescribed = None
-        if self.prescribed is not None:
-            prescribed = np.zeros_like(forces)
-            prescribed[:, :, -1] = np.asarray(self.prescribed).reshape(steps, -1)
-        u = self.marching.run(forces, prescribed)[0][:, unknowns]
-        return self._compliance(np.ascontiguousarray(u[:, :, :-1]), np.ascontiguousarray(u[:, :, -1]))
+def freed(operator: PoincareSteklov | ConvolutionOperator, forces: ArrayLike) -> Array:
+    """Return the displacement (steps, 2, n) under nodal forces without any support."""
+    given = array(type(operator).__name__, "forces", forces, operator.load_shape(3), unit="N/m")
+    return BoundaryProblem(operator, given).solve().displacement
