@@ -45,15 +45,15 @@ def evaluate_here(name: str, value: Value, points: Array, t: float) -> tuple[Arr
         said = f"{type(error).__name__}: {error} ({Path(place.filename).name}, line {place.lineno})"
         return np.zeros_like(points), f"{name} at t = {t:g} s ended in {said}: correct its function"
     if result.dtype.kind not in "iuf":
-        return np.zeros_like(points), f"{name} returned {shown(result)}: return real numbers"
-    result = result.astype(float, copy=False)
-    if result.shape != points.shape:
+        defect = f"{name} returned {shown(result)}: return real numbers"
+    elif result.shape != points.shape:
         shape = f"shape {result.shape} for {len(points)} points"
-        return np.zeros_like(points), f"{name} returned {shape}: return {points.shape[1]} components per point"
-    if not np.all(np.isfinite(result)):
-        where = f"NaN or infinite values at t = {t:g} s"
-        return np.zeros_like(points), f"{name} contains {where}: check its function or data"
-    return result, ""
+        defect = f"{name} returned {shape}: return {points.shape[1]} components per point"
+    elif not np.all(np.isfinite(result)):
+        defect = f"{name} contains NaN or infinite values at t = {t:g} s: check its function or data"
+    else:
+        return result.astype(float, copy=False), ""
+    return np.zeros_like(points), defect
 
 
 def _zero(points: Array, t: float) -> Array:

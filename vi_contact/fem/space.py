@@ -24,12 +24,10 @@ from .petsc_algebra import MpiComm, PetscMatrix
 from .ties import PLACE_TOLERANCE, Pairs, Tied, paired
 
 
-def body_numbers(mesh: Any, numbers: Indices) -> Indices:
+def body_numbers(mesh: Any) -> Indices:
     """Return the body (0, 1, ..., in the order of their smallest node number) of each local geometry node. Collective.
-
-    numbers: original numbers of the local geometry nodes.
     """
-    cells = compat.geometry_dofmap(mesh)
+    cells, numbers = compat.geometry_dofmap(mesh), node_numbers(mesh)
     count = mesh.topology.index_map(mesh.topology.dim).size_local
     first = np.repeat(cells[:, :1], cells.shape[1] - 1, axis=1)
     part = _smallest(first.ravel(), cells[:, 1:].ravel(), numbers)
@@ -192,7 +190,7 @@ class FemSpace:
     @cached_property
     def body_of_node(self) -> Indices:
         """Return the body of every owned node: parts of the mesh that share no node, in the order of node numbers."""
-        return body_numbers(self.mesh, node_numbers(self.mesh))[compat.dof_to_node(self.V)[: len(self.nodes)]]
+        return body_numbers(self.mesh)[compat.dof_to_node(self.V)[: len(self.nodes)]]
 
     @property
     def bodies(self) -> Indices:
