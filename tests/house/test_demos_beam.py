@@ -6,14 +6,13 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from demo_runs import demo
+from kept_figures import keep_figures
 
 from vi_contact import beam, cli
-from vi_contact.plots import histories as plotting
 from vi_contact.studies.cases.beam_study import BeamStudy, read_beam_run
 
 pytestmark = pytest.mark.serial
@@ -44,14 +43,7 @@ def test_every_axis_has_a_label(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     """Quantity and unit; curves in every panel."""
     from vi_contact.plots import beam as plotting_beam
 
-    seen: list[Any] = []
-    save = plotting.save
-
-    def keep(figure: Any, path: Any) -> Path:
-        seen.append(figure)
-        return save(figure, path)
-
-    monkeypatch.setattr(plotting_beam, "save", keep)
+    seen = keep_figures(monkeypatch, plotting_beam)
     stepper = beam.BeamStepper(beam.TimoshenkoBeam(), beam.Elements(10), 0.01, lambda t: 5.0, lambda t, rate: 0.2)
     run = beam.run_beam(stepper, beam.published_start(), steps=40, every=4)
     plotting_beam.plot_beam_energies({"one": run}, tmp_path / "energy.png", title="Energy")
