@@ -127,8 +127,8 @@ def _samples(text: TextFile, block: Block) -> list[float]:
         row = text.fixed(index, block.width) if index < len(text.lines) else []
         wanted = min(block.per_line, block.count - len(values))
         if len(row) != wanted:
-            raise InputError(f"{text.at(block.line)}: {block.count:g} samples are announced but line {index + 1} holds "
-                             f"{len(row)} of them instead of {wanted:g}; get the complete file")
+            raise InputError(f"{text.at(block.line)}: {block.count:.12g} samples are announced but line {index + 1} "
+                             f"holds {len(row)} of them instead of {wanted:g}; get the complete file")
         if unknown in row:
             raise InputError(f"{text.at(index)}: a sample is marked as unknown ({unknown:g}); use another record")
         values += row

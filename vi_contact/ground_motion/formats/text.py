@@ -79,7 +79,7 @@ class TextFile:
                              "leave units out or correct the file")
         if step is None:
             raise InputError(f"{self.path}: the file does not state its time step; pass dt= in seconds")
-        if self.dt is not None and not math.isclose(step, self.dt, rel_tol=SAME_STEP):
+        if dt is not None and self.dt is not None and not math.isclose(dt, self.dt, rel_tol=SAME_STEP):
             raise InputError(f"{self.path}: the file states a time step of {step:g} s but dt={self.dt!r} was passed; "
                              "leave dt out or correct the file")
         return Record(acceleration=UNITS[names[0]] * scale * np.array(samples, dtype=float), units=names[0], dt=step,
@@ -93,12 +93,13 @@ class TextFile:
             return int(self.channel or 1) - 1
         names = ", ".join(f"{k}: {name or 'unnamed'}" for k, name in enumerate(components, 1))
         wrong = "" if self.channel is None else f"there is no channel {self.channel}: "
-        raise InputError(f"{self.path}: {wrong}the file holds {len(components)} channels ({names}); pass channel=")
+        count = "1 channel" if len(components) == 1 else f"{len(components)} channels"
+        raise InputError(f"{self.path}: {wrong}the file holds {count} ({names}); pass channel=")
 
     def refuse_other_count(self, index: int, announced: float, found: int) -> None:
         """Raise InputError unless as many samples were found as lines[index] announces."""
         if found != announced:
-            raise InputError(f"{self.at(index)}: {announced:g} samples are announced but {found} follow; get the "
+            raise InputError(f"{self.at(index)}: {announced:.12g} samples are announced but {found} follow; get the "
                              "complete file")
 
     def filled(self, start: int) -> Sequence[int]:
