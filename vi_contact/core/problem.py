@@ -32,10 +32,7 @@ class ContactProblem:
     mass: MassLaw | None = None
 
     def __post_init__(self) -> None:
-        check_parts(
-            self.system, self.surface, self.friction, self.impact, self.mass, self.excitations,
-            frictional=self.frictional,
-        )
+        check_parts(self)
 
     @property
     def excitations(self) -> tuple[Excitation, ...]:

@@ -20,19 +20,17 @@ from .system import SemiDiscreteSystem
 EXCITATION = ("acceleration", "direction", "duration")
 
 
-def check_parts(
-    system: Any, surface: Any, friction: Any, impact: Any, mass: Any, excitations: tuple[Any, ...], *, frictional: bool
-) -> None:
+def check_parts(problem: Any) -> None:
     """Raise InputError, on all ranks, for parts of the wrong kind or size, or made for another system. Collective."""
-    owner = "ContactProblem"
+    owner, system, surface, excitations = "ContactProblem", problem.system, problem.surface, problem.excitations
     instance(owner, "system", system, SemiDiscreteSystem, "give a system, such as fem.assemble returns")
     instance(owner, "surface", surface, ContactSurface, "give a contact surface, such as fem.contact_surface returns")
-    provides(owner, "friction", friction, ("limit", "slope", "at"), "give Coulomb(mu) or another friction law")
-    if impact is not None:
-        provides(owner, "impact", impact, ("target", "apply"), "give Inelastic() or another law, or None")
-    if mass is not None:
+    provides(owner, "friction", problem.friction, ("limit", "slope", "at"), "give Coulomb(mu) or another friction law")
+    if problem.impact is not None:
+        provides(owner, "impact", problem.impact, ("target", "apply"), "give Inelastic() or another law, or None")
+    if problem.mass is not None:
         remedy = "give Redistributed() or ConsistentMass(), or None"
-        provides(owner, "mass", mass, ("apply",), remedy, lacks=("target",))
+        provides(owner, "mass", problem.mass, ("apply",), remedy, lacks=("target",))
     for excitation in excitations:
         _check_excitation(excitation, system)
     if system.absolute and excitations:
@@ -49,7 +47,7 @@ def check_parts(
         raise InputError(f"ContactProblem: the surface is shared by {surface.comm.size} ranks and the system by "
                          f"{system.algebra.comm.size}: make both on the same ranks")
     refuse((*_of_system(system), *_of_surface(surface, system)), surface.comm)
-    if frictional:
+    if problem.frictional:
         refuse_rubbing(surface)
 
 

@@ -140,15 +140,15 @@ def _pieces(bar: BouncingBar, round_trips: int) -> tuple[Array, Array, Array]:
             event = t - a / a1 if a1 > 0.0 else math.inf  # a grows to zero: release
         else:
             wave.append((y - fall - value, slope, curvature))
-            event = t + _landing(y, a, a1)
+            event = t + first_root(y, a, a1)
         step = (event if event < end - COINCIDENT * trip else end) - t
         t += step
         y = 0.0 if touching or t == event else y + (a + 0.5 * a1 * step) * step
     return np.array(start), np.array(wave), np.array(closed, dtype=float)
 
 
-def _landing(y: float, a: float, a1: float) -> float:
-    """Return the first s > 0 with y + a s + a1 s²/2 = 0, not negative before; infinite if there is none."""
+def first_root(y: float, a: float, a1: float) -> float:
+    """Return the first s > 0 at which y + a s + a1 s²/2, positive before, is zero; infinite if there is none."""
     disc = a * a - 2.0 * a1 * y
     if disc < 0.0 or (a1 >= 0.0 and a >= 0.0):
         return math.inf

@@ -95,7 +95,8 @@ class HousnerBlock:
         phi = ±(1 - (1 - phi_n) cosh(p (t - t_n))), t_n the time of the n-th amplitude; 0 after the rest time.
         """
         t = np.asarray(t, dtype=float)
-        phi = self._amplitudes(theta0, self._impacts())
+        impacts = math.ceil(math.log(REST) / math.log(self.energy_ratio))  # then phi is below REST, from any angle
+        phi = self._amplitudes(theta0, impacts)
         ends = self.impact_times(theta0, len(phi) - 1)
         peaks = np.append(0.0, 0.5 * (ends[1:] + ends[:-1]))
         n = np.searchsorted(ends, t, side="right")
@@ -119,10 +120,6 @@ class HousnerBlock:
         if not 0.0 < theta0 < self.alpha:
             raise InputError(f"HousnerBlock: theta0 is {theta0!r}; give one between 0 and alpha = {self.alpha:.6g}")
         return theta0 / self.alpha
-
-    def _impacts(self) -> int:
-        """Return the number of impacts after which phi is below REST, from any angle."""
-        return math.ceil(math.log(REST) / math.log(self.energy_ratio))
 
     def _amplitudes(self, theta0: float, impacts: int) -> Array:
         """Return phi_0, ..., shape (impacts + 1,)."""

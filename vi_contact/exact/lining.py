@@ -16,7 +16,6 @@ with A = -G gamma/2, B = 0 in the soil. ``ThinLining`` is the usual formula for 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -97,9 +96,8 @@ class ThickLining:
     def _constants(self) -> Array:
         """Return A, B, C, D of the lining; C, D of the soil, for gamma = 1, lengths in units of the outer radius."""
         G = self.soil.shear_modulus
-        lining, soil = self._rows(self.lining), self._rows(self.soil)
-        inside, interface = lining(self.inner / self.outer), lining(1.0)
-        outside = soil(1.0)
+        inside, interface = _rows(self.lining, self.inner / self.outer), _rows(self.lining, 1.0)
+        outside = _rows(self.soil, 1.0)
         far = np.array([-0.5 * G, 0.0, 0.0, 0.0])
         matrix, right = np.zeros((6, 6)), np.zeros(6)
         matrix[0, :4], matrix[1, :4] = inside["sigma_r"], inside["tau"]
@@ -113,26 +111,10 @@ class ThickLining:
         scale = np.abs(matrix).max(axis=1)
         return np.asarray(np.linalg.solve(matrix / scale[:, None], right / scale))
 
-    @staticmethod
-    def _rows(material: LinearElastic) -> Callable[[float], dict[str, Array]]:
-        """Return the amplitudes of the fields at r as products with (A, B, C, D)."""
-        nu, G2 = material.nu, 2.0 * material.shear_modulus
-
-        def at(r: float) -> dict[str, Array]:
-            return {
-                "sigma_r": -np.array([2.0, 0.0, 6.0 / r**4, 4.0 / r**2]),
-                "sigma_theta": np.array([2.0, 12.0 * r**2, 6.0 / r**4, 0.0]),
-                "tau": np.array([2.0, 6.0 * r**2, -6.0 / r**4, -2.0 / r**2]),
-                "u_r": np.array([-2.0 * r, -4.0 * nu * r**3, 2.0 / r**3, 4.0 * (1.0 - nu) / r]) / G2,
-                "u_theta": np.array([2 * r, 2 * (3 - 2 * nu) * r**3, 2 / r**3, -2 * (1 - 2 * nu) / r]) / G2,
-            }
-
-        return at
-
     def field(self, name: str, r: float, gamma: float) -> float:
         """Return the amplitude of "sigma_r", "sigma_theta", "tau" [Pa], "u_r", "u_theta" [m] in the lining at r [m]."""
         size = self.outer if name.startswith("u_") else 1.0
-        return float(gamma * size * (self._rows(self.lining)(r / self.outer)[name] @ self._constants[:4]))
+        return float(gamma * size * (_rows(self.lining, r / self.outer)[name] @ self._constants[:4]))
 
     def diameter_change(self, gamma: float) -> float:
         """Return 2 u_r [m] at the outside, of the diameter that is stretched most."""
@@ -156,3 +138,15 @@ class ThickLining:
         half, mean = 0.5 * (self.outer - self.inner), 0.5 * (self.outer + self.inner)
         hoop = np.array([self.field("sigma_theta", mean + half * s, gamma) for s in x])
         return float(half * (w @ hoop)), float(half * (w @ (hoop * half * x)))
+
+
+def _rows(material: LinearElastic, r: float) -> dict[str, Array]:
+    """Return the amplitudes of the fields at r as products with (A, B, C, D)."""
+    nu, G2 = material.nu, 2.0 * material.shear_modulus
+    return {
+        "sigma_r": -np.array([2.0, 0.0, 6.0 / r**4, 4.0 / r**2]),
+        "sigma_theta": np.array([2.0, 12.0 * r**2, 6.0 / r**4, 0.0]),
+        "tau": np.array([2.0, 6.0 * r**2, -6.0 / r**4, -2.0 / r**2]),
+        "u_r": np.array([-2.0 * r, -4.0 * nu * r**3, 2.0 / r**3, 4.0 * (1.0 - nu) / r]) / G2,
+        "u_theta": np.array([2 * r, 2 * (3 - 2 * nu) * r**3, 2 / r**3, -2 * (1 - 2 * nu) / r]) / G2,
+    }

@@ -69,7 +69,9 @@ class RigidWall:
 
     def thrust(self, acceleration: float) -> float:
         """Return Q [N/m] under a body force rho a to the wall; turning takes 8 G/pi² M_1 kappa d/(1 + Q_1 kappa d)."""
-        return self._unit(acceleration) * self.height * (THRUST - TURNED * MOMENT * self._yielding)
+        flexibility = self.kappa * self.flexibility
+        yielding = flexibility / (1.0 + THRUST * flexibility)
+        return self._unit(acceleration) * self.height * (THRUST - TURNED * MOMENT * yielding)
 
     def moment(self, acceleration: float) -> float:
         """Return M [N] about the foot of the wall."""
@@ -78,9 +80,3 @@ class RigidWall:
     def thrust_height(self, acceleration: float = 1.0) -> float:
         """Return the height [m] of the thrust above the rock, M/Q; 0.5986 H for a wall that cannot turn."""
         return self.moment(acceleration) / self.thrust(acceleration)
-
-    @property
-    def _yielding(self) -> float:
-        """Return kappa d/(1 + 0.54276 kappa d)."""
-        flexibility = self.kappa * self.flexibility
-        return flexibility / (1.0 + THRUST * flexibility)

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from ..core.algebra import Array
 from ..core.checks import attributes
 from ..core.errors import InputError
+from .bouncing_bar import first_root
 
 
 @dataclass(frozen=True)
@@ -70,7 +71,7 @@ class SlidingBlock:
                 a, length = math.copysign(self.onset_acceleration, slope), length - wait
                 continue
             push = -a - sign * self.onset_acceleration
-            step = min(length, _stop(sign * v, sign * push, -sign * slope))
+            step = min(length, first_root(sign * v, sign * push, -sign * slope))
             u += step * (v + step * (0.5 * push - slope * step / 6.0))
             v = 0.0 if step < length else v + step * (push - 0.5 * slope * step)
             a, length = a + slope * step, length - step
@@ -81,16 +82,3 @@ class SlidingBlock:
         side = math.copysign(1.0, a)  # of ±0 too, for a block without friction
         slides = abs(a) > self.onset_acceleration or (abs(a) == self.onset_acceleration and side * slope > 0.0)
         return -side if slides else 0.0
-
-
-def _stop(v: float, push: float, jerk: float) -> float:
-    """Return the first s > 0 at which v + push s + jerk s²/2, positive before, is zero; infinite if there is none."""
-    disc = push * push - 2.0 * jerk * v
-    if disc < 0.0:
-        return math.inf
-    root = math.sqrt(disc)
-    if v == 0.0:  # push >= 0
-        return -2.0 * push / jerk if jerk < 0.0 else math.inf
-    if push < 0.0:
-        return 2.0 * v / (root - push)
-    return (-push - root) / jerk if jerk < 0.0 else math.inf

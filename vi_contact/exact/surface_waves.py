@@ -46,27 +46,6 @@ def dashpot_reflection(
 
     angle: from the normal of the boundary, 0 to pi/2; wave: "P" or "S"; normal, tangential: factors of rho c_P and
     rho c_S. Amplitudes of displacement. InputError for another wave or angle.
-    """
-    return tuple(abs(a) for a in _reflected(material, angle, wave, normal, tangential))  # type: ignore[return-value]
-
-
-def dashpot_energy(
-    material: LinearElastic, angle: float, *, wave: str, normal: float = 1.0, tangential: float = 1.0
-) -> float:
-    """Return reflected over incident energy flux at right angles to the boundary; see ``dashpot_reflection``."""
-    a_p, a_s = _reflected(material, angle, wave, normal, tangential)
-    c_p, c_s = material.c_p, material.c_s
-    speed = c_p if wave == "P" else c_s
-    p = math.sin(angle) / speed
-    cosines = [complex(np.emath.sqrt(1.0 - (p * c) ** 2)) for c in (c_p, c_s)]
-    fluxes = [c * cosine.real * abs(a) ** 2 for c, cosine, a in zip((c_p, c_s), cosines, (a_p, a_s), strict=True)]
-    return float(sum(fluxes) / (speed * math.cos(angle)))
-
-
-def _reflected(
-    material: LinearElastic, angle: float, wave: str, normal: float, tangential: float
-) -> tuple[complex, complex]:
-    """Return the amplitudes of the reflected P and S wave.
 
     Boundary y = 0, body y < 0, factor exp(i w (t - p x)) with slowness p along the boundary. P waves have displacement
     (p, ±eta_p) c_P, S waves (±eta_s, -p) c_S with the vertical slownesses eta (+ travels towards the boundary).
@@ -94,4 +73,17 @@ def _reflected(
 
     incident = p_wave(eta_p) if wave == "P" else s_wave(eta_s)
     a_p, a_s = np.linalg.solve(np.column_stack([p_wave(-eta_p), s_wave(-eta_s)]), -incident)
-    return complex(a_p), complex(a_s)
+    return float(abs(a_p)), float(abs(a_s))
+
+
+def dashpot_energy(
+    material: LinearElastic, angle: float, *, wave: str, normal: float = 1.0, tangential: float = 1.0
+) -> float:
+    """Return reflected over incident energy flux at right angles to the boundary; see ``dashpot_reflection``."""
+    amplitudes = dashpot_reflection(material, angle, wave=wave, normal=normal, tangential=tangential)
+    speeds = material.c_p, material.c_s
+    speed = speeds["PS".index(wave)]
+    p = math.sin(angle) / speed
+    cosines = [np.emath.sqrt(1.0 - (p * c) ** 2).real for c in speeds]
+    fluxes = [c * cosine * a**2 for c, cosine, a in zip(speeds, cosines, amplitudes, strict=True)]
+    return float(sum(fluxes) / (speed * math.cos(angle)))

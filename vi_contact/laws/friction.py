@@ -129,46 +129,59 @@ def _coefficients(values: Any) -> Array:
 
 
 @dataclass(frozen=True)
-class ExponentialDecay:
+class TwoCoefficients:
+    """Hold static and kinetic coefficients: numbers >= 0, or one per contact point. InputError for other values."""
+
+    mu_s: float | Array | tuple[float, ...]
+    mu_k: float | Array | tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        for name, meaning in (("mu_s", "the static coefficient mu_s"), ("mu_k", "the kinetic coefficient mu_k")):
+            object.__setattr__(self, name, _checked(type(self).__name__, meaning, getattr(self, name)))
+        if isinstance(self.mu_s, tuple) and isinstance(self.mu_k, tuple) and len(self.mu_s) != len(self.mu_k):
+            raise InputError(f"{self}: {len(self.mu_s)} static and {len(self.mu_k)} kinetic coefficients; give as many")
+
+    def _nodal(self, count: int) -> list[Array]:
+        """mu_s and mu_k as arrays that broadcast over the nodes."""
+        return [_nodal(type(self).__name__, name, getattr(self, name), count) for name in ("mu_s", "mu_k")]
+
+
+@dataclass(frozen=True)
+class ExponentialDecay(TwoCoefficients):
     """Give mu(v) = mu_k + (mu_s - mu_k) exp(-v/v_c): from static to kinetic friction over the speed v_c [m/s] > 0.
 
     mu_s, mu_k: numbers >= 0, or one per contact point. InputError for other values.
     """
 
-    mu_s: float | Array | tuple[float, ...]
-    mu_k: float | Array | tuple[float, ...]
     v_c: float
 
     def __post_init__(self) -> None:
-        _keep_coefficients(self)
+        super().__post_init__()
         if not 0.0 < real(self.v_c) < math.inf:
             raise InputError(f"ExponentialDecay: v_c [m/s] is {shown(self.v_c)}; give a positive speed, or "
                              "StaticKinetic()")
 
     def __call__(self, speed: Array) -> Array:
         """mu of each speed."""
-        static, kinetic = _nodal_pair(self, len(speed))
+        static, kinetic = self._nodal(len(speed))
         return np.asarray(kinetic + (static - kinetic) * np.exp(-speed / self.v_c))
 
 
 @dataclass(frozen=True)
-class StaticKinetic:
+class StaticKinetic(TwoCoefficients):
     """Give mu_s at rest, mu_k in motion: the limit of ExponentialDecay for v_c -> 0. Where both hold, rest is chosen.
 
     mu_s >= mu_k >= 0: numbers, or one per contact point. InputError for other values.
     """
 
-    mu_s: float | Array | tuple[float, ...]
-    mu_k: float | Array | tuple[float, ...]
-
     def __post_init__(self) -> None:
-        _keep_coefficients(self)
+        super().__post_init__()
         if np.any(np.asarray(self.mu_s) < np.asarray(self.mu_k)):
             raise InputError(f"{self}: moving points that rub more than resting ones have no rate; give mu_s >= mu_k")
 
     def __call__(self, speed: Array) -> Array:
         """mu of each speed."""
-        static, kinetic = _nodal_pair(self, len(speed))
+        static, kinetic = self._nodal(len(speed))
         return np.where(speed == 0.0, static, kinetic)
 
 
@@ -205,17 +218,3 @@ def _nodal(law: str, name: str, value: Any, count: int) -> Array:
             "per contact point in the order of surface.points"
         )
     return np.asarray(value, dtype=float)
-
-
-def _keep_coefficients(law: ExponentialDecay | StaticKinetic) -> None:
-    """Check mu_s and mu_k and keep fields as tuples."""
-    for name, meaning in (("mu_s", "the static coefficient mu_s"), ("mu_k", "the kinetic coefficient mu_k")):
-        object.__setattr__(law, name, _checked(type(law).__name__, meaning, getattr(law, name)))
-    if isinstance(law.mu_s, tuple) and isinstance(law.mu_k, tuple) and len(law.mu_s) != len(law.mu_k):
-        raise InputError(f"{law}: {len(law.mu_s)} static and {len(law.mu_k)} kinetic coefficients; give as many")
-
-
-def _nodal_pair(law: ExponentialDecay | StaticKinetic, count: int) -> tuple[Array, Array]:
-    """(mu_s, mu_k) as arrays that broadcast over the nodes."""
-    name = type(law).__name__
-    return _nodal(name, "mu_s", law.mu_s, count), _nodal(name, "mu_k", law.mu_k, count)

@@ -59,6 +59,10 @@ class Bar:
         """Return the area of the section per unit of whatever the dimension leaves out."""
         return float((self.across * self.cell) ** (self.dimension - 1))
 
+    def along(self, value: float, across: float = 0.0) -> Array:
+        """Return the vector (d,) with this component along the bar, upwards, and ``across`` it."""
+        return np.where(np.arange(self.dimension) == UP[self.dimension], value, across)
+
     def time_step(self, courant: float = 1.0) -> float:
         """Return courant * cell / c [s]."""
         c = np.sqrt(self.material.E / self.material.rho)
@@ -76,52 +80,35 @@ class BarModel:
 
     def problem(self, *, mass: MassLaw | None = None, impact: ImpactLaw | None = None) -> ContactProblem:
         """Set up the bar in possible contact along its foot."""
-        point, normal = np.zeros(self.bar.dimension), np.zeros(self.bar.dimension)
-        point[UP[self.bar.dimension]], normal[UP[self.bar.dimension]] = -self.gap, 1.0
-        wall = HalfSpace(point=tuple(point), normal=tuple(normal))
-        return ContactProblem(
-            self.system, contact_surface(self.system, self.foot, obstacle=wall), mass=mass, impact=impact
-        )
+        normal = self.bar.along(1.0)
+        wall = HalfSpace(point=tuple(-self.gap * normal), normal=tuple(normal))
+        surface = contact_surface(self.system, self.foot, obstacle=wall)
+        return ContactProblem(self.system, surface, mass=mass, impact=impact)
 
     def probes(self) -> dict[str, tuple[float, ...]]:
         """Return the middle of the foot and of the top."""
         middle = 0.5 * self.bar.across * self.bar.cell
-        ends = {}
-        for name, height in (("foot", 0.0), ("top", self.bar.length)):
-            point = np.full(self.bar.dimension, middle)
-            point[UP[self.bar.dimension]] = height
-            ends[name] = tuple(point)
-        return ends
+        heights = {"foot": 0.0, "top": self.bar.length}
+        return {name: tuple(self.bar.along(height, middle)) for name, height in heights.items()}
 
 
 def build(bar: Bar, comm: Any) -> BarModel:
     """Mesh and assemble the bar, with the initial data of its case."""
     d, case = bar.dimension, bar.case
-    axis = UP[d]
-    lengths, divisions = np.full(d, bar.across * bar.cell), np.full(d, bar.across)
-    lengths[axis], divisions[axis] = bar.length, bar.elements
-    mesh, tags = build_mesh(
-        BlockMesh(lengths=tuple(lengths), divisions=tuple(int(n) for n in divisions), simplices=bar.triangles), comm
-    )
+    lengths = tuple(bar.along(bar.length, bar.across * bar.cell))
+    divisions = tuple(int(n) for n in bar.along(bar.elements, bar.across))
+    mesh, tags = build_mesh(BlockMesh(lengths=lengths, divisions=divisions, simplices=bar.triangles), comm)
     foot, top = (tags[name] for name in SIDES[d])
-
-    def upwards(values: Array) -> Array:
-        field = np.zeros((len(values), d))
-        field[:, axis] = values
-        return field
-
     data: dict[str, Any] = {}
     gap = 0.0
     if isinstance(case, ThrownBar):
         gap = case.height
-        data["initial_velocity"] = lambda x: upwards(np.full(len(x), -case.speed))
+        data["initial_velocity"] = tuple(bar.along(-case.speed))
     elif isinstance(case, BouncingBar):
         gap = case.height
-        weight = np.zeros(d)
-        weight[axis] = -case.rho * case.gravity
-        data["loads"] = BodyForce(tuple(weight))
+        data["loads"] = BodyForce(tuple(bar.along(-case.rho * case.gravity)))
     else:
         data["clamped"] = top
-        data["initial_displacement"] = lambda x: upwards(0.5 * (1.0 - x[:, axis]))
+        data["initial_displacement"] = lambda x: np.outer(0.5 * (1.0 - x[:, UP[d]]), bar.along(1.0))
     section = {1: None, 2: PlaneStrain(), 3: Solid()}[d]
     return BarModel(bar, assemble(mesh, bar.material, section=section, **data), foot, gap)

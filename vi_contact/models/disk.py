@@ -15,7 +15,7 @@ from ..core.checks import attributes, function, instance
 from ..core.obstacles import HalfSpace
 from ..core.problem import ContactProblem
 from ..core.protocols import FrictionLaw, Frictionless, MassLaw
-from ..core.step import Report, State
+from ..core.step import Columns, Report, Row, State
 from ..core.system import SemiDiscreteSystem
 from ..fem.assembly import assemble
 from ..fem.contact.surface import contact_surface
@@ -97,7 +97,7 @@ class Momentum:
     def __init__(self, centre: tuple[float, float]) -> None:
         self._centre = centre
 
-    def columns(self) -> Mapping[str, tuple[str, str]]:
+    def columns(self) -> Columns:
         """Return the columns momentum_x, momentum_y, momentum_angular."""
         return {
             "momentum_x": ("kg m/s", "momentum along x"),
@@ -105,9 +105,7 @@ class Momentum:
             "momentum_angular": ("kg m²/s", "angular momentum, positive anticlockwise"),
         }
 
-    def start(
-        self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
-    ) -> Mapping[str, float]:
+    def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
         """Return the momentum of the initial state."""
         self._system = system = problem.equations
         x, y = (system.space.coordinates - self._centre).T
@@ -115,10 +113,10 @@ class Momentum:
         self._motions = {"x": along, "y": up, "angular": up * x - along * y}
         return self._row(state)
 
-    def row(self, report: Report) -> Mapping[str, float]:
+    def row(self, report: Report) -> Row:
         return self._row(report.new)
 
-    def _row(self, state: State) -> Mapping[str, float]:
+    def _row(self, state: State) -> Row:
         impulse = self._system.M @ state.v
         return {f"momentum_{name}": self._system.algebra.dot(motion, impulse)
                 for name, motion in self._motions.items()}

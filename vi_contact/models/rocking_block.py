@@ -25,7 +25,7 @@ from ..core.errors import InputError
 from ..core.obstacles import HalfSpace
 from ..core.problem import ContactProblem
 from ..core.protocols import Excitation
-from ..core.step import Report, State
+from ..core.step import Columns, Report, Row, State
 from ..exact.housner import HousnerBlock
 from ..fem.assembly import assemble
 from ..fem.contact.surface import contact_surface
@@ -158,7 +158,7 @@ class Rocking:
     def __init__(self, model: RockingModel) -> None:
         self._model = model
 
-    def columns(self) -> Mapping[str, tuple[str, str]]:
+    def columns(self) -> Columns:
         """Return the columns theta, theta_rate, r_left, r_right."""
         return {
             "theta": ("rad", "rotation, positive when the right corner is up"),
@@ -167,16 +167,14 @@ class Rocking:
             "r_right": ("N", "reaction of the ground at the right corner, mean of the step"),
         }
 
-    def start(
-        self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
-    ) -> Mapping[str, Any]:
+    def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
         """Return the row of the initial state."""
         return self._row(state)
 
-    def row(self, report: Report) -> Mapping[str, Any]:
+    def row(self, report: Report) -> Row:
         return self._row(report.new)
 
-    def _row(self, state: State) -> Mapping[str, Any]:
+    def _row(self, state: State) -> Row:
         return {
             "theta": self._model.angle(state), "theta_rate": self._model.spin(state),
             "r_left": float(state.r_n[0]), "r_right": float(state.r_n[1]),

@@ -21,7 +21,7 @@ from ..engineering.modal import lowest_frequency
 from ..fem.assembly import assemble
 from ..fem.contact.surface import contact_surface
 from ..fem.loads import BodyForce
-from ..fem.mesh import Facets, build_mesh
+from ..fem.mesh import build_mesh
 from ..fem.petsc_algebra import MpiComm
 from ..laws.excitation import Harmonic
 from ..laws.impact import Inelastic
@@ -92,23 +92,17 @@ class WallModel:
     tags: Any
     system: SemiDiscreteSystem
 
-    @property
-    def face(self) -> Facets:
-        """Return the contact side."""
-        facets: Facets = self.tags["face"]
-        return facets
-
     def surface(self, case: str) -> ContactSurface:
         """Make the contact conditions of a case of CASES, or of the whole side for "face"."""
         ground = HalfSpace(point=(self.wall.width, 0.0), normal=(-1.0, 0.0))
         if case == "face":
-            return contact_surface(self.system, self.face, obstacle=ground)
+            return contact_surface(self.system, self.tags["face"], obstacle=ground)
         if case not in CASES:
             raise InputError(f"unknown case '{case}': choose one of {', '.join(CASES)}")
         if case == "free":
             return empty_surface(MpiComm(self.mesh.comm), 2)
         points = [self.wall.point(number) for number in CASES[case]]
-        surface = contact_surface(self.system, self.face, obstacle=ground, points=points)
+        surface = contact_surface(self.system, self.tags["face"], obstacle=ground, points=points)
         return surface.bilateral_everywhere() if case == "bilateral" else surface
 
     def problem(

@@ -25,20 +25,17 @@ class SoilProbe(Probe):
     """
 
     def _found(self, problem: ContactProblem, points: Array) -> Indices:
-        return touched_nodes(problem.surface, super()._found(problem, points))
-
-
-def touched_nodes(surface: ContactSurface, nodes: Indices) -> Indices:
-    """Return the numbers of the nodes of side 2 that face nodes of side 1 (the nearest where divisions differ)."""
-    faced: dict[int, int] = {}
-    for part in surface.parts if isinstance(surface, FemSurface) else ():
-        if part.facing is not None:
-            opposite = np.asarray(part.facing.P.argmax(axis=1)).ravel()
-            faced |= dict(zip(part.nodes.numbers.tolist(), part.facing.nodes.numbers[opposite].tolist(), strict=True))
-    missing = [node for node in nodes.tolist() if node not in faced]
-    if missing:
-        raise InputError("a soil probe is not at the interface with the channel: give points of the channel's outline")
-    return np.array([faced[node] for node in nodes.tolist()], dtype=np.int64)
+        """Numbers of the nodes of side 2 that face those of side 1 (the nearest where divisions differ)."""
+        nodes, surface = super()._found(problem, points).tolist(), problem.surface
+        faced: dict[int, int] = {}
+        for part in surface.parts if isinstance(surface, FemSurface) else ():
+            if part.facing is not None:
+                opposite = part.facing.nodes.numbers[np.asarray(part.facing.P.argmax(axis=1)).ravel()]
+                faced |= dict(zip(part.nodes.numbers.tolist(), opposite.tolist(), strict=True))
+        if not faced.keys() >= set(nodes):
+            raise InputError("a soil probe is not at the interface with the channel: give points of the channel's "
+                             "outline")
+        return np.array([faced[node] for node in nodes], dtype=np.int64)
 
 
 @dataclass(frozen=True)
