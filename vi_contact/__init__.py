@@ -32,6 +32,7 @@ _CONTENTS = {
     "core.step": ("Report", "State", "StepProblem", "StepResult"),
     "schemes": schemes.__all__,
     "solvers.condensed": ("Condensed",),
+    "solvers.iterative": ("Iterative",),
     "solvers.volume": ("Volume",),
     "run.simulate": ("simulate",),
     "run.solution": ("Solution",),

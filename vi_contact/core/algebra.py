@@ -114,11 +114,17 @@ class Algebra(Protocol):
 
 
 class EffectiveMatrix:
-    """Hold the matrix A of a step and its factor. A prepared solver belongs to one of these; it lives as long as dt."""
+    """Hold the matrix A of a step and its factor. A prepared solver belongs to one of these; it lives as long as dt.
 
-    def __init__(self, matrix: Matrix, algebra: Algebra) -> None:
+    ``space``: what its unknowns mean (core.system.Space); ``inertia``: (m, M) of A = m M + c C + k K. None: not known.
+    """
+
+    def __init__(
+        self, matrix: Matrix, algebra: Algebra, *, space: Any = None, inertia: tuple[float, Matrix] | None = None
+    ) -> None:
         self.matrix = matrix
         self.algebra = algebra
+        self.space, self.inertia = space, inertia
 
     @cached_property
     def factor(self) -> Factor:

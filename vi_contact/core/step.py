@@ -91,7 +91,8 @@ class StepResult:
     """Answer a step: x (n,), r_n (m,) and r_t (m, d - 1), ``scale`` times newtons, and the closed conditions (m,).
 
     ``iterations`` count changes of the active set, sweeps or Newton steps, as ``method`` says.
-    ``history``: what the method with friction logs of its convergence, see there.
+    ``history``: what the method with friction logs of its convergence, see there. ``aim``: the residual at which an
+    iterative method stopped because it was told to, 0 for one that goes on to round-off.
     """
 
     x: Array
@@ -101,6 +102,7 @@ class StepResult:
     method: str
     r_t: Array | None = None
     history: tuple[float, ...] = ()
+    aim: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -193,7 +193,7 @@ class SemiDiscreteSystem:
         terms = [(m, self.M), (k, self.K)]
         if self.C is not None:
             terms.append((c, self.C))
-        return EffectiveMatrix(self.algebra.combine(terms), self.algebra)
+        return EffectiveMatrix(self.algebra.combine(terms), self.algebra, space=self.space, inertia=(m, self.M))
 
     def with_load(self, *terms: tuple[Array, Callable[[float], float]]) -> SemiDiscreteSystem:
         """Return the same system with separable loads vector * history(t) added."""

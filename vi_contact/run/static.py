@@ -59,7 +59,9 @@ class Equilibria:
     ) -> None:
         system, solver = problem.static_load, solver or Condensed()
         self._problem = problem
-        self._K = EffectiveMatrix(system.algebra.combine([(1.0, system.K)]), system.algebra)
+        self._K = EffectiveMatrix(
+            system.algebra.combine([(1.0, system.K)]), system.algebra, space=system.space, inertia=(0.0, system.M)
+        )
         self._solve: Callable[[StepProblem], StepResult]
         if system.floating:
             self._solve = Proximal(problem, self._K, solver, tolerance).solve

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from ..core.lazy import lazy
-from . import friction, normal, volume
+from . import friction, iterative, normal, volume
 
 _CONTENTS = {
     "condensed": ("Condensed",),
     "friction": friction.__all__,
+    "iterative": iterative.__all__,
     "normal": normal.__all__,
     "volume": volume.__all__,
 }

@@ -65,7 +65,7 @@ class CertifiedSolver:
                 tried.append(str(failure))
                 continue
             certificate = kkt_residual(step, result)
-            if NEAR * self._tolerance < certificate.worst < FAR:
+            if max(NEAR * self._tolerance, result.aim) < certificate.worst < FAR:
                 solve, goal = self._get(rank).solve, NEAR * self._tolerance
                 result, certificate = corrected(step, result, certificate, solve, goal)
             if certificate.worst <= self._tolerance:

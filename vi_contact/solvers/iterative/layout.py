@@ -1,0 +1,131 @@
+"""Number the unknowns in whole nodes, so that matrices can be stored in blocks of the components of two nodes.
+
+A product with blocks of 3 x 3 reads one column number where AIJ reads nine, and half of a symmetric matrix serves for
+all of it (SBAIJ): it takes a third of the time. Prescribed components are no unknowns, and a node that keeps
+others would break the blocks: it gets them back here as unknowns that are always held at zero.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from petsc4py import PETSc
+
+from ...core.algebra import Array, EffectiveMatrix, Indices, SerialMatrix, largest
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Say where this rank's unknowns stand among those of whole nodes: ``places`` (n,) of ``size``, ``width`` a node.
+
+    ``complete``: on no rank is there a component of a node that is no unknown.
+    """
+
+    width: int
+    places: Indices
+    size: int
+    complete: bool
+
+    def padded(self, x: Array) -> Array:
+        """Return the values of all components of the nodes, zero where there is no unknown; a copy."""
+        if self.complete:
+            return np.array(x)
+        values = np.zeros(self.size)
+        values[self.places] = x
+        return values
+
+    def stripped(self, values: Array) -> Array:
+        """Return the values of the unknowns; a copy."""
+        return values[self.places] if not self.complete else np.array(values)
+
+    @property
+    def missing(self) -> Indices:
+        """Return the places of components that are no unknowns."""
+        return np.setdiff1d(np.arange(self.size), self.places)
+
+
+def layout_of(A: EffectiveMatrix) -> Layout:
+    """Return the layout of the unknowns of A; one unknown a block where nothing is known of nodes. Collective."""
+    n = A.matrix.rows
+    if A.space is None or A.space.dimension == 1:
+        return Layout(1, np.arange(n), n, complete=True)
+    d = int(A.space.dimension)
+    node, component = np.divmod(np.asarray(A.space.ids), d)
+    first = np.ones(n, dtype=bool)
+    first[1:] = (node[1:] != node[:-1]) | (component[1:] <= component[:-1])
+    places = d * (np.cumsum(first) - 1) + component
+    size = d * int(first.sum())
+    return Layout(d, places, size, complete=not largest(A.algebra.comm, size != n))
+
+
+def assembled(A: EffectiveMatrix) -> Any:
+    """Return A as PETSc's AIJ matrix, its own where it has one."""
+    matrix = A.matrix
+    if not isinstance(matrix, SerialMatrix):
+        return matrix.mat  # type: ignore[attr-defined]
+    csr, kind = matrix.csr, PETSc.IntType
+    arrays = (csr.indptr.astype(kind), csr.indices.astype(kind), csr.data)
+    return PETSc.Mat().createAIJ(csr.shape, csr=arrays, comm=PETSc.COMM_SELF)
+
+
+class Nodewise:
+    """Make matrices of A in whole nodes."""
+
+    def __init__(self, A: EffectiveMatrix) -> None:
+        self.A, self.source, self.layout = A, assembled(A), layout_of(A)
+        self._selection: Any = None
+
+    def blocks(self) -> Any:
+        """Return A in symmetric blocks (SBAIJ), or its own AIJ where blocks have one entry. Collective."""
+        layout, kind = self.layout, PETSc.IntType
+        if layout.width == 1:
+            return self.source
+        mat = self.source if layout.complete else self.entries()
+        indptr, columns, values = mat.getValuesCSR()
+        first, d = mat.getOwnershipRange()[0], layout.width
+        rows = sp.csr_matrix((values, columns, indptr), shape=(layout.size, mat.getSize()[1])).tobsr((d, d))
+        if not layout.complete:
+            mat.destroy()
+        del indptr, columns, values
+        row = np.repeat(np.arange(layout.size // d), np.diff(rows.indptr))
+        upper = rows.indices >= first // d + row
+        ends = np.append(0, np.cumsum(np.bincount(row[upper], minlength=layout.size // d)))
+        arrays = (ends.astype(kind), rows.indices[upper].astype(kind), rows.data[upper])
+        made = PETSc.Mat().createSBAIJ(self._sizes(), d, csr=arrays, comm=self.source.comm)
+        made.assemble()
+        made.setOption(PETSc.Mat.Option.SPD, True)
+        return made
+
+    def entries(self, result: Any = None) -> Any:
+        """Return A as an AIJ matrix of whole nodes, each block stored in full; ``result``: an earlier one to refill.
+
+        Rows of missing components hold the largest diagonal entry of A.
+        """
+        mat = self.source.PtAP(self._selected(), result=result)
+        mat.setBlockSize(self.layout.width)
+        mat.setOption(PETSc.Mat.Option.KEEP_NONZERO_PATTERN, True)
+        if not self.layout.complete:
+            rows = mat.getOwnershipRange()[0] + self.layout.missing
+            mat.zeroRowsColumns(rows.astype(PETSc.IntType), diag=self.A.largest)
+        mat.setOption(PETSc.Mat.Option.SPD, True)
+        return mat
+
+    def _sizes(self) -> Any:
+        return ((self.layout.size, None), (self.layout.size, None))
+
+    def _selected(self) -> Any:
+        """P of A -> PᵀAP, with zeros stored for the other components of a node: that fills the blocks."""
+        if self._selection is None:
+            layout, kind, d = self.layout, PETSc.IntType, self.layout.width
+            n = len(layout.places)
+            first = self.source.comm.tompi4py().scan(layout.size) - layout.size
+            columns = (layout.places // d * d)[:, None] + np.arange(d)
+            values = (columns == layout.places[:, None]).astype(float)
+            csr = (np.arange(0, d * n + 1, d).astype(kind), (first + columns).ravel().astype(kind), values.ravel())
+            sizes = (self.source.getSizes()[0], (layout.size, None))
+            self._selection = PETSc.Mat().createAIJ(sizes, csr=csr, comm=self.source.comm)
+            self._selection.assemble()
+        return self._selection

@@ -1,0 +1,53 @@
+"""Make rigid body modes in the unknowns of the equations: turned into the nodal frames, relative at two bodies."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ...core.algebra import Array, EffectiveMatrix
+from ...core.surfaces import ContactSurface
+from .layout import Layout
+
+
+def rigid_modes(A: EffectiveMatrix, surface: ContactSurface, layout: Layout, template: Any) -> list[Any]:
+    """Return orthonormal PETSc vectors of the rigid motions: translations, then rotations in the planes of two axes."""
+    space, comm = A.space, A.algebra.comm
+    d, points = int(space.dimension), np.asarray(space.coordinates)
+    component = np.asarray(space.ids) % d
+    low = -comm.max(-np.min(points, axis=0, initial=np.inf))
+    high = comm.max(np.max(points, axis=0, initial=-np.inf))
+    x = (points - 0.5 * (low + high)) / np.linalg.norm(high - low)
+    modes = [(component == i).astype(float) for i in range(d)]
+    for i in range(d):
+        modes += [np.where(component == j, x[:, i], np.where(component == i, -x[:, j], 0.0)) for j in range(i + 1, d)]
+    return orthonormal([_vector(template, layout.padded(_unknowns(surface, mode))) for mode in modes])
+
+
+def _unknowns(surface: ContactSurface, u: Array) -> Array:
+    """The unknowns of the equations of displacements along the axes: T⁻¹ u, then R⁻¹ = 2 - R."""
+    turned = surface.in_frames(u)
+    return turned if surface.coupling is None else 2.0 * turned - surface.coupling @ turned
+
+
+def _vector(template: Any, values: Array) -> Any:
+    vector = template.duplicate()
+    vector.array[:] = values
+    return vector
+
+
+def orthonormal(vectors: list[Any]) -> list[Any]:
+    """Return the vectors made orthonormal in place (Gram and Schmidt, twice); those that vanish are left out."""
+    kept: list[Any] = []
+    for vector in vectors:
+        before = vector.norm()
+        for _ in range(2):
+            for other in kept:
+                vector.axpy(-vector.dot(other), other)
+        size = vector.norm()
+        if size > 1e-8 * before:
+            vector.scale(1.0 / size)
+            kept.append(vector)
+    return kept
+

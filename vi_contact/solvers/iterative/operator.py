@@ -1,0 +1,47 @@
+"""Apply A, and the springs of closed points, to what PETSc hands over."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from petsc4py import PETSc
+
+from ...core.algebra import Array, Indices
+from .work import Work
+
+
+class Operator:
+    """Multiply by A + the stiffness of closed springs: the context of a PETSc shell matrix.
+
+    Held rows are multiplied too. Conjugate gradients whose preconditioner leaves these rows alone never move them, and
+    the residual that they carry along is the reaction there.
+    """
+
+    def __init__(self, blocks: Any, work: Work) -> None:
+        self.blocks, self.work = blocks, work
+        self._x, self._y = blocks.createVecs()
+        self.set_springs(np.zeros(0, dtype=np.int64), np.zeros(0))
+
+    def set_springs(self, rows: Indices, stiffness: Array) -> None:
+        """Take the springs that are closed: their rows and stiffnesses, in the unit of A."""
+        self._rows, self._stiffness = rows, stiffness
+
+    def mult(self, _shell: Any, x: Any, y: Any) -> None:
+        """Form y = A x + K_s x of PETSc vectors."""
+        with self.work.product():
+            self.blocks.mult(x, y)
+            if len(self._rows):
+                y.array[self._rows] += self._stiffness * x.array_r[self._rows]
+
+    def __matmul__(self, x: Array) -> Array:
+        self._x.array[:] = x
+        self.mult(None, self._x, self._y)
+        return np.array(self._y.array_r)
+
+    def shell(self) -> Any:
+        """Return a PETSc matrix that applies this operator. Whoever asks holds it: here the two would hold each other,
+        and PETSc would free neither."""
+        mat = PETSc.Mat().createPython(self.blocks.getSizes(), self, comm=self.blocks.comm)
+        mat.setUp()
+        return mat

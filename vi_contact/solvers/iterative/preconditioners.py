@@ -1,0 +1,144 @@
+"""Precondition the free unknowns: w M⁻¹ w with a mask w, and M⁻¹ one of Jacobi, block Jacobi with ICC(0), and GAMG.
+
+ICC and Jacobi are made of the whole A, once. GAMG is made of A with the held rows and columns replaced by their
+diagonal, or its coarse grids would believe the contact open; its interpolation is kept, and only the Galerkin products
+are renewed, when more than a tenth of the contact set has moved since.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+from petsc4py import PETSc
+
+from ...core.algebra import Array, Indices, Mask
+from ...core.errors import InputError
+from ...core.surfaces import ContactSurface
+from ..volume.failures import last_line
+from ..volume.options import OptionLayers, Options
+from .contact import Contact
+from .layout import Nodewise
+from .modes import rigid_modes
+from .regime import GAMG, ICC, JACOBI
+from .work import Work
+
+DRIFT = 0.1  # of the contact set that may move before GAMG is renewed
+RENEWALS = 4  # in a step, at most
+DEFAULTS: dict[str, Options] = {
+    JACOBI: {"pc_type": "jacobi"},
+    ICC: {"pc_type": "bjacobi", "sub_pc_type": "icc"},
+    GAMG: {"pc_type": "gamg", "pc_gamg_threshold": 0.01, "pc_gamg_reuse_interpolation": True},
+}
+
+
+class Masked:
+    """Apply w M⁻¹ w: the context of a PETSc shell preconditioner. ``inverse``: M⁻¹ as a PETSc preconditioner."""
+
+    def __init__(self, inverse: Any, template: Any) -> None:
+        self._inverse, self._r, self._z = inverse, template.duplicate(), template.duplicate()
+        self.weights: Array = np.ones(template.getLocalSize())
+
+    def apply(self, _pc: Any, r: Any, z: Any) -> None:
+        """Form z = w M⁻¹ w r of PETSc vectors."""
+        np.multiply(self.weights, r.array_r, out=self._r.array)
+        self._inverse.apply(self._r, z)
+        z.array[:] *= self.weights
+
+    def __call__(self, r: Array) -> Array:
+        """Return w M⁻¹ w r."""
+        self._r.array[:] = self.weights * r
+        self._inverse.apply(self._r, self._z)
+        return np.asarray(self.weights * self._z.array_r)
+
+
+class Inverse(Protocol):
+    """Hold M⁻¹ as the PETSc preconditioner ``pc``, and follow the contact set."""
+
+    pc: Any
+
+    def begin(self) -> None:
+        """Begin a step."""
+        ...
+
+    def follow(self, contact: Contact) -> None:
+        """Renew M for the conditions that are closed, when it is time to. Collective."""
+        ...
+
+
+class Constant:
+    """Hold a preconditioner that does not depend on the contact set: Jacobi and ICC."""
+
+    def __init__(self, blocks: Any, layers: OptionLayers, work: Work) -> None:
+        self.pc = made(blocks, layers, work)
+
+    def begin(self) -> None:
+        """Do nothing."""
+
+    def follow(self, contact: Contact) -> None:
+        """Do nothing."""
+
+
+class Multigrid:
+    """Hold GAMG, or what else the options say, of an AIJ matrix that is renewed for the contact set.
+
+    The interpolation is that of the whole A with its rigid modes, in which no set has left a trace.
+    """
+
+    def __init__(self, nodewise: Nodewise, surface: ContactSurface, layers: OptionLayers, work: Work) -> None:
+        self._nodewise, self._work, self._comm = nodewise, work, surface.comm
+        with work.set_up():
+            self._matrix = nodewise.entries()
+            if nodewise.A.space is not None:
+                modes = rigid_modes(nodewise.A, surface, nodewise.layout, self._matrix.createVecLeft())
+                self._matrix.setNearNullSpace(PETSc.NullSpace().create(vectors=modes, comm=self._matrix.comm))
+        self.pc = made(self._matrix, layers, work)
+        self._built: Mask = np.zeros(len(surface.owned), dtype=bool)
+        self._left = RENEWALS
+
+    def begin(self) -> None:
+        """Begin a step: it has its own number of renewals."""
+        self._left = RENEWALS
+
+    def follow(self, contact: Contact) -> None:
+        """Renew the Galerkin products when more than a tenth of the closed set has moved since."""
+        closed = contact.closed & ~contact.soft
+        moved, size = self._comm.sum(np.array([np.sum(closed ^ self._built), np.sum(closed)], dtype=float))
+        if self._left and moved > DRIFT * size:
+            self._left -= 1
+            self._built = closed
+            self._renew(contact.held)
+
+    def _renew(self, held: Indices) -> None:
+        matrix, work = self._matrix, self._work
+        with work.set_up():
+            self._nodewise.entries(matrix)
+            diagonal = matrix.getDiagonal()
+            rows = matrix.getOwnershipRange()[0] + held
+            matrix.zeroRowsColumns(rows.astype(PETSc.IntType), diag=1.0)
+            matrix.setDiagonal(diagonal)
+            self.pc.setOperators(matrix)
+            self.pc.setUp()
+        work.renewals += 1
+
+
+def inverse(kind: str, nodewise: Nodewise, blocks: Any, surface: ContactSurface, layers: OptionLayers, work: Work
+            ) -> Inverse:
+    """Return M⁻¹ of a kind; ``blocks``: A as its products store it. Collective."""
+    return Multigrid(nodewise, surface, layers, work) if kind == GAMG else Constant(blocks, layers, work)
+
+
+def made(matrix: Any, layers: OptionLayers, work: Work) -> Any:
+    """Return a PETSc preconditioner of a matrix, from the options. InputError when PETSc does not take them."""
+    pc = PETSc.PC().create(matrix.comm)
+    pc.setOptionsPrefix(layers.prefix)
+    pc.setOperators(matrix)
+    with work.set_up(), layers.in_force():
+        try:
+            pc.setFromOptions()
+            pc.setUp()
+            pc.setUpOnBlocks()
+        except PETSc.Error as error:
+            raise InputError(f"PETSc makes no preconditioner of the options under {layers.prefix} "
+                             f"({last_line(error)}): correct or drop them") from error
+    return pc

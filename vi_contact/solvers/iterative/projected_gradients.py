@@ -1,0 +1,147 @@
+"""Solve a step by projected conjugate gradients on all unknowns (MPRGP): what a search that goes in circles falls back
+on.
+
+The steps are those of ``normal.proportioning``, on r = -D^½ x with D the diagonal of A and of the closed springs, so
+that x <= bound is a lower bound and lengths and forces compare; on a face the preconditioner of the route is used. The
+springs that are closed are given while the bounds are searched; then they are taken from the answer, and a
+search along the line to it, which makes the energy as small as can be, keeps this Newton iteration from cycling.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...core.algebra import Array, Mask, largest, total
+from ..normal.proportioning import STEP, Face
+from .active_set import FALL, Search
+from .conjugate_gradients import INDEFINITE, SOLVED, STAGNATED, WRONG_SIGNS
+
+ROUNDS = 50  # of springs that open and close
+
+
+class Projected:
+    """Minimise ½ xᵀA x - bᵀx with x <= bound: the problem of ``proportioning``. ``norm``: of D^-½ A D^-½."""
+
+    def __init__(self, of: Search, diagonal: Array, norm: float) -> None:
+        contact = of.contact
+        rows, stiffness = contact.sprung
+        self.of, self._step = of, STEP / norm
+        diagonal = diagonal.copy()
+        diagonal[rows] += stiffness
+        self._root = np.sqrt(diagonal)
+        self._one_sided = contact.reach & ~contact.soft & ~contact.bilateral
+        self._rows, self._bound = contact.rows[self._one_sided], contact.bound[self._one_sided]
+        contact.closed = contact.closed & ~self._one_sided
+        self._weights = contact.weights()  # 0 where held on both sides, and where there is no unknown
+        self._fixed: Mask = self._weights == 0.0
+        self.lower = np.full(len(diagonal), -np.inf)
+        self.lower[self._rows] = -self._root[self._rows] * self._bound
+        self.q = np.where(self._fixed, 0.0, of.load / self._root)
+
+    def apply(self, r: Array) -> Array:
+        """Return D^-½ A D^-½ r, zero in rows that cannot move."""
+        return np.where(self._fixed, 0.0, (self.of.operator @ (r / self._root)) / self._root)
+
+    def dot(self, x: Array, y: Array) -> float:
+        """Return the inner product over all ranks."""
+        return total(self.of.comm, x @ y)
+
+    def least(self, values: Array) -> float:
+        """Return the smallest value on all ranks."""
+        return -largest(self.of.comm, -np.min(values, initial=np.inf))
+
+    def precondition(self, phi: Array, free: Mask) -> Array:
+        """Return D^½ w M⁻¹ w D^½ phi."""
+        masked = self.of.masked
+        masked.weights = np.where(free, self._weights, 0.0)
+        return self._root * masked(self._root * phi)
+
+    def not_definite(self) -> Exception:
+        """Return what ends the search."""
+        return Indefinite()
+
+    def solve(self, x: Array) -> tuple[Array, int]:
+        """Return (x, reason) of the search from x; the closed set of ``contact`` is then that of x."""
+        of = self.of
+        x = of.contact.feasible(x)
+        start = np.maximum(-self._root * x, self.lower)
+        face = Face(self, start, self.apply(start) + self.q, self._step)
+        reason = self._descend(face)
+        x = -face.r / self._root
+        closed = ~face.free[self._rows]
+        x[self._rows[closed]] = self._bound[closed]
+        of.contact.closed[self._one_sided] = closed
+        return x, reason
+
+    def _descend(self, face: Face) -> int:
+        """Advance until the projected gradient is as small as the measures of the step ask for."""
+        of, mark, since, count = self.of, np.inf, 0, 0
+        while True:
+            norm = largest(of.comm, np.max(np.abs(self._root * (face.phi + face.beta)), initial=0.0))
+            if not np.isfinite(norm):
+                return WRONG_SIGNS
+            if norm <= mark:
+                mark, since = FALL * norm, count
+                x = -face.r / self._root
+                of.look(norm, x, np.where(self._fixed, 0.0, self._root * face.gradient))
+            if norm <= of.goal:
+                return SOLVED
+            if count - since >= of.patience:
+                return STAGNATED
+            face.advance()
+            count += 1
+            of.operator.work.linear_iterations += 1
+
+
+class Indefinite(Exception):
+    """Say that A is not positive definite."""
+
+
+def largest_eigenvalue(of: Search, diagonal: Array, rounds: int = 15) -> float:
+    """Return the largest eigenvalue of D⁻¹A, from above by 5 % (power iteration). Collective."""
+    v = 1.0 + np.modf(0.6180339887498949 * np.arange(len(diagonal)))[0]
+    value = 1.0
+    of.operator.set_springs(np.zeros(0, dtype=np.int64), np.zeros(0))
+    for _ in range(rounds):
+        image = (of.operator @ v) / diagonal
+        before, after = of.comm.sum(np.array([v @ v, image @ image]))
+        value, v = float(np.sqrt(after / before)), image / np.sqrt(after)
+    of.operator.set_springs(*of.contact.sprung)
+    return 1.05 * max(value, 1.0)
+
+
+def projected_gradients(of: Search, diagonal: Array, norm: float, x: Array) -> tuple[Array, Array, int]:
+    """Return (x, residual formed afresh, reason) of the step from x: SOLVED, or why there is no answer. Collective."""
+    contact, residual = of.contact, of.load
+    for _ in range(ROUNDS):
+        try:
+            found, reason = Projected(of, diagonal, norm).solve(x)
+        except Indefinite:
+            return x, residual, INDEFINITE
+        of.take_set()
+        residual, size = of.afresh(found)
+        if reason != SOLVED or not of.certain(size):
+            return found, residual, reason if reason != SOLVED else STAGNATED
+        if not largest(of.comm, np.any(of.wrong(found, residual, 0.0) & contact.soft)):
+            return found, residual, SOLVED
+        x = contact.feasible(x)
+        x = x + _length(of, x, found - x) * (found - x)
+        contact.close_springs(x)
+        of.take_set()
+    return x, residual, STAGNATED
+
+
+def _length(of: Search, x: Array, d: Array) -> float:
+    """The t in (0, 1] at which ½ xᵀA x - bᵀx + sum ½ k max(x - bound, 0)² is smallest along d: a zero of its slope."""
+    contact = of.contact
+    contact.close_springs(None)
+    of.take_set()
+    here = of.load - (of.operator @ x)
+    there = of.load - (of.operator @ (x + d))
+    slope, curvature = of.comm.sum(np.array([-(d @ here), d @ (here - there)]))
+    low, high = 0.0, 1.0
+    for _ in range(50):
+        t = 0.5 * (low + high)
+        rising = slope + t * curvature + total(of.comm, contact.spring_slope(x, d, t)) > 0.0
+        low, high = (low, t) if rising else (t, high)
+    return high

@@ -1,0 +1,156 @@
+"""Solve the step on all unknowns by conjugate gradients: nothing is factorised, condensed or gathered.
+
+    A x = b - B_nᵀ r_n,    0 <= r_n  ⊥  bound - B_n x + compliance r_n / scale >= 0
+
+The contact set is a mask on the full-size vectors (``active_set``); a set that comes twice, or does not end, goes to
+projected gradients, which decrease the energy in every step and so cannot cycle (``projected_gradients``).
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from petsc4py import PETSc
+
+from ...core.algebra import EffectiveMatrix
+from ...core.checks import attributes, check_word, instance, shown, whole
+from ...core.errors import InputError
+from ...core.problem import ContactProblem
+from ...core.step import StepProblem, StepResult
+from ...core.surfaces import ContactSurface
+from ..volume.failures import raised
+from ..volume.options import OptionLayers
+from .active_set import Search, search
+from .conjugate_gradients import SOLVED, WRONG_SIGNS, ConjugateGradients
+from .contact import Contact
+from .failures import stopped
+from .layout import Nodewise
+from .operator import Operator
+from .preconditioners import DEFAULTS, Masked, inverse
+from .projected_gradients import largest_eigenvalue, projected_gradients
+from .regime import KINDS, chosen, courant
+from .work import Work
+
+log = logging.getLogger(__name__)
+AUTO = "auto"
+
+
+@dataclass(frozen=True)
+class Iterative:
+    """Hold the settings of the iterative volume route, for any number of ranks.
+
+    Attributes:
+        preconditioner: "jacobi", "icc" (block Jacobi with incomplete Cholesky factors), "gamg" (algebraic multigrid
+            with rigid body modes), or "auto": by the Courant number that A shows, up to 3, 30, and beyond. PETSc's
+            options may name another.
+        petsc_options: of the preconditioner, without prefix, e.g. {"pc_gamg_threshold": 0.02}; ICC's sub_pc_…;
+            options of the command line go before them.
+        prefix: what these options are called on the command line and in PETSC_OPTIONS.
+        tolerance: residuals of the step, measured as its certificate, at which it stops.
+        changes: of the contact set in a step; after more, or when a set comes twice, projected gradients go on.
+        patience: linear iterations within which the residual has to fall tenfold.
+    """
+
+    preconditioner: str = AUTO
+    petsc_options: Mapping[str, object | None] = field(default_factory=dict)
+    prefix: str = "vi_contact_iterative_"
+    tolerance: float = 3e-10
+    changes: int = 15
+    patience: int = 1000
+
+    def __post_init__(self) -> None:
+        check_word("preconditioner", self.preconditioner, (AUTO, *KINDS))
+        remedy = "give a dict of PETSc options without prefix"
+        instance("Iterative", "petsc_options", self.petsc_options, Mapping, remedy)
+        instance("Iterative", "prefix", self.prefix, str, "give a text such as 'vi_contact_iterative_'")
+        attributes(self, positive=("tolerance",), counts=("patience",))
+        whole("Iterative", "changes", self.changes)
+        if not self.tolerance < 1.0:
+            raise InputError(f"Iterative: tolerance is {shown(self.tolerance)}; give a relative error below 1, such as "
+                             "3e-10")
+
+    def check(self, problem: ContactProblem) -> None:
+        """Raise InputError for friction, which conjugate gradients cannot carry: the problem is not symmetric."""
+        if problem.frictional:
+            raise InputError(f"Iterative() would ignore {problem.friction}: use Condensed() or Volume(ReducedNewton())")
+
+    def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> PreparedIterative:
+        """Choose and make the preconditioner; collective. InputError for options that cannot work."""
+        return PreparedIterative(self, A, surface, scale)
+
+
+class PreparedIterative:
+    """Solve steps of one A. ``work``: what it has done so far; ``kind``: its preconditioner; ``ksp``: PETSc's object.
+    """
+
+    def __init__(self, settings: Iterative, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> None:
+        self._settings, self.work = settings, Work()
+        nodewise = Nodewise(A)
+        PETSc.garbage_cleanup(nodewise.source.comm)
+        self._layout = layout = nodewise.layout
+        self.kind = self._chosen(A)
+        with self.work.set_up():
+            blocks = nodewise.blocks()
+        self._operator = Operator(blocks, self.work)
+        layers = OptionLayers(settings.prefix, DEFAULTS[self.kind], settings.petsc_options)
+        self._inverse = inverse(self.kind, nodewise, blocks, surface, layers, self.work)
+        self._masked = Masked(self._inverse.pc, blocks.createVecLeft())
+        self._cg = ConjugateGradients(self._operator, self._masked)
+        self._diagonal = np.array(blocks.getDiagonal().array_r)
+        self._contact = Contact(surface, scale, layout.places[surface.owned], self._diagonal, layout.missing)
+        self._norm: float | None = None
+
+    def _chosen(self, A: EffectiveMatrix) -> str:
+        """The preconditioner, said in the log."""
+        number, asked = courant(A), self._settings.preconditioner
+        kind = chosen(number, A.space is not None) if asked == AUTO else asked
+        if A.algebra.comm.rank == 0:
+            log.info("Iterative: preconditioner %s, %s at Courant number %.3g", kind,
+                     "chosen" if asked == AUTO else "asked for", number)
+        return kind
+
+    @property
+    def ksp(self) -> Any:
+        """Return PETSc's linear solver."""
+        return self._cg.ksp
+
+    def solve(self, step: StepProblem) -> StepResult:
+        """Return the step; StepFailure, on all ranks, with the history of residuals when there is no answer."""
+        try:
+            return self._solve(step)
+        except PETSc.Error as error:
+            if error.__cause__ is not None:
+                raise error.__cause__ from None  # raised in one of our callbacks; PETSc before 3.22 passes it on
+            raise raised(self._name, error) from error
+
+    @property
+    def _name(self) -> str:
+        return f"Iterative({self.kind})"
+
+    def _solve(self, step: StepProblem) -> StepResult:
+        settings, contact, layout = self._settings, self._contact, self._layout
+        before = self.work.linear_iterations
+        of = Search(
+            step, layout.padded(step.b), contact, operator=self._operator, masked=self._masked, inverse=self._inverse,
+            tolerance=settings.tolerance, patience=settings.patience,
+        )
+        x, residual, changes, reason = search(of, self._cg, layout.padded(step.guess), settings.changes)
+        if reason == WRONG_SIGNS:
+            self.work.fallbacks += 1
+            if self._norm is None:
+                self._norm = largest_eigenvalue(of, self._diagonal)
+            x, residual, reason = projected_gradients(of, self._diagonal, self._norm, x)
+        if reason != SOLVED:
+            raise stopped(self._name, reason, self.work.linear_iterations - before, of.history)
+        return StepResult(
+            x=layout.stripped(x),
+            r_n=contact.reactions(x, residual),
+            active=contact.closed.copy(),
+            iterations=changes,
+            method=self._name,
+            aim=settings.tolerance,
+        )
