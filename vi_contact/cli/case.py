@@ -30,7 +30,7 @@ def add_case_commands(commands: Any) -> None:
     short.add_argument("--scale", type=float, metavar="F", help="factor on what shakes")
     short.add_argument("--dt", type=float, metavar="S", help="time step [s]")
     short.add_argument("--steps", type=int, metavar="N", help="number of steps")
-    short.add_argument("--solver", metavar="NAME", help="Condensed, Volume, or a method of them, as Hildreth")
+    short.add_argument("--solver", metavar="NAME", help="Condensed, Iterative, Volume or a method, as Hildreth")
     short.add_argument("--scheme", metavar="NAME", help=", ".join(schemes.__all__))
     short.add_argument("--cross-check", action="store_true", help="solve every step by the other route too and compare")
     run.add_argument("--out", metavar="DIR", help="output folder (default: out of [run], or results/NAME of the case)")

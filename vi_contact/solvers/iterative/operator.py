@@ -28,7 +28,7 @@ class Operator:
         self._rows, self._stiffness = rows, stiffness
 
     def mult(self, _shell: Any, x: Any, y: Any) -> None:
-        """Form y = A x + K_s x of PETSc vectors."""
+        """Apply A + K_s to x: PETSc vectors."""
         with self.work.product():
             self.blocks.mult(x, y)
             if len(self._rows):

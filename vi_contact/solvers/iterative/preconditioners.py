@@ -40,7 +40,7 @@ class Masked:
         self.weights: Array = np.ones(template.getLocalSize())
 
     def apply(self, _pc: Any, r: Any, z: Any) -> None:
-        """Form z = w M⁻¹ w r of PETSc vectors."""
+        """Apply w M⁻¹ w to r: PETSc vectors."""
         np.multiply(self.weights, r.array_r, out=self._r.array)
         self._inverse.apply(self._r, z)
         z.array[:] *= self.weights
@@ -62,7 +62,7 @@ class Inverse(Protocol):
         ...
 
     def follow(self, contact: Contact) -> None:
-        """Renew M for the conditions that are closed, when it is time to. Collective."""
+        """Make M anew for the conditions that are closed, when it is time to. Collective."""
         ...
 
 
@@ -101,7 +101,7 @@ class Multigrid:
         self._left = RENEWALS
 
     def follow(self, contact: Contact) -> None:
-        """Renew the Galerkin products when more than a tenth of the closed set has moved since."""
+        """Make the Galerkin products anew when more than a tenth of the closed set has moved since."""
         closed = contact.closed & ~contact.soft
         moved, size = self._comm.sum(np.array([np.sum(closed ^ self._built), np.sum(closed)], dtype=float))
         if self._left and moved > DRIFT * size:

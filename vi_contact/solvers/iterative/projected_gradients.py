@@ -13,8 +13,8 @@ import numpy as np
 
 from ...core.algebra import Array, Mask, largest, total
 from ..normal.proportioning import STEP, Face
-from .active_set import FALL, Search
 from .conjugate_gradients import INDEFINITE, SOLVED, STAGNATED, WRONG_SIGNS
+from .search import FALL, Search
 
 ROUNDS = 50  # of springs that open and close
 

@@ -2,7 +2,7 @@
 
     A x = b - B_nᵀ r_n,    0 <= r_n  ⊥  bound - B_n x + compliance r_n / scale >= 0
 
-The contact set is a mask on the full-size vectors (``active_set``); a set that comes twice, or does not end, goes to
+The contact set is a mask on the full-size vectors (``search``); a set that comes twice, or does not end, goes to
 projected gradients, which decrease the energy in every step and so cannot cycle (``projected_gradients``).
 """
 
@@ -24,7 +24,6 @@ from ...core.step import StepProblem, StepResult
 from ...core.surfaces import ContactSurface
 from ..volume.failures import raised
 from ..volume.options import OptionLayers
-from .active_set import Search, search
 from .conjugate_gradients import SOLVED, WRONG_SIGNS, ConjugateGradients
 from .contact import Contact
 from .failures import stopped
@@ -33,6 +32,7 @@ from .operator import Operator
 from .preconditioners import DEFAULTS, Masked, inverse
 from .projected_gradients import largest_eigenvalue, projected_gradients
 from .regime import KINDS, chosen, courant
+from .search import Search, search
 from .work import Work
 
 log = logging.getLogger(__name__)

@@ -34,7 +34,7 @@ class Work:
 
     @contextmanager
     def set_up(self) -> Iterator[None]:
-        """Time a preconditioner that is made or renewed."""
+        """Measure how long a preconditioner is made or renewed."""
         start = time.process_time()
         yield
         self.set_up_seconds += time.process_time() - start

@@ -135,7 +135,8 @@ def _solver(name: str) -> dict[str, Any]:
     from ...solvers.volume.route import Method
     from .vocabulary import names_of
 
-    return _named("solver", name, {"Condensed": names_of(SmallMethod), "Volume": names_of(Method)})
+    methods = {"Condensed": names_of(SmallMethod), "Iterative": (), "Volume": names_of(Method)}
+    return _named("solver", name, methods)
 
 
 def _named(kind: str, name: str, methods: Mapping[str, Sequence[str]]) -> dict[str, Any]:

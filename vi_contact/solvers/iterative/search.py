@@ -43,7 +43,7 @@ class Search:
         self.take_set()
 
     def take_set(self) -> bool:
-        """Adopt the closed set of ``contact``: mask, springs, load, preconditioner. False for one met before."""
+        """Take the closed set of ``contact``: mask, springs, load, preconditioner. False for one met before."""
         contact = self.contact
         self.masked.weights = contact.weights()
         self.operator.set_springs(*contact.sprung)
@@ -68,7 +68,10 @@ class Search:
             self.look(norm, x, residual, iteration)
             if largest(self.comm, np.any(self.wrong(x, residual, norm))):
                 return WRONG_SIGNS
-        return STAGNATED if iteration - self._since >= self.patience else 0
+        if iteration - self._since < self.patience:
+            return 0
+        self._note(norm)
+        return STAGNATED
 
     def look(self, norm: float, x: Array, residual: Array, iteration: int = 0) -> None:
         """Take the references at x, and note the residual."""

@@ -1,0 +1,236 @@
+"""The iterative volume route against brute force over all contact sets, and its parts; serial and parallel."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+pytest.importorskip("petsc4py")
+
+from volume_cases import Case, case, pushed_block
+
+from vi_contact.core.algebra import EffectiveMatrix, SerialAlgebra, SerialMatrix
+from vi_contact.core.errors import InputError, StepFailure
+from vi_contact.core.verify import kkt_residual
+from vi_contact.solvers import Iterative
+from vi_contact.solvers.iterative.failures import told
+from vi_contact.solvers.iterative.layout import Nodewise
+from vi_contact.solvers.iterative.regime import KINDS, chosen, courant
+
+M = 8  # contact points of pushed_block
+HALF = np.array([0.3, 0.0] * 4)
+OPTIONS: dict[str, dict[str, Any]] = {
+    "rigid": {},
+    "bilateral": {"bilateral": np.arange(M) % 3 == 0},
+    "springs": {"compliance": np.full(M, 0.3)},
+    "stiff and soft springs": {"compliance": 10.0 ** np.linspace(-6.0, 6.0, M)},
+    "springs, rigid and bilateral": {"compliance": HALF, "bilateral": np.arange(M) < 3, "scale": 2.0},
+}
+
+
+@pytest.fixture(params=[pytest.param(False, marks=pytest.mark.serial, id="scipy"), pytest.param(True, id="petsc")])
+def parallel(request: pytest.FixtureRequest) -> Iterator[bool]:
+    if request.param:
+        pytest.importorskip("mpi4py")
+    yield request.param
+
+
+def prepared(c: Case, kind: str = "icc", **settings: Any) -> Any:
+    return Iterative(kind, **settings).prepare(c.step.A, c.step.surface, c.step.scale)
+
+
+def agree(c: Case, result: Any, exact: Any) -> None:
+    """x and r_n to 1e-9 of their largest values, the same contact set, and the certificate of the loop."""
+    surface = c.step.surface
+    assert np.max(np.abs(c.all(result.x) - exact.x)) <= 1e-9 * np.max(np.abs(exact.x))
+    reaction, expected = (surface.reaction_load(r, len(result.x)) for r in (result.r_n, exact.r_n))
+    assert np.max(np.abs(reaction - expected)) <= 1e-9 * np.max(np.abs(exact.r_n))
+    assert np.array_equal(result.active, exact.active | surface.bilateral)
+    assert not np.any(result.r_n[~result.active])
+    assert kkt_residual(c.step, result).worst <= 3e-10
+
+
+@pytest.mark.parametrize("changes", [15, 0], ids=["active set", "projected gradients"])
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("options", OPTIONS.values(), ids=OPTIONS.keys())
+def test_agrees_with_brute_force(parallel: bool, kind: str, changes: int, options: dict[str, Any]) -> None:
+    c = pushed_block(parallel=parallel, **options)
+    exact = c.exact()
+    assert 0 < np.sum(exact.active) < M
+    solver = prepared(c, kind, changes=changes)
+    agree(c, solver.solve(c.step), exact)
+    assert solver.kind == kind and solver.work.fallbacks == (changes == 0)
+
+
+@pytest.mark.parametrize("seed", range(3, 8))
+def test_springs_that_open_and_close_by_projected_gradients(parallel: bool, seed: int) -> None:
+    """Given springs are searched with a line search around: from a prediction that is all wrong, too."""
+    c = pushed_block(parallel=parallel, seed=seed, compliance=10.0 ** np.linspace(-3.0, 1.0, M))
+    exact = c.exact()
+    wrong = replace(c.step, active=~exact.active)
+    agree(c, prepared(c, changes=0).solve(wrong), exact)
+
+
+def test_infinite_and_negative_bounds(parallel: bool) -> None:
+    """Moreau-Jean: +inf where no contact is predicted; -e v_n pulls a point back."""
+    c = pushed_block(parallel=parallel, seed=3)
+    free = replace(c, step=replace(c.step, bound=np.where(np.arange(M) > 3, np.inf, c.step.bound)))
+    agree(free, prepared(free).solve(free.step), free.exact())
+    pulled = replace(c, step=replace(c.step, bound=-0.1 - np.arange(M) / 50.0))
+    agree(pulled, prepared(pulled).solve(pulled.step), pulled.exact())
+
+
+def test_nothing_happens_at_rest(parallel: bool) -> None:
+    """No load, touching supports: zero, without an iteration; 0/0 is not an error."""
+    c = pushed_block(parallel=parallel)
+    solver = prepared(c)
+    result = solver.solve(replace(c.step, b=np.zeros_like(c.step.b)))
+    assert result.iterations == 0 and solver.work.linear_iterations == 0
+    assert not np.any(result.x) and not np.any(result.r_n) and not result.active.any()
+
+
+@pytest.mark.parametrize("length, force", [(1e-3, 1e6), (1e6, 1e-3)])
+def test_units_do_not_matter(parallel: bool, length: float, force: float) -> None:
+    """Millimetres and meganewtons: the same dimensionless numbers and the same work."""
+    one, other = pushed_block(parallel=parallel), pushed_block(parallel=parallel, length=length, force=force)
+    first, second = prepared(one), prepared(other)
+    a, b = first.solve(one.step), second.solve(other.step)
+    assert np.max(np.abs(b.x / length - a.x)) <= 1e-9 * np.max(np.abs(a.x))
+    assert np.max(np.abs(b.r_n / force - a.r_n), initial=0.0) <= 1e-9 * np.max(np.abs(a.r_n), initial=1.0)
+    assert np.array_equal(a.active, b.active)
+    assert first.work.products == second.work.products
+
+
+def test_is_deterministic_and_warm_starts(parallel: bool) -> None:
+    """The same bits twice; from the answer itself, no iteration and no change of the set."""
+    c = pushed_block(parallel=parallel)
+    one, two = prepared(c).solve(c.step), prepared(c).solve(c.step)
+    assert np.array_equal(one.x, two.x) and np.array_equal(one.r_n, two.r_n)
+    solver = prepared(c)
+    again = solver.solve(c.starting_at(one))
+    assert again.iterations == 0 and solver.work.linear_iterations <= 1
+
+
+def test_work_is_counted(parallel: bool) -> None:
+    """A product for every iteration, for the residual of every set, and one in the end; GAMG is renewed."""
+    c = pushed_block(parallel=parallel)
+    solver = prepared(c, "gamg")
+    result, work = solver.solve(c.step), solver.work
+    assert work.products == work.linear_iterations + result.iterations + 2
+    assert 0 <= work.renewals <= 4 and work.set_up_seconds > 0.0 and work.product_seconds >= 0.0
+
+
+# What cannot be solved ------------------------------------------------------------------------------------------------
+
+
+def failing(matrix: Any, b: Any, words: str, **settings: Any) -> None:
+    c = case(sp.csr_matrix(matrix), np.array([0]), b, np.array([1.0]))
+    with pytest.raises(StepFailure, match=words) as found:
+        prepared(c, "jacobi", **settings).solve(c.step)
+    assert "residuals" in str(found.value) and "\n" not in str(found.value)
+
+
+@pytest.mark.serial
+def test_a_driven_floating_body_is_a_sentence() -> None:
+    """Two masses on one spring, pulled: nothing holds them, and no residual vanishes."""
+    failing([[1.0, -1.0], [-1.0, 1.0]], np.array([-1.0, -1.0]), "is not positive definite|broke down|stagnated")
+
+
+@pytest.mark.serial
+def test_an_indefinite_matrix_is_a_sentence() -> None:
+    failing([[1.0, 3.0], [3.0, 1.0]], np.array([-1.0, 0.5]), "A is not positive definite")
+
+
+@pytest.mark.serial
+def test_stagnation_is_a_sentence_with_the_history() -> None:
+    """A chain of springs with a contrast of 1e14 and two iterations of patience."""
+    k = 10.0 ** np.linspace(-7.0, 7.0, 41)
+    chain = sp.diags([k[:-1] + k[1:], -k[1:-1], -k[1:-1]], [0, 1, -1]).toarray()
+    failing(chain, np.ones(40), "stagnated .*residuals .*, .*: check that every body", patience=2)
+
+
+@pytest.mark.serial
+def test_not_a_number_is_a_sentence() -> None:
+    failing(np.eye(2), np.array([np.nan, 1.0]), "not a number")
+
+
+def test_history_shows_first_some_and_last() -> None:
+    assert told([1.0]) == "1.0e+00" and told([]) == "none"
+    assert told([10.0 ** -i for i in range(11)]) == "1.0e+00, 1.0e-02, 1.0e-04, 1.0e-06, 1.0e-08, 1.0e-10"
+
+
+# Settings -------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("settings, words", [
+    ({"preconditioner": "ilu"}, "unknown preconditioner 'ilu': choose one of auto, jacobi, icc, gamg"),
+    ({"tolerance": 2.0}, "tolerance is 2.0; give a relative error below 1"),
+    ({"tolerance": 0.0}, "tolerance"),
+    ({"changes": -1}, "changes"),
+    ({"patience": 0}, "patience"),
+    ({"petsc_options": "pc_type"}, "petsc_options"),
+    ({"prefix": None}, "prefix"),
+])
+def test_wrong_settings_are_told(settings: dict[str, Any], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        Iterative(**settings)
+
+
+def test_petsc_options_choose_the_preconditioner(parallel: bool) -> None:
+    c = pushed_block(parallel=parallel)
+    solver = prepared(c, "gamg", petsc_options={"pc_type": "jacobi"})
+    agree(c, solver.solve(c.step), c.exact())
+    with pytest.raises(InputError, match="vi_contact_iterative_"):
+        prepared(c, "gamg", petsc_options={"pc_type": "no such thing"})
+
+
+class Plane:
+    """A space of nodes in the plane, of which some components are unknowns."""
+
+    dimension = 2
+
+    def __init__(self, ids: Any) -> None:
+        self.ids = np.asarray(ids)
+        self.coordinates = np.column_stack([np.cos(self.ids // 2), np.sin(self.ids // 2)])
+
+
+def effective(matrix: Any, ids: Any, inertia: Any = None) -> EffectiveMatrix:
+    return EffectiveMatrix(SerialMatrix(matrix), SerialAlgebra(), space=Plane(ids), inertia=inertia)
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("ids", [range(8), [0, 1, 3, 4, 5, 6], [7, 1, 2, 3]], ids=["whole", "rollers", "any order"])
+def test_blocks_of_whole_nodes_multiply_alike(ids: Any) -> None:
+    """Nodes with one of two components get the other one back, held at zero."""
+    ids, rng = np.array(ids), np.random.default_rng(1)
+    n = len(ids)
+    half = rng.normal(size=(n, n))
+    nodewise = Nodewise(effective(half @ half.T, ids))
+    layout, x = nodewise.layout, rng.normal(size=n)
+    assert layout.complete == (n == 8) and layout.size == 2 * len(np.unique(ids // 2)) == n + len(layout.missing)
+    assert np.array_equal(layout.stripped(layout.padded(x)), x)
+    for mat in (nodewise.blocks(), nodewise.entries()):
+        vx, vy = mat.createVecs()
+        vx.array[:] = layout.padded(x)
+        mat.mult(vx, vy)
+        assert mat.getBlockSize() == 2
+        assert np.max(np.abs(layout.stripped(vy.array_r) - half @ half.T @ x)) <= 1e-13 * np.abs(half).sum() ** 2
+        assert not np.any(vy.array_r[layout.missing])
+
+
+@pytest.mark.serial
+def test_the_courant_number_follows_the_matrices() -> None:
+    """Sums of the diagonals: stiffness 100 times inertia is 10; no inertia in statics; not known, not a number."""
+    M, K = SerialMatrix(np.diag([1.0, 0.0, 3.0, 4.0])), np.diag([100.0, 200.0, 300.0, 200.0])
+    A = effective(2.0 * M.csr.toarray() + 2.0 * K, range(4), (2.0, M))
+    assert courant(A) == pytest.approx(10.0, rel=1e-14)
+    assert courant(effective(K, range(4), (0.0, M))) == np.inf
+    assert np.isnan(courant(effective(K, range(4))))
+    numbers = (0.5, 3.0, 10.0, 30.0, 31.0, np.inf, np.nan)
+    assert [chosen(one, modes=True) for one in numbers] == ["jacobi", "jacobi", "icc", "icc", "gamg", "gamg", "icc"]
+    assert chosen(np.inf, modes=False) == "icc"
