@@ -31,14 +31,14 @@ Halve Hand Handle Hold
 Identify Ignore Integrate Interpolate Interpret Invert Iterate
 Join Judge
 Keep
-Leave Let Limit List Listen Load Locate Log Look
+Leave Let Limit Linearise List Listen Load Locate Log Look
 Make Map March Mark Mask Match Measure Mesh Minimise Mirror Model Move Multiply
 Name Normalise Note Number
 Obtain Offer Open Order Overwrite
 Pad Pair Parse Partition Pass Pick Place Plan Plot Point Pose Post Precondition Predict Prepare Prescribe Press Print
 Process Produce Project Propose Prove Provide Pull Push Put
 Raise Ramp Read Rebuild Recognise Record Reduce Refer Refine Refuse Register Relax Release Remember Remove Rename
-Replace Report Represent Resample Resolve Restore Return Reverse Rotate Round Run
+Replace Report Represent Resample Resolve Restore Restrict Return Reverse Rotate Round Run
 Sample Save Say Scale Scatter Search Select Send Separate Serve Set Shake Share Shift Show Shrink Simulate Skip Slide
 Smooth Solve Sort Split Stack Start State Step Stop Store Subtract Sum Support Suppress Swap Sweep
 Take Talk Tell Test Tie Transfer Transform Translate Treat Trim Try Turn

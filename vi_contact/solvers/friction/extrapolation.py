@@ -44,7 +44,7 @@ class Plain:
     """Take the image itself."""
 
     def start(self) -> Next:
-        """See Extrapolation; nothing is remembered."""
+        """Return the choice of the next point, which remembers nothing."""
         return lambda x, image: image
 
 
@@ -59,7 +59,7 @@ class Aitken:
             raise InputError(f"Aitken: limit is {shown(self.limit)}; give the largest relaxation factor, more than 1")
 
     def start(self) -> Next:
-        """See Extrapolation; the first step is plain."""
+        """Return the choice of the next point; the first step is plain."""
         omega, old = 1.0, None
 
         def following(x: Array, image: Array) -> Array:
@@ -87,7 +87,7 @@ class Anderson:
         whole("Anderson", "after", self.after)
 
     def start(self) -> Next:
-        """See Extrapolation."""
+        """Return the choice of the next point."""
         count = 0
         points: list[tuple[Array, Array]] = []  # (f, g)
 

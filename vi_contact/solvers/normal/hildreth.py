@@ -45,7 +45,7 @@ class Hildreth:
 
 
 class _Sweeps:
-    """Of one G: min ½ xᵀHx + cᵀx over x >= lower, with H scaled to unit diagonal, for x = s or x = r."""
+    """Sweeps for one G: min ½ xᵀHx + cᵀx over x >= lower, with H scaled to unit diagonal, for x = s or x = r."""
 
     def __init__(self, method: Hildreth, scaled: ScaledLCP) -> None:
         self.method, self._scaled, bilateral = method, scaled, scaled.bilateral
