@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -74,18 +74,14 @@ class Rod:
                 function("Rod", name, getattr(self, name), "give a function of the time, or None")
 
 
-def _zero(x: Array) -> Array:
-    return np.zeros_like(x)
-
-
 @dataclass(frozen=True)
 class Start:
     """Give initial values as functions of x: displacement u [m], velocity v [m/s], rotation theta, rate omega [1/s]."""
 
-    u: Profile = field(default=_zero)
-    v: Profile = field(default=_zero)
-    theta: Profile = field(default=_zero)
-    omega: Profile = field(default=_zero)
+    u: Profile = np.zeros_like
+    v: Profile = np.zeros_like
+    theta: Profile = np.zeros_like
+    omega: Profile = np.zeros_like
 
     def __post_init__(self) -> None:
         for name in ("u", "v", "theta", "omega"):

@@ -168,24 +168,21 @@ def run_steps(
     nothing = np.zeros((surface.count, 1))
     x, active = np.zeros(int(contact.free.sum())), surface.gap(0.0) <= 0.0
     loads = np.zeros_like(contact.v_free)
-    steps: list[StepProblem] = []
-    results: list[StepResult] = []
+    pairs: list[tuple[StepProblem, StepResult]] = []
     for k in range(len(loads)):
         step = contact.step(k, loads, x, active)
         result = solved(step)
         loads[k] = contact.load(result.r_n, result.r_t)
         x, active = result.x, result.active
-        steps.append(step)
-        results.append(result)
-    pairs = list(zip(steps, results, strict=True))
+        pairs.append((step, result))
     slip = [nothing if step.slip0 is None else surface.tangential_values(result.x) - step.slip0
             for step, result in pairs]
     forces = contact.cartesian(loads)
     return ContactRun(
-        contact, np.array([step.t for step in steps]), np.array([result.r_n for result in results]),
-        np.array([nothing if result.r_t is None else result.r_t for result in results])[:, :, 0],
+        contact, np.array([step.t for step, _ in pairs]), np.array([result.r_n for _, result in pairs]),
+        np.array([nothing if result.r_t is None else result.r_t for _, result in pairs])[:, :, 0],
         np.array([step.bound - surface.normal_values(result.x) for step, result in pairs]),
         np.array(slip)[:, :, 0], contact.compliance.displacement(forces), forces,
-        np.array([result.active for result in results]), tuple(kkt_residual(step, result) for step, result in pairs),
-        np.array([result.iterations for result in results]) if iterations is None else iterations, history,
+        np.array([result.active for _, result in pairs]), tuple(kkt_residual(*pair) for pair in pairs),
+        np.array([result.iterations for _, result in pairs]) if iterations is None else iterations, history,
     )

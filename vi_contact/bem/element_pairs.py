@@ -9,7 +9,7 @@ from ..core.algebra import Array
 from ..core.checks import instance
 from ..core.errors import InputError
 from .boundary_mesh import BoundaryMesh
-from .loops import point_at
+from .loops import distances, point_at
 
 Index = NDArray[np.int64]
 NEAR_LENGTHS = 3.0  # pairs closer than this many element lengths get the finer rule
@@ -46,8 +46,8 @@ class ElementPairs:
         self.same = first == second
         self.shares_end = mesh.after[first] == second
         self.corner = self.shares_end | (mesh.after[second] == first)
-        to_second = [_distance(p[first], starts[second], ends[second]) for p in (starts, ends)]
-        to_first = [_distance(p[second], starts[first], ends[first]) for p in (starts, ends)]
+        to_second = [distances(p[first], starts[second], ends[second]) for p in (starts, ends)]
+        to_first = [distances(p[second], starts[first], ends[first]) for p in (starts, ends)]
         self.r_min: Array = np.where(self.same | self.corner, 0.0, np.min(to_second + to_first, axis=0))
         free = [np.where(self.shares_end, ends[0], ends[1]) for ends in (to_second, to_first[::-1])]
         width = np.where(self.corner, np.minimum(*free), self.r_min) / self.h
@@ -75,8 +75,3 @@ class ElementPairs:
     def __len__(self) -> int:
         return len(self.first)
 
-
-def _distance(x: Array, start: Array, end: Array) -> Array:
-    along = end - start
-    share = np.clip(((x - start) * along).sum(1) / (along**2).sum(1), 0.0, 1.0)
-    return np.hypot(*(x - start - share[:, None] * along).T)

@@ -13,6 +13,7 @@ from ..core.errors import InputError
 from .boundary_mesh import BoundaryMesh
 from .boundary_operators import N_SINGLE, double_local, integrands, joined_at_nodes, tensor
 from .fundamental_solution import TimeKernels
+from .loops import distances
 from .poincare_steklov import BoundaryMotion, PoincareSteklov
 from .quadrature import at_points
 from .rules import pieces, roots, smoothed, stretched
@@ -91,11 +92,8 @@ def _moments(mesh: BoundaryMesh, x: Array, t: float, c_p: float, c_s: float) -> 
 
 def _check_inside(mesh: BoundaryMesh, x: Array) -> None:
     """Raise InputError unless all points are inside: winding number 1 (0 for an exterior body), off the boundary."""
-    along = mesh.points[mesh.after] - mesh.points
-    offset = x[:, None] - mesh.points
-    share = np.clip((offset * along).sum(2) / mesh.lengths**2, 0.0, 1.0)
-    distance = np.hypot(*np.moveaxis(offset - share[..., None] * along, 2, 0)) / mesh.lengths
-    start, end = -offset, along - offset
+    start, end = mesh.points - x[:, None], mesh.points[mesh.after] - x[:, None]
+    distance = distances(x[:, None], mesh.points, mesh.points[mesh.after]) / mesh.lengths
     turn = np.arctan2(start[..., 0] * end[..., 1] - start[..., 1] * end[..., 0], (start * end).sum(2)).sum(1)
     winding = np.rint(turn / (2.0 * np.pi)) + (1.0 if mesh.exterior else 0.0)
     bad = (distance.min(axis=1) < CLOSEST) | (winding != 1.0)

@@ -76,16 +76,20 @@ def check_simple(points: Array, after: Index) -> None:
 
 
 def _check_touching(points: Array, after: Index) -> None:
-    start, along = points, points[after] - points
-    offset = points[:, None] - start
-    share = np.clip((offset * along).sum(2) / (along**2).sum(1), 0.0, 1.0)
-    distance = np.hypot(*np.moveaxis(offset - share[..., None] * along, 2, 0))
+    distance = distances(points[:, None], points, points[after])
     index = np.arange(len(points))
     distance[index, index] = distance[after, index] = np.inf
     node, element = np.unravel_index(int(distance.argmin()), distance.shape)
     if distance[node, element] <= TOUCHING * np.hypot(*np.ptp(points, axis=0)):
         raise InputError(f"BoundaryMesh: the boundary crosses or touches itself at {point_at(points[node])}, where "
                          f"node {node} lies on element {element}; give a boundary that does not meet itself")
+
+
+def distances(x: Array, start: Array, end: Array) -> Array:
+    """Return the distances (...) of points x (..., 2) from segments from start to end, of shapes that fit."""
+    along = end - start
+    share = np.clip(((x - start) * along).sum(-1) / (along**2).sum(-1), 0.0, 1.0)
+    return np.hypot(*np.moveaxis(x - start - share[..., None] * along, -1, 0))
 
 
 def point_at(point: Array) -> str:

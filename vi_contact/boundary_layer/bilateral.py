@@ -14,7 +14,7 @@ decide how an error in phi fades, not the motion. The bracket is the reaction al
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -106,18 +106,17 @@ def _solved(
     return np.asarray(free + along @ reaction), reaction, multiplier_rate, force
 
 
-def _along(system: ConstrainedSystem, t: float, q: Array, v: Array, c: Array) -> tuple[Array, Array, Array]:
-    """(c̄, k̄, f̄) of (32), each (k,)."""
-    force: Callable[[float, Array, Array], Array] | None = system.force
+def _along(system: ConstrainedSystem, t: float, q: Array, v: Array, c: Array) -> Array:
+    """(c̄, k̄, f̄) of (32), (3, k)."""
+    values, force = np.zeros((3, c.shape[1])), system.force
     if force is None:
-        return np.zeros(c.shape[1]), np.zeros(c.shape[1]), np.zeros(c.shape[1])
-    values = np.empty((3, c.shape[1]))
+        return values
     for R, way in enumerate(c.T):
         h, w = (system.difference(x) / float(np.max(np.abs(way))) for x in (q, v))
         values[0, R] = -way @ (force(t, q, v + w * way) - force(t, q, v - w * way)) / (2.0 * w)
         values[1, R] = -way @ (force(t, q + h * way, v) - force(t, q - h * way, v)) / (2.0 * h)
         values[2, R] = way @ force(t, q, v)
-    return values[0], values[1], values[2]
+    return values
 
 
 def _slope(systems: Sequence[ConstrainedSystem], q: Array, v: Array) -> Array:

@@ -54,7 +54,7 @@ class ConstrainedSystem:
         owner = "ConstrainedSystem"
         sized(owner, "the scale of the coordinates", self.scale, "their units")
         if not callable(self.mass):
-            _check_mass(self.mass)
+            check_positive(owner, "the mass matrix", self.mass, "kg")
         for name in ("rho", "gradient", "force", "rates", "gradient_rate"):
             if name in ("rho", "gradient") or getattr(self, name) is not None:
                 function(owner, name, getattr(self, name), "give a function, see its docstring")
@@ -67,7 +67,7 @@ class ConstrainedSystem:
         number(owner, "rho(q) at the start", self.rho(q))
         array(owner, "gradient(q) at the start", self.gradient(q), (n,))
         if callable(self.mass):
-            _check_mass(self.mass(q))
+            check_positive(owner, "the mass matrix", self.mass(q), "kg")
         if self.matrix(q).shape != (n, n):
             raise InputError(f"{owner}: the mass matrix has shape {self.matrix(q).shape} and there are {n} velocities; "
                              "give one row for each")
@@ -143,10 +143,11 @@ def one_sentence() -> Iterator[None]:
                           "masses and the state at the start") from error
 
 
-def _check_mass(mass: Any) -> None:
-    M = array("ConstrainedSystem", "the mass matrix", mass, (None, None), unit="kg")
+def check_positive(owner: str, meaning: str, matrix: Any, unit: str) -> None:
+    """Raise InputError unless the matrix is square, symmetric and positive definite."""
+    M = array(owner, meaning, matrix, (None, None), unit=unit)
     if M.shape[0] != M.shape[1] or not np.allclose(M, M.T) or np.min(np.linalg.eigvalsh(M), initial=np.inf) <= 0.0:
-        raise InputError("ConstrainedSystem: the mass matrix is not symmetric positive definite; check its entries")
+        raise InputError(f"{owner}: {meaning} is not symmetric positive definite; check its entries")
 
 
 def _inertia(mass: Callable[[Array], Array], q: Array, v: Array, h: float) -> Array:

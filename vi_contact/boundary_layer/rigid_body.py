@@ -13,7 +13,6 @@ The impact map, which the motion through a thin layer tends to: v⁺ = v⁻ - M�
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,7 +23,7 @@ from ..core.checks import array, number, shape_of
 from ..core.errors import InputError
 from .layer import sized
 from .metric import normal_mass
-from .motion import ConstrainedSystem
+from .motion import ConstrainedSystem, check_positive
 
 
 @dataclass(frozen=True)
@@ -71,10 +70,7 @@ class RigidBody:
         for name in ("normal", "gravity"):
             array(owner, name, getattr(self, name), (3,))
         number(owner, "offset", self.offset, unit="m")
-        J = self.J
-        if J.shape != (3, 3) or not np.allclose(J, J.T) or np.min(np.linalg.eigvalsh(J)) <= 0.0:
-            raise InputError("RigidBody: the body's inertia is not symmetric positive definite; give (3, 3) or a "
-                             "diagonal (3,)")
+        check_positive(owner, "the body's inertia", self.J, "kg m²")
         if not np.linalg.norm(self.normal) > 0.0:
             raise InputError("RigidBody: the plane's normal has length zero; give a direction")
 
@@ -132,9 +128,7 @@ class RigidBody:
 
     def system(self) -> ConstrainedSystem:
         """Return the system for ``layer_motion``: coordinates (7,), velocities (6,)."""
-        turning: Callable[[Array, Array], float] | None = None
-        if not callable(self.point):
-            turning = self._turning
+        turning = None if callable(self.point) else self._turning
         return ConstrainedSystem(
             self.matrix, self.rho, self.gradient, force=self._force, rates=_rates, gradient_rate=turning
         )
