@@ -103,8 +103,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
         "solvers.volume.failures solvers.volume.friction_jacobian "
         "solvers.volume.friction_system solvers.volume.one_factorisation solvers.volume.options",
     "studies/test_case.py":
-        "cli.case studies.cases.model_tables studies.cases.parsing "
-        "studies.cases.toml_file studies.cases.vocabulary",
+        "cli.case studies.cases.parsing studies.cases.toml_file studies.cases.vocabulary",
     "studies/test_case_inputs.py": "studies.cases.table_calls",
     "studies/test_ida.py": "cli.ida plots.ida studies.ida.measures studies.ida.runs",
     "validation/test_boundary_element_examples.py": "models.boundary_elements",

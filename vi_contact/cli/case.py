@@ -14,7 +14,7 @@ from ..studies.cases.library import FOLDER, builtin_cases, located
 from ..studies.cases.short_settings import ShortOptions
 from ..studies.cases.toml_file import read_toml
 from .errors import world
-from .options import add_restart, add_settings
+from .options import add_settings
 
 
 def add_case_commands(commands: Any) -> None:
@@ -34,7 +34,9 @@ def add_case_commands(commands: Any) -> None:
     short.add_argument("--scheme", metavar="NAME", help=", ".join(schemes.__all__))
     short.add_argument("--cross-check", action="store_true", help="solve every step by the other route too and compare")
     run.add_argument("--out", metavar="DIR", help="output folder (default: out of [run], or results/NAME of the case)")
-    add_restart(run, "the output folder")
+    run.add_argument("--restart", action="store_true", help="continue the run in the output folder from its checkpoint")
+    run.add_argument("--restart-changed", action="store_true", dest="changed",
+                     help="the same, also when the problem is another one than that of the checkpoint")
     add_settings(run)
     run.add_argument("--check", action="store_true", help="read the case and stop: nothing is computed")
     run.add_argument("--quiet", action="store_true", help="no progress line")

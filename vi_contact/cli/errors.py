@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import errno
-import re
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -18,7 +17,6 @@ from ..core.files import sentence
 
 PATIENCE = 30.0  # seconds between the first rank that has failed and the last
 PETSC_ERR_MEM = 55  # of petscsystypes.h
-_ARGUMENT = re.compile(r"(?<= )(\w++)= ?")
 _MEMORY = ("out of memory", "cannot allocate memory", "unable to allocate", "memory allocation failed", "bad_alloc")
 LIBRARIES = ("dolfinx", "ufl", "basix", "petsc4py", "mpi4py", "h5py", "gmsh", "matplotlib", "tqdm")
 OUT_OF_MEMORY = (
@@ -57,26 +55,22 @@ def told(run: Callable[[], Any], spelling: Mapping[str, str]) -> Any:
         if _of_memory(error):
             raise ViContactError(OUT_OF_MEMORY) from error
         if spelling and isinstance(error, InputError):
-            raise InputError(_respelt(str(error), spelling)) from error
+            text = str(error)
+            for argument, option in spelling.items():
+                text = text.replace(f" {argument}= ", f" {option} ").replace(f" {argument}=", f" {option} ")
+            raise InputError(text.rstrip()) from error
         raise
     except Exception as error:
-        text = _sentence(error)
-        if text is None:
+        told = _sentence(error)
+        if told is None:
             raise
-        raise ViContactError(text) from error
+        raise ViContactError(told) from error
 
 
 def printable(text: str) -> str:
     """Return the text without what standard output cannot write, such as names of files that are no UTF-8."""
     encoding = sys.stdout.encoding or "utf-8"
     return text.encode(encoding, "backslashreplace").decode(encoding)
-
-
-def _respelt(sentence: str, spelling: Mapping[str, str]) -> str:
-    def option(found: re.Match[str]) -> str:
-        return f"{spelling[found[1]]} " if found[1] in spelling else found[0]
-
-    return _ARGUMENT.sub(option, sentence).rstrip()
 
 
 def _sentence(error: Exception) -> str | None:

@@ -58,9 +58,13 @@ def _ida(options: argparse.Namespace) -> str:
         launch = shlex.split(options.launch)
     except ValueError as error:
         raise InputError(f"--launch {shown(options.launch)}: {error}; close the quotation mark") from None
+    motions = [motion.split(",") for motion in options.motions]
+    for files in motions:
+        if not all(files):
+            raise InputError(f"--motions {','.join(files)}: give FILE, or FILE,FILE")
     study = IDA(
         read_case(located(options.case), options.settings, allow=options.allow),
-        [_files(motion) for motion in options.motions], options.edp,
+        motions, options.edp,
         scales=options.scales or (), levels=options.levels or (), intensity=options.im,
     )
     for signum in (signal.SIGINT, signal.SIGTERM):  # a scheduler's end of time is as Ctrl-C, also in the background
@@ -77,11 +81,3 @@ def _ida(options: argparse.Namespace) -> str:
         raise ViContactError(f"none of {failed} runs finished, the first because: {rows[0]['reason']}; the others are "
                              f"in {options.out}/ida.csv")
     return f"{len(rows)} rows, {failed} of failed runs: {options.out}/ida.csv, ida.png"
-
-
-def _files(motion: str) -> tuple[str, ...]:
-    """The files of one motion; InputError for an empty name."""
-    files = tuple(motion.split(","))
-    if not all(files):
-        raise InputError(f"--motions {motion}: give FILE, or FILE,FILE")
-    return files

@@ -153,8 +153,6 @@ def _plot(options: argparse.Namespace) -> str:
 
 
 def _spectrum(options: argparse.Namespace) -> str:
-
-
     units = canonical_units("--out-units", options.out_units)
     target = _target(options)
     periods = spaced("--periods", options.periods)

@@ -28,13 +28,6 @@ def add_settings(command: argparse.ArgumentParser) -> None:
                          "its code; repeatable (docs/guide/extend.md)")
 
 
-def add_restart(options: Any, where: str) -> None:
-    """Add the options that continue a run."""
-    options.add_argument("--restart", action="store_true", help=f"continue the run in {where} from its checkpoint")
-    options.add_argument("--restart-changed", action="store_true", dest="changed",
-                         help="the same, also when the problem is another one than that of the checkpoint")
-
-
 def add_actions(
     commands: Any, name: str, sentence: str, actions: Mapping[str, tuple[Callable[[argparse.Namespace], str], str]]
 ) -> dict[str, argparse.ArgumentParser]:

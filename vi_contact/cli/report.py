@@ -40,10 +40,6 @@ def add_report_commands(commands: Any) -> None:
     for name, one in parsers.items():
         one.add_argument("folder", metavar="DIR", help="output folder of a run")
         one.add_argument("--out", metavar="CSV", help=f"default DIR/{name}.csv; a picture goes beside it")
-    _add_actions(parsers)
-
-
-def _add_actions(parsers: dict[str, argparse.ArgumentParser]) -> None:
     parsers["peaks"].add_argument("columns", metavar="COLUMN", nargs="*", help="default: all")
     spectrum, transfer, loop = parsers["spectrum"], parsers["transfer"], parsers["loop"]
     spectrum.add_argument("columns", metavar="COLUMN", nargs="+", help="a_x_top, a_g_x; with an impact law v_x_top")

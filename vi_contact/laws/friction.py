@@ -89,7 +89,7 @@ class SlipRateCoulomb:
     mu(0) is the static coefficient.
     """
 
-    mu: Callable[[Array], Any]
+    mu: ExponentialDecay | StaticKinetic | Callable[[Array], Any]
 
     def __post_init__(self) -> None:
         function("SlipRateCoulomb", "mu", self.mu, "give a function of the slip rate, or use Coulomb()")

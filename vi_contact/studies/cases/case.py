@@ -40,12 +40,11 @@ from ...run.static import static_equilibrium
 from ...run.time_steps import step_plan
 from ...solvers.condensed import Condensed
 from .library import base_folder, check_format, keep_copy
-from .model_tables import Parts
 from .own_classes import packages
 from .parsing import Words, arguments, nearest, read
 from .table_calls import Call, Callee, Group, Named, Node, Spot, Value, callee, needs_body, nodes_in
 from .toml_file import read_toml, with_settings
-from .vocabulary import MeshFile, words
+from .vocabulary import MeshFile, Parts, words
 
 _TABLES: dict[str, Any] = {  # in the order in which they are read: type of what a table makes, or the one call it is
     "title": str,
@@ -88,15 +87,13 @@ class Case:
     @property
     def out(self) -> Path | None:
         """Return the run folder of [run], if it names one."""
-        node = self._run.get("out")
-        return node.build({}) if node is not None else None
+        return self._plain("out")
 
-    @property
-    def _run(self) -> Mapping[str, Node]:
-        """Return the entries of [run]."""
-        node = self.nodes["run"]
-        assert isinstance(node, Call)
-        return node.arguments
+    def _plain(self, key: str) -> Any:
+        """Return a value of [run]; None where it is left out, or made of other things."""
+        run = self.nodes["run"]
+        found = run.arguments.get(key) if isinstance(run, Call) else None
+        return found.value if isinstance(found, Value) else None
 
     def excitations(self, **context: Any) -> tuple[Excitation, ...]:
         """Return what shakes the body; record files are read here."""
@@ -185,9 +182,7 @@ class Case:
 
     def _parts(self, comm: Any) -> Parts:
         if "model" in self.nodes:
-            first = self._run.get("dt")
-            dt = first.value if isinstance(first, Value) else None
-            parts: Parts = self._made("model", comm=comm, run_dt=dt, **self._shaking())
+            parts: Parts = self._made("model", comm=comm, run_dt=self._plain("dt"), **self._shaking())
             return parts
         mesh, tags = self._mesh(comm)
         system = self._made("system", mesh=mesh, tags=tags, **self._shaking())

@@ -1,4 +1,4 @@
-"""Say the words of case files: which classes and functions a table may call where, all of the public interface.
+"""Say the words of case files: which classes, functions and models a table may call where.
 
 Rooms list their public classes once, in their ``__init__``; a class is a word wherever it is of the kind that is asked
 for, and so are its named constructors ("GeneralisedAlpha.spectral_radius"). What takes functions has no word, or one
@@ -8,7 +8,7 @@ of a function here that takes none.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType, ModuleType
@@ -26,7 +26,8 @@ from ...ground_motion.formats.reader import LARGEST_PEAK
 from ...laws.impact import VelocityUpdate
 from ...laws.materials import Damping, LinearElastic, Section
 from ...meshes.gmsh_session import MeshScript
-from ...models import channel
+from ...models import channel, wall
+from ...models.channel.sides import bedrock
 from ...run import HalvedAtImpact, Schedule
 from ...run.files.writer import FieldWriter
 from ...soil import FreeField, UpgoingVelocity, upgoing
@@ -35,7 +36,6 @@ from ...solvers.condensed import SmallMethod
 from ...solvers.friction.extrapolation import Extrapolation
 from ...solvers.friction.problem import FrictionMethod
 from ...solvers.volume.route import Method
-from .model_tables import MODELS, Parts
 from .own_classes import defect, is_protocol
 from .parsing import Words
 from .table_calls import Callee, callee
@@ -127,8 +127,65 @@ def free_field(
     return FreeField(facets, material, normal, tangential, base=foot)
 
 
-def slip_rate(mu: laws.ExponentialDecay | laws.StaticKinetic) -> laws.SlipRateCoulomb:
-    return laws.SlipRateCoulomb(mu)
+@dataclass(frozen=True)
+class Parts:
+    """Hold what a problem is made of.
+
+    tags: groups of the mesh; weighted: it carries its weight, and starts from its equilibrium; recorders: of a case
+    that names none; firm: the same body on supports that hold static loads, for the gravity stage, where its own do
+    not; moved: the excitations move its boundary, and are no inertia load.
+    """
+
+    system: SemiDiscreteSystem
+    surface: ContactSurface
+    tags: Any
+    weighted: bool = False
+    recorders: tuple[Recorder, ...] | None = None
+    firm: Parts | None = None
+    moved: bool = False
+
+
+def _wall(
+    shape: wall.Wall, comm: Any, *, case: str = "b", weight: bool = False, base_inertia: str = "whole"
+) -> Parts:
+    model = wall.build(shape, comm, weight=weight, base_inertia=base_inertia)
+    recorders = run.Energy(), run.Contact(), run.Probe(model.probes())
+    return Parts(model.system, model.surface(case), model.tags, weight, recorders)
+
+
+def _channel(
+    shape: channel.Channel, comm: Any, *, excitations: tuple[Excitation, ...], run_dt: float | None,
+    sides: channel.Sides | None = None, weighing: Sequence[str] = ("channel",), held: bool = False,
+    base: str = "relative", rock: LinearElastic | None = None,
+) -> Parts:
+    bottom = bedrock(base, excitations, dt=run_dt, rock=rock)
+    ends = replace(sides, base=bottom or excitations) if isinstance(sides, channel.FreeFieldSides) else sides
+
+    def parts(model: channel.ChannelModel, firm: Parts | None = None) -> Parts:
+        surface = model.surface.bilateral_everywhere() if held else model.surface
+        return Parts(model.system, surface, model.tags, bool(weighing), model.recorders(), firm, bottom is not None)
+
+    model, firm = channel.staged(shape, comm, sides=ends, weighing=weighing, base=bottom)
+    return parts(model, None if firm is None else parts(firm))
+
+
+def _model(shape: type, build: Callable[..., Parts], inner: str = "") -> Callee:
+    """Return the call of a model: its keys are the fields of its shape, and what ``build`` takes by keyword.
+
+    inner: a field of the shape whose own fields are keys, too.
+    """
+    of_shape, target = callee(shape).hints, callee(build)
+    of_inner = callee(of_shape[inner]).hints if inner else {}
+    extra = {key: hint for key, hint in target.hints.items() if key != "shape"}
+
+    def made(**values: Any) -> Parts:
+        own, parts, more = ({key: values[key] for key in names if key in values}
+                            for names in (of_shape, of_inner, (*extra, *target.given)))
+        if parts:
+            own[inner] = replace(own[inner], **parts) if inner in own else of_shape[inner](**parts)
+        return build(shape(**own), **more)
+
+    return Callee(shape.__name__, made, {**of_inner, **of_shape, **extra}, given=target.given)
 
 
 _FUNCTIONS: Mapping[Any, Mapping[str, Callable[..., Any]]] = {  # kind -> word -> what it calls
@@ -138,7 +195,6 @@ _FUNCTIONS: Mapping[Any, Mapping[str, Callable[..., Any]]] = {  # kind -> word -
     UpgoingVelocity: {"upgoing": upgoing},
     ContactSurface: {"contact_surface": surface, "contact_pair": pair},
     channel.Sides: {"FreeFieldSides": free_field_sides},
-    FrictionLaw: {"SlipRateCoulomb": slip_rate},
     ImpactLaw: {"Elastic": laws.Elastic},
     Record: {"read_record": record, "synthetic": synthetic},
     Excitation: {"FirstModeHarmonic": first_mode_harmonic},
@@ -154,7 +210,9 @@ def names_of(kind: Any) -> tuple[str, ...]:
 @cache
 def _choices() -> Mapping[Any, Mapping[str, Callee]]:
     """Return kind -> word -> what it calls."""
-    found: dict[Any, dict[str, Callee]] = {Parts: dict(MODELS)}
+    found: dict[Any, dict[str, Callee]] = {
+        Parts: {"Wall": _model(wall.Wall, _wall), "Channel": _model(channel.Channel, _channel, inner="shape")}
+    }
     for room, kinds in _KINDS.items():
         for kind in kinds:
             found.setdefault(kind, {}).update({one.name: one for one in _callees(room, kind)})
