@@ -65,11 +65,10 @@ def check_boundaries(mesh: Mesh, clamped: Any, prescribed: Any, tied: Any, dashp
     for group in clamped:
         facets_of(OWNER, "clamped", group, mesh)
     for name, items, kinds in (
-        ("prescribed", prescribed, Prescribed), ("tied", tied, Tied), ("dashpots", dashpots, Dashpots),
+        ("prescribed", prescribed, (Prescribed,)), ("tied", tied, (Tied,)), ("dashpots", dashpots, (Dashpots,)),
         ("loads", loads, (Traction, BodyForce)),
     ):
-        called = kinds if isinstance(kinds, tuple) else (kinds,)
-        remedy = f"give {' or '.join(f'fem.{kind.__name__}(…)' for kind in called)}, or a list of them"
+        remedy = f"give {' or '.join(f'fem.{kind.__name__}(…)' for kind in kinds)}, or a list of them"
         for item in items:
             instance(OWNER, name, item, kinds, remedy)
             for group in (getattr(item, one, None) for one in ("facets", "first", "second")):

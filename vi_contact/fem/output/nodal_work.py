@@ -145,6 +145,7 @@ class NodalWork:
 
     def _of_load(self, k: int, load: Traction | BodyForce, at: Callable[[Callable[[float], Any]], Any]) -> Array:
         """Return rᵀf on this rank, (count,); what does not change with time is evaluated once."""
+
         def work(t: float) -> Array:
             values = evaluate(type(load).__name__, load.value, self.space.points, t, self.space.comm)
             return np.asarray(self._matrices[len(self._forms) + k] @ values.ravel())

@@ -64,7 +64,7 @@ class FrictionNewton:
                 break
             sweep, r = sweeper(step), step.admissible(r)
             for _ in range(FIRST_SWEEPS * 2**attempt):
-                r, swept = sweep(r, r), swept + 1
+                r, swept = sweep(r), swept + 1
         return r, len(history) + swept, history
 
     def _newton(self, kept: Kept, step: ScaledProblem, y: Array, history: list[float]) -> tuple[Array, bool]:

@@ -47,12 +47,12 @@ class NSGS:
         return iterated(step, r, sweeper(step), self.tolerance, self.max_iterations)
 
 
-def sweeper(step: ScaledProblem) -> Callable[[Array, Array], Array]:
-    """Return one sweep: r, and w that it does not need, -> r."""
+def sweeper(step: ScaledProblem) -> Callable[..., Array]:
+    """Return one sweep: r -> r."""
     d, matrix = step.delassus.dimension, step.delassus.matrix
     nodes = [_Node(step, i) for i in range(step.count)]
 
-    def sweep(r: Array, w: Array) -> Array:
+    def sweep(r: Array, w: Array | None = None) -> Array:  # w of r is not needed
         flat = r.copy().ravel()
         for i, node in enumerate(nodes):
             rows = slice(i * d, (i + 1) * d)
