@@ -68,7 +68,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "meshes/test_partition.py": "meshes.rows",
     "meshes/test_two_body_meshes.py": "meshes.block meshes.cut meshes.from_arrays meshes.two_blocks",
     "models/test_channel.py":
-        "models.channel.model models.channel.points models.channel.sides "
+        "models.channel.model models.channel.sides "
         "studies.cases.short_settings",
     "models/test_wall.py": "core.units",
     "plots/test_plots_channel.py": "plots.channel plots.channel_mesh",
@@ -79,7 +79,6 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "run/test_proximal.py": "run.rigid_bodies",
     "run/test_restart_refused.py": "run.files.identity",
     "run/test_simulate.py": "core.version run.files.log",
-    "schemes/test_contact_stabilised.py": "schemes.admissible_predictor",
     "schemes/test_trapezoidal.py": "schemes.base",
     "soil/test_free_field.py": "core.companion core.problem_checks soil.companion soil.upgoing_wave",
     "solvers/test_friction_condensed.py": "solvers.certified solvers.friction.newton",

@@ -19,8 +19,7 @@ from vi_contact.core.errors import InputError
 from vi_contact.core.units import STANDARD_GRAVITY
 from vi_contact.meshes.channel import ChannelMesh
 from vi_contact.meshes.extract import arrays_from_script
-from vi_contact.models.channel.model import BODIES, REFERENCE, Channel, build, staged
-from vi_contact.models.channel.points import SoilProbe
+from vi_contact.models.channel.model import BODIES, REFERENCE, Channel, SoilProbe, build, staged
 from vi_contact.models.channel.sides import DashpotSides, Fixed, Rollers, TiedSides
 from vi_contact.studies.cases.case import read_case
 from vi_contact.studies.cases.library import located

@@ -18,7 +18,7 @@ from vi_contact.core.problem import ContactProblem
 from vi_contact.core.state_checks import initial_state
 from vi_contact.laws.excitation import Harmonic
 from vi_contact.laws.mass import ConsistentMass, Redistributed
-from vi_contact.schemes import admissible_predictor as mass_projection
+from vi_contact.schemes import contact_stabilised
 from vi_contact.schemes.contact_stabilised import ContactStabilisedNewmark
 from vi_contact.schemes.ss22 import SS22
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
@@ -210,6 +210,6 @@ def test_massless_contact_nodes_are_refused():
 
 
 def test_a_projection_that_cannot_be_certified_is_a_failure_with_a_sentence(monkeypatch):
-    monkeypatch.setattr(mass_projection, "TOLERANCE", -1.0)
+    monkeypatch.setattr(contact_stabilised, "TOLERANCE", -1.0)
     with pytest.raises(StepFailure, match="predictor could not be projected .* step 151 .* certificate tolerance"):
         list(run(thrown(**MASS), STABILISED, dt=1 / 300, steps=200))

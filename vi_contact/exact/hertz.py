@@ -45,14 +45,8 @@ def contact_radius(*radii: float) -> float:
 
 
 @dataclass(frozen=True)
-class HertzLine:
-    """Describe parallel cylinders pressed with `force` P per unit of length (plane strain):
-
-        a = sqrt(4 P R/(pi E*)),   p0 = 2 P/(pi a) = sqrt(P E*/(pi R)),   p = p0 sqrt(1 - x²/a²)
-
-    The approach of half-planes is not defined (logarithmic). force [N/m], modulus E* [Pa], radius R [m]. Raises
-    InputError unless all are finite and positive.
-    """
+class Pressed:
+    """Hold what presses bodies together: force, modulus E* and radius R, all finite and positive, else InputError."""
 
     force: float
     modulus: float
@@ -60,6 +54,17 @@ class HertzLine:
 
     def __post_init__(self) -> None:
         attributes(self, positive=("force", "modulus", "radius"))
+
+
+@dataclass(frozen=True)
+class HertzLine(Pressed):
+    """Describe parallel cylinders pressed with `force` P per unit of length (plane strain):
+
+        a = sqrt(4 P R/(pi E*)),   p0 = 2 P/(pi a) = sqrt(P E*/(pi R)),   p = p0 sqrt(1 - x²/a²)
+
+    The approach of half-planes is not defined (logarithmic). force [N/m], modulus E* [Pa], radius R [m]. Raises
+    InputError unless all are finite and positive.
+    """
 
     @property
     def half_width(self) -> float:
@@ -77,7 +82,7 @@ class HertzLine:
 
 
 @dataclass(frozen=True)
-class HertzPoint:
+class HertzPoint(Pressed):
     """Describe spheres pressed with `force` F:
 
         a = (3 F R/(4 E*))^(1/3),   p0 = 3 F/(2 pi a²),   p = p0 sqrt(1 - r²/a²),
@@ -85,13 +90,6 @@ class HertzPoint:
 
     force [N], modulus E* [Pa], radius R [m]. Raises InputError unless all are finite and positive.
     """
-
-    force: float
-    modulus: float
-    radius: float
-
-    def __post_init__(self) -> None:
-        attributes(self, positive=("force", "modulus", "radius"))
 
     @classmethod
     def from_approach(cls, approach: float, *, modulus: float, radius: float) -> HertzPoint:

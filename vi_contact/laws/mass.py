@@ -19,7 +19,7 @@ from ..core.corners import lumped_entries
 from ..core.errors import InputError
 from ..core.surfaces import ContactSurface
 from ..core.system import SemiDiscreteSystem
-from .mass_transfer import from_neighbours, rigid_motions
+from .mass_transfer import from_neighbours, named, rigid_motions
 
 LIGHT = 1e-9  # of the diagonal entry of M: a row sum that is no mass
 LARGEST_CORRECTION = 0.35  # of a node's lumped mass: beyond, the mesh is too coarse to move mass about
@@ -104,11 +104,7 @@ def _faced(system: SemiDiscreteSystem, coupling: Matrix, contact: Mask) -> Mask:
     """The unknowns of side 2 that contact nodes face: with mass they would ring between the springs of both bodies.
     Collective."""
     algebra, faced = system.algebra, np.zeros(system.rows, dtype=bool)
-    rows = [algebra.entries(coupling, int(row))[0] for row in np.flatnonzero(contact)]
-    mine = np.concatenate(rows) if rows else np.zeros(0, dtype=np.int64)
-    columns = np.unique(np.concatenate(algebra.comm.bcast(algebra.comm.gather(mine))))
-    first = algebra.first(system.rows)
-    faced[columns[(columns >= first) & (columns < first + system.rows)] - first] = True
+    faced[named(system, [algebra.entries(coupling, int(row))[0] for row in np.flatnonzero(contact)])] = True
     return faced
 
 

@@ -115,10 +115,8 @@ class _Neighbours:
 def _neighbours(system: SemiDiscreteSystem, donors: Mask, columns: list[Indices]) -> _Neighbours:
     """What all ranks need to know of the donor nodes in these columns. Collective."""
     comm, d = system.algebra.comm, system.influence.shape[1]
-    mine = np.unique(np.concatenate(columns)) if columns else np.zeros(0, dtype=np.int64)
-    wanted = np.unique(np.concatenate(comm.bcast(comm.gather(mine))))
     first, node = system.algebra.first(system.rows), np.asarray(system.space.ids) // d
-    asked = wanted[(wanted >= first) & (wanted < first + system.rows)] - first
+    asked = named(system, columns)
     own = np.flatnonzero(np.isin(node, node[asked[donors[asked]]]))
     told = (first + own, node[own], system.influence[own], system.space.coordinates[own])
     parts = comm.bcast(comm.gather(told))
@@ -126,6 +124,14 @@ def _neighbours(system: SemiDiscreteSystem, donors: Mask, columns: list[Indices]
     order = np.argsort(numbers)
     _, place = np.unique(nodes[order], return_inverse=True)
     return _Neighbours(numbers[order], place, directions[order], points[order])
+
+
+def named(system: SemiDiscreteSystem, columns: list[Indices]) -> Indices:
+    """Return those owned unknowns whose columns any rank names. Collective."""
+    comm, first = system.algebra.comm, system.algebra.first(system.rows)
+    mine = np.unique(np.concatenate(columns)) if columns else np.zeros(0, dtype=np.int64)
+    wanted = np.unique(np.concatenate(comm.bcast(comm.gather(mine))))
+    return np.asarray(wanted[(wanted >= first) & (wanted < first + system.rows)] - first)
 
 
 def rigid_motions(directions: Array, offset: Array) -> Array:

@@ -152,11 +152,11 @@ class RockingModel:
         return np.asarray(momentum / system.algebra.dot(s, momentum))
 
 
+@dataclass(frozen=True)
 class Rocking:
-    """Record the block's rotation, angular velocity and corner reactions."""
+    """Record the rotation, angular velocity and corner reactions of a model's block."""
 
-    def __init__(self, model: RockingModel) -> None:
-        self._model = model
+    model: RockingModel
 
     def columns(self) -> Columns:
         """Return the columns theta, theta_rate, r_left, r_right."""
@@ -176,7 +176,7 @@ class Rocking:
 
     def _row(self, state: State) -> Row:
         return {
-            "theta": self._model.angle(state), "theta_rate": self._model.spin(state),
+            "theta": self.model.angle(state), "theta_rate": self.model.spin(state),
             "r_left": float(state.r_n[0]), "r_right": float(state.r_n[1]),
         }
 

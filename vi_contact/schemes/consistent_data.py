@@ -52,7 +52,10 @@ def _with_contact(problem: ContactProblem, state: State, force: Array, dt: float
     compression = surface.normal_values(state.u) - surface.gap(state.t)
     springs = surface.reaction_load(_spring_reactions(surface, compression), len(force))
     resting = _resting(surface, compression, state)
-    slip = _slip_rate(problem, state, dt)
+    rate = None  # of slip: the tangential velocity relative to the obstacle [m/s]
+    if problem.frictional:
+        rate, sliding = surface.tangential_values(state.v), surface.sliding(state.t, state.t + dt)
+        rate = rate if sliding is None else rate - sliding / dt
     step = StepProblem(
         A=mass_matrix(problem),
         b=force - springs,
@@ -64,7 +67,7 @@ def _with_contact(problem: ContactProblem, state: State, force: Array, dt: float
         t=state.t,
         k=state.k,
         friction=problem.friction,
-        slip0=None if slip is None else -slip / dt,
+        slip0=None if rate is None else -rate / dt,
         rate_factor=dt,
     )
     solver: PreparedSolver = problem.equations.cached(
@@ -72,14 +75,6 @@ def _with_contact(problem: ContactProblem, state: State, force: Array, dt: float
     )
     result = solver.solve(step)
     return result.x, springs + surface.reaction_load(result.r_n, len(force), result.r_t)
-
-
-def _slip_rate(problem: ContactProblem, state: State, dt: float) -> Array | None:
-    """Return the tangential velocity relative to the obstacle [m/s]; None without friction."""
-    if not problem.frictional:
-        return None
-    rate, sliding = problem.surface.tangential_values(state.v), problem.surface.sliding(state.t, state.t + dt)
-    return rate if sliding is None else rate - sliding / dt
 
 
 def mass_matrix(problem: ContactProblem) -> EffectiveMatrix:

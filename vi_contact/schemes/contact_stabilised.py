@@ -1,6 +1,6 @@
 """Step by contact-stabilised Newmark: the predictor is made admissible first, so that contact forces do not ring.
 
-    u_p = argmin ½ (u - u0 - dt v0)ᵀ M (u - u0 - dt v0)  over  gap(u) >= 0           (schemes.admissible_predictor)
+    u_p = argmin ½ (u - u0 - dt v0)ᵀ M (u - u0 - dt v0)  over  gap(u) >= 0  (= on bilateral rows)
     M (u1 - u_p) = -½ dt² [K ½(u0 + u1) + C (u1 - u0)/dt - f(t0 + ½ dt) + B_nᵀ r̄_n + B_tᵀ r̄_t],    gap(u1) >= 0
     v1 = v0 + 2/dt (u1 - u_p),    0 <= r̄_n  ⊥  gap(u1),    |r̄_t| <= limit(r̄_n) along the slip B_t (u1 - u0)
 
@@ -24,14 +24,20 @@ Comput. Methods Appl. Mech. Engng 180 (1999) 1-26.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from ..core.algebra import EffectiveMatrix
+import numpy as np
+
+from ..core.algebra import Array, EffectiveMatrix, Mask
 from ..core.checks import flag
+from ..core.errors import StepFailure
 from ..core.problem import ContactProblem
+from ..core.protocols import Frictionless
 from ..core.step import Balance, State, StepProblem, StepResult
-from .admissible_predictor import admissible
+from ..solvers.certified import TOLERANCE, CertifiedSolver
+from ..solvers.condensed import Condensed
 from .base import SingleStep, means, position_step, stepped
+from .consistent_data import mass_matrix, rigid_part
 
 
 @dataclass(frozen=True)
@@ -69,3 +75,43 @@ class ContactStabilisedNewmark(SingleStep):
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
         """Return the averages of the equation above."""
         return means(old, new, dt, u=0.5 * (old.u + new.u), f=problem.equations.load(old.t + 0.5 * dt))
+
+
+def admissible(problem: ContactProblem, state: State, u: Array, dt: float) -> tuple[Array, Mask]:
+    """Return (u_p, the points that stopped it) for a predicted displacement ``u`` of the step of dt after ``state``.
+
+        M w = -B_nᵀ q,    0 <= q  ⊥  gap0 - B_n u - B_n w >= 0,    u_p = u + w
+
+    The same small problem as a step with A = M, solved in the increment w, so that nothing is rounded where nothing is
+    in the way. Springs give way: their points are not projected. Normal directions only; friction has no part in it.
+    StepFailure when the projection cannot be certified.
+    """
+    surface, system = problem.surface, problem.equations
+    rigid = surface.compliance == 0.0
+    gap = np.where(rigid, surface.gap(state.t + dt) - surface.normal_values(u), np.inf)
+    closed = (gap < 0.0) | (surface.bilateral & rigid)
+    if np.isnan(gap).any() or not np.any(gap[closed] != 0.0):
+        return u, closed  # nothing in the way; of NaN the step itself tells
+    bounds: ContactProblem = system.cached(  # springs are not bounds here, and nothing rubs
+        "admissible predictor, bounds",
+        lambda: replace(problem, surface=rigid_part(surface), friction=Frictionless()),
+    )
+    solver: CertifiedSolver = system.cached(
+        "admissible predictor", lambda: CertifiedSolver(bounds, mass_matrix(problem), 1.0, [Condensed()], TOLERANCE)
+    )
+    step = StepProblem(
+        A=mass_matrix(problem),
+        b=np.zeros_like(u),
+        bound=gap,
+        surface=bounds.surface,
+        scale=1.0,
+        guess=np.zeros_like(u),
+        active=closed,
+        t=state.t + dt,
+        k=state.k + 1,
+    )
+    try:
+        result, _, _ = solver.solve(step)
+    except StepFailure as failure:
+        raise StepFailure(f"the predictor could not be projected onto the admissible set: {failure}") from failure
+    return u + result.x, result.active

@@ -4,8 +4,7 @@
 its gravity stage, too, where sides or base hold no static load: ``fem.release`` goes from the one to the other.
 """
 
-from .model import Channel, ChannelModel, build, staged, weighted
-from .points import Openings, SoilProbe
+from .model import Channel, ChannelModel, Openings, SoilProbe, build, staged, weighted
 from .sides import DashpotSides, Fixed, FreeFieldSides, RockBelow, Rollers, Sides, TiedSides
 
 __all__ = [
