@@ -121,7 +121,7 @@ def convolution_operator(
     symmetric: bool = True,
     orders: Orders = ORDERS,
 ) -> ConvolutionOperator:
-    """Assemble S for `steps` time steps of dt [s]; method: BDF2(), Trapezoid() or RadauIIA(); 96 steps stages n² bytes.
+    """Assemble S for `steps` time steps of dt [s] by BDF2(), Trapezoid() or RadauIIA(): 96 steps stages n² bytes.
 
     Raises InputError for a time step too small (c_P dt/h < 0.05, for the trapezoidal rule 0.5) or too large (> 8) for
     the mesh, or for less than one step.
