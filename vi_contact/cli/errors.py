@@ -55,16 +55,16 @@ def told(run: Callable[[], Any], spelling: Mapping[str, str]) -> Any:
         if _of_memory(error):
             raise ViContactError(OUT_OF_MEMORY) from error
         if spelling and isinstance(error, InputError):
-            text = str(error)
+            said = str(error)
             for argument, option in spelling.items():
-                text = text.replace(f" {argument}= ", f" {option} ").replace(f" {argument}=", f" {option} ")
-            raise InputError(text.rstrip()) from error
+                said = said.replace(f" {argument}= ", f" {option} ").replace(f" {argument}=", f" {option} ")
+            raise InputError(said.rstrip()) from error
         raise
     except Exception as error:
-        told = _sentence(error)
-        if told is None:
+        text = _sentence(error)
+        if text is None:
             raise
-        raise ViContactError(told) from error
+        raise ViContactError(text) from error
 
 
 def printable(text: str) -> str:
