@@ -7,8 +7,8 @@ import pytest
 from exact_checks import derivative_defect, wave_defect
 
 from vi_contact.core.errors import InputError
+from vi_contact.exact.bar import TwoBars
 from vi_contact.exact.columns import ObliqueImpact, ShearColumn
-from vi_contact.exact.two_bars import TwoBars
 from vi_contact.laws.materials import LinearElastic
 
 pytestmark = pytest.mark.serial

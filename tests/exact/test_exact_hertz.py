@@ -7,8 +7,15 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 
 from vi_contact.core.errors import InputError
-from vi_contact.exact.hertz import HertzImpact, HertzLine, HertzPoint, contact_modulus, contact_radius
-from vi_contact.exact.punch import RoundPunch, StripPunch
+from vi_contact.exact.hertz import (
+    HertzImpact,
+    HertzLine,
+    HertzPoint,
+    RoundPunch,
+    StripPunch,
+    contact_modulus,
+    contact_radius,
+)
 
 pytestmark = pytest.mark.serial
 RIGID_PLANE = contact_modulus((1.0, 0.3))

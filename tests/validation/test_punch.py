@@ -14,7 +14,7 @@ from mpi4py import MPI
 
 from vi_contact.core.algebra import Array, Mask
 from vi_contact.core.obstacles import AnalyticGap
-from vi_contact.exact.punch import StripPunch
+from vi_contact.exact.hertz import StripPunch
 from vi_contact.laws.materials import LinearElastic
 
 COMM = MPI.COMM_WORLD

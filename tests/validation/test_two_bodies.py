@@ -19,7 +19,7 @@ from two_bodies import SOFT, blocks, momenta, per_body, relative, thrown, two_bl
 from vi_contact.core.algebra import Array
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.protocols import Frictionless
-from vi_contact.exact.two_bars import TwoBars
+from vi_contact.exact.bar import TwoBars
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.pairs import contact_pair
 from vi_contact.fem.loads import Prescribed

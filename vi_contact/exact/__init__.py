@@ -5,18 +5,17 @@ from __future__ import annotations
 from ..core.lazy import lazy
 
 _CONTENTS = {
-    "bar": ("PeriodicBar", "ThrownBar"),
+    "bar": ("PeriodicBar", "ThrownBar", "TwoBars"),
     "bouncing_bar": ("BouncingBar",),
     "columns": ("ObliqueImpact", "ShearColumn"),
-    "hertz": ("HertzImpact", "HertzLine", "HertzPoint", "contact_modulus", "contact_radius"),
+    "hertz":
+        ("HertzImpact", "HertzLine", "HertzPoint", "RoundPunch", "StripPunch", "contact_modulus", "contact_radius"),
     "housner": ("HousnerBlock",),
     "lining": ("ThickLining", "ThinLining"),
-    "punch": ("RoundPunch", "StripPunch"),
     "racking": ("BoxFrame", "ChannelFrame", "racking_ratio"),
     "rigid_wall": ("RigidWall",),
     "site_response": ("SoilLayer",),
     "sliding": ("SlidingBlock",),
     "surface_waves": ("dashpot_energy", "dashpot_reflection", "rayleigh_motion", "rayleigh_speed"),
-    "two_bars": ("TwoBars",),
 }
 __all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)

@@ -1,10 +1,12 @@
-"""Solve Hertz contact of smooth bodies, and the quasi-static impact of a sphere (Johnson 1985, ch. 4 and 11).
+"""Solve Hertz contact of smooth bodies, the quasi-static impact of a sphere, and flat rigid punches on an elastic
+half-space, all without friction (Johnson 1985, ch. 2 to 4 and 11).
 
 Bodies of moduli E_i, nu_i and radii R_i touch without friction, with E* and R from
 
     1/E* = sum over i of (1 - nu_i²)/E_i,   1/R = sum over i of 1/R_i.
 
-Pressures are positive in compression; lengths [m], pressures and moduli [Pa], forces [N], or any consistent units.
+Pressures are positive in compression; under a punch they are infinite at the edge, where they grow with the power -1/2
+of the distance. Lengths [m], pressures and moduli [Pa], forces [N], or any consistent units.
 """
 
 from __future__ import annotations
@@ -156,3 +158,52 @@ class HertzImpact:
 def _ellipse(peak: float, half_axis: float, x: ArrayLike) -> Array:
     """Return peak · sqrt(1 - (x/half_axis)²), 0 outside."""
     return peak * np.sqrt(np.maximum(1.0 - (np.asarray(x, dtype=float) / half_axis) ** 2, 0.0))
+
+
+@dataclass(frozen=True)
+class StripPunch:
+    """Describe a long punch of width 2a under `force` P per unit of length: p = P/(pi sqrt(a² - x²)).
+
+    half_width a [m], force [N/m]. Raises InputError unless both are finite and positive.
+    """
+
+    half_width: float
+    force: float
+
+    def __post_init__(self) -> None:
+        attributes(self, positive=("half_width", "force"))
+
+    def pressure(self, x: ArrayLike) -> Array:
+        """Return p(x) [Pa] at the distance x from the centre line, 0 beside the punch, infinite at its edge."""
+        return self.force / math.pi * _inverse_root(self.half_width, x)
+
+
+@dataclass(frozen=True)
+class RoundPunch:
+    """Describe a round punch of radius a under `force` F: p = F/(2 pi a sqrt(a² - r²)), depth = F/(2 E* a).
+
+    radius a [m], force [N], modulus E* = E/(1 - nu²) [Pa]. Raises InputError unless all are finite and positive.
+    """
+
+    radius: float
+    force: float
+    modulus: float
+
+    def __post_init__(self) -> None:
+        attributes(self, positive=("radius", "force", "modulus"))
+
+    @property
+    def depth(self) -> float:
+        """Return the depth to which it sinks [m]."""
+        return self.force / (2.0 * self.modulus * self.radius)
+
+    def pressure(self, r: ArrayLike) -> Array:
+        """Return p(r) [Pa] at the distance r from the axis, 0 beside the punch, infinite at its edge."""
+        return self.force / (2.0 * math.pi * self.radius) * _inverse_root(self.radius, r)
+
+
+def _inverse_root(a: float, x: ArrayLike) -> Array:
+    """Return 1/sqrt(a² - x²), 0 for |x| > a."""
+    square = a**2 - np.asarray(x, dtype=float) ** 2
+    with np.errstate(divide="ignore"):
+        return np.where(square < 0.0, 0.0, 1.0 / np.sqrt(np.maximum(square, 0.0)))

@@ -36,7 +36,6 @@ from ..laws.materials import Damping, LinearElastic, PlaneStress, Rayleigh
 from ..meshes.block import BlockMesh
 from ..run.static import static_equilibrium
 from ..run.time_steps import HalvedAtImpact
-from ..solvers.condensed import Condensed
 
 RIGID = 200.0  # least sqrt(E/rho)/height over p
 
@@ -196,10 +195,10 @@ def build(block: RockingBlock, comm: Any) -> RockingModel:
     )
     ground = HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))
     whole = ContactProblem(system, contact_surface(system, tags["bottom"], obstacle=ground))
-    heavy = geometric_stiffness(whole, static_equilibrium(whole, solver=Condensed()))
+    heavy = geometric_stiffness(whole, static_equilibrium(whole))
     corners = contact_surface(heavy, tags["bottom"], obstacle=ground, points=[(0.0, 0.0), (width, 0.0)])
     problem = ContactProblem(heavy, corners)
-    return RockingModel(block, problem, static_equilibrium(problem, solver=Condensed()))
+    return RockingModel(block, problem, static_equilibrium(problem))
 
 
 def impacts(history: Mapping[str, Array]) -> tuple[Array, Array]:

@@ -23,7 +23,6 @@ from ..laws.friction import Coulomb
 from ..laws.materials import Damping, LinearElastic, PlaneStress, Rayleigh
 from ..meshes.block import BlockMesh
 from ..run.static import static_equilibrium
-from ..solvers.condensed import Condensed
 
 
 @dataclass(frozen=True)
@@ -67,4 +66,4 @@ def build(body: SlidingBody, comm: Any, *, excitation: Excitation | Sequence[Exc
     ground = HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))
     surface = contact_surface(system, tags["bottom"], obstacle=ground)
     problem = ContactProblem(system, surface, friction=Coulomb(body.law.mu), excitation=excitation)
-    return SlidingModel(body, problem, static_equilibrium(problem, solver=Condensed()))
+    return SlidingModel(body, problem, static_equilibrium(problem))
