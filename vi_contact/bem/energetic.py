@@ -133,9 +133,10 @@ class Marching:
         total, before = forces.copy(), np.zeros((unknowns, count))
         q = np.empty_like(p) if self.symmetric else p
         for k in range(steps):
-            early = 0.5 * self.mass @ before - self._past_first(k, p, u)
+            past = summed(self.blocks.single[k:0:-1], p[:k]) - summed(self.blocks.double[k:0:-1], u[:k])
+            early = 0.5 * self.mass @ before - past
             v0_early = cho_solve(self.v0, early)
-            known = self.left @ v0_early + self._past_second(k, p, q, u)
+            known = self.left @ v0_early + self._past(k, p, q, u)
             if prescribed is not None:
                 u[k, ~self.free] = prescribed[k, ~self.free] - before[~self.free]
             if self.factor is not None:
@@ -148,11 +149,7 @@ class Marching:
             before = before + u[k]
         return np.cumsum(u, axis=0, out=u), p, total
 
-    def _past_first(self, k: int, p: Array, u: Array) -> Array:
-        """Return the sum over earlier steps of V p - K u."""
-        return summed(self.blocks.single[k:0:-1], p[:k]) - summed(self.blocks.double[k:0:-1], u[:k])
-
-    def _past_second(self, k: int, p: Array, q: Array, u: Array) -> Array:
+    def _past(self, k: int, p: Array, q: Array, u: Array) -> Array:
         """Return the sum over earlier steps of K' p - D u; q are the jumps of p. Zero in the unsymmetric form."""
         if k == 0 or not self.symmetric:
             return np.zeros(u.shape[1:])

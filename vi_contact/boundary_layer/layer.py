@@ -70,10 +70,6 @@ class Layer:
         """Return the layer as a body that enters with this speed [m/s] meets it."""
         return self if self.speed is not None else replace(self, speed=speed)
 
-    def times(self, factor: float) -> Layer:
-        """Return the layer with k and c times a factor: the same motion of a mass that many times as large."""
-        return replace(self, k=factor * self.k, c=factor * self.c)
-
     def cut_off(self, x: Array | float) -> Array:
         """Return delta(x; a, b): 1 up to a, 0 from b on, infinitely smooth between."""
         x, a, b = np.asarray(x, dtype=float), self.a, self.width
