@@ -21,7 +21,7 @@ import numpy as np
 
 from demos.pictures.layer import plot_cut_off, plot_parameters
 from vi_contact import boundary_layer
-from vi_contact.plots.layer import plot_particle
+from vi_contact.plots.studies import plot_particle
 
 # Parameters ----------------------------------------------------------------------------------------------------------
 STIFFNESSES = (0.5, 1.0, 2.0, 5.0, 10.0)  # k [N/m]

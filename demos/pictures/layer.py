@@ -12,7 +12,7 @@ from vi_contact.boundary_layer.particle import ParticleImpact
 from vi_contact.boundary_layer.trajectory import Trajectory
 from vi_contact.core.algebra import Array
 from vi_contact.plots.histories import canvas, save
-from vi_contact.plots.layer import COLOURS
+from vi_contact.plots.studies import COLOURS
 
 
 def plot_parameters(values: Sequence[float], dampers: Sequence[float], path: str | Path) -> Path:

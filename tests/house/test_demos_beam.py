@@ -41,7 +41,7 @@ def test_the_timoshenko_beam_demo(tmp_path: Path, capsys: pytest.CaptureFixture[
 
 def test_every_axis_has_a_label(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Quantity and unit; curves in every panel."""
-    from vi_contact.plots import beam as plotting_beam
+    from vi_contact.plots import studies as plotting_beam
 
     seen = keep_figures(monkeypatch, plotting_beam)
     stepper = beam.BeamStepper(beam.TimoshenkoBeam(), beam.Elements(10), 0.01, lambda t: 5.0, lambda t, rate: 0.2)

@@ -5,16 +5,15 @@ from __future__ import annotations
 from ..core.lazy import lazy
 
 _CONTENTS = {
-    "beam": ("plot_beam_energies", "plot_shapes", "plot_tips"),
     "channel": ("Outline", "plot_envelope", "plot_interface", "plot_openings", "plot_rocking"),
     "channel_mesh": ("animate",),
     "deformed": ("read_frames", "read_tractions"),
     "histories": ("plot_certificate", "plot_energy", "plot_excitation", "plot_points", "plot_runs"),
     "ida": ("plot_ida",),
-    "layer": ("plot_particle",),
     "maps": ("plot_contact",),
     "records": ("plot_loop", "plot_motion", "plot_spectra", "plot_transfer"),
     "report": ("plot_report",),
     "run_pictures": ("draw_run", "illustrate"),
+    "studies": ("plot_beam_energies", "plot_particle", "plot_shapes", "plot_tips"),
 }
 __all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)

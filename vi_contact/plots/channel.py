@@ -20,8 +20,6 @@ SHOWN = {  # panels of plot_openings: point -> outward normal of the channel the
     "feet of the walls": {"1": (-1.0, 0.0), "7": (1.0, 0.0)},
     "under the slab": {"1": (0.0, -1.0), "4": (0.0, -1.0), "7": (0.0, -1.0)},
 }
-_COLOURS = {(-1.0, 0.0): "tab:blue", (1.0, 0.0): "tab:red"}
-_BELOW = ("tab:blue", "black", "tab:red")
 RUNS = ("black", "tab:red", "tab:green", "tab:purple")
 CLIPPED = 98.0  # per cent of the closed points whose pressure the colours of a map tell apart
 LEGEND: dict[str, Any] = {"fontsize": 8, "loc": "lower right", "bbox_to_anchor": (1.0, 0.98), "frameon": False}
@@ -46,17 +44,13 @@ class Outline:
         return cls(arc, {"left wall": left, "base": ~(left | right), "right wall": right})
 
     def along(self) -> list[tuple[str, Array]]:
-        """Return (name, its conditions in the order of the arc) of the sides in the order of the arc."""
+        """Return (name, its conditions in the order of the arc) of the sides, which follow each other along the arc."""
         order = np.argsort(self.arc)
-        parts = [(name, order[mask[order]]) for name, mask in self.sides.items()]
-        return sorted(parts, key=lambda part: float(np.mean(self.arc[part[1]])))
+        return [(name, order[mask[order]]) for name, mask in self.sides.items()]
 
     def places(self) -> Array:
         """Return the arc lengths (m,) [m], a corner's two conditions a micrometre apart in the order of sides."""
-        apart = np.zeros(len(self.arc))
-        for rank, (_, conditions) in enumerate(self.along()):
-            apart[conditions] = 1e-6 * rank
-        return self.arc + apart
+        return self.arc + 1e-6 * np.argmax(list(self.sides.values()), axis=0)
 
     def corners(self) -> list[float]:
         """Return the arc lengths at which one side ends and the next one starts [m]."""
@@ -85,10 +79,10 @@ def opening(history: History, label: str, normal: Sequence[float]) -> Array:
 def plot_openings(history: History, path: str | Path, *, title: str) -> Path:
     """Draw Fig. 7: acceleration of the bedrock, and openings between channel and soil, left blue and right red."""
     found = {
-        name: [(label, opening(history, label, normal), normal) for label, normal in points.items()]
+        name: {label: opening(history, label, normal) for label, normal in points.items()}
         for name, points in SHOWN.items()
     }
-    metres, unit = unit_of(max(float(np.abs(one).max()) for rows in found.values() for _, one, _ in rows))
+    metres, unit = unit_of(max(float(np.abs(one).max()) for rows in found.values() for one in rows.values()))
     figure, axes = panels(len(found) + 1, (9.0, 9.6))
     for component in shaken(history):
         colour = "black" if component == "x" else "0.6"
@@ -96,8 +90,8 @@ def plot_openings(history: History, path: str | Path, *, title: str) -> Path:
     axes[0].set_ylabel("acceleration [m/s²]")
     axes[0].set_title("bedrock", fontsize=9, loc="left")
     for axis, (name, rows) in zip(axes[1:], found.items(), strict=True):
-        for below, (label, values, normal) in zip(_BELOW, rows, strict=False):
-            colour = _COLOURS.get(normal, below)
+        colours = ("tab:blue", "black", "tab:red") if len(rows) == 3 else ("tab:blue", "tab:red")
+        for colour, (label, values) in zip(colours, rows.items(), strict=True):
             axis.plot(history["t"], values / metres, color=colour, lw=0.9, label=f"point {label}")
         axis.set_ylabel(f"opening [{unit}]")
         axis.set_title(name, fontsize=9, loc="left")

@@ -238,25 +238,24 @@ def _header(figure: Any, run: RunFolder, title: str) -> None:
 
 def header_facts(run: RunFolder) -> list[tuple[str, str]]:
     """Return (name, value) of what the page says first: six of the method, six of the outcome; a dash for unknown."""
-    facts, t = run.facts, run.history["t"]
+    t, iterations = run.history["t"], run.facts.get("iterations_per_step") or {}
+    facts = {**run.facts, "mean": iterations.get("mean"), "own": (run.facts.get("versions") or {}).get("vi_contact")}
 
     def fact(name: str, form: str = "{}") -> str:
         value = facts.get(name)
         return "-" if value is None else form.format(value)
 
-    dt = facts.get("dt")
-    iterations = (facts.get("iterations_per_step") or {}).get("mean")
     return [
         ("scheme", shorten(fact("scheme"), 78, placeholder=" …")),
         ("mass", shorten(fact("mass"), 78, placeholder=" …")),
         ("solver", shorten(fact("solver"), 78, placeholder=" …")),
-        ("time step", dt if isinstance(dt, str) else "-" if dt is None else f"{dt:.6g} s"),
+        ("time step", fact("dt") if isinstance(facts.get("dt"), str) else fact("dt", "{:.6g} s")),
         ("steps", f"{len(t) - 1}, t = {t[0]:g} to {t[-1]:g} s"),
-        ("version", f"vi_contact {(facts.get('versions') or {}).get('vi_contact', '-')}, ranks {fact('ranks')}"),
-        ("status", fact("status") if facts else "not ended"),
+        ("version", f"vi_contact {fact('own')}, ranks {fact('ranks')}"),
+        ("status", fact("status") if run.facts else "not ended"),
         ("unknowns", fact("unknowns")),
         ("contact points", fact("contact_points")),
-        ("iterations a step", "-" if iterations is None else f"{iterations:.2f}"),
+        ("iterations a step", fact("mean", "{:.2f}")),
         ("worst certificate", f"{np.max(run.history['certificate']):.2e}"),
         ("energy defect", fact("energy_defect", "{:.2e}")),
     ]

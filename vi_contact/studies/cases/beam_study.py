@@ -18,7 +18,7 @@ from ...beam.values import Rod, TimoshenkoBeam
 from ...core.checks import check_word, counted
 from ...core.errors import InputError
 from ...core.files import write_atomically
-from ...plots.beam import plot_beam_energies, plot_shapes, plot_tips
+from ...plots.studies import plot_beam_energies, plot_shapes, plot_tips
 
 HISTORY, SHAPES = "history.csv", "shapes.npz"
 

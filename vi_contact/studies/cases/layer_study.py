@@ -17,7 +17,7 @@ from ...boundary_layer.trajectory import passage
 from ...core.checks import check_word
 from ...core.errors import InputError
 from ...core.files import write_atomically
-from ...plots.layer import plot_particle
+from ...plots.studies import plot_particle
 
 TABLE = "impacts.csv"
 COLUMNS = ("k [N/m]", "c [N]", "e", "e_p", "t_c [s]", "t_f [s]", "x_min [m]")

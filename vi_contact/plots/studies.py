@@ -1,15 +1,18 @@
-"""Draw rod and beam as Figs. 8.1 to 8.9 of Ahn (2012): energies, motion of the tip, shapes of the beam."""
+"""Draw what the studies compute: rod and beam as Figs. 8.1 to 8.9 of Ahn (2012), the impact of a particle on a boundary
+layer as Fig. 1 of the paper on b-geometry (ENOC 2017)."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from ..beam.algorithm import BeamRun
+from ..boundary_layer.particle import ParticleImpact
 from .histories import canvas, panels, save
 
+COLOURS = ("tab:blue", "tab:orange", "tab:green", "tab:red", "tab:purple")
 _QUANTITIES = ("(A) rotation [-]", "(B) angular speed [1/s]", "(C) displacement [m]", "(D) velocity [m/s]")
 
 
@@ -61,3 +64,19 @@ def plot_shapes(
     axes[1, 0].set_ylabel("whole beam")
     axes[0, 3].legend(*axes[1, 3].get_legend_handles_labels(), bbox_to_anchor=(1.02, 1.0), loc="upper left", fontsize=8)
     return save(figure, path, title)
+
+
+def plot_particle(impacts: Mapping[str, Sequence[tuple[str, ParticleImpact]]], path: str | Path) -> Path:
+    """Draw Fig. 1: distance and velocity against t/t_f, a row of panels for each group; group -> (label, impact)."""
+    figure, axes = canvas(len(impacts), 2, (10.0, 3.3 * len(impacts) + 0.3))
+    for (place, speed), (title, group) in zip(axes, impacts.items(), strict=True):
+        for (label, impact), colour in zip(group, COLOURS, strict=False):
+            part = np.linspace(0.0, 1.0, 301)
+            x, v = impact.position(part * impact.duration), impact.velocity(part * impact.duration)
+            place.plot(part, x / impact.layer.a, color=colour, lw=1.2, label=label)
+            speed.plot(part, v / impact.speed, color=colour, lw=1.2, label=label)
+        place.set(xlabel="t / t_f [-]", ylabel="x / a [-]", title=title)
+        speed.set(xlabel="t / t_f [-]", ylabel="velocity / V [-]", title=title)
+        speed.axhline(0.0, color="0.5", lw=0.8)
+        place.legend(fontsize=8)
+    return save(figure, path)
