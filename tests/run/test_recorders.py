@@ -246,5 +246,5 @@ def test_steps_tell_time_iterations_and_ground() -> None:
     assert found["k"].tolist() == list(range(21))
     assert found["t"] == pytest.approx(DT * np.arange(21), rel=1e-14)
     assert found["a_g_x"].tolist() == [SHAKE.acceleration(t) for t in found["t"]]
-    steps = Steps(3)
+    steps = Steps()
     assert [name for name in steps.columns() if name.startswith("a_g")] == ["a_g_x", "a_g_y", "a_g_z"]

@@ -66,24 +66,21 @@ class March:
         while self.base < self._step_plan.steps:
             dt = self._step_plan.dt(self.base)
             self._method.bind()  # another run of the problem may be under way
-            self._free_all_but([dt / 2**level for level in range(self._step_plan.halvings + 1)])
+            sizes = [dt / 2**level for level in range(self._step_plan.halvings + 1)]
+            self._matrices = {size: self._matrices[size] for size in sizes if size in self._matrices}
+            self._solvers = {size: self._solvers[size] for size in sizes if size in self._solvers}
             self._state, self.dt = self._restarted(dt), dt
             levels = [0]  # how often the parts of the base step that are left were halved
             while levels:
                 level = levels.pop()
-                report = self._attempt(dt / 2**level, final=level == self._step_plan.halvings)
+                report = self._attempt(sizes[level], final=level == self._step_plan.halvings)
                 if report is None:
                     self.halved += 1
                     levels += [level + 1, level + 1]
                     continue
-                self._state, self.dt, self.ended = report.new, dt / 2**level, not levels
+                self._state, self.dt, self.ended = report.new, sizes[level], not levels
                 self.base += self.ended
                 yield report.new, report
-
-    def _free_all_but(self, sizes: Sequence[float]) -> None:
-        """Free matrices and factors of every other dt."""
-        self._matrices = {dt: A for dt, A in self._matrices.items() if dt in sizes}
-        self._solvers = {dt: solver for dt, solver in self._solvers.items() if dt in sizes}
 
     def _restarted(self, dt: float) -> State:
         """The state, with a past for this dt."""

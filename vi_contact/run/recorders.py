@@ -35,8 +35,7 @@ class Steps:
     """Record the columns that every run has: time, step, solver iterations, certificate, escalation and ground
     acceleration."""
 
-    def __init__(self, dimension: int) -> None:
-        self._axes = AXES[:dimension]
+    _axes = AXES  # those of the problem, once it is started
 
     def columns(self) -> Columns:
         """Name t, k, iterations, certificate, escalated, a_g_x, …"""
@@ -55,7 +54,7 @@ class Steps:
 
     def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
         """Return the initial row: no iterations and no certificate were needed, so zeros."""
-        self._problem = problem
+        self._problem, self._axes = problem, AXES[: problem.system.influence.shape[1]]
         return self._row(state)
 
     def row(self, report: Report) -> Row:
@@ -133,8 +132,7 @@ class Contact:
     displacement on the support (also of points that are open).
     """
 
-    def __init__(self) -> None:
-        self._axes, self._frictional = AXES, False
+    _axes, _frictional = AXES, False  # those of the problem, once it is started
 
     def columns(self) -> Columns:
         """Name contact_uplift, contact_resultant, … and the arrays pressure, gap, active. Call ``start`` first."""

@@ -83,8 +83,7 @@ def simulate(
     problem, comm = method.problem, method.problem.system.algebra.comm
     folder = None if out is None else run_folder(comm, out)
     source = _source(restart, folder)
-    recorders: list[Any] = [Steps(problem.system.influence.shape[1])]
-    recorders += (Energy(), Contact()) if record is None else record
+    recorders: list[Recorder] = [Steps(), *((Energy(), Contact()) if record is None else record)]
     with locked(comm, folder):
         place, checksum = _place(method, source, state, changed)
         plan = step_plan(dt, steps, t_end, place.t_start)

@@ -66,9 +66,10 @@ def _lines(facts: Mapping[str, Any]) -> list[str]:
     def line(name: str, value: str) -> str:
         return f"  {name:<26} {value}"
 
-    iterations, warning = facts["iterations_per_step"], energy_warning(facts)
+    iterations, warning, dt = facts["iterations_per_step"], energy_warning(facts), facts["dt"]
+    length = f"({facts['base_steps']} base steps of {dt})" if isinstance(dt, str) else f"of {dt:g} s"
     lines = [
-        f"run {facts['status']}: {_steps(facts)}, "
+        f"run {facts['status']}: {facts['steps']} steps {length}, "
         f"t = {facts['t_start']:g} to {facts['t_end']:g} s, on {facts['ranks']} rank(s)",
         line("scheme", facts["scheme"]),
         line("mass matrix", facts["mass"]),
@@ -102,11 +103,3 @@ def _lines(facts: Mapping[str, Any]) -> list[str]:
     if facts["reason"]:
         lines.append(line("reason", facts["reason"]))
     return lines
-
-
-def _steps(facts: Mapping[str, Any]) -> str:
-    """How many steps of what length."""
-    steps, dt = facts["steps"], facts["dt"]
-    if not isinstance(dt, str):
-        return f"{steps} steps of {dt:g} s"
-    return f"{steps} steps ({facts['base_steps']} base steps of {dt})"

@@ -121,7 +121,8 @@ def read_checkpoint(
     file, comm = folder / CHECKPOINT, problem.system.algebra.comm
     about, arrays = comm.bcast(on_root(comm, lambda: _read(file, problem)))
     other = _compare(file, problem, scheme, dt, about, changed)
-    mine = _places(problem)
+    ids = problem.system.space.ids
+    mine = np.searchsorted(np.sort(np.concatenate(comm.bcast(comm.gather(ids)))), ids)
     for name in about["vectors"]:
         arrays[name] = arrays[name][mine]
     memory = {name.removeprefix(MEMORY): array for name, array in arrays.items() if name.startswith(MEMORY)}
@@ -129,8 +130,12 @@ def read_checkpoint(
     state = State(about["t"], about["k"], arrays["u"], arrays["v"], memory=memory, **contact)
     if "format" not in about and memory:
         _check_memory(file, problem, scheme, state, about)
+    if other:  # what the scheme keeps in mind was made of the old problem's matrices and loads
+        state = replace(state, memory={})
     place = RestartPoint(state, about["t_start"], about["k_start"], about["base"], about["halved"])
-    return _adapted(place, other), about.get("rows", "")
+    if "dt" in other:
+        place = replace(place, t_start=state.t, k_start=place.number, base=0)
+    return place, about.get("rows", "")
 
 
 def _compare(
@@ -150,21 +155,6 @@ def _compare(
     if names and problem.system.algebra.comm.rank == 0:
         log.warning("the checkpoint '%s' is continued as another problem: %s", file, ", ".join(names))
     return names
-
-
-def _adapted(place: RestartPoint, other: list[str]) -> RestartPoint:
-    """The place for a run that differs in these."""
-    if other:  # what the scheme keeps in mind was made of the old problem's matrices and loads
-        place = replace(place, state=replace(place.state, memory={}))
-    return place if "dt" not in other else replace(place, t_start=place.state.t, k_start=place.number, base=0)
-
-
-def _places(problem: ContactProblem) -> Any:
-    """Positions of the owned unknowns among all, in the order of their numbers."""
-    ids = problem.system.space.ids
-    comm = problem.system.algebra.comm
-    everyone = np.sort(np.concatenate(comm.bcast(comm.gather(ids))))
-    return np.searchsorted(everyone, ids)
 
 
 def _check_memory(

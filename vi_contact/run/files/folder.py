@@ -99,8 +99,10 @@ def locked(comm: Comm, folder: Path | None) -> Iterator[None]:
     try:
         yield
     finally:
-        if mine is not None and folder is not None:
-            _release(folder, mine)
+        if mine is not None and folder is not None:  # removed while locked: who opens it meanwhile makes a new one
+            _held.pop(folder.resolve(), None)
+            (folder / LOCK).unlink(missing_ok=True)
+            mine.close()
 
 
 def _take(folder: Path) -> Any:
@@ -139,10 +141,3 @@ def _is_there(path: Path, file: Any) -> bool:
         return os.path.samestat(os.stat(path), os.fstat(file.fileno()))
     except FileNotFoundError:
         return False
-
-
-def _release(folder: Path, file: Any) -> None:
-    """Remove the file while it is locked: who opens it in the meantime finds it gone and makes a new one."""
-    _held.pop(folder.resolve(), None)
-    (folder / LOCK).unlink(missing_ok=True)
-    file.close()

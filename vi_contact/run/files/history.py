@@ -113,16 +113,12 @@ class HistoryFiles:
 
     def save(self) -> None:
         """Write history.h5 with all rows; the journal starts anew."""
-        self._replace(self._since(), self._saved)
-        self._tail = self._csv.tell()
-        self._open_journal()
-
-    def _since(self) -> Iterator[Block]:
-        """The rows after those of the last history.h5."""
         with open(self._folder / HISTORY_CSV, "rb") as csv, closing(StoredArrays(self._folder, self._table)) as arrays:
             csv.seek(self._tail)
-            for _, block in read_blocks(csv, self._table, arrays, first=self._saved):
-                yield block
+            since = read_blocks(csv, self._table, arrays, first=self._saved)
+            self._replace((block for _, block in since), self._saved)
+        self._tail = self._csv.tell()
+        self._open_journal()
 
     def _replace(self, blocks: Iterator[Block], kept: int = 0) -> None:
         """history.h5 with so many rows of the old one, and these."""

@@ -7,6 +7,7 @@ import platform
 import sys
 import time
 from contextlib import suppress
+from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
@@ -28,38 +29,35 @@ class _LogFile(logging.FileHandler):
 
 
 class RunLog:
-    """Send everything logged under ``vi_contact`` to a file while it is open, and warnings to the terminal.
+    """Send everything logged under ``vi_contact`` to a file while it is open, and warnings to the terminal: on rank 0.
 
-    Only rank 0 has a path. The root logger is left out: form compilers make it print every line.
+    The root logger is left out: form compilers make it print every line.
     """
 
-    def __init__(self, path: Path | None, *, append: bool) -> None:
+    def __init__(self, path: Path, *, append: bool) -> None:
         self._before = LOGGER.level, LOGGER.propagate
-        self._file = None if path is None else _LogFile(path, mode="a" if append else "w", encoding="utf-8")
+        self._file = _LogFile(path, mode="a" if append else "w", encoding="utf-8")
         self._terminal = logging.StreamHandler()
         self._terminal.setLevel(logging.WARNING)
-        if self._file is not None:
-            self._file.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
-            LOGGER.addHandler(self._file)
-            LOGGER.addHandler(self._terminal)
-            LOGGER.setLevel(logging.INFO)
-            LOGGER.propagate = False
+        self._file.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
+        LOGGER.addHandler(self._file)
+        LOGGER.addHandler(self._terminal)
+        LOGGER.setLevel(logging.INFO)
+        LOGGER.propagate = False
 
     def check(self) -> None:
         """Raise the OSError of a line that could not be written."""
-        if self._file is not None and self._file.error is not None:
-            error = self._file.error
+        if error := self._file.error:
             raise OSError(error.errno, error.strerror, self._file.baseFilename)
 
     def close(self) -> None:
         """Give the logger back as it was."""
-        if self._file is not None:
-            LOGGER.removeHandler(self._file)
-            LOGGER.removeHandler(self._terminal)
-            LOGGER.setLevel(self._before[0])
-            LOGGER.propagate = self._before[1]
-            with suppress(OSError):  # the disk is full: check() or the histories have told
-                self._file.close()
+        LOGGER.removeHandler(self._file)
+        LOGGER.removeHandler(self._terminal)
+        LOGGER.setLevel(self._before[0])
+        LOGGER.propagate = self._before[1]
+        with suppress(OSError):  # the disk is full: check() or the histories have told
+            self._file.close()
 
 
 def versions() -> dict[str, str]:
@@ -67,13 +65,6 @@ def versions() -> dict[str, str]:
     names = [name for name in ("numpy", "scipy", "h5py", "petsc4py", "mpi4py", "dolfinx") if name in sys.modules]
     own = {"vi_contact": __version__, "python": platform.python_version()}
     return own | {name: str(sys.modules[name].__version__) for name in names}
-
-
-def clock(seconds: float) -> str:
-    """Return 1:02:03, or 2:03 below an hour."""
-    minutes, second = divmod(int(seconds), 60)
-    hours, minute = divmod(minutes, 60)
-    return f"{hours}:{minute:02d}:{second:02d}" if hours else f"{minute}:{second:02d}"
 
 
 class Progress:
@@ -107,5 +98,5 @@ class Progress:
             left = (now - self._begin) / self._done * (self._total - self._done)
             log.info(
                 "step %d, t = %.6g s: %d of %d steps, %d iterations, worst certificate %.1e, %s left",
-                k, t, self._done, self._total, iterations, worst, clock(left),
+                k, t, self._done, self._total, iterations, worst, timedelta(seconds=int(left)),
             )

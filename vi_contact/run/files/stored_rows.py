@@ -7,7 +7,7 @@ checksum over lines and arrays, which the checkpoint keeps.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import closing, suppress
 from itertools import islice
 from pathlib import Path
@@ -57,19 +57,16 @@ class StoredRows:
             if header.decode(errors="replace").strip() != ",".join(names):
                 raise InputError(f"'{path}' holds other columns than this run records: restart with the same recorders")
             self.length = len(header)
-            for block in read_blocks(csv, self._table, arrays, k=self.k):
-                self._note(*block)
-                yield block[1]
+            for lines, block in read_blocks(csv, self._table, arrays, k=self.k):
+                for i, line in enumerate(lines):
+                    self.length += len(line)
+                    self.hash.update(line)
+                    if self._table.arrays:
+                        self.hash.update(record_of(self._table, {name: values[i] for name, values in block.items()}))
+                yield block
             if self._checksum and self.hash.hexdigest() != self._checksum:
                 raise InputError(f"the histories in '{self.folder}' are not those of the checkpoint, a file of them is "
                                  "damaged: restore it or start a new run")
-
-    def _note(self, lines: list[bytes], block: Block) -> None:
-        for i, line in enumerate(lines):
-            self.length += len(line)
-            self.hash.update(line)
-            if self._table.arrays:
-                self.hash.update(record_of(self._table, {name: values[i] for name, values in block.items()}))
 
 
 def read_blocks(
@@ -115,8 +112,12 @@ class StoredArrays:
     def __init__(self, folder: Path, table: Table) -> None:
         self._path, self._samples = folder / HISTORY_H5, table.arrays
         self._file: Any = None
+        self._journal: Array
         if table.arrays:
-            self._journal = _journal(folder / JOURNAL, table.arrays)
+            path, width = folder / JOURNAL, 1 + sum(one.size for one in table.arrays.values())
+            rows = path.stat().st_size // (8 * width) if path.is_file() else 0  # one cut short by a crash is left out
+            shape = rows, width
+            self._journal = np.memmap(path, dtype=float, mode="r", shape=shape) if rows else np.zeros(shape)
             with suppress(OSError):  # missing or damaged: the journal may still have all
                 self._file = h5py.File(self._path, "r")
 
@@ -168,13 +169,6 @@ class StoredArrays:
             name: column.reshape(len(part), *one.shape).astype(one.dtype)
             for (name, one), column in zip(self._samples.items(), columns, strict=True)
         }
-
-
-def _journal(path: Path, samples: Mapping[str, Array]) -> Array:
-    """The whole records of the journal, on disk until they are used; a record cut short by a crash is left out."""
-    width = 1 + sum(one.size for one in samples.values())
-    rows = path.stat().st_size // (8 * width) if path.is_file() else 0
-    return np.memmap(path, dtype=float, mode="r", shape=(rows, width)) if rows else np.zeros((0, width))
 
 
 def times_of(folder: Path, steps: set[int]) -> dict[int, float]:

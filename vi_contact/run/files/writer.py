@@ -58,7 +58,7 @@ class Writer:
         self._comm = problem.system.algebra.comm
         self._fields: OpenFields | None = None
         self._files: HistoryFiles | None = None
-        self._log = RunLog(None, append=False)
+        self._log: RunLog | None = None
         self._saved = -1
 
     @property
@@ -100,8 +100,8 @@ class Writer:
             on_root(self._comm, lambda: self._append(row))
 
     def _append(self, row: Row) -> None:
-        self._log.check()
-        if self._files is not None:
+        if self._log is not None and self._files is not None:
+            self._log.check()
             self._files.append(row)
 
     def frame(self, report: Report, number: int) -> None:
@@ -146,6 +146,8 @@ class Writer:
             finally:
                 if self._files is not None:
                     self._files.close()
-            self._log.check()
+            if self._log is not None:
+                self._log.check()
         finally:
-            self._log.close()
+            if self._log is not None:
+                self._log.close()

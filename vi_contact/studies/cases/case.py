@@ -130,7 +130,7 @@ class Case:
         parts = self._parts(comm)
         problem = self._problem(parts)
         own = self._recorders(parts)
-        recorders = [Steps(problem.system.influence.shape[1]), *((Energy(), Contact()) if own is None else own)]
+        recorders = [Steps(), *((Energy(), Contact()) if own is None else own)]
         problem, _ = with_defaults(problem, self._made("scheme"))
         state = initial_state(problem)
         return frozenset(
