@@ -127,16 +127,8 @@ class PeriodicBar:
     length: ClassVar[float] = 1.0
     E: ClassVar[float] = 1.0
     rho: ClassVar[float] = 1.0
-
-    @property
-    def period(self) -> float:
-        """Return 3 [s]."""
-        return 3.0
-
-    @property
-    def energy(self) -> float:
-        """Return 1/8 [J/m²], kinetic and strain energy at any time."""
-        return 0.125
+    period: ClassVar[float] = 3.0  # [s]
+    energy: ClassVar[float] = 0.125  # [J/m²], kinetic and strain energy at any time
 
     def displacement(self, x: ArrayLike, t: ArrayLike) -> Array:
         """Return u(x, t) [m]."""

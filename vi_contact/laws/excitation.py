@@ -14,6 +14,7 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import ClassVar
 
 from ..core.checks import number
 from ..core.errors import InputError
@@ -31,14 +32,10 @@ class Harmonic:
     frequency: float
     phase: float = 0.0
     direction: tuple[float, ...] = (1.0, 0.0)
+    duration: ClassVar[float] = math.inf
 
     def __post_init__(self) -> None:
         check_excitation(self, finite=("amplitude", "phase"), positive=("frequency",))
-
-    @property
-    def duration(self) -> float:
-        """Return infinity."""
-        return math.inf
 
     def acceleration(self, t: float) -> float:
         """Return amplitude · sin(2 pi frequency t + phase) [m/s²]."""

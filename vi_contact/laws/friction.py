@@ -96,13 +96,18 @@ class SlipRateCoulomb:
 
     def at(self, speed: Array) -> Coulomb:
         """Return Coulomb's law with the coefficients of these speeds."""
-        found = _coefficients(self.mu(speed))
+        values = self.mu(speed)
+        found = np.asarray(values)
+        if found.dtype.kind not in "iuf":
+            raise InputError(
+                f"SlipRateCoulomb: mu returns {shown(values)}; return real coefficients, one per slip rate"
+            )
         if found.shape not in ((), speed.shape):
             raise InputError(
                 f"SlipRateCoulomb: mu returns shape {found.shape} for {len(speed)} slip rates; return one coefficient "
                 "per rate"
             )
-        found = np.broadcast_to(found, speed.shape)
+        found = np.broadcast_to(found.astype(float), speed.shape)
         wrong = np.flatnonzero(~(np.isfinite(found) & (found >= 0.0)))
         if len(wrong):
             raise InputError(
@@ -118,14 +123,6 @@ class SlipRateCoulomb:
     def slope(self, weights: Array) -> Array:
         """Return mu(0), shape (n,): at rest."""
         return self.at(np.zeros(len(weights))).slope(weights)
-
-
-def _coefficients(values: Any) -> Array:
-    """What a user's function has returned as floats; InputError for what are no real numbers."""
-    found = np.asarray(values)
-    if found.dtype.kind not in "iuf":
-        raise InputError(f"SlipRateCoulomb: mu returns {shown(values)}; return real coefficients, one per slip rate")
-    return found.astype(float)
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from ..core.problem import ContactProblem
 from ..core.protocols import MassLaw
 from ..core.step import Balance, State, StepProblem, StepResult
 from ..laws.mass import Redistributed
-from .base import check_balance, position_step
+from .base import check_balance, position_step, stepped
 from .consistent_data import equilibrated, massless_take
 
 
@@ -75,8 +75,7 @@ class Trapezoidal:
         """Return the state with v1 = 2 (u1 - u0)/dt - v0; massless unknowns get the mean velocity of the step."""
         mean = (result.x - state.u) / dt
         v = massless_take(problem, mean, 2.0 / dt * (result.x - state.u) - state.v)
-        new = State(step.t, step.k, result.x, v, result.r_n, result.active, r_t=result.r_t)
-        return self._with_force(problem, new)
+        return self._with_force(problem, stepped(step, result, result.x, v))
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
         """Return the means of both ends."""
