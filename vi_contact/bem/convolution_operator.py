@@ -77,7 +77,7 @@ class ConvolutionOperator:
         return (steps, stages, 2, len(self.mesh)) if dimensions == 4 else (steps, 2, len(self.mesh))
 
     def motion(self, forces: Array, fixed: Mask, prescribed: Array | None) -> tuple[Array, Array, Array]:
-        """Return what PoincareSteklov.motion does; forces: (steps, stages or 1, 2n)."""
+        """Return the motion by frequencies; forces: (steps, stages or 1, 2n)."""
         table = self.frequencies
         u = self._displacement_modes(table.impulses(forces), ~fixed, prescribed)
         over_s = u[..., None] / table.s[..., None, None]

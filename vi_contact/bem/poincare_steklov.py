@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,10 +19,32 @@ from ..core.errors import InputError
 from .boundary_mesh import BoundaryMesh
 from .energetic import EnergeticBlocks, Marching, summed
 
-if TYPE_CHECKING:
-    from .convolution_operator import ConvolutionOperator
-
 Mask = NDArray[np.bool_]
+
+
+class BodyOperator(Protocol):
+    """Move one body: what a boundary value problem asks of an operator, in either discretisation in time."""
+
+    @property
+    def mesh(self) -> BoundaryMesh: ...
+
+    @property
+    def dt(self) -> float: ...
+
+    def load_shape(self, dimensions: int) -> tuple[int | None, ...]:
+        """Return the shape of nodal forces given in so many dimensions."""
+        ...
+
+    def motion(self, forces: Array, fixed: Mask, prescribed: Array | None) -> tuple[Array, Array, Array]:
+        """Return displacements (steps, 2n), tractions (steps, 4n) and nodal forces (steps, 2n), reactions included,
+        under forces (steps, pieces of a step, 2n) and prescribed displacements (steps, 2n) of fixed unknowns (2n,)."""
+        ...
+
+    def condense(
+        self, forces: Array, fixed: Mask, prescribed: Array | None, unknowns: NDArray[np.int64]
+    ) -> tuple[Array, Array]:
+        """Return W and u_free of CondensedCompliance for these unknowns."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,8 +83,7 @@ class PoincareSteklov:
         return None, 2, len(self.mesh)
 
     def motion(self, forces: Array, fixed: Mask, prescribed: Array | None) -> tuple[Array, Array, Array]:
-        """Return displacements (steps, 2n), tractions (steps, 4n) and nodal forces (steps, 2n), reactions included,
-        under forces (steps, 1, 2n) and prescribed displacements (steps, 2n) of the fixed unknowns (2n,)."""
+        """Return the motion by one march; forces: (steps, 1, 2n)."""
         given = None if prescribed is None else prescribed[:, :, None]
         u, p, total = self._marching(fixed).run(forces.swapaxes(1, 2) / self.rho, given)
         return u[:, :, 0], self.rho * p[:, :, 0], self.rho * total[:, :, 0]
@@ -157,7 +178,7 @@ class BoundaryProblem:
     else is free of traction. Raises InputError for wrong shapes and what is no mask.
     """
 
-    operator: PoincareSteklov | ConvolutionOperator
+    operator: BodyOperator
     forces: Array
     fixed: Mask | None = None
     prescribed: Array | None = None
@@ -214,13 +235,13 @@ class BoundaryProblem:
         )
 
 
-def applied(operator: PoincareSteklov | ConvolutionOperator, displacement: ArrayLike) -> Array:
+def applied(operator: BodyOperator, displacement: ArrayLike) -> Array:
     """Return the nodal forces (steps, 2, n) of a motion prescribed everywhere."""
     u = array(type(operator).__name__, "displacement", displacement, operator.load_shape(3), unit="m")
     return BoundaryProblem(operator, np.zeros_like(u), np.ones(u.shape[1:], bool), u).solve().forces
 
 
-def freed(operator: PoincareSteklov | ConvolutionOperator, forces: ArrayLike) -> Array:
+def freed(operator: BodyOperator, forces: ArrayLike) -> Array:
     """Return the displacement (steps, 2, n) under nodal forces without any support."""
     given = array(type(operator).__name__, "forces", forces, operator.load_shape(3), unit="N/m")
     return BoundaryProblem(operator, given).solve().displacement
