@@ -61,7 +61,7 @@ class BoundaryLayer(Midpoint):
             raise InputError(f"BoundaryLayer is a law without friction: leave {problem.friction} out")
         if problem.impact is not None:
             raise InputError(f"BoundaryLayer makes the rebound itself: leave the impact law {problem.impact} out")
-        if np.any(surface.bilateral) or np.any(surface.compliance != 0.0):
+        if surface.some(surface.bilateral | (surface.compliance != 0.0)):
             raise InputError("BoundaryLayer needs unilateral contact on rigid supports: leave held points, springs out")
         if surface.motion is not None:
             raise InputError("BoundaryLayer needs an obstacle at rest: move the body's support instead")
@@ -69,8 +69,10 @@ class BoundaryLayer(Midpoint):
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
         """Return the state as it is; InputError where the layer would have to begin behind the obstacle."""
         surface = problem.surface
-        gap = surface.gap(state.t) - surface.normal_values(state.u)
-        if surface.count and not gap.min() > 0.0:
+        if RATE in state.memory and len(state.memory[RATE]) != len(state.u):
+            raise InputError(f"the state's {RATE} is of an earlier version of the layer: start a new run")
+        gap = surface.everywhere(surface.gap(state.t) - surface.normal_values(state.u))
+        if len(gap) and not gap.min() > 0.0:
             where = int(np.argmin(gap))
             raise InputError(
                 f"contact point {where} starts with gap {gap[where]:.3g} m, outside the admissible set of the layer, "
@@ -82,28 +84,33 @@ class BoundaryLayer(Midpoint):
         """Prepare the midpoint step with the layer's reactions among the loads."""
         step = super().step(problem, state, A, dt)
         surface = problem.surface
-        if surface.count == 0:
+        if surface.total == 0:
             return step
         old = surface.gap(state.t) - surface.normal_values(state.u)
+        free = step.bound - surface.normal_values(A.factor.solve(step.b))
+        rate, away = self._rate(problem, state, old), np.abs(step.bound - old)
+        values = surface.everywhere(np.column_stack([old, free, rate, surface.weights, away]))
+        old, free, rate, weights, away = (np.ascontiguousarray(column) for column in values.T)
         if not old.min() > 0.0:
             raise StepFailure(
                 f"step {step.k} at t = {step.t:.6g} s begins with a gap of {old.min():.1e} m, a rounding error beside "
-                f"displacements of {float(np.max(np.abs(step.bound - old))):.1e} m: make the layer wider"
+                f"displacements of {away.max():.1e} m: make the layer wider"
             )
-        free = step.bound - surface.normal_values(A.factor.solve(step.b))
-        rate, pressure = self._rate(problem, state, old), np.zeros(surface.count)
+        pressure = np.zeros(surface.total)
         if min(old.min(), free.min()) < self.law.layer.width:
-            G = _compliance(problem, A, step.scale) * (step.scale * surface.weights)
+            G = _compliance(problem, A, step.scale) * (step.scale * weights)
             pressure = self._pressure(step, G, free, old, rate, dt)
-        reaction = surface.weights * pressure
+        reaction = surface.weights * pressure[surface.slots]
         b = step.b - step.scale * surface.reaction_load(reaction, len(step.b))
         fields = {name: getattr(step, name) for name in StepProblem.__dataclass_fields__}
         return LayeredStep(**fields | {"b": b, "active": np.zeros(surface.count, dtype=bool)}, layer=reaction)
 
     def _rate(self, problem: ContactProblem, state: State, gap: Array) -> Array:
         """ẏ = w_0 [1/s]: carried inside the layer, from the velocities outside."""
-        rate = -problem.surface.normal_values(state.v) / gap
-        return np.where(gap < self.law.layer.width, state.memory.get(RATE, rate), rate)
+        surface = problem.surface
+        rate = -surface.normal_values(state.v) / gap
+        kept = surface.normal_values(state.memory[RATE]) if RATE in state.memory else rate
+        return np.where(gap < self.law.layer.width, kept, rate)
 
     def _pressure(self, step: StepProblem, G: Array, free: Array, old: Array, rate: Array, dt: float) -> Array:
         """p̄ (m,): gap = free + G p̄(gap) by Newton's method, in steps that leave a tenth of every gap at least."""
@@ -138,7 +145,8 @@ class BoundaryLayer(Midpoint):
         surface = problem.surface
         gap, old = (surface.gap(t) - surface.normal_values(u) for t, u in ((step.t, new.u), (state.t, state.u)))
         rate = 2.0 / dt * np.log(np.maximum(gap / old, 1e-300)) - self._rate(problem, state, old)
-        return replace(new, r_n=new.r_n + reaction, active=gap < self.law.layer.width, memory={RATE: rate})
+        memory = {RATE: surface.reaction_load(rate, len(new.u))}  # vectors of unknowns pass through checkpoints
+        return replace(new, r_n=new.r_n + reaction, active=gap < self.law.layer.width, memory=memory)
 
 
 def _compliance(problem: ContactProblem, A: EffectiveMatrix, scale: float) -> Array:

@@ -49,6 +49,12 @@ def total(comm: Comm, value: SupportsFloat) -> float:
     return float(comm.sum(np.array([float(value)]))[0])
 
 
+def from_each(comm: Comm, value: Any) -> list[Any]:
+    """Return the values of all ranks, in their order, on every rank."""
+    found: list[Any] = comm.bcast(comm.gather(value))
+    return found
+
+
 class Matrix(Protocol):
     """Provide products with a square sparse matrix whose rows are distributed like the vectors it multiplies."""
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .algebra import Array, Indices
+from .algebra import Array, Indices, from_each
 from .errors import InputError
 from .surfaces import ContactSurface
 
@@ -31,18 +31,22 @@ def oblique_corners(surface: ContactSurface) -> list[Indices]:
 
 def refuse_rubbing(surface: ContactSurface) -> None:
     """Raise InputError for corners beside friction, unless they are allowed to slide freely."""
-    if surface.corners and not surface.frictionless_corners:
-        where = ", ".join(f"{x:g}" for x in surface.points[surface.corners[0][0]])
+    if surface.frictionless_corners:
+        return
+    first = [(surface.slots[corner[0]], surface.points[corner[0]]) for corner in surface.corners]
+    every = [one for part in from_each(surface.comm, first) for one in part]
+    if every:
+        where = ", ".join(f"{x:g}" for x in min(every, key=lambda one: one[0])[1])
         raise InputError(
-            f"{len(surface.corners)} contact nodes, the first at ({where}), have several contact directions, and how "
-            "they rub on two faces at once is not modelled: let them slide freely "
-            "(surface.with_frictionless_corners()), or take the corner for smooth (a larger feature_angle=)"
+            f"{len(every)} contact nodes, the first at ({where}), have several contact directions, and how they rub on "
+            "two faces at once is not modelled: let them slide freely (surface.with_frictionless_corners()), or take "
+            "the corner for smooth (a larger feature_angle=)"
         )
 
 
 def with_open_faces(surface: ContactSurface, v: Array, target: Array) -> Array:
     """Return the target normal velocities (m,), NaN for open faces, with those that oblique open faces get from the
-    closed faces of their nodes, whose velocity changes along the normals of these. Collective."""
+    closed faces of their nodes, whose velocity changes along the normals of these."""
     corners = oblique_corners(surface)
     if not corners:
         return target
@@ -62,14 +66,10 @@ def lumped_entries(surface: ContactSurface, nodal: Array) -> tuple[Indices, Indi
     oblique corners."""
     rows = [np.arange(len(nodal))]
     columns, values = [rows[0]], [nodal.copy()]
-    unknown = np.full(surface.count, -1, dtype=np.int64)
-    unknown[surface.slots] = surface.owned
     for corner in oblique_corners(surface):
-        own = unknown[corner]
-        if np.all(own >= 0):  # one rank has all unknowns of a node
-            cosines = surface.normals[corner] @ surface.normals[corner].T
-            values[0][own] = 0.0
-            rows.append(np.repeat(own, len(own)))
-            columns.append(np.tile(own, len(own)))
-            values.append((np.sqrt(np.outer(nodal[own], nodal[own])) * np.linalg.inv(cosines)).ravel())
+        own, cosines = surface.owned[corner], surface.normals[corner] @ surface.normals[corner].T
+        values[0][own] = 0.0
+        rows.append(np.repeat(own, len(own)))
+        columns.append(np.tile(own, len(own)))
+        values.append((np.sqrt(np.outer(nodal[own], nodal[own])) * np.linalg.inv(cosines)).ravel())
     return np.concatenate(rows), np.concatenate(columns), np.concatenate(values)

@@ -46,7 +46,7 @@ def check_parts(problem: Any) -> None:
     if surface.comm.size != system.algebra.comm.size:
         raise InputError(f"ContactProblem: the surface is shared by {surface.comm.size} ranks and the system by "
                          f"{system.algebra.comm.size}: make both on the same ranks")
-    refuse((*_of_system(system), *_of_surface(surface, system)), surface.comm)
+    refuse((*_of_system(system), *_of_surface(surface, system, surface.total)), surface.comm)
     if problem.frictional:
         refuse_rubbing(surface)
 
@@ -84,17 +84,19 @@ def _sizes(owner: str, values: dict[str, Any], shapes: dict[str, tuple[int, ...]
             yield f"{owner} has {name} of shape {np.shape(values[name])}: give one of shape {shape}"
 
 
-def _of_surface(surface: ContactSurface, system: SemiDiscreteSystem) -> Iterator[str]:
+def _of_surface(surface: ContactSurface, system: SemiDiscreteSystem, total: int) -> Iterator[str]:
     """What is wrong with a surface on this rank, and with its places in the unknowns of the system."""
-    m, d, n, k = surface.count, system.influence.shape[1], system.rows, len(surface.owned)
-    shapes: dict[str, tuple[int, ...]] = {"points": (m, d), "normals": (m, d), "slots": (k,), "tangents": (k, d - 1)}
-    shapes |= dict.fromkeys(("gap0", "weights", "bilateral", "compliance"), (m,))
+    m, d, n = surface.count, system.influence.shape[1], system.rows
+    shapes: dict[str, tuple[int, ...]] = {"points": (m, d), "normals": (m, d), "tangents": (m, d - 1)}
+    shapes |= dict.fromkeys(("gap0", "weights", "bilateral", "compliance", "owned", "slots"), (m,))
     yield from _sizes("the contact surface", {name: getattr(surface, name) for name in shapes}, shapes)
-    for name, least, most in (("owned", 0, n), ("tangents", -1, n), ("slots", 0, m)):
+    for name, least, most in (("owned", 0, n), ("tangents", -1, n), ("slots", 0, total)):
         values = getattr(surface, name)
         if np.size(values) and not (least <= np.min(values) and np.max(values) < most):
             yield (f"the contact surface has {name} from {np.min(values)} to {np.max(values)}, outside {least} to "
                    f"{most - 1}: it was made for a system of another size")
+    if np.any(np.diff(surface.slots) <= 0):
+        yield "the contact surface has slots that do not ascend: number its conditions in the order of their rows"
     if np.isnan(np.sum(surface.gap0)):
         yield "the contact surface has NaN in gap0: check the obstacle's gap function"
     if not (np.all(surface.weights > 0.0) and np.all(surface.compliance >= 0.0)):

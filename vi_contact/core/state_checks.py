@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .algebra import largest, max_abs
+from .algebra import max_abs
 from .checks import instance, number, refuse, shown, whole
 from .errors import InputError
 from .problem import ContactProblem
@@ -54,11 +54,11 @@ def initial_state(problem: ContactProblem, t: float = 0.0) -> State:
     """Return u0 and v0 of the system in the rotated basis, without reaction; InputError when u0 is in the obstacle."""
     system, surface = problem.equations, problem.surface
     gap = surface.gap(t) - surface.normal_values(system.u0)
-    u_max = largest(surface.comm, max_abs(system.u0))
-    size = max(u_max, float(np.max(surface.gap0, initial=0.0)))
-    if len(gap) and gap.min() < -1e-9 * size:
+    sizes = np.array([np.max(-gap, initial=-np.inf), max_abs(system.u0), np.max(surface.gap0, initial=0.0)])
+    behind, *size = surface.comm.max(sizes)
+    if behind > 1e-9 * max(size):
         raise InputError(
-            f"the initial displacement penetrates the obstacle by {-gap.min():.3g} m: reduce it or enlarge the gap"
+            f"the initial displacement penetrates the obstacle by {behind:.3g} m: reduce it or enlarge the gap"
         )
     none = np.zeros(surface.count)
     return State(t, 0, system.u0.copy(), system.v0.copy(), none, surface.bilateral.copy())

@@ -1,7 +1,9 @@
-"""Hold the contact conditions of a surface, the same on every rank.
+"""Hold the contact conditions of a surface, each on the rank that owns its node.
 
 A contact condition bounds one unknown: after the change of basis u = T û (nodal frames turned to the contact
 direction) the normal displacement u_n of a contact point *is* an entry of û, and B_n is a selection of entries.
+Contact arrays (bounds, reactions, active sets, slips) have one row for every condition of this rank, and none of
+another's: what is asked of all of them (``some``, ``everywhere``) is asked on all ranks.
 Sign: the direction n points from the body to the obstacle, u_n = u·n, gap = gap0 - u_n >= 0, reaction r_n >= 0.
 """
 
@@ -14,8 +16,9 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from .algebra import Array, Comm, Indices, Mask, Matrix
+from .algebra import Array, Comm, Indices, Mask, Matrix, largest, total
 from .checks import function, number, shown
 from .companion import Companion
 from .errors import InputError
@@ -26,7 +29,7 @@ Motion = Callable[[float], float | Array]
 
 @dataclass(frozen=True)
 class ContactSurface:
-    """Hold m contact conditions, the same on every rank and in the same order for any number of ranks.
+    """Hold the m contact conditions whose unknowns this rank owns, of the ``total`` on all ranks.
 
     Attributes:
         comm: the ranks that share the surface.
@@ -35,8 +38,9 @@ class ContactSurface:
         gap0: (m,) initial gap [m], >= 0.
         bilateral: (m,) True where the point is held on the obstacle (u_n = gap0, reaction of either sign).
         compliance: (m,) of the support [m/N]; 0 is rigid, more is a spring.
-        owned: indices in û of the normal unknowns this rank owns; slots: their rows among the m conditions.
-        tangents: (len(owned), d-1) indices in û of the tangential unknowns of the same points; -1 where prescribed.
+        owned: (m,) indices in û of the normal unknowns; slots: (m,) the numbers of the conditions among those of all
+            ranks, ascending; they do not depend on the number of ranks.
+        tangents: (m, d-1) indices in û of the tangential unknowns of the same points; -1 where prescribed.
         basis: T with u = T û, the turn into nodal frames, or None when they already point along the axes.
         dual: T⁻ᵀ where T is not orthogonal, because some point has contact directions at oblique angles; else None.
         coupling: R with û = R ǔ where the other side deforms too: the unknowns of a contact point are then those of its
@@ -71,8 +75,26 @@ class ContactSurface:
 
     @property
     def count(self) -> int:
-        """Return the number of contact conditions m."""
+        """Return the number of contact conditions m of this rank."""
         return len(self.gap0)
+
+    @cached_property
+    def total(self) -> int:
+        """Return the number of contact conditions of all ranks. Collective when first asked."""
+        return round(total(self.comm, self.count))
+
+    def some(self, found: Mask) -> bool:
+        """Say whether the mask (m,) is True for a condition of any rank. Collective."""
+        return bool(largest(self.comm, np.any(found)))
+
+    def everywhere(self, values: NDArray[Any]) -> Any:
+        """Return (total, …) the values (m, …) of all conditions, by their numbers and the same on every rank, of one
+        type. Collective; for output, and for small problems that every rank solves."""
+        if self.comm.size == 1:
+            return np.asarray(values)
+        whole = np.zeros((self.total, *np.shape(values)[1:]))
+        whole[self.slots] = values
+        return self.comm.sum(whole).astype(np.asarray(values).dtype)
 
     @cached_property
     def corners(self) -> tuple[Indices, ...]:
@@ -93,17 +115,19 @@ class ContactSurface:
         turn = self.basis if self.dual is None else self.dual
         return load if turn is None else turn @ load
 
+    def whole(self) -> ContactSurface:
+        """Return the conditions of all ranks, by their numbers, on every rank: where they are and how large, for
+        output. Collective."""
+        names = ("points", "normals", "weights", "gap0", "bilateral", "compliance")
+        return replace(self, **{name: self.everywhere(getattr(self, name)) for name in names})
+
     def normal_values(self, x: Array) -> Array:
-        """Return B_n x on every rank, shape (m,)."""
-        values = np.zeros(self.count)
-        values[self.slots] = x[self.owned]
-        return self.comm.sum(values)
+        """Return B_n x, shape (m,)."""
+        return np.asarray(x[self.owned])
 
     def tangential_values(self, x: Array) -> Array:
-        """Return B_t x on every rank, shape (m, d - 1)."""
-        values = np.zeros((self.count, self.tangents.shape[1]))
-        values[self.slots] = np.where(self.tangents >= 0, x[self.tangents], 0.0)
-        return self.comm.sum(values)
+        """Return B_t x, shape (m, d - 1), zero where the tangent is prescribed."""
+        return np.where(self.tangents >= 0, x[self.tangents], 0.0)
 
     def slip(self, u: Array, t: float) -> Array:
         """Return the tangential displacements on the obstacle (m, d - 1) [m], those of open points too."""
@@ -113,10 +137,10 @@ class ContactSurface:
     def reaction_load(self, r_n: Array, rows: int, r_t: Array | None = None) -> Array:
         """Return B_nᵀ r_n + B_tᵀ r_t: the owned part of the contact reaction on the unknowns [N]."""
         load = np.zeros(rows)
-        load[self.owned] = r_n[self.slots]
+        load[self.owned] = r_n
         if r_t is not None:
             free = self.tangents >= 0
-            load[self.tangents[free]] = r_t[self.slots][free]
+            load[self.tangents[free]] = r_t[free]
         return load
 
     def gap(self, t: float) -> Array:
@@ -137,8 +161,8 @@ class ContactSurface:
         along: Motion | None = None,
     ) -> ContactSurface:
         """Return the surface on an obstacle that moves: ``towards`` the body and ``along`` the tangents, t [s] -> [m],
-        one value for all points or arrays of shape (m,) and (m, d-1). A moving obstacle is not turned; its points face
-        the same nodes."""
+        one value for all points or arrays of shape (m,) and (m, d-1), in the order of ``points``. A moving obstacle is
+        not turned; its points face the same nodes."""
 
         def spread(name: str, way: Motion, shape: tuple[int, ...]) -> Callable[[float], Array]:
             function("moving", name, way, "give a function of the time t [s] that returns metres")
@@ -159,10 +183,11 @@ class ContactSurface:
 
         What such a node could rub on one face is a force across the other, which the conditions, each a bound on one
         unknown, do not hold. In space it still rubs along its edge, with the normal force of its first condition (of
-        one group: that of the face with the lowest node numbers).
+        one group: that of the face with the lowest node numbers). Collective.
         """
-        if self.corners and self.comm.rank == 0:
-            log.info("%d contact nodes with several directions slide freely over their faces", len(self.corners))
+        corners = total(self.comm, len(self.corners))
+        if corners and self.comm.rank == 0:
+            log.info("%d contact nodes with several directions slide freely over their faces", corners)
         return replace(self, frictionless_corners=True)
 
     def on_springs(self, stiffness: float) -> ContactSurface:

@@ -22,23 +22,29 @@ def kkt_residual(step: StepProblem, result: StepResult) -> Certificate:
     Ax = step.A @ x
     residual = Ax - step.b
     residual += surface.reaction_load(r_n, len(x), result.r_t)
-    local = np.array([max_abs(residual), max_abs(step.b), max_abs(Ax), max_abs(x), max_abs(step.guess)])
-    local[np.isnan(local)] = np.inf
-    residual_max, b_max, Ax_max, x_max, guess_max = surface.comm.max(local)
     gap = step.bound - surface.normal_values(x) + surface.compliance * r_n / step.scale
-    gap = _over(gap, max(x_max, guess_max))
-    r_ref = max(b_max, max_abs(r_n))
-    r = _over(r_n, r_ref)
-    free = ~surface.bilateral
-    cone, dissipation = _friction_residuals(step, result, max(x_max, guess_max), r_ref)
+    free, closed = ~surface.bilateral, result.active | surface.bilateral
+    maxima = _maxima(
+        step, residual, step.b, Ax, x, step.guess, r_n, np.minimum(gap[free], 0.0), np.minimum(r_n[free], 0.0),
+        gap[closed], r_n[~closed],
+    )
+    residual_max, b_max, Ax_max, x_max, guess_max, r_max, behind, pull, apart, open_force = maxima
+    x_ref, r_ref = max(x_max, guess_max), max(b_max, r_max)
+    cone, dissipation = _friction_residuals(step, result, x_ref, r_ref)
     return Certificate(
-        equilibrium=max_abs(_over(np.array([residual_max]), max(b_max, Ax_max, ROUNDED * step.A.largest * x_max))),
-        penetration=max_abs(np.minimum(gap[free], 0.0)),
-        tension=max_abs(np.minimum(r[free], 0.0)),
-        complementarity=max_abs(np.where(result.active | surface.bilateral, gap, r)),
+        equilibrium=_over(residual_max, max(b_max, Ax_max, ROUNDED * step.A.largest * x_max)),
+        penetration=_over(behind, x_ref),
+        tension=_over(pull, r_ref),
+        complementarity=float(np.maximum(_over(apart, x_ref), _over(open_force, r_ref))),  # keeps NaN
         cone=cone,
         dissipation=dissipation,
     )
+
+
+def _maxima(step: StepProblem, *arrays: Array) -> Array:
+    """Largest sizes of the entries on all ranks, by one reduction; infinite for NaN, which no reduction keeps."""
+    sizes = np.array([max_abs(array) for array in arrays])
+    return step.surface.comm.max(np.where(np.isnan(sizes), np.inf, sizes))
 
 
 def _friction_residuals(step: StepProblem, result: StepResult, x_ref: float, r_ref: float) -> tuple[float, float]:
@@ -50,18 +56,17 @@ def _friction_residuals(step: StepProblem, result: StepResult, x_ref: float, r_r
     slip = surface.tangential_values(result.x) - step.slip0
     limit = step.friction_at(slip).limit(result.r_n, surface.weights, step.scale)
     size, way = np.linalg.norm(r_t, axis=1), np.linalg.norm(slip, axis=1)
-    missing = limit * way - np.sum(r_t * slip, axis=1)
-    t_ref = max(max_abs(limit), max_abs(size), ROUNDED**2 * r_ref)
-    s_ref = max(max_abs(way), ROUNDED * x_ref)
-    return max_abs(_over(np.maximum(size - limit, 0.0), t_ref)), max_abs(_over(missing, t_ref * s_ref))
+    missing, beyond = limit * way - np.sum(r_t * slip, axis=1), np.maximum(size - limit, 0.0)
+    limit_max, size_max, way_max, outside, lost = _maxima(step, limit, size, way, beyond, missing)
+    t_ref = max(limit_max, size_max, ROUNDED**2 * r_ref)
+    s_ref = max(way_max, ROUNDED * x_ref)
+    return _over(outside, t_ref), _over(lost, t_ref * s_ref)
 
 
-def _over(values: Array, reference: float) -> Array:
-    """values/reference, with 0/0 = 0 (nothing happens, nothing is wrong); NaN stays NaN."""
-    if 0.0 < reference < np.inf:
-        return np.asarray(values / reference)
+def _over(value: float, reference: float) -> float:
+    """value/reference, with 0/0 = 0 (nothing happens, nothing is wrong); NaN for infinity over infinity."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(values == 0.0, 0.0, values / np.float64(reference))
+        return 0.0 if value == 0.0 and reference < np.inf else float(np.float64(value) / np.float64(reference))
 
 
 @dataclass(frozen=True)
@@ -105,9 +110,9 @@ def energies(system: SemiDiscreteSystem, u: Array, v: Array) -> Energies:
     return Energies(momentum, elastic, float(kinetic), float(strain))
 
 
-def _dots(system: SemiDiscreteSystem, *pairs: tuple[Array, Array]) -> Array:
-    """Inner products with one reduction for all."""
-    return system.algebra.comm.sum(np.array([x @ y for x, y in pairs]))
+def _dots(system: SemiDiscreteSystem, *pairs: tuple[Array, Array], sums: tuple[float, ...] = ()) -> Array:
+    """Inner products, and sums over the ranks, with one reduction for all."""
+    return system.algebra.comm.sum(np.array([*(x @ y for x, y in pairs), *sums]))
 
 
 def energy_balance(
@@ -133,28 +138,31 @@ def energy_balance(
     before = before or energies(system, old.u, old.v)
     after = after or energies(system, new.u, new.v)
     du = new.u - old.u
-    work, inertia, kinetic, stiffness, damping = _dots(
+    pushed, dragged = _obstacle_work(problem, old.t, new.t, balance)
+    rubbing = 0.0 if balance.r_t is None else np.sum(balance.r_t * surface.tangential_values(du))
+    work, inertia, kinetic, stiffness, damping, lost, *local = _dots(
         system,
         (du, balance.f),
         (du, system.M @ balance.a),
         (0.5 * (old.v + new.v), after.momentum - before.momentum),
         (balance.u - 0.5 * (old.u + new.u), after.elastic - before.elastic),
         (du, np.zeros_like(du) if system.C is None else system.C @ balance.v),
+        (balance.r_n, surface.normal_values(du)),
+        sums=(rubbing, pushed, dragged),
     )
-    obstacle = _obstacle_work(problem, old.t, new.t, balance)
-    rubbing = 0.0 if balance.r_t is None else float(np.sum(balance.r_t * surface.tangential_values(du)))
+    rubbing, pushed, dragged = local
     return StepEnergy(
         change=after.total - before.total,
-        input=float(work + obstacle[0] + obstacle[1]),
+        input=float(work + pushed + dragged),
         damping=float(damping),
-        contact=float(balance.r_n @ surface.normal_values(du)) + obstacle[0],
-        friction=rubbing + obstacle[1],
+        contact=float(lost + pushed),
+        friction=float(rubbing + dragged),
         algorithmic=float(inertia - kinetic + stiffness),
     )
 
 
 def _obstacle_work(problem: ContactProblem, start: float, end: float, balance: Balance) -> tuple[float, float]:
-    """Work that a moving obstacle does on the body, (normal, tangential): r_n·advance and -r_t·sliding."""
+    """Work that a moving obstacle does on the body on this rank, (normal, tangential): r_n·advance and -r_t·sliding."""
     advance, sliding = problem.surface.advance(start, end), problem.surface.sliding(start, end)
     pushed = 0.0 if advance is None else float(balance.r_n @ advance)
     dragged = 0.0 if sliding is None or balance.r_t is None else -float(np.sum(balance.r_t * sliding))

@@ -204,7 +204,7 @@ class Resultants:
     def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
         """Find the part once, and return the row of the state, a static one or the start of a run."""
         self._surface = problem.surface
-        self._part = Part(self.name, problem.surface, self.centre, self.where, self.normal)
+        self._part = Part(self.name, problem.surface.whole(), self.centre, self.where, self.normal)
         return self._row(state)
 
     def row(self, report: Report) -> Row:
@@ -214,8 +214,11 @@ class Resultants:
         surface, part = self._surface, self._part
         u_n, slip = surface.normal_values(state.u), surface.slip(state.u, state.t)
         gap = surface.gap(state.t) - u_n + surface.compliance * state.r_n
-        r_t = None if state.r_t is None else state.r_t[None]
-        series = part.opening(state.active[None], gap[None], slip[None]) | part.resultants(state.r_n[None], r_t)
+        r_t = None if state.r_t is None else surface.everywhere(state.r_t)[None]
+        values = surface.everywhere(np.column_stack([gap, state.r_n, u_n, state.active]))
+        gap, r_n, u_n, active = (np.ascontiguousarray(column) for column in values.T)
+        slip = surface.everywhere(slip)
+        series = part.opening(active[None] > 0.0, gap[None], slip[None]) | part.resultants(r_n[None], r_t)
         found: dict[str, Any] = {quantity: float(values[0]) for quantity, values in series.items()}
         if part.dimension == 2:
             found |= part.rotation(u_n)

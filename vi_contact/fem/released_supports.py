@@ -16,7 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core.algebra import Array, max_abs
+from ..core.algebra import Array, largest, max_abs
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.state_checks import check_problem_given, check_sizes, initial_state
@@ -40,7 +40,7 @@ def release(static: ContactProblem, state: State, problem: ContactProblem) -> tu
     before, after = static.system.space, problem.system.space
     if not isinstance(before, FemSpace) or not isinstance(after, FemSpace) or before.mesh is not after.mesh:
         raise InputError("release needs two problems of fem.assemble on one mesh")
-    if not np.array_equal(static.surface.points, problem.surface.points):
+    if largest(before.comm, not np.array_equal(static.surface.points, problem.surface.points)):
         raise InputError("the static stage has other contact points than the problem: give both the same boundaries")
     nodal = before.expand(static.cartesian(state.u), state.t)
     u0 = after.restrict(nodal)

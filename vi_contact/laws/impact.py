@@ -50,10 +50,9 @@ class ComponentReset:
 
     def __call__(self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array) -> Array:
         target = with_open_faces(surface, v, target)
-        wanted = target[surface.slots]
-        chosen = ~np.isnan(wanted)
+        chosen = ~np.isnan(target)
         after = v.copy()
-        after[surface.owned[chosen]] = wanted[chosen]
+        after[surface.owned[chosen]] = target[chosen]
         return after
 
 
@@ -66,25 +65,23 @@ class ImpulseUpdate:
     """
 
     def __call__(self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array) -> Array:
-        chosen: Indices = np.flatnonzero(~np.isnan(target))
+        jump = surface.everywhere(target - surface.normal_values(v))
+        chosen: Indices = np.flatnonzero(~np.isnan(jump))
         if len(chosen) == 0:
             return v
         factor, columns, delassus = system.cached("impulse update", lambda: _prepared(system, surface))
-        jump = target[chosen] - surface.normal_values(v)[chosen]
-        impulse = np.zeros(surface.count)
-        impulse[chosen] = np.linalg.solve(delassus[np.ix_(chosen, chosen)], jump)
+        impulse = np.zeros(surface.total)
+        impulse[chosen] = np.linalg.solve(delassus[np.ix_(chosen, chosen)], jump[chosen])
         if columns is not None:
             return np.asarray(v + columns @ impulse)
-        return np.asarray(v + factor.solve(surface.reaction_load(impulse, system.rows)))
+        return np.asarray(v + factor.solve(surface.reaction_load(impulse[surface.slots], system.rows)))
 
 
 def _prepared(system: SemiDiscreteSystem, surface: ContactSurface) -> tuple[Factor, Array | None, Array]:
     """The factor of M, the owned rows of M⁻¹Bᵀ or None, and B M⁻¹Bᵀ. Collective."""
     comm, factor = system.algebra.comm, system.algebra.factor(system.M)
-    columns = factor.solve_units(surface.owned, surface.slots, surface.count)
-    rows = np.zeros((surface.count, surface.count))
-    rows[surface.slots] = columns[surface.owned]
-    delassus = comm.sum(rows)
+    columns = factor.solve_units(surface.owned, surface.slots, surface.total)
+    delassus = surface.everywhere(columns[surface.owned])
     return factor, columns if total(comm, columns.size) <= STORED_ENTRIES else None, delassus
 
 

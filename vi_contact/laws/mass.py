@@ -58,7 +58,7 @@ class Redistributed:
         between("lumping", self.lumping, 0.0, 1.0, "give a share from 0 (consistent) to 1 (lumped)")
 
     def apply(self, system: SemiDiscreteSystem, surface: ContactSurface, *, tangential: bool) -> SemiDiscreteSystem:
-        if surface.count == 0:
+        if surface.total == 0:
             return system
         massless, contact = _contact_unknowns(system, surface, tangential)
         nodal = _row_sums(system)

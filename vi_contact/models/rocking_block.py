@@ -116,7 +116,7 @@ class RockingModel:
 
     def tilted(self, theta: float, *, rate: float = 0.0) -> State:
         """Return the block at rest, turned by theta [rad] about its lower left corner, turning at ``rate`` [rad/s]."""
-        u, v, none = self.rest.u + theta * self._turn, rate * self._turn, np.zeros(2)
+        u, v, none = self.rest.u + theta * self._turn, rate * self._turn, np.zeros(self.problem.surface.count)
         return replace(self.rest, u=u, v=v, r_n=none, active=none.astype(bool))
 
     @property
@@ -128,7 +128,8 @@ class RockingModel:
 
     def angle(self, state: State) -> float:
         """Return the rotation [rad] by the heights of the corners, positive when the right one is up."""
-        down = self.problem.surface.normal_values(state.u - self.rest.u)
+        surface = self.problem.surface
+        down = surface.everywhere(surface.normal_values(state.u - self.rest.u))
         return float(down[0] - down[1]) / self.block.shape.width
 
     def spin(self, state: State) -> float:

@@ -95,7 +95,9 @@ class RunComparison:
     def _note(self, surface: ContactSurface, state: State, impulse: Array) -> None:
         self.times.append(state.t)
         self.impulse.append(impulse)
-        self.towards.append(float(surface.weights @ surface.normal_values(state.u) / surface.weights.sum()))
+        moments = surface.weights @ surface.normal_values(state.u), surface.weights.sum()
+        moved, size = surface.comm.sum(np.array(moments))
+        self.towards.append(float(moved / size))
 
     def compare(self, reference: Reference, bound: float) -> RunDifference:
         """Return the differences. InputError for a reference in other dimensions, without common times, or with NaN."""

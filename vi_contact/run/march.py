@@ -97,7 +97,7 @@ class March:
         if dt not in self._solvers:
             self._solvers[dt] = CertifiedSolver(problem, A, step.scale, self._method.solvers, self._method.tolerance)
         result, certificate, escalated = self._solvers[dt].solve(step)
-        if not final and np.any(result.active & ~state.active):
+        if not final and problem.surface.some(result.active & ~state.active):
             return None
         free = scheme.finish(problem, state, step, result, dt)
         new = after_impact(problem, scheme, state, free, dt)
@@ -113,10 +113,10 @@ def after_impact(problem: ContactProblem, scheme: Scheme, old: State, new: State
         return new
     solid = surface.compliance == 0.0
     active = new.active & solid
-    if not active.any():
+    if not surface.some(active):
         return new
     impact = Impact(surface.normal_values(old.v), surface.normal_values(new.v), active, active & ~old.active)
     target = law.target(impact)
-    if np.all(np.isnan(target)):
+    if not surface.some(~np.isnan(target)):
         return new
     return scheme.jump(problem, new, law.apply(problem.equations, surface, new.v, target), dt)

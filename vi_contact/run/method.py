@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.algebra import max_abs
+from ..core.algebra import from_each, max_abs
 from ..core.checks import provides, real, several, shown
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
@@ -99,14 +99,15 @@ def check_state(owner: str, problem: ContactProblem, state: State, *, dt: float,
     """
     check_sizes(owner, problem, state)
     surface, rigid = problem.surface, problem.surface.compliance == 0.0
-    if not rigid.any() or (state.k > 0 and getattr(scheme, "penetrates", False)):
+    if state.k > 0 and getattr(scheme, "penetrates", False):
         return
     gap = np.where(rigid, surface.gap(state.t) - surface.normal_values(state.u), np.inf)
-    moved = surface.comm.max(np.array([max_abs(state.u), dt * max_abs(state.v)]))
-    worst = int(np.argmin(gap))
-    if gap[worst] < -SLACK * tolerance * max(float(moved.max()), max_abs(surface.gap0[rigid])):
-        where = ", ".join(f"{x:g}" for x in surface.points[worst])
+    moved = max_abs(state.u), dt * max_abs(state.v), max_abs(surface.gap0[rigid])
+    inside, *sizes = surface.comm.max(np.array([np.max(-gap, initial=-np.inf), *moved]))
+    if inside > SLACK * tolerance * max(sizes):
+        worst = np.concatenate(from_each(surface.comm, surface.points[gap == -inside]))[0]
+        where = ", ".join(f"{x:g}" for x in worst)
         raise InputError(
-            f"{owner}: the state lies {-gap[worst]:.3g} m inside the obstacle at ({where}): start from one with every "
+            f"{owner}: the state lies {inside:.3g} m inside the obstacle at ({where}): start from one with every "
             "gap >= 0"
         )

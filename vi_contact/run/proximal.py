@@ -173,7 +173,8 @@ class Proximal:
         """InputError for a driven rigid motion without end."""
         system, energy = self._system, motion.pace**2
         bending, work = 2.0 * system.strain_energy(motion.d), system.algebra.dot(self.step.b, motion.d)
-        if energy == 0.0 or bending > RIGID * energy or work < DRIVEN * energy or self._closes(motion).any():
+        stopped = self.step.surface.some(self._closes(motion))
+        if energy == 0.0 or bending > RIGID * energy or work < DRIVEN * energy or stopped:
             return
         raise InputError(
             f"the body has no static equilibrium: its loads {self._way(motion.d)} and neither contact nor a "
@@ -195,12 +196,12 @@ class Proximal:
         """How many times d to go further at once: the sum of the steps to come when each is ‖d_new‖/‖d_old‖ of the
         one before (Aitken), or only to the next contact. 0 unless d_new and d_old are parallel, to the accuracy which
         that distance needs. Any start of the next step will do, so nothing but the speed depends on it."""
-        if new.pace == 0.0 or not np.array_equal(old.active, new.active):
+        if new.pace == 0.0 or self.step.surface.some(old.active != new.active):
             return 0.0
         surface, ratio = self.step.surface, new.pace / old.pace
         rows = self._closes(new) & ~result.active
         gap = (self.step.bound - surface.normal_values(result.x))[rows]
-        stop = float(np.min(np.maximum(gap, 0.0) / new.closing[rows], initial=np.inf))
+        stop = -largest(surface.comm, np.max(-np.maximum(gap, 0.0) / new.closing[rows], initial=-np.inf))
         ahead = min(stop, ratio / (1.0 - ratio) if ratio < UNBRAKED else np.inf)
         off, force = new.d - ratio * old.d, new.pull - ratio * old.pull
         aside = float(np.sqrt(max(self._system.algebra.dot(off, force), 0.0)))

@@ -124,11 +124,11 @@ class Contact:
     """Record what the contact surface does. Reactions are those of the step (mean or end value, as the scheme says).
 
     gap = gap0 - u_n, plus the shortening of a deformable support; pressure = r_n / weight; the force on the body is
-    -Σ r_n n; its point of action is Σ r_n X / Σ r_n (NaN while the contact is open). Arrays have shape (m,) and the
-    order of ``surface.points``, which is in ``history.h5`` too.
+    -Σ r_n n; its point of action is Σ r_n X / Σ r_n (NaN while the contact is open). Arrays (total,) are of all
+    conditions by their numbers, as the points in ``history.h5`` are, the same on every rank.
 
-    With friction also: the friction force on the body, the largest slip, and arrays (m, d - 1) in the tangents of the
-    nodal frames: traction_t = r_t / weight, that of the body on its support, and slip = B_t u, the tangential
+    With friction also: the friction force on the body, the largest slip, and arrays (total, d - 1) in the tangents of
+    the nodal frames: traction_t = r_t / weight, that of the body on its support, and slip = B_t u, the tangential
     displacement on the support (also of points that are open).
     """
 
@@ -159,25 +159,27 @@ class Contact:
     def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
         """Return the row of the initial contact: of a gravity stage, or open."""
         self._problem, self._frictional = problem, problem.frictional
-        self._axes = AXES[: problem.surface.points.shape[1]]
+        self._whole, self._axes = problem.surface.whole(), AXES[: problem.surface.points.shape[1]]
         return self._row(state)
 
     def row(self, report: Report) -> Row:
         return self._row(report.new)
 
     def _row(self, state: State) -> Row:
-        surface, r_n = self._problem.surface, state.r_n
-        gap = surface.gap(state.t) - surface.normal_values(state.u) + surface.compliance * r_n
-        pressure = r_n / surface.weights
-        total, resultant = float(surface.weights.sum()), float(r_n.sum())
-        closed = float(surface.weights[state.active].sum())
-        force = 0.0 - r_n @ surface.normals  # not -(…): no negative zeros
-        place = r_n @ surface.points / resultant if resultant else np.full(len(self._axes), np.nan)
+        surface, whole = self._problem.surface, self._whole
+        gap = surface.gap(state.t) - surface.normal_values(state.u) + surface.compliance * state.r_n
+        found = surface.everywhere(np.column_stack([gap, state.r_n, state.active]))
+        gap, r_n, active = found[:, 0].copy(), found[:, 1].copy(), found[:, 2] > 0.0
+        pressure = r_n / whole.weights
+        total, resultant = float(whole.weights.sum()), float(r_n.sum())
+        closed = float(whole.weights[active].sum())
+        force = 0.0 - r_n @ whole.normals  # not -(…): no negative zeros
+        place = r_n @ whole.points / resultant if resultant else np.full(len(self._axes), np.nan)
         values = [
-            1.0 - closed / total if total else 1.0, int(state.active.sum()), resultant,
+            1.0 - closed / total if total else 1.0, int(active.sum()), resultant,
             *force.tolist(), *place.tolist(),
             float(gap.min()) if len(gap) else np.nan, float(pressure.max()) if len(gap) else np.nan,
-            pressure, gap, state.active, *(self._friction(state) if self._frictional else ()),
+            pressure, gap, active, *(self._friction(state) if self._frictional else ()),
         ]
         return dict(zip(self.columns(), values, strict=True))
 
@@ -185,10 +187,11 @@ class Contact:
         surface, system = self._problem.surface, self._problem.system
         slip = surface.slip(state.u, state.t)
         r_t = np.zeros_like(slip) if state.r_t is None else state.r_t
+        traction, slip = surface.everywhere(r_t / surface.weights[:, None]), surface.everywhere(slip)
         load = surface.reaction_load(np.zeros(surface.count), system.rows, r_t)
         force = 0.0 - surface.comm.sum(system.influence.T @ surface.along_axes(load))
         largest = float(np.linalg.norm(slip, axis=1).max()) if len(slip) else np.nan
-        return [*force.tolist(), largest, r_t / surface.weights[:, None], slip]
+        return [*force.tolist(), largest, traction, slip]
 
 
 @dataclass

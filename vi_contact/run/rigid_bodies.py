@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core.algebra import Array, Comm, Indices, Matrix, largest
+from ..core.algebra import Array, Comm, Indices, Matrix, largest, total
 from ..core.problem import ContactProblem
 from ..core.system import SemiDiscreteSystem
 from ..laws.mass_transfer import rigid_motions
@@ -136,7 +136,7 @@ def body_springs(problem: ContactProblem) -> Matrix:
     np.maximum.at(stiffness, numbers, np.abs(system.K.diagonal()))
     stiffness = algebra.comm.max(stiffness)
     soft = surface.compliance > 0.0
-    bed = float(np.sum(1.0 / surface.compliance[soft])) if soft.any() else np.inf
+    bed = total(surface.comm, np.sum(1.0 / surface.compliance[soft])) or np.inf
     softest = min(bed, float(np.min(stiffness, where=stiffness > 0.0, initial=np.inf)))
     wanted = np.clip(STRONG * softest, WEAK * stiffness, STRONG * stiffness)
     root = np.sqrt(np.divide(wanted, mass, out=np.zeros(count), where=mass > 0.0))

@@ -79,7 +79,7 @@ class Session:
             "tolerance": method.tolerance,
             "ranks": problem.system.algebra.comm.size,
             "unknowns": problem.system.space.unknowns,
-            "contact_points": problem.surface.count,
+            "contact_points": problem.surface.total,
             "boundaries": list(problem.system.notes),
             "sampling": sampling_warning(problem.excitations, max(pieces_of(method.dt))[0]) or "",
         }

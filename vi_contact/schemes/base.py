@@ -5,8 +5,6 @@ from __future__ import annotations
 import logging
 from dataclasses import replace
 
-import numpy as np
-
 from ..core.algebra import Array, EffectiveMatrix, Mask
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
@@ -107,7 +105,7 @@ def check_balance(name: str, problem: ContactProblem) -> None:
             f"the impact law {problem.impact} acts on the mass of contact nodes and this problem has none there: leave "
             "the law out, or give the problem mass=ConsistentMass()"
         )
-    if massless or not np.any(~surface.bilateral & (surface.compliance == 0.0)):
+    if massless or not surface.some(~surface.bilateral & (surface.compliance == 0.0)):
         return
     told = problem.equations.cached(f"told of {name}", list)
     if not told and surface.comm.rank == 0:

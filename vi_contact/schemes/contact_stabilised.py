@@ -90,7 +90,7 @@ def admissible(problem: ContactProblem, state: State, u: Array, dt: float) -> tu
     rigid = surface.compliance == 0.0
     gap = np.where(rigid, surface.gap(state.t + dt) - surface.normal_values(u), np.inf)
     closed = (gap < 0.0) | (surface.bilateral & rigid)
-    if np.isnan(gap).any() or not np.any(gap[closed] != 0.0):
+    if surface.some(np.isnan(gap)) or not surface.some(closed & (gap != 0.0)):
         return u, closed  # nothing in the way; of NaN the step itself tells
     bounds: ContactProblem = system.cached(  # springs are not bounds here, and nothing rubs
         "admissible predictor, bounds",

@@ -73,7 +73,7 @@ class MoreauJean(SingleStep):
         """Raise InputError for massless contact nodes, springs, an impact law, or a bilateral point with a gap."""
         super().check(problem)
         surface = problem.surface
-        if np.any(surface.compliance > 0.0):
+        if surface.some(surface.compliance > 0.0):
             raise InputError(
                 "MoreauJean stops velocities and springs do not: use ContactStabilisedNewmark() or Midpoint() on "
                 "elastic supports"
@@ -83,7 +83,7 @@ class MoreauJean(SingleStep):
                 f"MoreauJean has its own restitution coefficient and {problem.impact} would act on top of it: leave "
                 "the impact law out, and give MoreauJean(e=…)"
             )
-        if np.any(surface.gap0[surface.bilateral] > 0.0):
+        if surface.some(surface.bilateral & (surface.gap0 > 0.0)):
             raise InputError(
                 "MoreauJean holds the velocity of bilateral points and would never close their initial gap: let them "
                 "start on the obstacle, or use another scheme"

@@ -87,11 +87,12 @@ class AppliedDelassus:
 
     def __init__(self, A: EffectiveMatrix, surface: ContactSurface, extra: Array) -> None:
         self._A, self._surface, self.extra = A, surface, extra
-        self.shape = (surface.count, surface.count)
+        self.shape = (surface.total, surface.total)
 
     def __matmul__(self, r: Array) -> Array:
-        x = self._A.factor.solve(self._surface.reaction_load(r, self._A.matrix.rows))
-        return self._surface.normal_values(x) + self.extra * r
+        surface = self._surface
+        x = self._A.factor.solve(surface.reaction_load(r[surface.slots], self._A.matrix.rows))
+        return np.asarray(surface.everywhere(surface.normal_values(x)) + self.extra * r)
 
 
 class PreparedCondensed:
@@ -104,23 +105,21 @@ class PreparedCondensed:
         self._rigid = surface.compliance == 0.0
         self._name = f"condensed {type(settings.method).__name__}"
         A.factor  # noqa: B018  made here, so that the first step is not charged for it
-        extra = surface.compliance / scale
+        extra = surface.everywhere(surface.compliance) / scale
         self.delassus: Any = None
-        if surface.count == 0:
+        if surface.total == 0:
             return
         if isinstance(settings.method, ProjectedCG):
             self.delassus = AppliedDelassus(A, surface, extra)
         else:
             self.delassus = self._form(extra)
-        self._small = settings.method.prepare(self.delassus, surface.bilateral)
+        self._small = settings.method.prepare(self.delassus, surface.everywhere(surface.bilateral))
 
     def _form(self, extra: Array) -> Array:
         """G, symmetrised; keeps A⁻¹E when it is small."""
-        surface, m = self._surface, self._surface.count
-        columns = self._A.factor.solve_units(surface.owned, surface.slots, m)
-        rows = np.zeros((m, m))
-        rows[surface.slots] = columns[surface.owned]
-        G = surface.comm.sum(rows)
+        surface = self._surface
+        columns = self._A.factor.solve_units(surface.owned, surface.slots, surface.total)
+        G = surface.everywhere(columns[surface.owned])
         entries = total(surface.comm, columns.size)
         self._columns = columns if entries <= STORED_ENTRIES else None
         return np.asarray(0.5 * (G + G.T) + np.diag(extra))
@@ -132,16 +131,17 @@ class PreparedCondensed:
 
     def solve(self, step: StepProblem) -> StepResult:
         """Return x, r_n and the active set of a step."""
-        x = self._A.factor.solve(step.b)
-        if self._surface.count == 0:
+        x, surface = self._A.factor.solve(step.b), self._surface
+        if surface.total == 0:
             none = np.zeros(0)
             return StepResult(x, none, none.astype(bool), 0, "linear")
         if step.slip0 is not None:
             return self._with_friction(step, x)
-        small: LCPResult = self._small.solve(step.bound - self._surface.normal_values(x), step.active)
+        gap, guess = surface.everywhere(np.column_stack([step.bound - surface.normal_values(x), step.active])).T
+        small: LCPResult = self._small.solve(np.ascontiguousarray(gap), guess > 0.0)
         if small.r.any():
             x = self._corrected(x, small.r, step)
-        return StepResult(x, small.r, small.active, small.iterations, self._name)
+        return StepResult(x, small.r[surface.slots], small.active[surface.slots], small.iterations, self._name)
 
     @property
     def friction(self) -> CondensedFriction:
@@ -156,23 +156,26 @@ class PreparedCondensed:
 
     def _with_friction(self, step: StepProblem, x: Array) -> StepResult:
         """The step with tangential reactions."""
-        small = self.friction.solve(step, x)
-        r_n, r_t = small.r[:, 0].copy(), small.r[:, 1:].copy()
+        small, mine = self.friction.solve(step, x), self._surface.slots
         if small.r.any():
-            x = self._corrected(x, r_n, step, r_t)
+            x = self._corrected(x, small.r[:, 0], step, small.r[:, 1:])
             self.friction.hold_sticking(x, step, small)
-        name = f"condensed {type(self._settings.friction_method).__name__}"
-        return StepResult(x, r_n, small.active, small.iterations, name, r_t=r_t, history=small.history)
+        name, r = f"condensed {type(self._settings.friction_method).__name__}", small.r[mine]
+        return StepResult(
+            x, r[:, 0].copy(), small.active[mine], small.iterations, name, r_t=r[:, 1:].copy(), history=small.history
+        )
 
     def _corrected(self, x: Array, r: Array, step: StepProblem, r_t: Array | None = None) -> Array:
-        """A⁻¹(b - E r_n - F r_t); unknowns on a rigid support are put on their bound, which removes round-off only."""
-        surface = self._surface
+        """A⁻¹(b - E r_n - F r_t) for the reactions of all ranks; unknowns on a rigid support are put on their bound,
+        which removes round-off only."""
+        surface, mine = self._surface, self._surface.slots
         if self._columns is None:
-            x = self._A.factor.solve(step.b - surface.reaction_load(r, len(x), r_t))
+            along = None if r_t is None else r_t[mine]
+            x = self._A.factor.solve(step.b - surface.reaction_load(r[mine], len(x), along))
         elif r_t is None:
             x = x - self._columns @ r
         else:
             x = x - self._columns @ r - self.friction.columns @ r_t.ravel()
-        closed = ((r != 0.0) & self._rigid)[surface.slots]
-        x[surface.owned[closed]] = step.bound[surface.slots[closed]]
+        closed = (r[mine] != 0.0) & self._rigid
+        x[surface.owned[closed]] = step.bound[closed]
         return x

@@ -171,7 +171,8 @@ def at(point: Array) -> str:
 
 
 def surface_of(space: FemSpace, parts: Sequence[NodalConditions], **data: Any) -> FemSurface:
-    """Make the surface of these conditions; ``data``: gap0, weights and what else it holds for each. Collective."""
+    """Make the surface of these conditions. ``data``: gap0, weights and whatever else it holds of each condition, for
+    those of all ranks; functions of time return those of this rank. Collective."""
     frames = NodalFrames(parts)
     d, count = space.dimension, len(frames.place)
     where = space.blocks_of(frames.numbers)
@@ -182,16 +183,17 @@ def surface_of(space: FemSpace, parts: Sequence[NodalConditions], **data: Any) -
     tangents = np.array([np.delete(index[p], c) for p, c in zip(place, column, strict=True)], dtype=np.int64)
     tangents = np.where(frames.rubs[slots], tangents.reshape(len(slots), d - 1), -1)
     given = {"bilateral": np.zeros(count, dtype=bool), "compliance": np.zeros(count)} | data
+    given = {name: value[slots] if isinstance(value, np.ndarray) else value for name, value in given.items()}
     return FemSurface(
         comm=space.comm,
-        points=frames.points,
-        normals=frames.directions,
+        points=frames.points[slots],
+        normals=frames.directions[slots],
         owned=index[place, column],
         slots=slots,
         tangents=tangents,
         basis=_turn(space, frames.turns, where >= 0, index),
         dual=_turn(space, frames.blocks, where >= 0, index) if frames.oblique else None,
-        nodes=frames.numbers[frames.place],
+        nodes=frames.numbers[place],
         coupling=_coupling(space, parts, frames, index),
         space=space,
         parts=tuple(parts),

@@ -19,7 +19,7 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 
-from ...core.algebra import Array, Mask
+from ...core.algebra import Array, Indices, Mask
 from ...core.checks import provides
 from ...core.corners import FEATURE_ANGLE
 from ...core.errors import InputError
@@ -88,10 +88,9 @@ def contact_pair(
     directions = snapped(nodes.normals)
     gap = _gap(space, one.name, two, nodes, directions, matched)
     conditions = NodalConditions(nodes, directions, Facing(two.nodes, matched.P))
-    moving = _prescribed_motion(space, conditions)
-    return surface_of(
-        space, [conditions], gap0=gap, weights=matched.weights * space.forms.section.thickness, **moving
-    )
+    surface = surface_of(space, [conditions], gap0=gap, weights=matched.weights * space.forms.section.thickness)
+    moving: dict[str, Any] = _prescribed_motion(space, conditions, surface.slots)
+    return replace(surface, **moving)
 
 
 def side_of(space: FemSpace, facets: Facets) -> Side:
@@ -201,21 +200,24 @@ def _gap(space: FemSpace, name: str, two: Side, nodes: Nodes, directions: Array,
     return np.maximum(gap, 0.0)
 
 
-def _prescribed_motion(space: FemSpace, conditions: NodalConditions) -> dict[str, Callable[[float], Array]]:
-    """``motion`` and ``slide`` of a surface whose side 2 has prescribed nodes that move: none when none does."""
+def _prescribed_motion(
+    space: FemSpace, conditions: NodalConditions, mine: Indices
+) -> dict[str, Callable[[float], Array]]:
+    """``motion`` and ``slide`` of this rank's conditions where side 2 has prescribed nodes that move: none when none
+    does."""
     frames, facing = NodalFrames([conditions]), conditions.facing
     moves = any(condition.moves for condition in space.prescribed)
     if facing is None or not moves or not facing.nodes.held[np.unique(facing.P.indices)].any():
         return {}
-    numbers, P = facing.nodes.numbers, facing.P
-    held = conditions.nodes.held
+    numbers, P, held = facing.nodes.numbers, facing.P[mine], conditions.nodes.held
     free = np.array([np.delete(~own, c) for own, c in zip(held, frames.column, strict=True)]) & frames.rubs
-    tangents, nothing = frames.tangents, np.zeros(len(space.ids))
+    tangents, directions, free = frames.tangents[mine], frames.directions[mine], free[mine]
+    nothing = np.zeros(len(space.ids))
 
     def displacement(t: float) -> Array:
         return np.asarray(P @ space.sample(nothing, numbers, t))
 
     return {
-        "motion": lambda t: -np.sum(displacement(t) * frames.directions, axis=1),
+        "motion": lambda t: -np.sum(displacement(t) * directions, axis=1),
         "slide": lambda t: np.einsum("ijk,ij->ik", tangents, displacement(t)) * free,
     }

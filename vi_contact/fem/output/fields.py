@@ -106,11 +106,10 @@ class FrameWriter:
         on_root(space.comm, partial(self._start, points, cells, kept))
 
     def _nodes_of_conditions(self) -> Indices:
-        """Node number of each contact condition (m,): that of the unknown it bounds."""
+        """Node number of every contact condition (total,): that of the unknown it bounds."""
         surface = self._problem.surface
-        numbers = np.zeros(surface.count)
-        numbers[surface.slots] = self._space.ids[surface.owned] // self._space.dimension
-        return np.rint(surface.comm.sum(numbers)).astype(np.int64)
+        nodes: Indices = surface.everywhere(self._space.ids[surface.owned] // self._space.dimension)
+        return nodes
 
     def _by_number(self, owned: Any, numbers: Indices) -> Any:
         """Rows of owned nodes or cells, on rank 0 as rows of all in input order; none elsewhere. Collective."""
@@ -152,7 +151,9 @@ class FrameWriter:
             moving += self._rubbing(state)
             slipping = slipping if report is None else slipped(report)
         vectors = self._by_number(np.hstack([_three(nodal) for nodal in moving]), space.nodes)
-        on_root(space.comm, partial(self._write, state, vectors, stress, slipping))
+        surface = problem.surface
+        each = np.column_stack([state.r_n / surface.weights, state.active, slipping])
+        on_root(space.comm, partial(self._write, state, vectors, stress, surface.everywhere(each)))
 
     def _rubbing(self, state: State) -> list[Array]:
         """Tangential traction and slip at the owned nodes, (k, d) each."""
@@ -169,8 +170,8 @@ class FrameWriter:
         full[space.free] = surface.along_axes(turned)  # tangents are at right angles to all that is oblique
         return full.reshape(-1, space.dimension)
 
-    def _write(self, state: State, vectors: Array, stress: Array, slipping: Mask) -> None:
-        pressure, status = self._contact(state, slipping)
+    def _write(self, state: State, vectors: Array, stress: Array, contact: Array) -> None:
+        pressure, status = self._contact(*contact.T)
 
         def fill(file: h5py.File) -> None:
             for i, name in enumerate(self._names):
@@ -181,13 +182,12 @@ class FrameWriter:
         self._frames.append((state.k, state.t))
         self._write_index()
 
-    def _contact(self, state: State, slipping: Mask) -> tuple[Array, Any]:
+    def _contact(self, each: Array, active: Array, slipping: Array) -> tuple[Array, Any]:
         """Contact pressure and status of all nodes."""
         pressure, status = np.zeros(self._shape[0]), np.zeros(self._shape[0], dtype=np.int32)
-        each = state.r_n / self._problem.surface.weights
         order = np.argsort(np.abs(each), kind="stable")  # of several faces of a node, the one that is pressed most
         pressure[self._contact_nodes[order]] = each[order]
-        np.maximum.at(status, self._contact_nodes, np.where(state.active, np.where(slipping, 3, 2), 1))
+        np.maximum.at(status, self._contact_nodes, np.where(active > 0.0, np.where(slipping > 0.0, 3, 2), 1))
         return pressure, status
 
     def _write_index(self) -> None:
@@ -221,7 +221,7 @@ class FrameWriter:
 
 
 def slipped(report: Report) -> Mask:
-    """Return the points (m,) that moved along their support in a step with friction. Collective."""
+    """Return the points (m,) that moved along their support in a step with friction."""
     step, result = report.step, report.result
     return np.asarray(np.any(step.surface.tangential_values(result.x) != step.slip0, axis=1))
 

@@ -135,9 +135,10 @@ class ChannelModel:
 
     @cached_property
     def sides(self) -> dict[str, Mask]:
-        """Return masks (m,) of the contact conditions of each of SIDES."""
+        """Return masks (total,) of all contact conditions of each of SIDES."""
         normals = {"base": (0.0, -1.0), "left": (-1.0, 0.0), "right": (1.0, 0.0)}
-        return {side: self.surface.normals @ normals[side] > 0.5 for side in SIDES}
+        whole = self.surface.whole()
+        return {side: whole.normals @ normals[side] > 0.5 for side in SIDES}
 
 
 @dataclass
@@ -163,7 +164,8 @@ class SoilProbe(Probe):
 
 @dataclass(frozen=True)
 class Openings:
-    """Record the largest gap of each side of the contact: columns opening_<side> [m]. ``sides``: name -> mask (m,)."""
+    """Record the largest gap of each side of the contact: columns opening_<side> [m]. ``sides``: name -> mask (total,).
+    """
 
     sides: Mapping[str, Mask]
 
@@ -177,7 +179,7 @@ class Openings:
         return self._row(report.problem.surface, report.new)
 
     def _row(self, surface: ContactSurface, state: State) -> dict[str, Any]:
-        gap = surface.gap(state.t) - surface.normal_values(state.u)
+        gap = surface.everywhere(surface.gap(state.t) - surface.normal_values(state.u))
         return {f"opening_{side}": float(gap[mask].max()) for side, mask in self.sides.items()}
 
 

@@ -101,7 +101,8 @@ def _split(problem: ContactProblem, state: State) -> tuple[Arrays, Arrays]:
     """(arrays of owned unknowns, arrays that are the same on every rank)."""
     comm = problem.system.algebra.comm
     vectors: Arrays = {"u": state.u, "v": state.v}
-    same: Arrays = {"r_n": state.r_n, "active": state.active} | ({} if state.r_t is None else {"r_t": state.r_t})
+    contact: Arrays = {"r_n": state.r_n, "active": state.active} | ({} if state.r_t is None else {"r_t": state.r_t})
+    same = {name: problem.surface.everywhere(array) for name, array in contact.items()}
     for name in sorted(state.memory):
         array = np.asarray(state.memory[name])
         kind = same if largest(comm, array.shape != state.u.shape) else vectors
@@ -126,7 +127,8 @@ def read_checkpoint(
     for name in about["vectors"]:
         arrays[name] = arrays[name][mine]
     memory = {name.removeprefix(MEMORY): array for name, array in arrays.items() if name.startswith(MEMORY)}
-    contact = {name: arrays.get(name) for name in ("r_n", "active", "r_t")}
+    slots = problem.surface.slots
+    contact: Arrays = {name: arrays[name][slots] if name in arrays else None for name in ("r_n", "active", "r_t")}
     state = State(about["t"], about["k"], arrays["u"], arrays["v"], memory=memory, **contact)
     if "format" not in about and memory:
         _check_memory(file, problem, scheme, state, about)
@@ -214,7 +216,7 @@ def _unpacked(file: Path) -> tuple[dict[str, Any], Arrays]:
 def _check_sizes(problem: ContactProblem, about: dict[str, Any], arrays: Arrays) -> None:
     """InputError or KeyError for missing, misshapen or senseless values. Unknowns and points come first: of another
     problem nothing fits."""
-    n, m, d = problem.system.space.unknowns, problem.surface.count, problem.surface.tangents.shape[1]
+    n, m, d = problem.system.space.unknowns, problem.surface.total, problem.surface.tangents.shape[1]
     about |= {name: number("it", name, about[name]) for name in ("t", "t_start")}
     about |= {name: whole("it", name, about[name], most=2**53) for name in ("k", "k_start", "base", "halved")}
     if "span" in about:

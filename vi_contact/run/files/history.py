@@ -33,16 +33,16 @@ GROWTH = 1.25  # history.h5 is rewritten when it has grown by this factor: what 
 
 
 class HistoryFiles:
-    """Keep the files of a table (rank 0 only). Every method may raise OSError.
+    """Keep the files of a table (rank 0 only), of contact points ``whole``. Every method may raise OSError.
 
     ``stored``: the rows of an earlier run that this one continues, in the same folder (later ones are dropped) or in
     another; without them the table has its first row only.
     """
 
     def __init__(
-        self, folder: Path, table: Table, surface: ContactSurface, stored: StoredRows | None = None
+        self, folder: Path, table: Table, whole: ContactSurface, stored: StoredRows | None = None
     ) -> None:
-        self._folder, self._table, self._surface = folder, table, surface
+        self._folder, self._table, self._surface = folder, table, whole
         self._rows = self._saved = self._tail = self._last = 0
         self._hash = hashlib.sha256()
         self._journal: Any = None

@@ -50,7 +50,7 @@ def identity(problem: ContactProblem, scheme: Scheme, dt: TimeSteps, *, start: f
     times = start + (end - start) * (np.arange(SAMPLES) + probe(np.arange(SAMPLES), 0) + 0.5) / SAMPLES
     return {
         "unknowns": system.space.unknowns,
-        "contact points": surface.count,
+        "contact points": surface.total,
         "dt": described(dt),
         "scheme": text_of(scheme),
         "mass": text_of(problem.mass),
@@ -163,13 +163,17 @@ def _contact(surface: ContactSurface, early: Sequence[float]) -> Numbers:
               surface.bilateral.astype(float)]
     arrays += [] if surface.motion is None else [surface.gap(t) for t in early]
     arrays += [] if surface.slide is None else [column for t in early for column in surface.slide(t).T]
-    return [pair for values in arrays for pair in _sampled(np.asarray(values, dtype=float))]
+    return _columns(surface, arrays)
+
+
+def _columns(surface: ContactSurface, arrays: Sequence[Array]) -> Numbers:
+    """Sums of values (m,) of the contact conditions of all ranks. Collective."""
+    whole = surface.everywhere(np.column_stack([np.asarray(values, dtype=float) for values in arrays]))
+    return [pair for values in whole.T for pair in _sampled(np.ascontiguousarray(values))]
 
 
 def _friction(problem: ContactProblem) -> Numbers:
     """The largest tangential reactions under a pressure, and their slopes at several slip rates."""
     law, weights = problem.friction, problem.surface.weights
-    found = _sampled(np.asarray(law.limit(weights, weights, 1.0), dtype=float))
-    for speed in SPEEDS:
-        found += _sampled(np.asarray(law.at(np.full(len(weights), speed)).slope(weights), dtype=float))
-    return found
+    rates = [law.at(np.full(len(weights), speed)).slope(weights) for speed in SPEEDS]
+    return _columns(problem.surface, [law.limit(weights, weights, 1.0), *rates])

@@ -15,6 +15,7 @@ from ...core.algebra import Array
 from ...core.files import FIELDS, on_root, to_json, write_atomically
 from ...core.problem import ContactProblem
 from ...core.step import Report, Row, State
+from ...core.surfaces import ContactSurface
 from .checkpoint import RestartPoint, write_checkpoint
 from .folder import ABOUT, FORMAT, LOG, SUMMARY, clear, remove_litter
 from .history import HistoryFiles
@@ -73,7 +74,7 @@ class Writer:
         folder = self._folder
         if folder is None:
             return
-        on_root(self._comm, partial(self._make, folder))
+        on_root(self._comm, partial(self._make, folder, self._problem.surface.whole()))
         if self._settings is not None:
             kept = on_root(self._comm, lambda: self._frames_of(folder)) or {}
             self._fields = self._settings.open(self._problem, folder, kept)
@@ -85,12 +86,12 @@ class Writer:
         numbers = [path.stem.rpartition("_")[2] for path in (folder / FIELDS).glob("*_*.h5")] if self._continued else []
         return times_of(folder, {int(number) for number in numbers if number.isdecimal()})
 
-    def _make(self, folder: Path) -> None:
+    def _make(self, folder: Path, whole: ContactSurface) -> None:
         remove_litter(folder)
         if not self._continued:
             clear(folder)
         self._log = RunLog(folder / LOG, append=self._continued)
-        self._files = HistoryFiles(folder, self._table, self._problem.surface, self._stored)
+        self._files = HistoryFiles(folder, self._table, whole, self._stored)
         about = {"format": FORMAT, "vi_contact": versions()["vi_contact"]}
         write_atomically(folder / ABOUT, (to_json(about) + "\n").encode())
 

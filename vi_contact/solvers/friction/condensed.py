@@ -39,17 +39,17 @@ class CondensedFriction:
         keep: bool,
     ) -> None:
         self._surface, self._rates = surface, rates
-        m, k = surface.count, surface.tangents.shape[1]
+        m, k = surface.total, surface.tangents.shape[1]
         free = surface.tangents >= 0
         places = (surface.slots[:, None] * k + np.arange(k))[free]
         columns = A.factor.solve_units(surface.tangents[free], places, m * k)
         self.delassus = self._assembled(normal, columns, places, free)
         self.columns = columns if keep else np.zeros((len(columns), 0))
-        self._small = method.prepare(self.delassus, surface.bilateral)
+        self._small = method.prepare(self.delassus, surface.everywhere(surface.bilateral))
 
     def _assembled(self, normal: Array, columns: Array, places: Indices, free: Mask) -> Array:
         """G (m d, m d), symmetrised."""
-        surface, (m, k) = self._surface, (self._surface.count, self._surface.tangents.shape[1])
+        surface, (m, k) = self._surface, (self._surface.total, self._surface.tangents.shape[1])
         rows = np.zeros((m + m * k, m * k))
         rows[surface.slots] = columns[surface.owned]
         rows[m + places] = columns[surface.tangents[free]]
@@ -67,21 +67,25 @@ class CondensedFriction:
 
     def solve(self, step: StepProblem, x_free: Array) -> FrictionResult:
         """Return the reactions of a step."""
-        surface = self._surface
+        surface, law = self._surface, step.friction
         gap = step.bound - surface.normal_values(x_free)
         slip = surface.tangential_values(x_free) - origin(step)
-        q = np.column_stack([gap, -slip])
-        cohesion = step.friction.limit(np.zeros(surface.count), surface.weights, step.scale)
-        if step.friction_at(np.zeros_like(slip)) is step.friction:
-            return self._small.solve(q, cohesion, step.friction.slope(surface.weights), step.active)
+        none = np.zeros(surface.count)
+        cohesion, slope = law.limit(none, surface.weights, step.scale), law.slope(surface.weights)
+        whole = surface.everywhere(np.column_stack([gap, -slip, cohesion, slope, step.active]))
+        q, (cohesion, slope, closed) = np.ascontiguousarray(whole[:, :-3]), whole[:, -3:].T
+        active = closed > 0.0
+        if step.friction_at(np.zeros_like(slip)) is law:
+            return self._small.solve(q, cohesion, slope, active)
 
         def solved(mu: Array, before: FrictionResult | None) -> FrictionResult:
-            return self._small.solve(q, cohesion, mu, step.active if before is None else before.r)
+            return self._small.solve(q, cohesion, mu, active if before is None else before.r)
 
         def coefficients(found: FrictionResult) -> Array:
-            return step.friction_at(self._slip(q, found)).slope(surface.weights)
+            rates = step.friction_at(self._slip(q, found)[surface.slots])
+            return np.asarray(surface.everywhere(rates.slope(surface.weights)))
 
-        return self._rates.solve(step.friction.slope(surface.weights), solved, coefficients)
+        return self._rates.solve(slope, solved, coefficients)
 
     def _slip(self, q: Array, found: FrictionResult) -> Array:
         """B_t x - slip0 (m, d - 1) of points that rub, exactly zero where they stick."""
@@ -90,9 +94,9 @@ class CondensedFriction:
 
     def hold_sticking(self, x: Array, step: StepProblem, small: FrictionResult) -> None:
         """Put the tangential unknowns of sticking points where they were, which removes round-off only."""
-        surface = self._surface
-        there = (surface.tangents >= 0) & small.stick[surface.slots][:, None]
-        x[surface.tangents[there]] = origin(step)[surface.slots][there]
+        tangents = self._surface.tangents
+        there = (tangents >= 0) & small.stick[self._surface.slots][:, None]
+        x[tangents[there]] = origin(step)[there]
 
 
 def origin(step: StepProblem) -> Array:

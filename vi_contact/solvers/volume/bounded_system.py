@@ -8,7 +8,7 @@ r_n / scale of the spring is a further unknown, and the bound is on w,
 
     z = (x, w),    [[A + Bᵀ k B, -Bᵀ k], [-k B, k]] z = (b, 0) - reactions,    w <= bound.
 
-The spring unknowns of a rank follow its body unknowns. ``local`` arrays below have one entry per owned contact point.
+The spring unknowns of a rank follow its body unknowns. Contact arrays (m,) are of the conditions that this rank owns.
 """
 
 from __future__ import annotations
@@ -30,17 +30,16 @@ class BoundedSystem:
     bounds.
 
     Attributes:
-        soft: (local) True where the support is a spring.
+        soft: (m,) True where the support is a spring.
         spring, feet: stiffness k of these springs, in the unit of A, and the positions in x of their body ends.
-        bounded: (local) position of the bounded unknown in z.
+        bounded: (m,) position of the bounded unknown in z.
     """
 
     def __init__(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> None:
         self.A, self.surface, self.scale = A, surface, scale
         self.rows = A.matrix.rows
-        compliance = surface.compliance[surface.slots]
-        self.soft: Mask = compliance > 0.0
-        self.spring = scale / compliance[self.soft]
+        self.soft: Mask = surface.compliance > 0.0
+        self.spring = scale / surface.compliance[self.soft]
         self.feet = surface.owned[self.soft]
         self.size = self.rows + len(self.spring)
         self.bounded = surface.owned.copy()
@@ -55,12 +54,6 @@ class BoundedSystem:
     def max(self, *values: float) -> Array:
         """Return the maxima over the ranks."""
         return np.asarray(self.surface.comm.max(np.array(values)))
-
-    def shared(self, local: Array) -> Array:
-        """Return values of the owned contact points -> (m,), the same on all ranks."""
-        values = np.zeros(self.surface.count)
-        values[self.surface.slots] = local
-        return self.surface.comm.sum(values)
 
     def apply(self, z: Array) -> Array:
         """Return A z."""
@@ -78,20 +71,19 @@ class BoundedSystem:
 
     def bounds(self, step: StepProblem) -> tuple[Array, Array]:
         """Return (lower, upper) of the owned unknowns; an infinite bound leaves its point free, bilateral or not."""
-        if np.isnan(step.bound).any():
+        if self.surface.some(np.isnan(step.bound)):
             raise InputError("the bound of the contact conditions contains NaN: check the gap and the time scheme")
         lower, upper = np.full(self.size, -np.inf), np.full(self.size, np.inf)
-        bound = step.bound[self.surface.slots]
-        upper[self.bounded] = bound
-        held = self.surface.bilateral[self.surface.slots] & np.isfinite(bound)
-        lower[self.bounded[held]] = bound[held]
+        upper[self.bounded] = step.bound
+        held = self.surface.bilateral & np.isfinite(step.bound)
+        lower[self.bounded[held]] = step.bound[held]
         return lower, upper
 
     def start(self, step: StepProblem) -> Array:
         """Return the guess, with springs at rest and the predicted contacts on their bounds."""
         z = np.concatenate([step.guess, step.guess[self.feet]])
-        closed = self.predicted(step)[self.surface.slots]
-        z[self.bounded[closed]] = step.bound[self.surface.slots][closed]
+        closed = self.predicted(step)
+        z[self.bounded[closed]] = step.bound[closed]
         return z
 
     def predicted(self, step: StepProblem) -> Mask:
@@ -99,7 +91,7 @@ class BoundedSystem:
         return (step.active | self.surface.bilateral) & np.isfinite(step.bound)
 
     def reactions(self, f: Array) -> Array:
-        """Return (local) r_n from the residual f = A z - b; on a spring k (x_n - w). Meaningful where the bound is
+        """Return (m,) r_n from the residual f = A z - b; on a spring k (x_n - w). Meaningful where the bound is
         active."""
         return np.asarray(-f[self.bounded])
 
@@ -119,7 +111,7 @@ class BoundedSystem:
             indptr, columns, values = matrix.csr.indptr, matrix.csr.indices, matrix.csr.data
         else:
             mat = matrix.mat  # type: ignore[attr-defined]
-            if not self.surface.compliance.any():
+            if not self.surface.some(self.surface.compliance > 0.0):
                 return mat
             indptr, columns, values = mat.getValuesCSR()
         first, columns, total = renumbered(self.surface.comm, self.rows, self.size, columns)

@@ -67,34 +67,38 @@ class VolumeFriction:
             return self._result(step, self._sequence(step, cohesion, slope, None))
 
         def solved(mu: Array, before: Any) -> Any:
-            return self._sequence(step, cohesion, mu, before)
+            return self._sequence(step, cohesion, mu[surface.slots], before)
 
         def coefficients(found: Any) -> Array:
-            return step.friction_at(self._friction.shared(found.slip)).slope(surface.weights)
+            rates = step.friction_at(self._friction.by_point(found.slip))
+            return np.asarray(surface.everywhere(rates.slope(surface.weights)))
 
-        found: Any = RateIteration().solve(slope, solved, coefficients)
+        found: Any = RateIteration().solve(surface.everywhere(slope), solved, coefficients)
         return self._result(step, found)
 
     def _sequence(self, step: StepProblem, cohesion: Array, slope: Array, before: Found | None) -> Found:
-        """Coulomb's problem with a coefficient (m,) that is given, from the solution of another one."""
+        """Coulomb's problem with a coefficient (m,) that is given, from the solution of another one. The thresholds are
+        those of all conditions: every rank extrapolates and judges them alike."""
         following, spent = EXTRAPOLATION.start(), 0
         history: list[float] = []
-        limit = cohesion if before is None else cohesion + slope * np.maximum(before.r_n, 0.0)
+        surface = self._body.surface
+        none, mine = np.zeros(surface.count), surface.slots
+        limit = surface.everywhere(cohesion + slope * np.maximum(none if before is None else before.r_n, 0.0))
         if before is None:
             start, spent = self._first(step, limit)
         else:
-            start = self._scaled.moved(before.state, before.slip, limit)
+            start = self._scaled.moved(before.state, before.slip, limit[mine])
         while len(history) < PROBLEMS:
-            found = self._tresca(step, limit, start)
+            found = self._tresca(step, limit[mine], start)
             spent += found.iterations
-            new = cohesion + slope * np.maximum(found.r_n, 0.0)
+            new = surface.everywhere(cohesion + slope * np.maximum(found.r_n, 0.0))
             size = max(max_abs(new), max_abs(limit))
             change = max_abs(new - limit) / size if size else 0.0
             if change <= TOLERANCE or (change <= NOISE and history and change >= history[-1]):
                 return Found(found.state, found.r_n, found.active, found.slip, spent, tuple(history))
             history.append(change)
             limit = np.maximum(following(limit, new), 0.0)
-            start = self._scaled.moved(found.state, found.slip, limit)
+            start = self._scaled.moved(found.state, found.slip, limit[mine])
         raise StepFailure(
             f"{self._name} stopped after {PROBLEMS} Tresca problems with a change of {history[-1]:.1e} of the friction "
             "thresholds: take a smaller step of time or load, or use Condensed()"
@@ -103,12 +107,12 @@ class VolumeFriction:
     def _first(self, step: StepProblem, limit: Array) -> tuple[FrictionUnknowns, int]:
         """The guess, sliding as predicted, and no iterations; with disks the solution without friction, whose slip
         gives the directions that Newton's method needs."""
-        friction, scaled = self._friction, self._scaled
+        friction, scaled, own = self._friction, self._scaled, limit[self._body.surface.slots]
         state = FrictionUnknowns(self._body.start(step), np.zeros(len(friction.tangent)), np.zeros(len(friction.pairs)))
         if not (friction.any_disk and limit.any()):
-            return scaled.moved(state, state.z[friction.tangent] - friction.origin(step), limit), 0
-        free = self._tresca(step, np.zeros_like(limit), state)
-        return scaled.moved(free.state, free.slip, limit), free.iterations
+            return scaled.moved(state, state.z[friction.tangent] - friction.origin(step), own), 0
+        free = self._tresca(step, np.zeros_like(own), state)
+        return scaled.moved(free.state, free.slip, own), free.iterations
 
     def _tresca(self, step: StepProblem, limit: Array, start: FrictionUnknowns) -> Found:
         """The problem with thresholds (m,)."""
@@ -121,15 +125,15 @@ class VolumeFriction:
         active = scaled.active(y, F)
         r_n = np.where(active, body.reactions(F * scaled.r_ref), 0.0)
         slip = scaled.slip(state.z, scaled.sliding(y))
-        return Found(state, body.shared(r_n), body.shared(active.astype(float)) > 0.0, slip, iterations)
+        return Found(state, r_n, active, slip, iterations)
 
     def _result(self, step: StepProblem, found: Found) -> StepResult:
         """x, with sticking points put exactly where they were, and r_t within the last digit of its disk."""
         surface, friction = self._body.surface, self._friction
-        law = step.friction_at(friction.shared(found.slip))
+        law = step.friction_at(friction.by_point(found.slip))
         limit = law.limit(found.r_n, surface.weights, step.scale)
         x = found.state.z[: self._body.rows]
-        stick = (found.slip == 0.0) & (limit > 0.0)[surface.slots][friction.point]
+        stick = (found.slip == 0.0) & (limit > 0.0)[friction.point]
         x[friction.tangent[stick]] = friction.origin(step)[stick]
-        r_t = project(friction.shared(found.state.reaction), limit)
+        r_t = project(friction.by_point(found.state.reaction), limit)
         return StepResult(x, found.r_n, found.active, found.iterations, self._name, r_t=r_t, history=found.history)

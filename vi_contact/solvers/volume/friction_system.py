@@ -40,8 +40,8 @@ class FrictionSystem:
     """Number the unknowns of a rank: z of ``body``, then lambda of the free tangents, point by point, then gamma.
 
     Attributes:
-        point, tangent, stiffness: (L,) local contact point, position in x and diagonal entry of A of each lambda.
-        disk: (local) True for points with two free tangents; ``any_disk``: whether some rank has one.
+        point, tangent, stiffness: (L,) contact point, position in x and diagonal entry of A of each lambda.
+        disk: (m,) True for points with two free tangents; ``any_disk``: whether some rank has one.
         pairs: (D, 2) places of their lambdas; line: (L,) True for the other lambdas.
     """
 
@@ -70,19 +70,13 @@ class FrictionSystem:
     def origin(self, step: StepProblem) -> Array:
         """Return (L,) x of the free tangents where the slip is zero."""
         assert step.slip0 is not None
-        return np.asarray(step.slip0[self.surface.slots][self.point, self.component])
+        return np.asarray(step.slip0[self.point, self.component])
 
     def by_point(self, values: Array) -> Array:
-        """Return (local, d - 1) of values (L,), zero where a tangent is prescribed."""
+        """Return (m, d - 1) of values (L,), zero where a tangent is prescribed."""
         table = np.zeros(self.surface.tangents.shape)
         table[self.point, self.component] = values
         return table
-
-    def shared(self, values: Array) -> Array:
-        """Return values (L,) -> (m, d - 1), the same on all ranks."""
-        table = np.zeros((self.surface.count, self.surface.tangents.shape[1]))
-        table[self.surface.slots] = self.by_point(values)
-        return self.surface.comm.sum(table)
 
 
 @dataclass(frozen=True)
@@ -107,7 +101,7 @@ class ScaledFrictionStep(ScaledStep):
         """Take a step with thresholds (m,) [as r_t]."""
         friction = self.friction
         self.set(step, start.z)
-        self.limit = limit[friction.surface.slots] / self.r_ref
+        self.limit = limit / self.r_ref
         self._origin = friction.origin(step) / self.x_ref
         s = self.limit[friction.point]
         s = np.where(friction.line | (s == 0.0), s, np.inf)
@@ -179,7 +173,7 @@ class ScaledFrictionStep(ScaledStep):
         return force, max(gap, fraction(slip, y_max), disk), backward
 
     def sliding(self, y: Array) -> Mask:
-        """Return (local) points on the edge of their disk."""
+        """Return (m,) points on the edge of their disk."""
         friction = self.friction
         _, reaction, gamma = friction.split(y)
         at_edge = np.abs(reaction) >= self.limit[friction.point]
@@ -201,8 +195,7 @@ class ScaledFrictionStep(ScaledStep):
 
     def moved(self, state: FrictionUnknowns, slip: Array, limit: Array) -> FrictionUnknowns:
         """Return the state with reactions in new disks (m,): sliding points on their edge, along their slip (L,)."""
-        friction = self.friction
-        s = limit[friction.surface.slots]
+        friction, s = self.friction, limit
         way = friction.by_point(slip)
         speed = np.linalg.norm(way, axis=1)
         edge = np.zeros_like(way)

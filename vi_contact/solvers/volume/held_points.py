@@ -14,6 +14,8 @@ from .bounded_system import BoundedSystem
 class HeldInverse:
     """Solve A z = r - reactions with z = target on a held set of contact points, by the factor of A alone.
 
+    Sets and targets (total,) are those of all conditions, the same on every rank.
+
     Columns of W are made when a point is first held. They are kept when there is room for ``limit`` numbers on every
     rank; else W is applied as a second back-substitution. G costs m² numbers.
     Springs enter by their compliance only: eliminating w gives back A, and G + compliance/scale.
@@ -22,7 +24,9 @@ class HeldInverse:
     def __init__(self, system: BoundedSystem, limit: int) -> None:
         self._system = system
         self._factor = system.A.factor
-        m = system.surface.count
+        surface = system.surface
+        m, self._extra = surface.total, surface.everywhere(surface.compliance) / system.scale
+        self._bilateral = surface.everywhere(surface.bilateral)
         keep = system.max(float(m * system.rows))[0] <= limit
         self._W = np.empty((m if keep else 0, system.rows))  # row j is column j; memory is taken when it is written
         self._known = np.zeros(m, dtype=bool)
@@ -38,12 +42,12 @@ class HeldInverse:
         return np.concatenate([x, x[system.feet] + r[n:] / system.spring])
 
     def hold(self, z: Array, held: Mask, target: Array) -> Array:
-        """Return z - W reaction, with the reaction on ``held`` (m,) that brings its points to ``target`` (m,)."""
+        """Return z - W reaction, with the reaction on ``held`` that brings its points to ``target``."""
         if not held.any():
             return z
         system, n = self._system, self._system.rows
         reaction = np.zeros(len(held))
-        reaction[held] = self._solve(held, (system.shared(z[system.bounded]) - target)[held])
+        reaction[held] = self._solve(held, (system.surface.everywhere(z[system.bounded]) - target)[held])
         x = z[:n] - self._respond(reaction, held)
         w = z[n:] - z[system.feet] + x[system.feet]  # held tips are set below
         z = np.concatenate([x, w])
@@ -52,19 +56,18 @@ class HeldInverse:
         return z
 
     def better_set(self, z: Array, held: Mask, target: Array, exchanges: int) -> Mask:
-        """Return (m,) a contact set to start from, for z = A⁻¹ b: ``held`` if its reactions push and no other point
+        """Return a contact set to start from, for z = A⁻¹ b: ``held`` if its reactions push and no other point
         passes its target; else the points that z takes beyond their targets, with at most so many exchanges of wrong
         signs.
 
         Asked of the contact points alone, it costs little beside a step; SNES decides.
         """
-        surface = self._system.surface
-        excess = self._system.shared(z[self._system.bounded]) - target
+        excess = self._system.surface.everywhere(z[self._system.bounded]) - target
         rounding = 1e-12 * float(np.max(np.abs(excess[np.isfinite(excess)]), initial=0.0))
         wrong = self._wrong(excess, held, rounding)
         if not wrong.any():
             return held
-        held = (excess > 0.0) | (held & surface.bilateral)
+        held = (excess > 0.0) | (held & self._bilateral)
         for _ in range(exchanges):
             wrong = self._wrong(excess, held, rounding)
             if not wrong.any():
@@ -73,18 +76,19 @@ class HeldInverse:
         return held
 
     def _wrong(self, excess: Array, held: Mask, rounding: float) -> Mask:
-        """(m,) held points whose reaction pulls, and others that pass their target."""
+        """Held points whose reaction pulls, and others that pass their target."""
         wrong = excess > rounding
         if held.any():
             push = self._solve(held, excess[held])
             wrong = excess - self._G[:, held] @ push > rounding
-            wrong[held] = (push < 0.0) & ~self._system.surface.bilateral[held]
+            wrong[held] = (push < 0.0) & ~self._bilateral[held]
         return wrong
 
     def _respond(self, reaction: Array, held: Mask) -> Array:
         """W reaction; kept columns are multiplied in runs of neighbours, without copying."""
         if not len(self._W):
-            return self._factor.solve(self._system.surface.reaction_load(reaction, self._system.rows))
+            surface = self._system.surface
+            return self._factor.solve(surface.reaction_load(reaction[surface.slots], self._system.rows))
         x = np.zeros(self._system.rows)
         if not len(x):
             return x  # BLAS does not take empty matrices
@@ -97,9 +101,8 @@ class HeldInverse:
         """(G_aa + compliance/scale)⁻¹ gap; its Cholesky factor is kept until the held set changes."""
         if held.tobytes() != self._set:
             self._make_columns(held & ~self._known)
-            surface = self._system.surface
             block = self._G[np.ix_(held, held)]
-            block = 0.5 * (block + block.T) + np.diag(surface.compliance[held] / self._system.scale)
+            block = 0.5 * (block + block.T) + np.diag(self._extra[held])
             try:
                 self._cholesky = cho_factor(block, check_finite=False)
             except LinAlgError as error:
@@ -119,9 +122,7 @@ class HeldInverse:
         mine = new[surface.slots]
         slots = np.flatnonzero(new)
         columns = self._factor.solve_units(surface.owned[mine], position[surface.slots[mine]], len(slots))
-        part = np.zeros((surface.count, len(slots)))
-        part[surface.slots] = columns[surface.owned]
-        self._G[:, slots] = surface.comm.sum(part)
+        self._G[:, slots] = surface.everywhere(columns[surface.owned])
         self._known |= new
         if len(self._W):
             self._W[slots] = columns.T

@@ -37,7 +37,7 @@ class ShellMatrix:
         self.local = np.arange(size) if local is None else local
         free = np.zeros(size, dtype=bool)
         free[self.local] = True
-        self.held = scaled.system.shared((~free[scaled.system.bounded]).astype(float)) > 0.0
+        self.held = scaled.system.surface.everywhere(~free[scaled.system.bounded])
 
     def mult(self, mat: Any, x: Any, y: Any) -> None:
         """Compute y = H x."""
@@ -94,18 +94,18 @@ class ReducedInverse:
         self._scaled, self._jacobian = scaled, jacobian
         self._inverse = HeldInverse(scaled.system, settings.limit)
         self._exchanges = settings.exchanges
-        self._zero = np.zeros(scaled.system.surface.count)
+        self._zero = np.zeros(scaled.system.surface.total)
         self._free, self._held = np.zeros(0), self._zero > 0.0
 
     def start(self, step: StepProblem) -> Array:
         """Return z with the predicted contacts held."""
         system = self._scaled.system
         self._free = self._inverse.unheld(system.load(step.b))
-        predicted = system.predicted(step)
-        self._held = predicted
+        everywhere = system.surface.everywhere
+        self._held, bound = everywhere(system.predicted(step)), everywhere(step.bound)
         if self._exchanges:
-            self._held = self._inverse.better_set(self._free, predicted, step.bound, self._exchanges)
-        return self._inverse.hold(self._free, self._held, step.bound)
+            self._held = self._inverse.better_set(self._free, self._held, bound, self._exchanges)
+        return self._inverse.hold(self._free, self._held, bound)
 
     def apply(self, pc: Any, r: Any, y: Any) -> None:
         """Compute y = H_II⁻¹ r."""

@@ -201,8 +201,8 @@ class PreparedVolume:
         r_n = np.where(active, system.reactions(F * scaled.r_ref), 0.0)
         return StepResult(
             x=y[: system.rows] * scaled.x_ref,
-            r_n=system.shared(r_n),
-            active=system.shared(active.astype(float)) > 0.0,
+            r_n=r_n,
+            active=active,
             iterations=iterations,
             method=self._name,
         )

@@ -76,7 +76,7 @@ class ScaledStep:
         self._zero = y, self.residual(y)
 
     def active(self, y: Array, F: Array) -> Mask:
-        """Return (local) what the natural map chooses: where the reaction exceeds the remaining gap."""
+        """Return (m,) what the natural map chooses: where the reaction exceeds the remaining gap."""
         i = self.system.bounded
         return np.asarray((self.upper[i] - y[i] < -F[i]) | (self.lower[i] == self.upper[i]))
 
