@@ -14,6 +14,7 @@ import pytest
 pytest.importorskip("dolfinx")
 
 import h5py
+from all_ranks import seen
 from fem_problems import BOX_DT, CONCRETE, block, field, shaken_wall, thrown_box, turned
 from tipped import ROUGH_ON_ONE_SIDE, tipped
 
@@ -156,10 +157,11 @@ def test_frames_hold_the_run(comm: Any, shared_tmp: Path) -> None:
         for name, exact in (("points", points), ("u", u), ("v", v)):
             assert np.allclose(frame[name][:, :2], exact, rtol=0.0, atol=1e-10 * np.max(np.abs(exact), initial=1e-300))
             assert frame[name].shape[1] == 3 and not frame[name][:, 2].any()
-        near = [int(np.argmin(np.linalg.norm(points - x, axis=1))) for x in problem.surface.points]
+        near = [int(np.argmin(np.linalg.norm(points - x, axis=1))) for x in seen(problem.surface).points]
         status, pressure = np.zeros(len(points), int), np.zeros(len(points))
-        status[near] = np.where(state.active, 2, 1)
-        pressure[near] = state.r_n / problem.surface.weights
+        contact = seen(problem.surface)
+        status[near] = np.where(contact.all(state.active), 2, 1)
+        pressure[near] = contact.all(state.r_n) / contact.weights
         assert frame["contact_status"].tolist() == status.tolist()
         assert np.allclose(frame["contact_pressure"], pressure, rtol=1e-9, atol=1e-9 * pressure.max())
     assert not found[0]["a"].any() and found[1]["a"].any()
@@ -169,25 +171,26 @@ def test_frames_hold_the_run(comm: Any, shared_tmp: Path) -> None:
 def test_friction_in_the_frames(comm: Any, shared_tmp: Path) -> None:
     """Status 2 where a point sticks and 3 where it slipped; traction and slip as vectors along the turned tangents."""
     problem = tipped(comm, ROUGH_ON_ONE_SIDE[0], simplices=True, angle=0.3)
-    surface = problem.surface
+    surface = seen(problem.surface)
     simulate(problem, scheme=ZienkiewiczWoodTaylor(), solver=Condensed(), dt=BOX_DT, steps=24, out=shared_tmp,
              fields=XDMF(every=1))
     found = frames(shared_tmp)
     nodes = [int(np.argmin(np.linalg.norm(found[0]["points"][:, :2] - x, axis=1))) for x in surface.points]
     others = np.setdiff1d(np.arange(len(found[0]["points"])), nodes)
     tangents = np.column_stack([-surface.normals[:, 1], surface.normals[:, 0], np.zeros(surface.count)])
-    seen = set()
+    found_status = set()
     for frame, (state, report) in zip(found[1:], march(problem, scheme=ZienkiewiczWoodTaylor(), solver=Condensed(),
                                                        dt=BOX_DT, steps=24), strict=True):
-        slips = (surface.tangential_values(report.result.x) != report.step.slip0)[:, 0]
-        assert frame["contact_status"][nodes].tolist() == np.where(state.active, np.where(slips, 3, 2), 1).tolist()
-        traction, slip = state.r_t / surface.weights[:, None], surface.tangential_values(state.u)
+        slips = (surface.tangential_values(report.result.x) != surface.all(report.step.slip0))[:, 0]
+        status = np.where(surface.all(state.active), np.where(slips, 3, 2), 1)
+        assert frame["contact_status"][nodes].tolist() == status.tolist()
+        traction, slip = surface.all(state.r_t) / surface.weights[:, None], surface.tangential_values(state.u)
         for name, exact in (("contact_traction_t", traction * tangents), ("slip", slip * tangents)):
             assert np.allclose(frame[name][nodes], exact, rtol=0.0, atol=1e-10 * np.abs(exact).max())
             assert not frame[name][others].any()
-        seen |= set(frame["contact_status"].tolist())
+        found_status |= set(frame["contact_status"].tolist())
         assert np.abs(frame["slip"]).max() > 0.0
-    assert seen == {0, 1, 2, 3} and not found[0]["contact_traction_t"].any()
+    assert found_status == {0, 1, 2, 3} and not found[0]["contact_traction_t"].any()
 
 
 def test_friction_in_space(comm: Any, shared_tmp: Path) -> None:
@@ -196,8 +199,8 @@ def test_friction_in_space(comm: Any, shared_tmp: Path) -> None:
     problem = replace(thrown_box(comm, angle=0.3, divisions=(2, 2, 2)), friction=Coulomb(0.3))
     solution = simulate(problem, scheme=ZienkiewiczWoodTaylor(), solver=Condensed(), dt=BOX_DT, steps=8,
                         out=shared_tmp / "box", fields=XDMF(every=8))
-    last, surface = frames(shared_tmp / "box")[-1], problem.surface
-    size = np.linalg.norm(solution.state.r_t, axis=1) / surface.weights
+    last, surface = frames(shared_tmp / "box")[-1], seen(problem.surface)
+    size = np.linalg.norm(surface.all(solution.state.r_t), axis=1) / surface.weights
     nodes = [int(np.argmin(np.linalg.norm(last["points"] - x, axis=1))) for x in surface.points]
     traction = last["contact_traction_t"][nodes]
     assert size.max() > 0.0

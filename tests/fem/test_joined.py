@@ -9,6 +9,7 @@ import pytest
 
 pytest.importorskip("dolfinx")
 
+from all_ranks import seen
 from fem_problems import dense, field, max_over_ranks, turned
 from mpi4py import MPI
 from two_bodies import SOFT, blocks, forces, momenta, per_body, relative, thrown, two_blocks
@@ -70,8 +71,9 @@ def test_two_pairs_and_an_obstacle(d):
     parts = [ground, *(contact_pair(system, tags[f"{one}_bottom"], tags[f"{two}_top"]) for one, two in ("ba", "cb"))]
     surface = joined_surfaces(*parts)
     problem = ContactProblem(system, surface)
-    m = parts[0].count
-    assert surface.count == 3 * m
+    m = parts[0].total
+    parts = [seen(part) for part in parts]
+    assert seen(surface).count == 3 * m
     u = per_body(system, wavy, linear, cubic)
     x = relative(problem, u)
     assert max_over_ranks(COMM, problem.cartesian(x) - u) < 1e-12
@@ -80,10 +82,10 @@ def test_two_pairs_and_an_obstacle(d):
     jumps[1] -= wavy(parts[1].points)
     for i, jump in enumerate(jumps):
         rows = slice(i * m, (i + 1) * m)
-        assert surface.normal_values(x)[rows] == pytest.approx(-jump @ up, abs=1e-12)
+        assert seen(surface).normal_values(x)[rows] == pytest.approx(-jump @ up, abs=1e-12)
         along = np.linalg.norm(jump - np.outer(jump @ up, up), axis=1)
-        assert np.linalg.norm(surface.tangential_values(x)[rows], axis=1) == pytest.approx(along, abs=1e-12)
-        assert np.array_equal(surface.points[rows], parts[i].points)
+        assert np.linalg.norm(seen(surface).tangential_values(x)[rows], axis=1) == pytest.approx(along, abs=1e-12)
+        assert np.array_equal(seen(surface).points[rows], parts[i].points)
     same = ContactProblem(system, empty_surface(system.space.comm, d))
     assert problem.equations.strain_energy(x) == pytest.approx(same.equations.strain_energy(u), rel=1e-11)
 
@@ -110,29 +112,27 @@ def test_corners(d, shape):
     u = per_body(system, wavy, linear)
     x = relative(problem, u)
     assert max_over_ranks(COMM, problem.cartesian(x) - u) < 1e-12
-    expected = [np.sum((linear(pair.points) - wavy(pair.points)) * pair.normals, axis=1)]
+    expected = [np.sum((linear(seen(pair).points) - wavy(seen(pair).points)) * seen(pair).normals, axis=1)]
     for i, wall in enumerate(walls):
-        expected.append(np.sum((wavy if i % 2 else linear)(wall.points) * wall.normals, axis=1))
-    assert surface.normal_values(x) == pytest.approx(np.concatenate(expected), abs=1e-12)
+        expected.append(np.sum((wavy if i % 2 else linear)(seen(wall).points) * seen(wall).normals, axis=1))
+    assert seen(surface).normal_values(x) == pytest.approx(np.concatenate(expected), abs=1e-12)
     if surface.basis is not None:
         T = dense(COMM, system, surface.basis)
         assert (np.abs(T.T @ T - np.eye(len(T))).max() < 1e-14) == (shape is not leaning) == (surface.dual is None)
-    places = np.round(surface.points, 9) + 0.0
-    body = np.repeat([1, *[1, 0] * len(sides)], [pair.count, *(wall.count for wall in walls)])
+    places = np.round(seen(surface).points, 9) + 0.0
+    body = np.repeat([1, *[1, 0] * len(sides)], [seen(pair).count, *(wall.total for wall in walls)])
     _, place, count = np.unique(np.column_stack([places, body]), axis=0, return_inverse=True, return_counts=True)
-    free = np.zeros((surface.count, d - 1))
-    free[surface.slots] = surface.tangents >= 0
-    free = system.algebra.comm.sum(free)
+    free = seen(surface).all(surface.tangents >= 0)
     assert np.array_equal(free.all(axis=1), count[place.ravel()] == 1)
     assert free.sum() == sum((d - n) for n in count)
     assert count.max() == d
     # a push on every condition of the pair moves nothing as a whole, corner nodes included
-    r_n = np.zeros(surface.count)
-    r_n[: pair.count] = 1.0
-    push = forces(problem, surface.reaction_load(r_n, system.rows))
+    r_n = np.zeros(seen(surface).count)
+    r_n[: seen(pair).count] = 1.0
+    push = forces(problem, seen(surface).reaction_load(r_n, system.rows))
     upper = field(system, (system.space.bodies == 1).astype(float))[1][:, 0] > 0.0
-    assert push[upper].sum(axis=0) == pytest.approx(pair.count * pair.normals[0], abs=1e-12)
-    assert push[~upper].sum(axis=0) == pytest.approx(-pair.count * pair.normals[0], abs=1e-12)
+    assert push[upper].sum(axis=0) == pytest.approx(seen(pair).count * seen(pair).normals[0], abs=1e-12)
+    assert push[~upper].sum(axis=0) == pytest.approx(-seen(pair).count * seen(pair).normals[0], abs=1e-12)
 
 
 def corner_run(angle: float, **how: Any) -> tuple[ContactSurface, Array, Array]:
@@ -147,7 +147,9 @@ def corner_run(angle: float, **how: Any) -> tuple[ContactSurface, Array, Array]:
     problem = ContactProblem(system, surface.with_frictionless_corners(), friction=Coulomb(0.3))
     reports = [report for _, report in march(problem, dt=1e-3, steps=60, **how)]
     assert max(report.certificate.worst for report in reports) <= 1e-9
-    return surface, np.array([report.new.r_n for report in reports]), np.array([r.new.active for r in reports])
+    everything = seen(surface).all
+    r_n, active = ([everything(getattr(r.new, name)) for r in reports] for name in ("r_n", "active"))
+    return surface, np.array(r_n), np.array(active)
 
 
 @pytest.mark.parametrize("scheme", [None, Midpoint()], ids=["default", "midpoint"])
@@ -155,7 +157,7 @@ def test_a_block_thrown_into_a_corner(scheme):
     """Gravity, speed and friction: every step certified, both conditions of the corner node active in some steps."""
     surface, _, active = corner_run(0.0, scheme=scheme)
     corner = [0, 9]  # first node of the pair, first node of the wall: the same
-    assert surface.points[corner[0]] == pytest.approx(surface.points[corner[1]], abs=1e-12)
+    assert seen(surface).points[corner[0]] == pytest.approx(seen(surface).points[corner[1]], abs=1e-12)
     assert np.any(active[:, corner].all(axis=1)) and not active.all()
 
 
@@ -176,10 +178,11 @@ def test_what_surfaces_know_is_kept():
     wall = contact_surface(system, tags["upper_right"])
     once, twice = joined_surfaces(pair, ground, wall), joined_surfaces(joined_surfaces(pair, ground), wall)
     for surface in (once, twice):
-        assert surface.bilateral.tolist() == [True] * 5 + [False] * (5 + 4)
-        assert surface.gap(0.5).tolist() == [0.125] * 5 + [-1.0] * 5 + [0.0] * 4
-        assert np.array_equal(surface.compliance[5:10], ground.compliance) and np.count_nonzero(surface.compliance) == 5
-        assert surface.sliding(0.0, 1.0) is None
+        assert seen(surface).bilateral.tolist() == [True] * 5 + [False] * (5 + 4)
+        assert seen(surface).gap(0.5).tolist() == [0.125] * 5 + [-1.0] * 5 + [0.0] * 4
+        assert np.array_equal(seen(surface).compliance[5:10], seen(ground).compliance)
+        assert np.count_nonzero(seen(surface).compliance) == 5
+        assert seen(surface).sliding(0.0, 1.0) is None
         assert np.array_equal(surface.owned, once.owned) and np.array_equal(surface.tangents, once.tangents)
 
 
@@ -194,9 +197,7 @@ def test_redistributed_mass_at_corners():
     for friction in (Frictionless(), Coulomb(0.3)):
         problem = ContactProblem(system, surface, friction=friction, mass=Redistributed())
         massless = problem.equations.massless
-        rows = np.zeros(surface.count)
-        rows[surface.slots] = massless[surface.owned]
-        assert system.algebra.comm.sum(rows).all()
+        assert seen(surface).all(massless[surface.owned]).all()
         random = np.random.default_rng(5).random(system.rows)
         inertia = problem.equations.M @ random
         assert np.abs(inertia[massless]).max(initial=0.0) < 1e-14 * max_over_ranks(COMM, inertia)
@@ -211,14 +212,14 @@ def test_sliding_obstacles_at_corners():
     wall = contact_surface(system, tags["lower_left"])
     surface = joined_surfaces(floor, wall)
     x = system.influence @ np.array([0.0, 0.0, 1.0])  # the edge runs along z
-    along = surface.tangential_values(x)
-    edge = np.flatnonzero(np.isclose(surface.points[:, 0], 0.0) & np.isclose(surface.points[:, 1], 0.0))
-    slide, alone = surface.sliding(0.0, 1.0), floor.sliding(0.0, 1.0)[0]
-    z = floor.tangential_values(x)[0]  # components of the z axis in the floor's own tangents
+    along = seen(surface).tangential_values(x)
+    edge = np.flatnonzero(np.isclose(seen(surface).points[:, 0], 0.0) & np.isclose(seen(surface).points[:, 1], 0.0))
+    slide, alone = seen(surface).sliding(0.0, 1.0), seen(floor).sliding(0.0, 1.0)[0]
+    z = seen(floor).tangential_values(x)[0]  # components of the z axis in the floor's own tangents
     for slot in edge[: len(edge) // 2]:
         assert np.sum(along[slot] * slide[slot]) == pytest.approx(alone @ z) and np.count_nonzero(slide[slot]) == 1
     assert not slide[edge[len(edge) // 2 :]].any() and not along[edge[len(edge) // 2 :]].any()
-    inside = np.setdiff1d(np.arange(floor.count), edge)
+    inside = np.setdiff1d(np.arange(seen(floor).count), edge)
     assert np.array_equal(slide[inside], np.tile(alone, (len(inside), 1)))
 
 

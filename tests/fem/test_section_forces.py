@@ -177,7 +177,7 @@ def test_reactions_move_all_masses(comm: Any) -> None:
     reactions.start(problem, initial_state(problem))
     for _, report in vc.march(problem, scheme=vc.Trapezoidal(), solver=vc.Condensed(), dt=DT, steps=STEPS):
         row = reactions.row(report)
-        contact = 0.0 - report.balance.r_n @ problem.surface.normals
+        contact = problem.surface.comm.sum(0.0 - report.balance.r_n @ problem.surface.normals)
         ground = 0.5 * (problem.ground_acceleration(report.old.t) + problem.ground_acceleration(report.new.t))
         a = system.space.expand(problem.cartesian(report.balance.a), report.new.t, 2) + ground
         inertia = comm.allreduce(free.influence.T @ (free.M @ a.ravel()))

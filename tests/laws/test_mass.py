@@ -56,7 +56,7 @@ def test_only_the_contact_nodes_lose_their_mass(name: str, friction: Any) -> Non
     assert np.array_equal(system.massless, wanted)
     massless = spread(MPI.COMM_WORLD, ids, wanted.astype(float))[np.sort(np.concatenate(MPI.COMM_WORLD.allgather(ids)))]
     none = massless.astype(bool)
-    assert none.sum() == given.surface.count * (1 if friction is None else given.system.influence.shape[1])
+    assert none.sum() == given.surface.total * (1 if friction is None else given.system.influence.shape[1])
     assert not M[none].any() and not M[:, none].any()
     assert np.allclose(M, M.T, rtol=0.0, atol=1e-14 * np.abs(M).max())
     assert np.linalg.eigvalsh(M[np.ix_(~none, ~none)])[0] > 0.0
@@ -114,7 +114,7 @@ def test_two_sides_that_meet_in_a_corner() -> None:
     both = replace(tags["left"], indices=np.union1d(tags["left"].indices, tags["top"].indices))
     plain = ContactProblem(system, contact_surface(system, both, obstacle=Touching()))
     moved = replace(plain, mass=Redistributed())
-    assert total(moved.equations.algebra.comm, moved.equations.massless.sum()) == plain.surface.count
+    assert total(moved.equations.algebra.comm, moved.equations.massless.sum()) == plain.surface.total
     assert np.abs(inertia(moved) - inertia(plain)).max() <= 1e-12 * np.abs(inertia(plain)).max()
 
 

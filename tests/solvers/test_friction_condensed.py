@@ -34,10 +34,9 @@ def problem(friction: Any = Coulomb(0.4), **more: Any) -> ContactProblem:
     return column(12, v0=(1.0, -1.0), friction=friction, **({"mass": ConsistentMass()} | more))
 
 
-def rough(slots: tuple[int, ...] = (1, 0, 2)) -> ContactProblem:
+def rough(order: tuple[int, ...] = (1, 0, 2)) -> ContactProblem:
     """The column rubbing with three of its nodes, in any order; the last one may not move along the wall."""
-    p = problem()
-    owned = np.array([1, 5, 9])
+    p, places = problem(), np.argsort(order)
     surface: ContactSurface = replace(
         p.surface,
         points=np.zeros((3, 2)),
@@ -46,9 +45,9 @@ def rough(slots: tuple[int, ...] = (1, 0, 2)) -> ContactProblem:
         gap0=np.zeros(3),
         bilateral=np.zeros(3, dtype=bool),
         compliance=np.array([0.0, 0.0, 0.25]),
-        owned=owned,
-        slots=np.array(slots),
-        tangents=np.array([[0], [4], [-1]]),
+        owned=np.array([1, 5, 9])[places],
+        slots=np.arange(3),
+        tangents=np.array([[0], [4], [-1]])[places],
     )
     return replace(p, surface=surface)
 

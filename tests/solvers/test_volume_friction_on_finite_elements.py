@@ -37,7 +37,8 @@ def compared(problem: ContactProblem, scheme: Any, steps: int) -> tuple[CrossChe
         result = report.result
         slip = np.linalg.norm(problem.surface.tangential_values(result.x) - report.step.slip0, axis=1)
         slips = result.active & (slip > 0.0)
-        states.append((int((~result.active).sum()), int((result.active & ~slips).sum()), int(slips.sum())))
+        found = (~result.active).sum(), (result.active & ~slips).sum(), slips.sum()
+        states.append(tuple(int(count) for count in problem.surface.comm.sum(np.array(found))))
     return checked, states
 
 

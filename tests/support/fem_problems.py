@@ -129,7 +129,8 @@ def run(
         problem, scheme=scheme or ZienkiewiczWoodTaylor(), solver=solver or Condensed(), dt=dt, steps=steps, state=state
     ):
         u = system.space.sample(problem.cartesian(new.u), nodes, new.t)
-        rows.append((u, new.r_n, new.active, report.result.iterations, report.certificate.worst))
+        r_n, active = (problem.surface.everywhere(values) for values in (new.r_n, new.active))
+        rows.append((u, r_n, active, report.result.iterations, report.certificate.worst))
     u, r_n, active, iterations, certificate = (np.array(column) for column in zip(*rows, strict=True))
     return Run(u, r_n, active, iterations, certificate, new)
 

@@ -79,14 +79,29 @@ class Case:
 
     def exact(self) -> StepResult:
         """Brute force over all contact sets (m <= 12), with dense algebra."""
-        surface, step = self.step.surface, self.step
-        E = np.zeros((len(self.b), surface.count))
-        E[self.contact, np.arange(surface.count)] = 1.0
+        step, surface = self.step, self.step.surface
+        bound, bilateral, compliance = (
+            surface.everywhere(values) for values in (step.bound, surface.bilateral, surface.compliance)
+        )
+        E = np.zeros((len(self.b), surface.total))
+        E[self.contact, np.arange(surface.total)] = 1.0
         W = np.linalg.solve(self.matrix.toarray(), E)
         free = np.linalg.solve(self.matrix.toarray(), self.b)
-        G = W[self.contact] + np.diag(surface.compliance / step.scale)
-        r_n = enumerate_lcp(G, step.bound - free[self.contact], surface.bilateral)
+        G = W[self.contact] + np.diag(compliance / step.scale)
+        r_n = enumerate_lcp(G, bound - free[self.contact], bilateral)
         return StepResult(free - W @ r_n, r_n, r_n > 0.0, 0, "brute force")
+
+    def whole(self, result: StepResult) -> StepResult:
+        """The result with all unknowns and all conditions, on every rank."""
+        everywhere = self.step.surface.everywhere
+        r_t = None if result.r_t is None else everywhere(result.r_t)
+        return replace(
+            result, x=self.all(result.x), r_n=everywhere(result.r_n), active=everywhere(result.active), r_t=r_t
+        )
+
+    def bounded(self, bound: Array) -> Case:
+        """The case with other bounds, given for all conditions."""
+        return replace(self, step=replace(self.step, bound=np.asarray(bound)[self.step.surface.slots]))
 
     def starting_at(self, result: StepResult) -> StepProblem:
         """The step with the owned part of a solution as prediction."""
@@ -105,23 +120,23 @@ def case(
     scale: float = 1.0,
 ) -> Case:
     """The step A x = b - reactions, x <= bound at the unknowns ``contact``, starting from rest without prediction."""
-    m = len(contact)
     rows, A, comm = _parallel(matrix) if parallel else (slice(0, len(b)), _serial(matrix), SerialComm())
     mine = (contact >= rows.start) & (contact < rows.stop)
+    own = int(mine.sum())
     surface = ContactSurface(
         comm=comm,
-        points=np.zeros((m, 2)),
-        normals=np.tile([1.0, 0.0], (m, 1)),
-        weights=np.ones(m),
-        gap0=np.zeros(m),
-        bilateral=np.zeros(m, dtype=bool) if bilateral is None else bilateral,
-        compliance=np.zeros(m) if compliance is None else compliance,
+        points=np.zeros((own, 2)),
+        normals=np.tile([1.0, 0.0], (own, 1)),
+        weights=np.ones(own),
+        gap0=np.zeros(own),
+        bilateral=np.zeros(own, dtype=bool) if bilateral is None else bilateral[mine],
+        compliance=np.zeros(own) if compliance is None else compliance[mine],
         owned=np.asarray(contact)[mine] - rows.start,
         slots=np.flatnonzero(mine),
-        tangents=np.zeros((int(mine.sum()), 0), dtype=np.int64),
+        tangents=np.zeros((own, 0), dtype=np.int64),
     )
     guess = np.zeros(rows.stop - rows.start)
-    step = StepProblem(A, b[rows].copy(), bound, surface, scale, guess, np.zeros(m, dtype=bool), 0.0, 1)
+    step = StepProblem(A, b[rows].copy(), bound[mine], surface, scale, guess, np.zeros(own, dtype=bool), 0.0, 1)
     return Case(step, matrix, np.asarray(contact), rows, b)
 
 
