@@ -206,7 +206,7 @@ def test_no_contact_nodes():
 def test_clamped_contact_nodes():
     """Where the side meets the clamped base its node is left out; clamped all over, or listed, it is refused."""
     system, tags = body(clamped=None)
-    whole = contact_surface(system, tags["right"]).count
+    whole = contact_surface(system, tags["right"]).total
     system, tags = body()
     mesh = system.space.mesh
     clamped = assemble(mesh, CONCRETE, clamped=tags["bottom"])
@@ -222,7 +222,7 @@ def test_contact_direction_partly_prescribed():
     """Held along the contact direction is refused (on all ranks, whoever owns the node); held across it is fine."""
     mesh, tags = block(COMM, **BODIES["quadrilaterals"])
     across = assemble(mesh, CONCRETE, prescribed=Prescribed(tags["left"], components=(0,)))
-    assert contact_surface(across, tags["bottom"]).count == 6
+    assert contact_surface(across, tags["bottom"]).total == 6
     along = assemble(mesh, CONCRETE, prescribed=Prescribed(tags["left"], components=(1,)))
     sentence = r"contact node \(0, 0\) is also prescribed along its contact direction: free that component or leave"
     with pytest.raises(InputError, match=sentence):

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -21,7 +22,8 @@ class ContactProblem:
 
     The system is turned into the surface's nodal frames once, here. ``impact=None`` leaves velocities alone;
     ``mass=None`` leaves the choice of the mass matrix to the time scheme. InputError, on all ranks, for parts of the
-    wrong kind or size, and for a surface that was made for another system. Collective.
+    wrong kind or size, and for a surface that was made for another system. A friction law that is a dataclass may hold
+    tuples with a value for every contact point: this rank's, or those of all by their numbers. Collective.
     """
 
     system: SemiDiscreteSystem
@@ -33,6 +35,7 @@ class ContactProblem:
 
     def __post_init__(self) -> None:
         check_parts(self)
+        object.__setattr__(self, "friction", _on_this_rank(self.friction, self.surface))
 
     @property
     def excitations(self) -> tuple[Excitation, ...]:
@@ -87,3 +90,18 @@ class ContactProblem:
         """Return the vector a_g(t) [m/s²] summed over the excitations."""
         parts = (one.acceleration(t) * np.asarray(one.direction, dtype=float) for one in self.excitations)
         return np.asarray(sum(parts, np.zeros(self.system.influence.shape[1])))
+
+
+def _on_this_rank(law: Any, surface: ContactSurface) -> Any:
+    """The law with those values of every tuple for all contact points, also in laws that it is made of, that belong to
+    this rank."""
+    if surface.comm.size == 1 or not is_dataclass(law):
+        return law
+    own = {}
+    for name in (one.name for one in fields(law) if one.init):
+        value = getattr(law, name)
+        if isinstance(value, tuple) and len(value) == surface.total:
+            own[name] = tuple(value[slot] for slot in surface.slots)
+        elif is_dataclass(value):
+            own[name] = _on_this_rank(value, surface)
+    return replace(law, **own) if own else law
