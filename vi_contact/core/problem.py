@@ -95,7 +95,7 @@ class ContactProblem:
 def _on_this_rank(law: Any, surface: ContactSurface) -> Any:
     """The law with those values of every tuple for all contact points, also in laws that it is made of, that belong to
     this rank."""
-    if surface.comm.size == 1 or not is_dataclass(law):
+    if surface.comm.size == 1 or not is_dataclass(law) or isinstance(law, type):
         return law
     own = {}
     for name in (one.name for one in fields(law) if one.init):
