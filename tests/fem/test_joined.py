@@ -250,7 +250,7 @@ def test_refusals():
         with pytest.raises(InputError, match=sentence):
             joined_surfaces(*surfaces)
     assert joined_surfaces(pair, slope).dual is not None  # directions at any angle
-    assert joined_surfaces(pair, chain).count == 10  # side 2 may touch an obstacle
+    assert joined_surfaces(pair, chain).total == 10  # side 2 may touch an obstacle
 
 
 def test_a_node_on_both_sides():
@@ -265,6 +265,6 @@ def test_a_node_on_both_sides():
     first = contact_pair(system, tags["sw_right"], tags["se_left"])
     sentence = r"node \(1, 1\) is on side 1 of one contact pair and on side 2 of another: exchange the sides of one"
     good = joined_surfaces(first, contact_pair(system, tags["ne_bottom"], tags["se_top"]))
-    assert good.count == 6
+    assert good.total == 6
     with pytest.raises(InputError, match=sentence):
         joined_surfaces(first, contact_pair(system, tags["se_top"], tags["ne_bottom"]))

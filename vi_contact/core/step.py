@@ -7,14 +7,15 @@ Every time scheme turns a step into the same one-step problem, and every solver 
 
 (bilateral rows: equality and r_n of either sign). A is constant as long as dt is, so it is factorised once.
 ``r_n`` and ``r_t`` are ``scale`` times the reactions of the step in newtons, those of the body on its support;
-``compliance`` is zero on a rigid support. Vectors are arrays of owned unknowns in the rotated basis; contact arrays
-have shape (m,) or, tangential ones, (m, d - 1), and are equal on all ranks; r_t is None without friction.
+``compliance`` is zero on a rigid support. Vectors are arrays of the unknowns that this rank owns, in the rotated basis;
+contact arrays have shape (m,) or, tangential ones, (m, d - 1), a row for each condition on these unknowns; r_t is None
+without friction. Branch on them with ``surface.some``, which asks all ranks: what follows may be collective.
 
 The loop (``run.march``) calls, for every step, in this order:
 
     scheme.step -> solver.solve -> kkt_residual (core.verify) -> scheme.finish -> the impact law, scheme.jump
 
-and ``scheme.effective_matrix`` and ``solver.prepare`` once for every dt. Below n are the unknowns this rank owns, m the
+and ``scheme.effective_matrix`` and ``solver.prepare`` once for every dt. Below n are the unknowns this rank owns, m its
 contact conditions, d the dimensions. ``problem.equations`` is the system to march: in the rotated basis, with mass law
 and excitations in it; ``problem.surface`` are its contact conditions. Arrays that come in are read, never written to.
 """
@@ -41,7 +42,8 @@ class State:
     """Hold displacement u (n,) [m], velocity v (n,) [m/s] and contact at time t = t_k [s], in the rotated basis.
 
     ``r_n`` (m,), ``r_t`` (m, d - 1) [N] are the reactions of the step that led here (mean or end values, as the scheme
-    says); ``active`` (m,) the closed conditions; ``memory`` holds what a scheme carries besides u and v.
+    says); ``active`` (m,) the closed conditions; ``memory`` holds what a scheme carries besides u and v: vectors (n,),
+    and arrays that are the same on every rank.
     """
 
     t: float
@@ -192,7 +194,7 @@ class PreparedSolver(Protocol):
         """Return x, reactions and closed conditions of ``step``, whose A, surface and scale are those it was made for.
 
         The answer is judged by its certificate, so the method may stop where it finds best. StepFailure, on all ranks,
-        when there is none. Collective; the reactions are the same arrays on every rank.
+        when there is none. Collective.
         """
         ...
 
