@@ -19,7 +19,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from ..core.algebra import Array, EffectiveMatrix
+from ..core.algebra import Array, EffectiveMatrix, max_abs
 from ..core.checks import instance
 from ..core.errors import InputError, StepFailure
 from ..core.problem import ContactProblem
@@ -87,15 +87,16 @@ class BoundaryLayer(Midpoint):
         if surface.total == 0:
             return step
         old = surface.gap(state.t) - surface.normal_values(state.u)
-        free = step.bound - surface.normal_values(A.factor.solve(step.b))
-        rate, away = self._rate(problem, state, old), np.abs(step.bound - old)
-        values = surface.everywhere(np.column_stack([old, free, rate, surface.weights, away]))
-        old, free, rate, weights, away = (np.ascontiguousarray(column) for column in values.T)
-        if not old.min() > 0.0:
+        closed, away = surface.comm.max(np.array([np.max(-old, initial=-np.inf), max_abs(step.bound - old)]))
+        if not closed < 0.0:
             raise StepFailure(
-                f"step {step.k} at t = {step.t:.6g} s begins with a gap of {old.min():.1e} m, a rounding error beside "
-                f"displacements of {away.max():.1e} m: make the layer wider"
+                f"step {step.k} at t = {step.t:.6g} s begins with a gap of {-closed:.1e} m, a rounding error beside "
+                f"displacements of {away:.1e} m: make the layer wider"
             )
+        free = step.bound - surface.normal_values(A.factor.solve(step.b))
+        rate = self._rate(problem, state, old)
+        values = surface.everywhere(np.column_stack([old, free, rate, surface.weights]))
+        old, free, rate, weights = (np.ascontiguousarray(column) for column in values.T)
         pressure = np.zeros(surface.total)
         if min(old.min(), free.min()) < self.law.layer.width:
             G = _compliance(problem, A, step.scale) * (step.scale * weights)
