@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
-import h5py
+import numpy as np
 import pytest
 from demo_runs import demo
 
 from demos.pictures import deformed
 from demos.pictures.boundary import SHEAR, plot_panels
-from vi_contact.run.files.folder import HISTORY_H5
 
 pytestmark = pytest.mark.serial
 
@@ -48,9 +48,10 @@ def test_the_shear_of_histories_is_drawn_on_the_body(
     """Histories hold what the body does to its support along +x; drawn is the opposite, and the axis says so."""
     shown: list[Any] = []
     monkeypatch.setattr(deformed, "save", lambda figure, path: shown.append(figure))
-    with h5py.File(tmp_path / HISTORY_H5, "w") as file:
-        file["t"], file["pressure"], file["traction_t"] = [1.0], [[1.0, 2.0]], [[[3.0], [-3.0]]]
-        file["contact/points"], file["contact/normals"] = [(0.0, 0.0), (1.0, 0.0)], [normal, normal]
+    history = {"t": [1.0], "pressure": [[1.0, 2.0]], "traction_t": [[[3.0], [-3.0]]]}
+    contact = SimpleNamespace(points=np.array([(0.0, 0.0), (1.0, 0.0)]), normals=np.array([normal, normal]))
+    run = SimpleNamespace(contact=contact, history={name: np.array(values) for name, values in history.items()})
+    monkeypatch.setattr("vi_contact.plots.deformed.read_run", lambda folder: run)
     deformed.plot_tractions({"box": tmp_path}, (1.0,), tmp_path / "none.png", title="")
     axis = shown[0].axes[1]
     assert axis.get_ylabel() == "shear $p_t$ on the body,\nalong +x [Pa]"
