@@ -119,7 +119,7 @@ def test_nineteen_points():
 def test_twenty_three_conditions():
     """V4.2: 9 + 7 + 7; the corners carry both normals; the sides are 3 + 4 + 3 m long."""
     one = model()
-    surface, sides = one.surface, one.sides
+    surface, sides = one.surface.whole(), one.sides
     assert surface.count == 23 and [int(mask.sum()) for mask in sides.values()] == [9, 7, 7]
     assert list(sides) == ["base", "left", "right"] and not surface.gap0.any()
     for corner, normal in (((10.0, 5.0), (-1.0, 0.0)), ((14.0, 5.0), (1.0, 0.0))):
@@ -134,7 +134,8 @@ def test_weight_rests_on_the_base(sides):
     """Smooth walls: the base carries the channel's weight, the walls push against each other; certified."""
     one = build(CHANNEL, COMM, sides=sides)
     start = vc.static_equilibrium(one.problem(), solver=vc.Condensed())
-    push = {side: start.r_n[mask].sum() for side, mask in one.sides.items()}
+    r_n = one.surface.everywhere(start.r_n)
+    push = {side: r_n[mask].sum() for side, mask in one.sides.items()}
     assert push["base"] == pytest.approx(WEIGHT, rel=1e-9)
     assert push["left"] == pytest.approx(push["right"], rel=1e-8) and push["left"] > 0.0
 
@@ -169,7 +170,7 @@ def test_records_of_both_sides():
     one = model()
     history = follow(one, one.problem(friction=FRICTION), 12).history
     size = max(np.abs(history[name]).max() for name in ("u_x_1", "u_x_19"))
-    gap, points = np.asarray(history["gap"]), one.surface.points
+    gap, points = np.asarray(history["gap"]), one.surface.whole().points
     for label, side, axis, sign in (("19", "left", "x", 1), ("13", "right", "x", -1), ("4", "base", "y", 1)):
         here = (np.abs(points - CHANNEL.point(int(label))).max(axis=1) < 1e-9) & one.sides[side]
         apart = sign * (history[f"u_{axis}_{label}"] - history[f"u_{axis}_{label}_soil"])

@@ -98,7 +98,8 @@ def test_a_belt_drags_with_the_force_of_friction(scheme: Any, mass: Any) -> None
     surface = contact_surface(system, tags["bottom"], obstacle=HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0)))
     rest = static_equilibrium(ContactProblem(system, surface), solver=Condensed())
     start = replace(rest, r_t=np.zeros((surface.count, 1)))
-    along = float(surface.tangential_values(system.influence[:, 0])[0, 0])  # 1 or -1: which way the tangents point
+    dragged = surface.everywhere(surface.tangential_values(system.influence[:, 0]))
+    along = float(dragged[0, 0])  # 1 or -1: which way the tangents point
     belt = ContactProblem(
         system, surface.moving(along=lambda t: along * speed * t), friction=Coulomb(mu), mass=mass
     )

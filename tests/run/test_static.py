@@ -7,6 +7,7 @@ import pytest
 from bar import bar
 from chain import chain_problem
 from fem_problems import CONCRETE, block, field, held_by, linear, max_over_ranks
+from gathered import gathered
 from standing import COLUMN, COMM, G, standing
 
 from vi_contact.core.algebra import Array
@@ -76,8 +77,9 @@ def test_v2_1_standing_column_presses_uniformly(gap, solver):
     problem = standing(material=COLUMN, gap=gap, start=(2.0e-4, 0.0))
     state = static_equilibrium(problem, solver=solver)
     pressure = 2400.0 * G * 3.0
-    assert state.r_n / problem.surface.weights == pytest.approx(np.full(5, pressure), rel=1e-9)
-    assert state.r_n.sum() == pytest.approx(pressure, rel=1e-9 if gap else 1e-10)
+    r_n = problem.surface.everywhere(state.r_n)
+    assert r_n / problem.surface.whole().weights == pytest.approx(np.full(5, pressure), rel=1e-9)
+    assert r_n.sum() == pytest.approx(pressure, rel=1e-9 if gap else 1e-10)
     points, u = field(problem.system, problem.cartesian(state.u))
     y = points[:, 1]
     sag = 2400.0 * G * (3.0 * y - y**2 / 2.0) / 2.0e10
@@ -100,10 +102,10 @@ def test_reactions_carry_the_weight(shape):
     """Σ r_n = weight to 1e-10, every node balanced; the dynamic stage that continues from there stays still."""
     problem = standing(**shape)
     state = static_equilibrium(problem, solver=Condensed())
-    push = problem.surface.normals.T @ state.r_n
+    push = COMM.allreduce(problem.surface.normals.T @ state.r_n)
     load = problem.system.load(0.0).reshape(-1, problem.system.space.dimension)
-    assert push == pytest.approx(COMM.allreduce(load.sum(axis=0)), abs=1e-10 * state.r_n.sum())
-    assert unbalanced(problem, state) < 1e-9 and state.active.any()
+    assert push == pytest.approx(COMM.allreduce(load.sum(axis=0)), abs=1e-10 * COMM.allreduce(state.r_n.sum()))
+    assert unbalanced(problem, state) < 1e-9 and problem.surface.some(state.active)
     sag = max_over_ranks(COMM, state.u)
     for new, _ in march(
         problem, scheme=ZienkiewiczWoodTaylor(), solver=Condensed(), dt=1e-3, steps=5, state=state
@@ -130,7 +132,7 @@ def test_free_motions_keep_their_place():
 def test_two_corners_share_the_weight_like_a_beam(push):
     """Only the base corners touch (u_x held at the base): r = W/2 ± T H / L, T = push · L on the top at height H."""
     problem = standing(points=[(0.0, 0.0), (1.0, 0.0)], held=True, push=push)
-    state = static_equilibrium(problem, solver=Condensed())
+    state = gathered(problem.surface, static_equilibrium(problem, solver=Condensed()))
     weight, moment = 2400.0 * G * 3.0, push * 3.0
     assert state.active.all()
     assert state.r_n == pytest.approx([weight / 2.0 - moment, weight / 2.0 + moment], rel=1e-9)
@@ -139,11 +141,11 @@ def test_two_corners_share_the_weight_like_a_beam(push):
 def test_partly_lifted_base_balances_moments():
     """Pushed beyond the kern the base opens: Σ r_n = W, Σ r_n x = W L/2 + T H, no tension anywhere."""
     problem = standing(held=True, push=8.0e3, divisions=(12, 20))
-    state = static_equilibrium(problem, solver=Condensed())
+    state = gathered(problem.surface, static_equilibrium(problem, solver=Condensed()))
     weight, moment = 2400.0 * G * 3.0, 8.0e3 * 3.0
     assert 0 < state.active.sum() < 13 and state.r_n.min() == 0.0
     assert state.r_n.sum() == pytest.approx(weight, rel=1e-10)
-    assert state.r_n @ problem.surface.points[:, 0] == pytest.approx(weight / 2.0 + moment, rel=1e-9)
+    assert state.r_n @ problem.surface.whole().points[:, 0] == pytest.approx(weight / 2.0 + moment, rel=1e-9)
 
 
 def test_springs_settle_by_the_weight():
@@ -153,8 +155,9 @@ def test_springs_settle_by_the_weight():
         problem = ContactProblem(problem.system, problem.surface.on_springs(modulus))
         state = static_equilibrium(problem, solver=Condensed())
         pressure = 2400.0 * G * 3.0
-        assert problem.surface.normal_values(state.u) == pytest.approx(np.full(5, pressure / modulus), rel=1e-7)
-        assert state.r_n.sum() == pytest.approx(pressure, rel=1e-7)
+        u_n = problem.surface.everywhere(problem.surface.normal_values(state.u))
+        assert u_n == pytest.approx(np.full(5, pressure / modulus), rel=1e-7)
+        assert COMM.allreduce(state.r_n.sum()) == pytest.approx(pressure, rel=1e-7)
 
 
 def test_balanced_loads_need_no_support():
@@ -201,7 +204,8 @@ def test_friction_holds_a_block_up_to_its_coefficient(gap):
         )
 
     theta = float(np.arctan(0.99 * 0.3))
-    state = static_equilibrium(on_slope(theta), solver=Condensed())
+    slope = on_slope(theta)
+    state = gathered(slope.surface, static_equilibrium(slope, solver=Condensed()))
     assert state.r_n.sum() == pytest.approx(4800.0 * G * np.cos(theta), rel=1e-9)
     assert state.r_t is not None and state.r_t.sum() == pytest.approx(4800.0 * G * np.sin(theta), rel=1e-9)
     used = np.abs(state.r_t[:, 0]) / np.where(state.r_n > 0.0, 0.3 * state.r_n, 1.0)
@@ -233,4 +237,4 @@ def test_pressed_by_a_moving_side_and_its_weight():
     state = static_equilibrium(problem, solver=Condensed())
     _, u = field(system, state.u)
     assert np.abs(u[:, 0] - 1e-3).max() < 1e-12
-    assert state.r_n.sum() == pytest.approx(2.0 * COLUMN.rho * G, rel=1e-9)
+    assert COMM.allreduce(state.r_n.sum()) == pytest.approx(2.0 * COLUMN.rho * G, rel=1e-9)

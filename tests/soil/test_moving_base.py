@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from gathered import gathered
 
 import vi_contact as vc
 from vi_contact import fem
@@ -107,7 +108,8 @@ def difference(pair: tuple[Any, Any], scheme: Any, steps: int = 220, *, rest: bo
         rows = []
         start = vc.static_equilibrium(problem, solver=vc.Condensed()) if rest else None
         for state, _ in march(problem, scheme=scheme, dt=DT, steps=steps, state=start):
-            rows.append(np.append(state.r_n, () if state.r_t is None else state.r_t.ravel()))
+            found = gathered(problem.surface, state)
+            rows.append(np.append(found.r_n, () if found.r_t is None else found.r_t.ravel()))
         histories.append(np.array(rows))
     one, other = histories
     closed = (one > 0.0).any(axis=1)

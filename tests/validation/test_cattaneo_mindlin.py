@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from gathered import gathered
 from graded import even_then_growing, growing
 from mpi4py import MPI
 
@@ -135,13 +136,14 @@ class Contact:
 def stages(pressed: ContactProblem, times: Sequence[float]) -> list[Contact]:
     """First pressed, then rubbed through the history."""
     state = static_equilibrium(pressed)
-    surface = pressed.surface
-    order = np.argsort(surface.points[:, 0])
+    surface, every = pressed.surface, pressed.surface.whole()
+    order = np.argsort(every.points[:, 0])
     contacts = []
     rough = replace(pressed, friction=Coulomb(MU))
     for stage in quasi_static(rough, times, solver=Condensed(), state=state):
         assert stage.r_t is not None
-        columns = (surface.points[:, 0], surface.weights, stage.r_n, stage.r_t[:, 0])
+        stage = gathered(surface, stage)
+        columns = (every.points[:, 0], every.weights, stage.r_n, stage.r_t[:, 0])
         contacts.append(Contact(*(column[order] for column in columns)))
     return contacts
 

@@ -62,7 +62,8 @@ def follow(bar: Bar, courant: float, t_end: float, *, scheme: Any = None, mass: 
             total -= system.algebra.dot(load.constant, state.u)
         up = system.influence[:, -1]
         momentum = system.algebra.dot(up, system.M @ state.v)
-        rows.append((state.t, state.r_n.sum(), report.balance.r_n.sum(), total, momentum))
+        forces = system.algebra.comm.sum(np.array([state.r_n.sum(), report.balance.r_n.sum()]))
+        rows.append((state.t, *forces, total, momentum))
     t, *values = np.array(rows).T
     return History(t, *(value / bar.section for value in values), dt)
 
@@ -146,7 +147,8 @@ def test_code_aster_sdnv100(body: str) -> None:
         u, v = (problem.system.space.sample(problem.cartesian(x), ends, state.t)[:, -1] for x in (state.u, state.v))
         system = report.problem.equations
         total = system.kinetic_energy(state.v) + system.strain_energy(state.u)
-        rows.append((state.t, *u, v[1], state.r_n.sum() / bar.section, total / bar.section))
+        force = MPI.COMM_WORLD.allreduce(state.r_n.sum())
+        rows.append((state.t, *u, v[1], force / bar.section, total / bar.section))
     t, foot, top, v_top, pressure, total = np.array(rows).T
     touching = t[pressure > 0.0]
     assert touching[0] == pytest.approx(2.0e-5, abs=1.001 * dt)

@@ -88,7 +88,7 @@ def busiest_step(problem: ContactProblem, dt: float, steps: int) -> StepProblem:
     """The last step that leaves a part of the surface closed."""
     found = None
     for _, report in march(problem, scheme=SCHEME, solver=Condensed(), dt=dt, steps=steps):
-        if 0 < report.result.active.sum() < problem.surface.count:
+        if 0 < COMM.allreduce(int(report.result.active.sum())) < problem.surface.total:
             found = report.step
     assert found is not None
     return found
