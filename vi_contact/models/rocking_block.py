@@ -175,9 +175,10 @@ class Rocking:
         return self._row(report.new)
 
     def _row(self, state: State) -> Row:
+        left, right = self.model.problem.surface.everywhere(state.r_n)
         return {
             "theta": self.model.angle(state), "theta_rate": self.model.spin(state),
-            "r_left": float(state.r_n[0]), "r_right": float(state.r_n[1]),
+            "r_left": float(left), "r_right": float(right),
         }
 
 
