@@ -211,11 +211,12 @@ class PreparedCrossCheck:
         return result
 
     def _compare(self, result: StepResult, other: StepResult, found: Disagreement) -> None:
-        found.add("u", *self.surface.comm.max(np.array([max_abs(other.x - result.x), max_abs(result.x)])).tolist())
-        found.add("r_n", max_abs(other.r_n - result.r_n), max_abs(result.r_n))
+        pairs = {"u": (other.x, result.x), "r_n": (other.r_n, result.r_n)}
         if result.r_t is not None:
-            rubbed = np.zeros_like(result.r_t) if other.r_t is None else other.r_t
-            found.add("r_t", max_abs((rubbed - result.r_t).ravel()), max_abs(result.r_t.ravel()))
+            pairs["r_t"] = (np.zeros_like(result.r_t) if other.r_t is None else other.r_t, result.r_t)
+        sizes = np.array([[max_abs((its - own).ravel()), max_abs(own.ravel())] for its, own in pairs.values()])
+        for name, (off, size) in zip(pairs, self.surface.comm.max(sizes).tolist(), strict=True):
+            found.add(name, off, size)
         found.method = other.method
         found.iterations += other.iterations
         found.steps += 1
