@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .algebra import Array, Comm, Indices, Mask, Matrix, largest, total
+from .algebra import Array, Comm, Indices, Mask, Matrix, SerialComm, largest, total
 from .checks import function, number, shown
 from .companion import Companion
 from .errors import InputError
@@ -116,10 +116,11 @@ class ContactSurface:
         return load if turn is None else turn @ load
 
     def whole(self) -> ContactSurface:
-        """Return the conditions of all ranks, by their numbers, on every rank: where they are and how large, for
-        output. Collective."""
+        """Return the conditions of all ranks, by their numbers, on every rank as if it were alone: where they are and
+        how large, for output. Collective."""
         names = ("points", "normals", "weights", "gap0", "bilateral", "compliance")
-        return replace(self, **{name: self.everywhere(getattr(self, name)) for name in names})
+        arrays = {name: self.everywhere(getattr(self, name)) for name in names}
+        return replace(self, comm=SerialComm(), slots=np.arange(self.total), **arrays)
 
     def normal_values(self, x: Array) -> Array:
         """Return B_n x, shape (m,)."""

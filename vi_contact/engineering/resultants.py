@@ -24,7 +24,7 @@ from ..core.checks import array, column_name, function, instance, provides
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.step import AXES, Columns, Report, Row, State
-from ..core.surfaces import block_of, nodal_frames
+from ..core.surfaces import ContactSurface, block_of, nodal_frames
 
 Where = Callable[[Array, Array], Mask]
 
@@ -232,8 +232,8 @@ def contact_summary(
 ) -> dict[str, Array]:
     """Return the resultants of a run that recorded ``Contact()``: quantity -> (rows,), without theta.
 
-    ``geometry``: the surface of the problem, or ``read_run(folder).contact``. Slip and friction count where they were
-    recorded, with friction. InputError without arrays of the contact points.
+    ``geometry``: the surface of the problem (then collective), or ``read_run(folder).contact``. Slip and friction count
+    where they were recorded, with friction. InputError without arrays of the contact points.
     """
     instance("contact_summary", "history", history, Mapping, "give the history of a solution")
     provides("contact_summary", "geometry", geometry, ("points", "normals", "weights"), "give a contact surface")
@@ -241,6 +241,7 @@ def contact_summary(
     missing = [column for column in ("pressure", "gap", "active") if column not in history]
     if missing:
         raise InputError(f"the history has no column {missing[0]}: record Contact() and read history.h5")
+    geometry = geometry.whole() if isinstance(geometry, ContactSurface) else geometry
     part = Part(name, geometry, centre, where, normal)
     rows, m = len(history["t"]), len(geometry.weights)
 
