@@ -16,7 +16,7 @@ from marched_chain import chain, equal_files, rubbing_box, run, run_wall, wall
 from vi_contact.core.errors import InputError
 from vi_contact.core.problem import ContactProblem
 from vi_contact.laws.excitation import Harmonic, Tabulated
-from vi_contact.laws.friction import Coulomb, SlipRateCoulomb
+from vi_contact.laws.friction import Coulomb, ExponentialDecay, SlipRateCoulomb
 from vi_contact.laws.impact import Elastic
 from vi_contact.run.files.checkpoint import checksum
 from vi_contact.run.files.identity import difference, identity, text_of
@@ -253,7 +253,12 @@ def test_other_ranks_are_the_same_problem(comm: Any) -> None:
     def numbers(problem: ContactProblem) -> dict[str, Any]:
         return identity(problem, ZienkiewiczWoodTaylor(), 1e-3, start=0.0, end=0.5)
 
-    for make in (wall, lambda ranks: replace(rubbing_box(ranks, None), friction=Coulomb(0.3))):
+    def rough(ranks: Any) -> ContactProblem:
+        box = rubbing_box(ranks, None)
+        mu = 0.3 + 0.01 * np.arange(box.surface.total)
+        return replace(box, friction=SlipRateCoulomb(ExponentialDecay(mu, 0.2, 1.0)))
+
+    for make in (wall, lambda ranks: replace(rubbing_box(ranks, None), friction=Coulomb(0.3)), rough):
         spread, alone = numbers(make(comm)), numbers(make(MPI.COMM_SELF))
         assert difference(spread, alone) is None and spread.keys() == alone.keys()
         for name, own in alone.items():

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
 from math import isclose
 from typing import Any
 
 import numpy as np
 
-from ...core.algebra import Array
+from ...core.algebra import Array, from_each
 from ...core.problem import ContactProblem
 from ...core.step import Scheme
 from ...core.surfaces import ContactSurface
@@ -55,7 +55,7 @@ def identity(problem: ContactProblem, scheme: Scheme, dt: TimeSteps, *, start: f
         "scheme": text_of(scheme),
         "mass": text_of(problem.mass),
         "impact law": text_of(problem.impact),
-        "friction law": text_of(problem.friction),
+        "friction law": text_of(_of_all_points(problem.friction, surface)),
         "stiffness": [_dot(system, w, system.K @ w) for w in probes],
         "mass matrix": [_dot(system, w, system.M @ w) for w in probes],
         "damping": [] if system.C is None else [_dot(system, w, system.C @ w) for w in probes],
@@ -170,6 +170,23 @@ def _columns(surface: ContactSurface, arrays: Sequence[Array]) -> Numbers:
     """Sums of values (m,) of the contact conditions of all ranks. Collective."""
     whole = surface.everywhere(np.column_stack([np.asarray(values, dtype=float) for values in arrays]))
     return [pair for values in whole.T for pair in _sampled(np.ascontiguousarray(values))]
+
+
+def _of_all_points(law: Any, surface: ContactSurface) -> Any:
+    """The law with the values of all contact points in place of this rank's, also in laws that it is made of."""
+    if surface.comm.size == 1 or not is_dataclass(law) or isinstance(law, type):
+        return law
+    whole = {}
+    for name in (one.name for one in fields(law) if one.init):
+        value = getattr(law, name)
+        if isinstance(value, tuple):
+            parts = from_each(surface.comm, (surface.slots.tolist(), value))
+            if all(len(slots) == len(values) for slots, values in parts):
+                numbered = [pair for slots, values in parts for pair in zip(slots, values, strict=True)]
+                whole[name] = tuple(value for _, value in sorted(numbered, key=lambda pair: pair[0]))
+        elif is_dataclass(value):
+            whole[name] = _of_all_points(value, surface)
+    return replace(law, **whole) if whole else law
 
 
 def _friction(problem: ContactProblem) -> Numbers:
