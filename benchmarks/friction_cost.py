@@ -20,6 +20,7 @@ from step_cost import DIVISIONS, SCHEME, LinearSteps, StepsWithContact, memory  
 
 import vi_contact as vc
 from vi_contact import solvers
+from vi_contact.core.algebra import total
 from vi_contact.models.wall import Wall, build
 from vi_contact.solvers.friction.extrapolation import Anderson
 
@@ -43,7 +44,7 @@ def measured(problem: vc.ContactProblem, solver: Any, dt: float, count: int, lin
         iterations.append(result.iterations)
         if problem.frictional:
             moved = problem.surface.tangential_values(result.x) != report.step.slip0
-            slipping.append(int((result.active & moved[:, 0]).sum()))
+            slipping.append(int(total(problem.surface.comm, (result.active & moved[:, 0]).sum())))
     set_up, seconds, plain, closed, worst = steps.set_up, steps.seconds, steps.plain, steps.active, steps.worst
     return {
         "set_up": set_up, "linear": 1e3 * float(np.median(plain)), "step": 1e3 * float(np.median(seconds)),
@@ -66,7 +67,7 @@ def measure(size: float, steps: int, mu: float) -> None:
         problem = plain if name == "no friction" else replace(plain, friction=vc.Coulomb(mu))
         f = measured(problem, solver, dt, steps, linear)
         print(
-            f"{model.system.space.unknowns:>9} {problem.surface.count:>6} {name:<21} {f['linear']:>9.3f}"
+            f"{model.system.space.unknowns:>9} {problem.surface.total:>6} {name:<21} {f['linear']:>9.3f}"
             f" {f['step']:>9.3f} {f['ratio']:>6.2f} {f['mean']:>6.2f} {f['iterations']:>5.1f} {f['closed']:>6.1f}"
             f" {f['slip']:>5.1f} {f['set_up']:>8.2f} {memory():>6.0f} {f['worst']:>11.1e}",
             flush=True,

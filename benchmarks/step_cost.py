@@ -30,6 +30,7 @@ import numpy as np  # noqa: E402
 from mpi4py import MPI  # noqa: E402
 
 import vi_contact as vc  # noqa: E402
+from vi_contact.core.algebra import total  # noqa: E402
 from vi_contact.core.state_checks import initial_state  # noqa: E402
 from vi_contact.meshes.channel import ChannelMesh  # noqa: E402
 from vi_contact.models.channel import model as channel  # noqa: E402
@@ -103,14 +104,15 @@ class StepsWithContact:
         while len(self.seconds) < self.count:
             spent, (_, report) = timed(lambda: next(self.loop))
             self.worst = max(self.worst, report.certificate.worst)
-            if not report.new.active.any():
+            active = int(total(report.problem.surface.comm, report.new.active.sum()))
+            if not active:
                 continue
             warm_up -= 1
             if warm_up >= 0:
                 continue
             self.seconds.append(spent)
             self.plain.append(timed(self.linear)[0])
-            self.active.append(int(report.new.active.sum()))
+            self.active.append(active)
             yield report
 
 
@@ -144,7 +146,7 @@ def measure(size: float, steps: int) -> dict[str, Any]:
     factorisation, _ = timed(lambda: A.factor)
     linear = LinearSteps(problem, A, dt)
     row: dict[str, Any] = {
-        "unknowns": model.system.space.unknowns, "contact_points": problem.surface.count,
+        "unknowns": model.system.space.unknowns, "contact_points": problem.surface.total,
         "factorisation_seconds": factorisation, "routes": {},
     }
     for name, solver in ROUTES.items():
@@ -166,7 +168,7 @@ def measure_channel(size: float, steps: int) -> dict[str, Any]:
         linear()  # factorises
         found = unilateral_steps(problem, solver, dt, steps, linear, state) | {"gravity_seconds": gravity}
         row["routes"][name] = found
-        row["contact_points"] = problem.surface.count
+        row["contact_points"] = problem.surface.total
         print(line(row, name, found), flush=True)
     return row
 

@@ -109,7 +109,7 @@ def example(name: str, size: int, cells: float, comm: Any) -> dict[str, Answer]:
         solution = vc.simulate(
             problem(friction=friction), dt=fem_dt, t_end=T_END[name], record=(vc.Energy(), vc.Contact()), progress=False
         )
-        points = problem().surface.points
+        points = problem().surface.whole().points
         answers[law] = Answer(run, solve(run.forces), solution.history, points[:, 0])
     return answers
 

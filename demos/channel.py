@@ -30,7 +30,7 @@ from demos.pictures.friction import plot_states
 from vi_contact import fem
 from vi_contact.cli import main as command
 from vi_contact.meshes.channel import ChannelMesh
-from vi_contact.models.channel.model import REFERENCE, Channel, ChannelModel, build
+from vi_contact.models.channel.model import REFERENCE, Channel, build
 from vi_contact.plots import channel as pictures
 from vi_contact.plots.channel_mesh import animate
 from vi_contact.plots.histories import History, plot_energy, plot_excitation
@@ -74,8 +74,9 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
         if comm.rank == 0:
             print(f"\n{name}\n{solution.summary()}")
             print("\n".join(f"  {key:<26} {value:.6g}" for key, value in found.items()))
+    contact = model.surface.whole()
     if comm.rank == 0:
-        draw(model, histories, out, quick)
+        draw(contact, histories, out, quick)
         print(f"\nFigures and the film are in {out}, histories and ParaView files in folders below it.")
     comm.Barrier()  # nobody leaves before the figures are there
     return numbers
@@ -100,11 +101,11 @@ def key_numbers(history: History) -> dict[str, float]:
     }
 
 
-def draw(model: ChannelModel, runs: Mapping[str, History], out: Path, quick: bool) -> None:
+def draw(contact: vc.ContactSurface, runs: Mapping[str, History], out: Path, quick: bool) -> None:
     """Draw all figures and the film."""
     sliding, coulomb, bilateral = runs
     unilateral = {name: runs[name] for name in (sliding, coulomb)}
-    outline = pictures.Outline.of(model.surface.points, model.surface.normals)
+    outline = pictures.Outline.of(contact.points, contact.normals)
     points = {str(number): CHANNEL.point(number) for number in range(1, 20)}
     plot_layout(
         folder(out, sliding), points, out / "layout.png", title="The channel in its layer (compare Fig. 6)",

@@ -129,7 +129,8 @@ def shaken_wall(widths: tuple[float, ...], steps: int, periods: float, out: Path
 
     def displacements(problem: vc.ContactProblem, scheme) -> np.ndarray:
         found = vc.march(problem, scheme=scheme, dt=dt, steps=round(periods * steps))
-        return np.array([problem.surface.normal_values(state.u) for state, _ in found])
+        surface = problem.surface
+        return np.array([surface.everywhere(surface.normal_values(state.u)) for state, _ in found])
 
     reference = displacements(exact, vc.Midpoint())
     numbers["wall: largest displacement"] = float(np.max(np.abs(reference)))
@@ -155,15 +156,16 @@ def marched(
     problem: vc.ContactProblem, scheme, dt: float, t_end: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
     """Return times, gap of the foot, pressure; the energy lost, the weight's included."""
-    system, rows = problem.equations, []
+    system, surface, rows = problem.equations, problem.surface, []
     weight = system.load.constant
 
     def energy(u: np.ndarray, v: np.ndarray) -> float:
         return system.kinetic_energy(v) + system.strain_energy(u) - system.algebra.dot(weight, u)
 
     for state, _ in vc.march(problem, scheme=scheme, dt=dt, t_end=t_end):
-        gap = problem.surface.gap0 - problem.surface.normal_values(state.u)
-        rows.append((state.t, gap.mean(), state.r_n.sum() / problem.surface.weights.sum()))
+        gap = surface.gap0 - surface.normal_values(state.u)
+        sums = surface.comm.sum(np.array([gap.sum(), state.r_n.sum(), surface.weights.sum()]))
+        rows.append((state.t, sums[0] / surface.total, sums[1] / sums[2]))
     t, y, p = np.array(rows).T
     return t, y, p, energy(system.u0, system.v0) - energy(state.u, state.v)
 

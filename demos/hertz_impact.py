@@ -62,7 +62,7 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
 
 def curves_of(model: BallModel, problem: vc.ContactProblem, solution: vc.Solution) -> ImpactCurves:
     """Return the histories of the whole ball; time and approach count from the first touch."""
-    history, points = solution.history, problem.surface.points
+    history, points = solution.history, problem.surface.whole().points
     force = QUARTERS * history["contact_resultant"]
     return ImpactCurves(
         t=history["t"] - model.ball.height / model.ball.speed,

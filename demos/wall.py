@@ -70,9 +70,10 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
             f"{case}_certificate": solution.facts["worst_certificate"],
             f"{case}_energy_defect": solution.facts["energy_defect"],
         }
+        contact = problem.surface.whole()
         if comm.rank == 0:
             print(f"\nCase {case}. {title}\n{solution.summary()}")
-            draw_histories(solution.history, problem.surface, out / case, title=title, reference=linear.history,
+            draw_histories(solution.history, contact, out / case, title=title, reference=linear.history,
                            unilateral=[str(number) for number in wall_model.CASES[case]])
         comm.Barrier()  # nobody leaves before the figures are there
     for case in CASES:
