@@ -17,6 +17,7 @@ from vi_contact import fem
 from vi_contact.cli.entry import main
 from vi_contact.core.errors import InputError
 from vi_contact.core.units import STANDARD_GRAVITY
+from vi_contact.engineering import contact_summary
 from vi_contact.meshes.channel import ChannelMesh
 from vi_contact.meshes.extract import arrays_from_script
 from vi_contact.models.channel.model import BODIES, REFERENCE, Channel, SoilProbe, build, staged
@@ -178,6 +179,10 @@ def test_records_of_both_sides():
     for side, mask in one.sides.items():
         assert np.abs(history[f"opening_{side}"] - gap[:, mask].max(axis=1)).max() < 1e-15 * size
     assert max(history["opening_left"].max(), history["opening_right"].max()) > 0.01 * size
+    for surface in (one.surface, one.surface.whole()):
+        force = contact_summary(history, surface, centre=(12.0, 5.0), normal=(0.0, -1.0))["force_y"]
+        recorded = history["contact_force_y"] + history["friction_force_y"]
+        assert np.abs(force - recorded).max() < 1e-12 * np.abs(recorded).max()
     with pytest.raises(InputError, match="not at the interface"):
         SoilProbe({"far": (0.0, 4.0)}).start(one.problem(), vc.static_equilibrium(one.problem(), solver=vc.Condensed()))
 
