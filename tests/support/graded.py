@@ -66,5 +66,6 @@ def pressed_half(
     )
     surface = contact_surface(system, tags["bottom"], obstacle=obstacle)
     state = static_equilibrium(ContactProblem(system, surface), solver=Condensed())
-    order = np.argsort(surface.points[:, 0])
-    return Pressed(surface.points[order, 0], surface.weights[order], state.r_n[order])
+    every = surface.whole()
+    order = np.argsort(every.points[:, 0])
+    return Pressed(every.points[order, 0], every.weights[order], surface.everywhere(state.r_n)[order])

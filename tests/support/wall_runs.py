@@ -69,8 +69,8 @@ def follow(
         changes.append((impact, step.contact, step.change - impact))
         energy.append(system.kinetic_energy(new.v) + system.strain_energy(new.u))
         u = space.sample(given.cartesian(new.u), nodes, new.t)[:, 0]
-        rows.append((u, given.surface.normal_values(new.u)))
-        sets.append(new.active)
+        rows.append((u, given.surface.everywhere(given.surface.normal_values(new.u))))
+        sets.append(given.surface.everywhere(new.active))
         iterations.append(report.result.iterations)
         worst = max(worst, report.certificate.worst)
     u, contact = (np.array(column) for column in zip(*rows, strict=True))
