@@ -45,7 +45,7 @@ class Iterative:
 
     Attributes:
         preconditioner: "jacobi", "icc" (block Jacobi with incomplete Cholesky factors), "gamg" (algebraic multigrid
-            with rigid body modes), or "auto": by the Courant number that A shows, up to 3, 30, and beyond. PETSc's
+            with rigid body modes), or "auto": by the Courant number that A shows, up to 0.5, 30, and beyond. PETSc's
             options may name another.
         petsc_options: of the preconditioner, without prefix, e.g. {"pc_gamg_threshold": 0.02}; ICC's sub_pc_…;
             options of the command line go before them.

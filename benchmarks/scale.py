@@ -1,0 +1,326 @@
+#!/usr/bin/env python3
+"""What a contact step costs in three dimensions without any factor, in products with the matrix of the step.
+
+    python3 benchmarks/scale.py [--sizes 6e4 1e6] [--json FILE]
+    mpirun -n 2 python3 benchmarks/scale.py --sizes 2e5
+
+A block of two layers, ten times stiffer above, thrown on a wavy rigid plane: all of its lower face may touch. Steps of
+the default scheme at Courant numbers C = c_p dt / h of 1 and 10 after a common history at C = 10; and, at C = 100 and
+in statics, steps of a block whose top is pushed down slowly. For the same step the plain linear problem is solved too: same A, tolerance,
+preconditioner and guess, with the reactions given as a load. Times are processor time of the busiest rank; a product
+is one with A as AIJ, timed in the same run. ``peak_bytes`` counts set-up, ``bytes_per_unknown`` what there is while
+stepping (Linux), Python, mesh, M, K, and A included. Beside it, on small blocks, the condensed route.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ[name] = "1"
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+import dolfinx  # noqa: E402
+import numpy as np  # noqa: E402
+from mpi4py import MPI  # noqa: E402
+
+import vi_contact as vc  # noqa: E402
+from vi_contact import fem  # noqa: E402
+from vi_contact.core.verify import kkt_residual  # noqa: E402
+
+COMM = MPI.COMM_WORLD
+NU, CONTRAST, WEIGHT = 0.3, 10.0, 0.02  # E and rho of the lower layer are 1
+SPEED = float(np.sqrt(CONTRAST * (1.0 - NU) / ((1.0 + NU) * (1.0 - 2.0 * NU))))  # of P waves in the upper layer
+COURANTS, FAR = (1.0, 10.0), 100.0
+PUSH = 5e-4  # of the top in a step at C = 100 and in a static one
+LARGE = 5e5  # unknowns beyond which only C = 10 is run, on tetrahedra: what a machine of one person carries
+SMALL = (2e3, 6e3, 1.5e4)  # blocks for the condensed route
+ELEMENTS = {"hexahedra": "hexahedron", "tetrahedra": "tetrahedron"}
+
+
+def busiest(seconds: float) -> float:
+    """The largest value of all ranks."""
+    return float(COMM.allreduce(seconds, op=MPI.MAX))
+
+
+class Memory:
+    """Largest resident memory of all ranks together since the last ``forget`` [bytes]; zero where it is not told."""
+
+    def forget(self) -> None:
+        try:
+            Path("/proc/self/clear_refs").write_text("5")
+        except OSError:
+            pass
+
+    def peak(self) -> float:
+        try:
+            lines = Path("/proc/self/status").read_text().splitlines()
+        except OSError:
+            return 0.0
+        here = next(float(line.split()[1]) * 1024.0 for line in lines if line.startswith("VmHWM"))
+        return float(COMM.allreduce(here))
+
+
+MEMORY = Memory()
+
+
+@dataclass(frozen=True)
+class Block:
+    """A problem and the size of its cells [m]."""
+
+    problem: vc.ContactProblem
+    h: float
+    element: str
+
+    @property
+    def unknowns(self) -> int:
+        return int(self.problem.system.space.unknowns)
+
+    def dt(self, courant: float) -> float:
+        return courant * self.h / SPEED
+
+
+def wavy(x: Any) -> Any:
+    """Gap of the plane below the face [m]."""
+    waves = 1.0 - np.cos(12.0 * np.pi * x[:, 0]) * np.cos(10.0 * np.pi * x[:, 1])
+    return 2e-2 * ((x[:, 0] - 0.5) ** 2 + (x[:, 1] - 0.45) ** 2) + 4e-3 * waves
+
+
+def divisions(unknowns: float, dimension: int) -> tuple[int, ...]:
+    """Cells along the axes of a flat block with about so many unknowns."""
+    n = round((2.75 * unknowns) ** (1.0 / 3.0)) if dimension == 3 else round((2.0 * unknowns) ** 0.5)
+    high = max(round(n / 8.5), 2) if dimension == 3 else max(n // 4, 2)
+    return (n,) * (dimension - 1) + (high,)
+
+
+def box(cells: tuple[int, ...], element: str) -> Any:
+    """The mesh, built on all ranks together."""
+    top, ghosts = [1.0] * (len(cells) - 1) + [cells[-1] / cells[0]], dolfinx.mesh.GhostMode.shared_facet
+    corners, kind = [np.zeros(len(cells)), np.array(top)], getattr(dolfinx.mesh.CellType, element)
+    make = dolfinx.mesh.create_box if len(cells) == 3 else dolfinx.mesh.create_rectangle
+    return make(COMM, corners, list(cells), kind, ghost_mode=ghosts)
+
+
+def block(unknowns: float, element: str, *, pushed: bool = False, dimension: int = 3) -> Block:
+    """The block, thrown, or at rest with its top pushed down slowly."""
+    cells = divisions(unknowns, dimension)
+    kind = ELEMENTS[element] if dimension == 3 else {"hexahedra": "quadrilateral", "tetrahedra": "triangle"}[element]
+    mesh, up, h = box(cells, kind), dimension - 1, 1.0 / cells[0]
+    height = cells[-1] * h
+
+    def face(name: str, z: float) -> Any:
+        found = dolfinx.mesh.locate_entities_boundary(mesh, up, lambda x: np.abs(x[up] - z) < 0.1 * h)
+        return fem.Facets(name, found, mesh)
+
+    def layer(name: str, low: float, high: float) -> Any:
+        index_map = mesh.topology.index_map(mesh.topology.dim)
+        every = np.arange(index_map.size_local + index_map.num_ghosts, dtype=np.int32)
+        middle = dolfinx.mesh.compute_midpoints(mesh, mesh.topology.dim, every)[:, up]
+        return fem.Cells(name, np.flatnonzero((middle >= low) & (middle < high)), mesh)
+
+    halves = 0.5 * height
+    soft, hard = (vc.LinearElastic(E=E, nu=NU, rho=1.0) for E in (1.0, CONTRAST))
+    materials = [(layer("soft", -1.0, halves), soft), (layer("hard", halves, 2.0), hard)]
+    side, tilt = np.eye(dimension)[0], np.eye(dimension)[up]
+    speed = -PUSH / (FAR * h / SPEED) * tilt
+    held = fem.Prescribed(face("top", height), lambda x, t: np.tile(speed * t, (len(x), 1)), tuple(speed))
+    system = fem.assemble(
+        mesh, materials, prescribed=held if pushed else (), loads=fem.BodyForce(tuple(-WEIGHT * tilt)),
+        initial_velocity=None if pushed else lambda x: np.outer(0.01 * x[:, 0] - 0.025, tilt) + 0.01 * side,
+    )
+    surface = fem.contact_surface(system, face("bottom", 0.0), obstacle=vc.AnalyticGap(wavy))
+    return Block(vc.ContactProblem(system, surface), h, element)
+
+
+class Watched:
+    """A solver that remembers what it prepared, and the steps it solved last with the processor time they took."""
+
+    def __init__(self, solver: Any) -> None:
+        self.solver, self.check = solver, solver.check
+        self.prepared: Any = None
+        self.setup = 0.0
+        self.rows: list[dict[str, float]] = []
+        self.last: list[tuple[Any, Any]] = []
+
+    def prepare(self, *given: Any) -> Watched:
+        start = time.process_time()
+        self.prepared = self.solver.prepare(*given)
+        self.setup = time.process_time() - start
+        return self
+
+    def solve(self, step: Any) -> Any:
+        before, start = self.counts(), time.process_time()
+        result = self.prepared.solve(step)
+        spent = busiest(time.process_time() - start)
+        counts = {key: value - before[key] for key, value in self.counts().items()}
+        self.rows.append({"seconds": spent, "iterations": result.iterations, **counts})
+        self.last = [*self.last[-2:], (step, result)]
+        return result
+
+    def counts(self) -> dict[str, float]:
+        work = getattr(self.prepared, "work", None)
+        return {name: getattr(work, name, 0) for name in ("linear_iterations", "products", "renewals")}
+
+
+def product_seconds(A: Any) -> float:
+    """Processor time of one product with A as it was assembled."""
+    mat = A.matrix.mat
+    x, y = mat.createVecs()
+    x.set(1.0)
+    best = np.inf
+    for _ in range(5):
+        start = time.process_time()
+        for _ in range(3):
+            mat.mult(x, y)
+        best = min(best, (time.process_time() - start) / 3.0)
+    return busiest(best)
+
+
+def linear_iterations(watched: Watched) -> float | None:
+    """Mean iterations of the same steps with the reactions given: no condition closes."""
+    if not hasattr(watched.prepared, "work"):
+        return None
+    before = watched.counts()["linear_iterations"]
+    for step, result in watched.last:
+        given = step.surface.reaction_load(result.r_n, len(step.b))
+        none = np.zeros_like(step.active)
+        open_ = replace(step, b=step.b - given, bound=np.full_like(step.bound, np.inf), active=none)
+        watched.prepared.solve(open_)
+    return float(watched.counts()["linear_iterations"] - before) / len(watched.last)
+
+
+def history(given: Block) -> vc.State:
+    """The state after the steps at C = 10 that bring the block well into contact."""
+    steps = max(3, round(0.25 / given.dt(10.0)))
+    solver = vc.Iterative("icc", tolerance=1e-7)
+    for state, _ in vc.march(given.problem, solver=solver, dt=given.dt(10.0), steps=steps, tolerance=1e-6):
+        pass
+    return state
+
+
+def dynamic(given: Block, state: vc.State | None, courant: float, solver: Any, steps: int, warm: int) -> dict[str, Any]:
+    """A row of steps from a state."""
+    watched, worst, closed = Watched(solver), 0.0, []
+    dt = given.dt(courant)
+    for _, report in vc.march(given.problem, solver=watched, dt=dt, steps=warm + steps, state=state):
+        worst = max(worst, report.certificate.worst)
+        closed.append(float(COMM.allreduce(int(report.new.active.sum()))))
+        if len(closed) == warm:
+            watched.rows.clear()
+            MEMORY.forget()
+    return row(given, watched, courant, worst, float(np.mean(closed[warm:])), report.step.A)
+
+
+def static(given: Block, solver: Any, steps: int) -> dict[str, Any]:
+    """A row of static steps: the weight grows, each step starts from the one before."""
+    problem, watched, worst = given.problem, Watched(solver), 0.0
+    equations, surface = problem.equations, problem.surface
+    A = equations.effective(m=0.0, c=0.0, k=1.0)
+    watched.prepare(A, surface, 1.0)
+    x, active, closed = np.zeros(equations.rows), np.zeros(len(surface.gap0), dtype=bool), []
+    for k in range(steps + 1):
+        load = equations.load((k + 4) * given.dt(FAR))
+        step = vc.StepProblem(A, load, surface.gap0, surface, 1.0, x, active, 0.0, k)
+        result = watched.solve(step)
+        worst = max(worst, kkt_residual(step, result).worst)
+        x, active = result.x, result.active
+        closed.append(float(COMM.allreduce(int(active.sum()))))
+    del watched.rows[0]
+    return row(given, watched, None, worst, float(np.mean(closed[1:])), A)
+
+
+def row(
+    given: Block, watched: Watched, courant: float | None, worst: float, closed: float, A: Any
+) -> dict[str, Any]:
+    """What the table shows of the steps that ``watched`` solved; means a step."""
+    resident = MEMORY.peak()
+    product, solver = product_seconds(A), watched.solver
+    linear = linear_iterations(watched)
+    mean = {key: float(np.mean([one[key] for one in watched.rows])) for key in watched.rows[0]}
+    own = hasattr(watched.prepared, "work")
+    return {
+        "unknowns": given.unknowns, "points": int(COMM.allreduce(len(given.problem.surface.owned))), "closed": closed,
+        "dimension": int(given.problem.system.space.dimension), "element": given.element, "courant": courant,
+        "friction": None, "mu": 0.0, "method": type(solver).__name__,
+        "preconditioner": watched.prepared.kind if own else None,
+        "iterations": mean["iterations"], "linear_iterations": mean["linear_iterations"] if own else None,
+        "newton_steps": 0.0, "products": mean["products"] if own else None,
+        "renewals": mean["renewals"], "largest_renewals": max(one["renewals"] for one in watched.rows),
+        "cpu_products": mean["seconds"] / product, "setup_products": busiest(watched.setup) / product,
+        "seconds": mean["seconds"], "product_seconds": product,
+        "over_linear": None if not linear else mean["linear_iterations"] / linear,
+        "peak_bytes": resident, "bytes_per_unknown": resident / given.unknowns, "certificate": worst,
+        "ranks": COMM.size,
+    }
+
+
+def rows_of(size: float, steps: int) -> Iterator[dict[str, Any]]:
+    """All rows of one size."""
+    for element in ("tetrahedra",) if size > LARGE else ELEMENTS:
+        MEMORY.forget()
+        given = block(size, element)
+        state = history(given)
+        set_up = MEMORY.peak()
+        for courant in (10.0,) if size > LARGE else COURANTS:
+            yield dynamic(given, state, courant, vc.Iterative(), steps, 2) | {"peak_bytes": set_up}
+        if size <= LARGE:
+            del given, state
+            given = block(size, element, pushed=True)
+            yield dynamic(given, None, FAR, vc.Iterative(), steps, 6)
+            yield static(given, vc.Iterative(), 4)
+
+
+def small_rows(steps: int) -> Iterator[dict[str, Any]]:
+    """The condensed and the iterative route side by side."""
+    for dimension in (2, 3):
+        for size in SMALL:
+            given = block(size, "tetrahedra", dimension=dimension)
+            state = history(given)
+            for courant in COURANTS:
+                for solver in (vc.Condensed(), vc.Iterative()):
+                    yield dynamic(given, state, courant, solver, steps, 2)
+
+
+SHOWN = ("unknowns", "points", "closed", "element", "courant", "method", "preconditioner", "iterations",
+         "linear_iterations", "over_linear", "products", "renewals", "cpu_products", "setup_products", "seconds",
+         "bytes_per_unknown", "certificate")
+
+
+def told(found: dict[str, Any]) -> str:
+    """A row as text."""
+    def text(value: Any) -> str:
+        return "-" if value is None else f"{value:.3g}" if isinstance(value, float) else str(value)
+
+    return "  ".join(f"{text(found[key]):>10}" for key in SHOWN)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--sizes", type=float, nargs="+", default=[6e4], help="unknowns, about")
+    parser.add_argument("--steps", type=int, default=5, help="steps of a row")
+    parser.add_argument("--no-small", action="store_true", help="leave out the condensed route")
+    parser.add_argument("--json", type=Path, help="file for all figures")
+    options = parser.parse_args()
+    found: list[dict[str, Any]] = []
+    if COMM.rank == 0:
+        print("  ".join(f"{key[:10]:>10}" for key in SHOWN), flush=True)
+    parts = [rows_of(size, options.steps) for size in options.sizes]
+    for part in parts if options.no_small else [*parts, small_rows(options.steps)]:
+        for one in part:
+            found.append(one)
+            if COMM.rank == 0:
+                print(told(one), flush=True)
+                if options.json:
+                    options.json.write_text(json.dumps(found, indent=1))
+
+
+if __name__ == "__main__":
+    main()
