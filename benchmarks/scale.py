@@ -4,12 +4,13 @@
     python3 benchmarks/scale.py [--sizes 6e4 1e6] [--json FILE]
     mpirun -n 2 python3 benchmarks/scale.py --sizes 2e5
 
-A block of two layers, ten times stiffer above, thrown on a wavy rigid plane: all of its lower face may touch. Steps of
-the default scheme at Courant numbers C = c_p dt / h of 1 and 10 after a common history at C = 10; and, at C = 100 and
-in statics, steps of a block whose top is pushed down slowly. For the same step the plain linear problem is solved too: same A, tolerance,
-preconditioner and guess, with the reactions given as a load. Times are processor time of the busiest rank; a product
-is one with A as AIJ, timed in the same run. ``peak_bytes`` counts set-up, ``bytes_per_unknown`` what there is while
-stepping (Linux), Python, mesh, M, K, and A included. Beside it, on small blocks, the condensed route.
+A block of two layers, ten times stiffer above, on a wavy rigid plane: all of its lower face may touch. Steps of the
+default scheme at Courant numbers C = c_p dt / h of 1 and 10 after a common history at C = 10, the block thrown; and, at
+C = 100 and in statics, of a block at rest whose top is pushed down slowly. For the same step the plain linear problem
+is solved too: same A, tolerance, preconditioner and guess, with the reactions given as a load. Times are processor time
+of the busiest rank; a product is one with A as AIJ, timed in the same run. ``peak_bytes`` counts set-up,
+``bytes_per_unknown`` what there is while stepping (Linux), Python, mesh, M, K, and A included. Beside it, on small
+blocks, the condensed route.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ import os
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -55,10 +57,8 @@ class Memory:
     """Largest resident memory of all ranks together since the last ``forget`` [bytes]; zero where it is not told."""
 
     def forget(self) -> None:
-        try:
+        with suppress(OSError):
             Path("/proc/self/clear_refs").write_text("5")
-        except OSError:
-            pass
 
     def peak(self) -> float:
         try:
@@ -201,8 +201,7 @@ def history(given: Block) -> vc.State:
     """The state after the steps at C = 10 that bring the block well into contact."""
     steps = max(3, round(0.25 / given.dt(10.0)))
     solver = vc.Iterative("icc", tolerance=1e-7)
-    for state, _ in vc.march(given.problem, solver=solver, dt=given.dt(10.0), steps=steps, tolerance=1e-6):
-        pass
+    *_, (state, _) = vc.march(given.problem, solver=solver, dt=given.dt(10.0), steps=steps, tolerance=1e-6)
     return state
 
 
