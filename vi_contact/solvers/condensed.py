@@ -23,6 +23,7 @@ from ..core.algebra import Array, EffectiveMatrix, Mask, total
 from ..core.checks import instance, provides
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
+from ..core.sizes import refuse_dense
 from ..core.step import StepProblem, StepResult
 from ..core.surfaces import ContactSurface
 from .friction.condensed import CondensedFriction
@@ -69,8 +70,13 @@ class Condensed:
         instance("Condensed", "rates", self.rates, RateIteration, "give RateIteration()")
 
     def check(self, problem: ContactProblem) -> None:
-        """Raise InputError for friction without a tangential direction, or of a wrong number of values."""
+        """Raise InputError for friction without a tangential direction, or of a wrong number of values, and for more
+        contact unknowns than a dense matrix suits."""
         surface = problem.surface
+        if problem.frictional:
+            refuse_dense(f"Condensed() with {problem.friction}", surface.total * (1 + surface.tangents.shape[1]))
+        else:
+            self._refuse_large(surface)
         if problem.frictional and surface.tangents.shape[1] == 0:
             raise InputError(
                 f"Condensed would ignore {problem.friction}: a body in one dimension cannot slide, use Frictionless()"
@@ -78,8 +84,15 @@ class Condensed:
         problem.friction.limit(np.zeros(surface.count), surface.weights, 1.0)
 
     def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> PreparedCondensed:
-        """Factorise A and condense it; once per time step size."""
+        """Factorise A and condense it; once per time step size. InputError for more contact conditions than a dense
+        matrix suits."""
+        self._refuse_large(surface)
         return PreparedCondensed(self, A, surface, scale)
+
+    def _refuse_large(self, surface: ContactSurface) -> None:
+        """InputError for more conditions than a dense G suits, if one is formed."""
+        if not isinstance(self.method, ProjectedCG):
+            refuse_dense("Condensed()", surface.total)
 
 
 class AppliedDelassus:

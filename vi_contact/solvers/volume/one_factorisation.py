@@ -20,6 +20,7 @@ from petsc4py import PETSc
 
 from ...core.algebra import Array
 from ...core.checks import whole
+from ...core.sizes import refuse_dense
 from ...core.step import StepProblem
 from .bounded_system import BoundedSystem
 from .held_points import HeldInverse
@@ -164,7 +165,8 @@ class OneFactorisation:
         return NEWTON_OPTIONS
 
     def driver(self, scaled: ScaledStep, layers: OptionLayers) -> FactorisedDriver:
-        """Return the SNES object."""
+        """Return the SNES object. InputError for more contact conditions than a dense matrix suits."""
+        refuse_dense("OneFactorisation()", scaled.system.surface.total)
         return FactorisedDriver(scaled, layers, self)
 
     def start(self, driver: FactorisedDriver, system: BoundedSystem, step: StepProblem) -> Array:

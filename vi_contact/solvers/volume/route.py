@@ -20,6 +20,7 @@ from ...core.algebra import Array, EffectiveMatrix
 from ...core.checks import instance, provides, real, shown
 from ...core.errors import InputError, StepFailure
 from ...core.problem import ContactProblem
+from ...core.sizes import refuse_dense
 from ...core.step import StepProblem, StepResult
 from ...core.surfaces import ContactSurface
 from .bounded_system import BoundedSystem
@@ -96,7 +97,9 @@ class Volume:
 
     def check(self, problem: ContactProblem) -> None:
         """Raise InputError for friction that the method cannot carry, without a tangent, or of a wrong number of
-        values."""
+        values, and for more contact conditions than OneFactorisation suits."""
+        if isinstance(self.method, OneFactorisation):
+            refuse_dense("OneFactorisation()", problem.surface.total)
         if not problem.frictional:
             return
         surface, law = problem.surface, problem.friction

@@ -1,0 +1,87 @@
+"""What is too large for dense matrices is refused with its size and what to take instead; what is small is counted
+over all ranks."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from chain import chain_problem
+
+from vi_contact.core.algebra import SerialComm
+from vi_contact.core.errors import InputError
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.sizes import DENSE_ROWS, OWN_CONDITIONS, OWN_UNKNOWNS, small
+from vi_contact.laws.friction import Coulomb
+from vi_contact.run.march import march
+from vi_contact.solvers.condensed import Condensed
+from vi_contact.solvers.normal.projected_cg import ProjectedCG
+
+pytestmark = pytest.mark.serial
+
+
+def touching(m: int) -> ContactProblem:
+    """A chain of which every mass may touch."""
+    problem = chain_problem(m)
+    return replace(problem, surface=replace(
+        problem.surface, points=np.zeros((m, 1)), normals=np.ones((m, 1)), weights=np.ones(m), gap0=np.ones(m),
+        bilateral=np.zeros(m, dtype=bool), compliance=np.zeros(m), owned=np.arange(m), slots=np.arange(m),
+        tangents=np.zeros((m, 0), dtype=np.int64),
+    ))  # fmt: skip
+
+
+def rubbing(m: int) -> Any:
+    """Points in space, as far as a count of their unknowns goes."""
+    surface = replace(touching(m).surface, tangents=np.full((m, 2), -1))
+    return SimpleNamespace(frictional=True, friction=Coulomb(0.3), surface=surface)
+
+
+def told(owner: str, rows: int) -> str:
+    return re.escape(f"{owner} stores a dense matrix of its {rows} contact unknowns on every rank, 0.8 GB: take "
+                     f"Iterative(), which stores none, or at most {DENSE_ROWS}")
+
+
+def test_condensed_refuses_what_its_dense_matrix_would_not_fit() -> None:
+    """Before anything is made of it: in ``check``, and in ``prepare`` for those who do not ask."""
+    fits, large = touching(DENSE_ROWS), touching(DENSE_ROWS + 1)
+    Condensed().check(fits)
+    Condensed(ProjectedCG()).check(large)
+    for refused in (
+        lambda: Condensed().check(large),
+        lambda: march(large, solver=Condensed(), dt=0.1, steps=1),
+        lambda: Condensed().prepare(large.system.effective(m=1.0, c=0.0, k=1.0), large.surface, 1.0),
+    ):
+        with pytest.raises(InputError, match=told("Condensed()", DENSE_ROWS + 1)):
+            refused()
+
+
+@pytest.mark.parametrize("method", [Condensed(), Condensed(ProjectedCG())], ids=["dense", "applied"])
+def test_tangents_count_with_friction(method: Condensed) -> None:
+    """Friction forms the matrix of normal and tangential unknowns, whatever method there is without."""
+    with pytest.raises(InputError, match=told("Condensed() with Coulomb(mu=0.3)", 10_002)):
+        method.check(rubbing(3334))
+    method.check(rubbing(3333))
+
+
+def test_one_factorisation_refuses_the_same() -> None:
+    route: Any = pytest.importorskip("vi_contact.solvers.volume.route")
+    large = touching(DENSE_ROWS + 1)
+    A = large.system.effective(m=1.0, c=0.0, k=1.0)
+    for refused in (route.Volume().check, lambda p: route.Volume().prepare(A, p.surface, 1.0)):
+        with pytest.raises(InputError, match=told("OneFactorisation()", DENSE_ROWS + 1)):
+            refused(large)
+    route.Volume(route.ReducedNewton()).check(large)
+
+
+def test_small_is_counted_over_all_ranks() -> None:
+    class Two(SerialComm):
+        def sum(self, x: np.ndarray) -> np.ndarray:
+            return 2.0 * x
+
+    assert small(SerialComm(), OWN_UNKNOWNS, OWN_CONDITIONS)
+    assert small(Two(), OWN_UNKNOWNS // 2, OWN_CONDITIONS // 2)
+    assert not small(Two(), OWN_UNKNOWNS // 2 + 1, 1) and not small(Two(), 1, OWN_CONDITIONS // 2 + 1)

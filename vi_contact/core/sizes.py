@@ -1,0 +1,26 @@
+"""Say which problems are small: those that a dense matrix on every rank, or a factor made in passing, suits."""
+
+from __future__ import annotations
+
+from .algebra import Comm, total
+from .errors import InputError
+
+DENSE_ROWS = 10_000  # 0.8 GB a matrix, and its factor and a copy while it is made, on every rank
+OWN_UNKNOWNS = 100_000  # with a factor of the mass matrix, in seconds and 1 GB, in 3D too
+OWN_CONDITIONS = 2_000  # with a dense matrix, as many back-substitutions
+
+
+def refuse_dense(owner: str, rows: int) -> None:
+    """Raise InputError for more contact unknowns than a dense matrix on every rank suits."""
+    if rows > DENSE_ROWS:
+        raise InputError(f"{owner} stores a dense matrix of its {rows} contact unknowns on every rank, "
+                         f"{8e-9 * rows**2:.2g} GB: take Iterative(), which stores none, or at most {DENSE_ROWS}")
+
+
+def small(comm: Comm, unknowns: int, conditions: int) -> bool:
+    """Say whether what the package solves beside the steps is small, by unknowns and contact conditions of this rank.
+
+    Such problems are condensed with a factor of their own, whatever solves the steps; larger ones are solved by
+    conjugate gradients. Collective.
+    """
+    return total(comm, unknowns) <= OWN_UNKNOWNS and total(comm, conditions) <= OWN_CONDITIONS
