@@ -13,7 +13,7 @@ from .core.lazy import lazy
 from .core.version import __version__
 
 _CONTENTS = {
-    "core.errors": ("InputError", "Interrupted", "StepFailure", "ViContactError"),
+    "core.errors": ("InputError", "Interrupted", "OutOfTime", "StepFailure", "ViContactError"),
     "laws.materials": (
         "LinearElastic", "MassProportional", "NoDamping", "PlaneStrain", "PlaneStress", "Rayleigh", "Solid",
     ),

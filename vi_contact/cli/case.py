@@ -37,6 +37,9 @@ def add_case_commands(commands: Any) -> None:
     run.add_argument("--restart", action="store_true", help="continue the run in the output folder from its checkpoint")
     run.add_argument("--restart-changed", action="store_true", dest="changed",
                      help="the same, also when the problem is another one than that of the checkpoint")
+    run.add_argument("--wall-time", metavar="TIME",
+                     help="end with a checkpoint, and status 75, before so much time since the start is over: "
+                     "hours:minutes:seconds, or what else Slurm reads as --time")
     add_settings(run)
     run.add_argument("--check", action="store_true", help="read the case and stop: nothing is computed")
     run.add_argument("--quiet", action="store_true", help="no progress line")
@@ -52,11 +55,14 @@ def _cases(options: argparse.Namespace) -> str:
 
 
 def _run(options: argparse.Namespace) -> str:
+    from ..run.wall_time import seconds_of
     from ..studies.cases.own_case import OwnCase, open_case
 
     with suppress(ImportError):  # the beam and the layer need no MPI
         import mpi4py.MPI  # noqa: F401
     comm, path = world(), located(options.case)
+    if options.wall_time is not None:
+        seconds_of(options.wall_time)
     if options.steps is not None and options.steps < 1:
         raise InputError(f"--steps {options.steps}: give at least one step")
     short = ShortOptions(**{one.name: getattr(options, one.name) for one in fields(ShortOptions)})
@@ -66,6 +72,8 @@ def _run(options: argparse.Namespace) -> str:
     if isinstance(case, OwnCase) and restart:
         raise InputError(f"{path}: this case keeps no checkpoint: leave --restart away, it takes seconds")
     out = options.out or (None if isinstance(case, OwnCase) else case.out) or Path("results") / path.stem
+    if isinstance(case, OwnCase) and options.wall_time:
+        raise InputError(f"{path}: this case keeps no checkpoint: leave --wall-time away, it takes seconds")
     if options.check:
         if not isinstance(case, OwnCase):
             case.check(comm)
@@ -73,6 +81,7 @@ def _run(options: argparse.Namespace) -> str:
     elif isinstance(case, OwnCase):
         said = f"{name}\n{case.run(comm, out)}\noutput: {out}"
     else:
-        found = case.run(comm, out=out, restart=restart, progress=not options.quiet, changed=options.changed)
+        found = case.run(comm, out=out, restart=restart, progress=not options.quiet, changed=options.changed,
+                         wall_time=options.wall_time)
         said = f"{name}\n{found.summary()}\noutput: {out}"
     return said if comm.rank == 0 else ""

@@ -7,7 +7,7 @@ import sys
 import traceback
 from collections.abc import Sequence
 
-from ..core.errors import InputError, Interrupted, ViContactError
+from ..core.errors import InputError, Interrupted, OutOfTime, ViContactError
 from ..core.version import __version__
 from .case import add_case_commands
 from .errors import Parser, check_words, fail_together, printable, told, world
@@ -52,7 +52,8 @@ def refuse_retired(arguments: Sequence[str]) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command and print its text, or one sentence on standard error and return 1; 128 + n after signal n."""
+    """Run a command and print its text, or one sentence on standard error and return 1; 128 + n after signal n, 75 when
+    the wall time was nearly over."""
     own, petsc = split_petsc(sys.argv[1:] if arguments is None else arguments)
     try:
         refuse_retired(own)
@@ -68,7 +69,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _stopped(error, 1)
     except KeyboardInterrupt as error:
         stopped = error if isinstance(error, Interrupted) else Interrupted()
-        return _stopped(stopped, 128 + stopped.number)
+        if isinstance(error, OutOfTime):  # on all ranks: a launcher kills what is left when the first one has failed
+            fail_together(str(error))
+        return _stopped(stopped, stopped.status)
     except Exception:
         fail_together(traceback.format_exc())
         raise

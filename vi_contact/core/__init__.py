@@ -7,7 +7,7 @@ from .lazy import lazy
 _CONTENTS = {
     "certificate": ("Certificate",),
     "companion": ("Companion",),
-    "errors": ("InputError", "Interrupted", "StepFailure", "ViContactError"),
+    "errors": ("InputError", "Interrupted", "OutOfTime", "StepFailure", "ViContactError"),
     "obstacles": ("AnalyticGap", "HalfSpace", "Obstacle", "Touching"),
     "problem": ("ContactProblem",),
     "protocols": ("Excitation", "Frictionless", "FrictionLaw", "ImpactLaw", "MassLaw"),

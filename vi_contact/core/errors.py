@@ -24,12 +24,23 @@ class Interrupted(KeyboardInterrupt):
     folder.
 
     Like Ctrl-C itself it is no ``Exception``, so that no loop over runs goes on with the next one. ``number``: of the
-    signal; the command line exits with 128 + number.
+    signal; ``status``: 128 + number, with which the command line exits.
     """
 
     def __init__(self, message: str = "interrupted", number: int = signal.SIGINT) -> None:
         super().__init__(message, number)
-        self.number = number
+        self.number, self.status = number, 128 + number
 
     def __str__(self) -> str:
         return str(self.args[0])
+
+
+class OutOfTime(Interrupted):
+    """Say that a run ended, on all ranks, because its wall time was nearly over; a restart goes on.
+
+    ``status`` is 75, which says that the command may be given again (EX_TEMPFAIL).
+    """
+
+    def __init__(self, message: str) -> None:
+        super().__init__(message)
+        self.status = 75

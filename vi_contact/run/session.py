@@ -14,7 +14,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..core.errors import Interrupted
+from ..core.algebra import Comm
+from ..core.errors import Interrupted, OutOfTime
 from ..core.step import Recorder, Report, State, StepResult
 from .files.checkpoint import RestartPoint
 from .files.identity import identity
@@ -27,6 +28,7 @@ from .recorders import refuse_overflow
 from .solution import Solution, energy_warning, sampling_warning
 from .stop_signals import StopSignals
 from .time_steps import StepPlan, described, pieces_of
+from .wall_time import WallTime
 
 log = logging.getLogger(__name__)
 TIMED = 10_000  # the last steps, of which seconds_per_step is the median
@@ -44,7 +46,7 @@ class Session:
     """Hold a run under way: what of the arguments of ``simulate`` holds for all of it, and where it is.
 
     Attributes:
-        recorders: the user's, after those of every run.
+        recorders: the user's, after those of every run. wall_time: when the process has to have ended.
         table: the rows so far. step_plan: the base steps. place: the end of the last base step.
         resumed_from: the step of the checkpoint that it continues, None for a new run.
     """
@@ -57,6 +59,7 @@ class Session:
     checkpoint_every: int
     cross_check: Comparison | None
     progress: bool
+    wall_time: WallTime
     resumed_from: int | None = None
     last: Report | None = None
     dt: float = float("nan")
@@ -66,7 +69,11 @@ class Session:
     @property
     def root(self) -> bool:
         """Say whether this is rank 0, the one that speaks."""
-        return self.method.problem.system.algebra.comm.rank == 0
+        return self._comm.rank == 0
+
+    @property
+    def _comm(self) -> Comm:
+        return self.method.problem.system.algebra.comm
 
     def settings(self) -> dict[str, Any]:
         """Return what was asked for, for log and summary."""
@@ -77,7 +84,7 @@ class Session:
             "solver": repr(solver if self.cross_check is None else getattr(solver, "primary", solver)),
             "dt": described(method.dt),
             "tolerance": method.tolerance,
-            "ranks": problem.system.algebra.comm.size,
+            "ranks": self._comm.size,
             "unknowns": problem.system.space.unknowns,
             "contact_points": problem.surface.total,
             "boundaries": list(problem.system.notes),
@@ -107,6 +114,8 @@ class Session:
             interrupted = isinstance(error, KeyboardInterrupt)
             reason = str(error) or ("interrupted by the user" if interrupted else type(error).__name__)
             self._rescue(writer, "interrupted" if interrupted else "failed", reason, time.perf_counter() - begin)
+            if isinstance(error, Interrupted):  # on all ranks: none ends before the first has written
+                self._comm.bcast(None)
             raise
         facts = self._facts("finished", "", time.perf_counter() - begin) | {"seconds_per_linear_step": linear}
         warning = energy_warning(facts)
@@ -119,6 +128,7 @@ class Session:
         place = self.place
         loop = March(self.method, self.step_plan, place.state, place.base, place.halved)
         worst, begin = 0.0, time.perf_counter()
+        self.wall_time.begin()
         with closing(Progress(self.left, shown=self.progress and self.root)) as progress:
             for state, report in loop:
                 self._keep(state, report, writer)
@@ -127,7 +137,7 @@ class Session:
                 if loop.ended:
                     self.place = replace(place, state=state, base=loop.base, halved=loop.halved)
                     writer.frame(report, self.place.number)
-                    if self.place.number % self.checkpoint_every == 0:
+                    if self.place.number % self.checkpoint_every == 0 or self.wall_time.unsure:
                         self._checkpoint(writer)
                     if self.root:
                         progress.step(state.k, state.t, iterations=report.result.iterations, worst=worst)
@@ -137,12 +147,16 @@ class Session:
                 begin = time.perf_counter()
 
     def _stop_if_asked(self, writer: Writer, signals: StopSignals) -> None:
-        """Interrupted on all ranks, with a checkpoint, when a signal has reached one of them. Collective."""
-        number = signals.asked(self.method.problem.system.algebra.comm)
+        """Interrupted on all ranks, with a checkpoint, when a signal has reached one of them, or the time is nearly
+        over. Collective."""
+        number, late = signals.asked(self._comm, self.wall_time.over())
+        if not (number or late):
+            return
+        self._checkpoint(writer)
+        rest = f"ended the run after step {self.place.state.k}, t = {self.place.state.t:.6g} s: {writer.rest}"
         if number:
-            self._checkpoint(writer)
-            where = f"after step {self.place.state.k}, t = {self.place.state.t:.6g} s"
-            raise Interrupted(f"{Signals(number).name} ended the run {where}: {writer.rest}", number)
+            raise Interrupted(f"{Signals(number).name} {rest}", number)
+        raise OutOfTime(f"{self.wall_time.left:.0f} s left of the wall time {self.wall_time.text} {rest}")
 
     def _keep(self, state: State, report: Report, writer: Writer) -> None:
         """Everything that is recorded of a step, be it a base step or a part of one."""
@@ -158,7 +172,8 @@ class Session:
         self.last = report
 
     def _checkpoint(self, writer: Writer) -> None:
-        writer.checkpoint(self.place, lambda: self._about)
+        with self.wall_time.saving():
+            writer.checkpoint(self.place, lambda: self._about)
 
     @cached_property
     def _about(self) -> dict[str, Any]:
@@ -169,7 +184,7 @@ class Session:
     def _rescue(self, writer: Writer, status: str, reason: str, seconds: float) -> None:
         """Save what there is. A checkpoint of the last base step only on one rank: others might not come."""
         with suppress(Exception):
-            if self.method.problem.system.algebra.comm.size == 1:
+            if self._comm.size == 1:
                 self._checkpoint(writer)
         facts: dict[str, Any] = {"status": status, "reason": reason, "steps": self.place.state.k}
         with suppress(Exception):
@@ -188,6 +203,8 @@ class Session:
         if self.resumed_from is not None:
             log.info("continues from the checkpoint of step %d", self.resumed_from)
         log.info("%d steps to do", self.left)
+        if self.wall_time.text is not None:
+            log.info("%.0f s are left of the wall time %s", self.wall_time.left, self.wall_time.text)
 
     def _facts(self, status: str, reason: str, seconds: float) -> dict[str, Any]:
         """The content of summary.json."""

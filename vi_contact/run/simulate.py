@@ -25,6 +25,7 @@ from .recorders import Contact, Energy, Steps
 from .session import Comparison, Session
 from .solution import Solution
 from .time_steps import TimeSteps, step_plan
+from .wall_time import WallTime
 
 __all__ = ["Solution", "simulate"]
 
@@ -48,6 +49,7 @@ def simulate(
     progress: bool = True,
     fields: FieldWriter | None = None,
     cross_check: Comparison | None = None,
+    wall_time: str | None = None,
 ) -> Solution:
     """March to t_end, or for so many steps, and records. Collective; every rank gets the solution.
 
@@ -66,23 +68,24 @@ def simulate(
             ``steps`` and ``t_end`` are those of the whole run. The result is the uninterrupted run's: on one rank to
             the last bit, on several to round-off. Another problem, dt or scheme than that of the checkpoint is refused.
         changed: True continues all the same; after another dt, ``steps`` count from the checkpoint.
-        progress: a progress line on a terminal.
-        fields: fem.XDMF(every=10) for ParaView.
+        progress: a progress line on a terminal. fields: fem.XDMF(every=10) for ParaView.
         cross_check: whose report() goes into the summary.
+        wall_time: "11:30:00", as Slurm reads --time, from the start of the process: the run ends before it is over.
     Raises:
         InputError: before anything is computed or overwritten; also when another run writes into the folder.
         Interrupted: after the step in which some rank got SIGINT (Ctrl-C), SIGTERM or SIGHUP, with a checkpoint.
+        OutOfTime: likewise, before the wall time is over.
         StepFailure: a step no solver could certify; ViContactError: the disk refused something. All that was computed
             is in the folder then, and summary.json says why the run ended.
     """
     _check_outputs(record, out, restart, checkpoint_every, (progress, changed), fields, cross_check)
+    end = _wall_time(wall_time, out)
     solvers = solver, escalation
     method = checked_method(
         "simulate", problem, scheme, solvers, dt, steps=steps, t_end=t_end, state=state, tolerance=tolerance
     )
     problem, comm = method.problem, method.problem.system.algebra.comm
-    folder = None if out is None else run_folder(comm, out)
-    source = _source(restart, folder)
+    source = _source(restart, folder := None if out is None else run_folder(comm, out))
     recorders: list[Recorder] = [Steps(), *((Energy(), Contact()) if record is None else record)]
     with locked(comm, folder):
         place, checksum = _place(method, source, state, changed)
@@ -93,7 +96,7 @@ def simulate(
         if stored is not None:
             _started(problem, recorders, place.state, _restored(table, stored, comm))
         session = Session(
-            method, recorders, table, plan, place, checkpoint_every, cross_check, progress,
+            method, recorders, table, plan, place, checkpoint_every, cross_check, progress, end,
             resumed_from=None if stored is None else stored.k,
         )
         return session.go(Writer(problem, folder, fields, table, stored))
@@ -125,6 +128,13 @@ def _check_outputs(
         provides(owner, "fields", fields, ("open",), "give fem.XDMF(every=10), or None")
     if cross_check is not None:
         provides(owner, "cross_check", cross_check, ("report",), "give a CrossChecked solver, or None")
+
+
+def _wall_time(wall_time: str | None, out: Any) -> WallTime:
+    """The watch over a wall time, which needs a folder that keeps what a restart goes on from."""
+    if wall_time is not None and out is None:
+        raise InputError("wall_time needs out, the folder of the run to continue afterwards")
+    return WallTime(wall_time)
 
 
 def _source(restart: bool | str | Path, folder: Path | None) -> Path | None:

@@ -12,7 +12,9 @@ import threading
 from types import FrameType
 from typing import Any
 
-from ..core.algebra import Comm, largest
+import numpy as np
+
+from ..core.algebra import Comm
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
@@ -44,11 +46,12 @@ class StopSignals:
         if number == signal.SIGINT:
             signal.signal(number, signal.SIG_DFL)
 
-    def asked(self, comm: Comm) -> int:
-        """Return the number of a signal that some rank has got, the same on all ranks; 0 for none. Collective."""
-        number = int(largest(comm, self._found))
+    def asked(self, comm: Comm, over: bool = False) -> tuple[int, bool]:
+        """Return the number of a signal that some rank has got, 0 for none, and whether the time is over for one of
+        them: the same on all ranks. Collective, one reduction."""
+        number, late = comm.max(np.array([self._found, over], dtype=float))
         self._found = 0 if number else self._found
-        return number
+        return int(number), bool(late)
 
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         for number, before in self._before.items():

@@ -143,7 +143,7 @@ class Case:
 
     def run(
         self, comm: Any, *, out: str | Path | None = None, restart: bool | str | Path = False, progress: bool = True,
-        changed: bool = False,
+        changed: bool = False, wall_time: str | None = None,
     ) -> Solution:
         """Compute the whole run; collective. ``out``: the run folder, by default the one of [run], if any.
 
@@ -168,7 +168,7 @@ class Case:
                 problem, scheme=self._made("scheme"), solver=solver, state=state, out=folder, restart=restart,
                 record=self._recorders(parts),
                 escalation=self._several("escalation"), fields=self._made("fields"), progress=progress,
-                cross_check=solver if isinstance(solver, CrossChecked) else None, **own,
+                cross_check=solver if isinstance(solver, CrossChecked) else None, wall_time=wall_time, **own,
             )
 
     def _made(self, table: str, **context: Any) -> Any:

@@ -1,0 +1,78 @@
+"""End a run before its time is over: read a wall time as Slurm does, and say when what is left of it gets short."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from ..core.checks import shown
+from ..core.errors import InputError
+
+SAFETY = 2.0  # times the longest step and the checkpoint and histories at the end, as long as the longest so far
+_FORMS = "minutes, minutes:seconds, hours:minutes:seconds, days-hours, days-hours:minutes or days-hours:minutes:seconds"
+_UNITS = {"": ((60,), (60, 1), (3600, 60, 1)), "-": ((3600,), (3600, 60), (3600, 60, 1))}  # without and with days [s]
+_IMPORTED = time.monotonic()
+
+
+def seconds_of(wall_time: object) -> float:
+    """Return the seconds of a text that Slurm reads as --time; InputError for any other."""
+    text = wall_time if isinstance(wall_time, str) else ""
+    found = re.fullmatch(r"(?:(\d+)(-))?(\d+(?::\d+){0,2})", text, re.ASCII)
+    if found:
+        days, dash, rest = found.groups("")
+        parts = [int(part) for part in rest.split(":")]
+        units = _UNITS[dash][len(parts) - 1]
+        seconds = 86400 * int(days or 0) + sum(a * b for a, b in zip(units, parts, strict=True))
+        if 0 < seconds < 1e9:
+            return float(seconds)
+    raise InputError(f"the wall time {shown(wall_time)} is none that Slurm reads: give {_FORMS}, such as '11:30:00'")
+
+
+def age() -> float:
+    """Return the seconds since this process began; where the system does not tell, since this module was imported."""
+    try:
+        ticks = int(Path("/proc/self/stat").read_text().rpartition(")")[2].split()[19])
+        return time.clock_gettime(time.CLOCK_BOOTTIME) - ticks / os.sysconf("SC_CLK_TCK")
+    except (OSError, ValueError, IndexError, AttributeError):
+        return time.monotonic() - _IMPORTED
+
+
+class WallTime:
+    """Keep what base steps and checkpoints take, against the wall time of the process; None: there is no end."""
+
+    def __init__(self, wall_time: str | None = None) -> None:
+        self.text = wall_time
+        self._end = math.inf if wall_time is None else seconds_of(wall_time)
+        self._last, self._step, self._saving = 0.0, 0.0, math.nan
+
+    @property
+    def left(self) -> float:
+        """Return how much of the wall time is left [s]."""
+        return self._end - age()
+
+    @property
+    def unsure(self) -> bool:
+        """Say whether nobody knows yet how long a checkpoint takes, although it matters."""
+        return math.isnan(self._saving) and self._end < math.inf
+
+    def begin(self) -> None:
+        """Note that the first step begins now."""
+        self._last = age()
+
+    @contextmanager
+    def saving(self) -> Iterator[None]:
+        """Take the time of a checkpoint."""
+        begin = age()
+        yield
+        self._saving = max(age() - begin, self._saving) if self._saving >= 0.0 else age() - begin
+
+    def over(self) -> bool:
+        """Say, at the end of a base step, whether another one might not end in time."""
+        now = age()
+        self._step, self._last = max(self._step, now - self._last), now
+        return bool(self._end - now <= SAFETY * (self._step + 2.0 * self._saving))
