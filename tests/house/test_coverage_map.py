@@ -78,6 +78,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "run/test_proximal.py": "run.rigid_bodies",
     "run/test_restart_refused.py": "run.files.identity",
     "run/test_simulate.py": "core.version run.files.log",
+    "schemes/test_massless_contact.py": "solvers.beside_steps",
     "schemes/test_trapezoidal.py": "schemes.base",
     "soil/test_free_field.py": "core.companion core.problem_checks soil.companion soil.upgoing_wave",
     "solvers/test_friction_condensed.py": "solvers.certified solvers.friction.newton",

@@ -6,8 +6,8 @@ from .algebra import Comm, total
 from .errors import InputError
 
 DENSE_ROWS = 10_000  # 0.8 GB a matrix, and its factor and a copy while it is made, on every rank
-OWN_UNKNOWNS = 100_000  # with a factor of the mass matrix, in seconds and 1 GB, in 3D too
-OWN_CONDITIONS = 2_000  # with a dense matrix, as many back-substitutions
+OWN_UNKNOWNS = 50_000  # beyond it a factor of the mass matrix takes ten seconds, conjugate gradients a tenth of one
+OWN_CONDITIONS = 1_000  # as many back-substitutions, and a dense matrix
 
 
 def refuse_dense(owner: str, rows: int) -> None:

@@ -24,7 +24,9 @@ import numpy as np
 from ..core.algebra import Array, Factor, Indices, total
 from ..core.checks import between, function
 from ..core.corners import with_open_faces
+from ..core.free_unknowns import solve_free
 from ..core.protocols import Impact
+from ..core.sizes import small
 from ..core.surfaces import ContactSurface
 from ..core.system import SemiDiscreteSystem
 
@@ -61,10 +63,22 @@ class ImpulseUpdate:
     """Apply an impulse on the chosen contact unknowns: the M-orthogonal projection onto the wanted velocities.
 
     The system keeps the factor of M, and M⁻¹Bᵀ when it is small: one back-substitution per contact point at first, then
-    one per impact or a dense product.
+    one per impact or a dense product. Large systems are not factorised: M (v⁺ - v⁻) = 0 off the chosen unknowns, by
+    conjugate gradients to round-off at every impact.
     """
 
     def __call__(self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array) -> Array:
+        is_small = system.cached("small impacts", lambda: small(surface.comm, system.rows, surface.count))
+        return (self._condensed if is_small else self._iterative)(system, surface, v, target)
+
+    def _iterative(self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array) -> Array:
+        chosen = ~np.isnan(target)
+        held, jump = np.zeros(len(v), dtype=bool), np.zeros(len(v))
+        held[surface.owned[chosen]] = True
+        jump[surface.owned[chosen]] = (target - surface.normal_values(v))[chosen]
+        return v + solve_free(system.algebra, system.M, np.zeros(len(v)), held, jump)
+
+    def _condensed(self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array) -> Array:
         jump = surface.everywhere(target - surface.normal_values(v))
         chosen: Indices = np.flatnonzero(~np.isnan(jump))
         if len(chosen) == 0:

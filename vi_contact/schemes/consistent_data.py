@@ -25,11 +25,13 @@ from dataclasses import replace
 import numpy as np
 
 from ..core.algebra import Array, EffectiveMatrix, Mask, max_abs
+from ..core.free_unknowns import solve_free
 from ..core.problem import ContactProblem
+from ..core.sizes import small
 from ..core.step import PreparedSolver, State, StepProblem
 from ..core.surfaces import ContactSurface
+from ..solvers.beside_steps import solver_beside_steps
 from ..solvers.certified import TOLERANCE, CertifiedSolver
-from ..solvers.condensed import Condensed
 
 ROUND_OFF = 1e-12  # of the largest displacement or velocity: smaller gaps and velocities are zero
 
@@ -43,7 +45,15 @@ def consistent_acceleration(problem: ContactProblem, state: State, dt: float) ->
     if system.massless is None:
         return _with_contact(problem, state, force, dt)
     moving = np.where(system.massless, 0.0, force)
-    return mass_matrix(problem).factor.solve(moving), force - moving
+    return _moved(problem, moving, system.massless), force - moving
+
+
+def _moved(problem: ContactProblem, force: Array, massless: Mask) -> Array:
+    """M⁻¹ f, zero on massless unknowns."""
+    system = problem.equations
+    if small(system.algebra.comm, system.rows, 0):
+        return mass_matrix(problem).factor.solve(force)
+    return solve_free(system.algebra, system.M, force, massless, np.zeros_like(force))
 
 
 def _with_contact(problem: ContactProblem, state: State, force: Array, dt: float) -> tuple[Array, Array]:
@@ -71,7 +81,8 @@ def _with_contact(problem: ContactProblem, state: State, force: Array, dt: float
         rate_factor=dt,
     )
     solver: PreparedSolver = problem.equations.cached(
-        "resting contacts", lambda: Condensed().prepare(step.A, step.surface, 1.0)
+        "resting contacts",
+        lambda: solver_beside_steps(problem, step.A, step.surface).prepare(step.A, step.surface, 1.0),
     )
     result = solver.solve(step)
     return result.x, springs + surface.reaction_load(result.r_n, len(force), result.r_t)
@@ -113,7 +124,7 @@ def _resting(surface: ContactSurface, compression: Array, state: State) -> Mask:
 def equilibrated(problem: ContactProblem, state: State) -> State:
     """Return the state with its massless unknowns, if any, in equilibrium, and with the reactions that belong to it.
 
-    Only their own block of K is factorised, however large the body is.
+    Only their own block of K is factorised, however large the body is; not even that when it is large itself.
     """
     system, layer = problem.equations, problem.equations.massless
     if layer is None:
@@ -134,7 +145,8 @@ def equilibrated(problem: ContactProblem, state: State) -> State:
         friction=problem.friction,
         slip0=problem.slip_origin(state.u, state.t, state.t),
     )
-    result, _, _ = CertifiedSolver(problem, A, 1.0, [Condensed()], TOLERANCE, surface=surface).solve(step)
+    solver = solver_beside_steps(problem, A, surface)
+    result, _, _ = CertifiedSolver(problem, A, 1.0, [solver], TOLERANCE, surface=surface).solve(step)
     u = state.u.copy()
     u[layer] = result.x
     return replace(state, u=u, r_n=result.r_n, r_t=result.r_t, active=result.active)

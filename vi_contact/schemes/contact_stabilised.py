@@ -34,8 +34,8 @@ from ..core.errors import StepFailure
 from ..core.problem import ContactProblem
 from ..core.protocols import Frictionless
 from ..core.step import Balance, State, StepProblem, StepResult
+from ..solvers.beside_steps import solver_beside_steps
 from ..solvers.certified import TOLERANCE, CertifiedSolver
-from ..solvers.condensed import Condensed
 from .base import SingleStep, means, position_step, stepped
 from .consistent_data import mass_matrix, rigid_part
 
@@ -96,11 +96,14 @@ def admissible(problem: ContactProblem, state: State, u: Array, dt: float) -> tu
         "admissible predictor, bounds",
         lambda: replace(problem, surface=rigid_part(surface), friction=Frictionless()),
     )
-    solver: CertifiedSolver = system.cached(
-        "admissible predictor", lambda: CertifiedSolver(bounds, mass_matrix(problem), 1.0, [Condensed()], TOLERANCE)
-    )
+    M = mass_matrix(problem)
+
+    def prepared() -> CertifiedSolver:
+        return CertifiedSolver(bounds, M, 1.0, [solver_beside_steps(bounds, M, bounds.surface)], TOLERANCE)
+
+    solver: CertifiedSolver = system.cached("admissible predictor", prepared)
     step = StepProblem(
-        A=mass_matrix(problem),
+        A=M,
         b=np.zeros_like(u),
         bound=gap,
         surface=bounds.surface,
