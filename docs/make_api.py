@@ -290,20 +290,18 @@ def short_names() -> Iterator[str]:
 
 
 def room(name: str) -> Iterator[str]:
-    """Yield the names of one room; of a room that hands nothing on, those of each of its modules."""
+    """Yield the names of one room; of a room that hands on whole modules, those of each."""
     where = module(name)
-    yield f"## `vi_contact.{name}`\n\n{documentation(where.tree)}\n"
+    told = re.sub(r"(?ms)\n^>>> .*", lambda example: f"\n\n```pycon{example[0]}\n```", documentation(where.tree))
+    yield f"## `vi_contact.{name}`\n\n{told}\n"
     if public(where):
         yield from (entry(where, one) for one in public(where))
         yield ""
         return
-    for file in sorted(file_of(name).parent.rglob("*.py")):
-        path = ".".join(file.relative_to(PACKAGE).with_suffix("").parts)
-        names = [] if file.name.startswith("_") else public(module(path))
-        if names:
-            yield f"`vi_contact.{path}`:\n"
-            yield from (entry(module(path), one) for one in names)
-            yield ""
+    for part in contents(where):
+        yield f"`vi_contact.{name}.{part}`:\n"
+        yield from (entry(module(f"{name}.{part}"), one) for one in public(module(f"{name}.{part}")))
+        yield ""
 
 
 def page() -> str:

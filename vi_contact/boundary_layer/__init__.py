@@ -1,9 +1,11 @@
 """Model contact in a thin layer before the obstacle, as a smooth force: b-geometry.
 
-``layer``: the boundary force and its cut-off; ``particle``: its closed form; ``metric``: b-metric and b-affinities;
-``motion``: any constrained system as ordinary differential equations, which ``trajectory`` integrates;
-``rigid_body``: a rolling ellipsoid; ``bilateral``: equality constraints; ``contact_law`` and ``scheme``: the law at the
-contact nodes of a finite element body. See docs/theory/boundary_layer.md.
+Begin with ``layer`` (force, cut-off) and ``particle`` (closed form). ``motion`` and ``trajectory`` take any constrained
+system, ``rigid_body`` an ellipsoid, ``bilateral`` equality constraints; ``metric``: b-metric and b-affinities;
+``contact_law``, ``scheme``: contact nodes of finite element bodies. See docs/theory/boundary_layer.md.
+>>> from vi_contact.boundary_layer import ParticleImpact, layer_for
+>>> round(ParticleImpact(layer_for(0.5, mass=1.0, speed=2.0, width=1e-3), mass=1.0, speed=2.0).restitution, 9)
+0.5
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Hold the contract between schemes and solvers, and what everything stands on. Read ``step`` first."""
+"""Hold the contract between schemes and solvers, and what everything stands on.
+
+Read ``step.py`` first: ``Scheme``, ``Solver``, ``Recorder`` and the values between them. A ``ContactProblem`` is a
+``SemiDiscreteSystem`` (M, C, K, loads) with a ``ContactSurface``; ``verify.py`` judges. See docs/theory/routes.md."""
 
 from __future__ import annotations
 

@@ -3,7 +3,7 @@
 A mesh is a frozen value with a method `build(gmsh)` that adds geometry, named physical groups and cells to Gmsh's
 current model. `write(mesh, path)` of `gmsh_session` makes a file of it, `fem.build_mesh(mesh, comm)` a distributed
 mesh without a file. Each script also runs by itself: `python3 meshes/wall.py --help`. Lengths in metres, angles in
-radians.
+radians. Begin with ``wall.py``.
 """
 
 from __future__ import annotations

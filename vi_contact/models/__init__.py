@@ -1,1 +1,17 @@
-"""Hold problems ready to run: a value that describes one, and ``build``, which makes the contact problem of it."""
+"""Hold problems ready to run, one a module: a value that describes one, and ``build``, which assembles it.
+
+What ``build`` returns has the ``problem`` to simulate. Two modules without ``build`` serve the room ``bem``.
+>>> from mpi4py import MPI
+>>> from vi_contact import models, run
+>>> model = models.bar.build(models.bar.Bar(elements=8), MPI.COMM_WORLD)
+>>> run.simulate(model.problem(), dt=model.bar.time_step(), steps=10).facts["status"]
+'finished'
+"""
+
+from ..core.lazy import lazy
+
+_CONTENTS = {  # modules that are handed on whole
+    "ball": (), "bar": (), "boundary_curve": (), "boundary_elements": (), "channel": (), "disk": (), "embedded": (),
+    "rocking_block": (), "sliding_block": (), "square": (), "wall": (),
+}
+__all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)

@@ -1,4 +1,7 @@
-"""Draw runs, records and studies, and write the page about a run. matplotlib is imported when something is drawn."""
+"""Draw runs, records and studies, and write the page about a run. matplotlib is imported when something is drawn.
+
+Begin with ``plot_report(run.read_run(folder), "report.pdf")``, the page about a run; ``draw_run`` draws its pictures.
+The ending of a file's name says its format: docs/guide/outputs.md."""
 
 from __future__ import annotations
 

@@ -5,9 +5,9 @@ its gravity stage, too, where sides or base hold no static load: ``fem.release``
 """
 
 from .model import Channel, ChannelModel, Openings, SoilProbe, build, staged, weighted
-from .sides import DashpotSides, Fixed, FreeFieldSides, RockBelow, Rollers, Sides, TiedSides
+from .sides import DashpotSides, Fixed, FreeFieldSides, RockBelow, Rollers, Sides, TiedSides, bedrock
 
 __all__ = [
     "Channel", "ChannelModel", "DashpotSides", "Fixed", "FreeFieldSides", "Openings", "RockBelow", "Rollers",
-    "Sides", "SoilProbe", "TiedSides", "build", "staged", "weighted",
+    "Sides", "SoilProbe", "TiedSides", "bedrock", "build", "staged", "weighted",
 ]

@@ -27,7 +27,7 @@ from ...laws.impact import VelocityUpdate
 from ...laws.materials import Damping, LinearElastic, Section
 from ...meshes.gmsh_session import MeshScript
 from ...models import channel, wall
-from ...models.channel.sides import bedrock
+from ...models.channel import bedrock
 from ...run import HalvedAtImpact, Schedule
 from ...run.files.writer import FieldWriter
 from ...soil import FreeField, UpgoingVelocity, upgoing

@@ -1,0 +1,22 @@
+"""Every room says how to use it, in words and in an example that runs, and lists its public names."""
+
+import doctest
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+import vi_contact
+
+pytestmark = pytest.mark.serial
+ROOMS = sorted(path.parent.name for path in Path(vi_contact.__file__).parent.glob("*/__init__.py"))
+WITHOUT_EXAMPLE = {"core", "meshes", "run", "plots", "cli"}
+
+
+@pytest.mark.parametrize("name", ROOMS)
+def test_a_room_says_how_to_use_it(name):
+    room = import_module(f"vi_contact.{name}")
+    assert 4 <= len(room.__doc__.strip().splitlines()) <= 9
+    ran = doctest.testmod(room, globs={})
+    assert ran.failed == 0 and (ran.attempted > 0) is (name not in WITHOUT_EXAMPLE)
+    assert room.__all__ and all(getattr(room, public) is not None for public in room.__all__)
