@@ -23,7 +23,7 @@ class Contact:
     """Hold the closed set of one step. ``rows``: where the normal unknowns stand in the padded vectors of ``size``."""
 
     def __init__(self, surface: ContactSurface, scale: float, rows: Indices, diagonal: Array, missing: Indices) -> None:
-        self.rows, self._size, self._missing = rows, len(diagonal), missing
+        self._owned, self.rows, self._size, self._missing = surface.owned, rows, len(diagonal), missing
         self.bilateral, self.soft = surface.bilateral, surface.compliance > 0.0
         self.k = np.zeros(len(rows))
         self.k[self.soft] = scale / surface.compliance[self.soft]
@@ -31,12 +31,13 @@ class Contact:
         self.closed: Mask = np.zeros(len(rows), dtype=bool)
 
     def begin(self, step: StepProblem) -> None:
-        """Take the bounds of a step, and its predicted set."""
+        """Take the bounds of a step, and its predicted set with the points that the guess lets penetrate."""
         if np.isnan(step.bound).any():
             raise InputError("the bound of the contact conditions contains NaN: check the gap and the time scheme")
         self.reach = np.isfinite(step.bound)
         self.bound = np.where(self.reach, step.bound, 0.0)
-        self.closed = (step.active | self.bilateral) & self.reach
+        inside = step.guess[self._owned] > self.bound
+        self.closed = (step.active | self.bilateral | inside) & self.reach
 
     @property
     def held(self) -> Indices:

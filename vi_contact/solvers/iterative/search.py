@@ -22,6 +22,7 @@ from .measures import Measured, largest_free
 from .operator import Operator
 from .preconditioners import Inverse, Masked
 
+GOAL = 0.7  # of the tolerance: the rest is for what the carried residual and the one formed afresh differ by
 FALL = 0.1  # of the residual between two looks at the signs
 
 
@@ -77,7 +78,7 @@ class Search:
         """Take the references at x, and note the residual."""
         self._mark, self._since = FALL * norm, iteration
         self.scales = self.measured(self.contact, x, residual, self.load)
-        self.goal = 0.5 * self.tolerance * self.scales.force
+        self.goal = GOAL * self.tolerance * self.scales.force
         self._note(norm)
 
     def _note(self, norm: float) -> None:
