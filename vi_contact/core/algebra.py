@@ -8,7 +8,7 @@ returned by ``dot`` and by ``Comm`` are the same number on every rank.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any, Protocol, SupportsFloat
 
@@ -106,13 +106,12 @@ class Algebra(Protocol):
         """Return the number, among those of all ranks, of the first of the n unknowns that this rank owns."""
         ...
 
-    def entries(self, A: Matrix, row: int) -> tuple[Indices, Array]:
-        """Return (columns numbered over all ranks, values) of an owned row."""
+    def entries(self, A: Matrix, rows: Indices) -> sp.csr_matrix:
+        """Return these owned rows of A, ascending, their columns numbered over all ranks. Collective."""
         ...
 
-    def replaced_rows(self, n: int, rows: Mapping[int, tuple[Indices, Array]]) -> Matrix:
-        """Return the identity with some owned rows replaced by (columns numbered over all ranks, values); n owned rows.
-        """
+    def replaced_rows(self, n: int, rows: Indices, entries: sp.csr_matrix) -> Matrix:
+        """Return the identity of n owned rows with some of them replaced, columns numbered over all ranks."""
         ...
 
     def factor(self, A: Matrix) -> Factor: ...
@@ -232,13 +231,11 @@ class SerialAlgebra:
     def first(self, n: int) -> int:
         return 0
 
-    def entries(self, A: Matrix, row: int) -> tuple[Indices, Array]:
-        csr = serial(A).csr
-        part = slice(csr.indptr[row], csr.indptr[row + 1])
-        return csr.indices[part].astype(np.int64), csr.data[part]
+    def entries(self, A: Matrix, rows: Indices) -> sp.csr_matrix:
+        return serial(A).csr[rows]
 
-    def replaced_rows(self, n: int, rows: Mapping[int, tuple[Indices, Array]]) -> Matrix:
-        return SerialMatrix(sp.csr_matrix(identity_with(n, rows, first=0, columns=n)))
+    def replaced_rows(self, n: int, rows: Indices, entries: sp.csr_matrix) -> Matrix:
+        return SerialMatrix(identity_with(n, rows, entries, first=0))
 
     def factor(self, A: Matrix) -> Factor:
         return SerialFactor(serial(A))
@@ -254,12 +251,10 @@ def serial(matrix: Matrix) -> SerialMatrix:
     return matrix
 
 
-def identity_with(n: int, rows: Mapping[int, tuple[Indices, Array]], *, first: int, columns: int) -> sp.coo_matrix:
-    """Return n rows of the identity, whose ones begin in column ``first``, with some rows replaced by (columns,
-    values)."""
-    kept = np.setdiff1d(np.arange(n), np.fromiter(rows, dtype=np.int64, count=len(rows)))
-    where = [kept] + [np.full(len(found), row) for row, (found, _) in rows.items()]
-    column = [first + kept] + [found for found, _ in rows.values()]
-    values = [np.ones(len(kept))] + [value for _, value in rows.values()]
-    entries = np.concatenate(values), (np.concatenate(where), np.concatenate(column))
-    return sp.coo_matrix(entries, shape=(n, columns))
+def identity_with(n: int, rows: Indices, entries: sp.csr_matrix, *, first: int) -> sp.coo_matrix:
+    """Return n rows of the identity, whose ones begin in column ``first``, with these rows replaced by the entries."""
+    kept = np.setdiff1d(np.arange(n), rows)
+    where = np.concatenate([kept, np.repeat(rows, np.diff(entries.indptr))])
+    column = np.concatenate([first + kept, entries.indices])
+    values = np.concatenate([np.ones(len(kept)), entries.data])
+    return sp.coo_matrix((values, (where, column)), shape=(n, entries.shape[1]))

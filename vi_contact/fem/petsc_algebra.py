@@ -220,13 +220,18 @@ class PetscAlgebra:
     def _all(self, n: int) -> int:
         return int(self.comm.mpi.allreduce(n))
 
-    def entries(self, A: Matrix, row: int) -> tuple[Indices, Array]:
+    def entries(self, A: Matrix, rows: Indices) -> sp.csr_matrix:
         mat = as_petsc(A).mat
-        columns, values = mat.getRow(mat.getOwnershipRange()[0] + row)
-        return columns.astype(np.int64), values
+        (start, _), (first, last) = mat.getOwnershipRange(), mat.getOwnershipRangeColumn()
+        chosen = PETSc.IS().createGeneral((start + rows).astype(PETSc.IntType), comm=mat.comm)
+        whole = PETSc.IS().createStride(last - first, first, 1, comm=mat.comm)
+        part = mat.createSubMatrix(chosen, whole)
+        ends, columns, values = part.getValuesCSR()
+        part.destroy()
+        return sp.csr_matrix((values, columns, ends), shape=(len(rows), mat.getSize()[1]))
 
-    def replaced_rows(self, n: int, rows: Mapping[int, tuple[Indices, Array]]) -> Matrix:
-        return self._matrix(identity_with(n, rows, first=self.first(n), columns=self._all(n)))
+    def replaced_rows(self, n: int, rows: Indices, entries: sp.csr_matrix) -> Matrix:
+        return self._matrix(identity_with(n, rows, entries, first=self.first(n)))
 
     def with_identity_rows(self, A: Matrix, mask: Mask) -> Matrix:
         every = np.arange(len(mask))

@@ -104,7 +104,7 @@ def _faced(system: SemiDiscreteSystem, coupling: Matrix, contact: Mask) -> Mask:
     """The unknowns of side 2 that contact nodes face: with mass they would ring between the springs of both bodies.
     Collective."""
     algebra, faced = system.algebra, np.zeros(system.rows, dtype=bool)
-    faced[named(system, [algebra.entries(coupling, int(row))[0] for row in np.flatnonzero(contact)])] = True
+    faced[named(system, algebra.entries(coupling, np.flatnonzero(contact)).indices)] = True
     return faced
 
 

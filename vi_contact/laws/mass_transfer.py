@@ -10,14 +10,17 @@ so that every rigid motion is kept exactly. In 1D it is the velocity of the neig
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
 
-from ..core.algebra import Array, Indices, Mask, Matrix, largest
+from ..core.algebra import Array, Indices, Mask, Matrix, from_each, largest
 from ..core.errors import InputError
 from ..core.system import SemiDiscreteSystem
 
+BATCH = 4096  # rows that are fitted at a time: bounds the memory
 KEPT = 1e-10  # of a rigid motion, in the units of the neighbourhood
 NOTHING = 1e-10  # of a node's own mass: neighbours with less cannot carry it
 
@@ -37,10 +40,9 @@ def from_neighbours(system: SemiDiscreteSystem, massless: Mask, contact: Mask, n
     if system.tied is not None:
         donors &= ~system.tied
     while largest(comm, left.any()):
-        rows = _rows(system, left, donors, nodal, exact=exact)
-        if largest(comm, len(rows)):
-            levels.append(algebra.replaced_rows(system.rows, rows))
-            ready = np.fromiter(rows, dtype=np.int64, count=len(rows))
+        ready, entries = _rows(system, left, donors, nodal, exact=exact)
+        if largest(comm, len(ready)):
+            levels.append(algebra.replaced_rows(system.rows, ready, entries))
             left[ready] = False
             donors |= contact & np.isin(node, node[ready])
         elif exact:
@@ -55,26 +57,40 @@ def from_neighbours(system: SemiDiscreteSystem, massless: Mask, contact: Mask, n
 
 def _rows(
     system: SemiDiscreteSystem, left: Mask, donors: Mask, nodal: Array, *, exact: bool
-) -> dict[int, tuple[Indices, Array]]:
-    """Rows of P for those of the unknowns ``left`` that have neighbours among the donors; ``exact``: enough of them to
-    keep every rigid motion."""
-    entries = {int(row): system.algebra.entries(system.M, row) for row in np.flatnonzero(left)}
-    neighbours = _neighbours(system, donors, [columns for columns, _ in entries.values()])
-    points, rows = system.space.coordinates, {}
-    node = np.asarray(system.space.ids) // system.influence.shape[1]
-    for row, (columns, values) in entries.items():
-        weights = neighbours.weights(columns, values)
-        if weights.sum() > NOTHING * nodal[row]:
-            fitted, error = neighbours.fit(weights, system.influence[row], points[row], turning=exact)
-            if error <= KEPT or not exact:
-                rows[row] = fitted
-    waiting = set(node[[row for row in entries if row not in rows]])  # a node goes as a whole
-    return {row: fitted for row, fitted in rows.items() if node[row] not in waiting}
+) -> tuple[Indices, sp.csr_matrix]:
+    """(numbers, rows of P) of those of the unknowns ``left`` that have neighbours among the donors; ``exact``: enough
+    of them to keep every rigid motion. Collective."""
+    asked = np.flatnonzero(left)
+    entries = system.algebra.entries(system.M, asked)
+    neighbours = _neighbours(system, donors, entries.indices)
+    weights = neighbours.weights(entries)
+    enough = np.asarray(weights.sum(axis=1)).ravel() > NOTHING * nodal[asked]
+    fitted, fits = neighbours.of_unknowns(weights), np.zeros(len(asked), dtype=bool)
+    directions, points = system.influence[asked], system.space.coordinates[asked]
+    for rows in _alike(np.diff(fitted.indptr), enough):
+        places = fitted.indptr[rows][:, None] + np.arange(fitted.indptr[rows[0] + 1] - fitted.indptr[rows[0]])
+        row, error = neighbours.fit(
+            fitted.indices[places], fitted.data[places], directions[rows], points[rows], turning=exact
+        )
+        fitted.data[places] = row
+        fits[rows] = True if not exact else error <= KEPT
+    node = np.asarray(system.space.ids)[asked] // system.influence.shape[1]
+    fits &= ~np.isin(node, node[~fits])  # a node goes as a whole
+    columns = neighbours.columns[fitted.indices] if len(fitted.indices) else np.zeros(0, dtype=np.int64)
+    rows_of_p = sp.csr_matrix((fitted.data, columns, fitted.indptr), shape=entries.shape)
+    return asked[fits], rows_of_p[fits]
+
+
+def _alike(counts: Indices, chosen: Mask) -> Iterator[Indices]:
+    """The chosen rows, in batches of those with the same count."""
+    for count in np.unique(counts[chosen]):
+        rows = np.flatnonzero(chosen & (counts == count))
+        yield from np.split(rows, range(BATCH, len(rows), BATCH))
 
 
 @dataclass(frozen=True)
 class _Neighbours:
-    """Unknowns of all donor nodes next to contact nodes, on every rank, sorted by column.
+    """Unknowns of all donor nodes next to the contact nodes of this rank, and some others, sorted by column.
 
     columns: numbers over all ranks; node: 0, 1, … of their nodes; directions, points: (k, d).
     """
@@ -84,61 +100,85 @@ class _Neighbours:
     directions: Array
     points: Array
 
-    def weights(self, columns: Indices, values: Array) -> Array:
-        """Weight of every donor node in a row of M: the size of its entries there."""
-        place = np.minimum(np.searchsorted(self.columns, columns), max(len(self.columns) - 1, 0))
-        found = self.columns[place] == columns if len(self.columns) else np.zeros(len(columns), dtype=bool)
-        total = np.zeros(int(self.node.max(initial=-1)) + 1)
-        np.add.at(total, self.node[place[found]], values[found] ** 2)
-        return np.asarray(np.sqrt(total))
+    def weights(self, entries: sp.csr_matrix) -> sp.csr_matrix:
+        """Weight of every donor node in rows of M: the size of its entries there."""
+        rows, count = np.repeat(np.arange(entries.shape[0]), np.diff(entries.indptr)), len(self.columns)
+        place = np.minimum(np.searchsorted(self.columns, entries.indices), max(count - 1, 0))
+        found = self.columns[place] == entries.indices if count else np.zeros(len(rows), dtype=bool)
+        nodes = int(self.node.max(initial=-1)) + 1
+        pairs, which = np.unique(rows[found] * nodes + self.node[place[found]], return_inverse=True)
+        sizes = np.sqrt(np.bincount(which.ravel(), weights=entries.data[found] ** 2, minlength=len(pairs)))
+        used = sizes > 0.0
+        row, node = np.divmod(pairs[used], max(nodes, 1))
+        return sp.csr_matrix((sizes[used], (row, node)), shape=(entries.shape[0], nodes))
+
+    def of_unknowns(self, weights: sp.csr_matrix) -> sp.csr_matrix:
+        """Weights of nodes, told to every unknown of theirs, columns ascending."""
+        count = len(self.columns)
+        spread = sp.csr_matrix((np.ones(count), (self.node, np.arange(count))), shape=(weights.shape[1], count))
+        found = sp.csr_matrix(weights @ spread)
+        found.sort_indices()
+        return found
 
     def fit(
-        self, weights: Array, direction: Array, point: Array, *, turning: bool
-    ) -> tuple[tuple[Indices, Array], float]:
-        """(columns, values) of the row R_i G⁻¹ w_J R_Jᵀ, and how much of a rigid motion it loses; with ``turning``
-        False of translations only, which a single neighbour can tell."""
-        of_unknown = weights[self.node]
-        used = np.flatnonzero(of_unknown)
-        offset = self.points[used] - point
-        size = float(np.max(np.abs(offset)))
+        self, used: Indices, weights: Array, directions: Array, points: Array, *, turning: bool
+    ) -> tuple[Array, Array]:
+        """(rows R_i G⁻¹ w_J R_Jᵀ (n, k) on the ``used`` neighbours (n, k), how much of a rigid motion each loses); with
+        ``turning`` False of translations only, which a single neighbour can tell."""
+        offset = self.points[used] - points[:, None, :]
+        size = np.max(np.abs(offset), axis=(1, 2))[:, None, None]
         R = rigid_motions(self.directions[used], offset / size)
-        target = rigid_motions(direction[None, :], np.zeros((1, len(point))))[0]
+        target = rigid_motions(directions, np.zeros_like(points))
         if not turning:
-            R, target = R[:, : len(point)], target[: len(point)]
-        root = np.sqrt(of_unknown[used])
-        U, values, V = np.linalg.svd(root[:, None] * R, full_matrices=False)
-        kept = values > 1e-8 * values[0]
-        row = root * (U[:, kept] @ (V[kept] @ target / values[kept]))
-        return (self.columns[used], row), float(np.max(np.abs(row @ R - target)))
+            d = points.shape[1]
+            R, target = R[:, :, :d], target[:, :d]
+        root = np.sqrt(weights)
+        U, values, V = np.linalg.svd(root[:, :, None] * R, full_matrices=False)
+        kept = values > 1e-8 * values[:, :1]
+        share = np.where(kept, (V @ target[:, :, None])[:, :, 0] / np.where(kept, values, 1.0), 0.0)
+        by_columns = np.ascontiguousarray(U.swapaxes(1, 2)).swapaxes(1, 2)  # one order of sums, whatever the batch
+        row = root * (by_columns @ share[:, :, None])[:, :, 0]
+        return row, np.max(np.abs((row[:, None, :] @ R)[:, 0] - target), axis=1)
 
 
-def _neighbours(system: SemiDiscreteSystem, donors: Mask, columns: list[Indices]) -> _Neighbours:
-    """What all ranks need to know of the donor nodes in these columns. Collective."""
-    comm, d = system.algebra.comm, system.influence.shape[1]
-    first, node = system.algebra.first(system.rows), np.asarray(system.space.ids) // d
-    asked = named(system, columns)
-    own = np.flatnonzero(np.isin(node, node[asked[donors[asked]]]))
-    told = (first + own, node[own], system.influence[own], system.space.coordinates[own])
-    parts = comm.bcast(comm.gather(told))
-    numbers, nodes, directions, points = (np.concatenate([part[i] for part in parts]) for i in range(4))
+def _neighbours(system: SemiDiscreteSystem, donors: Mask, columns: Indices) -> _Neighbours:
+    """What this rank needs to know of the donor nodes in these columns; those that other ranks own are told to all.
+    Collective."""
+    d, first = system.influence.shape[1], system.algebra.first(system.rows)
+    node, every = np.asarray(system.space.ids) // d, system.space.coordinates
+
+    def told(asked: Indices) -> tuple[Indices, Indices, Array, Array]:
+        own = np.flatnonzero(np.isin(node, node[asked[donors[asked]]]))
+        return first + own, node[own], system.influence[own], every[own]
+
+    mine, foreign = _owned(system, columns)
+    others = from_each(system.algebra.comm, told(foreign))
+    others[system.algebra.comm.rank] = told(mine)
+    numbers, nodes, directions, points = (np.concatenate([part[i] for part in others]) for i in range(4))
     order = np.argsort(numbers)
     _, place = np.unique(nodes[order], return_inverse=True)
-    return _Neighbours(numbers[order], place, directions[order], points[order])
+    return _Neighbours(numbers[order], place.ravel(), directions[order], points[order])
 
 
-def named(system: SemiDiscreteSystem, columns: list[Indices]) -> Indices:
+def _owned(system: SemiDiscreteSystem, columns: Indices) -> tuple[Indices, Indices]:
+    """Those owned unknowns whose columns this rank names, and those that others name. Collective."""
+    first, named = system.algebra.first(system.rows), np.unique(columns)
+    mine = (named >= first) & (named < first + system.rows)
+    away = np.unique(np.concatenate(from_each(system.algebra.comm, named[~mine])))
+    return named[mine] - first, away[(away >= first) & (away < first + system.rows)] - first
+
+
+def named(system: SemiDiscreteSystem, columns: Indices) -> Indices:
     """Return those owned unknowns whose columns any rank names. Collective."""
-    comm, first = system.algebra.comm, system.algebra.first(system.rows)
-    mine = np.unique(np.concatenate(columns)) if columns else np.zeros(0, dtype=np.int64)
-    wanted = np.unique(np.concatenate(comm.bcast(comm.gather(mine))))
-    return np.asarray(wanted[(wanted >= first) & (wanted < first + system.rows)] - first)
+    return np.union1d(*_owned(system, columns))
 
 
 def rigid_motions(directions: Array, offset: Array) -> Array:
-    """Return the rows R of rigid motions: d translations and the rotations, of unknowns with these directions at these
-    places."""
-    d = directions.shape[1]
+    """Return the rows R of rigid motions (…, modes): d translations and the rotations, of unknowns with these
+    directions (…, d) at these places."""
+    d = directions.shape[-1]
     turns = [
-        directions[:, j] * offset[:, i] - directions[:, i] * offset[:, j] for i in range(d) for j in range(i + 1, d)
+        directions[..., j] * offset[..., i] - directions[..., i] * offset[..., j]
+        for i in range(d) for j in range(i + 1, d)
     ]
-    return np.column_stack([directions, *turns])
+    return np.concatenate([directions, np.stack(turns, axis=-1)] if turns else [directions], axis=-1)

@@ -115,11 +115,19 @@ class NodalFrames:
             self.rubs[slots] = False
             self.rubs[slots[0]] = np.delete(free, self.column[slots[0]])
 
+    def own_vectors(self) -> Mask:
+        """Return which vectors (m, d) of its node belong to each condition: its direction, and those that rub."""
+        m, d = self.place.size, self.blocks.shape[1]
+        own = np.zeros((m, d), dtype=bool)
+        np.put_along_axis(own, others(self.column, d), self.rubs, axis=1)
+        own[np.arange(m), self.column] = True
+        return own
+
     @property
     def tangents(self) -> Array:
         """Return the tangential vectors (m, d, d-1) of each condition, in the order of the tangential unknowns."""
-        blocks = self.blocks[self.place]
-        return np.array([np.delete(block, c, axis=1) for block, c in zip(blocks, self.column, strict=True)])
+        beside = others(self.column, self.blocks.shape[1])
+        return np.take_along_axis(self.blocks[self.place], beside[:, None, :], axis=2)
 
     def _refuse_prescribed(self, held: Mask) -> None:
         for slot in np.flatnonzero(np.any(held & (self.directions != 0.0), axis=1)):
@@ -144,6 +152,12 @@ class NodalFrames:
                 "dimensions: take the corner for smooth (a larger feature_angle=), or leave the node out of some of "
                 "its surfaces (points=)"
             )
+
+
+def others(column: Indices, d: int) -> Indices:
+    """Return the columns (m, d-1) beside these (m,), ascending."""
+    beside = np.arange(d - 1)[None, :]
+    return np.asarray(beside + (beside >= column[:, None]))
 
 
 def corner_of(directions: Array) -> tuple[list[int], Array]:
@@ -231,23 +245,22 @@ def _coupling(
     if all(part.facing is None for part in parts):
         return None
     _refuse_chains(parts)
-    algebra, rows, slot = PetscAlgebra(space.mesh.comm), {}, -1
-    first = algebra.first(len(space.ids))
+    algebra, n = PetscAlgebra(space.mesh.comm), len(space.ids)
+    first, total = algebra.first(n), space.unknowns
+    own, entries, start = [np.zeros(0, dtype=np.int64)], [sp.csr_matrix((0, total))], 0
+    relative = frames.own_vectors()
     for part in parts:
-        turns = None if part.facing is None else _turns(frames, part.facing.nodes)
-        for row in range(len(part.nodes.numbers)):
-            slot += 1
-            if part.facing is None or turns is None:
-                continue
-            place = frames.place[slot]
-            own_column = int(frames.column[slot])
-            others = np.delete(np.arange(space.dimension), own_column)[frames.rubs[slot]]
-            for c in (own_column, *others):
-                own = int(index[place, c])
-                if own >= 0:
-                    faced, values = _faced(part.facing, row, turns, frames.blocks[place][:, c])
-                    rows[own] = np.append(first + own, faced), np.append(1.0, values)
-    return as_petsc(algebra.replaced_rows(len(space.ids), rows))
+        slots = slice(start, start + len(part.nodes.numbers))
+        start = slots.stop
+        if part.facing is None:
+            continue
+        place, turns = frames.place[slots], _turns(frames, part.facing.nodes)
+        for c in range(space.dimension):
+            rows = np.flatnonzero(relative[slots, c] & (index[place, c] >= 0))
+            own.append(index[place[rows], c])
+            diagonal = sp.csr_matrix((np.ones(len(rows)), (np.arange(len(rows)), first + own[-1])), (len(rows), total))
+            entries.append(diagonal + _faced(part.facing, rows, turns, frames.blocks[place[rows], :, c], total))
+    return as_petsc(algebra.replaced_rows(n, np.concatenate(own), sp.csr_matrix(sp.vstack(entries))))
 
 
 def _turns(frames: NodalFrames, nodes: Nodes) -> Array:
@@ -259,14 +272,15 @@ def _turns(frames: NodalFrames, nodes: Nodes) -> Array:
     return turns
 
 
-def _faced(facing: Facing, row: int, turns: Array, direction: Array) -> tuple[Indices, Array]:
-    """(numbers over all ranks, coefficients) of direction·sum_j P_sj u_j in the unknowns û."""
-    entries = slice(facing.P.indptr[row], facing.P.indptr[row + 1])
-    partners, shares = facing.P.indices[entries], facing.P.data[entries]
+def _faced(facing: Facing, rows: Indices, turns: Array, directions: Array, total: int) -> sp.csr_matrix:
+    """Coefficients (rows, ``total`` unknowns û) of direction·sum_j P_sj u_j."""
+    shares = sp.csr_matrix(facing.P[rows])
+    row, partners = np.repeat(np.arange(len(rows)), np.diff(shares.indptr)), shares.indices
+    values = shares.data[:, None] * np.matmul(directions[row][:, None, :], turns[partners])[:, 0]
     unknowns = facing.nodes.unknowns[partners]
-    values = shares[:, None] * (direction @ turns[partners])
     used = (unknowns >= 0) & (values != 0.0)
-    return unknowns[used], values[used]
+    places = np.broadcast_to(row[:, None], used.shape)[used], unknowns[used]
+    return sp.csr_matrix((values[used], places), shape=(len(rows), total))
 
 
 def _refuse_chains(parts: Sequence[NodalConditions]) -> None:
