@@ -31,6 +31,7 @@ _CONTENTS = {
     "core.certificate": ("Certificate",),
     "core.step": ("Report", "State", "StepProblem", "StepResult"),
     "schemes": schemes.__all__,
+    "solvers.automatic": ("Automatic",),
     "solvers.condensed": ("Condensed",),
     "solvers.iterative": ("Iterative",),
     "solvers.volume": ("Volume",),

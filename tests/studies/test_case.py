@@ -498,7 +498,7 @@ def test_schemes_and_solvers_have_one_vocabulary() -> None:
     """Case files, the command line, ``vc.`` and the rooms say the same names, each listed once."""
     assert {name.split(".")[0] for name in names_of(Scheme)} == set(schemes.__all__) <= set(vc.__all__)
     assert {"GeneralisedAlpha.spectral_radius", "LinearMultistep.newmark"} <= set(names_of(Scheme))
-    assert set(names_of(Solver)) == {"Condensed", "Iterative", "Volume", "CrossChecked"} <= set(vc.__all__)
+    assert set(names_of(Solver)) == {"Automatic", "Condensed", "Iterative", "Volume", "CrossChecked"} <= set(vc.__all__)
     assert set(names_of(FrictionMethod)) == set(solvers.friction.__all__) - {
         "Aitken", "Anderson", "Plain", "RateIteration"}
 

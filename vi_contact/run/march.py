@@ -32,7 +32,7 @@ def march(
     """Yield (state, report) after every certified step.
 
     ``scheme`` None, and the mass matrix of a problem that does not name one: see ``run.method.with_defaults``, whose
-    problem is ``report.problem``. ``solver`` None is Condensed().
+    problem is ``report.problem``. ``solver`` None is Automatic().
 
     ``dt`` [s] is constant, or a Schedule, or HalvedAtImpact. ``steps`` and ``t_end`` count base steps: the halves of
     a halved step are yielded one by one, and ``state.k`` counts them, but they are one of the ``steps``.

@@ -17,7 +17,7 @@ from ..core.step import Scheme, Solver, State
 from ..laws.mass import ConsistentMass
 from ..schemes.trapezoidal import Trapezoidal
 from ..schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
-from ..solvers.condensed import Condensed
+from ..solvers.automatic import Automatic
 from .time_steps import TimeSteps, step_plan
 
 SCHEME = ("check", "start", "jump", "effective_matrix", "step", "finish", "balance")
@@ -45,14 +45,14 @@ def checked_method(
     owner: str, problem: ContactProblem, scheme: Scheme | None, solvers: tuple[Solver | None, Sequence[Solver]],
     dt: TimeSteps, *, steps: int | None, t_end: float | None, state: State | None, tolerance: float,
 ) -> Method:
-    """Return the method with its defaults; ``solvers``: the first one, None for Condensed(), and the escalation.
+    """Return the method with its defaults; ``solvers``: the first one, None for Automatic(), and the escalation.
 
     InputError for arguments of the wrong kind, and a state of another problem or inside the obstacle. Collective.
     """
     check_methods(owner, *solvers, tolerance)
     problem, scheme = with_defaults(problem, scheme)
     first, others = solvers
-    method = Method(problem, scheme, [Condensed() if first is None else first, *others], dt, tolerance)
+    method = Method(problem, scheme, [Automatic() if first is None else first, *others], dt, tolerance)
     size = step_plan(dt, steps, t_end, start_time(owner, state)).dt(0)
     method.bind()
     scheme.check(problem)

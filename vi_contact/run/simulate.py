@@ -56,7 +56,7 @@ def simulate(
     Args:
         scheme: None is the trapezoidal rule on redistributed mass, with an impact law the Zienkiewicz-Wood-Taylor step;
             a problem that names no mass matrix gets the one of the scheme (``run.method.with_defaults``).
-        solver: Condensed() when None.
+        solver: Automatic() when None.
         dt: time step [s], or a plan: Schedule, HalvedAtImpact. ``steps``, t_end and checkpoint_every count base steps.
         record: recorders, (Energy(), Contact()) when None; time, iterations and certificate are always recorded.
         out: the run folder: history.csv, columns.json, history.h5, summary.json, run.log, checkpoint.npz, fields.xdmf.

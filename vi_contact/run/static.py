@@ -23,8 +23,8 @@ from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.state_checks import check_problem_given, check_sizes, initial_state
 from ..core.step import Solver, State, StepProblem, StepResult
+from ..solvers.automatic import Automatic
 from ..solvers.certified import TOLERANCE, CertifiedSolver, refuse_nan
-from ..solvers.condensed import Condensed
 from .method import check_methods
 from .proximal import Proximal
 
@@ -38,7 +38,7 @@ def static_equilibrium(
 
     The state it leaves has v = 0, keeps stresses, reactions and contact set, and is the start of the dynamic stage. A
     body that no prescribed displacement holds is brought to rest on its contacts; free rigid motions that no load
-    drives keep the mean position of u0 (see ``proximal``). ``solver`` None is Condensed().
+    drives keep the mean position of u0 (see ``proximal``). ``solver`` None is Automatic().
 
     Raises:
         InputError: the loads drive a rigid motion that nothing stops: there is no equilibrium.
@@ -57,7 +57,7 @@ class Equilibria:
     def __init__(
         self, problem: ContactProblem, *, solver: Solver | None = None, tolerance: float = TOLERANCE
     ) -> None:
-        system, solver = problem.static_load, solver or Condensed()
+        system, solver = problem.static_load, solver or Automatic()
         self._problem = problem
         self._K = EffectiveMatrix(
             system.algebra.combine([(1.0, system.K)]), system.algebra, space=system.space, inertia=(0.0, system.M)
@@ -106,7 +106,7 @@ def quasi_static(
     K is factorised once. Prescribed motions should have no velocity and acceleration: their C U' + M U'' are loads.
 
     Args:
-        solver: Condensed() when None.
+        solver: Automatic() when None.
         times: increasing, none before ``state.t``; the loads are taken there, excitations are not.
         state: where the history starts, from ``static_equilibrium`` or an earlier history; u0 at t = 0 without
             reactions when None. A body pressed without friction first: the state of that problem.

@@ -14,6 +14,7 @@ from ..core.lazy import lazy
 from . import friction, iterative, normal, volume
 
 _CONTENTS = {
+    "automatic": ("Automatic",),
     "condensed": ("Condensed",),
     "friction": friction.__all__,
     "iterative": iterative.__all__,

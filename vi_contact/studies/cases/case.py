@@ -38,7 +38,7 @@ from ...run.recorders import Contact, Energy, Steps
 from ...run.simulate import Solution, simulate
 from ...run.static import static_equilibrium
 from ...run.time_steps import step_plan
-from ...solvers.condensed import Condensed
+from ...solvers.automatic import Automatic
 from .library import base_folder, check_format, keep_copy
 from .own_classes import packages
 from .parsing import Words, arguments, nearest, read
@@ -217,7 +217,7 @@ class Case:
         self, parts: Parts, problem: ContactProblem, solver: Solver | None
     ) -> tuple[ContactProblem, State | None]:
         """Return the problem and its equilibrium under its weight, supports that hold no static load released there."""
-        own = (solver.primary if isinstance(solver, CrossChecked) else solver) or Condensed()
+        own = (solver.primary if isinstance(solver, CrossChecked) else solver) or Automatic()
         if not parts.weighted:
             return problem, None
         if parts.firm is None:

@@ -135,7 +135,7 @@ def _solver(name: str) -> dict[str, Any]:
     from ...solvers.volume.route import Method
     from .vocabulary import names_of
 
-    methods = {"Condensed": names_of(SmallMethod), "Iterative": (), "Volume": names_of(Method)}
+    methods = {"Automatic": (), "Condensed": names_of(SmallMethod), "Iterative": (), "Volume": names_of(Method)}
     return _named("solver", name, methods)
 
 
