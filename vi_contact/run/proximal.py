@@ -90,8 +90,9 @@ class Proximal:
         """Take P so many times as strong, and factorise."""
         algebra = self._system.algebra
         self._strength = factor
-        self._springs = algebra.combine([(factor, self._weak)])
-        self._A = EffectiveMatrix(algebra.combine([(1.0, self._K.matrix), (factor, self._weak)]), algebra)
+        self._springs = self._weak if factor == 1.0 else algebra.combine([(factor, self._weak)])
+        A = algebra.combine([(1.0, self._K.matrix), (factor, self._weak)])
+        self._A = EffectiveMatrix(A, algebra, space=self._K.space, inertia=self._K.inertia)
         self._prepared = self._solver.prepare(self._A, self._surface, 1.0)
 
     def certificate(self, result: StepResult) -> Certificate:
@@ -127,8 +128,10 @@ class Proximal:
         """From the answer; StepFailure of the solver, or when it has spent too many iterations."""
         share, before, again, centre = 1.0, np.inf, False, answer.x
         old: _Motion | None = None
+        carried = np.zeros_like(centre)
         for _ in range(ITERATIONS):
-            found = self._prepared.solve(self._left_over(answer, share, centre))
+            inner = self._left_over(answer, share, centre, carried)
+            found = self._prepared.solve(inner)
             result = added(self.step, answer, found, share)
             worst, new = self.certificate(result).worst, self._motion(result.x - centre, found.active)
             progress.take(result, worst, new.pace)
@@ -144,19 +147,28 @@ class Proximal:
             before, answer, again = worst, result, share < last == 1.0
             if again:
                 continue  # the same step, which corrects its round-off
+            carried = self._missing(inner, found)
             # once the tolerance is met steps are round-off: to go far along one would shift the body
             ahead = 0.0 if old is None or progress.certified else self._ahead(old, new, result)
             old = new if ahead == 0.0 else None
             answer = replace(result, x=result.x + ahead * new.d)
             centre = answer.x
 
-    def _left_over(self, answer: StepResult, share: float, centre: Array) -> StepProblem:
+    def _missing(self, inner: StepProblem, found: StepResult) -> Array:
+        """What a solver that stops at its aim left of the resultants of a step: the next one carries it, or bodies
+        would end somewhere else along motions that only P holds."""
+        if found.aim == 0.0:
+            return np.zeros_like(found.x)
+        reaction = inner.surface.reaction_load(found.r_n, len(found.x), found.r_t)
+        return self._bodies.resultants(inner.b - self._springs @ found.x - reaction)
+
+    def _left_over(self, answer: StepResult, share: float, centre: Array, carried: Array) -> StepProblem:
         """The next step. The resultants of K u are zero, so that those of b are the forces' own: the round-off of a
         million times larger parts would move the body."""
         left, x, surface = left_over(self.step, answer, share), answer.x, self.step.surface
         r_n, r_t = kept(self.step, answer, share)
         forces = self.step.b - surface.reaction_load(r_n, len(x), r_t)
-        b = left.b + self._bodies.resultants(forces - left.b) + self._springs @ (centre - x)
+        b = left.b + self._bodies.resultants(forces - left.b) + self._springs @ (centre - x) + carried
         return replace(left, A=self._A, b=b)
 
     def _motion(self, d: Array, active: Mask) -> _Motion:
