@@ -101,9 +101,11 @@ class ContactSurface:
         """Return the conditions of each node that has several, in the order of the nodes."""
         if self.nodes is None:
             return ()
-        order = np.argsort(self.nodes, kind="stable")
+        _, place, counts = np.unique(self.nodes, return_inverse=True, return_counts=True)
+        several = np.flatnonzero(counts[place.ravel()] > 1)
+        order = several[np.argsort(self.nodes[several], kind="stable")]
         groups = np.split(order, np.flatnonzero(np.diff(self.nodes[order])) + 1)
-        return tuple(group for group in groups if len(group) > 1)
+        return tuple(group for group in groups if len(group))
 
     def in_frames(self, u: Array) -> Array:
         """Return T⁻¹ u: displacements along the axes in the nodal frames."""
@@ -229,24 +231,30 @@ def nodal_frames(directions: Array) -> Array:
     return frames
 
 
-def block_of(frame: Array) -> tuple[int, Array]:
-    """Return (c, Q): a nodal frame with the contact direction in column c, so that component c is the normal unknown.
+def nodal_blocks(frames: Array) -> tuple[Indices, Array]:
+    """Return (c, Q): nodal frames (k, d, d) with the contact direction in column c, so that component c is the normal
+    unknown.
 
     c is the direction's largest component. Axes at right angles to the direction keep their own columns: these are the
     components that may be prescribed.
     """
-    d = len(frame)
-    direction = frame[:, 0]
-    normal = int(np.argmax(np.abs(direction)))
-    others = [c for c in range(d) if c != normal]
-    block = np.empty((d, d))
-    block[:, normal] = direction
-    if np.count_nonzero(direction) == 1:
-        block[:, others] = np.eye(d)[:, others]
-    else:
-        others.sort(key=lambda c: abs(direction[c]))  # the first tangent is made of the axis least aligned
-        block[:, others] = frame[:, 1:]
-    return normal, block
+    k, d, _ = frames.shape
+    directions, every = frames[:, :, 0], np.arange(k)
+    size = np.abs(directions)
+    normal = np.argmax(size, axis=1)
+    size[every, normal] = np.inf
+    others = np.argsort(size, axis=1, kind="stable")[:, :-1]  # the first tangent is made of the axis least aligned
+    blocks = np.tile(np.eye(d), (k, 1, 1))
+    turned = np.count_nonzero(directions, axis=1) > 1
+    blocks[every[turned, None], :, others[turned]] = frames[turned, :, 1:].swapaxes(1, 2)
+    blocks[every, :, normal] = directions
+    return normal, blocks
+
+
+def tangential_columns(column: Indices, d: int) -> Indices:
+    """Return the columns (m, d-1) beside these (m,), ascending."""
+    beside = np.arange(d - 1)[None, :]
+    return np.asarray(beside + (beside >= column[:, None]))
 
 
 def empty_surface(comm: Comm, dimension: int) -> ContactSurface:

@@ -24,7 +24,7 @@ from ..core.checks import array, column_name, function, instance, provides
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.step import AXES, Columns, Report, Row, State
-from ..core.surfaces import ContactSurface, block_of, nodal_frames
+from ..core.surfaces import ContactSurface, nodal_blocks, nodal_frames, tangential_columns
 
 Where = Callable[[Array, Array], Mask]
 
@@ -147,8 +147,8 @@ def tangent_vectors(normals: Array) -> Array:
 
     Points with several directions are not covered: in the plane nothing rubs there.
     """
-    blocks = (block_of(frame) for frame in nodal_frames(normals))
-    return np.array([np.delete(block, column, axis=1) for column, block in blocks])
+    column, blocks = nodal_blocks(nodal_frames(normals))
+    return np.take_along_axis(blocks, tangential_columns(column, normals.shape[1])[:, None, :], axis=2)
 
 
 _MEANING = {

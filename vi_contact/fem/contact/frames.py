@@ -15,12 +15,11 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from petsc4py import PETSc
 
 from ...core.algebra import Array, Indices, Mask
 from ...core.corners import PARALLEL, at_right_angles
 from ...core.errors import InputError
-from ...core.surfaces import ContactSurface, block_of, nodal_frames
+from ...core.surfaces import ContactSurface, nodal_blocks, nodal_frames, tangential_columns
 from ..petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc
 from ..space import FemSpace
 
@@ -94,39 +93,42 @@ class NodalFrames:
         self._refuse_prescribed(np.concatenate([part.nodes.held for part in parts]))
         self.numbers, first, self.place = np.unique(numbers, return_index=True, return_inverse=True)
         self.double: Mask = np.bincount(self.place) > 1
-        self.blocks = nodal_frames(self.directions[first])
-        self.column = np.zeros(len(numbers), dtype=np.int64)
-        for node, slot in enumerate(first):
-            if not self.double[node]:
-                self.column[slot], self.blocks[node] = block_of(self.blocks[node])
-        for node in np.flatnonzero(self.double):
-            slots = np.flatnonzero(self.place == node)
-            self._refuse_dependent(slots)
-            self.column[slots], self.blocks[node] = corner_of(self.directions[slots])
-        self.turns = self.blocks.copy()
-        for node in np.flatnonzero(self.double):
-            if not at_right_angles(self.directions[self.place == node]):
-                self.turns[node] = np.linalg.inv(self.blocks[node]).T
-        self.oblique = not np.array_equal(self.turns, self.blocks)
+        column, self.blocks = nodal_blocks(nodal_frames(self.directions[first]))
+        self.column, self.turns = column[self.place], self.blocks.copy()
         self.rubs = np.ones((len(numbers), self.blocks.shape[1] - 1), dtype=bool)
-        for node in np.flatnonzero(self.double):
-            slots = np.flatnonzero(self.place == node)
-            free = ~np.isin(np.arange(self.blocks.shape[1]), self.column[slots])
-            self.rubs[slots] = False
-            self.rubs[slots[0]] = np.delete(free, self.column[slots[0]])
+        for slots in self._corners():
+            self._refuse_dependent(slots)
+            self._turn_corner(slots)
+        self.oblique = not np.array_equal(self.turns, self.blocks)
+
+    def _corners(self) -> list[Indices]:
+        """The conditions of each node that has several."""
+        several = np.flatnonzero(self.double[self.place])
+        order = several[np.argsort(self.place[several], kind="stable")]
+        return [slots for slots in np.split(order, np.flatnonzero(np.diff(self.place[order])) + 1) if len(slots)]
+
+    def _turn_corner(self, slots: Indices) -> None:
+        """Give a node with several conditions its frame."""
+        node = self.place[slots[0]]
+        self.column[slots], block = corner_of(self.directions[slots])
+        self.blocks[node] = block
+        self.turns[node] = block if at_right_angles(self.directions[slots]) else np.linalg.inv(block).T
+        free = ~np.isin(np.arange(len(block)), self.column[slots])
+        self.rubs[slots] = False
+        self.rubs[slots[0]] = np.delete(free, self.column[slots[0]])
 
     def own_vectors(self) -> Mask:
         """Return which vectors (m, d) of its node belong to each condition: its direction, and those that rub."""
         m, d = self.place.size, self.blocks.shape[1]
         own = np.zeros((m, d), dtype=bool)
-        np.put_along_axis(own, others(self.column, d), self.rubs, axis=1)
+        np.put_along_axis(own, tangential_columns(self.column, d), self.rubs, axis=1)
         own[np.arange(m), self.column] = True
         return own
 
     @property
     def tangents(self) -> Array:
         """Return the tangential vectors (m, d, d-1) of each condition, in the order of the tangential unknowns."""
-        beside = others(self.column, self.blocks.shape[1])
+        beside = tangential_columns(self.column, self.blocks.shape[1])
         return np.take_along_axis(self.blocks[self.place], beside[:, None, :], axis=2)
 
     def _refuse_prescribed(self, held: Mask) -> None:
@@ -152,12 +154,6 @@ class NodalFrames:
                 "dimensions: take the corner for smooth (a larger feature_angle=), or leave the node out of some of "
                 "its surfaces (points=)"
             )
-
-
-def others(column: Indices, d: int) -> Indices:
-    """Return the columns (m, d-1) beside these (m,), ascending."""
-    beside = np.arange(d - 1)[None, :]
-    return np.asarray(beside + (beside >= column[:, None]))
 
 
 def corner_of(directions: Array) -> tuple[list[int], Array]:
@@ -194,8 +190,7 @@ def surface_of(space: FemSpace, parts: Sequence[NodalConditions], **data: Any) -
     index[where >= 0] = space.free_index.reshape(-1, d)[where[where >= 0]]  # a rank may own no node at all
     slots = np.flatnonzero(where[frames.place] >= 0)
     place, column = frames.place[slots], frames.column[slots]
-    tangents = np.array([np.delete(index[p], c) for p, c in zip(place, column, strict=True)], dtype=np.int64)
-    tangents = np.where(frames.rubs[slots], tangents.reshape(len(slots), d - 1), -1)
+    tangents = np.where(frames.rubs[slots], np.take_along_axis(index[place], tangential_columns(column, d), axis=1), -1)
     given = {"bilateral": np.zeros(count, dtype=bool), "compliance": np.zeros(count)} | data
     given = {name: value[slots] if isinstance(value, np.ndarray) else value for name, value in given.items()}
     return FemSurface(
@@ -217,22 +212,17 @@ def surface_of(space: FemSpace, parts: Sequence[NodalConditions], **data: Any) -
 
 def _turn(space: FemSpace, blocks: Array, mine: Mask, index: Indices) -> PetscMatrix | None:
     """The identity but for the blocks of the contact nodes (T, or T⁻ᵀ); None when all are the identity too."""
-    if all(np.array_equal(block, np.eye(space.dimension)) for block in blocks):
+    n, d = len(space.ids), space.dimension
+    if np.array_equal(blocks, np.broadcast_to(np.eye(d), blocks.shape)):
         return None
-    rows = len(space.ids)
-    T = PETSc.Mat().createAIJ(((rows, None), (rows, None)), nnz=(space.dimension, 0), comm=space.mesh.comm)
-    T.setUp()
-    start = T.getOwnershipRange()[0]
-    plain = np.ones(rows, dtype=bool)
-    for own, block in zip(index[mine], blocks[mine], strict=True):
-        free = own >= 0
-        plain[own[free]] = False
-        rotated = (start + own[free]).astype(PETSc.IntType)
-        T.setValues(rotated, rotated, np.ascontiguousarray(block[np.ix_(free, free)]))
-    for row in np.flatnonzero(plain):
-        T.setValue(start + row, start + row, 1.0)
-    T.assemble()
-    return PetscMatrix(T)
+    index, blocks = index[mine], blocks[mine]
+    free = index >= 0
+    used = free[:, :, None] & free[:, None, :]
+    rows, columns = (np.broadcast_to(way, used.shape)[used] for way in (index[:, :, None], index[:, None, :]))
+    plain = np.setdiff1d(np.arange(n), index)
+    entries = np.concatenate([rows, plain]), np.concatenate([columns, plain])
+    values = np.concatenate([blocks[used], np.ones(len(plain))])
+    return as_petsc(PetscAlgebra(space.mesh.comm).local(*entries, values, n))
 
 
 def _coupling(

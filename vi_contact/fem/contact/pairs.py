@@ -24,7 +24,7 @@ from ...core.algebra import Array, Indices, Mask
 from ...core.checks import provides
 from ...core.corners import FEATURE_ANGLE
 from ...core.errors import InputError
-from ...core.surfaces import ContactSurface
+from ...core.surfaces import ContactSurface, tangential_columns
 from ...core.system import SemiDiscreteSystem
 from .. import compat
 from ..mesh import Facets, node_numbers
@@ -211,7 +211,7 @@ def _prescribed_motion(
     if facing is None or not moves or not facing.nodes.held[np.unique(facing.P.indices)].any():
         return {}
     numbers, P, held = facing.nodes.numbers, facing.P[mine], conditions.nodes.held
-    free = np.array([np.delete(~own, c) for own, c in zip(held, frames.column, strict=True)]) & frames.rubs
+    free = np.take_along_axis(~held, tangential_columns(frames.column, space.dimension), axis=1) & frames.rubs
     tangents, directions, free = frames.tangents[mine], frames.directions[mine], free[mine]
     nothing = np.zeros(len(space.ids))
 
