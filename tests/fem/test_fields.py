@@ -20,6 +20,7 @@ from tipped import ROUGH_ON_ONE_SIDE, tipped
 
 from vi_contact.core.errors import InputError
 from vi_contact.core.problem import ContactProblem
+from vi_contact.core.state_checks import initial_state
 from vi_contact.core.surfaces import empty_surface
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface
@@ -27,7 +28,9 @@ from vi_contact.fem.loads import Prescribed
 from vi_contact.fem.output.fields import XDMF, VonMises
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.materials import LinearElastic, PlaneStrain, PlaneStress, Section
+from vi_contact.plots.deformed import read_frames
 from vi_contact.run.march import march
+from vi_contact.run.recorders import Contact
 from vi_contact.run.simulate import Solution, simulate
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
@@ -193,6 +196,40 @@ def test_friction_in_the_frames(comm: Any, shared_tmp: Path) -> None:
     assert found_status == {0, 1, 2, 3} and not found[0]["contact_traction_t"].any()
 
 
+class Counting:
+    """A communicator that notes how many numbers are reduced at a time."""
+
+    def __init__(self, comm: Any) -> None:
+        self._comm, self.rank, self.size, self.most = comm, comm.rank, comm.size, 0
+
+    def sum(self, x: Any) -> Any:
+        self.most = max(self.most, np.size(x))
+        return self._comm.sum(x)
+
+    def max(self, x: Any) -> Any:
+        self.most = max(self.most, np.size(x))
+        return self._comm.max(x)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._comm, name)
+
+
+def test_contact_beside_the_frames(comm: Any) -> None:
+    """Where frames hold the arrays, Contact(arrays=False) finds the same numbers and reduces a dozen at a time."""
+    problem = tipped(comm, ROUGH_ON_ONE_SIDE[0], simplices=True, angle=0.3)
+    counting = Counting(problem.surface.comm)
+    thin, whole = Contact(arrays=False), Contact()
+    watched = replace(problem, surface=replace(problem.surface, comm=counting))
+    thin.start(watched, initial_state(problem))
+    whole.start(problem, initial_state(problem))
+    for _, report in march(problem, scheme=ZienkiewiczWoodTaylor(), dt=BOX_DT, steps=12):
+        row, exact = thin.row(report), whole.row(report)
+        assert set(exact) - set(row) == {"pressure", "gap", "active", "traction_t", "slip"}
+        assert all(row[name] == pytest.approx(exact[name], rel=1e-10, abs=1e-300, nan_ok=True) for name in row)
+    assert row["contact_active"] > 0 and row["contact_max_slip"] > 0.0
+    assert 1 <= counting.most <= 12 < problem.surface.total
+
+
 def test_friction_in_space(comm: Any, shared_tmp: Path) -> None:
     """Vectors lie in the plane of the obstacle and are as long as r_t / weight; without friction
     the frames are as before."""
@@ -299,7 +336,42 @@ def test_restart_goes_on_after_the_frames_it_keeps(comm: Any, shared_tmp: Path) 
     assert len(list((shared_tmp / "fields").glob("frame_*.h5"))) == 2
 
 
-def test_index_is_readable_after_every_frame(comm: Any, shared_tmp: Path) -> None:
+def test_several_frames_in_a_file(comm: Any, shared_tmp: Path) -> None:
+    """What a reader finds is the same as with a file for each, also after a restart that drops some of a file."""
+    problem, folders = shaken_wall(comm, angle=0.3, gap=1e-7), (shared_tmp / "each", shared_tmp / "packed")
+    for folder, many in zip(folders, (1, 3), strict=True):
+        for steps, restart in ((10, False), (19, True)):
+            simulate(problem, scheme=ZienkiewiczWoodTaylor(), dt=DT, steps=steps, out=folder, restart=restart,
+                     fields=XDMF(every=2, frames_per_file=many), checkpoint_every=10)
+        assert [round(frame["t"] / DT) for frame in frames(folder)] == list(range(0, 20, 2))
+    for one, packed in zip(*(frames(folder) for folder in folders), strict=True):
+        assert one.keys() == packed.keys() and all(np.array_equal(one[name], packed[name]) for name in one)
+    kept = sorted(path.name for path in (folders[1] / "fields").iterdir())
+    assert kept == ["frame_000018.h5", *(f"frames_{k:06d}.h5" for k in (0, 6, 12)), "mesh.h5"]
+    stored = read_frames(folders[1])
+    assert stored.t.tolist() == [frame["t"] for frame in frames(folders[1])]
+    assert np.array_equal(stored.at(12 * DT)[1], frames(folders[0])[6]["u"][:, :2])
+
+
+def test_restart_drops_late_frames_of_a_file(comm: Any, shared_tmp: Path) -> None:
+    """A run killed behind its checkpoint has later frames in a file with earlier ones: only those are kept."""
+    problem, checkpoint, kept = shaken_wall(comm), shared_tmp / "checkpoint.npz", b""
+    for steps in (8, 12, 9):
+        simulate(problem, scheme=ZienkiewiczWoodTaylor(), dt=DT, steps=steps, out=shared_tmp, restart=steps != 8,
+                 fields=XDMF(every=2, frames_per_file=6))
+        comm.Barrier()
+        if comm.rank == 0:
+            kept = kept or checkpoint.read_bytes()
+            checkpoint.write_bytes(kept)
+        comm.Barrier()
+        assert [round(frame["t"] / DT) for frame in frames(shared_tmp)] == list(range(0, steps + 1, 2))
+        comm.Barrier()
+    with h5py.File(shared_tmp / "fields" / "frames_000000.h5") as file:
+        assert list(file) == [f"{k:06d}" for k in (0, 2, 4, 6, 8)]
+
+
+@pytest.mark.parametrize("many", [1, 2])
+def test_index_is_readable_after_every_frame(comm: Any, shared_tmp: Path, many: int) -> None:
     """Whatever moment the run is killed at, the index on disk names complete frames only."""
     seen: list[int] = []
 
@@ -315,7 +387,7 @@ def test_index_is_readable_after_every_frame(comm: Any, shared_tmp: Path) -> Non
             comm.Barrier()
             return {"looks": 1.0}
 
-    run(shaken_wall(comm), shared_tmp, 6, 2, record=[Looks()])
+    simulate(shaken_wall(comm), dt=DT, steps=6, out=shared_tmp, fields=XDMF(2, many), record=[Looks()])
     assert seen == [1, 1, 2, 2, 3, 3]
 
 
@@ -323,8 +395,9 @@ def test_bad_settings_are_told(comm: Any, shared_tmp: Path) -> None:
     """every < 1, and a system without finite elements."""
     from chain import chain_problem
 
-    with pytest.raises(InputError, match="XDMF: every is 0"):
-        XDMF(every=0)
+    for name in ("every", "frames_per_file"):
+        with pytest.raises(InputError, match=f"XDMF: {name} is 0"):
+            XDMF(**{name: 0})
     if comm.rank == 0:
         with pytest.raises(InputError, match="XDMF needs a system made by fem.assemble"):
             run(chain_problem(3), shared_tmp)

@@ -39,6 +39,18 @@ def history(problem: ContactProblem, scheme: Any, steps: int = 300, **more: Any)
     return dict(simulate(problem, scheme=scheme, solver=Condensed(), dt=DT, steps=steps, **more).history)
 
 
+def test_contact_without_arrays() -> None:
+    """The numbers are the same to the last bit on one rank, and the arrays are not there."""
+    problem = chain_problem(5, gap=1e-3, left_gap=2e-3, excitation=SHAKE)
+    whole = history(problem, ZienkiewiczWoodTaylor(), 80, record=[Contact()])
+    thin = history(problem, ZienkiewiczWoodTaylor(), 80, record=[Contact(arrays=False)])
+    assert set(whole) - set(thin) == {"pressure", "gap", "active"} and not set(thin) - set(whole)
+    assert all(np.array_equal(thin[name], whole[name], equal_nan=True) for name in thin)
+    assert thin["contact_active"].max() > 0
+    with pytest.raises(InputError, match="Contact: arrays is 3"):
+        Contact(arrays=3)  # type: ignore[arg-type]
+
+
 def ledger_defect(found: dict[str, Array]) -> Array:
     """E + D_damping + D_contact + D_impact + D_algorithmic - W - E(0), over max E (V9.7)."""
     total = found["energy_kinetic"] + found["energy_strain"]

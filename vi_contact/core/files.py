@@ -26,6 +26,18 @@ _FULL = (errno.ENOSPC, errno.EDQUOT)
 _REFUSED = (errno.EACCES, errno.EPERM, errno.EROFS)
 
 
+def frames_of(folder: Path) -> dict[int, tuple[Path, str]]:
+    """Return where the frames of an XDMF series in a run folder are: step -> (HDF5 file, group in it)."""
+    import h5py
+
+    single = [path for path in (folder / FIELDS).glob("frame_*.h5") if path.stem[6:].isdecimal()]
+    found = {int(path.stem[6:]): (path, "/") for path in single}
+    for path in (folder / FIELDS).glob("frames_*.h5"):
+        with h5py.File(path, "r") as file:
+            found |= {int(name): (path, f"/{name}") for name in file}
+    return found
+
+
 def on_root(comm: Comm, action: Callable[[], T]) -> T | None:
     """Return the action's value on rank 0, None elsewhere; what it raises there is raised on every rank.
 

@@ -214,11 +214,13 @@ class Resultants:
         surface, part = self._surface, self._part
         u_n, slip = surface.normal_values(state.u), surface.slip(state.u, state.t)
         gap = surface.gap(state.t) - u_n + surface.compliance * state.r_n
-        r_t = None if state.r_t is None else surface.everywhere(state.r_t)[None]
-        values = surface.everywhere(np.column_stack([gap, state.r_n, u_n, state.active]))
-        gap, r_n, u_n, active = (np.ascontiguousarray(column) for column in values.T)
-        slip = surface.everywhere(slip)
-        series = part.opening(active[None] > 0.0, gap[None], slip[None]) | part.resultants(r_n[None], r_t)
+        rubbing = [slip] if state.r_t is None else [slip, state.r_t]
+        values = surface.everywhere(np.column_stack([gap, state.r_n, u_n, state.active, *rubbing]))
+        gap, r_n, u_n, active = (np.ascontiguousarray(column) for column in values.T[:4])
+        slip, r_t = (np.ascontiguousarray(part) for part in np.hsplit(values[:, 4:], [slip.shape[1]]))
+        series = part.opening(active[None] > 0.0, gap[None], slip[None]) | part.resultants(
+            r_n[None], None if state.r_t is None else r_t[None]
+        )
         found: dict[str, Any] = {quantity: float(values[0]) for quantity, values in series.items()}
         if part.dimension == 2:
             found |= part.rotation(u_n)

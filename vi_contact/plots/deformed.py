@@ -12,7 +12,7 @@ import numpy as np
 
 from ..core.algebra import Array, Indices
 from ..core.errors import InputError
-from ..core.files import FIELDS
+from ..core.files import FIELDS, frames_of
 from ..run.files.folder import HISTORY_H5
 from ..run.files.reading import read_run
 
@@ -38,20 +38,22 @@ class Tractions:
 
 @dataclass(frozen=True)
 class StoredFrames:
-    """Hold the fields of a run: ``points`` (n, 2) [m], ``cells`` (c, corners), times ``t`` (f,) [s], their files."""
+    """Hold the fields of a run: ``points`` (n, 2) [m], ``cells`` (c, corners), times ``t`` (f,) [s], their files with
+    the groups in them."""
 
     points: Array
     cells: Indices
     t: Array
-    paths: tuple[Path, ...]
+    places: tuple[tuple[Path, str], ...]
 
     def at(self, t: float) -> tuple[float, Array, Array]:
         """Return (its time [s], u (n, 2) [m], von Mises stress (c,) [Pa]) of the frame nearest to t."""
         import h5py
 
         row = int(np.argmin(np.abs(self.t - t)))
-        with h5py.File(self.paths[row]) as file:
-            return float(self.t[row]), file["u"][:, :2], file["von_mises"][:]
+        path, group = self.places[row]
+        with h5py.File(path) as file:
+            return float(self.t[row]), file[group]["u"][:, :2], file[group]["von_mises"][:]
 
 
 def read_tractions(folder: str | Path) -> Tractions:
@@ -72,11 +74,11 @@ def read_frames(folder: str | Path) -> StoredFrames:
     import h5py
 
     fields, history = Path(folder) / FIELDS, Path(folder) / HISTORY_H5
-    paths = sorted(fields.glob("frame_*.h5"))
-    if not paths or not history.is_file():
+    places = dict(sorted(frames_of(Path(folder)).items()))
+    if not places or not history.is_file():
         raise InputError(f"no frames in {fields}: run it with out and fields=fem.XDMF(every=...)")
     with h5py.File(history) as file:
         times = dict(zip(file["k"][:].astype(int), file["t"][:], strict=True))
     with h5py.File(fields / "mesh.h5") as file:
-        t = np.array([times[int(path.stem.removeprefix("frame_"))] for path in paths])
-        return StoredFrames(file["points"][:, :2], file["cells"][:], t, tuple(paths))
+        t = np.array([times[k] for k in places])
+        return StoredFrames(file["points"][:, :2], file["cells"][:], t, tuple(places.values()))

@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..core.algebra import Array, Indices
+from ..core.algebra import Array, Indices, SerialComm, total
 from ..core.checks import array, attributes, column_name, instance
 from ..core.errors import InputError, StepFailure
 from ..core.problem import ContactProblem
@@ -120,6 +120,7 @@ class Energy:
         return self._row()
 
 
+@dataclass
 class Contact:
     """Record what the contact surface does. Reactions are those of the step (mean or end value, as the scheme says).
 
@@ -130,9 +131,16 @@ class Contact:
     With friction also: the friction force on the body, the largest slip, and arrays (total, d - 1) in the tangents of
     the nodal frames: traction_t = r_t / weight, that of the body on its support, and slip = B_t u, the tangential
     displacement on the support (also of points that are open).
+
+    ``arrays=False`` leaves the arrays out: then no rank gathers them, and the numbers are reduced, a dozen at a time.
     """
 
+    arrays: bool = True
     _axes, _frictional = AXES, False  # those of the problem, once it is started
+    _ARRAYS: ClassVar[tuple[str, ...]] = ("pressure", "gap", "active", "traction_t", "slip")
+
+    def __post_init__(self) -> None:
+        attributes(self, flags=("arrays",))
 
     def columns(self) -> Columns:
         """Name contact_uplift, contact_resultant, … and the arrays pressure, gap, active. Call ``start`` first."""
@@ -144,7 +152,7 @@ class Contact:
             "traction_t": ("Pa", "tangential reaction r_t / weight of every contact point, in its nodal tangents"),
             "slip": ("m", "tangential displacement of every contact point, in its nodal tangents"),
         }
-        return {
+        every = {
             "contact_uplift": ("-", "uplift ratio: share of the contact surface, by weight, that is open"),
             "contact_active": ("-", "number of closed contact points"),
             "contact_resultant": ("N", "sum of the normal reactions Σ r_n"),
@@ -155,43 +163,57 @@ class Contact:
             "gap": ("m", "gap of every contact point"),
             "active": ("-", "whether the contact point is closed"),
         } | (friction if self._frictional else {})
+        return {name: about for name, about in every.items() if self.arrays or name not in self._ARRAYS}
 
     def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
         """Return the row of the initial contact: of a gravity stage, or open."""
-        self._problem, self._frictional = problem, problem.frictional
-        self._whole, self._axes = problem.surface.whole(), AXES[: problem.surface.points.shape[1]]
+        surface, self._problem, self._frictional = problem.surface, problem, problem.frictional
+        self._axes = AXES[: surface.points.shape[1]]
+        self._whole, self._comm = (surface.whole(), SerialComm()) if self.arrays else (surface, surface.comm)
+        self._weight = total(self._comm, self._whole.weights.sum())
         return self._row(state)
 
     def row(self, report: Report) -> Row:
         return self._row(report.new)
 
     def _row(self, state: State) -> Row:
-        surface, whole = self._problem.surface, self._whole
+        surface, whole, d = self._problem.surface, self._whole, len(self._axes)
         gap = surface.gap(state.t) - surface.normal_values(state.u) + surface.compliance * state.r_n
-        found = surface.everywhere(np.column_stack([gap, state.r_n, state.active]))
+        found = np.column_stack([gap, state.r_n, state.active, *(self._rubbing(state) if self._frictional else ())])
+        found = surface.everywhere(found) if self.arrays else found
         gap, r_n, active = found[:, 0].copy(), found[:, 1].copy(), found[:, 2] > 0.0
-        pressure = r_n / whole.weights
-        total, resultant = float(whole.weights.sum()), float(r_n.sum())
-        closed = float(whole.weights[active].sum())
-        force = 0.0 - r_n @ whole.normals  # not -(…): no negative zeros
-        place = r_n @ whole.points / resultant if resultant else np.full(len(self._axes), np.nan)
+        pressure, traction, slip = r_n / whole.weights, found[:, 3 : 2 + d].copy(), found[:, 2 + d :].copy()
+        sums = [whole.weights[active].sum(), active.sum(), r_n.sum(), *(r_n @ whole.normals), *(r_n @ whole.points)]
+        closed, count, resultant, *vectors = self._comm.sum(np.array(sums, dtype=float)).tolist()
+        force, place = [0.0 - one for one in vectors[:d]], vectors[d:]  # not -one: no negative zeros
+        depth, highest, farthest = self._largest(gap, pressure, slip)
         values = [
-            1.0 - closed / total if total else 1.0, int(active.sum()), resultant,
-            *force.tolist(), *place.tolist(),
-            float(gap.min()) if len(gap) else np.nan, float(pressure.max()) if len(gap) else np.nan,
-            pressure, gap, active, *(self._friction(state) if self._frictional else ()),
+            1.0 - closed / self._weight if self._weight else 1.0, int(count), resultant, *force,
+            *(one / resultant if resultant else np.nan for one in place), -depth, highest,
         ]
+        values += [pressure, gap, active] if self.arrays else []
+        values += [*self._friction_force(state), farthest] if self._frictional else []
+        values += [traction, slip] if self._frictional and self.arrays else []
         return dict(zip(self.columns(), values, strict=True))
 
-    def _friction(self, state: State) -> list[Any]:
-        surface, system = self._problem.surface, self._problem.system
+    def _largest(self, gap: Array, pressure: Array, slip: Array) -> list[float]:
+        """The largest depth, pressure and slip of all conditions; nan without any."""
+        if not self._problem.surface.total:
+            return [np.nan, np.nan, np.nan]
+        tops = [-gap.min(), pressure.max(), np.linalg.norm(slip, axis=1).max()] if len(gap) else [-np.inf] * 3
+        return self._comm.max(np.array(tops)).tolist()
+
+    def _rubbing(self, state: State) -> tuple[Array, Array]:
+        """Tangential tractions and slips (m, d - 1)."""
+        surface = self._problem.surface
         slip = surface.slip(state.u, state.t)
-        r_t = np.zeros_like(slip) if state.r_t is None else state.r_t
-        traction, slip = surface.everywhere(r_t / surface.weights[:, None]), surface.everywhere(slip)
-        load = surface.reaction_load(np.zeros(surface.count), system.rows, r_t)
+        return (np.zeros_like(slip) if state.r_t is None else state.r_t / surface.weights[:, None]), slip
+
+    def _friction_force(self, state: State) -> list[float]:
+        surface, system = self._problem.surface, self._problem.system
+        load = surface.reaction_load(np.zeros(surface.count), system.rows, state.r_t)
         force = 0.0 - surface.comm.sum(system.influence.T @ surface.along_axes(load))
-        largest = float(np.linalg.norm(slip, axis=1).max()) if len(slip) else np.nan
-        return [*force.tolist(), largest, traction, slip]
+        return force.tolist()
 
 
 @dataclass

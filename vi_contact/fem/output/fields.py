@@ -1,4 +1,5 @@
-"""Write fields for ParaView: ``fields.xdmf`` and one HDF5 file per frame, in the node and cell order of the input mesh.
+"""Write fields for ParaView: ``fields.xdmf`` and HDF5 files of one frame or several, in the node and cell order of the
+input mesh.
 
 Every file is replaced as a whole and the index names only frames that are complete, so that ParaView can open it at any
 moment, also while the run goes on or after it was killed. Nothing in the files depends on the number of ranks.
@@ -14,7 +15,7 @@ displacement on it, of open nodes too: 3-vectors along the axes, zero at other n
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -26,7 +27,7 @@ import ufl
 
 from ...core.algebra import Array, Indices, Mask
 from ...core.checks import attributes
-from ...core.files import FIELDS, FIELDS_INDEX, hdf5_atomically, on_root, write_atomically
+from ...core.files import FIELDS, FIELDS_INDEX, frames_of, hdf5_atomically, on_root, write_atomically
 from ...core.problem import ContactProblem
 from ...core.step import Report, State
 from .. import compat
@@ -74,30 +75,36 @@ _RUBBING = ("contact_traction_t", "slip")
 
 @dataclass(frozen=True)
 class XDMF:
-    """Write a frame every so many steps, and one of the initial state. InputError unless ``every`` >= 1."""
+    """Write a frame every so many steps, and one of the initial state. InputError unless both numbers are >= 1.
+
+    ``frames_per_file``: each time so many frames have files of their own they are put into one, for file systems that
+    do not like many.
+    """
 
     every: int = 10
+    frames_per_file: int = 1
 
     def __post_init__(self) -> None:
-        attributes(self, counts=("every",))
+        attributes(self, counts=("every", "frames_per_file"))
 
     def open(self, problem: ContactProblem, folder: Path, kept: Mapping[int, float]) -> FrameWriter:
         """Write the mesh; go on after the frames of ``kept`` (step -> time) that are in the folder. Collective."""
         space_of("XDMF", problem.system)
         known_matrices("XDMF, von_mises", problem.system, "K")
-        return FrameWriter(problem, folder, kept)
+        return FrameWriter(problem, folder, kept, self.frames_per_file)
 
 
 class FrameWriter:
-    """Write the frames of a run, one HDF5 file each."""
+    """Write the frames of a run, so many in an HDF5 file."""
 
-    def __init__(self, problem: ContactProblem, folder: Path, kept: Mapping[int, float]) -> None:
+    def __init__(self, problem: ContactProblem, folder: Path, kept: Mapping[int, float], per_file: int) -> None:
         space = problem.system.space
         assert isinstance(space, FemSpace)
-        self._problem, self._space, self._folder = problem, space, folder
+        self._problem, self._space, self._folder, self._per_file = problem, space, folder, per_file
         self._names = _VECTORS + (_RUBBING if problem.frictional else ())
         self._von_mises = VonMises(space.forms)
-        self._contact_nodes = self._nodes_of_conditions()
+        owned, slots = problem.surface.owned, problem.surface.slots
+        self._contact_nodes = self._by_number(space.ids[owned] // space.dimension, slots)
         self._type, mine = _cells(space.mesh)
         self._cell_numbers = np.asarray(space.mesh.topology.original_cell_index[: len(mine)], dtype=np.int64)
         points = self._by_number(_three(space.points), space.nodes)
@@ -105,14 +112,9 @@ class FrameWriter:
         self._shape = (len(points), *cells.shape)
         on_root(space.comm, partial(self._start, points, cells, kept))
 
-    def _nodes_of_conditions(self) -> Indices:
-        """Node number of every contact condition (total,): that of the unknown it bounds."""
-        surface = self._problem.surface
-        nodes: Indices = surface.everywhere(self._space.ids[surface.owned] // self._space.dimension)
-        return nodes
-
     def _by_number(self, owned: Any, numbers: Indices) -> Any:
-        """Rows of owned nodes or cells, on rank 0 as rows of all in input order; none elsewhere. Collective."""
+        """Rows of owned nodes, cells or conditions, on rank 0 as rows of all in input order; none elsewhere.
+        Collective."""
         parts = self._space.comm.gather((numbers, owned))
         if parts is None:
             return owned[:0]
@@ -130,11 +132,31 @@ class FrameWriter:
             file["points"], file["cells"] = points, cells
 
         hdf5_atomically(folder / "mesh.h5", fill)
-        self._frames = [(k, t) for k, t in sorted(kept.items()) if (self._folder / _name(k)).is_file()]
-        if self._frames:
+        found = frames_of(self._folder)
+        self._times = {k: t for k, t in sorted(kept.items()) if k in found}
+        self._places = {k: found[k] for k in self._times}
+        if self._times:
             self._write_index()
-        known = {self._folder / _name(k) for k, _ in self._frames}
-        for path in folder.glob("frame_*.h5"):
+        for path in {path for k, (path, group) in found.items() if group != "/" and k not in kept}:
+            self._collect(path, [k for k, place in self._places.items() if place[0] == path])
+        self._remove_others()
+
+    def _collect(self, target: Path, steps: Sequence[int]) -> None:
+        """Put these frames into one file, in the place of the one that has this name."""
+
+        def fill(file: h5py.File) -> None:
+            for k in steps:
+                path, group = self._places[k]
+                with h5py.File(path, "r") as one:
+                    one.copy(group, file, name=f"{k:06d}")
+
+        hdf5_atomically(target, fill)
+        self._places |= {k: (target, f"/{k:06d}") for k in steps}
+
+    def _remove_others(self) -> None:
+        """Remove files that hold no frame of the index."""
+        known = {path for path, _ in self._places.values()}
+        for path in (self._folder / FIELDS).glob("frame*_*.h5"):
             if path not in known:
                 path.unlink()
 
@@ -153,7 +175,8 @@ class FrameWriter:
         vectors = self._by_number(np.hstack([_three(nodal) for nodal in moving]), space.nodes)
         surface = problem.surface
         each = np.column_stack([state.r_n / surface.weights, state.active, slipping])
-        on_root(space.comm, partial(self._write, state, vectors, stress, surface.everywhere(each)))
+        each = self._by_number(each, surface.slots)
+        on_root(space.comm, partial(self._write, state, vectors, stress, each))
 
     def _rubbing(self, state: State) -> list[Array]:
         """Tangential traction and slip at the owned nodes, (k, d) each."""
@@ -178,9 +201,16 @@ class FrameWriter:
                 file[name] = vectors[:, 3 * i : 3 * i + 3]
             file["von_mises"], file["contact_pressure"], file["contact_status"] = stress, pressure, status
 
-        hdf5_atomically(self._folder / _name(state.k), fill)
-        self._frames.append((state.k, state.t))
+        path = self._folder / FIELDS / f"frame_{state.k:06d}.h5"
+        hdf5_atomically(path, fill)
+        self._times[state.k], self._places[state.k] = state.t, (path, "/")
+        single = [k for k, (_, group) in self._places.items() if group == "/"]
+        full = len(single) >= self._per_file > 1
+        if full:
+            self._collect(path.with_name(f"frames_{single[0]:06d}.h5"), single)
         self._write_index()
+        if full:
+            self._remove_others()
 
     def _contact(self, each: Array, active: Array, slipping: Array) -> tuple[Array, Any]:
         """Contact pressure and status of all nodes."""
@@ -192,7 +222,7 @@ class FrameWriter:
 
     def _write_index(self) -> None:
         """fields.xdmf with all complete frames."""
-        frames = "".join(self._grid(k, t) for k, t in self._frames)
+        frames = "".join(self._grid(k, t) for k, t in self._times.items())
         text = (
             '<?xml version="1.0"?>\n<Xdmf Version="3.0"><Domain>\n'
             f'<Grid Name="frames" GridType="Collection" CollectionType="Temporal">\n{frames}</Grid>\n</Domain></Xdmf>\n'
@@ -201,10 +231,11 @@ class FrameWriter:
 
     def _grid(self, k: int, t: float) -> str:
         nodes, cells, corners = self._shape
-        mesh, frame = f"{FIELDS}/mesh.h5", _name(k)
+        path, group = self._places[k]
+        mesh, frame = f"{FIELDS}/mesh.h5", f"{FIELDS}/{path.name}:{group.rstrip('/')}"
 
         def attribute(name: str, center: str, *shape: int, number: str = "Float", size: int = 8) -> str:
-            kind, item = "Vector" if len(shape) == 2 else "Scalar", _item(shape, f"{frame}:/{name}", number, size)
+            kind, item = "Vector" if len(shape) == 2 else "Scalar", _item(shape, f"{frame}/{name}", number, size)
             return f'<Attribute Name="{name}" AttributeType="{kind}" Center="{center}">{item}</Attribute>\n'
 
         attributes = [attribute(name, "Node", nodes, 3) for name in self._names]
@@ -224,10 +255,6 @@ def slipped(report: Report) -> Mask:
     """Return the points (m,) that moved along their support in a step with friction."""
     step, result = report.step, report.result
     return np.asarray(np.any(step.surface.tangential_values(result.x) != step.slip0, axis=1))
-
-
-def _name(k: int) -> str:
-    return f"{FIELDS}/frame_{k:06d}.h5"
 
 
 def _item(shape: tuple[int, ...], where: str, number: str = "Float", size: int = 8) -> str:

@@ -12,7 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ...core.algebra import Array
-from ...core.files import FIELDS, on_root, to_json, write_atomically
+from ...core.files import frames_of, on_root, to_json, write_atomically
 from ...core.problem import ContactProblem
 from ...core.step import Report, Row, State
 from ...core.surfaces import ContactSurface
@@ -83,8 +83,7 @@ class Writer:
 
     def _frames_of(self, folder: Path) -> dict[int, float]:
         """Step -> time of the frames that an earlier part of the run has left."""
-        numbers = [path.stem.rpartition("_")[2] for path in (folder / FIELDS).glob("*_*.h5")] if self._continued else []
-        return times_of(folder, {int(number) for number in numbers if number.isdecimal()})
+        return times_of(folder, set(frames_of(folder))) if self._continued else {}
 
     def _make(self, folder: Path, whole: ContactSurface) -> None:
         remove_litter(folder)
