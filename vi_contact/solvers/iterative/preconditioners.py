@@ -17,7 +17,6 @@ from ...core.errors import InputError
 from ...core.surfaces import ContactSurface
 from ..volume.failures import last_line
 from ..volume.options import OptionLayers, Options
-from .contact import Contact
 from .layout import Nodewise
 from .modes import rigid_modes
 from .regime import GAMG, ICC, JACOBI
@@ -52,6 +51,13 @@ class Masked:
         return np.asarray(self.weights * self._z.array_r)
 
 
+class Holds(Protocol):
+    """Say which rows are held: of closed conditions, and of points that stick."""
+
+    @property
+    def held(self) -> Indices: ...
+
+
 class Inverse(Protocol):
     """Hold M⁻¹ as the PETSc preconditioner ``pc``, and follow the contact set."""
 
@@ -61,8 +67,8 @@ class Inverse(Protocol):
         """Begin a step."""
         ...
 
-    def follow(self, contact: Contact) -> None:
-        """Make M anew for the conditions that are closed, when it is time to. Collective."""
+    def follow(self, contact: Holds) -> None:
+        """Make M anew for the rows that are held, when it is time to. Collective."""
         ...
 
 
@@ -75,7 +81,7 @@ class Constant:
     def begin(self) -> None:
         """Do nothing."""
 
-    def follow(self, contact: Contact) -> None:
+    def follow(self, contact: Holds) -> None:
         """Do nothing."""
 
 
@@ -93,20 +99,21 @@ class Multigrid:
                 modes = rigid_modes(nodewise.A, surface, nodewise.layout, self._matrix.createVecLeft())
                 self._matrix.setNearNullSpace(PETSc.NullSpace().create(vectors=modes, comm=self._matrix.comm))
         self.pc = made(self._matrix, layers, work)
-        self._built: Mask = np.zeros(len(surface.owned), dtype=bool)
+        self._built: Mask = np.zeros(nodewise.layout.size, dtype=bool)
         self._left = RENEWALS
 
     def begin(self) -> None:
         """Begin a step: it has its own number of renewals."""
         self._left = RENEWALS
 
-    def follow(self, contact: Contact) -> None:
-        """Make the Galerkin products anew when more than a tenth of the closed set has moved since."""
-        closed = contact.closed & ~contact.soft
-        moved, size = self._comm.sum(np.array([np.sum(closed ^ self._built), np.sum(closed)], dtype=float))
+    def follow(self, contact: Holds) -> None:
+        """Make the Galerkin products anew when more than a tenth of the held rows have changed since."""
+        held = np.zeros_like(self._built)
+        held[contact.held] = True
+        moved, size = self._comm.sum(np.array([np.sum(held ^ self._built), np.sum(held)], dtype=float))
         if self._left and moved > DRIFT * size:
             self._left -= 1
-            self._built = closed
+            self._built = held
             self._renew(contact.held)
 
     def _renew(self, held: Indices) -> None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,7 @@ from ..volume.options import OptionLayers
 from .conjugate_gradients import SOLVED, WRONG_SIGNS, ConjugateGradients
 from .contact import Contact
 from .failures import stopped
+from .friction import Friction
 from .layout import Nodewise
 from .operator import Operator
 from .preconditioners import DEFAULTS, Masked, inverse
@@ -74,9 +76,10 @@ class Iterative:
                              "3e-10")
 
     def check(self, problem: ContactProblem) -> None:
-        """Raise InputError for friction, which conjugate gradients cannot carry: the problem is not symmetric."""
-        if problem.frictional:
-            raise InputError(f"Iterative() would ignore {problem.friction}: use Condensed() or Volume(ReducedNewton())")
+        """Raise InputError for friction in one dimension."""
+        if problem.frictional and problem.surface.tangents.shape[1] == 0:
+            raise InputError(f"Iterative() would ignore {problem.friction}: a body in one dimension cannot slide, use "
+                             "Frictionless()")
 
     def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> PreparedIterative:
         """Choose and make the preconditioner; collective. InputError for options that cannot work."""
@@ -103,6 +106,7 @@ class PreparedIterative:
         self._diagonal = np.array(blocks.getDiagonal().array_r)
         self._contact = Contact(surface, scale, layout.places[surface.owned], self._diagonal, layout.missing)
         self._norm: float | None = None
+        self._surface = surface
 
     def _chosen(self, A: EffectiveMatrix) -> str:
         """The preconditioner, said in the log."""
@@ -121,11 +125,20 @@ class PreparedIterative:
     def solve(self, step: StepProblem) -> StepResult:
         """Return the step; StepFailure, on all ranks, with the history of residuals when there is no answer."""
         try:
-            return self._solve(step)
+            return self._solve(step) if step.slip0 is None else self._friction.solve(step)
         except PETSc.Error as error:
             if error.__cause__ is not None:
                 raise error.__cause__ from None  # raised in one of our callbacks; PETSc before 3.22 passes it on
             raise raised(self._name, error) from error
+
+    @cached_property
+    def _friction(self) -> Friction:
+        """The solver of steps with friction."""
+        settings = self._settings
+        return Friction(
+            self._surface, self._contact, self._layout, self._diagonal, self._operator, self._inverse,
+            tolerance=settings.tolerance, patience=settings.patience, name=self._name,
+        )
 
     @property
     def _name(self) -> str:

@@ -12,12 +12,14 @@ from dataclasses import dataclass
 class Work:
     """Hold sums since the solver was prepared, on this rank; times are seconds of its processor.
 
-    ``linear_iterations`` of conjugate gradients, those of the fallback too; ``products`` with A, which took
+    ``linear_iterations`` of conjugate gradients, those of the fallback too, or of GMRES; ``newton_steps`` with friction;
+    ``products`` with A, which took
     ``product_seconds``; ``renewals`` of the preconditioner after the first, which with it took ``set_up_seconds``;
     ``fallbacks``: steps that ended by projected gradients.
     """
 
     linear_iterations: int = 0
+    newton_steps: int = 0
     products: int = 0
     product_seconds: float = 0.0
     renewals: int = 0

@@ -1,0 +1,217 @@
+"""Solve a step with friction by semismooth Newton on all unknowns: closed normals and sticking tangents are a mask.
+
+Every Newton step solves the linear problem of the present states (``friction_states``) by GMRES (``friction_krylov``),
+to a hundredth of its residual. The first states are those of the reactions of the last step, with the slip
+that the step predicts: A x - b at a predicted x is no contact force. In the end every residual is formed afresh;
+reactions are put on their cone, and tangents that stick where they were.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...core.algebra import Array, Comm, Mask, max_abs
+from ...core.errors import StepFailure
+from ...core.step import StepProblem, StepResult
+from ...core.surfaces import ContactSurface
+from ...laws.friction import project
+from .contact import Contact
+from .failures import told
+from .friction_krylov import Gmres, Held, Turned
+from .friction_laws import LawOfStep
+from .friction_states import States, Tangents
+from .layout import Layout
+from .measures import Measured
+from .operator import Operator
+from .preconditioners import Inverse
+
+SHARE = 1e-2  # of the residual of a linear problem that GMRES may leave
+ROUND = 1e-4  # of the largest friction limit: residual at which coefficients that are given are taken anew
+STEPS = 60  # of Newton
+
+
+@dataclass(frozen=True)
+class Reactions:
+    """Hold r_n (m,), r_t and slip (m, d - 1) of an answer."""
+
+    r_n: Array
+    r_t: Array
+    slip: Array
+
+
+class Friction:
+    """Solve steps with friction of one A. ``ksp``: PETSc's linear solver."""
+
+    def __init__(
+        self, surface: ContactSurface, contact: Contact, layout: Layout, diagonal: Array, operator: Operator,
+        inverse: Inverse, *, tolerance: float, patience: int, name: str,
+    ) -> None:
+        self.comm: Comm = surface.comm
+        self.surface, self.contact, self.layout, self.operator = surface, contact, layout, operator
+        self.inverse, self.tolerance, self.name = inverse, tolerance, name
+        self.tangents = Tangents(surface, layout.places, diagonal)
+        turned = Turned(inverse.pc, operator.blocks.createVecLeft(), self.tangents)
+        self.gmres = Gmres(operator, contact, turned, patience)
+        self.last: Reactions | None = None
+
+    @property
+    def ksp(self) -> object:
+        """Return PETSc's linear solver."""
+        return self.gmres.ksp
+
+    def solve(self, step: StepProblem) -> StepResult:
+        """Return the step; StepFailure, on all ranks, with the history of residuals when there is no answer."""
+        newton = Newton(self, step)
+        while not newton.solved():
+            newton.advance()
+        result, self.last = newton.answer()
+        return result
+
+
+class Newton:
+    """Iterate over one step. ``history``: residuals over the forces."""
+
+    def __init__(self, of: Friction, step: StepProblem) -> None:
+        self.of, self.step = of, step
+        self.law = LawOfStep(step)
+        assert step.slip0 is not None
+        self.slip0 = step.slip0
+        self.b = of.layout.padded(step.b)
+        self.measured = Measured(step, self.b)
+        self.history: list[float] = []
+        of.contact.begin(step)
+        of.inverse.begin()
+        self.x = of.layout.padded(step.guess)
+        self._take(self._predicted())
+
+    def _predicted(self) -> States:
+        """The states of the last reactions and the predicted slip; without any, points stick where they touch."""
+        of, slip = self.of, self._slip()
+        last = of.last
+        if last is None:
+            none = np.zeros(len(slip))
+            limits = self.law(np.zeros_like(slip), none)
+            return States(of.tangents, limits, (none, of.tangents.c[:, None] * slip), slip,
+                          stuck=of.contact.closed & (limits.slope > 0.0))
+        r_n = np.where(of.contact.closed, last.r_n, 0.0)
+        y_t = last.r_t + of.tangents.c[:, None] * slip
+        return States(of.tangents, self.law(slip, r_n), (r_n, y_t), slip,
+                      stuck=of.contact.closed & ~np.any(last.slip, axis=1) & (last.r_n > 0.0))
+
+    def _slip(self) -> Array:
+        """B_t x - slip0 (m, d - 1), zero where a tangent is prescribed."""
+        of = self.of
+        return np.where(of.surface.tangents >= 0, of.tangents.of(self.x) - self.slip0, 0.0)
+
+    def _take(self, states: States) -> None:
+        """Take states and the closed set of the contact: hold what they hold, and form the residual: a product."""
+        of, contact = self.of, self.of.contact
+        self.states = states
+        contact.place(self.x)
+        origin = of.tangents.flat(self.slip0)
+        sticks = of.tangents.flat(np.repeat(states.stick[:, None], self.slip0.shape[1], axis=1))
+        self.x[of.tangents.rows[sticks]] = origin[sticks]
+        of.operator.set_springs(*contact.sprung)
+        of.gmres.take(states)
+        of.inverse.follow(Held(contact, states))
+        self.load = contact.load(self.b)
+        self._form()
+
+    def _form(self) -> None:
+        """Form the residual at x, and what follows from it."""
+        of = self.of
+        self.residual = self.load - (of.operator @ self.x)
+        self.scales = self.measured(of.contact, self.x, self.residual, self.load)
+        self.r_n = of.contact.reactions(self.x, self.residual)
+        self.r_t, self.slip = of.tangents.of(self.residual), self._slip()
+        self.limits = self.law(self.slip, self.r_n)
+
+    def _rubbed(self) -> Array:
+        """The friction (m, d - 1) that the law allows next to r_t: along the slip, where that is certain, or the
+        projection."""
+        limit, size = self.limits(self.r_n), np.linalg.norm(self.slip, axis=1)
+        y_t = self.r_t + self.of.tangents.c[:, None] * self.slip
+        along = self.slip * (limit / np.where(size > 0.0, size, 1.0))[:, None]
+        goal = self.of.tolerance * self.scales.force
+        certain = (np.linalg.norm(y_t, axis=1) > limit) & (np.linalg.norm(self.r_t - along, axis=1) <= 0.5 * goal)
+        return np.where(certain[:, None], along, project(y_t, limit))
+
+    def solved(self) -> bool:
+        """Say whether x solves the step. StepFailure when it is not a number, or there were too many steps."""
+        of = self.of
+        error = np.where(of.contact.weights() > 0.0, self.residual, 0.0)
+        error[of.tangents.rows] = of.tangents.flat(self.r_t - self._rubbed())
+        wrong = self._wrong(0.0)
+        local = np.array([max_abs(error), np.any(wrong), max_abs(self.limits(self.r_n))], dtype=float)
+        self.error, any_wrong, limit = of.comm.max(np.where(np.isnan(local), np.inf, local))
+        force = self.scales.force
+        self.history.append(self.error / force if force > 0.0 else self.error)
+        if not np.isfinite(self.error):
+            raise self._stopped("the residual is not a number", "check the load, the guess and the bound for NaN")
+        small = self.error <= 0.5 * of.tolerance * force and not any_wrong
+        if small and self.law.settled:
+            return True
+        if not self.law.settled and not any_wrong and self.error <= max(ROUND * limit, 0.5 * of.tolerance * force):
+            self.law.advance(self.slip)
+            self.limits = self.law(self.slip, self.r_n)
+            return self.solved()
+        if len(self.history) > STEPS:
+            raise self._stopped("the states of friction did not settle", "take a smaller step of time or load")
+        return False
+
+    def _wrong(self, error: float) -> Mask:
+        """Conditions whose signs are wrong by more than the error of the residual."""
+        least = 0.5 * self.of.tolerance * self.scales.reaction
+        return self.of.contact.wrong(self.x, self.r_n, error=error, least_force=least,
+                                     x_ref=self.scales.displacement)
+
+    def advance(self) -> None:
+        """Solve the linear problem of the states, and take those of its solution."""
+        of = self.of
+        residual = np.where(of.gmres.free > 0.0, self.residual, 0.0)
+        rows = of.tangents.rows
+        residual[rows] = of.tangents.flat(self.states.residual(self.r_n, self.r_t, self.slip)) * of.gmres.free[rows]
+        dx, left, reason = of.gmres.solve(residual, SHARE, 0.2 * of.tolerance * self.scales.force)
+        if reason < 0 and reason != -3:
+            raise self._stopped(f"GMRES broke down (reason {reason})", "take another preconditioner, or Condensed()")
+        of.operator.work.newton_steps += 1
+        self.x += dx
+        self._form()
+        self._take(self._next(left))
+
+    def _next(self, error: float) -> States:
+        """The states at x; the closed set of the contact changes with them."""
+        of, contact = self.of, self.of.contact
+        wrong = self._wrong(0.0 if error <= 0.5 * of.tolerance * self.scales.force else error)
+        stiffness = np.where(contact.soft, contact.k, contact.diagonal)
+        pressed = stiffness * (self.x[contact.rows] - contact.bound)
+        y_n = np.where(wrong, np.where(contact.closed, 0.0, pressed), self.r_n)
+        contact.change(wrong)
+        y_t = self.r_t + of.tangents.c[:, None] * self.slip
+        return States(of.tangents, self.law(self.slip, y_n), (y_n, y_t), self.slip, before=self.states)
+
+    def answer(self) -> tuple[StepResult, Reactions]:
+        """Return the result, and what the next step begins with."""
+        of, contact, step = self.of, self.of.contact, self.step
+        pulls = ~contact.bilateral & (self.r_n < 0.0)
+        self.r_n = np.where(pulls, 0.0, self.r_n)
+        r_t = self._rubbed()
+        y_t = self.r_t + of.tangents.c[:, None] * self.slip
+        limit = self.limits(self.r_n)
+        still = (np.linalg.norm(y_t, axis=1) <= limit) & (limit > 0.0)
+        x = of.layout.stripped(self.x)
+        there = (of.surface.tangents >= 0) & still[:, None]
+        x[of.surface.tangents[there]] = self.slip0[there]
+        slip = np.where(still[:, None], 0.0, self.slip)
+        result = StepResult(
+            x=x, r_n=self.r_n, active=contact.closed.copy(), iterations=len(self.history) - 1, method=of.name, r_t=r_t,
+            history=tuple(self.history), aim=of.tolerance,
+        )
+        return result, Reactions(self.r_n, r_t, slip)
+
+    def _stopped(self, words: str, remedy: str) -> StepFailure:
+        """The failure, with the history of residuals."""
+        return StepFailure(f"{self.of.name} stopped after {len(self.history) - 1} Newton steps, {words} (residuals "
+                           f"{told(self.history)}): {remedy}")

@@ -1,0 +1,52 @@
+"""Evaluate a friction law in a step: limits that are affine in r_n, with coefficients that may depend on the slip rate.
+
+A law with rates may have several solutions where it weakens. As in ``friction.slip_rate`` the step begins with the
+coefficients of rest and takes those of the slip found in a few rounds; then they follow every Newton step, with
+their derivative, by differences.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...core.algebra import Array
+from ...core.step import StepProblem
+from .friction_states import Limits
+
+ROUNDS = 4  # with coefficients that are given
+DIFFERENCE = 1e-6  # of the slip
+
+
+class LawOfStep:
+    """Evaluate the law of a step. ``settled``: its coefficients are constant, or follow the slip by now."""
+
+    def __init__(self, step: StepProblem) -> None:
+        self._step = step
+        rest = np.zeros((step.surface.count, step.surface.tangents.shape[1]))
+        self._constant = step.rate_factor == 0.0 or step.friction_at(rest) is step.friction
+        self._given, self._left = rest, 0 if self._constant else ROUNDS
+
+    @property
+    def settled(self) -> bool:
+        """Say whether an answer with the present coefficients is one of the step."""
+        return self._left == 0
+
+    def advance(self, slip: Array) -> None:
+        """Take the coefficients of this slip (m, d - 1); after some rounds they follow."""
+        self._given = slip
+        self._left -= 1
+
+    def __call__(self, slip: Array, r_n: Array) -> Limits:
+        """Return the limits at this slip, or at the one that is given."""
+        if self._constant or not self.settled:
+            return self._at(self._given)
+        here, size, h = self._at(slip), np.linalg.norm(slip, axis=1), DIFFERENCE
+        moved = size > 0.0
+        change = self._at(slip * (1.0 + h))(r_n) - here(r_n)
+        return Limits(here.cohesion, here.slope, np.where(moved, change, 0.0) / np.where(moved, h * size, 1.0))
+
+    def _at(self, slip: Array) -> Limits:
+        step, none = self._step, np.zeros(self._step.surface.count)
+        law = step.friction_at(slip)
+        weights = step.surface.weights
+        return Limits(law.limit(none, weights, step.scale), law.slope(weights), none)
