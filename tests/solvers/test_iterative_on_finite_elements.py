@@ -183,11 +183,6 @@ def test_rigid_modes_in_turned_and_relative_unknowns(name: str) -> None:
         assert image.norm() <= 1e-12 * A.largest
 
 
-def test_friction_is_refused() -> None:
-    problem = replace(thrown_box(COMM), friction=vc.Coulomb(0.3))
-    with pytest.raises(InputError, match="would ignore Coulomb.*Condensed"):
-        vc.simulate(problem, solver=Iterative(), dt=1e-3, steps=1)
-
 
 def test_the_choice_is_said_once(caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level("INFO"):

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...core.algebra import Array, Comm, Mask, max_abs
+from ...core.algebra import Array, Comm, Mask, largest, max_abs
 from ...core.errors import StepFailure
 from ...core.step import StepProblem, StepResult
 from ...core.surfaces import ContactSurface
@@ -21,7 +21,7 @@ from .contact import Contact
 from .failures import told
 from .friction_krylov import Gmres, Held, Turned
 from .friction_laws import LawOfStep
-from .friction_states import States, Tangents
+from .friction_states import Limits, States, Tangents
 from .layout import Layout
 from .measures import Measured
 from .operator import Operator
@@ -74,7 +74,7 @@ class Newton:
     """Iterate over one step. ``history``: residuals over the forces."""
 
     def __init__(self, of: Friction, step: StepProblem) -> None:
-        self.of, self.step = of, step
+        self.of = of
         self.law = LawOfStep(step)
         assert step.slip0 is not None
         self.slip0 = step.slip0
@@ -92,12 +92,12 @@ class Newton:
         last = of.last
         if last is None:
             none = np.zeros(len(slip))
-            limits = self.law(np.zeros_like(slip), none)
+            limits = self.law(np.zeros_like(slip), none, none)
             return States(of.tangents, limits, (none, of.tangents.c[:, None] * slip), slip,
                           stuck=of.contact.closed & (limits.slope > 0.0))
         r_n = np.where(of.contact.closed, last.r_n, 0.0)
         y_t = last.r_t + of.tangents.c[:, None] * slip
-        return States(of.tangents, self.law(slip, r_n), (r_n, y_t), slip,
+        return States(of.tangents, self._limits(slip, r_n, y_t), (r_n, y_t), slip,
                       stuck=of.contact.closed & ~np.any(last.slip, axis=1) & (last.r_n > 0.0))
 
     def _slip(self) -> Array:
@@ -105,19 +105,23 @@ class Newton:
         of = self.of
         return np.where(of.surface.tangents >= 0, of.tangents.of(self.x) - self.slip0, 0.0)
 
-    def _take(self, states: States) -> None:
-        """Take states and the closed set of the contact: hold what they hold, and form the residual: a product."""
-        of, contact = self.of, self.of.contact
+    def _take(self, states: States, changed: Mask | None = None) -> None:
+        """Take states and the closed set of the contact: hold what they hold, and form the residual, a product, unless
+        nothing moved. ``changed``: conditions that closed or opened, None before the first residual."""
+        of, contact, x = self.of, self.of.contact, self.x.copy()
         self.states = states
-        contact.place(self.x)
+        contact.place(x)
         origin = of.tangents.flat(self.slip0)
         sticks = of.tangents.flat(np.repeat(states.stick[:, None], self.slip0.shape[1], axis=1))
-        self.x[of.tangents.rows[sticks]] = origin[sticks]
+        x[of.tangents.rows[sticks]] = origin[sticks]
         of.operator.set_springs(*contact.sprung)
         of.gmres.take(states)
         of.inverse.follow(Held(contact, states))
         self.load = contact.load(self.b)
-        self._form()
+        moved = changed is None or bool(np.any(changed)) or not np.array_equal(x, self.x)
+        if largest(of.comm, moved):
+            self.x = x
+            self._form()
 
     def _form(self) -> None:
         """Form the residual at x, and what follows from it."""
@@ -126,7 +130,10 @@ class Newton:
         self.scales = self.measured(of.contact, self.x, self.residual, self.load)
         self.r_n = of.contact.reactions(self.x, self.residual)
         self.r_t, self.slip = of.tangents.of(self.residual), self._slip()
-        self.limits = self.law(self.slip, self.r_n)
+        self.limits = self._limits(self.slip, self.r_n, self.r_t)
+
+    def _limits(self, slip: Array, r_n: Array, y_t: Array) -> Limits:
+        return self.law(slip, r_n, np.linalg.norm(y_t, axis=1) / self.of.tangents.c)
 
     def _rubbed(self) -> Array:
         """The friction (m, d - 1) that the law allows next to r_t: along the slip, where that is certain, or the
@@ -147,7 +154,7 @@ class Newton:
         local = np.array([max_abs(error), np.any(wrong), max_abs(self.limits(self.r_n))], dtype=float)
         self.error, any_wrong, limit = of.comm.max(np.where(np.isnan(local), np.inf, local))
         force = self.scales.force
-        self.history.append(self.error / force if force > 0.0 else self.error)
+        self.history.append(self.error / force if 0.0 < force < np.inf else self.error)
         if not np.isfinite(self.error):
             raise self._stopped("the residual is not a number", "check the load, the guess and the bound for NaN")
         small = self.error <= 0.5 * of.tolerance * force and not any_wrong
@@ -155,7 +162,7 @@ class Newton:
             return True
         if not self.law.settled and not any_wrong and self.error <= max(ROUND * limit, 0.5 * of.tolerance * force):
             self.law.advance(self.slip)
-            self.limits = self.law(self.slip, self.r_n)
+            self.limits = self._limits(self.slip, self.r_n, self.r_t)
             return self.solved()
         if len(self.history) > STEPS:
             raise self._stopped("the states of friction did not settle", "take a smaller step of time or load")
@@ -179,10 +186,10 @@ class Newton:
         of.operator.work.newton_steps += 1
         self.x += dx
         self._form()
-        self._take(self._next(left))
+        self._take(*self._next(left))
 
-    def _next(self, error: float) -> States:
-        """The states at x; the closed set of the contact changes with them."""
+    def _next(self, error: float) -> tuple[States, Mask]:
+        """The states at x, and the conditions that close or open with them."""
         of, contact = self.of, self.of.contact
         wrong = self._wrong(0.0 if error <= 0.5 * of.tolerance * self.scales.force else error)
         stiffness = np.where(contact.soft, contact.k, contact.diagonal)
@@ -190,11 +197,12 @@ class Newton:
         y_n = np.where(wrong, np.where(contact.closed, 0.0, pressed), self.r_n)
         contact.change(wrong)
         y_t = self.r_t + of.tangents.c[:, None] * self.slip
-        return States(of.tangents, self.law(self.slip, y_n), (y_n, y_t), self.slip, before=self.states)
+        limits = self._limits(self.slip, y_n, y_t)
+        return States(of.tangents, limits, (y_n, y_t), self.slip, before=self.states), wrong
 
     def answer(self) -> tuple[StepResult, Reactions]:
         """Return the result, and what the next step begins with."""
-        of, contact, step = self.of, self.of.contact, self.step
+        of, contact = self.of, self.of.contact
         pulls = ~contact.bilateral & (self.r_n < 0.0)
         self.r_n = np.where(pulls, 0.0, self.r_n)
         r_t = self._rubbed()

@@ -1,9 +1,11 @@
 """Solve the linear problem of given friction states by PETSc's GMRES: it is not symmetric where points slip.
 
 The preconditioner is that of the frictionless step, made once: w W M⁻¹ W w, with zeros in w for closed normals and
-sticking tangents, and in the tangent plane of a point that slips W = n nᵀ + sqrt(c / (c + kappa)) (1 - n nᵀ), which gives
-M the diagonal of A + kappa across the slip, and tends to the mask of a point that cannot turn. Without it GMRES needs
-three to five times as many iterations.
+sticking tangents, and in the tangent plane of a point that slips
+
+    W = n nᵀ + sqrt(c / (c + kappa)) (1 - n nᵀ),
+
+which gives M the diagonal of A + kappa across the slip, and tends to the mask of a point that cannot turn.
 """
 
 from __future__ import annotations

@@ -36,14 +36,17 @@ class LawOfStep:
         self._given = slip
         self._left -= 1
 
-    def __call__(self, slip: Array, r_n: Array) -> Limits:
-        """Return the limits at this slip, or at the one that is given."""
+    def __call__(self, slip: Array, r_n: Array, reach: Array) -> Limits:
+        """Return the limits at this slip, or at the one that is given. ``reach`` (m,): slips that points at rest may
+        come to; they rise with the law where it grows."""
         if self._constant or not self.settled:
             return self._at(self._given)
-        here, size, h = self._at(slip), np.linalg.norm(slip, axis=1), DIFFERENCE
+        here, rest, size = self._at(slip), self._at(np.zeros_like(slip)), np.linalg.norm(slip, axis=1)
         moved = size > 0.0
-        change = self._at(slip * (1.0 + h))(r_n) - here(r_n)
-        return Limits(here.cohesion, here.slope, np.where(moved, change, 0.0) / np.where(moved, h * size, 1.0))
+        h = DIFFERENCE * np.where(moved, size, reach)
+        change = self._at(np.column_stack([size + h, *np.zeros_like(slip.T[1:])]))(r_n) - here(r_n)
+        rise = np.where(h > 0.0, change, 0.0) / np.where(h > 0.0, h, 1.0)
+        return Limits(here.cohesion, here.slope, np.where(moved, rise, np.maximum(rise, 0.0)), rest)
 
     def _at(self, slip: Array) -> Limits:
         step, none = self._step, np.zeros(self._step.surface.count)

@@ -54,15 +54,20 @@ class Tangents:
 
 @dataclass(frozen=True)
 class Limits:
-    """Hold the friction limit cohesion + slope r_n of every point, and its ``rise`` [A] with the slip."""
+    """Hold the friction limit cohesion + slope r_n of every point, its ``rise`` [A] with the slip, and that at rest."""
 
     cohesion: Array
     slope: Array
     rise: Array
+    rest: Limits | None = None
 
     def __call__(self, r_n: Array) -> Array:
         """Return the limit (m,): tension rubs on nothing."""
         return self.cohesion + self.slope * np.maximum(r_n, 0.0)
+
+    def sticking(self, r_n: Array) -> Array:
+        """Return the limit (m,) below which a point sticks: of a slip that is slower under the law, or of rest."""
+        return self(r_n) if self.rest is None else np.minimum(self(r_n), self.rest(r_n))
 
 
 def dot(a: Array, b: Array) -> Array:
@@ -83,15 +88,15 @@ class States:
         self._tangents = tangents
         y_n, y_t = y
         limit, size, c = limits(y_n), np.linalg.norm(y_t, axis=1), tangents.c
-        sticks = size <= limit
+        sticks = size <= limits.sticking(y_n)
         if before is not None:
             sticks |= dot(before.direction, y_t) < 0.0
         self.stick: Mask = tangents.rubs & (limit > 0.0) & sticks
         if stuck is not None:
             self.stick |= stuck & tangents.rubs
         self.slips: Mask = tangents.rubs & (limit > 0.0) & ~self.stick
-        over = np.where(self.slips, size - limit, 1.0)
-        self.direction = np.where(self.slips[:, None], y_t, 0.0) / np.where(self.slips, size, 1.0)[:, None]
+        over = np.where(self.slips, np.where(size > limit, size - limit, c * np.linalg.norm(slip, axis=1)), 1.0)
+        self.direction: Array = np.where(self.slips[:, None], y_t, 0.0) / np.where(self.slips, size, 1.0)[:, None]
         self.kappa = np.where(self.slips, np.minimum(limit * c / np.maximum(over, limit / STIFFEST), STIFFEST * c), 0.0)
         if y_t.shape[1] < 2:
             self.kappa[:] = 0.0

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 class Work:
     """Hold sums since the solver was prepared, on this rank; times are seconds of its processor.
 
-    ``linear_iterations`` of conjugate gradients, those of the fallback too, or of GMRES; ``newton_steps`` with friction;
-    ``products`` with A, which took
-    ``product_seconds``; ``renewals`` of the preconditioner after the first, which with it took ``set_up_seconds``;
+    ``linear_iterations`` of conjugate gradients, those of the fallback too, or of GMRES; ``newton_steps`` with
+    friction; ``products`` with A, which took ``product_seconds``; ``renewals`` of the preconditioner after the first,
+    which with it took ``set_up_seconds``;
     ``fallbacks``: steps that ended by projected gradients.
     """
 
