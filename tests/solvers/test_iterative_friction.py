@@ -21,7 +21,6 @@ from vi_contact.core.verify import kkt_residual
 from vi_contact.laws.friction import Coulomb, ExponentialDecay, SlipRateCoulomb, StaticKinetic, Tresca
 from vi_contact.solvers import Iterative
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.solvers.iterative.regime import KINDS
 from vi_contact.solvers.volume.route import ReducedNewton, Volume
 
 CLOSE = 3e-11
@@ -49,10 +48,9 @@ def sound(c: Case, result: StepResult) -> None:
     """The certificate with room; cone and dissipation but for the last digits; what sticks is where it was."""
     certificate = kkt_residual(c.step, result)
     assert certificate.worst <= 1.1 * CLOSE and certificate.cone <= 1e-14
-    slip = np.linalg.norm(c.step.surface.tangential_values(result.x) - c.step.slip0, axis=1)
-    assert not np.any(slip[np.linalg.norm(result.r_t, axis=1) < 0.999 * c.step.friction_at(
-        c.step.surface.tangential_values(result.x) - c.step.slip0).limit(result.r_n, c.step.surface.weights,
-                                                                         c.step.scale)])
+    slip = c.step.surface.tangential_values(result.x) - c.step.slip0
+    limit = c.step.friction_at(slip).limit(result.r_n, c.step.surface.weights, c.step.scale)
+    assert not np.any(slip[np.linalg.norm(result.r_t, axis=1) < 0.999 * limit])
 
 
 # Closed forms --------------------------------------------------------------------------------------------------------
@@ -95,23 +93,24 @@ def test_slip_direction_in_space_by_hand(law: Any) -> None:
 def test_agrees_with_the_condensed_route(parallel: bool, law: Any, options: dict[str, Any]) -> None:
     """x, r_n and r_t to 1e-9, the same sets, in steps with open, sticking and slipping points."""
     seen = []
-    for seed in range(4):
+    for seed in range(3):
         c = random_case(law, seed=seed, parallel=parallel, **options)
-        result = solve(c)
-        agree(c, result, solve(c, Condensed()))
+        result, condensed = solve(c), solve(c, Condensed())
+        agree(c, result, condensed)
         sound(c, result)
         seen.append(states(c, result))
-        assert seen[-1] == states(c, solve(c, Condensed()))
+        assert seen[-1] == states(c, condensed)
     assert all(total > 0 for total in np.sum(seen, axis=0))
 
 
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("law", [Coulomb(0.3), Coulomb(0.8), Coulomb(1.2), Tresca((0.0, 0.1, 0.3, 0.6, 1.0, 2.0))],
-                         ids=repr)
+@pytest.mark.parametrize("kind, law", [
+    ("icc", Coulomb(0.3)), ("jacobi", Coulomb(0.8)), ("gamg", Coulomb(0.8)), ("icc", Coulomb(1.2)),
+    ("icc", Tresca((0.0, 0.1, 0.3, 0.6, 1.0, 2.0))), ("gamg", Tresca(0.1)),
+], ids=str)
 def test_disks_agree_with_the_condensed_route(parallel: bool, kind: str, law: Any) -> None:
     """In space: the exact disk, no polygon; at most 12 Newton steps."""
     seen = []
-    for seed in range(8):
+    for seed in range(5):
         c, _ = spatial(law, seed, parallel=parallel)
         result = solve(c, Iterative(kind, tolerance=CLOSE))
         agree(c, result, solve(c, Condensed()))
@@ -132,7 +131,7 @@ def test_agrees_with_the_reference_in_the_volume(parallel: bool) -> None:
 ], ids=["weakening", "strengthening", "static and kinetic", "viscous"])
 def test_rates_in_space(parallel: bool, mu: Any) -> None:
     """The coefficient of the rate that the step itself finds."""
-    for seed in range(6):
+    for seed in range(3):
         c, _ = spatial(Coulomb(0.0), seed, parallel=parallel)
         c = replace(c, step=replace(c.step, friction=SlipRateCoulomb(mu), rate_factor=2.0))
         result = solve(c)

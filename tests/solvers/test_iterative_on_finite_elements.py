@@ -17,7 +17,6 @@ from two_bodies import SOFT, blocks, thrown, two_blocks
 
 import vi_contact as vc
 from vi_contact import fem
-from vi_contact.core.errors import InputError
 from vi_contact.core.verify import kkt_residual
 from vi_contact.solvers import Iterative
 from vi_contact.solvers.iterative.layout import Nodewise
