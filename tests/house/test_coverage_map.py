@@ -90,6 +90,9 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
         "solvers.iterative.contact solvers.iterative.failures solvers.iterative.layout "
         "solvers.iterative.projected_gradients solvers.iterative.regime solvers.iterative.route "
         "solvers.iterative.search solvers.iterative.work",
+    "solvers/test_iterative_friction.py":
+        "solvers.iterative.friction solvers.iterative.friction_krylov solvers.iterative.friction_laws "
+        "solvers.iterative.friction_states",
     "solvers/test_iterative_on_finite_elements.py":
         "solvers.iterative.conjugate_gradients solvers.iterative.measures solvers.iterative.modes "
         "solvers.iterative.operator solvers.iterative.preconditioners",
