@@ -56,14 +56,21 @@ def test_mass_matrix_to_round_off(held: bool) -> None:
         solve_free(system.algebra, system.M, np.full_like(x, np.nan), fixed, x)
 
 
-@pytest.mark.parametrize("mass", [Redistributed(), vc.ConsistentMass()], ids=["massless", "resting"])
-def test_first_acceleration_of_a_large_body(mass: Any, large: Any) -> None:
+STARTS: dict[str, dict[str, Any]] = {
+    "massless": {"mass": Redistributed()},
+    "resting": {"mass": vc.ConsistentMass()},
+    "rubbing": {"mass": vc.ConsistentMass(), "friction": vc.Coulomb(0.02)},
+}
+
+
+@pytest.mark.parametrize("name", STARTS)
+def test_first_acceleration_of_a_large_body(name: str, large: Any) -> None:
     """With and without mass at contact points that rest and push: as with the factor of M, to 1e-11."""
     box = thrown_box(COMM, simplices=True, divisions=(4, 4, 4))
     flat = replace(box.surface, gap0=np.zeros(box.surface.count))
-    problem = replace(box, surface=flat, mass=mass)
+    problem = replace(box, surface=flat, **STARTS[name])
     state = initial_state(problem)
-    state = replace(state, v=np.zeros_like(state.v))
+    state = replace(state, v=0.1 * problem.equations.influence[:, 0])  # along the ground
     exact = consistent_acceleration(problem, state, BOX_DT)
     large()
     found = consistent_acceleration(replace(problem), state, BOX_DT)

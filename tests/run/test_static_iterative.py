@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -53,6 +54,8 @@ PROBLEMS: dict[str, tuple[Callable[[], vc.ContactProblem], int]] = {  # name -> 
     "stack": (lambda: stack(2), 500),
     "stack in space": (lambda: stack(3), 770),
     "channel": (channel, 3800),
+    "pushed and rubbing": (lambda: replace(standing(push=1e3, **SPACE), friction=vc.Coulomb(0.5)), 900),
+    "channel that rubs": (lambda: replace(channel(), friction=vc.Coulomb(0.5)), 8000),
 }
 
 
@@ -77,6 +80,8 @@ def test_as_with_a_factor(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     assert max_over_ranks(COMM, found.u - exact.u) <= 1e-9 * max_over_ranks(COMM, exact.u)
     assert max_over_ranks(COMM, found.r_n - exact.r_n) <= 1e-9 * max_over_ranks(COMM, exact.r_n)
     assert np.array_equal(found.active, exact.active)
+    if found.r_t is not None and exact.r_t is not None:
+        assert max_over_ranks(COMM, found.r_t - exact.r_t) <= 1e-9 * max_over_ranks(COMM, exact.r_n)
     (prepared,) = Watched.prepared
     assert prepared.kind == "gamg" and prepared.work.linear_iterations <= most
 

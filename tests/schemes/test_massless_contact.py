@@ -118,7 +118,7 @@ def test_only_contact_rows_are_factorised(name: str, factorised: Rows) -> None:
     assert np.array_equal(found.u[~massless], state.u[~massless])
 
 
-@pytest.mark.parametrize("name", ["wall", "turned, on springs", "pair"])
+@pytest.mark.parametrize("name", PROBLEMS)
 def test_a_large_layer_is_not_factorised(name: str, factorised: Rows, monkeypatch: pytest.MonkeyPatch) -> None:
     """The same equilibrium by conjugate gradients, to 1e-11."""
     problem = PROBLEMS[name]()

@@ -127,6 +127,7 @@ def test_a_step_and_its_certificate(kind: str, traffic: Traffic) -> None:
 STEPPED: dict[str, tuple[dict[str, Any], Any, float]] = {
     "midpoint": ({}, vc.Midpoint(), 6),
     "default": ({"mass": Redistributed()}, None, 6),
+    "friction": ({"friction": vc.Coulomb(0.3)}, vc.Midpoint(), 6),
     "HHT": ({"mass": Redistributed()}, vc.HHT(), 6),
     "predictor": ({}, vc.ContactStabilisedNewmark(), 7),
     "impacts": ({"impact": Inelastic(ImpulseUpdate())}, vc.Midpoint(), 45),
