@@ -187,11 +187,19 @@ def test_restart_and_change_of_step(tmp_path):
         (lambda law: _check(law, surface=lambda s: s.bilateral_everywhere()), "unilateral contact on rigid supports"),
         (lambda law: _check(law, surface=lambda s: s.on_springs(1.0)), "unilateral contact on rigid supports"),
         (lambda law: _check(law, surface=lambda s: s.moving(towards=lambda t: t)), "obstacle at rest"),
+        (lambda law: _check(law, surface=_crowded), r"10001 contact unknowns .* take an impact law .*Newton\(e\)"),
     ],
 )
 def test_what_the_law_refuses(make, word):
     with pytest.raises(InputError, match=word):
         make(contact_layer(1.0, mass=1.0, speed=1.0, width=0.1))
+
+
+def _crowded(surface: Any) -> Any:
+    """The surface, which says that it has more points."""
+    surface = replace(surface)
+    surface.__dict__["total"] = 10_001
+    return surface
 
 
 def _check(law: ContactLayer, surface: Any = None, **more: Any) -> None:

@@ -14,7 +14,6 @@ from two_bodies import two_blocks
 
 from vi_contact.core import sizes
 from vi_contact.core.algebra import Array, EffectiveMatrix, SerialAlgebra, total
-from vi_contact.core.errors import InputError
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.step import State, StepProblem
 from vi_contact.fem.contact.pairs import contact_pair
@@ -27,7 +26,6 @@ from vi_contact.meshes.two_blocks import TwoBlocks
 from vi_contact.run.simulate import simulate
 from vi_contact.schemes.consistent_data import equilibrated
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.solvers.iterative.route import Iterative
 from vi_contact.solvers.volume.route import ReducedNewton, Volume
 
 COMM = MPI.COMM_WORLD
@@ -130,23 +128,6 @@ def test_a_large_layer_is_not_factorised(name: str, factorised: Rows, monkeypatc
     assert not factorised and np.array_equal(large.active, small.active)
     assert max_over_ranks(COMM, large.u - small.u) < 1e-11 * max_over_ranks(COMM, small.u)
     assert max_over_ranks(COMM, large.r_n - small.r_n) < 1e-11 * max_over_ranks(COMM, small.r_n)
-
-
-def test_what_conjugate_gradients_refuse_is_condensed(
-    factorised: Rows, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    """A law that they cannot carry: the small route, however large, and a sentence in the log."""
-    def refuse(solver: Iterative, problem: ContactProblem) -> None:
-        raise InputError("not this law")
-
-    monkeypatch.setattr(sizes, "OWN_UNKNOWNS", 0)
-    monkeypatch.setattr(Iterative, "check", refuse)
-    problem = PROBLEMS["rubbing"]()
-    assert equilibrated(problem, disturbed(problem)).r_t is not None
-    assert len(factorised) == 1
-    assert [r.getMessage() for r in caplog.records] == (
-        ["a large problem at the start is factorised: not this law"] if COMM.rank == 0 else []
-    )
 
 
 def test_an_iterative_run_factorises_no_whole_matrix(factorised: Rows) -> None:

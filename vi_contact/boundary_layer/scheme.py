@@ -23,6 +23,7 @@ from ..core.algebra import Array, EffectiveMatrix, max_abs
 from ..core.checks import instance
 from ..core.errors import InputError, StepFailure
 from ..core.problem import ContactProblem
+from ..core.sizes import refuse_dense
 from ..core.step import State, StepProblem, StepResult
 from ..schemes.midpoint import Midpoint
 from ..solvers.condensed import Condensed
@@ -65,6 +66,7 @@ class BoundaryLayer(Midpoint):
             raise InputError("BoundaryLayer needs unilateral contact on rigid supports: leave held points, springs out")
         if surface.motion is not None:
             raise InputError("BoundaryLayer needs an obstacle at rest: move the body's support instead")
+        refuse_dense("BoundaryLayer", surface.total, instead="an impact law with restitution, Newton(e)")
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
         """Return the state as it is; InputError where the layer would have to begin behind the obstacle."""

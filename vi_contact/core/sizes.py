@@ -10,11 +10,11 @@ OWN_UNKNOWNS = 50_000  # beyond it a factor of the mass matrix takes ten seconds
 OWN_CONDITIONS = 1_000  # as many back-substitutions, and a dense matrix
 
 
-def refuse_dense(owner: str, rows: int) -> None:
+def refuse_dense(owner: str, rows: int, *, instead: str = "Iterative(), which stores none") -> None:
     """Raise InputError for more contact unknowns than a dense matrix on every rank suits."""
     if rows > DENSE_ROWS:
         raise InputError(f"{owner} stores a dense matrix of its {rows} contact unknowns on every rank, "
-                         f"{8e-9 * rows**2:.2g} GB: take Iterative(), which stores none, or at most {DENSE_ROWS}")
+                         f"{8e-9 * rows**2:.2g} GB: take {instead}, or at most {DENSE_ROWS}")
 
 
 def small(comm: Comm, unknowns: int, conditions: int) -> bool:

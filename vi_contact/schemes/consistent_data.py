@@ -82,7 +82,7 @@ def _with_contact(problem: ContactProblem, state: State, force: Array, dt: float
     )
     solver: PreparedSolver = problem.equations.cached(
         "resting contacts",
-        lambda: solver_beside_steps(problem, step.A, step.surface).prepare(step.A, step.surface, 1.0),
+        lambda: solver_beside_steps(step.A, step.surface).prepare(step.A, step.surface, 1.0),
     )
     result = solver.solve(step)
     return result.x, springs + surface.reaction_load(result.r_n, len(force), result.r_t)
@@ -145,7 +145,7 @@ def equilibrated(problem: ContactProblem, state: State) -> State:
         friction=problem.friction,
         slip0=problem.slip_origin(state.u, state.t, state.t),
     )
-    solver = solver_beside_steps(problem, A, surface)
+    solver = solver_beside_steps(A, surface)
     result, _, _ = CertifiedSolver(problem, A, 1.0, [solver], TOLERANCE, surface=surface).solve(step)
     u = state.u.copy()
     u[layer] = result.x

@@ -99,7 +99,7 @@ def admissible(problem: ContactProblem, state: State, u: Array, dt: float) -> tu
     M = mass_matrix(problem)
 
     def prepared() -> CertifiedSolver:
-        return CertifiedSolver(bounds, M, 1.0, [solver_beside_steps(bounds, M, bounds.surface)], TOLERANCE)
+        return CertifiedSolver(bounds, M, 1.0, [solver_beside_steps(M, bounds.surface)], TOLERANCE)
 
     solver: CertifiedSolver = system.cached("admissible predictor", prepared)
     step = StepProblem(
