@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import schemes
+from ..core import stages
 from ..core.errors import InputError
 from ..studies.cases.library import FOLDER, builtin_cases, located
 from ..studies.cases.short_settings import ShortOptions
@@ -61,6 +62,7 @@ def _run(options: argparse.Namespace) -> str:
     with suppress(ImportError):  # the beam and the layer need no MPI
         import mpi4py.MPI  # noqa: F401
     comm, path = world(), located(options.case)
+    stages.show(not options.quiet)
     if options.wall_time is not None:
         seconds_of(options.wall_time)
     if options.steps is not None and options.steps < 1:

@@ -12,6 +12,7 @@ import numpy as np
 from .algebra import Array
 from .problem_checks import check_parts
 from .protocols import Excitation, FrictionLaw, Frictionless, ImpactLaw, MassLaw
+from .stages import stage
 from .surfaces import ContactSurface
 from .system import SemiDiscreteSystem
 
@@ -43,6 +44,7 @@ class ContactProblem:
         return tuple(self.excitation) if isinstance(self.excitation, Sequence) else (self.excitation,)
 
     @cached_property
+    @stage("mass")
     def equations(self) -> SemiDiscreteSystem:
         """Return the system in the rotated basis, with the inertia loads -M r a_g(t) of the excitations; schemes see
         this."""

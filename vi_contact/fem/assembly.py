@@ -18,6 +18,7 @@ import ufl
 
 from ..core.algebra import Array, Mask, largest
 from ..core.errors import InputError
+from ..core.stages import stage
 from ..core.system import Load, SemiDiscreteSystem
 from ..laws.materials import Damping, LinearElastic, Section
 from . import compat
@@ -34,6 +35,7 @@ Field = tuple[float, ...] | Callable[[Array], Array]
 Initial = Field | Sequence[tuple[Cells, Field]] | None
 
 
+@stage("assembling")
 def assemble(
     mesh: Any,
     material: Materials,

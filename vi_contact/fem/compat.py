@@ -8,6 +8,8 @@ per cell type (0.11).
 
 from __future__ import annotations
 
+from contextlib import suppress
+from itertools import product
 from typing import Any
 
 import dolfinx
@@ -72,6 +74,16 @@ def geometry_dofmap(mesh: Mesh) -> Indices:
     if _DOFMAP_PER_CELL_TYPE:
         return mesh.geometry.dofmaps[0]
     return _as_table(mesh.geometry.dofmap, mesh)
+
+
+def mesh_bytes(mesh: Mesh) -> int:
+    """Return the bytes of the nodes and of the connectivities that there are, on this rank."""
+    parts = [mesh.geometry.x, geometry_dofmap(mesh)]
+    for pair in product(range(mesh.topology.dim + 1), repeat=2):
+        with suppress(RuntimeError):  # from 0.6 on of what has not been made, which is None before
+            found = mesh.topology.connectivity(*pair)
+            parts += [] if found is None else [found.array, found.offsets]
+    return sum(part.nbytes for part in parts)
 
 
 def entities_to_geometry(mesh: Mesh, dim: int, entities: Indices) -> Indices:

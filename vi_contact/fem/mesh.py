@@ -20,6 +20,7 @@ from mpi4py import MPI
 from vi_contact.core.checks import instance, provides, refuse, shown
 from vi_contact.core.errors import InputError
 from vi_contact.core.files import on_root
+from vi_contact.core.stages import stage
 from vi_contact.fem import compat
 from vi_contact.fem.compat import Indices
 from vi_contact.fem.petsc_algebra import MpiComm
@@ -128,6 +129,7 @@ def node_numbers(mesh: Mesh) -> npt.NDArray[np.int64]:
     return np.asarray(mesh.geometry.input_global_indices, dtype=np.int64)
 
 
+@stage("mesh")
 def _distribute(comm: MPI.Comm, produce: Callable[[], MeshArrays]) -> tuple[Mesh, Tags]:
     instance("mesh", "comm", comm, MPI.Comm, "give a communicator, such as MPI.COMM_WORLD")
     arrays = _on_root(comm, produce)

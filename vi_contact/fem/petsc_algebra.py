@@ -23,6 +23,7 @@ OWN_FACTOR = {
 FULL_ROW = 40.0  # entries of a row: 2D meshes have fewer, 3D meshes more
 FEW_ROWS = 10_000  # with full rows: beyond, MUMPS' dense blocks pay
 COPIED_ROWS = 300_000  # with sparse rows: a copy of the factor on every rank takes about 0.5 GB here
+_ENTRY = 8 + np.dtype(PETSc.IntType).itemsize  # bytes of an entry and its column
 RIGHT_SIDES = 64  # right-hand sides per block solve: bounds the memory of the dense blocks
 
 
@@ -65,6 +66,11 @@ class PetscMatrix:
     @property
     def rows(self) -> int:
         return int(self.mat.getLocalSize()[0])
+
+    @property
+    def bytes(self) -> float:
+        """Return the bytes of the entries of this rank and their columns."""
+        return _ENTRY * float(self.mat.getInfo(PETSc.Mat.InfoType.LOCAL)["nz_allocated"])
 
     def __matmul__(self, x: Array) -> Array:
         self._x.array[:] = x
@@ -127,6 +133,14 @@ class PetscFactor:
                 "the effective matrix cannot be factorised: it is singular or contains NaN; check the materials, and "
                 "that every part of the body is clamped or has mass"
             )
+
+    @property
+    def bytes(self) -> float:
+        """Return the bytes of the entries, an equal share of them on each rank; 0 for copies, which tell nothing."""
+        if self._pc.getType() not in ("cholesky", "lu"):
+            return 0.0
+        count = self._pc.getFactorMatrix().getInfo()["nz_used"]  # MUMPS counts many of them in millions, below zero
+        return _ENTRY * (count if count >= 0.0 else -1e6 * count) / self._b.comm.size
 
     def solve(self, b: Array) -> Array:
         self._b.array[:] = b

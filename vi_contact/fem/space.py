@@ -116,6 +116,11 @@ class FemSpace:
         self._P = PetscMatrix(self.selection) if pairs else None
         self.forms: Any = None  # the ElasticForms of the system made on it; stress output needs them
 
+    @property
+    def bytes(self) -> int:
+        """Return the bytes of the mesh on this rank."""
+        return compat.mesh_bytes(self.mesh)
+
     def _size(self) -> float:
         """Diagonal of the bounding box [m], the length that tolerances are relative to."""
         low = -self.comm.max(-np.min(self.points, axis=0, initial=np.inf))

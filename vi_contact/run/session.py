@@ -16,6 +16,7 @@ import numpy as np
 
 from ..core.algebra import Comm
 from ..core.errors import Interrupted, OutOfTime
+from ..core.stages import done
 from ..core.step import Recorder, Report, State, StepResult
 from .files.checkpoint import RestartPoint
 from .files.identity import identity
@@ -23,6 +24,7 @@ from .files.log import Progress, versions
 from .files.table import Table
 from .files.writer import Writer
 from .march import March
+from .memory import in_words, memory
 from .method import Method
 from .recorders import refuse_overflow
 from .solution import Solution, energy_warning, sampling_warning
@@ -63,6 +65,7 @@ class Session:
     resumed_from: int | None = None
     last: Report | None = None
     dt: float = float("nan")
+    memory: Mapping[str, Any] = field(default_factory=dict)
     halved: int = 0
     seconds: deque[float] = field(default_factory=lambda: deque(maxlen=TIMED))
 
@@ -109,6 +112,7 @@ class Session:
             self._tell_start()
             self._march(writer, signals)
             self._checkpoint(writer)
+            self._measure()
             linear = self._seconds_per_linear_step()
         except BaseException as error:
             interrupted = isinstance(error, KeyboardInterrupt)
@@ -142,6 +146,8 @@ class Session:
                     if self.root:
                         progress.step(state.k, state.t, iterations=report.result.iterations, worst=worst)
                 self.seconds.append(time.perf_counter() - begin)
+                if len(self.seconds) == 1:
+                    self._measure()
                 if loop.ended and self.left:
                     self._stop_if_asked(writer, signals)
                 begin = time.perf_counter()
@@ -153,6 +159,7 @@ class Session:
         if not (number or late):
             return
         self._checkpoint(writer)
+        self._measure()
         rest = f"ended the run after step {self.place.state.k}, t = {self.place.state.t:.6g} s: {writer.rest}"
         if number:
             raise Interrupted(f"{Signals(number).name} {rest}", number)
@@ -170,6 +177,12 @@ class Session:
         writer.append(row)
         self.table.append(row)  # after the disk: a checkpoint never knows a step that history.csv does not
         self.last = report
+
+    def _measure(self) -> None:
+        """Tell how much memory is taken, once all is set up and at the end. Collective."""
+        self.memory = memory(self.method.problem, None if self.last is None else self.last.step.A)
+        if self.root:
+            log.info("%s", in_words(self.memory))
 
     def _checkpoint(self, writer: Writer) -> None:
         with self.wall_time.saving():
@@ -202,6 +215,7 @@ class Session:
                 log.warning("%s", value)
         if self.resumed_from is not None:
             log.info("continues from the checkpoint of step %d", self.resumed_from)
+        log.info("set up: %s", done())
         log.info("%d steps to do", self.left)
         if self.wall_time.text is not None:
             log.info("%.0f s are left of the wall time %s", self.wall_time.left, self.wall_time.text)
@@ -218,6 +232,7 @@ class Session:
                 "halved_steps": self.halved,
                 "cross_check": None if self.cross_check is None else self.cross_check.report(),
                 "seconds": seconds,
+                "memory": self.memory,
                 "seconds_per_step": float(np.median(list(self.seconds))) if self.seconds else float("nan"),
                 "seconds_per_linear_step": float("nan"),
             }

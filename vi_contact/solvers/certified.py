@@ -14,6 +14,7 @@ from ..core.algebra import EffectiveMatrix, largest
 from ..core.certificate import Certificate
 from ..core.errors import StepFailure
 from ..core.problem import ContactProblem
+from ..core.stages import stage
 from ..core.step import PreparedSolver, Solver, StepProblem, StepResult
 from ..core.surfaces import ContactSurface
 from ..core.verify import kkt_residual
@@ -50,7 +51,8 @@ class CertifiedSolver:
     def _get(self, rank: int) -> PreparedSolver:
         """The solver of that rank of escalation, prepared when first needed."""
         if rank not in self._prepared:
-            self._prepared[rank] = self._solvers[rank].prepare(self._A, self._surface, self._scale)
+            prepare = stage("preparing")(self._solvers[rank].prepare)
+            self._prepared[rank] = prepare(self._A, self._surface, self._scale)
         return self._prepared[rank]
 
     def solve(self, step: StepProblem) -> tuple[StepResult, Certificate, bool]:

@@ -24,6 +24,7 @@ from ...core.algebra import Array, Indices, Mask
 from ...core.checks import provides
 from ...core.corners import FEATURE_ANGLE
 from ...core.errors import InputError
+from ...core.stages import stage
 from ...core.surfaces import ContactSurface, tangential_columns
 from ...core.system import SemiDiscreteSystem
 from .. import compat
@@ -37,6 +38,7 @@ from .surface import contact_space, listed, nodes_on, snapped
 log = logging.getLogger(__name__)
 
 
+@stage("contact")
 def contact_pair(
     system: SemiDiscreteSystem,
     facets1: Facets,

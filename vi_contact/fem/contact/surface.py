@@ -14,6 +14,7 @@ from ...core.checks import array, provides, several
 from ...core.corners import FEATURE_ANGLE, PARALLEL
 from ...core.errors import InputError
 from ...core.obstacles import Obstacle, Touching, admissible_gap, facing
+from ...core.stages import stage
 from ...core.surfaces import ContactSurface
 from ...core.system import SemiDiscreteSystem
 from ..groups import facets_of
@@ -25,6 +26,7 @@ from .frames import NodalConditions, Nodes, at, surface_of
 log = logging.getLogger(__name__)
 
 
+@stage("contact")
 def contact_surface(
     system: SemiDiscreteSystem,
     facets: Facets,

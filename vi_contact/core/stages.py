@@ -1,0 +1,54 @@
+"""Tell how long the stages of setting up take: to the log, and to the terminal of a command."""
+
+from __future__ import annotations
+
+import logging
+import sys
+import time
+from collections import deque
+from collections.abc import Callable
+from functools import wraps
+from typing import Any, TypeVar, cast
+
+log = logging.getLogger(__name__)
+F = TypeVar("F", bound=Callable[..., Any])
+LONG = 1.0  # seconds that somebody at a terminal notices
+_done: deque[str] = deque(maxlen=50)
+_shown = [False]
+
+
+def stage(name: str) -> Callable[[F], F]:
+    """Return a decorator: the first rank tells how long the function took."""
+
+    def decorate(function: F) -> F:
+        @wraps(function)
+        def timed(*args: Any, **kwargs: Any) -> Any:
+            begin = time.perf_counter()
+            result = function(*args, **kwargs)
+            _tell(f"{name} {time.perf_counter() - begin:.3g} s", time.perf_counter() - begin >= LONG)
+            return result
+
+        return cast(F, timed)
+
+    return decorate
+
+
+def _tell(text: str, long: bool) -> None:
+    if "mpi4py.MPI" in sys.modules and sys.modules["mpi4py.MPI"].COMM_WORLD.rank:
+        return
+    _done.append(text)
+    log.info("%s", text)
+    if _shown[0] and long:
+        print(f"vi-contact: {text}", file=sys.stderr, flush=True)
+
+
+def show(shown: bool) -> None:
+    """Choose whether stages that take longer than a second are told on standard error too."""
+    _shown[0] = shown
+
+
+def done() -> str:
+    """Return the stages since this was last asked, in a line."""
+    said = ", ".join(_done)
+    _done.clear()
+    return said
