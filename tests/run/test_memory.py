@@ -11,7 +11,6 @@ import pytest
 from marched_chain import run, run_wall, wall
 from summaries import summary_of
 
-from vi_contact.core import stages
 from vi_contact.run.memory import in_words, memory
 
 
@@ -43,22 +42,6 @@ def test_what_nothing_tells_is_left_out(tmp_path: Path) -> None:
     found = run(tmp_path, 5).facts["memory"]
     assert found["bytes"] == {} and len(found["peak_bytes"]) == 1
     assert np.array_equal(summary_of(tmp_path)["memory"]["peak_bytes"], found["peak_bytes"])
-
-
-@pytest.mark.serial
-def test_a_long_stage_is_told_at_the_terminal(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-                                              ) -> None:
-    """Longer than a second, and only where it is wanted; nothing of a stage that fails."""
-    times = iter((0.0, 2.0, 2.0, 10.0, 10.5, 10.5, 20.0, 22.0, 22.0, 30.0))
-    monkeypatch.setattr(stages.time, "perf_counter", lambda: next(times))
-    stages.done()
-    for shown in (True, True, False):
-        stages.show(shown)
-        assert stages.stage("meshing")(lambda x: x + 1)(1) == 2
-    with pytest.raises(ZeroDivisionError):
-        stages.stage("dividing")(lambda: 1 / 0)()
-    assert capsys.readouterr().err == "vi-contact: meshing 2 s\n"
-    assert stages.done() == "meshing 2 s, meshing 0.5 s, meshing 2 s" and stages.done() == ""
 
 
 def test_memory_before_a_step(comm: Any) -> None:
