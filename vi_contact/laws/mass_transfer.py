@@ -161,7 +161,7 @@ def _neighbours(system: SemiDiscreteSystem, donors: Mask, columns: Indices) -> _
 
 
 def _owned(system: SemiDiscreteSystem, columns: Indices) -> tuple[Indices, Indices]:
-    """Those owned unknowns whose columns this rank names, and those that others name. Collective."""
+    """Owned unknowns whose columns this rank names, and those that others name. Collective."""
     first, named = system.algebra.first(system.rows), np.unique(columns)
     mine = (named >= first) & (named < first + system.rows)
     away = np.unique(np.concatenate(from_each(system.algebra.comm, named[~mine])))
