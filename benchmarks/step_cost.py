@@ -35,7 +35,6 @@ from vi_contact.core.state_checks import initial_state  # noqa: E402
 from vi_contact.meshes.channel import ChannelMesh  # noqa: E402
 from vi_contact.models.channel import model as channel  # noqa: E402
 from vi_contact.models.wall import Wall, build  # noqa: E402
-from vi_contact.solvers.volume.one_factorisation import OneFactorisation  # noqa: E402
 from vi_contact.solvers.volume.route import Volume  # noqa: E402
 from vi_contact.solvers.volume.snes import ReducedNewton  # noqa: E402
 
@@ -43,7 +42,6 @@ SCHEME = vc.ZienkiewiczWoodTaylor(phi=0.5)
 DIVISIONS = {1e3: (18, 27), 2e3: (26, 39), 2e4: (82, 123), 2e5: (167, 600)}  # up to 600 contact points
 ROUTES: dict[str, Any] = {
     "condensed": vc.Condensed(),
-    "volume, one factorisation": Volume(method=OneFactorisation()),
     "volume, reference": Volume(method=ReducedNewton()),
 }
 SLOW = {"volume, reference": 1e5}  # not run at or above this size
@@ -81,7 +79,7 @@ class LinearSteps:
 
 class StepsWithContact:
     """Iterates over the reports of ``count`` steps with contact, each timed beside a linear step; a third as many
-    before them warm up: the one factorisation makes its columns as points come into contact.
+    before them warm up.
 
     set_up: seconds of the first step; seconds, plain: of the steps and of the linear ones; active: points in contact;
     worst: certificate of all steps.

@@ -67,16 +67,6 @@ def test_tangents_count_with_friction(method: Condensed) -> None:
     method.check(rubbing(3333))
 
 
-def test_one_factorisation_refuses_the_same() -> None:
-    route: Any = pytest.importorskip("vi_contact.solvers.volume.route")
-    large = touching(DENSE_ROWS + 1)
-    A = large.system.effective(m=1.0, c=0.0, k=1.0)
-    for refused in (route.Volume().check, lambda p: route.Volume().prepare(A, p.surface, 1.0)):
-        with pytest.raises(InputError, match=told("OneFactorisation()", DENSE_ROWS + 1)):
-            refused(large)
-    route.Volume(route.ReducedNewton()).check(large)
-
-
 def test_small_is_counted_over_all_ranks() -> None:
     class Two(SerialComm):
         def sum(self, x: np.ndarray) -> np.ndarray:

@@ -99,11 +99,10 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "solvers/test_projected_cg.py": "solvers.normal.proportioning",
     "solvers/test_volume.py": "solvers.volume.snes solvers.volume.tao",
     "solvers/test_volume_friction.py": "solvers.friction.nsgs solvers.volume.friction solvers.volume.route",
-    "solvers/test_volume_held_points.py":
-        "solvers.volume.bounded_system solvers.volume.held_points solvers.volume.scaled_step",
     "solvers/test_volume_options.py":
         "solvers.volume.failures solvers.volume.friction_jacobian "
-        "solvers.volume.friction_system solvers.volume.one_factorisation solvers.volume.options",
+        "solvers.volume.friction_system solvers.volume.options",
+    "solvers/test_volume_system.py": "solvers.volume.bounded_system solvers.volume.scaled_step",
     "studies/test_case.py":
         "cli.case studies.cases.parsing studies.cases.toml_file studies.cases.vocabulary",
     "studies/test_case_inputs.py": "studies.cases.table_calls",

@@ -29,7 +29,7 @@ from vi_contact.run.time_steps import HalvedAtImpact
 from vi_contact.schemes.contact_stabilised import ContactStabilisedNewmark
 from vi_contact.schemes.moreau_jean import MoreauJean
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.solvers.volume.route import OneFactorisation, ReducedNewton, Volume
+from vi_contact.solvers.volume.route import ReducedNewton, Volume
 
 STEPS = 80
 SCHEMES = {
@@ -51,7 +51,7 @@ def scheme(request: pytest.FixtureRequest) -> Any:
 
 def test_volume_and_condensed_routes_take_the_same_steps(scheme: Any) -> None:
     """V4.0, step by step: bounds on displacements and, where contact is predicted, on velocities (+inf elsewhere)."""
-    solvers = (Condensed(), Volume(method=ReducedNewton()), Volume(method=OneFactorisation()))
+    solvers = (Condensed(), Volume(method=ReducedNewton()))
     checked = cross_check(wall(MPI.COMM_WORLD), scheme=scheme, solvers=solvers, dt=WALL_DT, steps=STEPS)
     assert len(checked.report()) == 2
     assert checked.worst <= 1e-9
@@ -61,7 +61,7 @@ def test_volume_and_condensed_routes_take_the_same_steps(scheme: Any) -> None:
 def test_default_scheme_takes_the_same_steps(dt: Any) -> None:
     """V4.0: no scheme and no mass named, so redistributed mass and the trapezoidal rule; steps may be halved."""
     problem = replace(wall(MPI.COMM_WORLD), mass=None)
-    solvers = (Condensed(), Volume(method=OneFactorisation()), Volume(method=ReducedNewton()))
+    solvers = (Condensed(), Volume(method=ReducedNewton()))
     checked = cross_check(problem, solvers=solvers, dt=dt, steps=STEPS)
     accepted = [report for _, report in march(problem, dt=dt, steps=STEPS)]
     assert accepted[0].problem.mass == Redistributed() and accepted[0].problem.equations.massless is not None

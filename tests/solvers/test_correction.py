@@ -23,7 +23,7 @@ from vi_contact.solvers.certified import NEAR, TOLERANCE, CertifiedSolver
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.correction import Share, added, left_over, share_of
 from vi_contact.solvers.friction.nsgs import NSGS
-from vi_contact.solvers.volume.route import OneFactorisation, ReducedNewton, Volume
+from vi_contact.solvers.volume.route import ReducedNewton, Volume
 
 COMM = MPI.COMM_WORLD
 DECAY = SlipRateCoulomb(ExponentialDecay(0.6, 0.3, 0.05))
@@ -31,7 +31,6 @@ CASES = {
     "frictionless": ({}, None, Condensed()),
     "springs": ({"springs": 1.0e9}, None, Condensed()),
     "volume": ({}, None, Volume(ReducedNewton())),
-    "one factorisation": ({"springs": 1.0e9}, None, Volume(OneFactorisation())),
     "Coulomb": ({}, Coulomb(0.4), Condensed()),
     "Tresca": ({}, Tresca(2.0e3), Condensed(friction_method=NSGS())),
     "rate": ({}, DECAY, Condensed()),

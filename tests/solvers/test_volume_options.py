@@ -23,14 +23,13 @@ from vi_contact.core.verify import kkt_residual
 from vi_contact.laws.friction import Coulomb
 from vi_contact.solvers.volume.failures import NOT_A_NUMBER, raised, stopped
 from vi_contact.solvers.volume.route import (
-    OneFactorisation,
     ReducedNewton,
     SemismoothNewton,
     TaoTron,
     Volume,
 )
 
-METHODS = (ReducedNewton(), OneFactorisation(), SemismoothNewton(), TaoTron())
+METHODS = (ReducedNewton(), SemismoothNewton(), TaoTron())
 PREFIX = "vi_contact_volume_"
 
 
@@ -90,7 +89,6 @@ REFUSED = [
     (ReducedNewton(), {"pc_type": "nothere"}, "does not accept the options"),
     (ReducedNewton(), {"snes_type": "newtonls"}, "set up for vinewtonrsls"),
     (ReducedNewton(), {"snes_type": "vinewtonssls"}, "set up for vinewtonrsls"),
-    (OneFactorisation(), {"pc_type": "cholesky"}, "never assembled"),
     (SemismoothNewton(), {"pc_type": "cholesky"}, "not symmetric"),
     (SemismoothNewton(), {"ksp_type": "cg", "pc_type": "jacobi"}, "not symmetric"),
     (SemismoothNewton(), {"pc_type": "ilu"}, "does not solve the system"),
@@ -135,15 +133,6 @@ def test_iterative_linear_solver(pushed: Case, pc: str) -> None:
     prepared = prepare(pushed, Volume(method=ReducedNewton(), petsc_options=options))
     assert kkt_residual(pushed.step, prepared.solve(pushed.step)).worst <= 1e-9
     assert (prepared.snes.ksp.getType(), prepared.snes.ksp.pc.getType()) == ("cg", pc)
-
-
-@pytest.mark.parametrize("ksp", ["gmres", "cg"])
-def test_krylov_methods_on_the_one_factorisation(pushed: Case, ksp: str) -> None:
-    """The shell matrices multiply too, and their preconditioner is the exact inverse."""
-    options = {"ksp_type": ksp, "ksp_rtol": 1e-12}
-    prepared = prepare(pushed, Volume(method=OneFactorisation(exchanges=0), petsc_options=options))
-    assert kkt_residual(pushed.step, prepared.solve(pushed.step)).worst <= 1e-12
-    assert 0 < prepared.snes.getLinearSolveIterations() <= 2 * prepared.snes.getIterationNumber()
 
 
 def test_petsc_objects_are_reachable(pushed: Case) -> None:
@@ -271,16 +260,6 @@ def test_a_body_that_flies_away_is_a_failure(method: Any) -> None:
     c = case(stiffness, np.array([n - 1]), load, np.array([0.1]), parallel=bool(pytest.importorskip("mpi4py")))
     with pytest.raises(StepFailure, match="check that"):
         prepare(c, Volume(method=method)).solve(c.step)
-
-
-@pytest.mark.serial
-@pytest.mark.parametrize("predicted", [True, False])
-def test_indefinite_matrix_on_the_one_factorisation(predicted: bool) -> None:
-    """A failure inside the preconditioner, before or within SNES, comes out as a StepFailure of ours."""
-    A = sp.csr_matrix(np.array([[1.0, 2.0, 0.1], [2.0, 1.0, 0.1], [0.1, 0.1, 1.0]]))
-    c = case(A, np.array([0, 1]), np.array([4.0, 4.0, 1.0]), np.array([1.0, 1.0]))
-    with pytest.raises(StepFailure, match="not positive definite"):
-        prepare(c, Volume()).solve(replace(c.step, active=np.array([predicted, predicted])))
 
 
 @pytest.mark.slow

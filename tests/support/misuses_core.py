@@ -23,7 +23,7 @@ import vi_contact as vc
 from vi_contact import core, engineering, fem, ground_motion, soil, solvers
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.models.boundary_curve import boundary_curve
-from vi_contact.solvers.volume.route import OneFactorisation, Volume
+from vi_contact.solvers.volume.route import Volume
 
 Wrong = Mapping[str, Any]
 HUGE = 10**5000  # more digits than Python prints
@@ -161,7 +161,6 @@ def values() -> Table:
         (solvers.Anderson, {}, {"depth": COUNT, "after": but(COUNT, "zero")}),
         (Volume, {}, {"method": METHOD | {"of the other route": solvers.ActiveSet()}, "tolerance": SHARE,
                       "petsc_options": {"text": "snes_monitor", "list": ["snes_monitor"]}, "prefix": {"none": None}}),
-        (OneFactorisation, {}, {"exchanges": but(COUNT, "zero"), "limit": but(COUNT, "zero")}),
         (vc.Schedule, {"pieces": ((0.1, 1.0),)},
          {"pieces": {"number": 0.1, "text": "0.1", "none": None, "nan": ((nan, 1.0),), "texts": (("0.1", 1.0),),
                      "back": ((0.1, 1.0), (0.1, 0.5)), "empty": ()}}),

@@ -5,7 +5,6 @@ from __future__ import annotations
 from ...core.lazy import lazy
 
 _CONTENTS = {
-    "one_factorisation": ("OneFactorisation",),
     "route": ("Volume",),
     "snes": ("ReducedNewton", "SemismoothNewton"),
     "tao": ("TaoTron",),

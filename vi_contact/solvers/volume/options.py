@@ -87,16 +87,6 @@ def check_reduced(snes: Any, layers: OptionLayers) -> None:
     _check_line_search(layers)
 
 
-def check_own_inverse(snes: Any, layers: OptionLayers) -> None:
-    """Raise InputError for a preconditioner: the one-factorisation path brings its own."""
-    _check_type(snes, "vinewtonrsls", layers)
-    pc = snes.ksp.pc.getType()
-    if pc != "python":
-        reason = "the reduced matrix is never assembled"
-        refuse(f"pc_type {pc} with OneFactorisation", reason, "use method=ReducedNewton()")
-    _check_line_search(layers)
-
-
 def check_semismooth(snes: Any, layers: OptionLayers) -> None:
     """Refuse what needs a symmetric matrix: the Jacobian D_a + D_b A of VINEWTONSSLS is not."""
     _check_unsymmetric(snes, layers, "vinewtonssls", "vinewtonssls", "the semismooth Jacobian")

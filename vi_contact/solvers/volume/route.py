@@ -20,20 +20,18 @@ from ...core.algebra import Array, EffectiveMatrix
 from ...core.checks import instance, provides, real, shown
 from ...core.errors import InputError, StepFailure
 from ...core.problem import ContactProblem
-from ...core.sizes import refuse_dense
 from ...core.step import StepProblem, StepResult
 from ...core.surfaces import ContactSurface
 from .bounded_system import BoundedSystem
 from .failures import raised, stopped
 from .friction import VolumeFriction
 from .friction_system import ScaledFrictionStep
-from .one_factorisation import OneFactorisation
 from .options import OptionLayers, Options
 from .scaled_step import ScaledStep
 from .snes import ReducedNewton, SemismoothNewton
 from .tao import TaoTron
 
-__all__ = ["OneFactorisation", "ReducedNewton", "SemismoothNewton", "TaoTron", "Volume"]
+__all__ = ["ReducedNewton", "SemismoothNewton", "TaoTron", "Volume"]
 
 
 class Driver(Protocol):
@@ -50,7 +48,7 @@ class Driver(Protocol):
 
 
 class Method(Protocol):
-    """Say how the bounded problem is solved: settings that make a driver and choose where it starts.
+    """Say how the bounded problem is solved: settings that make a driver.
 
     One that ``carries_friction`` is a FrictionMethod.
     """
@@ -60,7 +58,6 @@ class Method(Protocol):
 
     def defaults(self, ranks: int) -> Options: ...
     def driver(self, scaled: ScaledStep, layers: OptionLayers) -> Any: ...
-    def start(self, driver: Any, system: BoundedSystem, step: StepProblem) -> Array: ...
 
 
 class FrictionMethod(Method, Protocol):
@@ -75,20 +72,20 @@ class Volume:
     """Hold the settings of the volume route.
 
     Attributes:
-        method: OneFactorisation (fast), ReducedNewton (the reference), SemismoothNewton or TaoTron.
+        method: ReducedNewton (the reference), SemismoothNewton or TaoTron.
         petsc_options: PETSc options without prefix, e.g. {"snes_monitor": None}; command-line options go before them.
         prefix: what these options are called on the command line and in PETSC_OPTIONS.
         tolerance: largest relative error accepted when a solver stops improving above round-off.
     """
 
-    method: Method = field(default_factory=OneFactorisation)
+    method: Method = field(default_factory=ReducedNewton)
     petsc_options: Mapping[str, object | None] = field(default_factory=dict)
     prefix: str = "vi_contact_volume_"
     tolerance: float = 1e-9
 
     def __post_init__(self) -> None:
-        names = ("carries_friction", "defaults", "driver", "start")
-        provides("Volume", "method", self.method, names, "give OneFactorisation(), ReducedNewton() or another")
+        names = ("carries_friction", "defaults", "driver")
+        provides("Volume", "method", self.method, names, "give ReducedNewton() or another")
         instance("Volume", "petsc_options", self.petsc_options, Mapping, "give a dict of PETSc options without prefix")
         instance("Volume", "prefix", self.prefix, str, "give a text such as 'vi_contact_volume_'")
         if not 0.0 < real(self.tolerance) < 1.0:
@@ -97,9 +94,7 @@ class Volume:
 
     def check(self, problem: ContactProblem) -> None:
         """Raise InputError for friction that the method cannot carry, without a tangent, or of a wrong number of
-        values, and for more contact conditions than OneFactorisation suits."""
-        if isinstance(self.method, OneFactorisation):
-            refuse_dense("OneFactorisation()", problem.surface.total)
+        values."""
         if not problem.frictional:
             return
         surface, law = problem.surface, problem.friction
@@ -191,7 +186,7 @@ class PreparedVolume:
         """The step without friction."""
         if self._driver is None:
             self._driver = self._make()
-        self._scaled.set(step, self._method.start(self._driver, self._system, step))
+        self._scaled.set(step, self._system.start(step))
         y, F, reason, iterations = self._driver.run()
         if reason <= 0 and not self._scaled.accepts(y, F):
             raise stopped(self._name, self._driver.reasons, reason, iterations, self._scaled.worst)

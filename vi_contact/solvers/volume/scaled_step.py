@@ -57,8 +57,7 @@ class ScaledStep:
 
     def function(self, _solver: Any, y: Any, F: Any) -> None:
         """Evaluate F(y) as a PETSc callback (SNES function, TAO gradient)."""
-        self.last = self.residual(y.array_r)
-        F.array[:] = self.last
+        F.array[:] = self.residual(y.array_r)
 
     def objective(self, _solver: Any, y: Any, G: Any) -> float:
         """Return f(y) - f(origin) and the gradient F(y), for TAO; f(y) = ½ y·Hy - y·b/r_ref, H = A x_ref / r_ref.

@@ -11,14 +11,12 @@ from __future__ import annotations
 import weakref
 from collections.abc import Callable
 from dataclasses import dataclass
-from types import SimpleNamespace
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from petsc4py import PETSc
 
 from ...core.algebra import Array
-from ...core.step import StepProblem
 from .bounded_system import BoundedSystem
 from .friction_jacobian import FrictionJacobian
 from .friction_system import ScaledFrictionStep
@@ -52,12 +50,6 @@ class Jacobian(Protocol):
     def destroy(self) -> None: ...
 
 
-class Preconditioner(Protocol):
-    """Provide a PETSc preconditioner in Python."""
-
-    def apply(self, pc: Any, r: Any, y: Any) -> None: ...
-
-
 class SnesDriver:
     """Run a SNES object bound to a scaled step; ``solver`` is the PETSc object."""
 
@@ -71,7 +63,6 @@ class SnesDriver:
         *,
         snes_type: str,
         check: Callable[[Any, OptionLayers], None],
-        inverse: Preconditioner | None = None,
     ) -> None:
         self._scaled, self._layers, self._jacobian = scaled, layers, jacobian
         self._y, self._F = jacobian.mat.createVecs()
@@ -84,10 +75,6 @@ class SnesDriver:
         self.solver.setJacobian(weakly(jacobian.evaluate), jacobian.mat)
         self.solver.setVariableBounds(self._lower, self._upper)
         self.solver.setConvergenceTest(weakly(self._test.reason))
-        if inverse is not None:
-            self.solver.ksp.setType("preonly")
-            self.solver.ksp.pc.setType("python")
-            self.solver.ksp.pc.setPythonContext(SimpleNamespace(apply=weakly(inverse.apply)))
         layers.apply(self.solver, check)
 
     def run(self) -> tuple[Array, Array, int, int]:
@@ -215,10 +202,6 @@ class ReducedNewton:
             scaled, layers, AssembledJacobian(scaled.system), snes_type="vinewtonrsls", check=check_reduced
         )
 
-    def start(self, driver: SnesDriver, system: BoundedSystem, step: StepProblem) -> Array:
-        """Return the guess with the predicted contacts on their bounds."""
-        return system.start(step)
-
     def friction_defaults(self) -> Options:
         """Return options before the user's: LU, the system with friction is not symmetric. Its zeros on the diagonal
         delay pivots, for which MUMPS on several ranks needs room: it stops with INFOG(1) = -9 when it has only the
@@ -250,7 +233,3 @@ class SemismoothNewton:
         return SnesDriver(
             scaled, layers, SemismoothJacobian(scaled.system), snes_type="vinewtonssls", check=check_semismooth
         )
-
-    def start(self, driver: SnesDriver, system: BoundedSystem, step: StepProblem) -> Array:
-        """Return the guess with the predicted contacts on their bounds."""
-        return system.start(step)

@@ -13,8 +13,6 @@ import numpy as np
 from petsc4py import PETSc
 
 from ...core.algebra import Array
-from ...core.step import StepProblem
-from .bounded_system import BoundedSystem
 from .options import REDUCED_PC, OptionLayers, Options, refuse
 from .scaled_step import ScaledStep
 from .snes import AssembledJacobian, weakly, write_bounds
@@ -123,7 +121,3 @@ class TaoTron:
     def driver(self, scaled: ScaledStep, layers: OptionLayers) -> TaoDriver:
         """Return the TAO object."""
         return TaoDriver(scaled, layers)
-
-    def start(self, driver: TaoDriver, system: BoundedSystem, step: StepProblem) -> Array:
-        """Return the guess with the predicted contacts on their bounds."""
-        return system.start(step)

@@ -1,4 +1,4 @@
-"""Parts of the volume route: points held by one factorisation, the system with springs, the measure of its errors."""
+"""Parts of the volume route: the system with springs, the measure of its errors."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from volume_cases import Case, pushed_block
 
 from vi_contact.core.verify import kkt_residual
 from vi_contact.solvers.volume.bounded_system import BoundedSystem
-from vi_contact.solvers.volume.held_points import HeldInverse
 from vi_contact.solvers.volume.route import ReducedNewton, Volume
 from vi_contact.solvers.volume.scaled_step import ScaledStep
 
@@ -51,25 +50,6 @@ def test_assembled_matrix_in_parallel(options: dict[str, Any]) -> None:
     x.array[:] = np.sin(1.0 + np.arange(system.size) + 10.0 * system.surface.comm.rank)
     assembled.mult(x, y)
     assert np.max(np.abs(y.array_r - system.apply(x.array_r)), initial=0.0) <= 1e-13
-
-
-@pytest.mark.serial
-@pytest.mark.parametrize("limit", [0, 10**6])
-@pytest.mark.parametrize("options", [{}, SPRINGS], ids=["rigid", "springs"])
-def test_held_points_by_one_factorisation(options: dict[str, Any], limit: int) -> None:
-    """Solver notes 1b against a dense solve with the held rows fixed; the held values are met exactly."""
-    system = system_of(pushed_block(**options))
-    A, inverse, rng = dense(system), HeldInverse(system, limit), np.random.default_rng(1)
-    for held in (np.arange(M) % 3 == 0, np.arange(M) > 2, np.ones(M, dtype=bool), np.zeros(M, dtype=bool)):
-        r, target = rng.normal(size=system.size), rng.normal(size=M)
-        z = inverse.hold(inverse.unheld(r), held, target)
-        fixed = np.zeros(system.size, dtype=bool)
-        fixed[system.bounded[held]] = True
-        exact = np.zeros(system.size)
-        exact[system.bounded[held]] = target[held]
-        exact[~fixed] = np.linalg.solve(A[np.ix_(~fixed, ~fixed)], (r - A @ exact)[~fixed])
-        assert np.max(np.abs(z - exact)) <= 1e-12 * np.max(np.abs(exact))
-        assert np.array_equal(z[system.bounded[held]], target[held])
 
 
 @pytest.mark.parametrize("options", [{}, SPRINGS], ids=["rigid", "springs"])
