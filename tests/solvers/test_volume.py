@@ -74,10 +74,10 @@ def test_agrees_with_brute_force(parallel: bool, method: Any, options: dict[str,
     agree(c, solve(c, method), exact)
 
 
-def test_springs_far_from_the_stiffness_of_the_body(parallel: bool, method: Any) -> None:
-    """Springs 1e6 times stiffer and softer than the body: only the reduced methods are up to these."""
+def test_springs_far_from_the_stiffness_of_the_body(parallel: bool) -> None:
+    """Springs 1e6 times stiffer and softer than the body: only the reduced method is up to these."""
     c = pushed_block(parallel=parallel, seed=0, compliance=10.0 ** np.linspace(-6.0, 6.0, M))
-    agree(c, solve(c, method), c.exact())
+    agree(c, solve(c, ReducedNewton()), c.exact())
 
 
 @pytest.mark.parametrize("seed", range(1, 6))
