@@ -81,6 +81,15 @@ class Block:
     element: str
 
     @property
+    def mu(self) -> float:
+        """Coulomb's coefficient, 0 without friction."""
+        return float(getattr(self.problem.friction, "mu", 0.0))
+
+    def rubbing(self, mu: float) -> Block:
+        """The block with friction."""
+        return replace(self, problem=replace(self.problem, friction=vc.Coulomb(mu)))
+
+    @property
     def unknowns(self) -> int:
         return int(self.problem.system.space.unknowns)
 
@@ -186,7 +195,7 @@ def product_seconds(A: Any) -> float:
 
 def linear_iterations(watched: Watched) -> float | None:
     """Mean iterations of the same steps without contact: the plain linear problem."""
-    if not hasattr(watched.prepared, "work"):
+    if not hasattr(watched.prepared, "work") or watched.last[0].slip0 is not None:
         return None
     before = watched.counts()["linear_iterations"]
     for step in watched.last:
@@ -245,10 +254,11 @@ def row(
     return {
         "unknowns": given.unknowns, "points": int(COMM.allreduce(len(given.problem.surface.owned))), "closed": closed,
         "dimension": int(given.problem.system.space.dimension), "element": given.element, "courant": courant,
-        "friction": None, "mu": 0.0, "method": type(solver).__name__,
+        "friction": type(given.problem.friction).__name__ if given.mu else None, "mu": given.mu,
+        "method": type(solver).__name__,
         "preconditioner": watched.prepared.kind if own else None,
         "iterations": mean["iterations"], "linear_iterations": mean["linear_iterations"] if own else None,
-        "newton_steps": 0.0, "products": mean["products"] if own else None,
+        "newton_steps": mean["iterations"] if given.mu else 0.0, "products": mean["products"] if own else None,
         "renewals": mean["renewals"], "largest_renewals": max(one["renewals"] for one in watched.rows),
         "cpu_products": mean["seconds"] / product, "setup_products": busiest(watched.setup) / product,
         "seconds": mean["seconds"], "product_seconds": product,
@@ -267,6 +277,8 @@ def rows_of(size: float, steps: int) -> Iterator[dict[str, Any]]:
         set_up = MEMORY.peak()
         for courant in (10.0,) if size > LARGE else COURANTS:
             yield dynamic(given, state, courant, vc.Iterative(), steps, 2) | {"peak_bytes": set_up}
+        for mu in (0.3, 0.8):
+            yield dynamic(given.rubbing(mu), state, 10.0, vc.Iterative(), steps, 2) | {"peak_bytes": set_up}
         if size <= LARGE:
             del given, state
             given = block(size, element, pushed=True)
@@ -285,7 +297,7 @@ def small_rows(steps: int) -> Iterator[dict[str, Any]]:
                     yield dynamic(given, state, courant, solver, steps, 2)
 
 
-SHOWN = ("unknowns", "points", "closed", "element", "courant", "method", "preconditioner", "iterations",
+SHOWN = ("unknowns", "points", "closed", "element", "courant", "mu", "method", "preconditioner", "iterations",
          "linear_iterations", "over_linear", "products", "renewals", "cpu_products", "setup_products", "seconds",
          "bytes_per_unknown", "certificate")
 

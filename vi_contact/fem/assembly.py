@@ -26,7 +26,7 @@ from .assembly_checks import check_body, check_boundaries, check_initial
 from .dashpots import BoundaryLoads, DashpotMatrix, Dashpots, describe_boundaries
 from .loads import ActingLoad, BodyForce, Prescribed, Traction, as_tuple, evaluate
 from .mesh import Cells, Facets
-from .petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc
+from .petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc, triple_product
 from .space import FemSpace
 from .ties import Tied
 
@@ -84,7 +84,7 @@ def assemble(
     load = assemble_loads(space, section, as_tuple(loads), (stiffness, damper, mass))
 
     def reduced(full: Any) -> PetscMatrix:
-        return PetscMatrix(full.PtAP(space.selection))
+        return PetscMatrix(triple_product(full, space.selection))
 
     rigid, M = _rigid(space), reduced(mass)
     system = SemiDiscreteSystem(

@@ -214,7 +214,7 @@ class PetscAlgebra:
         return PetscMatrix(total)
 
     def congruence(self, T: Matrix, K: Matrix) -> Matrix:
-        return PetscMatrix(as_petsc(K).mat.PtAP(as_petsc(T).mat))
+        return PetscMatrix(triple_product(as_petsc(K).mat, as_petsc(T).mat))
 
     def local(self, rows: Indices, columns: Indices, values: Array, n: int) -> Matrix:
         places = rows, self.first(n) + np.asarray(columns)
@@ -266,6 +266,14 @@ class PetscAlgebra:
 
     def dot(self, x: Array, y: Array) -> float:
         return total(self.comm, x @ y)
+
+
+def triple_product(K: Any, P: Any) -> Any:
+    """Return PᵀKP of PETSc matrices. What PETSc makes holds K and P for as long as it lives; a copy of it does not."""
+    product = K.PtAP(P)
+    made = product.duplicate(copy=True)
+    product.destroy()
+    return made
 
 
 def as_petsc(matrix: Matrix) -> PetscMatrix:
