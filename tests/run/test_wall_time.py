@@ -163,6 +163,32 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: py
 
 
 @serial
+@pytest.mark.slow
+def test_the_batch_script_of_the_guide(tmp_path: Path) -> None:
+    """With srun and sbatch that run in place: jobs with too little time go on from one another until all is done."""
+    pytest.importorskip("dolfinx")
+    guide = (Path(PACKAGE) / "docs" / "guide" / "clusters.md").read_text(encoding="utf-8")
+    script = guide.split("```bash\n")[1].split("```")[0]
+    for old, new in (("case=dam.toml", "case=wall"), ("--wall-time 11:45:00", "--wall-time 0:01 --steps 3")):
+        assert script.count(old) == 1
+        script = script.replace(old, new)
+    (tmp_path / "job.sh").write_text(script)
+    tools = {"srun": 'while [ "$1" != vi-contact ]; do shift; done; shift; exec "$PYTHON" -m vi_contact "$@"',
+             "sbatch": 'echo again >> "$SLURM_SUBMIT_DIR/jobs"; exec bash "$1"'}
+    for name, does in tools.items():
+        (tmp_path / name).write_text(f"#!/bin/bash\n{does}\n")
+        (tmp_path / name).chmod(0o755)
+    environment = {"PYTHON": sys.executable, "PYTHONPATH": PACKAGE, "SLURM_SUBMIT_DIR": str(tmp_path),
+                   "PATH": f"{tmp_path}:{os.environ['PATH']}"}
+    done = subprocess.run(["bash", "job.sh"], cwd=tmp_path, env=os.environ | environment, capture_output=True,
+                          text=True, timeout=600)
+    assert (tmp_path / "jobs").read_text().split() == ["again", "again"], done.stderr
+    found = summary_of(tmp_path / "results" / "dam")
+    assert (found["status"], found["steps"], found["restarted_from_step"]) == ("finished", 3, 2)
+    assert done.stderr.count("of the wall time 0:01 ended the run after step") == 2 and done.returncode == 75
+
+
+@serial
 def test_the_age_is_that_of_the_process() -> None:
     """A process that has slept before it imports anything is at least so old, and no older than who has started it."""
     code = "import time\ntime.sleep(0.5)\nfrom vi_contact.run.wall_time import age\nprint(age())"
