@@ -73,9 +73,9 @@ class Factor(Protocol):
 
     def solve(self, b: Array) -> Array: ...
 
-    def solve_units(self, owned: Indices, slots: Indices, m: int) -> Array:
+    def solve_units(self, owned: Indices, slots: Indices, m: int, rows: Indices | None = None) -> Array:
         """Return the columns A^-1 e_j for m unit vectors: e_{slots[k]} has its one in row ``owned[k]`` of the owning
-        rank. Returns the owned rows, shape (rows, m)."""
+        rank. Returns the owned rows, shape (rows, m), or only those of them that are named: the whole may not fit."""
         ...
 
 
@@ -199,10 +199,11 @@ class SerialFactor:
     def solve(self, b: Array) -> Array:
         return np.asarray(self._lu.solve(b))
 
-    def solve_units(self, owned: Indices, slots: Indices, m: int) -> Array:
+    def solve_units(self, owned: Indices, slots: Indices, m: int, rows: Indices | None = None) -> Array:
         units = np.zeros((self._rows, m))
         units[owned, slots] = 1.0
-        return np.asarray(self._lu.solve(units)) if m else units
+        columns = np.asarray(self._lu.solve(units)) if m else units
+        return columns if rows is None else columns[rows]
 
 
 class SerialAlgebra:

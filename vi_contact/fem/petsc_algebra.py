@@ -147,18 +147,20 @@ class PetscFactor:
         self._pc.apply(self._b, self._x)
         return np.array(self._x.array_r)
 
-    def solve_units(self, owned: Indices, slots: Indices, m: int) -> Array:
-        columns = np.zeros((self._x.getLocalSize(), m))
+    def solve_units(self, owned: Indices, slots: Indices, m: int, rows: Indices | None = None) -> Array:
+        size = self._x.getLocalSize()
+        rows = np.arange(size) if rows is None else rows
+        columns = np.zeros((len(rows), m))
         for first in range(0, m, RIGHT_SIDES):
             width = min(RIGHT_SIDES, m - first)
-            units = np.zeros((len(columns), width))
+            units = np.zeros((size, width))
             mine = (slots >= first) & (slots < first + width)
             units[owned[mine], slots[mine] - first] = 1.0
             if self._by_blocks:
-                columns[:, first : first + width] = self._solve_block(units)
+                columns[:, first : first + width] = self._solve_block(units)[rows]
             else:
                 for column in range(width):
-                    columns[:, first + column] = self.solve(units[:, column])
+                    columns[:, first + column] = self.solve(units[:, column])[rows]
         return columns
 
     def _solve_block(self, values: Array) -> Array:

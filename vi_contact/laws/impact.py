@@ -94,9 +94,9 @@ class ImpulseUpdate:
 def _prepared(system: SemiDiscreteSystem, surface: ContactSurface) -> tuple[Factor, Array | None, Array]:
     """The factor of M, the owned rows of M⁻¹Bᵀ or None, and B M⁻¹Bᵀ. Collective."""
     comm, factor = system.algebra.comm, system.algebra.factor(system.M)
-    columns = factor.solve_units(surface.owned, surface.slots, surface.total)
-    delassus = surface.everywhere(columns[surface.owned])
-    return factor, columns if total(comm, columns.size) <= STORED_ENTRIES else None, delassus
+    keep = total(comm, system.rows * surface.total) <= STORED_ENTRIES
+    columns = factor.solve_units(surface.owned, surface.slots, surface.total, None if keep else surface.owned)
+    return factor, columns if keep else None, surface.everywhere(columns[surface.owned] if keep else columns)
 
 
 @dataclass(frozen=True)

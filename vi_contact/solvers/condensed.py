@@ -130,11 +130,12 @@ class PreparedCondensed:
 
     def _form(self, extra: Array) -> Array:
         """G, symmetrised; keeps A⁻¹E when it is small."""
-        surface = self._surface
-        columns = self._A.factor.solve_units(surface.owned, surface.slots, surface.total)
-        G = surface.everywhere(columns[surface.owned])
-        entries = total(surface.comm, columns.size)
-        self._columns = columns if entries <= STORED_ENTRIES else None
+        surface, A = self._surface, self._A
+        keep = total(surface.comm, A.matrix.rows * surface.total) <= STORED_ENTRIES
+        rows = None if keep else surface.owned
+        columns = A.factor.solve_units(surface.owned, surface.slots, surface.total, rows)
+        G = surface.everywhere(columns[surface.owned] if keep else columns)
+        self._columns = columns if keep else None
         return np.asarray(0.5 * (G + G.T) + np.diag(extra))
 
     @property

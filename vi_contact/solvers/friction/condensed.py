@@ -42,17 +42,18 @@ class CondensedFriction:
         m, k = surface.total, surface.tangents.shape[1]
         free = surface.tangents >= 0
         places = (surface.slots[:, None] * k + np.arange(k))[free]
-        columns = A.factor.solve_units(surface.tangents[free], places, m * k)
-        self.delassus = self._assembled(normal, columns, places, free)
-        self.columns = columns if keep else np.zeros((len(columns), 0))
+        wanted = np.concatenate([surface.owned, surface.tangents[free]])
+        columns = A.factor.solve_units(surface.tangents[free], places, m * k, None if keep else wanted)
+        self.delassus = self._assembled(normal, columns[wanted] if keep else columns, places, free)
+        self.columns = columns if keep else np.zeros((0, 0))
         self._small = method.prepare(self.delassus, surface.everywhere(surface.bilateral))
 
     def _assembled(self, normal: Array, columns: Array, places: Indices, free: Mask) -> Array:
-        """G (m d, m d), symmetrised."""
+        """G (m d, m d), symmetrised. ``columns``: the rows of A⁻¹F of normal unknowns, then of tangential ones."""
         surface, (m, k) = self._surface, (self._surface.total, self._surface.tangents.shape[1])
         rows = np.zeros((m + m * k, m * k))
-        rows[surface.slots] = columns[surface.owned]
-        rows[m + places] = columns[surface.tangents[free]]
+        rows[surface.slots] = columns[: surface.count]
+        rows[m + places] = columns[surface.count :]
         present = np.zeros(m * k)
         present[places] = 1.0
         total = surface.comm.sum(np.vstack([rows, present]))
