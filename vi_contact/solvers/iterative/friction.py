@@ -28,6 +28,7 @@ from .operator import Operator
 from .preconditioners import Inverse
 
 SHARE = 1e-2  # of the residual of a linear problem that GMRES may leave
+AHEAD = 0.1  # of what Newton's last step left: it leaves less and less
 ROUND = 1e-4  # of the largest friction limit: residual at which coefficients that are given are taken anew
 STEPS = 60  # of Newton
 
@@ -180,7 +181,9 @@ class Newton:
         residual = np.where(of.gmres.free > 0.0, self.residual, 0.0)
         rows = of.tangents.rows
         residual[rows] = of.tangents.flat(self.states.residual(self.r_n, self.r_t, self.slip)) * of.gmres.free[rows]
-        dx, left, reason = of.gmres.solve(residual, SHARE, 0.2 * of.tolerance * self.scales.force)
+        fall = self.history[-1] / self.history[-2] if len(self.history) > 1 else 1.0
+        share = min(SHARE, AHEAD * fall)
+        dx, left, reason = of.gmres.solve(residual, share, 0.2 * of.tolerance * self.scales.force)
         if reason < 0 and reason != -3:
             raise self._stopped(f"GMRES broke down (reason {reason})", "take another preconditioner, or Condensed()")
         of.operator.work.newton_steps += 1
