@@ -139,6 +139,16 @@ def test_rates_in_space(parallel: bool, mu: Any) -> None:
         sound(c, result)
 
 
+def test_newton_in_circles_goes_on_with_given_limits(parallel: bool) -> None:
+    """mu = 2 on ten points that hardly stand alone: Tresca problems lead out of the circle, and the answer is right."""
+    c, _ = spatial(Coulomb(2.0), 7, parallel=parallel, m=10, alone=0.01)
+    solver = prepared(c, "jacobi")
+    result = solver.solve(c.step)
+    agree(c, result, solve(c, Condensed()))
+    sound(c, result)
+    assert solver.work.fallbacks == 1 and result.iterations > 15
+
+
 def test_answers_do_not_depend_on_steps_before(parallel: bool) -> None:
     """One prepared solver over many steps, and a new one for each; Tresca, Coulomb and frictionless steps mixed."""
     cases = [random_case(law, seed=seed, parallel=parallel) for seed in range(3) for law in (Coulomb(0.4), Tresca(0.2))]

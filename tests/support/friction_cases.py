@@ -51,12 +51,14 @@ def random_case(law: Any, *, seed: int = 2, parallel: bool = False, length: floa
     return replace(c, step=replace(c.step, rate_factor=1.0))
 
 
-def spatial(law: Any, seed: int, *, parallel: bool = False, m: int = 6) -> tuple[Case, Array]:
-    """m points of three unknowns each on a random elastic body."""
+def spatial(
+    law: Any, seed: int, *, parallel: bool = False, m: int = 6, alone: float = 1.0
+) -> tuple[Case, Array]:
+    """m points of three unknowns each on a random elastic body; the less they stand ``alone``, the more they couple."""
     rng = np.random.default_rng(seed)
     n = 3 * m
     root = rng.normal(size=(n, n))
-    matrix = sp.csr_matrix(root @ root.T / n + np.diag(rng.uniform(0.5, 2.0, n)))
+    matrix = sp.csr_matrix(root @ root.T / n + alone * np.diag(rng.uniform(0.5, 2.0, n)))
     b = rng.normal(size=n)
     b[::3] += 0.3
     c = case(matrix, np.arange(0, n, 3), b, 0.1 * rng.random(m), parallel=parallel)

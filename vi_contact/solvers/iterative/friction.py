@@ -30,7 +30,9 @@ from .preconditioners import Inverse
 SHARE = 1e-2  # of the residual of a linear problem that GMRES may leave
 AHEAD = 0.1  # of what Newton's last step left: it leaves less and less
 ROUND = 1e-4  # of the largest friction limit: residual at which coefficients that are given are taken anew
-STEPS = 60  # of Newton
+CIRCLES = 15  # Newton steps after which limits are given,
+GIVEN = 8  # for so many rounds at first, and twice as many every time after
+STEPS = 150  # of Newton
 
 
 @dataclass(frozen=True)
@@ -82,6 +84,7 @@ class Newton:
         self.b = of.layout.padded(step.b)
         self.measured = Measured(step, self.b)
         self.history: list[float] = []
+        self._newton, self._rounds = 0, GIVEN
         of.contact.begin(step)
         of.inverse.begin()
         self.x = of.layout.padded(step.guess)
@@ -162,12 +165,21 @@ class Newton:
         if small and self.law.settled:
             return True
         if not self.law.settled and not any_wrong and self.error <= max(ROUND * limit, 0.5 * of.tolerance * force):
-            self.law.advance(self.slip)
+            self.law.advance(self.slip, self.r_n)
             self.limits = self._limits(self.slip, self.r_n, self.r_t)
             return self.solved()
         if len(self.history) > STEPS:
             raise self._stopped("the states of friction did not settle", "take a smaller step of time or load")
+        self._newton += self.law.settled
+        if self._newton > CIRCLES:
+            self._leave_the_circle()
         return False
+
+    def _leave_the_circle(self) -> None:
+        """Give limits for some rounds, from which Newton begins anew."""
+        self.of.operator.work.fallbacks += self._rounds == GIVEN
+        self.law.give_limits(self._rounds, self.slip, self.r_n)
+        self._newton, self._rounds = 0, 2 * self._rounds
 
     def _wrong(self, error: float) -> Mask:
         """Conditions whose signs are wrong by more than the error of the residual."""

@@ -3,9 +3,10 @@
 The preconditioner is that of the frictionless step, made once: w W M⁻¹ W w, with zeros in w for closed normals and
 sticking tangents, and in the tangent plane of a point that slips
 
-    W = n nᵀ + sqrt(c / (c + kappa)) (1 - n nᵀ),
+    W = n nᵀ + sqrt(g / (g + kappa)) (1 - n nᵀ),    g = c / 2,
 
-which gives M the diagonal of A + kappa across the slip, and tends to the mask of a point that cannot turn.
+which gives M⁻¹ the diagonal of (A + kappa)⁻¹ across the slip, where 1/g is that of A⁻¹, and tends to the mask of a
+point that cannot turn. About half of the diagonal of A is what its neighbours leave a node of stiffness.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from .operator import Operator
 from .preconditioners import Masked
 
 RESTART = 60
+LEFT = 0.5  # g over c
 NOT_A_NUMBER = -9  # PETSc's reason
 
 
@@ -37,8 +39,8 @@ class Turned(Masked):
         """Take mask and curvature of the states."""
         self.weights = contact.weights()
         self.weights[states.held] = 0.0
-        c = self._tangents.c
-        self._across, self._states = 1.0 - np.sqrt(c / (c + states.kappa)), states
+        g = LEFT * self._tangents.c
+        self._across, self._states = 1.0 - np.sqrt(g / (g + states.kappa)), states
 
     def apply(self, pc: Any, r: Any, z: Any) -> None:
         """Apply w W M⁻¹ W w to r: PETSc vectors."""

@@ -3,6 +3,10 @@
 A law with rates may have several solutions where it weakens. As in ``friction.slip_rate`` the step begins with the
 coefficients of rest and takes those of the slip found in a few rounds; then they follow every Newton step, with
 their derivative, by differences.
+
+Where Newton's steps go in circles, which large coefficients may bring about, limits are given for some rounds, those
+of the r_n found last: Tresca problems, which are convex (Nečas, Jarušek and Haslinger, Boll. Unione Mat. Ital. 17-B,
+1980).
 """
 
 from __future__ import annotations
@@ -25,21 +29,37 @@ class LawOfStep:
         rest = np.zeros((step.surface.count, step.surface.tangents.shape[1]))
         self._constant = step.rate_factor == 0.0 or step.friction_at(rest) is step.friction
         self._given, self._left = rest, 0 if self._constant else ROUNDS
+        self._limit, self._tresca = np.zeros(len(rest)), 0
 
     @property
     def settled(self) -> bool:
         """Say whether an answer with the present coefficients is one of the step."""
-        return self._left == 0
+        return self._left == 0 and self._tresca == 0
 
-    def advance(self, slip: Array) -> None:
-        """Take the coefficients of this slip (m, d - 1); after some rounds they follow."""
-        self._given = slip
-        self._left -= 1
+    def advance(self, slip: Array, r_n: Array) -> None:
+        """Take the coefficients of this slip (m, d - 1), or the limits of r_n; after some rounds they follow."""
+        if self._tresca:
+            self._tresca -= 1
+            self._limit = self._affine(slip, r_n, np.zeros_like(r_n))(r_n)
+        else:
+            self._given = slip
+            self._left -= 1
+
+    def give_limits(self, rounds: int, slip: Array, r_n: Array) -> None:
+        """Begin rounds of limits that are given."""
+        self._tresca, self._limit = rounds, self._affine(slip, r_n, np.zeros_like(r_n))(r_n)
 
     def __call__(self, slip: Array, r_n: Array, reach: Array) -> Limits:
         """Return the limits at this slip, or at the one that is given. ``reach`` (m,): slips that points at rest may
         come to; they rise with the law where it grows."""
-        if self._constant or not self.settled:
+        if self._tresca:
+            none = np.zeros_like(self._limit)
+            return Limits(self._limit, none, none)
+        return self._affine(slip, r_n, reach)
+
+    def _affine(self, slip: Array, r_n: Array, reach: Array) -> Limits:
+        """The limits of the law."""
+        if self._constant or self._left:
             return self._at(self._given)
         here, rest, size = self._at(slip), self._at(np.zeros_like(slip)), np.linalg.norm(slip, axis=1)
         moved = size > 0.0

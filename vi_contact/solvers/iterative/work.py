@@ -15,7 +15,7 @@ class Work:
     ``linear_iterations`` of conjugate gradients, those of the fallback too, or of GMRES; ``newton_steps`` with
     friction; ``products`` with A, which took ``product_seconds``; ``renewals`` of the preconditioner after the first,
     which with it took ``set_up_seconds``;
-    ``fallbacks``: steps that ended by projected gradients.
+    ``fallbacks``: steps that ended by projected gradients, or with limits of friction given for some rounds.
     """
 
     linear_iterations: int = 0
