@@ -136,10 +136,12 @@ class PetscFactor:
 
     @property
     def bytes(self) -> float:
-        """Return the bytes of the entries, an equal share of them on each rank; 0 for copies, which tell nothing."""
-        if self._pc.getType() not in ("cholesky", "lu"):
+        """Return the bytes of the entries, an equal share on each rank; 0 for factors that tell nothing, such as copies
+        on every rank."""
+        try:
+            count = self._pc.getFactorMatrix().getInfo()["nz_used"]  # MUMPS counts many in millions, below zero
+        except PETSc.Error:
             return 0.0
-        count = self._pc.getFactorMatrix().getInfo()["nz_used"]  # MUMPS counts many of them in millions, below zero
         return _ENTRY * (count if count >= 0.0 else -1e6 * count) / self._b.comm.size
 
     def solve(self, b: Array) -> Array:
