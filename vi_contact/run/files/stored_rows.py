@@ -100,7 +100,8 @@ def numbers_of(path: str, lines: list[bytes], width: int, before: int) -> Array:
     values = np.empty((len(lines), width))
     for i, line in enumerate(lines):
         try:
-            values[i] = [float(text) for text in line.replace(b"_", b"?").decode("ascii").split(",")]  # not 1_0
+            texts = line.replace(b"_", b"?").decode("ascii").split(",")  # float() would read 1_0 as ten
+            values[i] = np.reshape([float(text) for text in texts], width)  # one number alone would fill the row
         except (ValueError, UnicodeDecodeError) as error:
             raise InputError(f"line {before + i + 2} of '{path}' is damaged: restore it or start a new run") from error
     return values
