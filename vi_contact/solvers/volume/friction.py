@@ -35,7 +35,7 @@ EXTRAPOLATION = Anderson(depth=5, after=3)
 
 @dataclass(frozen=True)
 class Found:
-    """Hold the solution of a following, or of one problem: r_n (m,), slip (L,), zero where points stick, SNES
+    """Hold the solution of a sequence of problems, or of one: r_n (m,), slip (L,), zero where points stick, SNES
     iterations."""
 
     state: FrictionUnknowns
