@@ -2,9 +2,10 @@
 
 What ``build`` returns has the ``problem`` to simulate. Two modules without ``build`` serve the room ``bem``.
 >>> from mpi4py import MPI
->>> from vi_contact import models, run
+>>> import vi_contact as vc
+>>> from vi_contact import models
 >>> model = models.bar.build(models.bar.Bar(elements=8), MPI.COMM_WORLD)
->>> run.simulate(model.problem(), dt=model.bar.time_step(), steps=10).facts["status"]
+>>> vc.simulate(model.problem(), dt=model.bar.time_step(), steps=10).facts["status"]
 'finished'
 """
 
