@@ -8,6 +8,7 @@ import re
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 
 from ..core.checks import shown
@@ -35,11 +36,17 @@ def seconds_of(wall_time: object) -> float:
 
 def age() -> float:
     """Return the seconds since this process began; where the system does not tell, since this module was imported."""
+    return time.monotonic() - _born()
+
+
+@cache
+def _born() -> float:
     try:
         ticks = int(Path("/proc/self/stat").read_text().rpartition(")")[2].split()[19])
-        return time.clock_gettime(time.CLOCK_BOOTTIME) - ticks / os.sysconf("SC_CLK_TCK")
+        age = time.clock_gettime(time.CLOCK_BOOTTIME) - ticks / os.sysconf("SC_CLK_TCK")
     except (OSError, ValueError, IndexError, AttributeError):
-        return time.monotonic() - _IMPORTED
+        return _IMPORTED
+    return time.monotonic() - age
 
 
 class WallTime:
@@ -73,6 +80,8 @@ class WallTime:
 
     def over(self) -> bool:
         """Say, at the end of a base step, whether another one might not end in time."""
+        if self.text is None:
+            return False
         now = age()
         self._step, self._last = max(self._step, now - self._last), now
         return bool(self._end - now <= SAFETY * (self._step + 2.0 * self._saving))
