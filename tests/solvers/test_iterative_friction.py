@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
@@ -242,3 +244,20 @@ def test_stagnation_is_a_sentence_with_the_history(parallel: bool) -> None:
     with pytest.raises(StepFailure, match=r"Newton steps, .*\(residuals .*, .*\): ") as found:
         solver.solve(c.step)
     assert "\n" not in str(found.value)
+
+
+def test_solvers_are_freed(parallel: bool) -> None:
+    """Only PETSc objects outlive the last reference."""
+    c = random_case(Coulomb(0.4), parallel=parallel)
+    gc.collect()
+    gc.disable()
+    try:
+        solver = prepared(c)
+        solver.solve(c.step)
+        friction = solver._friction
+        alive = [weakref.ref(part) for part in (solver, friction, friction.gmres)]
+        assert friction.ksp.getType() == "gmres"
+        del solver, friction
+        assert [reference() for reference in alive] == [None] * len(alive)
+    finally:
+        gc.enable()

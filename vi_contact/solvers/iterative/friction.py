@@ -17,8 +17,9 @@ from ...core.errors import StepFailure
 from ...core.step import StepProblem, StepResult
 from ...core.surfaces import ContactSurface
 from ...laws.friction import project
+from .conjugate_gradients import NOT_A_NUMBER
 from .contact import Contact
-from .failures import told
+from .failures import OTHER, SAID, told
 from .friction_krylov import Gmres, Held, Turned
 from .friction_laws import LawOfStep
 from .friction_states import Limits, States, Tangents
@@ -74,7 +75,7 @@ class Friction:
 
 
 class Newton:
-    """Iterate over one step. ``history``: residuals over the forces."""
+    """Iterate over one step. ``history``: residuals over the forces; ``steps``: linear problems solved."""
 
     def __init__(self, of: Friction, step: StepProblem) -> None:
         self.of = of
@@ -84,7 +85,7 @@ class Newton:
         self.b = of.layout.padded(step.b)
         self.measured = Measured(step, self.b)
         self.history: list[float] = []
-        self._newton, self._rounds = 0, GIVEN
+        self.steps, self._newton, self._rounds = 0, 0, GIVEN
         of.contact.begin(step)
         of.inverse.begin()
         self.x = of.layout.padded(step.guess)
@@ -160,7 +161,7 @@ class Newton:
         force = self.scales.force
         self.history.append(self.error / force if 0.0 < force < np.inf else self.error)
         if not np.isfinite(self.error):
-            raise self._stopped("the residual is not a number", "check the load, the guess and the bound for NaN")
+            raise self._stopped(*SAID[NOT_A_NUMBER])
         small = self.error <= 0.5 * of.tolerance * force and not any_wrong
         if small and self.law.settled:
             return True
@@ -168,7 +169,7 @@ class Newton:
             self.law.advance(self.slip, self.r_n)
             self.limits = self._limits(self.slip, self.r_n, self.r_t)
             return self.solved()
-        if len(self.history) > STEPS:
+        if self.steps == STEPS:
             raise self._stopped("the states of friction did not settle", "take a smaller step of time or load")
         self._newton += self.law.settled
         if self._newton > CIRCLES:
@@ -193,12 +194,13 @@ class Newton:
         residual = np.where(of.gmres.free > 0.0, self.residual, 0.0)
         rows = of.tangents.rows
         residual[rows] = of.tangents.flat(self.states.residual(self.r_n, self.r_t, self.slip)) * of.gmres.free[rows]
-        fall = self.history[-1] / self.history[-2] if len(self.history) > 1 else 1.0
-        share = min(SHARE, AHEAD * fall)
+        last = self.history[-2:]
+        share = min(SHARE, AHEAD * last[1] / last[0]) if last[0] > 0.0 and len(last) > 1 else SHARE
         dx, left, reason = of.gmres.solve(residual, share, 0.2 * of.tolerance * self.scales.force)
-        if reason < 0 and reason != -3:
-            raise self._stopped(f"GMRES broke down (reason {reason})", "take another preconditioner, or Condensed()")
+        if reason < 0:
+            raise self._stopped(*SAID.get(reason, ("GMRES broke down", OTHER)))
         of.operator.work.newton_steps += 1
+        self.steps += 1
         self.x += dx
         self._form()
         self._take(*self._next(left))
@@ -229,12 +231,12 @@ class Newton:
         x[of.surface.tangents[there]] = self.slip0[there]
         slip = np.where(still[:, None], 0.0, self.slip)
         result = StepResult(
-            x=x, r_n=self.r_n, active=contact.closed.copy(), iterations=len(self.history) - 1, method=of.name, r_t=r_t,
+            x=x, r_n=self.r_n, active=contact.closed.copy(), iterations=self.steps, method=of.name, r_t=r_t,
             history=tuple(self.history), aim=of.tolerance,
         )
         return result, Reactions(self.r_n, r_t, slip)
 
     def _stopped(self, words: str, remedy: str) -> StepFailure:
         """The failure, with the history of residuals."""
-        return StepFailure(f"{self.of.name} stopped after {len(self.history) - 1} Newton steps, {words} (residuals "
+        return StepFailure(f"{self.of.name} stopped after {self.steps} Newton steps, {words} (residuals "
                            f"{told(self.history)}): {remedy}")

@@ -17,6 +17,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from ...core.algebra import Array, Indices
+from .conjugate_gradients import SOLVED, STAGNATED
 from .contact import Contact
 from .friction_states import States, Tangents, dot
 from .operator import Operator
@@ -24,7 +25,7 @@ from .preconditioners import Masked
 
 RESTART = 60
 LEFT = 0.5  # g over c
-NOT_A_NUMBER = -9  # PETSc's reason
+FALL = 0.1  # of the residual that is no stagnation
 
 
 class Turned(Masked):
@@ -113,11 +114,10 @@ class Gmres:
         self.ksp.setTolerances(rtol=share, atol=goal, divtol=1e10, max_it=self._patience)
         self.ksp.solve(self._b, self._x)
         self._operator.work.linear_iterations += self.ksp.getIterationNumber()
-        return np.array(self._x.array_r), float(self.ksp.getResidualNorm()), int(self.ksp.getConvergedReason())
-
-    def destroy(self) -> None:
-        """Free the PETSc object; collective."""
-        self.ksp.destroy()
+        left, reason = float(self.ksp.getResidualNorm()), int(self.ksp.getConvergedReason())
+        if reason == STAGNATED and left <= FALL * self._b.norm():
+            reason = SOLVED  # as far as it came: Newton goes on from there
+        return np.array(self._x.array_r), left, reason
 
 
 class Held:
