@@ -53,7 +53,7 @@ def test_volume_and_condensed_routes_take_the_same_steps(scheme: Any) -> None:
     """V4.0, step by step: bounds on displacements and, where contact is predicted, on velocities (+inf elsewhere)."""
     solvers = (Condensed(), Volume(method=ReducedNewton()))
     checked = cross_check(wall(MPI.COMM_WORLD), scheme=scheme, solvers=solvers, dt=WALL_DT, steps=STEPS)
-    assert len(checked.report()) == 2
+    assert len(checked.report()) == 1
     assert checked.worst <= 1e-9
 
 
@@ -67,7 +67,7 @@ def test_default_scheme_takes_the_same_steps(dt: Any) -> None:
     assert accepted[0].problem.mass == Redistributed() and accepted[0].problem.equations.massless is not None
     closed = {MPI.COMM_WORLD.allreduce(int(report.new.active.sum())) for report in accepted}
     assert len(closed) > 3  # contact opens and closes
-    assert [one.steps for one in checked.found] == [len(accepted)] * 2 and len(accepted) >= STEPS
+    assert [one.steps for one in checked.found] == [len(accepted)] and len(accepted) >= STEPS
     assert 0.0 < checked.worst <= 1e-9
 
 
