@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
+from types import ModuleType
 from typing import Any
 
 
@@ -20,4 +22,12 @@ def lazy(
         module = import_module(f"{package}.{home[name]}")
         return getattr(module, name) if contents[home[name]] else module
 
+    class Room(ModuleType):
+        """Keep names when Python binds a module of the same name: ``run.simulate`` stays the function."""
+
+        def __setattr__(self, name: str, value: Any) -> None:
+            if name not in home or not isinstance(value, ModuleType):
+                super().__setattr__(name, value)
+
+    sys.modules[package].__class__ = Room
     return public, get, lambda: public
