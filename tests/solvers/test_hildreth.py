@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from reference_lcp import LCP, generic, mixed, solve
 
-from vi_contact.core.errors import StepFailure
+from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.solvers.normal.active_set import ActiveSet
 from vi_contact.solvers.normal.hildreth import Hildreth
 
@@ -110,3 +110,5 @@ def test_failure_tells_what_happened_and_what_to_do(primal):
     problem = generic(np.random.default_rng(4), 12)
     with pytest.raises(StepFailure, match=r"Hildreth.*after 3 iterations with residual .*use ActiveSet"):
         solve(Hildreth(primal=primal, max_sweeps=3), problem)
+    with pytest.raises(InputError, match="finite numbers"):
+        solve(Hildreth(primal=primal), problem, guess=np.full(12, np.nan))
