@@ -29,7 +29,7 @@ LAWS = {
     "none": vc.Frictionless(), "Tresca": vc.Tresca(0.05), "Coulomb": vc.Coulomb(0.5), "weak Coulomb": vc.Coulomb(0.1),
 }
 METHODS = (
-    vc.Condensed(solvers.Hildreth()), vc.Condensed(solvers.ProjectedCG()), vc.Condensed(friction_method=solvers.NSGS()),
+    vc.Condensed(solvers.Hildreth()), vc.Condensed(friction_method=solvers.NSGS()),
     vc.Condensed(friction_method=solvers.FixedPoint()),
 )
 

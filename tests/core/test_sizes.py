@@ -19,7 +19,6 @@ from vi_contact.core.sizes import DENSE_ROWS, OWN_CONDITIONS, OWN_UNKNOWNS, smal
 from vi_contact.laws.friction import Coulomb
 from vi_contact.run.march import march
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.solvers.normal.projected_cg import ProjectedCG
 
 pytestmark = pytest.mark.serial
 
@@ -49,7 +48,6 @@ def test_condensed_refuses_what_its_dense_matrix_would_not_fit() -> None:
     """Before anything is made of it: in ``check``, and in ``prepare`` for those who do not ask."""
     fits, large = touching(DENSE_ROWS), touching(DENSE_ROWS + 1)
     Condensed().check(fits)
-    Condensed(ProjectedCG()).check(large)
     for refused in (
         lambda: Condensed().check(large),
         lambda: march(large, solver=Condensed(), dt=0.1, steps=1),
@@ -59,12 +57,11 @@ def test_condensed_refuses_what_its_dense_matrix_would_not_fit() -> None:
             refused()
 
 
-@pytest.mark.parametrize("method", [Condensed(), Condensed(ProjectedCG())], ids=["dense", "applied"])
-def test_tangents_count_with_friction(method: Condensed) -> None:
-    """Friction forms the matrix of normal and tangential unknowns, whatever method there is without."""
+def test_tangents_count_with_friction() -> None:
+    """Friction forms the matrix of normal and tangential unknowns."""
     with pytest.raises(InputError, match=told("Condensed() with Coulomb(mu=0.3)", 10_002)):
-        method.check(rubbing(3334))
-    method.check(rubbing(3333))
+        Condensed().check(rubbing(3334))
+    Condensed().check(rubbing(3333))
 
 
 def test_small_is_counted_over_all_ranks() -> None:

@@ -178,7 +178,7 @@ import vi_contact as vc
 sys.path.insert(0, SUPPORT)
 from shaken import shaken
 for scheme in (vc.ZienkiewiczWoodTaylor(), vc.SS22(), vc.LinearMultistep.newmark()):
-    for method in (ActiveSet(), Hildreth(), ProjectedCG()):
+    for method in (ActiveSet(), Hildreth()):
         problem = shaken(vc.Inelastic())
         for state, report in vc.march(problem, scheme=scheme, solver=vc.Condensed(method), dt=5e-3, steps=9):
             pass
@@ -187,7 +187,6 @@ print(sorted({"petsc4py", "dolfinx", "ufl", "basix", "mpi4py", "gmsh", "matplotl
 """
 METHODS = """from vi_contact.solvers.normal.active_set import ActiveSet
 from vi_contact.solvers.normal.hildreth import Hildreth
-from vi_contact.solvers.normal.projected_cg import ProjectedCG
 """
 
 

@@ -89,14 +89,13 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "solvers/test_iterative.py":
         "solvers.iterative.contact solvers.iterative.failures solvers.iterative.layout "
         "solvers.iterative.projected_gradients solvers.iterative.regime solvers.iterative.route "
-        "solvers.iterative.search solvers.iterative.work",
+        "solvers.iterative.search solvers.iterative.work solvers.normal.proportioning",
     "solvers/test_iterative_friction.py":
         "solvers.iterative.friction solvers.iterative.friction_krylov solvers.iterative.friction_laws "
         "solvers.iterative.friction_states",
     "solvers/test_iterative_on_finite_elements.py":
         "solvers.iterative.conjugate_gradients solvers.iterative.measures solvers.iterative.modes "
         "solvers.iterative.operator solvers.iterative.preconditioners",
-    "solvers/test_projected_cg.py": "solvers.normal.proportioning",
     "solvers/test_volume.py": "solvers.volume.snes solvers.volume.tao",
     "solvers/test_volume_friction.py": "solvers.friction.nsgs solvers.volume.friction solvers.volume.route",
     "solvers/test_volume_options.py":

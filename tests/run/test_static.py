@@ -23,11 +23,10 @@ from vi_contact.run.march import march
 from vi_contact.run.static import static_equilibrium
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.solvers.normal.projected_cg import ProjectedCG
 from vi_contact.solvers.volume.route import ReducedNewton, Volume
 
 solvers = pytest.mark.parametrize(
-    "solver", [Condensed(), Condensed(ProjectedCG()), Volume(method=ReducedNewton())], ids=["dense", "cg", "volume"]
+    "solver", [Condensed(), Volume(method=ReducedNewton())], ids=["condensed", "volume"]
 )
 
 

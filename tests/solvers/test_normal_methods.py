@@ -11,12 +11,11 @@ from reference_lcp import KINDS, LCP, enumerate_lcp, from_solution, generic, mix
 from vi_contact.core.errors import InputError
 from vi_contact.solvers.normal.active_set import ActiveSet
 from vi_contact.solvers.normal.hildreth import Hildreth
-from vi_contact.solvers.normal.projected_cg import ProjectedCG
 
 pytestmark = pytest.mark.serial
 
-METHODS = (ActiveSet(), Hildreth(), Hildreth(primal=False), ProjectedCG())
-each_method = pytest.mark.parametrize("method", METHODS, ids=("ActiveSet", "primal Hildreth", "dual Hildreth", "MPRGP"))
+METHODS = (ActiveSet(), Hildreth(), Hildreth(primal=False))
+each_method = pytest.mark.parametrize("method", METHODS, ids=("ActiveSet", "primal Hildreth", "dual Hildreth"))
 
 
 @lru_cache

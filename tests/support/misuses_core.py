@@ -150,7 +150,6 @@ def values() -> Table:
                             "friction_method": METHOD | {"without": solvers.ActiveSet()}, "rates": METHOD}),
         (solvers.ActiveSet, {}, RULE),
         (solvers.Hildreth, {}, {"tolerance": POSITIVE, "max_sweeps": COUNT, "primal": FLAG, "record": FLAG}),
-        (solvers.ProjectedCG, {}, RULE),
         (solvers.FrictionNewton, {}, RULE),
         (solvers.NSGS, {}, RULE),
         (solvers.FixedPoint, {}, RULE | {"tresca": METHOD, "extrapolation": METHOD}),

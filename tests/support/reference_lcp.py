@@ -12,7 +12,6 @@ import numpy as np
 from vi_contact.core.algebra import Array, Mask, max_abs
 from vi_contact.solvers.normal.lcp import (
     LCPResult,
-    Operator,
     check_gap,
     check_operator,
     energy_scale,
@@ -21,12 +20,12 @@ from vi_contact.solvers.normal.lcp import (
 
 @dataclass(frozen=True)
 class LCP:
-    """The problem w = q + G r, 0 <= r ⊥ w >= 0 (w = 0 in bilateral rows); G an array or an Operator.
+    """The problem w = q + G r, 0 <= r ⊥ w >= 0 (w = 0 in bilateral rows); G an array.
 
     Raises InputError for shapes that do not match, a NaN or -inf in q, and an infinite q in a bilateral row.
     """
 
-    G: Array | Operator
+    G: Array
     q: Array
     bilateral: Mask
 
@@ -36,7 +35,7 @@ class LCP:
 
     def w(self, r: Array) -> Array:
         """Gap q + G r (m,)."""
-        return self.q + np.asarray(self.G @ r)
+        return np.asarray(self.q + self.G @ r)
 
     def residual(self, r: Array) -> float:
         """How far r (m,) is from solving it, dimensionless and the same in all units.
@@ -62,7 +61,7 @@ def _complementarity(r: Array, w: Array, bilateral: Mask) -> float:
 
 
 def solve(method: Any, problem: LCP, *, guess: Array | Mask | None = None) -> LCPResult:
-    """The answer of a method: ActiveSet, Hildreth or ProjectedCG."""
+    """The answer of a method: ActiveSet or Hildreth."""
     result: LCPResult = method.prepare(problem.G, problem.bilateral).solve(problem.q, guess)
     return result
 

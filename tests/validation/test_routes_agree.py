@@ -25,7 +25,6 @@ from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.normal.active_set import ActiveSet
 from vi_contact.solvers.normal.hildreth import Hildreth
-from vi_contact.solvers.normal.projected_cg import ProjectedCG
 from vi_contact.solvers.volume.route import ReducedNewton, SemismoothNewton, TaoTron, Volume
 
 COMM = MPI.COMM_WORLD
@@ -34,7 +33,6 @@ CONDENSED = {
     "active set": Condensed(ActiveSet()),
     "Hildreth primal": Condensed(Hildreth(primal=True)),
     "Hildreth dual": Condensed(Hildreth(primal=False)),
-    "projected CG": Condensed(ProjectedCG()),
 }
 VOLUME = {
     "reduced Newton": Volume(method=ReducedNewton()),
@@ -98,7 +96,7 @@ def busiest_step(problem: ContactProblem, dt: float, steps: int) -> StepProblem:
 def test_warm_start_at_the_solution_costs_nothing(name):
     """A step begun at its own solution: no change of the contact set, no Newton step, no TAO iteration.
 
-    (Hildreth and projected CG count sweeps and products; they are told the contact set, not the reactions.)
+    (Hildreth counts sweeps; it is told the contact set, not the reactions.)
     """
     dt, steps = timing(name)
     problem = PROBLEMS[name](COMM)

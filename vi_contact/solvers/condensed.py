@@ -32,15 +32,14 @@ from .friction.problem import FrictionMethod, inner_method
 from .friction.slip_rate import RateIteration
 from .normal.active_set import ActiveSet
 from .normal.lcp import LCPResult
-from .normal.projected_cg import ProjectedCG
 
 STORED_ENTRIES = 200_000  # of A⁻¹E over all ranks: beyond it a second back-substitution is cheaper than the product
 
 
 class SmallMethod(Protocol):
-    """Solve the small problem without friction: ActiveSet, Hildreth or ProjectedCG."""
+    """Solve the small problem without friction: ActiveSet or Hildreth."""
 
-    def prepare(self, G: Any, bilateral: Mask) -> Any:
+    def prepare(self, G: Array, bilateral: Mask) -> Any:
         """Check G (m, m) and factor or scale it, once for many right-hand sides; ``bilateral`` (m,).
 
         What it returns has ``solve(q, guess) -> LCPResult``, q (m,) the gaps without reactions and ``guess`` (m,).
@@ -53,10 +52,9 @@ class Condensed:
     """Condense onto the contact unknowns, with a method for the small problem; with or without friction, any number of
     ranks.
 
-    ``method`` solves it without friction. ``ProjectedCG`` never forms G: each of its products is a back-substitution,
-    for contact sets too large to store. ``friction_method`` solves it with friction: FrictionNewton, NSGS or
-    FixedPoint, GivenForces or Uzawa, which all form G; ``rates`` is the iteration around it for laws that depend on the
-    slip rate.
+    ``method`` solves it without friction: ActiveSet or Hildreth. ``friction_method`` solves it with friction:
+    FrictionNewton, NSGS or FixedPoint, GivenForces or Uzawa; ``rates`` is the iteration around it for laws that depend
+    on the slip rate. Contact sets too large for a dense G are for ``Iterative``.
     """
 
     method: SmallMethod = field(default_factory=ActiveSet)
@@ -64,7 +62,7 @@ class Condensed:
     rates: RateIteration = field(default_factory=RateIteration)
 
     def __post_init__(self) -> None:
-        remedy = "give ActiveSet(), Hildreth() or ProjectedCG()"
+        remedy = "give ActiveSet() or Hildreth()"
         provides("Condensed", "method", self.method, ("prepare",), remedy, lacks=("check", "carries_friction"))
         inner_method("Condensed", "friction_method", self.friction_method)
         instance("Condensed", "rates", self.rates, RateIteration, "give RateIteration()")
@@ -76,7 +74,7 @@ class Condensed:
         if problem.frictional:
             refuse_dense(f"Condensed() with {problem.friction}", surface.total * (1 + surface.tangents.shape[1]))
         else:
-            self._refuse_large(surface)
+            refuse_dense("Condensed()", surface.total)
         if problem.frictional and surface.tangents.shape[1] == 0:
             raise InputError(
                 f"Condensed would ignore {problem.friction}: a body in one dimension cannot slide, use Frictionless()"
@@ -86,26 +84,8 @@ class Condensed:
     def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> PreparedCondensed:
         """Factorise A and condense it; once per time step size. InputError for more contact conditions than a dense
         matrix suits."""
-        self._refuse_large(surface)
+        refuse_dense("Condensed()", surface.total)
         return PreparedCondensed(self, A, surface, scale)
-
-    def _refuse_large(self, surface: ContactSurface) -> None:
-        """InputError for more conditions than a dense G suits, if one is formed."""
-        if not isinstance(self.method, ProjectedCG):
-            refuse_dense("Condensed()", surface.total)
-
-
-class AppliedDelassus:
-    """Apply G as an operator: each product is one back-substitution. Nothing of size rows x m is stored."""
-
-    def __init__(self, A: EffectiveMatrix, surface: ContactSurface, extra: Array) -> None:
-        self._A, self._surface, self.extra = A, surface, extra
-        self.shape = (surface.total, surface.total)
-
-    def __matmul__(self, r: Array) -> Array:
-        surface = self._surface
-        x = self._A.factor.solve(surface.reaction_load(r[surface.slots], self._A.matrix.rows))
-        return np.asarray(surface.everywhere(surface.normal_values(x)) + self.extra * r)
 
 
 class PreparedCondensed:
@@ -119,14 +99,10 @@ class PreparedCondensed:
         self._name = f"condensed {type(settings.method).__name__}"
         A.factor  # noqa: B018  made here, so that the first step is not charged for it
         extra = surface.everywhere(surface.compliance) / scale
-        self.delassus: Any = None
-        if surface.total == 0:
-            return
-        if isinstance(settings.method, ProjectedCG):
-            self.delassus = AppliedDelassus(A, surface, extra)
-        else:
+        self.delassus: Array = np.zeros((0, 0))
+        if surface.total:
             self.delassus = self._form(extra)
-        self._small = settings.method.prepare(self.delassus, surface.everywhere(surface.bilateral))
+            self._small = settings.method.prepare(self.delassus, surface.everywhere(surface.bilateral))
 
     def _form(self, extra: Array) -> Array:
         """G, symmetrised; keeps A⁻¹E when it is small."""
@@ -161,11 +137,8 @@ class PreparedCondensed:
     def friction(self) -> CondensedFriction:
         """Return the small problem with friction, made at the first step that has some."""
         if self._friction is None:
-            normal = self.delassus
-            if isinstance(normal, AppliedDelassus):
-                normal = self._form(normal.extra)
             method, rates, keep = self._settings.friction_method, self._settings.rates, self._columns is not None
-            self._friction = CondensedFriction(method, self._A, self._surface, normal, rates=rates, keep=keep)
+            self._friction = CondensedFriction(method, self._A, self._surface, self.delassus, rates=rates, keep=keep)
         return self._friction
 
     def _with_friction(self, step: StepProblem, x: Array) -> StepResult:

@@ -7,6 +7,5 @@ from ...core.lazy import lazy
 _CONTENTS = {
     "active_set": ("ActiveSet",),
     "hildreth": ("Hildreth",),
-    "projected_cg": ("ProjectedCG",),
 }
 __all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)

@@ -17,7 +17,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
 
 import numpy as np
 from scipy.linalg import lapack
@@ -27,14 +26,6 @@ from ...core.errors import InputError, StepFailure
 
 EPS = float(np.finfo(float).eps)
 Found = tuple[Array, float, int, Sequence[float]]  # scaled r, residual over the unit, iterations, history
-
-
-class Operator(Protocol):
-    """Apply a symmetric positive definite matrix that is only applied; ``diagonal()`` is used when there is one."""
-
-    @property
-    def shape(self) -> Any: ...
-    def __matmul__(self, x: Any, /) -> Any: ...
 
 
 @dataclass(frozen=True)
@@ -60,7 +51,7 @@ class ScaledLCP:
     """Hold d G d with its scale d: what the methods work on. Everything here is in sqrt(J) or dimensionless."""
 
     scale: Array
-    matrix: Any
+    matrix: Array
     norm: float  # of the matrix: bounds the growth of rounding errors
     bilateral: Mask
 
@@ -113,7 +104,7 @@ def scaled_dense(G: Array, bilateral: Mask) -> ScaledLCP:
     """Check and scale a dense G. InputError when it is not finite, symmetric (to 1e-8), of positive diagonal."""
     check_operator(G, bilateral)
     if not isinstance(G, np.ndarray):
-        raise InputError("This method needs the Delassus operator as an array: form it, or use ProjectedCG.")
+        raise InputError("This method needs the Delassus operator as an array: form it.")
     d = energy_scale(G)
     return ScaledLCP(d, *scaled_symmetric(G, d), bilateral.copy())
 
@@ -127,57 +118,15 @@ def scaled_symmetric(G: Array, d: Array) -> tuple[Array, float]:
     return matrix, float(np.abs(matrix).sum(axis=1).max(initial=0.0))
 
 
-def scaled_operator(G: Operator, bilateral: Mask) -> ScaledLCP:
-    """Scale a G that is only applied: symmetry and definiteness are taken on trust."""
-    check_operator(G, bilateral)
-    d = energy_scale(G)
-    matrix = _Applied(G, d)
-    norm = largest_eigenvalue(matrix, d.size) if hasattr(G, "diagonal") else 1.0  # by the choice of d
-    return ScaledLCP(d, matrix, norm, bilateral.copy())
-
-
-class _Applied:
-    """d G d, one application at a time."""
-
-    def __init__(self, G: Operator, scale: Array) -> None:
-        self._G, self._scale = G, scale
-
-    def __matmul__(self, x: Array) -> Array:
-        return self._scale * np.asarray(self._G @ (self._scale * x))
-
-
-def energy_scale(G: Array | Operator) -> Array:
-    """Return d = G_ii^(-1/2) (m,); for an operator without ``diagonal()``, ‖G‖^(-1/2) in every row."""
-    if not hasattr(G, "diagonal"):
-        size = int(G.shape[0])
-        return np.full(size, largest_eigenvalue(G, size) ** -0.5)
-    if isinstance(G, np.ndarray) and not np.isfinite(G).all():
+def energy_scale(G: Array) -> Array:
+    """Return d = G_ii^(-1/2) (m,)."""
+    if not np.isfinite(G).all():
         raise InputError("The Delassus operator contains NaN or infinity: check the factorisation it came from.")
     diagonal = np.asarray(G.diagonal(), dtype=float)
     wrong = np.flatnonzero(~(diagonal > 0.0))
     if wrong.size:
         raise InputError(f"Row {wrong[0]} cannot move (G_ii is not positive): fixed unknowns cannot be contacts.")
     return diagonal**-0.5
-
-
-def largest_eigenvalue(G: Any, size: int) -> float:
-    """Return the largest eigenvalue [as G] by power iteration from a fixed vector, its residual added: it errs upwards.
-    """
-    if not size:
-        return 0.0
-    v = 1.0 + np.modf(0.6180339887498949 * np.arange(size))[0]  # no symmetry of a structure is orthogonal to it
-    value = error = 0.0
-    for _ in range(50):
-        v /= np.linalg.norm(v)
-        image = np.asarray(G @ v)
-        previous, value = value, float(v @ image)
-        error = float(np.linalg.norm(image - value * v))
-        if not value > 0.0:
-            raise InputError("The Delassus operator is not positive definite: check the matrices it came from.")
-        if value - previous <= 0.01 * value:
-            break
-        v = image
-    return value + error
 
 
 def cholesky(G: Array) -> Array:
@@ -194,7 +143,7 @@ def cholesky(G: Array) -> Array:
     return factor
 
 
-def check_operator(G: Array | Operator, bilateral: Mask) -> None:
+def check_operator(G: Array, bilateral: Mask) -> None:
     """Raise InputError unless G is square and ``bilateral`` a boolean mask of its rows."""
     if len(G.shape) != 2 or G.shape[0] != G.shape[1]:
         raise InputError(f"The Delassus operator has shape {tuple(G.shape)}: it must be square.")
