@@ -22,7 +22,6 @@ from vi_contact.core.protocols import Frictionless
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.mortar import DualMortar
 from vi_contact.fem.contact.pairs import contact_pair, side_of
-from vi_contact.fem.contact.surface import nodes_on
 from vi_contact.fem.mesh import build_mesh
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.mass import ConsistentMass, Redistributed
@@ -79,7 +78,8 @@ def test_linear_fields_and_uniform_pressure(angle, swapped, simplices):
     """Rows of P sum to 1 and reproduce positions: P x_2 = x_1; the nodal forces of a uniform pressure on side 1 arrive
     as those of the same pressure on side 2: Pᵀ weights = ∫ phi_j. All to 1e-13."""
     system, one, two = sides(unlike(simplices=simplices, angle=angle), swapped=swapped)
-    found, nodes1, nodes2 = matched(system, one, two), nodes_on(system.space, one), nodes_on(system.space, two)
+    found = matched(system, one, two)
+    nodes1, nodes2 = side_of(system.space, one).nodes, side_of(system.space, two).nodes
     assert np.array_equal(found.rows, np.arange(len(nodes1.numbers)))
     assert np.asarray(found.P.sum(axis=1)).ravel() == pytest.approx(np.ones(len(found.rows)), rel=1e-13)
     assert found.P @ nodes2.points == pytest.approx(nodes1.points, abs=1e-13)
@@ -105,7 +105,8 @@ def test_partly_covered_sides(offset, swapped):
     linear fields are exact, the pressure on it arrives as the same force and moment."""
     lengths = (0.6, 1.5)
     system, one, two = sides(unlike(lengths=lengths, offset=(offset,)), swapped=swapped)
-    found, nodes1, nodes2 = matched(system, one, two), nodes_on(system.space, one), nodes_on(system.space, two)
+    found = matched(system, one, two)
+    nodes1, nodes2 = side_of(system.space, one).nodes, side_of(system.space, two).nodes
     low, high = max(offset, 0.0), min(offset + lengths[0], lengths[1])
     assert found.weights.sum() == pytest.approx(high - low, rel=1e-12)
     assert found.P @ nodes2.points == pytest.approx(nodes1.points[found.rows], abs=1e-10)

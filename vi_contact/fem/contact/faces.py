@@ -2,7 +2,7 @@
 
 Facets round a node are one face there as long as each turns by no more than the angle from another one of them. A
 smooth node has one face, a node at an edge two, at a corner in space three. Normal and weight of a face at a node are
-those of the facets of this face. Everything here is the same on every rank.
+those of the facets of this face. Facets are gathered on every rank only round nodes where they may turn so far.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ import scipy.sparse as sp
 import ufl
 from scipy.sparse.csgraph import connected_components
 
-from ...core.algebra import Array, Indices, Mask
+from ...core.algebra import Array, Indices, Mask, from_each
 from ...core.checks import number
 from ...core.errors import InputError
 from ...meshes.rows import number_alike
 from .. import compat
 from ..mesh import Facets, node_numbers
 from ..space import FemSpace
-from .frames import Nodes, at
+from .nodes import Nodes, at
 
 log = logging.getLogger(__name__)
 LEANING = 0.9  # cosine of the angle (26°) up to which a normal counts as lying in a symmetry plane
@@ -32,7 +32,7 @@ NAMED = 4  # corners that the log names
 
 @dataclass(frozen=True, eq=False)
 class Boundary:
-    """Hold the facets of a group, on every rank in the order of the numbers of their nodes.
+    """Hold facets of a group, the same on every rank in the order of the numbers of their nodes.
 
     Attributes:
         vertices: (k, v) original numbers of their nodes, ascending; normals: (k, d) outward, of length one.
@@ -74,17 +74,44 @@ def checked_angle(owner: str, value: Any) -> float:
     return angle
 
 
-def boundary(space: FemSpace, facets: Facets) -> Boundary:
-    """Gather the facets of a group. Collective."""
-    mesh = space.mesh
-    geometry = compat.entities_to_geometry(mesh, mesh.topology.dim - 1, facets.indices)
-    vertices = node_numbers(mesh)[geometry].astype(np.int64)
-    parts = space.comm.bcast(space.comm.gather((vertices, _outward(mesh, facets.indices, geometry))))
+def boundary(space: FemSpace, facets: Facets, *, beyond: float | None = None) -> Boundary:
+    """Gather the facets of a group; with the angle ``beyond`` only those round nodes where some may turn by more than
+    it from others: of a smooth boundary none. Collective."""
+    mesh, local = space.mesh, np.asarray(facets.indices)
+    geometry = compat.entities_to_geometry(mesh, mesh.topology.dim - 1, local)
+    vertices, normals = node_numbers(mesh)[geometry].astype(np.int64), _outward(mesh, local, geometry)
+    if beyond is not None:
+        kept = np.isin(vertices, _turning(space, vertices, normals, beyond)).any(axis=1)
+        local, vertices, normals = local[kept], vertices[kept], normals[kept]
+    parts = from_each(space.comm, (vertices, normals))
     rows, normals = (np.concatenate([part[i] for part in parts]) for i in (0, 1))
+    if not len(rows):
+        return Boundary(rows, normals, local, np.zeros(0, dtype=np.int64))
     unique, first = np.unique(np.sort(rows, axis=1), axis=0, return_index=True)
     known, own = number_alike(unique, vertices)
     order = np.argsort(known)
-    return Boundary(unique, normals[first], facets.indices, order[np.searchsorted(known[order], own)])
+    return Boundary(unique, normals[first], local, order[np.searchsorted(known[order], own)])
+
+
+def _turning(space: FemSpace, vertices: Indices, normals: Array, angle: float) -> Indices:
+    """Numbers of the nodes, the same on every rank, whose facets have normals in too large a box for all to be within
+    the angle of one another. Of nodes that other ranks own every rank tells the box of those facets that it holds."""
+    facet = np.repeat(np.arange(len(vertices)), vertices.shape[1])
+    numbers, low, high = _boxes(vertices.ravel(), normals[facet], normals[facet])
+    away = ~np.isin(numbers, space.nodes)
+    parts = [(numbers, low, high), *from_each(space.comm, (numbers[away], low[away], high[away]))]
+    numbers, low, high = _boxes(*(np.concatenate([part[i] for part in parts]) for i in range(3)))
+    wide = np.linalg.norm(high - low, axis=1) > 2.0 * np.sin(0.5 * angle)
+    return np.unique(np.concatenate(from_each(space.comm, numbers[wide])))
+
+
+def _boxes(nodes: Indices, low: Array, high: Array) -> tuple[Indices, Array, Array]:
+    """(each node once, least values, largest values) of rows for nodes."""
+    if not len(nodes):
+        return nodes, low, high
+    order = np.argsort(nodes, kind="stable")
+    numbers, starts = np.unique(nodes[order], return_index=True)
+    return numbers, np.minimum.reduceat(low[order], starts), np.maximum.reduceat(high[order], starts)
 
 
 def _outward(mesh: Any, facets: Any, geometry: Any) -> Array:
@@ -94,7 +121,7 @@ def _outward(mesh: Any, facets: Any, geometry: Any) -> Array:
     middle = x.mean(axis=1)
     normals = np.linalg.svd(x - middle[:, None, :])[2][:, -1]  # along which the facet extends least
     cell_of = mesh.topology.connectivity(mesh.topology.dim - 1, mesh.topology.dim)
-    cells = np.array([cell_of.links(facet)[0] for facet in facets], dtype=np.int64)
+    cells = cell_of.array[cell_of.offsets[facets]]  # the first cell of each
     inside = mesh.geometry.x[compat.geometry_dofmap(mesh)[cells]][:, :, :d].mean(axis=1)
     return np.asarray(np.where(np.sum((middle - inside) * normals, axis=1)[:, None] < 0.0, -normals, normals))
 
@@ -124,19 +151,24 @@ def integrals(space: FemSpace, indices: Any) -> Array:
 def split(space: FemSpace, around: Boundary, nodes: Nodes, angle: float) -> tuple[Nodes, Indices]:
     """Return (nodes, at corners one for each face with its normal and weight; a facet of the face, -1 elsewhere).
 
-    The order of the nodes is kept. Collective.
+    ``nodes``: of this rank or of all, the order is kept. Collective.
     """
-    labels = around.corner_faces(angle)
-    known = np.isin(around.vertices, nodes.numbers)
+    if not len(around.vertices):
+        return nodes, np.full(len(nodes.numbers), -1)
+    corners, labels = nodes.numbers[np.isin(nodes.numbers, around.vertices)], around.corner_faces(angle)
+    known = np.isin(around.vertices, np.concatenate(from_each(space.comm, corners)))
+    if not known.any():
+        return nodes, np.full(len(nodes.numbers), -1)
     pairs = np.unique(np.column_stack([around.vertices[known], labels[known]]), axis=0)
     numbers, counts = np.unique(pairs[:, 0], return_counts=True)
     pairs = pairs[np.isin(pairs[:, 0], numbers[counts > 1])]
     if not len(pairs):
         return nodes, np.full(len(nodes.numbers), -1)
     starts, ends = (np.searchsorted(pairs[:, 0], nodes.numbers, side) for side in ("left", "right"))
-    of_rows = [np.arange(start, end) if end > start else [-1] for start, end in zip(starts, ends, strict=True)]
-    found = nodes.pick(np.repeat(np.arange(len(of_rows)), [len(own) for own in of_rows]))
-    pair = np.concatenate(of_rows).astype(np.int64)
+    times = np.maximum(ends - starts, 1)
+    found = nodes.pick(np.repeat(np.arange(len(times)), times))
+    among = np.arange(times.sum()) - np.repeat(np.cumsum(times) - times, times)
+    pair = np.where(np.repeat(ends > starts, times), np.repeat(starts, times) + among, -1)
     double, values = pair >= 0, _of_faces(space, around, labels, pairs)[pair]
     unit = values[:, 1:] / np.linalg.norm(values[:, 1:], axis=1)[:, None]
     normals = np.where(double[:, None], in_symmetry_planes(unit, found.held), found.normals)
@@ -188,13 +220,16 @@ def in_symmetry_planes(normals: Array, held: Mask) -> Array:
     return np.asarray(np.where(length > LEANING, inside / np.maximum(length, LEANING), normals))
 
 
-def tell_corners(space: FemSpace, name: str, nodes: Nodes, angle: float) -> None:
-    """Log, on rank 0, how many nodes have several conditions, and where."""
+def tell_corners(space: FemSpace, name: str, nodes: Nodes, slots: Indices, angle: float) -> None:
+    """Log, on rank 0, how many nodes have several conditions, and where. Collective."""
     _, first, counts = np.unique(nodes.numbers, return_index=True, return_counts=True)
-    rows = np.sort(first[counts > 1])
-    if space.comm.rank == 0 and len(rows):
-        places = ", ".join(at(point) for point in nodes.points[rows[:NAMED]]) + (", …" if len(rows) > NAMED else "")
+    rows = first[counts > 1]
+    parts = from_each(space.comm, (slots[rows], nodes.points[rows]))
+    numbers, points = (np.concatenate([part[i] for part in parts]) for i in range(2))
+    if space.comm.rank == 0 and len(numbers):
+        some = points[np.argsort(numbers)[:NAMED]]
+        places = ", ".join(at(point) for point in some) + (", …" if len(numbers) > NAMED else "")
         log.info(
             "'%s' turns by more than %.4g degrees at %d contact nodes, which have one condition for every face: %s",
-            name, np.degrees(angle), len(rows), places,
+            name, np.degrees(angle), len(numbers), places,
         )

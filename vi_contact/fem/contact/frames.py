@@ -3,7 +3,7 @@
 A condition is a node, a contact direction and, between two bodies, what the node faces. Each node has one frame Q, with
 the directions of all its conditions among its vectors, and its unknowns are û = Qᵀu: every u·n is one of them. Forces
 are Q f̂ then, and u = T û with T = Q⁻ᵀ: Q itself, unless directions of the node are oblique. In space a node with two
-directions has the unit vector along its edge as the third. Everything here but the matrices is the same on every rank.
+directions has the unit vector along its edge as the third. A rank holds the conditions of its own nodes.
 """
 
 from __future__ import annotations
@@ -16,41 +16,21 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from ...core.algebra import Array, Indices, Mask
+from ...core.algebra import Array, Indices, Mask, largest
 from ...core.corners import PARALLEL, at_right_angles
 from ...core.errors import InputError
 from ...core.surfaces import ContactSurface, nodal_blocks, nodal_frames, tangential_columns
 from ..petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc
 from ..space import FemSpace
+from .nodes import Nodes, asked, at, joined_nodes
 
 INDEPENDENT = 0.01  # least singular value of a node's directions: two that turn by 0.8° (CHOSEN; T has 1 over it)
 
 
 @dataclass(frozen=True, eq=False)
-class Nodes:
-    """Hold nodes of a boundary, the same on every rank: original numbers, coordinates, body normals, weights, held
-    components, and the numbers over all ranks of their free unknowns, -1 for held ones."""
-
-    numbers: Indices
-    points: Array
-    normals: Array
-    weights: Array
-    held: Mask
-    unknowns: Indices
-
-    def pick(self, rows: Any) -> Nodes:
-        """Return the nodes of these rows."""
-        return Nodes(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
-
-
-def joined_nodes(parts: Sequence[Nodes]) -> Nodes:
-    """Return the nodes of all parts, one part after the other."""
-    return Nodes(*(np.concatenate([getattr(part, name) for part in parts]) for name in Nodes.__dataclass_fields__))
-
-
-@dataclass(frozen=True, eq=False)
 class Facing:
-    """Hold what contact nodes face: opposite node s the other body moves by sum_j P_sj u_j of these nodes."""
+    """Hold what contact nodes face: opposite node s the other body moves by sum_j P_sj u_j of these nodes, which are
+    those of all ranks."""
 
     nodes: Nodes
     P: sp.csr_matrix
@@ -58,10 +38,12 @@ class Facing:
 
 @dataclass(frozen=True, eq=False)
 class NodalConditions:
-    """Hold conditions u·direction <= gap at nodes, u being relative to what they are ``facing`` if that deforms too."""
+    """Hold this rank's conditions u·direction <= gap at nodes, u being relative to what they are ``facing`` if that
+    deforms too; ``slots``: their numbers among those of all ranks, ascending."""
 
     nodes: Nodes
     directions: Array
+    slots: Indices
     facing: Facing | None = None
 
 
@@ -74,7 +56,7 @@ class FemSurface(ContactSurface):
 
 
 class NodalFrames:
-    """Make one frame of unit vectors per node of the conditions, orthonormal unless the node has oblique directions.
+    """Make one frame of unit vectors per node of conditions, orthonormal unless the node has oblique directions.
 
     Attributes:
         numbers: (k,) nodes; blocks: (k, d, d) frames Q, vectors as columns; turns: (k, d, d) Q⁻ᵀ.
@@ -86,12 +68,11 @@ class NodalFrames:
         InputError: a contact direction that is partly prescribed; directions of one node that depend on one another.
     """
 
-    def __init__(self, parts: Sequence[NodalConditions]) -> None:
-        numbers = np.concatenate([part.nodes.numbers for part in parts])
-        self.points = np.concatenate([part.nodes.points for part in parts])
-        self.directions = np.concatenate([part.directions for part in parts])
-        self._refuse_prescribed(np.concatenate([part.nodes.held for part in parts]))
-        self.numbers, first, self.place = np.unique(numbers, return_index=True, return_inverse=True)
+    def __init__(self, numbers: Indices, points: Array, directions: Array, held: Mask) -> None:
+        self.points, self.directions = points, directions
+        self._refuse_prescribed(held)
+        self.numbers, first, place = np.unique(numbers, return_index=True, return_inverse=True)
+        self.place: Indices = place.ravel()
         self.double: Mask = np.bincount(self.place) > 1
         column, self.blocks = nodal_blocks(nodal_frames(self.directions[first]))
         self.column, self.turns = column[self.place], self.blocks.copy()
@@ -175,47 +156,46 @@ def corner_of(directions: Array) -> tuple[list[int], Array]:
     return columns, block
 
 
-def at(point: Array) -> str:
-    """Return a point as words for a sentence."""
-    return f"({', '.join(f'{x:g}' for x in point)})"
+def given(parts: Sequence[NodalConditions]) -> tuple[Indices, Array, Array, Mask]:
+    """Return what makes the frames of these conditions: numbers and points of their nodes, directions, held components.
+    """
+    nodes = joined_nodes([part.nodes for part in parts])
+    return nodes.numbers, nodes.points, np.concatenate([part.directions for part in parts]), nodes.held
 
 
 def surface_of(space: FemSpace, parts: Sequence[NodalConditions], **data: Any) -> FemSurface:
-    """Make the surface of these conditions. ``data``: gap0, weights and whatever else it holds of each condition, for
-    those of all ranks; functions of time return those of this rank. Collective."""
-    frames = NodalFrames(parts)
-    d, count = space.dimension, len(frames.place)
-    where = space.blocks_of(frames.numbers)
-    index = np.full((len(where), d), -1, dtype=np.int64)
-    index[where >= 0] = space.free_index.reshape(-1, d)[where[where >= 0]]  # a rank may own no node at all
-    slots = np.flatnonzero(where[frames.place] >= 0)
-    place, column = frames.place[slots], frames.column[slots]
-    tangents = np.where(frames.rubs[slots], np.take_along_axis(index[place], tangential_columns(column, d), axis=1), -1)
-    given = {"bilateral": np.zeros(count, dtype=bool), "compliance": np.zeros(count)} | data
-    given = {name: value[slots] if isinstance(value, np.ndarray) else value for name, value in given.items()}
+    """Make the surface of these conditions, one part after the other. ``data``: gap0, weights and whatever else it
+    holds of each condition of this rank. Collective."""
+    comm, d = space.comm, space.dimension
+    starts = np.cumsum([0, *comm.sum(np.array([float(len(part.slots)) for part in parts]))]).astype(np.int64)
+    slots = np.concatenate([start + part.slots for start, part in zip(starts[:-1], parts, strict=True)])
+    frames: NodalFrames = asked(comm, slots, lambda *arrays: (NodalFrames(*arrays),), *given(parts))[0]
+    index = space.free_index.reshape(-1, d)[space.blocks_of(frames.numbers)]
+    place, column, count = frames.place, frames.column, len(slots)
+    tangents = np.take_along_axis(index[place], tangential_columns(column, d), axis=1)
     return FemSurface(
-        comm=space.comm,
-        points=frames.points[slots],
-        normals=frames.directions[slots],
+        comm=comm,
+        points=frames.points,
+        normals=frames.directions,
         owned=index[place, column],
         slots=slots,
-        tangents=tangents,
-        basis=_turn(space, frames.turns, where >= 0, index),
-        dual=_turn(space, frames.blocks, where >= 0, index) if frames.oblique else None,
+        tangents=np.where(frames.rubs, tangents, -1),
+        basis=_turn(space, frames.turns, index),
+        dual=_turn(space, frames.blocks, index) if largest(comm, frames.oblique) else None,
         nodes=frames.numbers[place],
         coupling=_coupling(space, parts, frames, index),
         space=space,
         parts=tuple(parts),
-        **given,
+        **{"bilateral": np.zeros(count, dtype=bool), "compliance": np.zeros(count)} | data,
     )
 
 
-def _turn(space: FemSpace, blocks: Array, mine: Mask, index: Indices) -> PetscMatrix | None:
-    """The identity but for the blocks of the contact nodes (T, or T⁻ᵀ); None when all are the identity too."""
-    n, d = len(space.ids), space.dimension
-    if np.array_equal(blocks, np.broadcast_to(np.eye(d), blocks.shape)):
+def _turn(space: FemSpace, blocks: Array, index: Indices) -> PetscMatrix | None:
+    """The identity but for the blocks of the contact nodes (T, or T⁻ᵀ); None when all are the identity too. Collective.
+    """
+    n = len(space.ids)
+    if not largest(space.comm, np.any(blocks != np.eye(space.dimension))):
         return None
-    index, blocks = index[mine], blocks[mine]
     free = index >= 0
     used = free[:, :, None] & free[:, None, :]
     rows, columns = (np.broadcast_to(way, used.shape)[used] for way in (index[:, :, None], index[:, None, :]))
@@ -234,7 +214,7 @@ def _coupling(
     """
     if all(part.facing is None for part in parts):
         return None
-    _refuse_chains(parts)
+    _refuse_chains(space, parts)
     algebra, n = PetscAlgebra(space.mesh.comm), len(space.ids)
     first, total = algebra.first(n), space.unknowns
     own, entries, start = [np.zeros(0, dtype=np.int64)], [sp.csr_matrix((0, total))], 0
@@ -244,7 +224,7 @@ def _coupling(
         start = slots.stop
         if part.facing is None:
             continue
-        place, turns = frames.place[slots], _turns(frames, part.facing.nodes)
+        place, turns = frames.place[slots], _turns(space, frames, part.facing.nodes.numbers)
         for c in range(space.dimension):
             rows = np.flatnonzero(relative[slots, c] & (index[place, c] >= 0))
             own.append(index[place[rows], c])
@@ -253,13 +233,15 @@ def _coupling(
     return as_petsc(algebra.replaced_rows(n, np.concatenate(own), sp.csr_matrix(sp.vstack(entries))))
 
 
-def _turns(frames: NodalFrames, nodes: Nodes) -> Array:
-    """T (k, d, d) of nodes that are faced; the axes where they are in contact with nothing else."""
-    turns = np.tile(np.eye(nodes.points.shape[1]), (len(nodes.numbers), 1, 1))
-    place = np.minimum(np.searchsorted(frames.numbers, nodes.numbers), len(frames.numbers) - 1)
-    known = frames.numbers[place] == nodes.numbers
-    turns[known] = frames.turns[place[known]]
-    return turns
+def _turns(space: FemSpace, frames: NodalFrames, numbers: Indices) -> Array:
+    """T (k, d, d) of nodes that are faced, whichever rank owns them; the axes where they are in contact with nothing
+    else. Collective."""
+    d = space.dimension
+    known = np.zeros((len(space.nodes), 1 + d * d))
+    own = space.blocks_of(frames.numbers)
+    known[own, 0], known[own, 1:] = 1.0, frames.turns.reshape(-1, d * d)
+    found = space.at_nodes(numbers, known)
+    return np.asarray(np.where(found[:, :1, None] > 0.0, found[:, 1:].reshape(-1, d, d), np.eye(d)))
 
 
 def _faced(facing: Facing, rows: Indices, turns: Array, directions: Array, total: int) -> sp.csr_matrix:
@@ -273,13 +255,15 @@ def _faced(facing: Facing, rows: Indices, turns: Array, directions: Array, total
     return sp.csr_matrix((values[used], places), shape=(len(rows), total))
 
 
-def _refuse_chains(parts: Sequence[NodalConditions]) -> None:
-    """InputError for a node on side 1 of one pair and side 2 of another: R⁻¹ = 2 - R needs them apart."""
+def _refuse_chains(space: FemSpace, parts: Sequence[NodalConditions]) -> None:
+    """InputError for a node on side 1 of one pair and side 2 of another: R⁻¹ = 2 - R needs them apart. Collective."""
     coupled = [(part.nodes, part.facing) for part in parts if part.facing is not None]
-    first = np.concatenate([nodes.numbers for nodes, _ in coupled])
+    first = np.zeros((len(space.nodes), 1))
+    first[space.blocks_of(np.concatenate([nodes.numbers for nodes, _ in coupled]))] = 1.0
     for _, facing in coupled:
-        used = np.unique(facing.P.indices)
-        both = used[np.isin(facing.nodes.numbers[used], first)]
+        used = np.zeros(len(facing.nodes.numbers))
+        used[facing.P.indices] = 1.0
+        both = np.flatnonzero(space.at_nodes(facing.nodes.numbers, first)[:, 0] * space.comm.max(used))
         if len(both):
             raise InputError(
                 f"node {at(facing.nodes.points[both[0]])} is on side 1 of one contact pair and on side 2 of another: "

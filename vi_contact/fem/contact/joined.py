@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from ...core.algebra import Array
 from ...core.errors import InputError
 from ...core.surfaces import ContactSurface
-from .frames import FemSurface, NodalFrames, surface_of
+from .frames import FemSurface, NodalFrames, given, surface_of
 
 Motion = Callable[[float], Array]
 
@@ -31,18 +32,16 @@ def joined_surfaces(*surfaces: ContactSurface) -> ContactSurface:
     if not made or len(made) < len(surfaces) or any(surface.space is not made[0].space for surface in made):
         raise InputError("joined_surfaces needs surfaces of fem.contact_surface and contact_pair, all of one system")
     names = ("gap0", "weights", "bilateral", "compliance")
-    data: dict[str, Any] = {
-        name: np.concatenate([surface.everywhere(getattr(surface, name)) for surface in made]) for name in names
-    }
+    data: dict[str, Any] = {name: np.concatenate([getattr(surface, name) for surface in made]) for name in names}
     parts = [part for surface in made for part in surface.parts]
     joined = surface_of(
         made[0].space,
         parts,
         motion=_joined([(surface.motion, (surface.count,)) for surface in made]),
-        slide=_slide(made),
         companions=tuple(one for surface in made for one in surface.companions),
         **data,
     )
+    joined = replace(joined, slide=_slide(made))
     return joined.with_frictionless_corners() if all(one.frictionless_corners for one in made) else joined
 
 
@@ -56,15 +55,12 @@ def _joined(motions: Sequence[tuple[Motion | None, tuple[int, ...]]]) -> Motion 
 def _slide(made: Sequence[FemSurface]) -> Motion | None:
     """The slides of all conditions, those of nodes with several along the vectors that are left to them."""
     joined = _joined([(surface.slide, (surface.count, surface.tangents.shape[1])) for surface in made])
-    frames = NodalFrames([part for surface in made for part in surface.parts])
-    starts = np.cumsum([0, *(surface.total for surface in made)])
-    mine = np.concatenate([first + surface.slots for first, surface in zip(starts[:-1], made, strict=True)])
-    corners = np.flatnonzero(frames.double[frames.place[mine]])
+    frames = NodalFrames(*given([part for surface in made for part in surface.parts]))
+    corners = np.flatnonzero(frames.double[frames.place])
     if joined is None or not len(corners):
         return joined
-    mine = mine[corners]
-    before = np.concatenate([NodalFrames(surface.parts).tangents for surface in made])[mine]
-    after = frames.tangents[mine] * frames.rubs[mine, None, :]
+    before = np.concatenate([NodalFrames(*given(surface.parts)).tangents for surface in made])[corners]
+    after = frames.tangents[corners] * frames.rubs[corners, None, :]
     turn = np.einsum("kic,kie->kce", after, before)
 
     def slide(t: float) -> Array:

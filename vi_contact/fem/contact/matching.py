@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from ...core.algebra import Array, Indices
 from ...core.checks import attributes
 from ...core.errors import InputError
-from .frames import Nodes, at
+from .nodes import Nodes, at
 
 DISTANCE_ROWS = 256  # rows of the tables of distances
 

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from ...core.algebra import Array, Indices, Mask
+from ...core.algebra import Array, Mask, largest
 from ...core.checks import provides
 from ...core.corners import FEATURE_ANGLE
 from ...core.errors import InputError
@@ -31,8 +31,9 @@ from .. import compat
 from ..mesh import Facets, node_numbers
 from ..space import FemSpace
 from .faces import Boundary, boundary, checked_angle, split, tell_corners
-from .frames import Facing, NodalConditions, NodalFrames, Nodes, at, joined_nodes, surface_of
+from .frames import Facing, NodalConditions, NodalFrames, given, surface_of
 from .matching import Matched, Matching, NodeToNode, Side
+from .nodes import Nodes, at, everywhere, joined_nodes
 from .surface import contact_space, listed, nodes_on, snapped
 
 log = logging.getLogger(__name__)
@@ -77,28 +78,32 @@ def contact_pair(
             f"'{one.name}' and '{two.name}' are the same nodes, so that nothing can part there: mesh the bodies one by "
             "one, or cut the mesh open (meshes.cut.CutOpen)"
         )
-    faces = _faces(space, one, boundary(space, facets1), angle)
+    around = boundary(space, facets1, beyond=angle)
+    faces = _faces(space, one, boundary(space, facets1) if len(around.vertices) else around, angle)
     nodes, matched = _by_face(faces, two, NodeToNode() if matching is None else matching, space.size)
     kept = ~np.isin(nodes.numbers, two.nodes.numbers)
     nodes, matched = nodes.pick(kept), matched.pick(kept)
     free = _unclamped(space, one.name, nodes, two, matched)
     nodes, matched = nodes.pick(free), matched.pick(free)
     if points is not None:
-        chosen = listed(space, nodes, points, one.name).numbers
+        chosen = listed(space, nodes, points, one.name)
         rows = np.concatenate([np.flatnonzero(nodes.numbers == number) for number in chosen])
         nodes, matched = nodes.pick(rows), matched.pick(rows)
-    tell_corners(space, one.name, nodes, angle)
     directions = snapped(nodes.normals)
     gap = _gap(space, one.name, two, nodes, directions, matched)
-    conditions = NodalConditions(nodes, directions, Facing(two.nodes, matched.P))
-    surface = surface_of(space, [conditions], gap0=gap, weights=matched.weights * space.forms.section.thickness)
-    moving: dict[str, Any] = _prescribed_motion(space, conditions, surface.slots)
+    slots = np.flatnonzero(space.blocks_of(nodes.numbers) >= 0)  # from here on every rank has its own nodes of side 1
+    nodes, matched = nodes.pick(slots), matched.pick(slots)
+    tell_corners(space, one.name, nodes, slots, angle)
+    conditions = NodalConditions(nodes, directions[slots], slots, Facing(two.nodes, matched.P))
+    weights = matched.weights * space.forms.section.thickness
+    surface = surface_of(space, [conditions], gap0=gap[slots], weights=weights)
+    moving: dict[str, Any] = _prescribed_motion(space, conditions)
     return replace(surface, **moving)
 
 
 def side_of(space: FemSpace, facets: Facets) -> Side:
     """Gather all nodes and facets of a boundary, on every rank, in the order of the mesh's numbers. Collective."""
-    mesh, nodes = space.mesh, nodes_on(space, facets)
+    mesh, nodes = space.mesh, everywhere(space.comm, nodes_on(space, facets))
     vertices = node_numbers(mesh)[compat.entities_to_geometry(mesh, mesh.topology.dim - 1, facets.indices)]
     rows = np.concatenate(space.comm.bcast(space.comm.gather(vertices.astype(np.int64))))
     _, first = np.unique(np.sort(rows, axis=1), axis=0, return_index=True)
@@ -203,18 +208,16 @@ def _gap(space: FemSpace, name: str, two: Side, nodes: Nodes, directions: Array,
     return np.maximum(gap, 0.0)
 
 
-def _prescribed_motion(
-    space: FemSpace, conditions: NodalConditions, mine: Indices
-) -> dict[str, Callable[[float], Array]]:
+def _prescribed_motion(space: FemSpace, conditions: NodalConditions) -> dict[str, Callable[[float], Array]]:
     """``motion`` and ``slide`` of this rank's conditions where side 2 has prescribed nodes that move: none when none
-    does."""
-    frames, facing = NodalFrames([conditions]), conditions.facing
+    does. Collective."""
+    facing, held = conditions.facing, conditions.nodes.held
     moves = any(condition.moves for condition in space.prescribed)
-    if facing is None or not moves or not facing.nodes.held[np.unique(facing.P.indices)].any():
+    if facing is None or not moves or not largest(space.comm, facing.nodes.held[facing.P.indices].any()):
         return {}
-    numbers, P, held = facing.nodes.numbers, facing.P[mine], conditions.nodes.held
+    frames, numbers, P = NodalFrames(*given([conditions])), facing.nodes.numbers, facing.P
     free = np.take_along_axis(~held, tangential_columns(frames.column, space.dimension), axis=1) & frames.rubs
-    tangents, directions, free = frames.tangents[mine], frames.directions[mine], free[mine]
+    tangents, directions = frames.tangents, frames.directions
     nothing = np.zeros(len(space.ids))
 
     def displacement(t: float) -> Array:

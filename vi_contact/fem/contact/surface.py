@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from ...core.algebra import Array
+from ...core.algebra import Array, Indices, Mask, largest, total
 from ...core.checks import array, provides, several
 from ...core.corners import FEATURE_ANGLE, PARALLEL
 from ...core.errors import InputError
@@ -21,7 +21,8 @@ from ..groups import facets_of
 from ..mesh import Facets
 from ..space import FemSpace, space_of
 from .faces import boundary, checked_angle, in_symmetry_planes, integrals, split, tell_corners
-from .frames import NodalConditions, Nodes, at, surface_of
+from .frames import NodalConditions, surface_of
+from .nodes import Nodes, asked, at, everywhere, slots_of
 
 log = logging.getLogger(__name__)
 
@@ -57,16 +58,43 @@ def contact_surface(
     if obstacle is not None:
         provides("contact_surface", "obstacle", obstacle, ("directions", "gap"), "give HalfSpace(…) or another")
     angle = checked_angle("contact_surface", feature_angle)
-    whole = nodes_on(space, facets)
-    whole = free_nodes(space, whole, facets.name) if points is None else listed(space, whole, points, facets.name)
-    nodes, _ = split(space, boundary(space, facets), whole, angle)
-    directions, gap = facing(Touching() if obstacle is None else obstacle, nodes.points, nodes.normals)
-    directions, gap = snapped(directions), admissible_gap(gap, nodes.points, space.size)
+    comm, whole = space.comm, nodes_on(space, facets)
+    chosen = None if points is None else listed(space, everywhere(comm, whole), points, facets.name)
+    whole = free_nodes(space, whole, facets.name) if chosen is None else whole.pick(_rows_of(whole, chosen))
+    nodes, _ = split(space, boundary(space, facets, beyond=angle), whole, angle)
+    slots = slots_of(comm, _places(nodes, chosen))
+    directions, gap = asked(comm, slots, _obstacle(obstacle, space.size), nodes.points, nodes.normals)
     nodes, directions, gap = one_per_direction(whole, nodes, directions, gap)
+    slots = slots_of(comm, _places(nodes, chosen))
     weights = nodes.weights * space.forms.section.thickness
-    _refuse_tied(space, nodes, facets.name)
-    tell_corners(space, facets.name, nodes, angle)
-    return surface_of(space, [NodalConditions(nodes, directions)], gap0=gap, weights=weights)
+    _refuse_tied(space, nodes, slots, facets.name)
+    tell_corners(space, facets.name, nodes, slots, angle)
+    return surface_of(space, [NodalConditions(nodes, directions, slots)], gap0=gap, weights=weights)
+
+
+def _obstacle(obstacle: Obstacle | None, size: float) -> Callable[[Array, Array], tuple[Array, Array]]:
+    """What an obstacle answers: directions and initial gaps at points with these normals."""
+    def ask(points: Array, normals: Array) -> tuple[Array, Array]:
+        if not len(points):  # users' functions need not cope with none
+            return np.zeros_like(points), np.zeros(0)
+        directions, gap = facing(Touching() if obstacle is None else obstacle, points, normals)
+        return snapped(directions), admissible_gap(gap, points, size)
+
+    return ask
+
+
+def _rows_of(nodes: Nodes, chosen: Indices) -> Indices:
+    """The rows of those nodes that are chosen, in the order of the choice."""
+    rows = np.flatnonzero(np.isin(nodes.numbers, chosen))
+    return np.asarray(rows[np.argsort(_places(nodes.pick(rows), chosen))])
+
+
+def _places(nodes: Nodes, chosen: Indices | None) -> Indices:
+    """What orders the conditions of all ranks: the numbers of their nodes, or their places in a list of nodes."""
+    if chosen is None:
+        return nodes.numbers
+    order = np.argsort(chosen)
+    return np.asarray(order[np.searchsorted(chosen, nodes.numbers, sorter=order)])
 
 
 def one_per_direction(whole: Nodes, nodes: Nodes, directions: Array, gap: Array) -> tuple[Nodes, Array, Array]:
@@ -76,21 +104,21 @@ def one_per_direction(whole: Nodes, nodes: Nodes, directions: Array, gap: Array)
     """
     if len(nodes.numbers) == len(whole.numbers):
         return nodes, directions, gap
-    home: dict[int, list[int]] = {}
-    weights, gap = nodes.weights.copy(), gap.copy()
-    for row, node in enumerate(nodes.numbers):
-        before = home.setdefault(int(node), [])
-        alike = [other for other in before if directions[row] @ directions[other] > 1.0 - PARALLEL]
-        if alike:
-            weights[alike[0]] += weights[row]
-            gap[alike[0]] = min(gap[alike[0]], gap[row])
-        else:
-            before.append(row)
-    total = dict(zip(whole.numbers.tolist(), whole.weights, strict=True))
-    for node, rows in home.items():
-        if len(rows) == 1:
-            weights[rows[0]] = total[node]  # to the last digit
-    kept = [row for rows in home.values() for row in rows]
+    weights, gap, kept = nodes.weights.copy(), gap.copy(), np.ones(len(nodes.numbers), dtype=bool)
+    numbers, starts, counts = np.unique(nodes.numbers, return_index=True, return_counts=True)
+    entire = dict(zip(whole.numbers.tolist(), whole.weights, strict=True))
+    for node, start, count in zip(*(column[counts > 1].tolist() for column in (numbers, starts, counts)), strict=True):
+        before: list[int] = []  # the rows of a node follow one another
+        for row in range(start, start + count):
+            alike = [other for other in before if directions[row] @ directions[other] > 1.0 - PARALLEL]
+            if alike:
+                weights[alike[0]] += weights[row]
+                gap[alike[0]] = min(gap[alike[0]], gap[row])
+                kept[row] = False
+            else:
+                before.append(row)
+        if len(before) == 1:
+            weights[start] = entire[node]  # to the last digit
     return replace(nodes, weights=weights).pick(kept), directions[kept], gap[kept]
 
 
@@ -108,42 +136,42 @@ def contact_space(
 
 
 def nodes_on(space: FemSpace, facets: Facets) -> Nodes:
-    """Gather all nodes of the facets, ordered by original node number."""
+    """Return this rank's nodes of the facets, ordered by original node number. Collective."""
     d = space.dimension
     values = integrals(space, facets.indices)
     blocks = space.facet_blocks(facets.indices)
+    blocks = blocks[np.argsort(space.nodes[blocks])]
     first = int(space.mesh.comm.exscan(len(space.ids)) or 0)
-    unknowns = np.where(space.free, first + space.free_index, -1).reshape(-1, d)
-    local = (space.nodes, space.points, values[:, 1:], values[:, 0], space.held, unknowns)
-    parts = space.comm.bcast(space.comm.gather(tuple(values[blocks] for values in local)))
-    nodes = Nodes(*(np.concatenate([part[i] for part in parts]) for i in range(6)))
-    if len(nodes.numbers) == 0:
+    unknowns = np.where(space.free, first + space.free_index, -1).reshape(-1, d)[blocks]
+    weights, sums, held = values[blocks, 0], values[blocks, 1:], space.held[blocks]
+    if not largest(space.comm, len(blocks)):
         raise InputError(f"no contact nodes: boundary group '{facets.name}' is empty, choose a group that has facets")
-    if not nodes.weights.all():
+    if largest(space.comm, not weights.all()):
         raise InputError(
             f"boundary group '{facets.name}' lies inside the body, where cells on both sides share its nodes: cut the "
             "mesh open there (meshes.cut.CutOpen), or choose an outer boundary"
         )
-    length = np.linalg.norm(nodes.normals, axis=1)[:, None]
-    normals = in_symmetry_planes(nodes.normals / np.maximum(length, np.finfo(float).tiny), nodes.held)
-    return replace(nodes, normals=normals).pick(np.argsort(nodes.numbers))
+    length = np.linalg.norm(sums, axis=1)[:, None]
+    normals = in_symmetry_planes(sums / np.maximum(length, np.finfo(float).tiny), held)
+    return Nodes(space.nodes[blocks], space.points[blocks], normals, weights, held, unknowns)
 
 
 def free_nodes(space: FemSpace, nodes: Nodes, name: str) -> Nodes:
-    """Return the nodes that are not clamped; InputError when none is left."""
+    """Return the nodes that are not clamped; InputError when none is left on any rank."""
     clamped = nodes.held.all(axis=1)
-    if clamped.all():
+    count = round(total(space.comm, clamped.sum()))
+    if not largest(space.comm, (~clamped).any()):
         raise InputError(
             f"no contact nodes: every node of boundary group '{name}' is also clamped, "
             "a point cannot be clamped and in contact; choose another boundary or clamp less"
         )
-    if clamped.any():
-        log.info("%d clamped nodes of '%s' are left out of the contact surface", clamped.sum(), name)
+    if count:
+        log.info("%d clamped nodes of '%s' are left out of the contact surface", count, name)
     return nodes.pick(~clamped)
 
 
-def listed(space: FemSpace, nodes: Nodes, points: Sequence[Sequence[float]], name: str) -> Nodes:
-    """Return the nodes nearest to the listed points, in their order."""
+def listed(space: FemSpace, nodes: Nodes, points: Sequence[Sequence[float]], name: str) -> Indices:
+    """Return the numbers of those nodes, given of all ranks, that are nearest to the listed points, in their order."""
     rows = []
     for point in points:
         x = np.asarray(point, dtype=float)
@@ -168,15 +196,19 @@ def listed(space: FemSpace, nodes: Nodes, points: Sequence[Sequence[float]], nam
         rows.append(row)
     if not rows:
         raise InputError(f"no contact nodes: the list of contact points on '{name}' is empty")
-    return nodes.pick(rows)
+    return np.asarray(nodes.numbers[rows])
 
 
-def _refuse_tied(space: FemSpace, nodes: Nodes, name: str) -> None:
-    for row in np.flatnonzero(np.isin(nodes.numbers, space.tied_nodes)):
-        raise InputError(
-            f"contact node {at(nodes.points[row])} of '{name}' is tied to another: leave it out (points=), or tie "
-            "boundaries that end before the contact"
-        )
+def _refuse_tied(space: FemSpace, nodes: Nodes, slots: Indices, name: str) -> None:
+    def refuse(points: Array, tied: Mask) -> tuple[()]:
+        for point in points[tied]:
+            raise InputError(
+                f"contact node {at(point)} of '{name}' is tied to another: leave it out (points=), or tie boundaries "
+                "that end before the contact"
+            )
+        return ()
+
+    asked(space.comm, slots, refuse, nodes.points, np.isin(nodes.numbers, space.tied_nodes))
 
 
 def snapped(directions: Array) -> Array:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.algebra import Array, Indices, Mask
+from ...core.algebra import Array, Indices, Mask, from_each
 from ...core.errors import InputError
 from ...core.problem import ContactProblem
 from ...core.protocols import Excitation, FrictionLaw, Frictionless, ImpactLaw, MassLaw
@@ -155,7 +155,8 @@ class SoilProbe(Probe):
         for part in surface.parts if isinstance(surface, FemSurface) else ():
             if part.facing is not None:
                 opposite = part.facing.nodes.numbers[np.asarray(part.facing.P.argmax(axis=1)).ravel()]
-                faced |= dict(zip(part.nodes.numbers.tolist(), opposite.tolist(), strict=True))
+                for numbers, partners in from_each(surface.comm, (part.nodes.numbers, opposite)):
+                    faced |= dict(zip(numbers.tolist(), partners.tolist(), strict=True))
         if not faced.keys() >= set(nodes):
             raise InputError("a soil probe is not at the interface with the channel: give points of the channel's "
                              "outline")
