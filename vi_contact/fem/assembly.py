@@ -15,6 +15,7 @@ from weakref import WeakSet
 
 import numpy as np
 import ufl
+from petsc4py import PETSc
 
 from ..core.algebra import Array, Mask, largest
 from ..core.errors import InputError
@@ -105,6 +106,8 @@ def assemble(
         companions=tuple(one for part in (*moved, *acting) for one in part.companions),
     )
     forms.own(system)
+    del mass, stiffness, damper, absorbers
+    PETSc.garbage_cleanup(M.mat.comm)  # matrices of all nodes, which PETSc keeps until it is asked on all ranks
     return system
 
 

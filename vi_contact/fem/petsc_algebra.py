@@ -205,6 +205,8 @@ class PetscAlgebra:
 
     def combine(self, terms: Sequence[tuple[float, Matrix]]) -> Matrix:
         total = None
+        for _, matrix in terms[:1]:
+            PETSc.garbage_cleanup(as_petsc(matrix).mat.comm)
         for factor, matrix in terms:
             mat = as_petsc(matrix).mat
             if total is None:
@@ -273,7 +275,11 @@ class PetscAlgebra:
 
 
 def triple_product(K: Any, P: Any) -> Any:
-    """Return PᵀKP of PETSc matrices. What PETSc makes holds K and P for as long as it lives; a copy of it does not."""
+    """Return PᵀKP of PETSc matrices. What PETSc makes holds K and P for as long as it lives; a copy of it does not.
+
+    Matrices that nobody holds any more are freed here: PETSc keeps them until all ranks ask it to.
+    """
+    PETSc.garbage_cleanup(K.comm)
     product = K.PtAP(P)
     made = product.duplicate(copy=True)
     product.destroy()
