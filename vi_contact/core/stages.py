@@ -25,7 +25,7 @@ def stage(name: str) -> Callable[[F], F]:
         def timed(*args: Any, **kwargs: Any) -> Any:
             begin = time.perf_counter()
             result = function(*args, **kwargs)
-            _tell(f"{name} {time.perf_counter() - begin:.3g} s", time.perf_counter() - begin >= LONG)
+            _tell(name, time.perf_counter() - begin)
             return result
 
         return cast(F, timed)
@@ -33,18 +33,19 @@ def stage(name: str) -> Callable[[F], F]:
     return decorate
 
 
-def _tell(text: str, long: bool) -> None:
+def _tell(name: str, seconds: float) -> None:
     if "mpi4py.MPI" in sys.modules and sys.modules["mpi4py.MPI"].COMM_WORLD.rank:
         return
+    text = f"{name} {seconds:.3g} s"
     _done.append(text)
     log.info("%s", text)
-    if _shown[0] and long:
+    if _shown[0] and seconds >= LONG:
         print(f"vi-contact: {text}", file=sys.stderr, flush=True)
 
 
 def show(shown: bool) -> None:
-    """Choose whether stages that take longer than a second are told on standard error too."""
-    _shown[0] = shown
+    """Choose whether stages that take longer than a second are told too where standard error is a terminal."""
+    _shown[0] = shown and sys.stderr.isatty()
 
 
 def done() -> str:
