@@ -13,7 +13,7 @@ import numpy as np
 
 from ...core.algebra import Array, Mask, largest, total
 from ..normal.proportioning import STEP, Face
-from .conjugate_gradients import INDEFINITE, SOLVED, STAGNATED, WRONG_SIGNS
+from .conjugate_gradients import INDEFINITE, NOT_A_NUMBER, SOLVED, STAGNATED
 from .search import FALL, Search
 
 ROUNDS = 50  # of springs that open and close
@@ -79,7 +79,7 @@ class Projected:
         while True:
             norm = largest(of.comm, np.max(np.abs(self._root * (face.phi + face.beta)), initial=0.0))
             if not np.isfinite(norm):
-                return WRONG_SIGNS
+                return NOT_A_NUMBER
             if norm <= mark:
                 mark, since = FALL * norm, count
                 x = -face.r / self._root

@@ -120,7 +120,9 @@ def search(of: Search, cg: ConjugateGradients, x: Array, changes: int) -> tuple[
             norm = largest_free(of.comm, residual, of.masked.weights)
         wrong = of.wrong(x, residual, norm)
         if not largest(of.comm, np.any(wrong)):
-            return x, residual, count, SOLVED
+            if reason == SOLVED:
+                return x, residual, count, SOLVED
+            continue
         if count == changes:
             return x, residual, count, WRONG_SIGNS
         contact.change(wrong)
