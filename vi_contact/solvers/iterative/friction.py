@@ -177,9 +177,9 @@ class Newton:
         return False
 
     def _leave_the_circle(self) -> None:
-        """Give limits for some rounds, from which Newton begins anew."""
+        """Give limits or coefficients for some rounds, from which Newton begins anew."""
         self.of.operator.work.fallbacks += self._rounds == GIVEN
-        self.law.give_limits(self._rounds, self.slip, self.r_n)
+        self.law.give(self._rounds, self.slip, self.r_n)
         self._newton, self._rounds = 0, 2 * self._rounds
 
     def _wrong(self, error: float) -> Mask:

@@ -6,7 +6,7 @@ their derivative, by differences.
 
 Where Newton's steps go in circles, which large coefficients may bring about, limits are given for some rounds, those
 of the r_n found last: Tresca problems, which are convex (Nečas, Jarušek and Haslinger, Boll. Unione Mat. Ital. 17-B,
-1980).
+1980). A law that weakens steeply goes back to the coefficients of rest, and climbs for more rounds than before.
 """
 
 from __future__ import annotations
@@ -40,14 +40,17 @@ class LawOfStep:
         """Take the coefficients of this slip (m, d - 1), or the limits of r_n; after some rounds they follow."""
         if self._tresca:
             self._tresca -= 1
-            self._limit = self._affine(slip, r_n, np.zeros_like(r_n))(r_n)
+            self._limit = self._at(slip)(r_n)
         else:
             self._given = slip
             self._left -= 1
 
-    def give_limits(self, rounds: int, slip: Array, r_n: Array) -> None:
-        """Begin rounds of limits that are given."""
-        self._tresca, self._limit = rounds, self._affine(slip, r_n, np.zeros_like(r_n))(r_n)
+    def give(self, rounds: int, slip: Array, r_n: Array) -> None:
+        """Begin rounds of given coefficients, those of rest, or of given limits where coefficients are constant."""
+        if self._constant:
+            self._limit, self._tresca = self._at(slip)(r_n), rounds
+        else:
+            self._given, self._left = np.zeros_like(slip), rounds
 
     def __call__(self, slip: Array, r_n: Array, reach: Array) -> Limits:
         """Return the limits at this slip, or at the one that is given. ``reach`` (m,): slips that points at rest may
@@ -55,10 +58,6 @@ class LawOfStep:
         if self._tresca:
             none = np.zeros_like(self._limit)
             return Limits(self._limit, none, none)
-        return self._affine(slip, r_n, reach)
-
-    def _affine(self, slip: Array, r_n: Array, reach: Array) -> Limits:
-        """The limits of the law."""
         if self._constant or self._left:
             return self._at(self._given)
         here, rest, size = self._at(slip), self._at(np.zeros_like(slip)), np.linalg.norm(slip, axis=1)

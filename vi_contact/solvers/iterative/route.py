@@ -3,7 +3,8 @@
     A x = b - B_nᵀ r_n,    0 <= r_n  ⊥  bound - B_n x + compliance r_n / scale >= 0
 
 The contact set is a mask on the full-size vectors (``search``); a set that comes twice, or does not end, goes to
-projected gradients, which decrease the energy in every step and so cannot cycle (``projected_gradients``).
+projected gradients, which decrease the energy in every step and so cannot cycle (``projected_gradients``). Steps with
+friction take semismooth Newton and GMRES instead (``friction``).
 """
 
 from __future__ import annotations
@@ -53,7 +54,8 @@ class Iterative:
             options of the command line go before them.
         prefix: what these options are called on the command line and in PETSC_OPTIONS.
         tolerance: residuals of the step, measured as its certificate, at which it stops.
-        changes: of the contact set in a step; after more, or when a set comes twice, projected gradients go on.
+        changes: of the contact set in a step without friction; after more, or when a set comes twice, projected
+            gradients go on.
         patience: linear iterations within which the residual has to fall tenfold.
     """
 
