@@ -12,7 +12,7 @@ from small_steps import small
 from vi_contact.core.algebra import Array, Mask
 from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.solvers.friction import linear as friction_linear
-from vi_contact.solvers.friction.extrapolation import Aitken, Anderson, Plain
+from vi_contact.solvers.friction.extrapolation import Anderson, Plain
 from vi_contact.solvers.friction.fixed_point import FixedPoint, contraction
 from vi_contact.solvers.friction.given_forces import GivenForces
 from vi_contact.solvers.friction.newton import FrictionNewton
@@ -22,7 +22,7 @@ from vi_contact.solvers.normal.active_set import ActiveSet
 
 pytestmark = pytest.mark.serial
 METHODS = [
-    FrictionNewton(), NSGS(), FixedPoint(), FixedPoint(tresca=NSGS()), FixedPoint(extrapolation=Aitken()),
+    FrictionNewton(), NSGS(), FixedPoint(), FixedPoint(tresca=NSGS()),
     FixedPoint(extrapolation=Anderson()), GivenForces(), GivenForces(extrapolation=Anderson()), Uzawa(),
 ]
 NAMES = ["newton", "nsgs", "fixed", "fixed nsgs", "aitken", "anderson", "given", "given anderson", "uzawa"]
@@ -242,7 +242,7 @@ def test_extrapolation_shortens_fixed_points() -> None:
     also where the plain map expands before it contracts (mu = 0.8, one strongly coupled node)."""
     for kind in (FixedPoint, GivenForces):
         counts = []
-        for way in (Plain(), Aitken(), Anderson()):
+        for way in (Plain(), Anderson()):
             spent = 0
             for seed in range(16):
                 m, d = 1 + seed % 8, 2 + seed % 2

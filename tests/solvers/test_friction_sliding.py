@@ -33,7 +33,7 @@ from vi_contact.solvers.condensed import Condensed
 G, SLOPE = 9.81, pi / 6.0
 MIDPOINT = vc.ZienkiewiczWoodTaylor()
 METHODS = [
-    solvers.NSGS(), solvers.FixedPoint(), solvers.FixedPoint(extrapolation=solvers.Aitken()),
+    solvers.NSGS(), solvers.FixedPoint(),
     solvers.FixedPoint(extrapolation=solvers.Anderson()),
     solvers.GivenForces(), solvers.GivenForces(extrapolation=solvers.Anderson()), solvers.Uzawa(),
 ]

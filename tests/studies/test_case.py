@@ -500,7 +500,7 @@ def test_schemes_and_solvers_have_one_vocabulary() -> None:
     assert {"GeneralisedAlpha.spectral_radius", "LinearMultistep.newmark"} <= set(names_of(Scheme))
     assert set(names_of(Solver)) == {"Automatic", "Condensed", "Iterative", "Volume", "CrossChecked"} <= set(vc.__all__)
     assert set(names_of(FrictionMethod)) == set(solvers.friction.__all__) - {
-        "Aitken", "Anderson", "Plain", "RateIteration"}
+        "Anderson", "Plain", "RateIteration"}
 
 
 @pytest.mark.serial

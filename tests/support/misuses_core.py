@@ -156,7 +156,6 @@ def values() -> Table:
         (solvers.GivenForces, {}, RULE | {"tangential": METHOD, "extrapolation": METHOD}),
         (solvers.Uzawa, {}, RULE | {"rho": but(POSITIVE, "none")}),
         (solvers.RateIteration, {}, RULE | {"extrapolation": METHOD}),
-        (solvers.Aitken, {}, {"limit": POSITIVE | {"one": 1.0}}),
         (solvers.Anderson, {}, {"depth": COUNT, "after": but(COUNT, "zero")}),
         (Volume, {}, {"method": METHOD | {"of the other route": solvers.ActiveSet()}, "tolerance": SHARE,
                       "petsc_options": {"text": "snes_monitor", "list": ["snes_monitor"]}, "prefix": {"none": None}}),

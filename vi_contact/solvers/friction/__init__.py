@@ -5,7 +5,7 @@ from __future__ import annotations
 from ...core.lazy import lazy
 
 _CONTENTS = {
-    "extrapolation": ("Aitken", "Anderson", "Plain"),
+    "extrapolation": ("Anderson", "Plain"),
     "fixed_point": ("FixedPoint",),
     "given_forces": ("GivenForces",),
     "newton": ("FrictionNewton",),

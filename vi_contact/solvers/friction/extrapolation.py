@@ -1,11 +1,9 @@
 """Extrapolate fixed-point iterations: the next point x from the points tried so far and their images g(x).
 
     plain       x <- g(x)
-    Aitken      x <- x + omega f,  f = g(x) - x;      omega <- -omega f_old·(f - f_old)/|f - f_old|²
-    Anderson    x <- g(x) - sum_j gamma_j (g_j+1 - g_j),    f = sum_j gamma_j (f_j+1 - f_j) in the least-squares sense
+    Anderson    x <- g(x) - sum_j gamma_j (g_j+1 - g_j),    f = g(x) - x = sum_j gamma_j (f_j+1 - f_j) in least squares
 
-All need one image a step and nothing else. Aitken takes one relaxation factor for the whole vector (Irons and Tuck,
-Int. J. Numer. Methods Eng. 1, 1969); Anderson combines the last ``depth`` differences (J. ACM 12, 1965; Walker and Ni,
+Both need one image a step and nothing else. Anderson combines the last ``depth`` differences (J. ACM 12, 1965; Walker and Ni,
 SIAM J. Numer. Anal. 49, 2011), is the secant method for one unknown, and on linear problems is equivalent to GMRES.
 Where a plain step lets f grow along itself, f·f_old >= |f_old|², g expands and both would turn back: the next step is
 plain again, and what was tried before is forgotten.
@@ -20,14 +18,13 @@ from typing import Any, Protocol
 import numpy as np
 
 from ...core.algebra import Array
-from ...core.checks import provides, real, shown, whole
-from ...core.errors import InputError
+from ...core.checks import provides, whole
 
 Next = Callable[[Array, Array], Array]  # x (n,) and its image g(x) -> the point to try after x
 
 
 class Extrapolation(Protocol):
-    """Choose the next point: Plain, Aitken or Anderson."""
+    """Choose the next point: Plain or Anderson."""
 
     def start(self) -> Next:
         """Return what chooses the points of one iteration, which it remembers."""
@@ -36,7 +33,7 @@ class Extrapolation(Protocol):
 
 def accelerated(owner: str, value: Any) -> None:
     """Raise InputError unless it is an extrapolation."""
-    provides(owner, "extrapolation", value, ("start",), "give Plain(), Aitken() or Anderson()", lacks=("step",))
+    provides(owner, "extrapolation", value, ("start",), "give Plain() or Anderson()", lacks=("step",))
 
 
 @dataclass(frozen=True)
@@ -46,33 +43,6 @@ class Plain:
     def start(self) -> Next:
         """Return the choice of the next point, which remembers nothing."""
         return lambda x, image: image
-
-
-@dataclass(frozen=True)
-class Aitken:
-    """Use one relaxation factor for all unknowns, between 1/``limit`` and ``limit``. InputError for limit <= 1."""
-
-    limit: float = 10.0
-
-    def __post_init__(self) -> None:
-        if not 1.0 < real(self.limit) < np.inf:
-            raise InputError(f"Aitken: limit is {shown(self.limit)}; give the largest relaxation factor, more than 1")
-
-    def start(self) -> Next:
-        """Return the choice of the next point; the first step is plain."""
-        omega, old = 1.0, None
-
-        def following(x: Array, image: Array) -> Array:
-            nonlocal omega, old
-            f = image - x
-            if old is not None:
-                change = f - old
-                omega, size = -omega * float(old @ change), float(change @ change)
-                omega = float(np.clip(omega / size, 1.0 / self.limit, self.limit)) if omega > 0.0 else 1.0
-            old = f
-            return np.asarray(x + omega * f)
-
-        return following
 
 
 @dataclass(frozen=True)

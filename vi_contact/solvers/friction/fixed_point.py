@@ -22,7 +22,7 @@ from .problem import FrictionMethod, FrictionResult, ScaledDelassus, inner_metho
 @dataclass(frozen=True)
 class FixedPoint:
     """Hold the settings. ``tolerance``: change of the thresholds relative to the largest, or rounding where that is
-    more; ``tresca``: method for each problem; ``extrapolation``: Plain(), Aitken() or Anderson(), how the next
+    more; ``tresca``: method for each problem; ``extrapolation``: Plain() or Anderson(), how the next
     thresholds follow. What the thresholds still change by shifts points that stick, and fine meshes amplify that: on
     2e5 unknowns the equilibrium of a step is off by 1e-9 at 1e-10.
 
