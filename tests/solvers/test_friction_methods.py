@@ -238,7 +238,7 @@ def test_fixed_point_contracts_faster_for_less_friction() -> None:
 
 
 def test_extrapolation_shortens_fixed_points() -> None:
-    """2D and 3D, mu = 0.5: Anderson's method needs fewer problems than Aitken's, and that fewer than plain iterations;
+    """2D and 3D, mu = 0.5: Anderson's method needs fewer problems than plain iterations;
     also where the plain map expands before it contracts (mu = 0.8, one strongly coupled node)."""
     for kind in (FixedPoint, GivenForces):
         counts = []
@@ -251,7 +251,7 @@ def test_extrapolation_shortens_fixed_points() -> None:
             counts.append(spent)
             G, q, bilateral = small(112, 1, 2)
             assert kind(extrapolation=way).prepare(G, bilateral).solve(q, np.zeros(1), np.full(1, 0.8)).iterations < 150
-        assert counts[2] < counts[1] < counts[0] and counts[2] < 0.7 * counts[0]
+        assert counts[1] < 0.7 * counts[0]
 
 
 def test_given_forces_are_the_right_hand_side_of_the_normal_problem() -> None:

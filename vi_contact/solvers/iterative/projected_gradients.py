@@ -1,10 +1,16 @@
 """Solve a step by projected conjugate gradients on all unknowns (MPRGP): what a search that goes in circles falls back
 on.
 
-The steps are those of ``normal.proportioning``, on r = -D^½ x with D the diagonal of A and of the closed springs, so
-that x <= bound is a lower bound and lengths and forces compare; on a face the preconditioner of the route is used. The
-springs that are closed are given while the bounds are searched; then they are taken from the answer, and a
-search along the line to it, which makes the energy as small as can be, keeps this Newton iteration from cycling.
+min ½ rᵀG r + qᵀr over r >= lower (Z. Dostál, Optimal Quadratic Programming Algorithms, Springer 2009, algorithm 5.8).
+With g = q + G r, the free gradient is phi = g where r is off its bound, and the chopped gradient beta = min(g, 0) where
+it is on it. As long as beta is small beside phi, go on with conjugate gradients on the present face; a step that would
+leave the bounds is cut there and followed by a projected gradient step of fixed length (expansion); otherwise release
+rows along -beta (proportioning). The energy falls in every step, so that it cannot cycle.
+
+Here r = -D^½ x with D the diagonal of A and of the closed springs, so that x <= bound is a lower bound and lengths and
+forces compare; on a face the preconditioner of the route is used. The springs that are closed are given while the
+bounds are searched; then they are taken from the answer, and a search along the line to it, which makes the energy as
+small as can be, keeps this Newton iteration from cycling.
 """
 
 from __future__ import annotations
@@ -12,15 +18,16 @@ from __future__ import annotations
 import numpy as np
 
 from ...core.algebra import Array, Mask, largest, total
-from ..normal.proportioning import STEP, Face
 from .conjugate_gradients import INDEFINITE, NOT_A_NUMBER, SOLVED, STAGNATED
 from .search import FALL, Search
 
 ROUNDS = 50  # of springs that open and close
+PROPORTION = 1.0  # of beta to phi; any positive number works, 1 is Dostál's choice
+STEP = 1.5  # of the expansion, in units of 1/‖G‖: less than 2 converges; the rest is for the error of the estimate
 
 
 class Projected:
-    """Minimise ½ xᵀA x - bᵀx with x <= bound: the problem of ``proportioning``. ``norm``: of D^-½ A D^-½."""
+    """Minimise ½ xᵀA x - bᵀx with x <= bound. ``norm``: of D^-½ A D^-½."""
 
     def __init__(self, of: Search, diagonal: Array, norm: float) -> None:
         contact = of.contact
@@ -91,6 +98,67 @@ class Projected:
             face.advance()
             count += 1
             of.operator.work.linear_iterations += 1
+
+
+class Face:
+    """Hold the iterate: r, its gradient split into phi and beta, and the conjugate direction on the present face."""
+
+    def __init__(self, problem: Projected, start: Array, gradient: Array, step: float) -> None:
+        self._problem, self._step = problem, step
+        self._place(start, gradient)
+        self._turn()
+
+    def _place(self, r: Array, gradient: Array) -> None:
+        self.r, self.gradient = r, gradient
+        self.free = r > self._problem.lower
+        self.phi = np.where(self.free, gradient, 0.0)
+        self.beta = np.where(self.free, 0.0, np.minimum(gradient, 0.0))
+
+    def _turn(self) -> None:
+        """Start the conjugate directions anew."""
+        self._direction = self._problem.precondition(self.phi, self.free)
+
+    def move_to(self, r: Array) -> None:
+        """Go to r with an exact gradient and start the conjugate directions anew."""
+        self._place(r, self._problem.apply(r) + self._problem.q)
+        self._turn()
+
+    def advance(self) -> None:
+        """Take one step: conjugate gradient or expansion on the face, or proportioning off it."""
+        dot = self._problem.dot
+        room = (self.r - self._problem.lower) / self._step
+        reduced = np.minimum(room, self.phi)  # what a fixed step could really use
+        if dot(self.beta, self.beta) <= PROPORTION**2 * dot(reduced, self.phi):
+            self._explore()
+        else:
+            self._release()
+
+    def _explore(self) -> None:
+        p, lower = self._direction, self._problem.lower
+        image, curvature = self._curvature(p)
+        length = self._problem.dot(self.gradient, p) / curvature
+        blocking = p > 0.0
+        feasible = self._problem.least((self.r - lower)[blocking] / p[blocking])
+        if length <= feasible:
+            self._place(np.maximum(self.r - length * p, lower), self.gradient - length * image)
+            z = self._problem.precondition(self.phi, self.free)
+            self._direction = z - (self._problem.dot(z, image) / curvature) * p
+        else:
+            self._place(np.maximum(self.r - feasible * p, lower), self.gradient - feasible * image)
+            self.move_to(np.maximum(self.r - self._step * self.phi, lower))
+
+    def _release(self) -> None:
+        image, curvature = self._curvature(self.beta)
+        length = self._problem.dot(self.gradient, self.beta) / curvature
+        self._place(self.r - length * self.beta, self.gradient - length * image)
+        self._turn()
+
+    def _curvature(self, p: Array) -> tuple[Array, float]:
+        image = self._problem.apply(p)
+        curvature = self._problem.dot(p, image)
+        if not curvature > 0.0:
+            raise self._problem.not_definite()
+        return image, curvature
 
 
 class Indefinite(Exception):
