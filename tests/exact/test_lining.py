@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from thin_lining import ThinLining
 
 from vi_contact import LinearElastic
 from vi_contact.core.errors import InputError
-from vi_contact.exact.lining import ThickLining, ThinLining
+from vi_contact.exact.lining import ThickLining
 from vi_contact.exact.racking import BoxFrame, ChannelFrame, racking_ratio
 from vi_contact.exact.rigid_wall import RigidWall
 

@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 import pytest
+from site_response import SoilLayer, viscous
 from soil import SOIL, column_of
 
 import vi_contact as vc
 from vi_contact import exact
 from vi_contact.core.errors import InputError
-from vi_contact.exact.site_response import viscous
 from vi_contact.ground_motion import Record
 from vi_contact.soil import upgoing
 
@@ -71,7 +71,7 @@ def test_rayleigh_waves():
 
 def test_transfer_functions():
     """V8.2 and seismic practice 3.2: printed digits; natural frequencies."""
-    layer, damped = exact.SoilLayer(30.0, SOIL), exact.SoilLayer(30.0, SOIL, xi=0.05)
+    layer, damped = SoilLayer(30.0, SOIL), SoilLayer(30.0, SOIL, xi=0.05)
     f = np.array([0.5, 1.0, 2.0, 3.0])
     np.testing.assert_allclose(layer.on_rigid_base(f), [1.122326, 1.701302, 3.236068, 1.051462], atol=6e-7)
     np.testing.assert_allclose(damped.on_rigid_base(f), [1.120939, 1.687834, 3.159038, 1.043650], atol=6e-7)
@@ -80,13 +80,13 @@ def test_transfer_functions():
     assert damped.on_rigid_base(fine).max() == pytest.approx(12.767, abs=5e-4)
     shallow = vc.LinearElastic.from_wave_speeds(600.0, 300.0, 2000.0)
     for xi, peaks in ((0.05, (12.77, 4.22)), (0.02, (31.84, 10.60))):
-        column = exact.SoilLayer(20.0, shallow, xi=xi)
+        column = SoilLayer(20.0, shallow, xi=xi)
         assert column.frequency() == 3.75
         for f_n, peak in zip((3.75, 11.25), peaks, strict=True):
             assert column.on_rigid_base(np.linspace(0.98, 1.02, 801) * f_n).max() == pytest.approx(peak, abs=6e-3)
     for speed, peak in ((1000.0, 3.141), (2000.0, 5.041)):
         rock = vc.LinearElastic.from_wave_speeds(2.0 * speed, speed, 2500.0)
-        found = exact.SoilLayer(20.0, shallow, xi=0.05).on_elastic_base(np.linspace(2.0, 5.0, 3001), rock)
+        found = SoilLayer(20.0, shallow, xi=0.05).on_elastic_base(np.linspace(2.0, 5.0, 3001), rock)
         assert found.max() == pytest.approx(peak, abs=6e-4)
 
 
@@ -110,7 +110,7 @@ def test_the_column_answers_like_the_layer(f):
     ratio = harmonic_amplitude(total, t, f) * (2 * np.pi * f) ** 2
     own = abs(1.0 / np.cos(viscous(SOIL, f, beta=beta) * 30.0))
     assert ratio == pytest.approx(own, rel=5e-3)
-    assert ratio == pytest.approx(float(exact.SoilLayer(30.0, SOIL, xi=0.05).on_rigid_base(f)), rel=1e-2)
+    assert ratio == pytest.approx(float(SoilLayer(30.0, SOIL, xi=0.05).on_rigid_base(f)), rel=1e-2)
 
 
 @pytest.mark.parametrize("speed, peak", [(1000.0, 3.141), (2000.0, 5.041)])
@@ -118,7 +118,7 @@ def test_the_column_on_rock_answers_like_the_layer(speed, peak):
     """Seismic practice 3.2: largest amplification of an outcrop motion, 20 m on two rocks, damping 5 % there: 1 %."""
     soil = vc.LinearElastic.from_wave_speeds(600.0, 300.0, 2000.0)
     rock = vc.LinearElastic.from_wave_speeds(2.0 * speed, speed, 2500.0)
-    layer, fine = exact.SoilLayer(20.0, soil, xi=0.05), np.linspace(2.0, 5.0, 601)
+    layer, fine = SoilLayer(20.0, soil, xi=0.05), np.linspace(2.0, 5.0, 601)
     f = float(fine[np.argmax(layer.on_elastic_base(fine, rock))])
     column = column_of(soil, np.linspace(0.0, 20.0, 31), beta=0.05 / (np.pi * f))
     up = upgoing(vc.Harmonic(1.0, f, phase=0.5 * np.pi), dt=1.0 / (400.0 * f))

@@ -38,7 +38,6 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
         "engineering.floor_spectra engineering.peak_values engineering.racking plots.maps",
     "exact/test_exact_hertz.py": "exact.hertz",
     "exact/test_lining.py": "exact.racking exact.rigid_wall",
-    "exact/test_surface_waves.py": "exact.site_response",
     "fem/test_assembly.py": "fem.assembly_checks",
     "fem/test_corners.py": "core.corners laws.mass_transfer",
     "fem/test_pairs.py": "fem.contact.matching",
@@ -89,7 +88,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "solvers/test_iterative.py":
         "solvers.iterative.contact solvers.iterative.failures solvers.iterative.layout "
         "solvers.iterative.projected_gradients solvers.iterative.regime solvers.iterative.route "
-        "solvers.iterative.search solvers.iterative.work solvers.normal.proportioning",
+        "solvers.iterative.search solvers.iterative.work",
     "solvers/test_iterative_friction.py":
         "solvers.iterative.friction solvers.iterative.friction_krylov solvers.iterative.friction_laws "
         "solvers.iterative.friction_states",

@@ -25,7 +25,7 @@ METHODS = [
     FrictionNewton(), NSGS(), FixedPoint(), FixedPoint(tresca=NSGS()),
     FixedPoint(extrapolation=Anderson()), GivenForces(), GivenForces(extrapolation=Anderson()), Uzawa(),
 ]
-NAMES = ["newton", "nsgs", "fixed", "fixed nsgs", "aitken", "anderson", "given", "given anderson", "uzawa"]
+NAMES = ["newton", "nsgs", "fixed", "fixed nsgs", "anderson", "given", "given anderson", "uzawa"]
 
 
 def enumerated(G: Array, q: Array, bilateral: Mask, cohesion: Array, slope: Array) -> list[Array]:

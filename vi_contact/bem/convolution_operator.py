@@ -112,14 +112,8 @@ class ConvolutionOperator:
 
 
 def convolution_operator(
-    mesh: BoundaryMesh,
-    material: LinearElastic,
-    *,
-    dt: float,
-    steps: int,
-    method: TimeMethod = RadauIIA(),
-    symmetric: bool = True,
-    orders: Orders = ORDERS,
+    mesh: BoundaryMesh, material: LinearElastic, *, dt: float, steps: int, method: TimeMethod = RadauIIA(),
+    symmetric: bool = True, orders: Orders = ORDERS,
 ) -> ConvolutionOperator:
     """Assemble S for `steps` time steps of dt [s] by BDF2(), Trapezoid() or RadauIIA(): 96 steps stages n² bytes.
 

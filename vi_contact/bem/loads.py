@@ -15,13 +15,8 @@ from .rules import gauss
 
 
 def traction_forces(
-    mesh: BoundaryMesh,
-    traction: Callable[[Array, Array, float], ArrayLike],
-    *,
-    dt: float,
-    steps: int,
-    elements: ArrayLike | None = None,
-    order: int = 4,
+    mesh: BoundaryMesh, traction: Callable[[Array, Array, float], ArrayLike], *, dt: float, steps: int,
+    elements: ArrayLike | None = None, order: int = 4,
 ) -> Array:
     """Return (steps, 2, n) nodal forces [N/m], mean over each step, of traction(points, normals, t) -> (m, 2) [Pa].
 

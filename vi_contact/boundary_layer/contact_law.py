@@ -116,13 +116,7 @@ class ContactLayer:
 
 
 def contact_layer(
-    e: float,
-    *,
-    mass: float,
-    speed: float,
-    width: float,
-    start: float | None = None,
-    strength: float = 1.0,
+    e: float, *, mass: float, speed: float, width: float, start: float | None = None, strength: float = 1.0,
     metric: Metric = Metric.BLENDED,
 ) -> ContactLayer:
     """Find the law that returns a rigid body of ``mass`` [kg/m²] with e times its ``speed`` [m/s], 0.001 <= e <= 1.

@@ -54,17 +54,8 @@ class Trajectory:
 
 
 def layer_motion(
-    system: ConstrainedSystem,
-    layer: Layer,
-    *,
-    q0: Array,
-    v0: Array,
-    t_end: float,
-    metric: Metric = Metric.DOMINANT,
-    contacts: int | None = None,
-    rtol: float = 1e-11,
-    method: str = "DOP853",
-    refine: int = 1,
+    system: ConstrainedSystem, layer: Layer, *, q0: Array, v0: Array, t_end: float, metric: Metric = Metric.DOMINANT,
+    contacts: int | None = None, rtol: float = 1e-11, method: str = "DOP853", refine: int = 1,
 ) -> Trajectory:
     """Compute the motion from (q0, v0) at t = 0 to t_end, or to the end of so many contacts.
 

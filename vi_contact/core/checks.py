@@ -65,13 +65,8 @@ def counted(owner: str, asked: str, value: Any, things: str = "samples", *, most
 
 
 def attributes(
-    owner: object,
-    *,
-    finite: tuple[str, ...] = (),
-    positive: tuple[str, ...] = (),
-    not_negative: tuple[str, ...] = (),
-    counts: tuple[str, ...] = (),
-    flags: tuple[str, ...] = (),
+    owner: object, *, finite: tuple[str, ...] = (), positive: tuple[str, ...] = (), not_negative: tuple[str, ...] = (),
+    counts: tuple[str, ...] = (), flags: tuple[str, ...] = (),
 ) -> None:
     """Raise InputError naming the first attribute of ``owner`` that is not a finite number, or not > 0, or not >= 0, or
     no whole number of at least 1 (``counts``), or neither True nor False (``flags``)."""

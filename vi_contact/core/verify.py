@@ -116,12 +116,7 @@ def _dots(system: SemiDiscreteSystem, *pairs: tuple[Array, Array], sums: tuple[f
 
 
 def energy_balance(
-    problem: ContactProblem,
-    old: State,
-    new: State,
-    balance: Balance,
-    *,
-    before: Energies | None = None,
+    problem: ContactProblem, old: State, new: State, balance: Balance, *, before: Energies | None = None,
     after: Energies | None = None,
 ) -> StepEnergy:
     """Return the ledger of a step before the impact law, for any scheme.

@@ -17,10 +17,9 @@ _CONTENTS = {
     "hertz":
         ("HertzImpact", "HertzLine", "HertzPoint", "RoundPunch", "StripPunch", "contact_modulus", "contact_radius"),
     "housner": ("HousnerBlock",),
-    "lining": ("ThickLining", "ThinLining"),
+    "lining": ("ThickLining",),
     "racking": ("BoxFrame", "ChannelFrame", "racking_ratio"),
     "rigid_wall": ("RigidWall",),
-    "site_response": ("SoilLayer",),
     "sliding": ("SlidingBlock",),
     "surface_waves": ("dashpot_energy", "dashpot_reflection", "rayleigh_motion", "rayleigh_speed"),
 }

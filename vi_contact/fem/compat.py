@@ -42,10 +42,7 @@ _defaults["timeout"] = (120, "Timeout for JIT compilation [s]")
 
 
 def create_mesh(
-    comm: MPI.Comm,
-    cell: str,
-    cells: npt.NDArray[np.int64],
-    x: npt.NDArray[np.float64],
+    comm: MPI.Comm, cell: str, cells: npt.NDArray[np.int64], x: npt.NDArray[np.float64],
     destinations: tuple[Indices, Indices],
 ) -> Mesh:
     """Create a first-order mesh, distributed as told.

@@ -106,12 +106,8 @@ class WallModel:
         return surface.bilateral_everywhere() if case == "bilateral" else surface
 
     def problem(
-        self,
-        case: str,
-        *,
-        excitation: Excitation | Sequence[Excitation] | None = None,
-        impact: ImpactLaw | None = Inelastic(),
-        mass: MassLaw | None = None,
+        self, case: str, *, excitation: Excitation | Sequence[Excitation] | None = None,
+        impact: ImpactLaw | None = Inelastic(), mass: MassLaw | None = None,
     ) -> ContactProblem:
         """Set up the wall in a case; by default the harmonic of Fig. 3 and the source's inelastic impact on its mass.
 

@@ -87,14 +87,8 @@ def save(figure: Any, path: str | Path, title: str | None = None) -> Path:
 
 
 def plot_points(
-    history: History,
-    labels: Sequence[str],
-    path: str | Path,
-    *,
-    title: str,
-    component: str = "x",
-    unilateral: Sequence[str] | None = (),
-    reference: History | None = None,
+    history: History, labels: Sequence[str], path: str | Path, *, title: str, component: str = "x",
+    unilateral: Sequence[str] | None = (), reference: History | None = None,
 ) -> Path:
     """Draw the displacement against time, a panel for each point, as Figs. 4 and 5 of the boundary method.
 

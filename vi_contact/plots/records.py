@@ -49,13 +49,8 @@ def plot_motion(record: Record, path: str | Path, *, title: str | None = None, u
 
 
 def plot_spectra(
-    spectra: Mapping[str, ResponseSpectrum],
-    path: str | Path,
-    *,
-    target: EC8Spectrum | None = None,
-    steps: Mapping[str, float] | None = None,
-    title: str = "Response spectra",
-    units: str = "g",
+    spectra: Mapping[str, ResponseSpectrum], path: str | Path, *, target: EC8Spectrum | None = None,
+    steps: Mapping[str, float] | None = None, title: str = "Response spectra", units: str = "g",
 ) -> Path:
     """Draw pseudo-acceleration in `units` and displacement over the period, one line for each label, the target dashed.
 

@@ -72,16 +72,8 @@ class Equilibria:
         ``old``."""
         problem = self._problem
         step = StepProblem(
-            A=self._K,
-            b=problem.static_load.load.at_rest(t),
-            bound=problem.surface.gap(t),
-            surface=problem.surface,
-            scale=1.0,
-            guess=old.u,
-            active=old.active,
-            t=t,
-            k=old.k,
-            friction=problem.friction,
+            A=self._K, b=problem.static_load.load.at_rest(t), bound=problem.surface.gap(t), surface=problem.surface,
+            scale=1.0, guess=old.u, active=old.active, t=t, k=old.k, friction=problem.friction,
             slip0=problem.slip_origin(old.u, old.t, t),
         )
         refuse_nan(step)

@@ -67,18 +67,9 @@ def _with_contact(problem: ContactProblem, state: State, force: Array, dt: float
         rate, sliding = surface.tangential_values(state.v), surface.sliding(state.t, state.t + dt)
         rate = rate if sliding is None else rate - sliding / dt
     step = StepProblem(
-        A=mass_matrix(problem),
-        b=force - springs,
-        bound=np.where(resting, 0.0, np.inf),
-        surface=rigid_part(surface),
-        scale=1.0,
-        guess=np.zeros_like(force),
-        active=resting,
-        t=state.t,
-        k=state.k,
-        friction=problem.friction,
-        slip0=None if rate is None else -rate / dt,
-        rate_factor=dt,
+        A=mass_matrix(problem), b=force - springs, bound=np.where(resting, 0.0, np.inf), surface=rigid_part(surface),
+        scale=1.0, guess=np.zeros_like(force), active=resting, t=state.t, k=state.k, friction=problem.friction,
+        slip0=None if rate is None else -rate / dt, rate_factor=dt,
     )
     solver: PreparedSolver = problem.equations.cached(
         "resting contacts",
@@ -133,16 +124,8 @@ def equilibrated(problem: ContactProblem, state: State) -> State:
     A = system.cached("massless block", lambda: EffectiveMatrix(system.algebra.block(system.K, layer), system.algebra))
     surface = _within(problem.surface, layer)
     step = StepProblem(
-        A=A,
-        b=load[layer],
-        bound=surface.gap(state.t),
-        surface=surface,
-        scale=1.0,
-        guess=state.u[layer],
-        active=state.active,
-        t=state.t,
-        k=state.k,
-        friction=problem.friction,
+        A=A, b=load[layer], bound=surface.gap(state.t), surface=surface, scale=1.0, guess=state.u[layer],
+        active=state.active, t=state.t, k=state.k, friction=problem.friction,
         slip0=problem.slip_origin(state.u, state.t, state.t),
     )
     solver = solver_beside_steps(A, surface)

@@ -103,15 +103,8 @@ def admissible(problem: ContactProblem, state: State, u: Array, dt: float) -> tu
 
     solver: CertifiedSolver = system.cached("admissible predictor", prepared)
     step = StepProblem(
-        A=M,
-        b=np.zeros_like(u),
-        bound=gap,
-        surface=bounds.surface,
-        scale=1.0,
-        guess=np.zeros_like(u),
-        active=closed,
-        t=state.t + dt,
-        k=state.k + 1,
+        A=M, b=np.zeros_like(u), bound=gap, surface=bounds.surface, scale=1.0, guess=np.zeros_like(u), active=closed,
+        t=state.t + dt, k=state.k + 1,
     )
     try:
         result, _, _ = solver.solve(step)

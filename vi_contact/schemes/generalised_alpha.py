@@ -118,11 +118,9 @@ def weighted(problem: ContactProblem, old: State, new: State, m: float, f: float
     the memory's names."""
     load, surface, r0 = problem.equations.load, problem.surface, old.memory[f"reaction{level}"]
     return Balance(
-        u=(1.0 - f) * new.u + f * old.u,
-        v=(1.0 - f) * new.v + f * old.v,
+        u=(1.0 - f) * new.u + f * old.u, v=(1.0 - f) * new.v + f * old.v,
         a=(1.0 - m) * new.memory[f"a{level}"] + m * old.memory[f"a{level}"],
-        f=(1.0 - f) * load(new.t) + f * load(old.t),
-        r_n=(1.0 - f) * new.r_n + f * surface.normal_values(r0),
+        f=(1.0 - f) * load(new.t) + f * load(old.t), r_n=(1.0 - f) * new.r_n + f * surface.normal_values(r0),
         r_t=None if new.r_t is None else (1.0 - f) * new.r_t + f * surface.tangential_values(r0),
     )
 

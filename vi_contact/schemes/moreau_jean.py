@@ -116,18 +116,9 @@ class MoreauJean(SingleStep):
         sliding = surface.sliding(state.t, state.t + dt)
         slip = np.zeros((surface.count, surface.tangents.shape[1])) if sliding is None else sliding / dt
         return StepProblem(
-            A=A,
-            b=system.M @ state.v + dt * force,
-            bound=np.where(closed, self._target(problem, state, dt), np.inf),
-            surface=surface,
-            scale=dt,
-            guess=state.v,
-            active=closed,
-            t=state.t + dt,
-            k=state.k + 1,
-            friction=problem.friction,
-            slip0=slip if problem.frictional else None,
-            rate_factor=1.0,
+            A=A, b=system.M @ state.v + dt * force, bound=np.where(closed, self._target(problem, state, dt), np.inf),
+            surface=surface, scale=dt, guess=state.v, active=closed, t=state.t + dt, k=state.k + 1,
+            friction=problem.friction, slip0=slip if problem.frictional else None, rate_factor=1.0,
         )
 
     def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:

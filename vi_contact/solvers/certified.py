@@ -30,15 +30,8 @@ class CertifiedSolver:
     """Try a solver and the methods to escalate to, all bound to one effective matrix; nothing uncertified leaves it."""
 
     def __init__(
-        self,
-        problem: ContactProblem,
-        A: EffectiveMatrix,
-        scale: float,
-        solvers: Sequence[Solver],
-        tolerance: float,
-        *,
-        surface: ContactSurface | None = None,
-        advice: str = ADVICE,
+        self, problem: ContactProblem, A: EffectiveMatrix, scale: float, solvers: Sequence[Solver], tolerance: float,
+        *, surface: ContactSurface | None = None, advice: str = ADVICE,
     ) -> None:
         for solver in solvers:
             solver.check(problem)

@@ -62,10 +62,8 @@ def left_over(step: StepProblem, answer: StepResult, share: float) -> StepProble
     surface, x = step.surface, answer.x
     r_n, r_t = kept(step, answer, share)
     return replace(
-        step,
-        b=step.b - step.A @ x - surface.reaction_load(r_n, len(x), r_t),
-        bound=step.bound - surface.normal_values(x) + surface.compliance * r_n / step.scale,
-        guess=np.zeros_like(x),
+        step, b=step.b - step.A @ x - surface.reaction_load(r_n, len(x), r_t),
+        bound=step.bound - surface.normal_values(x) + surface.compliance * r_n / step.scale, guess=np.zeros_like(x),
         active=answer.active,
         friction=step.friction if step.slip0 is None or share == 1.0 else Share(step.friction, share),
         slip0=None if step.slip0 is None else step.slip0 - surface.tangential_values(x),
@@ -96,10 +94,7 @@ def kept(step: StepProblem, answer: StepResult, share: float) -> tuple[Array, Ar
 
 
 def corrected(
-    step: StepProblem,
-    result: StepResult,
-    certificate: Certificate,
-    solve: Callable[[StepProblem], StepResult],
+    step: StepProblem, result: StepResult, certificate: Certificate, solve: Callable[[StepProblem], StepResult],
     goal: float,
 ) -> tuple[StepResult, Certificate]:
     """Return the result after corrections that brought its certificate to the goal, or as near to it as they got."""

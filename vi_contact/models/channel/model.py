@@ -101,13 +101,9 @@ class ChannelModel:
     surface: ContactSurface
 
     def problem(
-        self,
-        *,
-        friction: FrictionLaw | None = None,
-        bilateral: bool = False,
+        self, *, friction: FrictionLaw | None = None, bilateral: bool = False,
         excitation: Excitation | Sequence[Excitation] | None = None,
-        impact: ImpactLaw | None = Inelastic(ImpulseUpdate()),
-        mass: MassLaw | None = None,
+        impact: ImpactLaw | None = Inelastic(ImpulseUpdate()), mass: MassLaw | None = None,
     ) -> ContactProblem:
         """Set up channel and soil under the harmonic motion, sliding freely; with the inelastic impact rule, as an
         impulse, on consistent mass.
@@ -185,13 +181,8 @@ class Openings:
 
 
 def build(
-    channel: Channel,
-    comm: Any,
-    *,
-    sides: Sides | None = None,
-    weighing: Sequence[str] = ("channel",),
-    base: BaseMotion | RockBelow | None = None,
-    meshed: tuple[Any, Any] | None = None,
+    channel: Channel, comm: Any, *, sides: Sides | None = None, weighing: Sequence[str] = ("channel",),
+    base: BaseMotion | RockBelow | None = None, meshed: tuple[Any, Any] | None = None,
 ) -> ChannelModel:
     """Mesh and assemble channel and soil; collective.
 

@@ -29,14 +29,8 @@ class CondensedFriction:
     """
 
     def __init__(
-        self,
-        method: FrictionMethod,
-        A: EffectiveMatrix,
-        surface: ContactSurface,
-        normal: Array,
-        *,
-        rates: RateIteration,
-        keep: bool,
+        self, method: FrictionMethod, A: EffectiveMatrix, surface: ContactSurface, normal: Array, *,
+        rates: RateIteration, keep: bool,
     ) -> None:
         self._surface, self._rates = surface, rates
         m, k = surface.total, surface.tangents.shape[1]

@@ -56,12 +56,7 @@ class SnesDriver:
     reasons = PETSc.SNES.ConvergedReason
 
     def __init__(
-        self,
-        scaled: ScaledStep,
-        layers: OptionLayers,
-        jacobian: Jacobian,
-        *,
-        snes_type: str,
+        self, scaled: ScaledStep, layers: OptionLayers, jacobian: Jacobian, *, snes_type: str,
         check: Callable[[Any, OptionLayers], None],
     ) -> None:
         self._scaled, self._layers, self._jacobian = scaled, layers, jacobian

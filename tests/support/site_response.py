@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..core.algebra import Array
-from ..core.checks import attributes
-from ..laws.materials import LinearElastic
+from vi_contact.core.algebra import Array
+from vi_contact.core.checks import attributes
+from vi_contact.laws.materials import LinearElastic
 
 
 @dataclass(frozen=True)
