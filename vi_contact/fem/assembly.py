@@ -89,20 +89,13 @@ def assemble(
 
     rigid, M = _rigid(space), reduced(mass)
     system = SemiDiscreteSystem(
-        algebra=algebra,
-        M=M,
-        C=None if damper is None else reduced(damper),
-        K=reduced(stiffness),
-        load=_with_boundaries(load, acting),
-        influence=rigid,
+        algebra=algebra, M=M, C=None if damper is None else reduced(damper), K=reduced(stiffness),
+        load=_with_boundaries(load, acting), influence=rigid,
         base_mass=_base_mass(space, PetscMatrix(mass), M, rigid) if base_inertia else None,
         u0=_initial(space, "initial displacement", initial_displacement),
         v0=_initial(space, "initial velocity", initial_velocity),
-        space=space,
-        floating=floats(space),
-        tied=space.tied_unknowns,
-        notes=describe_boundaries(boundaries, mesh.comm.rank),
-        absolute=any(one.lets_waves_in for one in boundaries),
+        space=space, floating=floats(space), tied=space.tied_unknowns,
+        notes=describe_boundaries(boundaries, mesh.comm.rank), absolute=any(one.lets_waves_in for one in boundaries),
         companions=tuple(one for part in (*moved, *acting) for one in part.companions),
     )
     forms.own(system)
