@@ -32,7 +32,7 @@ class Contact:
 
     def begin(self, step: StepProblem) -> None:
         """Take the bounds of a step, and its predicted set with the points that the guess lets penetrate."""
-        if np.isnan(step.bound).any():
+        if step.surface.some(np.isnan(step.bound)):
             raise InputError("the bound of the contact conditions contains NaN: check the gap and the time scheme")
         self.reach = np.isfinite(step.bound)
         self.bound = np.where(self.reach, step.bound, 0.0)
