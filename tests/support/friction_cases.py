@@ -61,7 +61,7 @@ def spatial(
     matrix = sp.csr_matrix(root @ root.T / n + alone * np.diag(rng.uniform(0.5, 2.0, n)))
     b = rng.normal(size=n)
     b[::3] += 0.3
-    c = case(matrix, np.arange(0, n, 3), b, 0.1 * rng.random(m), parallel=parallel)
+    c = case(matrix, np.arange(0, n, 3), b, 0.1 * rng.random(m), parallel=parallel, of_node=3)
     return rubbing(c, law, 0.1 * rng.normal(size=(m, 2)), tangents=2), b
 
 

@@ -115,12 +115,13 @@ def case(
     bound: Array,
     *,
     parallel: bool = False,
+    of_node: int = 1,
     bilateral: Any = None,
     compliance: Any = None,
     scale: float = 1.0,
 ) -> Case:
     """The step A x = b - reactions, x <= bound at the unknowns ``contact``, starting from rest without prediction."""
-    rows, A, comm = _parallel(matrix) if parallel else (slice(0, len(b)), _serial(matrix), SerialComm())
+    rows, A, comm = _parallel(matrix, of_node) if parallel else (slice(0, len(b)), _serial(matrix), SerialComm())
     mine = (contact >= rows.start) & (contact < rows.stop)
     own = int(mine.sum())
     surface = ContactSurface(
@@ -144,14 +145,15 @@ def _serial(matrix: Any) -> EffectiveMatrix:
     return EffectiveMatrix(SerialMatrix(matrix), SerialAlgebra())
 
 
-def _parallel(matrix: Any) -> tuple[slice, EffectiveMatrix, Any]:
+def _parallel(matrix: Any, of_node: int) -> tuple[slice, EffectiveMatrix, Any]:
     from mpi4py import MPI
     from petsc4py import PETSc
 
     from vi_contact.fem.petsc_algebra import PetscAlgebra, PetscMatrix
 
     comm, n = MPI.COMM_WORLD, matrix.shape[0]
-    rows = slice(n * comm.rank // comm.size, n * (comm.rank + 1) // comm.size)
+    nodes = n // of_node  # a rank owns whole nodes
+    rows = slice(*(of_node * (nodes * rank // comm.size) for rank in (comm.rank, comm.rank + 1)))
     part = matrix.tocsr()[rows]
     arrays = (part.indptr.astype(PETSc.IntType), part.indices.astype(PETSc.IntType), part.data)
     size = (rows.stop - rows.start, n)

@@ -23,6 +23,7 @@ from ...core.surfaces import ContactSurface
 from ...core.system import SemiDiscreteSystem
 from ..time_steps import TimeSteps, described, pieces_of
 
+ROUND_OFF = 1e-6  # of coordinates: SAME of it is a hundred times the last digit of a gap
 SAME = 1e-8  # relative difference of numbers that count as equal: above round-off, below what anybody means to change
 GOLDEN = 0.6180339887498949
 PROBES = 2  # vectors w
@@ -163,7 +164,10 @@ def _contact(surface: ContactSurface, early: Sequence[float]) -> Numbers:
               surface.bilateral.astype(float)]
     arrays += [] if surface.motion is None else [surface.gap(t) for t in early]
     arrays += [] if surface.slide is None else [column for t in early for column in surface.slide(t).T]
-    return _columns(surface, arrays)
+    found, d = _columns(surface, arrays), surface.points.shape[1]
+    round_off = ROUND_OFF * max(size for _, size in found[: 3 * d])  # of points, which gaps are differences of
+    gaps = {2 * d + 1, *range(2 * d + 4, len(arrays))}
+    return [(value, max(size, round_off) if i // 3 in gaps else size) for i, (value, size) in enumerate(found)]
 
 
 def _columns(surface: ContactSurface, arrays: Sequence[Array]) -> Numbers:
