@@ -20,7 +20,9 @@ from vi_contact.core.errors import InputError
 from vi_contact.core.obstacles import HalfSpace
 from vi_contact.core.problem import ContactProblem
 from vi_contact.fem.assembly import assemble
+from vi_contact.fem.contact import matching
 from vi_contact.fem.contact.matching import NodeToNode
+from vi_contact.fem.contact.nodes import Nodes
 from vi_contact.fem.contact.pairs import contact_pair
 from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import BodyForce, Prescribed
@@ -269,6 +271,33 @@ def test_nodes_clamped_on_both_sides_are_left_out():
 
 
 # Refusals, each with its sentence, on all ranks -----------------------------------------------------------------------
+
+def test_partners_are_looked_for_nearby():
+    """On two waved faces, touching or apart, a table holds the few nodes next to each one; partners are those that all
+    nodes of the other side would give."""
+    x = np.stack(np.meshgrid(np.linspace(0.0, 1.0, 24), np.linspace(0.0, 2.0, 24)), axis=-1).reshape(-1, 2)
+    x = np.column_stack([x, 0.1 * np.sin(6.0 * x[:, 0])])
+    normals = np.column_stack([-0.6 * np.cos(6.0 * x[:, 0]), np.zeros(len(x)), np.ones(len(x))])
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    order, looked = np.random.default_rng(1).permutation(len(x)), []
+
+    def side(points, directions):
+        none = np.zeros(len(points))
+        return matching.Side("side", Nodes(none, points, directions, none, none, none), none)
+
+    def opposite(one, two, places, reach):
+        looked.append(places.size)
+        return plain(one, two, places, reach)
+
+    with pytest.MonkeyPatch.context() as patch:
+        plain = matching._opposite
+        patch.setattr(matching, "_opposite", opposite)
+        for gap in (0.0, 0.01):
+            other = side((x + gap * normals)[order], -normals[order])
+            found = NodeToNode().match(side(x, normals), other, 2.0).P.indices
+            assert np.array_equal(order[found], np.arange(len(x)))
+    assert looked == [matching.NEARBY * len(x)] * 2
+
 
 def test_sides_that_do_not_pair():
     system, tags = two_blocks(COMM, blocks(2, lower=(5, 2)))

@@ -12,12 +12,13 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
-from ...core.algebra import Array, Indices
+from ...core.algebra import Array, Indices, Mask
 from ...core.checks import attributes
 from ...core.errors import InputError
 from .nodes import Nodes, at
 
-DISTANCE_ROWS = 256  # rows of the tables of distances
+NEARBY = 8  # nodes of side 2 that are looked at first
+DISTANCES = 2**20  # in a table, where all nodes of side 2 are looked at
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,24 +89,32 @@ class NodeToNode:
 
     def _partners(self, one: Side, two: Side, size: float) -> Indices:
         """Place of the nearest node opposite among those of side 2, -1 for none."""
-        x, normals, reach = one.nodes.points, one.nodes.normals, self.tolerance * _spacing(one.nodes.points, size)
-        partner = np.full(len(x), -1, dtype=np.int64)
-        facing = np.zeros(len(x), dtype=bool)
-        for first in range(0, len(x), DISTANCE_ROWS):
-            rows = slice(first, first + DISTANCE_ROWS)
-            offset = two.nodes.points[None, :, :] - x[rows, None, :]
-            along = np.einsum("ijk,ik->ij", offset, normals[rows])
-            beside = np.linalg.norm(offset - along[:, :, None] * normals[rows, None, :], axis=2)
-            near = beside <= reach[rows, None]
-            faces = normals[rows] @ two.nodes.normals.T < 0.0
-            distance = np.where(near & faces, np.abs(along), np.inf)
-            nearest = distance.argmin(axis=1)
-            found = np.isfinite(distance[np.arange(len(nearest)), nearest])
-            partner[rows] = np.where(found, nearest, -1)
-            facing[rows] = ~near.any(axis=1) | (near & faces).any(axis=1)
-        if not facing.all():
-            refuse_same_way(one.name, two.name, x[np.flatnonzero(~facing)[0]])
+        x, count, reach = one.nodes.points, len(two.nodes.points), self.tolerance * _spacing(one.nodes.points, size)
+        away, nearby = cKDTree(two.nodes.points).query(x, k=np.arange(1, min(NEARBY, count) + 1))
+        partner, along, turned = _opposite(one.nodes, two.nodes, np.sort(nearby, axis=1), reach)
+        # what is nearer along the normal lies in a ball of this size: unless all of it was looked at, all nodes are
+        unsure = np.flatnonzero((1.0 + 1e-9) * np.hypot(along, reach) >= away[:, -1])
+        for rows in np.array_split(unsure, -(-len(unsure) * count // DISTANCES)) if len(unsure) else ():
+            whole = np.arange(count)[None, :]
+            partner[rows], _, turned[rows] = _opposite(one.nodes.pick(rows), two.nodes, whole, reach[rows])
+        if turned.any():
+            refuse_same_way(one.name, two.name, x[np.argmax(turned)])
         return partner
+
+
+def _opposite(one: Nodes, two: Nodes, places: Indices, reach: Array) -> tuple[Indices, Array, Mask]:
+    """(the nearest node opposite each one of side 1 among these ``places`` (m, k) on side 2, the first of equally near
+    ones, -1 for none; how far along the normal it is, infinite for none; whether all that are there face away)."""
+    offset = two.points[places] - one.points[:, None, :]
+    along = np.einsum("ijk,ik->ij", offset, one.normals)
+    beside = np.linalg.norm(offset - along[:, :, None] * one.normals[:, None, :], axis=2)
+    near = beside <= reach[:, None]
+    faces = np.einsum("ijk,ik->ij", two.normals[places], one.normals) < 0.0
+    distance = np.where(near & faces, np.abs(along), np.inf)
+    rows, nearest = np.arange(len(reach)), distance.argmin(axis=1)
+    found = np.isfinite(distance[rows, nearest])
+    partner = np.where(found, np.broadcast_to(places, distance.shape)[rows, nearest], -1)
+    return partner, distance[rows, nearest], near.any(axis=1) & ~found
 
 
 def refuse_same_way(one: str, two: str, point: Array) -> None:
