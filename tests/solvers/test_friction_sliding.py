@@ -3,6 +3,7 @@ friction work is the area of the loop; the force does not depend on the number o
 
 from __future__ import annotations
 
+from functools import partial
 from math import cos, pi, sin, sqrt
 from typing import Any
 
@@ -29,6 +30,7 @@ from vi_contact.laws.materials import LinearElastic, Rayleigh
 from vi_contact.run.march import march
 from vi_contact.run.static import static_equilibrium
 from vi_contact.solvers.condensed import Condensed
+from vi_contact.solvers.volume import ReducedNewton
 
 G, SLOPE = 9.81, pi / 6.0
 MIDPOINT = vc.ZienkiewiczWoodTaylor()
@@ -185,3 +187,18 @@ def test_ranks_agree_on_friction_of_the_slip_rate(comm: Any) -> None:
         assert report.certificate.worst <= 1e-9 and report.result.history[-1] <= 1e-12
         ends.append(problem.surface.everywhere(problem.surface.tangential_values(state.u)))
     assert np.abs(ends[0] - ends[1]).max() <= 1e-10 * np.abs(ends[1]).max()
+
+
+@pytest.mark.parametrize("solver", [Condensed(), solvers.Iterative(), solvers.Volume(ReducedNewton())], ids=repr)
+def test_a_law_that_fails_on_one_rank_stops_all(comm: Any, solver: Any) -> None:
+    """At rest, before anything is computed, and once points slide; with the line of the user's function."""
+    def broken(speed: Array, *, from_speed: float) -> Array:
+        if comm.rank == comm.size - 1 and np.any(speed >= from_speed):
+            raise ZeroDivisionError("no such rate")
+        return 0.2 + 0.0 * speed
+
+    for least in (0.0, 1e-3):
+        law = SlipRateCoulomb(partial(broken, from_speed=least))
+        with pytest.raises(InputError, match=r"ended in ZeroDivisionError: no such rate .test_friction_sliding.py, li"):
+            for _ in march(resting(comm, law), scheme=MIDPOINT, solver=solver, dt=0.01, steps=10):
+                pass

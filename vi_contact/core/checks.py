@@ -8,15 +8,18 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Sequence
+import traceback
+from collections.abc import Callable, Iterable, Sequence
 from numbers import Integral, Real
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from .algebra import Array, Comm, Indices, Mask, largest
-from .errors import InputError
+from .errors import InputError, ViContactError
+
+T = TypeVar("T")
 
 SHOWN = 60  # characters of a value in a sentence
 LARGEST = 50_000_000  # numbers in one array that an input may ask for: 400 MB
@@ -214,3 +217,22 @@ def refuse(defects: Iterable[str], comm: Comm) -> None:
     if largest(comm, bool(mine)):
         found = comm.bcast(comm.gather(mine))
         raise InputError(next(text for text in found if text))
+
+
+def ended(name: str, error: Exception) -> str:
+    """Return the sentence about an error in a user's function: the package's own as it is, others with their line."""
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    said = f"{type(error).__name__}: {error} ({Path(place.filename).name}, line {place.lineno})"
+    return str(error) if isinstance(error, ViContactError) else f"{name} ended in {said}: correct its function"
+
+
+def on_all(comm: Comm, name: str, call: Callable[[], T]) -> T:
+    """Return what the call returns, which asks a user's function for what one rank has. Collective; InputError on all
+    ranks where it raises on one."""
+    found, defect = [], ""
+    try:
+        found.append(call())
+    except Exception as error:  # the others must not wait for this one
+        defect = ended(name, error)
+    refuse([defect], comm)
+    return found[0]

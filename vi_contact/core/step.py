@@ -31,6 +31,7 @@ import numpy as np
 
 from .algebra import Array, EffectiveMatrix, Mask
 from .certificate import Certificate
+from .checks import on_all
 from .errors import InputError
 from .problem import ContactProblem
 from .protocols import FrictionLaw, Frictionless, MassLaw
@@ -84,8 +85,11 @@ class StepProblem:
                              f"contact set of {len(self.active)} for {conditions} conditions: give one of each")
 
     def friction_at(self, slip: Array) -> FrictionLaw:
-        """Return the friction law at the rates [m/s] of this slip, B_t x - slip0 (m, d - 1)."""
-        return self.friction.at(self.rate_factor * np.linalg.norm(slip, axis=1))
+        """Return the friction law at the rates [m/s] of this slip, B_t x - slip0 (m, d - 1). Collective: what a law of
+        the user's own raises on one rank is raised on all."""
+        speed = self.rate_factor * np.linalg.norm(slip, axis=1)
+        return on_all(self.surface.comm, f"{type(self.friction).__name__} at t = {self.t:g} s",
+                      lambda: self.friction.at(speed))
 
 
 @dataclass(frozen=True)

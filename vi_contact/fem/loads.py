@@ -6,10 +6,8 @@ interpolated at the nodes and then integrated exactly, so a load costs one spars
 
 from __future__ import annotations
 
-import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,7 +15,7 @@ import ufl
 from dolfinx.mesh import Mesh
 
 from ..core.algebra import Array, Comm
-from ..core.checks import function, refuse, shown
+from ..core.checks import ended, function, refuse, shown
 from . import compat
 from .groups import components_given, facets_of, field_given
 from .mesh import Facets
@@ -41,9 +39,7 @@ def evaluate_here(name: str, value: Value, points: Array, t: float) -> tuple[Arr
     try:
         result = np.asarray(value(points, t)) if callable(value) else np.tile(np.asarray(value), (len(points), 1))
     except Exception as error:  # of a user's function, at the points of one rank: the others must not wait for it
-        place = traceback.extract_tb(error.__traceback__)[-1]
-        said = f"{type(error).__name__}: {error} ({Path(place.filename).name}, line {place.lineno})"
-        return np.zeros_like(points), f"{name} at t = {t:g} s ended in {said}: correct its function"
+        return np.zeros_like(points), ended(f"{name} at t = {t:g} s", error)
     if result.dtype.kind not in "iuf":
         defect = f"{name} returned {shown(result)}: return real numbers"
     elif result.shape != points.shape:

@@ -96,6 +96,8 @@ class SlipRateCoulomb:
 
     def at(self, speed: Array) -> Coulomb:
         """Return Coulomb's law with the coefficients of these speeds."""
+        if not len(speed):  # users' functions need not cope with none
+            return Coulomb(speed)
         values = self.mu(speed)
         found = np.asarray(values)
         if found.dtype.kind not in "iuf":

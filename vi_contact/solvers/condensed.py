@@ -20,7 +20,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..core.algebra import Array, EffectiveMatrix, Mask, total
-from ..core.checks import instance, provides
+from ..core.checks import instance, on_all, provides
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.sizes import refuse_dense
@@ -79,7 +79,8 @@ class Condensed:
             raise InputError(
                 f"Condensed would ignore {problem.friction}: a body in one dimension cannot slide, use Frictionless()"
             )
-        problem.friction.limit(np.zeros(surface.count), surface.weights, 1.0)
+        on_all(surface.comm, "the friction law",
+               lambda: problem.friction.limit(np.zeros(surface.count), surface.weights, 1.0))
 
     def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> PreparedCondensed:
         """Factorise A and condense it; once per time step size. InputError for more contact conditions than a dense

@@ -66,11 +66,12 @@ class CondensedFriction:
         gap = step.bound - surface.normal_values(x_free)
         slip = surface.tangential_values(x_free) - origin(step)
         none = np.zeros(surface.count)
-        cohesion, slope = law.limit(none, surface.weights, step.scale), law.slope(surface.weights)
+        rest = step.friction_at(np.zeros_like(slip))
+        cohesion, slope = rest.limit(none, surface.weights, step.scale), rest.slope(surface.weights)
         whole = surface.everywhere(np.column_stack([gap, -slip, cohesion, slope, step.active]))
         q, (cohesion, slope, closed) = np.ascontiguousarray(whole[:, :-3]), whole[:, -3:].T
         active = closed > 0.0
-        if step.friction_at(np.zeros_like(slip)) is law:
+        if rest is law:
             return self._small.solve(q, cohesion, slope, active)
 
         def solved(mu: Array, before: FrictionResult | None) -> FrictionResult:

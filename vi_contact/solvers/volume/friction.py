@@ -60,10 +60,10 @@ class VolumeFriction:
     def solve(self, step: StepProblem) -> StepResult:
         """Return the step; StepFailure with PETSc's reason, or when the thresholds do not settle."""
         surface, law = self._body.surface, step.friction
-        cohesion = law.limit(np.zeros(surface.count), surface.weights, step.scale)
-        slope = law.slope(surface.weights)
-        still = np.zeros((surface.count, surface.tangents.shape[1]))
-        if step.friction_at(still) is law:
+        rest = step.friction_at(np.zeros((surface.count, surface.tangents.shape[1])))
+        cohesion = rest.limit(np.zeros(surface.count), surface.weights, step.scale)
+        slope = rest.slope(surface.weights)
+        if rest is law:
             return self._result(step, self._sequence(step, cohesion, slope, None))
 
         def solved(mu: Array, before: Any) -> Any:

@@ -17,7 +17,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from ...core.algebra import Array, EffectiveMatrix
-from ...core.checks import instance, provides, real, shown
+from ...core.checks import instance, on_all, provides, real, shown
 from ...core.errors import InputError, StepFailure
 from ...core.problem import ContactProblem
 from ...core.step import StepProblem, StepResult
@@ -105,7 +105,7 @@ class Volume:
             )
         if surface.tangents.shape[1] == 0:
             raise InputError(f"Volume would ignore {law}: a body in one dimension cannot slide, use Frictionless()")
-        law.limit(np.zeros(surface.count), surface.weights, 1.0)
+        on_all(surface.comm, "the friction law", lambda: law.limit(np.zeros(surface.count), surface.weights, 1.0))
 
     def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> PreparedVolume:
         """Return the solver for one effective matrix; collective. InputError for options that cannot work."""
