@@ -25,6 +25,7 @@ from mpi4py import MPI
 import vi_contact as vc
 from demos.pictures.bars import plot_bounces
 from vi_contact import exact
+from vi_contact.cli import status_of
 from vi_contact.models.bar import Bar, build
 
 # Parameters ----------------------------------------------------------------------------------------------------------
@@ -88,4 +89,4 @@ def table(numbers: dict[str, float]) -> str:
 # gains a little and HHT does not; dt=vc.HalvedAtImpact(dt); impact=vc.Inelastic() with consistent mass.
 if __name__ == "__main__":
     logging.getLogger("vi_contact.schemes").setLevel(logging.ERROR)  # the last scheme is here because it gains energy
-    main()
+    raise SystemExit(status_of(main))

@@ -27,6 +27,7 @@ from mpi4py import MPI
 import vi_contact as vc
 from demos.pictures.boundary import SHEAR, Curve, Panel, Shot, plot_boundary_snapshots, plot_panels
 from vi_contact import bem
+from vi_contact.cli import status_of
 from vi_contact.models import disk, embedded, square
 from vi_contact.models.boundary_elements import disk_contact, disk_problem, embedded_problem, square_problem
 
@@ -269,4 +270,4 @@ def table(numbers: dict[str, float]) -> str:
 # Things to try: ELEMENTS of twice the number; bem.SpaceTimeUzawa(rho=...), whose iterations depend on rho;
 # bem.convolution_operator instead of the energetic method; vc.cross_check(..., references=[run]).
 if __name__ == "__main__":
-    main()
+    raise SystemExit(status_of(main))

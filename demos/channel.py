@@ -29,6 +29,7 @@ from demos.pictures.channel import plot_beside, plot_layout, plot_moments
 from demos.pictures.friction import plot_states
 from vi_contact import fem
 from vi_contact.cli import main as command
+from vi_contact.cli import status_of
 from vi_contact.meshes.channel import ChannelMesh
 from vi_contact.models.channel.model import REFERENCE, Channel, build
 from vi_contact.plots import channel as pictures
@@ -151,4 +152,4 @@ def command_line(words: Sequence[str]) -> int:
 if __name__ == "__main__":
     if len(sys.argv) > 1:
         sys.exit(command_line(sys.argv[1:]))
-    main()
+    raise SystemExit(status_of(main))

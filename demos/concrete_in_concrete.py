@@ -23,6 +23,7 @@ from mpi4py import MPI
 import vi_contact as vc
 from demos.pictures.deformed import plot_snapshots
 from vi_contact import fem
+from vi_contact.cli import status_of
 from vi_contact.models.embedded import Embedded, build
 from vi_contact.models.square import concrete
 from vi_contact.plots.histories import History, plot_runs
@@ -100,4 +101,4 @@ def table(numbers: Mapping[str, float]) -> str:
 # Things to try: vc.Coulomb(0.2); a soft block, Embedded(..., block=vc.LinearElastic(E=1e9, nu=0.3, rho=1800.0));
 # a sudden load, history=None in Square().
 if __name__ == "__main__":
-    main()
+    raise SystemExit(status_of(main))

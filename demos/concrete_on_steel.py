@@ -23,6 +23,7 @@ from mpi4py import MPI
 import vi_contact as vc
 from demos.pictures.deformed import plot_snapshots, plot_tractions
 from vi_contact import fem
+from vi_contact.cli import status_of
 from vi_contact.models.square import Square, build, concrete
 from vi_contact.plots.histories import History, plot_runs
 
@@ -113,4 +114,4 @@ def table(numbers: Mapping[str, float]) -> str:
 
 # Things to try: vc.Coulomb(0.1), which slips at the edges; T_END = 40e-3; a sudden load, history=None in Square().
 if __name__ == "__main__":
-    main()
+    raise SystemExit(status_of(main))

@@ -25,6 +25,7 @@ from mpi4py import MPI
 import vi_contact as vc
 from demos.pictures.layer import plot_layered_bar, plot_thin_limit
 from vi_contact import boundary_layer
+from vi_contact.cli import status_of
 from vi_contact.exact import BouncingBar, ThrownBar
 from vi_contact.models import wall
 from vi_contact.models.bar import Bar, build
@@ -173,4 +174,4 @@ def marched(
 # Things to try: a restitution other than ½ in thin_limit (on a bar it changes little: it is that of its foot's mass);
 # a mass that does not shrink with the width; PASSAGE = 2; dimension=2 in BARS; vc.Trapezoidal() beside vc.Midpoint().
 if __name__ == "__main__":
-    main()
+    raise SystemExit(status_of(main))

@@ -21,6 +21,7 @@ from mpi4py import MPI
 
 import vi_contact as vc
 from demos.pictures.impact import ImpactCurves, plot_impact
+from vi_contact.cli import status_of
 from vi_contact.models.ball import QUARTERS, Ball, BallModel, build, hertz_motion
 
 # Parameters ----------------------------------------------------------------------------------------------------------
@@ -86,4 +87,4 @@ def table(numbers: dict[str, float]) -> str:
 # Things to try: speed=10.0 (the theory holds as long as the contact is small and long); E=1e7, rho=1000 for rubber;
 # MESHES = (12,), which takes a minute; scheme=vc.Midpoint() in simulate.
 if __name__ == "__main__":
-    main()
+    raise SystemExit(status_of(main))

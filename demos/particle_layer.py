@@ -21,6 +21,7 @@ import numpy as np
 
 from demos.pictures.layer import plot_cut_off, plot_parameters
 from vi_contact import boundary_layer
+from vi_contact.cli import status_of
 from vi_contact.plots.studies import plot_particle
 
 # Parameters ----------------------------------------------------------------------------------------------------------
@@ -103,4 +104,4 @@ def readings(ratios: tuple[float, ...], out: Path) -> dict[str, float]:
 # counts twice; WIDTH = 1e-3 with k = 1e6 (b cancels: the same restitution); c = 100, an almost plastic impact;
 # gravity as the system's force, and t_end instead of contacts=1.
 if __name__ == "__main__":
-    main()
+    raise SystemExit(status_of(main))

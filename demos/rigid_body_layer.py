@@ -21,6 +21,7 @@ import numpy as np
 
 from demos.pictures.layer import plot_bounces_of_body, plot_thin_limit
 from vi_contact import boundary_layer
+from vi_contact.cli import status_of
 
 # Parameters ----------------------------------------------------------------------------------------------------------
 BODY = boundary_layer.RigidBody(mass=2.0, inertia=(0.2, 0.3, 0.4), point=(0.3, -0.2, -0.5))
@@ -99,4 +100,4 @@ def tumbling(t_end: float, out: Path) -> dict[str, float]:
 # Things to try: vc.Metric.FULL in layer_motion (another restitution for the same k and c); EGG_E = 1.0, which bounces
 # for ever and loses nothing; axes (0.3, 0.3, 0.3), a ball whose spin no impact can change; EGG_WIDTH = 1e-2, soft skin.
 if __name__ == "__main__":
-    main()
+    raise SystemExit(status_of(main))

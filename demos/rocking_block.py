@@ -24,6 +24,7 @@ from mpi4py import MPI
 import vi_contact as vc
 from demos.pictures.rocking import plot_pulses, plot_rocking
 from vi_contact import exact, fem
+from vi_contact.cli import status_of
 from vi_contact.models import rocking_block as rocking
 from vi_contact.plots.histories import plot_certificate, plot_energy
 
@@ -136,4 +137,4 @@ def pulses(model: rocking.RockingModel, dt: vc.HalvedAtImpact, out: Path, progre
 # model.time_steps(); vc.Trapezoidal() with NoDamping(), which loses no energy: the block hops; a real record,
 # vc.GroundMotion(vc.read_record(file)); mpirun -n 3.
 if __name__ == "__main__":
-    main()
+    raise SystemExit(status_of(main))

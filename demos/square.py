@@ -25,6 +25,7 @@ from mpi4py import MPI
 import vi_contact as vc
 from demos.pictures.deformed import plot_snapshots, plot_tractions
 from vi_contact import fem
+from vi_contact.cli import status_of
 from vi_contact.models.square import Square, build
 from vi_contact.plots.histories import History, plot_runs
 
@@ -106,4 +107,4 @@ def table(numbers: dict[str, float], runs: list[str]) -> str:
 # Things to try: cells=80; confined=True in SQUARE, where the wave is plane and the base feels twice the pressure;
 # vc.Coulomb(0.1), which slips; fem and ParaView with results/square/*/fields.xdmf.
 if __name__ == "__main__":
-    main()
+    raise SystemExit(status_of(main))

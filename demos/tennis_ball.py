@@ -26,6 +26,7 @@ from mpi4py import MPI
 import vi_contact as vc
 from demos.pictures.deformed import plot_snapshots, plot_tractions
 from vi_contact import fem
+from vi_contact.cli import status_of
 from vi_contact.models.disk import Disk, Momentum, Push, build
 from vi_contact.plots.histories import History, plot_runs
 
@@ -113,4 +114,4 @@ def table(numbers: Mapping[str, float]) -> str:
 # Things to try: Push(height=0.1, rise=4.0), a gentler push of which boundary elements say v = 0.0679; vc.Coulomb(0.1),
 # which slips; scheme=vc.Midpoint() in simulate; size=0.02.
 if __name__ == "__main__":
-    main()
+    raise SystemExit(status_of(main))

@@ -23,6 +23,7 @@ import numpy as np
 import vi_contact as vc
 from demos.pictures.beam import plot_regularisation, plot_rubbing
 from vi_contact import beam
+from vi_contact.cli import status_of
 from vi_contact.plots.studies import plot_beam_energies, plot_shapes, plot_tips
 
 # Parameters ----------------------------------------------------------------------------------------------------------
@@ -129,4 +130,4 @@ def rubbing(count: int, dt: float, out: Path, progress: bool) -> dict[str, float
 # vc.SlipRateCoulomb(vc.ExponentialDecay(0.4, 0.2, 0.5)), in rubbing(); scheme=vc.Midpoint() there, whose contact forces
 # ring; body_force=lambda t: 20.0 + 10.0 * np.sin(8.0 * t) for ROD.
 if __name__ == "__main__":
-    main()
+    raise SystemExit(status_of(main))

@@ -22,6 +22,7 @@ from mpi4py import MPI
 
 import vi_contact as vc
 from vi_contact import fem, soil
+from vi_contact.cli import status_of
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import TwoBlocks
 from vi_contact.plots.histories import plot_certificate, plot_energy
@@ -113,7 +114,7 @@ def draw(history: Any, path: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(quick="--quick" in sys.argv)
+    raise SystemExit(status_of(lambda: main(quick="--quick" in sys.argv)))
 
 # Things to try:
 # - MU = 0.2 slides instead of rocking; a smaller amplitude keeps the foot closed and the response linear.

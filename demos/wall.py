@@ -25,6 +25,7 @@ from mpi4py import MPI
 import vi_contact as vc
 from vi_contact import fem
 from vi_contact.cli import main as command
+from vi_contact.cli import status_of
 from vi_contact.models import wall as wall_model
 from vi_contact.plots.histories import plot_runs
 from vi_contact.plots.run_pictures import draw_histories
@@ -126,4 +127,4 @@ def command_line(words: Sequence[str]) -> int:
 if __name__ == "__main__":
     if len(sys.argv) > 1:
         raise SystemExit(command_line(sys.argv[1:]))
-    main()
+    raise SystemExit(status_of(main))

@@ -194,3 +194,13 @@ def test_the_hertz_impact_demo(comm: Any, shared_tmp: Path, capsys: pytest.Captu
     assert 0.0 < of["certificate"] <= 1e-9 and of["ledger defect"] <= 1e-10
     assert (shared_tmp / "hertz_impact.png").stat().st_size > 30_000
     assert comm.rank or "4 cells in the contact radius" in capsys.readouterr().out
+
+
+@pytest.mark.serial
+def test_a_demo_in_a_folder_that_takes_no_files_says_so_in_a_sentence(tmp_path: Path) -> None:
+    """What main() raises ends a script as it ends a command."""
+    (tmp_path / "results").write_text("no folder\n")
+    done = subprocess.run([sys.executable, str(ROOT / "demos" / "timoshenko_beam.py")], cwd=tmp_path,
+                          capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr.startswith("vi-contact: ") and "results" in done.stderr and done.stderr.count("\n") == 1

@@ -2,8 +2,9 @@
 
 ``entry.py`` lists the commands; ``case.py``, ``ida.py``, ``motion.py`` and ``report.py`` hold them, and call what
 ``studies``, ``ground_motion`` and ``plots`` offer in Python. ``main(["run", "wall", "--check"])`` is the command
-``vi-contact run wall --check``, and returns its status. docs/guide/studies.md."""
+``vi-contact run wall --check``, and returns its status; ``status_of(call)`` ends a script of your own likewise.
+docs/guide/studies.md."""
 
-from .entry import main
+from .entry import main, status_of
 
-__all__ = ["main"]
+__all__ = ["main", "status_of"]

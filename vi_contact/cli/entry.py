@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 import traceback
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from ..core.errors import InputError, Interrupted, OutOfTime, ViContactError
 from ..core.version import __version__
@@ -55,7 +55,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command and print its text, or one sentence on standard error and return 1; 128 + n after signal n, 75 when
     the wall time was nearly over."""
     own, petsc = split_petsc(sys.argv[1:] if arguments is None else arguments)
-    try:
+
+    def command() -> None:
         refuse_retired(own)
         options = parser().parse_args(own)
         if petsc:
@@ -64,6 +65,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
             petsc4py.init(["vi-contact", *petsc])
         check_words(own)
         text = told(lambda: options.run(options), getattr(options, "spelling", {}))
+        if text:
+            print(printable(text))
+
+    return status_of(command)
+
+
+def status_of(call: Callable[[], object]) -> int:
+    """Call a command, or the main function of a script, and return 0; other ends are as those of ``main``."""
+    try:
+        told(call, {})
     except ViContactError as error:
         fail_together(str(error))
         return _stopped(error, 1)
@@ -75,8 +86,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except Exception:
         fail_together(traceback.format_exc())
         raise
-    if text:
-        print(printable(text))
     return 0
 
 
