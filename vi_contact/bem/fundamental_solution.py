@@ -32,41 +32,17 @@ EULER = float(np.euler_gamma)
 SMALL = 0.7  # below this the Bessel function minus its pole is summed as a power series
 
 
-class SingleLayerKernels(NamedTuple):
-    """Hold G = g1 I - g2 r̂ r̂ᵀ (density 1); arrays of the shape of r."""
-
-    g1: Array
-    g2: Array
-
-
-class DoubleLayerKernels(NamedTuple):
-    """Hold phi = Phi_S, dphi = Phi_S'/r, ddiff = (Phi_P - Phi_S)'/r and G; a prime is d/dr."""
-
-    phi: Array
-    dphi: Array
-    ddiff: Array
-    g1: Array
-    g2: Array
-
-
-class HypersingularKernels(NamedTuple):
-    """Hold those of the double layer, and inertia_a = s² Phi_a (in time: Phi_a integrated twice less)."""
-
-    phi: Array
-    dphi: Array
-    ddiff: Array
-    g1: Array
-    g2: Array
-    inertia_p: Array
-    inertia_s: Array
-
-
 class KernelSet(NamedTuple):
-    """Hold what the Galerkin layer integrates; without kernels of its own the hypersingular operator is left out."""
+    """Hold what the Galerkin layer integrates, arrays of the shape of r; ``hyper`` None leaves that operator out.
 
-    single: SingleLayerKernels
-    double: DoubleLayerKernels
-    hyper: HypersingularKernels | None = None
+    single: (g1, g2) of G (density 1); double: (phi, dphi, ddiff, g1, g2) with phi = Phi_S, dphi = Phi_S'/r, ddiff =
+    (Phi_P - Phi_S)'/r, a prime being d/dr; hyper: the same and (inertia_p, inertia_s), inertia_a = s² Phi_a (in time:
+    Phi_a integrated twice less).
+    """
+
+    single: tuple[NDArray, ...]
+    double: tuple[NDArray, ...]
+    hyper: tuple[NDArray, ...] | None = None
 
 
 @dataclass(frozen=True)
@@ -96,11 +72,8 @@ class LaplaceKernels:
         phi = k0_s / TWO_PI
         dphi = -((s / self.c_s) ** 2 * kappa_s + 1.0 / r**2) / TWO_PI
         ddiff = ((s / self.c_s) ** 2 * kappa_s - (s / self.c_p) ** 2 * kappa_p) / TWO_PI
-        return KernelSet(
-            SingleLayerKernels(g1, g2),
-            DoubleLayerKernels(phi, dphi, ddiff, g1, g2),
-            HypersingularKernels(phi, dphi, ddiff, g1, g2, s**2 * k0_p / TWO_PI, s**2 * phi),
-        )
+        double = phi, dphi, ddiff, g1, g2
+        return KernelSet((g1, g2), double, (*double, s**2 * k0_p / TWO_PI, s**2 * phi))
 
 
 def _check_speeds(kernels: LaplaceKernels | TimeKernels) -> None:
@@ -160,18 +133,14 @@ class TimeKernels:
         # (n-1)² dQ_n = (2n-3) t dQ_(n-1) - t² dQ_(n-2) + [(r F'_(n-2) + 2 F_(n-2))/c²] S minus P, where
         # r F_n' = (n-1) F_n - t F_(n-1) and Q_n = F_n'/r, dQ_n = Q_n^S - Q_n^P
         dq4 = (5.0 * t * dq3 - t**2 * dq2 + slow * (3.0 * f2_s - t * f1_s) - fast * (3.0 * f2_p - t * f1_p)) / 9.0
-        double = DoubleLayerKernels(
-            f2_s / TWO_PI, -root_s * inverse / TWO_PI, -dq2 / TWO_PI, *tensor(f2_s * slow, f2_p * fast, dq4)
-        )
+        double = f2_s / TWO_PI, -root_s * inverse / TWO_PI, -dq2 / TWO_PI, *tensor(f2_s * slow, f2_p * fast, dq4)
         if not self.hyper:
             return KernelSet(single, double)
         f3_s = 0.25 * (3.0 * t * f2_s - root_s**2 * f1_s)
         f3_p = 0.25 * (3.0 * t * f2_p - root_p**2 * f1_p)
         dq5 = (7.0 * t * dq4 - t**2 * dq3 + slow * (4.0 * f3_s - t * f2_s) - fast * (4.0 * f3_p - t * f2_p)) / 16.0
-        hyper = HypersingularKernels(
-            f3_s / TWO_PI, (2.0 * f3_s - t * f2_s) * inverse / TWO_PI, -dq3 / TWO_PI,
-            *tensor(f3_s * slow, f3_p * fast, dq5), f1_p / TWO_PI, f1_s / TWO_PI,
-        )
+        hyper = (f3_s / TWO_PI, (2.0 * f3_s - t * f2_s) * inverse / TWO_PI, -dq3 / TWO_PI,
+                 *tensor(f3_s * slow, f3_p * fast, dq5), f1_p / TWO_PI, f1_s / TWO_PI)
         return KernelSet(single, double, hyper)
 
 
@@ -182,6 +151,6 @@ def front_functions(r: Array, t: float, c: float) -> tuple[Array, Array]:
     return t * root, np.log((1.0 + root) / q)
 
 
-def tensor(f_s: Array, f_p: Array, dq: Array) -> SingleLayerKernels:
+def tensor(f_s: Array, f_p: Array, dq: Array) -> tuple[Array, Array]:
     """Return (g1, g2) from F_n^S/c_S², F_n^P/c_P² and dQ_(n+2)."""
-    return SingleLayerKernels((f_s - dq) / TWO_PI, (f_s - f_p - 2.0 * dq) / TWO_PI)
+    return (f_s - dq) / TWO_PI, (f_s - f_p - 2.0 * dq) / TWO_PI
