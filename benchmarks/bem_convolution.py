@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Convolution quadrature against the energetic boundary elements: accuracy and cost on the problems of bem.py.
 
-    python3 benchmarks/bem_convolution.py [--sides 10 20] [--methods BDF2 Trapezoid RadauIIA energetic]
+    python3 benchmarks/bem_convolution.py [--sides 10 20] [--methods convolution energetic]
 
 Unit square, k elements a side, c_P dt = h, T = 6, N = 6 k steps, symmetric form; one thread; a row is a process of its
 own, seconds are processor time. Errors as in bem.py. Contact: the pressed square under Tresca's friction (V7.1):
@@ -37,7 +37,7 @@ from vi_contact.bem.contact_run import march_contact  # noqa: E402
 from vi_contact.bem.uzawa_space_time import SpaceTimeUzawa  # noqa: E402
 from vi_contact.core.errors import StepFailure  # noqa: E402
 
-METHODS = ("energetic", "BDF2", "Trapezoid", "RadauIIA")
+METHODS = ("energetic", "convolution")
 COLUMNS = ("k", "assembly", "solve", "condense", "peak MB", "pulse P", "pulse S", "sin²", "step", "base", "max base",
            "impulse", "E(2)", "Uzawa", "Uzawa/5", "W_0")
 Problem = Callable[..., Any]
@@ -50,7 +50,7 @@ def discretised(method: str, k: int) -> tuple[Problem, Callable[[Forces], np.nda
     if method == "energetic":
         operator = bem.PoincareSteklov(bem.energetic_blocks(mesh, MATERIAL, dt=dt, steps=steps), MATERIAL.rho)
         return lambda *a, **more: bem.BoundaryProblem(operator, *a, **more), lambda forces: forces(dt, steps)
-    transformed = bem.convolution_operator(mesh, MATERIAL, method=getattr(bem, method)(), dt=dt, steps=steps)
+    transformed = bem.convolution_operator(mesh, MATERIAL, dt=dt, steps=steps)
     return (lambda *a, **more: bem.BoundaryProblem(transformed, *a, **more),
             transformed.frequencies.substep_means)
 

@@ -11,15 +11,12 @@ from scipy.linalg import expm
 
 from vi_contact import LinearElastic, Tresca
 from vi_contact.bem import (
-    BDF2,
     BoundaryProblem,
     ConvolutionOperator,
     Frequencies,
     Galerkin,
     LaplaceKernels,
     PoincareSteklov,
-    RadauIIA,
-    Trapezoid,
     convolution_operator,
     energetic_blocks,
     polygon,
@@ -32,15 +29,13 @@ from vi_contact.bem.uzawa_space_time import SpaceTimeUzawa
 from vi_contact.core.errors import InputError
 
 pytestmark = pytest.mark.serial
-METHODS = {"BDF2": BDF2(), "trapezoid": Trapezoid(), "Radau": RadauIIA()}
 
 
 @pytest.fixture(scope="module")
-def operators() -> dict[tuple[str, int], ConvolutionOperator]:
+def operators() -> dict[int, ConvolutionOperator]:
     """Squares of 5 and 10 elements a side, c_P dt = h, six crossings of the square."""
     return {
-        (name, k): convolution_operator(polygon(SQUARE, 1.0 / k), MATERIAL, method=method, dt=1.0 / k, steps=6 * k)
-        for name, method in METHODS.items() for k in (5, 10)
+        k: convolution_operator(polygon(SQUARE, 1.0 / k), MATERIAL, dt=1.0 / k, steps=6 * k) for k in (5, 10)
     }
 
 
@@ -78,9 +73,8 @@ def top_error(operator: ConvolutionOperator, load, integral) -> float:
     return float(np.sqrt(np.mean((top - exact) ** 2) / np.mean(exact**2)))
 
 
-@pytest.mark.parametrize(("name", "order"), [("BDF2", 2), ("trapezoid", 2), ("Radau", 3)])
-def test_weights_of_an_oscillator(name, order):
-    """C(s) = 1/(s² + 0.6 s + 9) under sin⁴ t against the exact answer: the order of the method; held g: order 2."""
+def test_weights_of_an_oscillator():
+    """C(s) = 1/(s² + 0.6 s + 9) under sin⁴ t against the exact answer: order 3; held g: order 2."""
     w2, damping, end, errors, held = 9.0, 0.6, 4.0, [], []
 
     def transfer(s):
@@ -93,12 +87,12 @@ def test_weights_of_an_oscillator(name, order):
     for steps in (80, 160):
         dt = end / steps
         exact = oscillator(w2, damping, dt * np.arange(1, steps + 1))
-        table = Frequencies(METHODS[name], dt, steps)
+        table = Frequencies(dt, steps)
         weights = table.backward((table.held_factors * transfer(table.s)).sum(axis=1))
         held.append(np.abs(np.convolve(weights, means(dt, steps))[:steps] - exact).max() / np.abs(exact).max())
         modes = table.s * transfer(table.s) * table.impulses(table.substep_means(means))
         errors.append(np.abs(table.at_ends(modes) - exact).max() / np.abs(exact).max())
-    assert errors[1] < 6e-3 and np.log2(errors[0] / errors[1]) > order - 0.1
+    assert errors[1] < 6e-3 and np.log2(errors[0] / errors[1]) > 2.9
     assert held[1] < 6e-3 and np.log2(held[0] / held[1]) > 1.9
 
 
@@ -116,71 +110,61 @@ def oscillator(w2: float, damping: float, times: np.ndarray) -> np.ndarray:
 
 @pytest.mark.slow
 def test_table_of_radial_functions(operators):
-    """The matrices from the table are those of the Galerkin layer at all frequencies; the trapezoidal rule has the
-    greatest, |s| dt up to 14 here, where the matrices are small."""
+    """The matrices from the table are those of the Galerkin layer at all frequencies."""
     mesh = polygon([(0, 0), (1, 0.1), (0.2, 0.8)], 0.2)
     table, plain = RadialTable(mesh, 0.5, 0.15), Galerkin(mesh, 0.5)
-    for name, tolerance in (("BDF2", 1e-10), ("Radau", 1e-10), ("trapezoid", 1e-6)):
-        for s in operators[name, 5].frequencies.s.ravel()[::5]:
-            kernels = LaplaceKernels(complex(s), 1.0, 0.5)
-            few, exact = table.assemble(kernels), plain.assemble(kernels)
-            for which in ("single", "double", "hyper"):
-                a, b = getattr(few, which), getattr(exact, which)
-                assert np.abs(a - b).max() < tolerance * np.abs(b).max(), (name, s, which)
+    for s in operators[5].frequencies.s.ravel()[::5]:
+        kernels = LaplaceKernels(complex(s), 1.0, 0.5)
+        few, exact = table.assemble(kernels), plain.assemble(kernels)
+        for which in ("single", "double", "hyper"):
+            a, b = getattr(few, which), getattr(exact, which)
+            assert np.abs(a - b).max() < 1e-10 * np.abs(b).max(), (s, which)
 
 
-@pytest.mark.parametrize(("name", "fine", "order"), [
-    ("BDF2", 0.12, 1.3), ("trapezoid", 0.04, 1.8), ("Radau", 3.4e-3, 2.4)])
-def test_rod_under_a_smooth_load(operators, name, fine, order):
-    """B11: top displacement, 10 elements a side; order from 5 to 10 (that of BDF2 is 1.8 from 10 to 20)."""
-    errors = [top_error(operators[name, k], smooth_load, smooth_integral) for k in (5, 10)]
-    assert errors[1] < fine and np.log2(errors[0] / errors[1]) > order
+def test_rod_under_a_smooth_load(operators):
+    """B11: top displacement, 10 elements a side; order from 5 to 10."""
+    errors = [top_error(operators[k], smooth_load, smooth_integral) for k in (5, 10)]
+    assert errors[1] < 3.4e-3 and np.log2(errors[0] / errors[1]) > 2.4
 
 
-@pytest.mark.parametrize(("name", "top", "pressure", "greatest"), [
-    ("BDF2", 0.11, 0.4, 2.5), ("trapezoid", 0.066, 0.4, 2.7), ("Radau", 0.026, 0.25, 2.25)])
-def test_rod_under_a_step(operators, name, top, pressure, greatest):
+def test_rod_under_a_step(operators):
     """B11: top displacement, reaction of the base (exactly 0 or 2) and its greatest value; fronts smear and ring."""
-    operator, mesh = operators[name, 10], operators[name, 10].mesh
-    assert top_error(operator, lambda t: 1.0, lambda t: np.maximum(t, 0.0)) < top
+    operator, mesh = operators[10], operators[10].mesh
+    assert top_error(operator, lambda t: 1.0, lambda t: np.maximum(t, 0.0)) < 0.026
     motion = rod(operator, lambda t: 1.0).solve()
     base = -motion.forces[:, 1][:, mesh.nodes_of(mesh.labels == 0)].sum(axis=1)
     middle = motion.times - 0.5 * operator.dt
     exact = np.where((middle > 1.0) & (np.mod(middle - 1.0, 4.0) < 2.0), 2.0, 0.0)
-    assert np.linalg.norm(base - exact) < pressure * np.linalg.norm(exact) and base.max() < greatest
+    assert np.linalg.norm(base - exact) < 0.25 * np.linalg.norm(exact) and base.max() < 2.25
     elements = mesh.labels == 0
     by_traction = -(motion.traction[:, 1, elements].mean(axis=2) * mesh.lengths[elements]).sum(axis=1)
-    assert np.abs(by_traction - base).max() < 0.1 * greatest
+    assert np.abs(by_traction - base).max() < 0.225
     assert motion.work.min() > 0.0 and 1.8 < motion.work[19] < 2.02  # exactly 2; numerical damping takes up to 7 %
 
 
-@pytest.mark.parametrize(("method", "ratio", "end"), [(Trapezoid(), 0.5, 60.0), (RadauIIA(), 0.1, 20.0)])
-def test_small_steps_stay_bounded(method, ratio, end):
+def test_small_steps_stay_bounded():
     """B11: the rod (top exactly 1 at most) with |s| h/c_S up to 100; fewer points on touching elements give 250."""
-    dt = 0.5 * ratio
-    operator = convolution_operator(polygon(SQUARE, 0.5), MATERIAL, method=method, dt=dt, steps=round(end / dt))
+    operator = convolution_operator(polygon(SQUARE, 0.5), MATERIAL, dt=0.05, steps=400)
     motion = rod(operator, smooth_load).solve()
-    assert np.abs(motion.displacement[motion.times > end - 10.0, 1]).max() < 1.25
+    assert np.abs(motion.displacement[motion.times > 10.0, 1]).max() < 1.25
 
 
 @pytest.mark.parametrize("shear", [False, True])
-@pytest.mark.parametrize(("name", "fine", "order"), [
-    ("BDF2", 0.2, 1.2), ("trapezoid", 0.09, 1.7), ("Radau", 0.03, 2.0)])
-def test_plane_pulses(operators, name, fine, order, shear):
+def test_plane_pulses(operators, shear):
     """B11: displacement of the whole boundary under the tractions of an oblique pulse, T = 4."""
     wave, errors = pulse(shear=shear), []
     for k in (5, 10):
-        operator = operators[name, k]
+        operator = operators[k]
         forces = traction_forces(operator.mesh, wave.traction, dt=operator.dt, steps=operator.steps)
         exact = np.array([wave.displacement(operator.mesh.points, operator.dt * (j + 1)).T for j in range(4 * k)])
-        found = operator.solve(forces)[: 4 * k]
+        found = BoundaryProblem(operator, forces).solve().displacement[: 4 * k]
         errors.append(np.linalg.norm(found - exact) / np.linalg.norm(exact))
-    assert errors[1] < fine and np.log2(errors[0] / errors[1]) > order
+    assert errors[1] < 0.03 and np.log2(errors[0] / errors[1]) > 2.0
 
 
 def test_energetic_and_convolution_agree(operators):
     """B11: top of the rod under the smooth load, Radau against energetic, 10 elements a side."""
-    problem = rod(operators["Radau", 10], smooth_load)
+    problem = rod(operators[10], smooth_load)
     blocks = energetic_blocks(problem.operator.mesh, MATERIAL, dt=0.1, steps=60)
     means = np.tensordot([1.0 / 3.0, 2.0 / 3.0], problem.forces, (0, 1))
     energetic = BoundaryProblem(PoincareSteklov(blocks, 1.0), means, problem.fixed).solve()
@@ -189,10 +173,9 @@ def test_energetic_and_convolution_agree(operators):
     assert np.linalg.norm(difference) < 5e-3 * np.linalg.norm(energetic.displacement)
 
 
-@pytest.mark.parametrize("name", METHODS)
-def test_compliance_is_the_inverse_seen_from_the_contact(operators, name):
+def test_compliance_is_the_inverse_seen_from_the_contact(operators):
     """u_c = W * lam + u_free is what solve() gives, to what wraps around; supported unknowns zero; W_0 symmetric."""
-    problem = rod(operators[name, 5], smooth_load)
+    problem = rod(operators[5], smooth_load)
     lam = np.random.default_rng(1).standard_normal(problem.condensed().u_free.shape)
     for fixed in (problem.fixed, None):
         case = replace(problem, fixed=fixed)
@@ -204,10 +187,9 @@ def test_compliance_is_the_inverse_seen_from_the_contact(operators, name):
     assert values[0] > 0.9 and values[-1] < 5.5
 
 
-@pytest.mark.parametrize("name", METHODS)
-def test_work_of_contact_forces_is_never_negative(operators, name):
+def test_work_of_contact_forces_is_never_negative(operators):
     """B11: forces held in each step and the displacement increments: their work is a positive quadratic form."""
-    w = replace(rod(operators[name, 5], smooth_load), fixed=None).condensed().W[:20]
+    w = replace(rod(operators[5], smooth_load), fixed=None).condensed().W[:20]
     increments = np.diff(w, axis=0, prepend=0.0)
     size = w.shape[1]
     form = np.zeros((20 * size, 20 * size))
@@ -218,15 +200,14 @@ def test_work_of_contact_forces_is_never_negative(operators, name):
     assert values[0] > -1e-8 * values[-1]
 
 
-@pytest.mark.parametrize(("name", "tolerance"), [("BDF2", 6e-3), ("trapezoid", 1e-2), ("Radau", 1.2e-3)])
-def test_contact_runs_on_it(operators, name, tolerance):
+def test_contact_runs_on_it(operators):
     """V7.1: the pressed square with Tresca's friction: no penetration, impulse at t = 4 (4.6737 energetic); Uzawa."""
-    operator, mesh = operators[name, 10], operators[name, 10].mesh
+    operator, mesh = operators[10], operators[10].mesh
     forces = traction_forces(mesh, lambda x, n, t: -n, dt=0.1, steps=60, elements=mesh.labels == 2)
     problem = BoundaryProblem(operator, forces, contact=mesh.labels == 0)
     contact = BoundaryContact(problem.condensed(), friction=Tresca(0.05))
     run = march_contact(contact)
-    assert run.impulse[39, 1] == pytest.approx(4.6737, rel=tolerance) and run.gap.min() > -1e-12
+    assert run.impulse[39, 1] == pytest.approx(4.6737, rel=1.2e-3) and run.gap.min() > -1e-12
     assert (np.abs(run.shear) <= 0.05 * (1.0 + 1e-9)).all() and run.friction_loss[-1] > 0.04
     motion = problem.solve(run.forces)
     on_contact = motion.displacement[:, :, contact.compliance.nodes].reshape(60, -1)
@@ -236,49 +217,48 @@ def test_contact_runs_on_it(operators, name, tolerance):
     assert np.abs(SpaceTimeUzawa().solve(contact).r_n - run.r_n).max() < 1e-6 * run.r_n.max()
 
 
-@pytest.mark.parametrize("name", ["BDF2", "trapezoid"])
-def test_prescribed_motion_gives_the_forces_back(operators, name):
-    """The motion under forces, prescribed on a side or everywhere, has these forces as its reactions."""
-    operator, mesh = operators[name, 5], operators[name, 5].mesh
-    forces = np.moveaxis(np.random.default_rng(3).standard_normal((2, len(mesh), operator.steps)), -1, 0)
-    u = operator.solve(forces)
-    assert np.abs(operator.apply(u) - forces).max() < 1e-5 * np.abs(forces).max()
-    fixed = np.tile(mesh.nodes_of(mesh.labels == 1), (2, 1))
-    motion = BoundaryProblem(operator, np.where(fixed, 0.0, forces), fixed, u).solve()
-    assert np.abs(motion.displacement - u).max() < 1e-6 * np.abs(u).max()
-    assert np.abs(motion.forces - forces).max() < 1e-5 * np.abs(forces).max()
+def test_prescribed_motion(operators):
+    """The top of the rod moved as it moved under its load: all else moves as before, to second order in the step,
+    for prescribed unknowns move evenly during each step; the reactions there are the load."""
+    errors, forces = [], []
+    for operator in operators.values():
+        loaded, mesh = rod(operator, smooth_load), operator.mesh
+        motion, fixed = loaded.solve(), loaded.fixed.copy()
+        fixed[1] |= mesh.nodes_of(mesh.labels == 2)
+        still = np.zeros_like(loaded.forces)
+        moved = replace(loaded, forces=still, fixed=fixed, prescribed=motion.displacement).solve()
+        errors.append(np.linalg.norm(moved.displacement - motion.displacement) / np.linalg.norm(motion.displacement))
+        forces.append(np.linalg.norm(moved.forces - motion.forces) / np.linalg.norm(motion.forces))
+    assert errors[1] < 5e-3 and np.log2(errors[0] / errors[1]) > 1.7
+    assert forces[1] < 1.6e-2 and np.log2(forces[0] / forces[1]) > 1.3
 
 
 def test_density_and_the_unsymmetric_form(operators):
     """Twice the density at the same speeds halves the compliance; the unsymmetric form converges to the same rod."""
-    mesh = operators["BDF2", 5].mesh
+    mesh = operators[5].mesh
     heavy = LinearElastic.from_wave_speeds(1.0, 0.5, 2.0)
     light, twice = (
-        rod(convolution_operator(mesh, material, method=BDF2(), dt=0.2, steps=8), smooth_load).condensed()
+        rod(convolution_operator(mesh, material, dt=0.2, steps=8), smooth_load).condensed()
         for material in (MATERIAL, heavy)
     )
     assert np.allclose(2.0 * twice.W, light.W)
-    other = convolution_operator(polygon(SQUARE, 0.1), MATERIAL, method=Trapezoid(), dt=0.1, steps=60, symmetric=False)
+    other = convolution_operator(polygon(SQUARE, 0.1), MATERIAL, dt=0.1, steps=60, symmetric=False)
     assert top_error(other, smooth_load, smooth_integral) < 0.04
 
 
 def test_errors(operators):
     """One sentence each, naming the thing and the remedy."""
-    operator = operators["BDF2", 5]
+    operator = operators[5]
     n, steps = len(operator.mesh), operator.steps
     forces = np.zeros((steps, 2, n))
-    with pytest.raises(InputError, match="give BDF2"):
-        Frequencies("bdf2", 0.1, 3)
     with pytest.raises(InputError, match="above zero"):
-        Frequencies(BDF2(), -1.0, 3)
+        Frequencies(-1.0, 3)
     for count in (0, 2.5):
         with pytest.raises(InputError, match="at least 1"):
-            Frequencies(BDF2(), 0.1, count)
+            Frequencies(0.1, count)
     for dt, remedy in ((1e-3, "enlarge"), (10.0, "reduce")):
         with pytest.raises(InputError, match=remedy):
-            convolution_operator(operator.mesh, MATERIAL, method=BDF2(), dt=dt, steps=3)
-    with pytest.raises(InputError, match=r"0.3, too small for Trapezoid.* needs 0.5"):
-        convolution_operator(operator.mesh, MATERIAL, method=Trapezoid(), dt=0.06, steps=3)
+            convolution_operator(operator.mesh, MATERIAL, dt=dt, steps=3)
     with pytest.raises(InputError, match="forces has shape"):
         BoundaryProblem(operator, forces[1:])
     with pytest.raises(InputError, match="prescribed has shape"):

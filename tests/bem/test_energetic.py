@@ -25,7 +25,7 @@ from vi_contact.bem import (
     stored_blocks,
     traction_forces,
 )
-from vi_contact.bem.energetic import Marching
+from vi_contact.bem.energetic import marched
 from vi_contact.core.errors import InputError
 
 pytestmark = pytest.mark.serial
@@ -45,7 +45,7 @@ def test_plane_pulses(blocks, symmetric, shear, fine):
     for k, b in blocks.items():
         forces = traction_forces(b.mesh, wave.traction, dt=b.dt, steps=4 * k)
         exact = np.array([wave.displacement(b.mesh.points, b.dt * (j + 1)).T for j in range(4 * k)])
-        found = PoincareSteklov(b, 1.0, symmetric).solve(forces)
+        found = BoundaryProblem(PoincareSteklov(b, 1.0, symmetric), forces).solve().displacement
         errors.append(np.linalg.norm(found - exact) / np.linalg.norm(exact))
     assert errors[1] < fine and np.log2(errors[0] / errors[1]) > 1.85
 
@@ -71,7 +71,8 @@ def test_plane_pulses_in_other_shapes(shape, fine):
         forces = traction_forces(mesh, wave.traction, dt=1.0 / k, steps=4 * k)
         exact = np.array([wave.displacement(mesh.points, (j + 1) / k).T for j in range(4 * k)])
         b = energetic_blocks(mesh, MATERIAL, dt=1.0 / k, steps=4 * k)
-        errors.append(np.linalg.norm(PoincareSteklov(b, 1.0).solve(forces) - exact) / np.linalg.norm(exact))
+        found = BoundaryProblem(PoincareSteklov(b, 1.0), forces).solve().displacement
+        errors.append(np.linalg.norm(found - exact) / np.linalg.norm(exact))
     assert errors[1] < fine and np.log2(errors[0] / errors[1]) > 1.8
 
 
@@ -134,11 +135,12 @@ def test_compliance_is_the_inverse_seen_from_the_contact(blocks):
     assert np.allclose(compliance.normals, (0, -1)) and compliance.lengths.sum() == pytest.approx(1.0)
 
 
-def test_apply_and_solve_are_inverse(blocks):
+def test_motion_everywhere_gives_the_forces_back(blocks):
     """S of the displacements of the rod gives back its forces, reactions included."""
     for symmetric in (True, False):
-        motion = rod(blocks[5], smooth_load, symmetric=symmetric, rho=2.0).solve()
-        forces = PoincareSteklov(blocks[5], 2.0, symmetric).apply(motion.displacement)
+        problem = rod(blocks[5], smooth_load, symmetric=symmetric, rho=2.0)
+        motion, everywhere = problem.solve(), np.ones_like(problem.fixed)
+        forces = replace(problem, fixed=everywhere, prescribed=motion.displacement).solve().forces
         assert np.abs(forces - motion.forces).max() < 1e-11 * np.abs(forces).max()
 
 
@@ -149,7 +151,7 @@ def test_symmetric_form_is_positive_definite(ratio):
     small = energetic_blocks(mesh, MATERIAL, dt=0.2 * ratio, steps=steps)
     n = 2 * len(mesh)
     held = np.broadcast_to(np.eye(n), (steps, n, n))  # unit increments in step 0
-    columns = Marching(small, np.ones(n, bool)).run(np.zeros((steps, n, n)), held)[2]
+    columns = marched(small, np.ones(n, bool), np.zeros((steps, n, n)), held)[2]
     whole = np.zeros((steps, n, steps, n))
     for k in range(steps):
         for j in range(k + 1):
@@ -163,8 +165,8 @@ def test_symmetric_form_is_positive_definite(ratio):
 @pytest.mark.parametrize("ratio", [0.1, 0.25, 0.73, 4.0])
 def test_stable_for_small_and_large_time_steps(ratio):
     """B5: the rod stays bounded for c_P dt / h from 0.1 to 4 (to t = 60: benchmarks/bem.py)."""
-    dt = 0.2 * ratio
-    small = energetic_blocks(polygon(SQUARE, 0.2), MATERIAL, dt=dt, steps=round(12 / max(dt, 0.06)))
+    dt = 0.5 * ratio
+    small = energetic_blocks(polygon(SQUARE, 0.5), MATERIAL, dt=dt, steps=round(12 / dt))
     motion = rod(small, smooth_load).solve()
     assert np.abs(motion.displacement).max() < 1.2 and motion.work.min() > -1e-12
     assert (motion.work[motion.times > 2.0] < 1.2 * motion.work.max()).all()
@@ -185,7 +187,7 @@ def test_a_free_disk_keeps_its_momentum():
     flying = energetic_blocks(mesh, MATERIAL, dt=0.1, steps=50)
     forces = np.zeros((50, 2, 24))
     forces[:10, 1, 0] = 1.0
-    u = PoincareSteklov(flying, 1.0).solve(forces)
+    u = BoundaryProblem(PoincareSteklov(flying, 1.0), forces).solve().displacement
     share = mesh.node_lengths(np.ones(len(mesh), bool)) / mesh.lengths.sum()
     mean = (u[:, 1] * share).sum(axis=1)
     velocity = np.polyfit(flying.dt * np.arange(20, 51), mean[19:], 1)[0]
@@ -263,7 +265,7 @@ def test_time_steps_that_are_refused(options, message):
 def test_other_errors(blocks):
     operator = PoincareSteklov(blocks[5], 1.0)
     with pytest.raises(InputError, match="assemble it with more steps"):
-        operator.solve(np.zeros((99, 2, 20)))
+        BoundaryProblem(operator, np.zeros((99, 2, 20))).solve()
     with pytest.raises(InputError, match=r"fixed has shape \(20,\)"):
         BoundaryProblem(operator, np.zeros((3, 2, 20)), np.zeros(20, bool))
     with pytest.raises(InputError, match="no contact boundary"):

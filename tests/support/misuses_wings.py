@@ -92,7 +92,7 @@ def operators() -> Table:
             "dt": POSITIVE | {"small": 1e-6, "great": 50.0}, "steps": STEPS | {"endless": 10**12},
             "orders": OTHER | {"numbers": (4, 8)}}),
         (bem.convolution_operator, body | {"dt": 0.5, "steps": 2}, BODY | {
-            "method": OTHER | {"class": bem.BDF2}, "dt": POSITIVE, "steps": STEPS, "symmetric": FLAG}),
+            "dt": POSITIVE, "steps": STEPS, "symmetric": FLAG}),
         (bem.LaplaceKernels, {"s": 1.0 + 1.0j, "c_p": 1.0, "c_s": 0.5},
          speed | {"s": {"text": "1", "nan": complex(nan, 1.0), "negative": -1.0 + 1.0j, "zero": 0.0, "none": None}}),
         (bem.TimeKernels, {"t": 1.0, "c_p": 1.0, "c_s": 0.5}, speed | {"t": POSITIVE}),
@@ -107,8 +107,7 @@ def operators() -> Table:
         (problem.solve, {}, {"contact_forces": {"text": "up", "nan": np.full((2, 6), nan), "short": np.zeros((2, 5))}}),
         (bem.BoundaryProblem, {"operator": wave, "forces": still},
          fields | {"operator": OTHER | {"blocks": blocks}, "forces": histories | {"many": np.zeros((3, 2, 8))}}),
-        (bem.Frequencies, {"method": bem.BDF2(), "dt": 0.1, "steps": 2},
-         {"method": OTHER | {"class": bem.BDF2}, "dt": POSITIVE, "steps": STEPS}),
+        (bem.Frequencies, {"dt": 0.1, "steps": 2}, {"dt": POSITIVE, "steps": STEPS}),
         (bem.interior_displacement, {"operator": steklov, "motion": motion, "points": [(0.5, 0.4)]}, {
             "operator": OTHER, "motion": OTHER, "steps": {"text": "ab", "far": [7], "half": [0.5]},
             "points": RAGGED | {"text": "middle", "nan": [(nan, 0.0)], "space": np.eye(3), "outside": [(2.0, 2.0)]}}),

@@ -12,7 +12,7 @@ from .boundary_operators import Galerkin, OperatorMatrices
 from .contact import BoundaryContact, Conditions, conditions_on
 from .contact_run import ContactLedger, ContactRun, ledger, march_contact
 from .convolution_operator import ConvolutionOperator, convolution_operator
-from .convolution_quadrature import BDF2, Frequencies, RadauIIA, Trapezoid
+from .convolution_quadrature import Frequencies
 from .energetic import EnergeticBlocks, energetic_blocks
 from .fundamental_solution import LaplaceKernels, TimeKernels
 from .interior import interior_displacement
@@ -25,10 +25,10 @@ from .two_bodies import TwoBodies
 from .uzawa_space_time import SpaceTimeUzawa
 
 __all__ = [
-    "BDF2", "BoundaryContact", "BoundaryMesh", "BoundaryMotion", "BoundaryProblem", "CondensedCompliance",
+    "BoundaryContact", "BoundaryMesh", "BoundaryMotion", "BoundaryProblem", "CondensedCompliance",
     "Conditions", "ContactLedger", "ContactRun", "ConvolutionOperator", "EnergeticBlocks",
     "Frequencies", "Galerkin", "LaplaceKernels", "OperatorMatrices", "Orders", "PoincareSteklov",
-    "RadauIIA", "RadialTable", "SpaceTimeUzawa", "TimeKernels", "Trapezoid", "TwoBodies", "circle", "conditions_on",
+    "RadialTable", "SpaceTimeUzawa", "TimeKernels", "TwoBodies", "circle", "conditions_on",
     "convolution_operator",
     "energetic_blocks", "from_segments", "interior_displacement", "ledger", "load_blocks", "march_contact",
     "polygon", "save_blocks", "smooth_curve", "stored_blocks", "traction_forces",

@@ -11,18 +11,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from ..core.algebra import Array
-from ..core.checks import counted, flag, instance, shape_of
-from ..core.errors import InputError
+from ..core.checks import counted, flag
 from ..laws.materials import LinearElastic
 from .boundary_mesh import BoundaryMesh
 from .boundary_operators import check_body
-from .convolution_quadrature import Frequencies, RadauIIA, TimeMethod
+from .convolution_quadrature import WIDTHS, Frequencies
 from .energetic import NUMBERS, check_time_step
 from .fundamental_solution import LaplaceKernels
-from .poincare_steklov import applied, freed
 from .quadrature import Orders
 from .radial_table import RadialTable
 
@@ -36,22 +34,13 @@ PANEL = 1.5  # width of the panels of the radial table, in c_S dt: functions the
 class ConvolutionOperator:
     """Hold S of a body at the frequencies of a convolution quadrature, of the material's own density.
 
-    steklov: (L, stages, 2n, 2n) S(s); to_traction: (L, stages, 4n, 2n) V⁻¹ (M/2 + K); L = steps/2 + 1.
+    steklov: (L, 2, 2n, 2n) S(s); to_traction: (L, 2, 4n, 2n) V⁻¹ (M/2 + K); L = steps/2 + 1: convolution_operator(...).
     """
 
     mesh: BoundaryMesh
     frequencies: Frequencies
     steklov: NDArray
     to_traction: NDArray
-
-    def __post_init__(self) -> None:
-        instance("ConvolutionOperator", "mesh", self.mesh, BoundaryMesh, "give a BoundaryMesh")
-        instance("ConvolutionOperator", "frequencies", self.frequencies, Frequencies, "give Frequencies(...)")
-        n, table = len(self.mesh), self.frequencies.s.shape
-        for name, rows in (("steklov", 2 * n), ("to_traction", 4 * n)):
-            if shape_of(getattr(self, name)) != (*table, rows, 2 * n):
-                raise InputError(f"ConvolutionOperator: {name} has shape {np.shape(getattr(self, name))}; this mesh "
-                                 f"and these frequencies need {(*table, rows, 2 * n)}: use convolution_operator(...)")
 
     @property
     def steps(self) -> int:
@@ -63,27 +52,19 @@ class ConvolutionOperator:
         """Return the time step [s]."""
         return self.frequencies.dt
 
-    def apply(self, displacement: ArrayLike) -> Array:
-        """Return (steps, 2, n) mean nodal forces [N/m] of displacements (steps, 2, n) at t_1, t_2, ...; 0 at t_0."""
-        return applied(self, displacement)
-
-    def solve(self, forces: ArrayLike) -> Array:
-        """Return (steps, 2, n) displacements under nodal forces (steps, 2, n): the inverse, no support anywhere."""
-        return freed(self, forces)
-
     def load_shape(self, dimensions: int) -> tuple[int, ...]:
         """Return the shape of the nodal forces of a problem; in four dimensions the second is that of the stages."""
-        steps, stages = self.steps, self.frequencies.s.shape[1]
-        return (steps, stages, 2, len(self.mesh)) if dimensions == 4 else (steps, 2, len(self.mesh))
+        stages = (2,) if dimensions == 4 else ()
+        return self.steps, *stages, 2, len(self.mesh)
 
     def motion(self, forces: Array, fixed: Mask, prescribed: Array | None) -> tuple[Array, Array, Array]:
-        """Return the motion by frequencies; forces: (steps, stages or 1, 2n)."""
+        """Return the motion by frequencies; forces: (steps, 2 or 1, 2n)."""
         table = self.frequencies
         u = self._displacement_modes(table.impulses(forces), ~fixed, prescribed)
         over_s = u[..., None] / table.s[..., None, None]
         traction = table.step_means((self.to_traction @ over_s)[..., 0])
         reaction = table.step_means((self.steklov @ over_s)[..., 0])
-        widths = np.diff(table.method.abscissae, prepend=0.0) if forces.shape[1] > 1 else np.ones(1)
+        widths = WIDTHS if forces.shape[1] > 1 else np.ones(1)
         return table.at_ends(u), traction, np.where(fixed, reaction, forces.transpose(0, 2, 1) @ widths)
 
     def condense(
@@ -100,7 +81,7 @@ class ConvolutionOperator:
         return table.backward(transform), self.motion(forces, fixed, prescribed)[0][:, unknowns]
 
     def _displacement_modes(self, impulses: NDArray, free: Mask, prescribed: Array | None) -> NDArray:
-        """Return (L, stages, 2n) displacements at the frequencies; prescribed ones move evenly during each step."""
+        """Return (L, 2, 2n) displacements at the frequencies; prescribed ones move evenly during each step."""
         table, u = self.frequencies, np.zeros_like(impulses)
         load = impulses * table.s[..., None]
         if prescribed is not None:
@@ -112,24 +93,20 @@ class ConvolutionOperator:
 
 
 def convolution_operator(
-    mesh: BoundaryMesh, material: LinearElastic, *, dt: float, steps: int, method: TimeMethod = RadauIIA(),
-    symmetric: bool = True, orders: Orders = ORDERS,
+    mesh: BoundaryMesh, material: LinearElastic, *, dt: float, steps: int, symmetric: bool = True,
+    orders: Orders = ORDERS,
 ) -> ConvolutionOperator:
-    """Assemble S for `steps` time steps of dt [s] by BDF2(), Trapezoid() or RadauIIA(): 96 steps stages n² bytes.
+    """Assemble S for `steps` time steps of dt [s] by Radau IIA: 192 steps n² bytes.
 
-    Raises InputError for a time step too small (c_P dt/h < 0.05, for the trapezoidal rule 0.5) or too large (> 8) for
-    the mesh, or for less than one step.
+    Raises InputError for a time step too small (c_P dt/h < 0.05) or too large (> 8) for the mesh, or for less than one
+    step.
     """
     check_body(mesh, material, orders)
     flag("convolution_operator", "symmetric", symmetric)
-    table = Frequencies(method, dt, steps)
+    table = Frequencies(dt, steps)
     counted("convolution_operator", f"{table.s.size} frequencies of {len(mesh)} elements",
             24 * table.s.size * len(mesh) ** 2, "numbers", most=NUMBERS)
     check_time_step(mesh, material.c_p, dt)
-    ratio = material.c_p * dt / float(mesh.lengths.max())
-    if ratio < method.smallest_ratio * (1.0 - 1e-9):
-        raise InputError(f"convolution_operator: c_P dt / h is {ratio:.3g}, too small for {method}, which "
-                         f"needs {method.smallest_ratio:g}; enlarge the time step or refine the mesh")
     n, rho, count = len(mesh), material.rho, table.s.size
     galerkin = RadialTable(mesh, material.c_s, PANEL * material.c_s * dt, orders)
     steklov, to_traction = np.empty((count, 2 * n, 2 * n), complex), np.empty((count, 4 * n, 2 * n), complex)

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, lu_factor, lu_solve
 
 from ..core.algebra import Array
-from ..core.checks import attributes, counted, instance, number, shape_of, whole
+from ..core.checks import counted, number, whole
 from ..core.errors import InputError
 from ..laws.materials import LinearElastic
 from .boundary_mesh import BoundaryMesh
@@ -48,17 +48,6 @@ class EnergeticBlocks:
     single: Array
     double: Array
     hyper: Array
-
-    def __post_init__(self) -> None:
-        instance("EnergeticBlocks", "mesh", self.mesh, BoundaryMesh, "give a BoundaryMesh")
-        attributes(self, positive=("c_p", "c_s", "dt"))
-        n, steps = len(self.mesh), shape_of(self.single)[:1]
-        shapes = {"single": (*steps, 4 * n, 4 * n), "double": (*steps, 4 * n, 2 * n), "hyper": (*steps, 2 * n, 2 * n)}
-        for name, shape in shapes.items():
-            found = shape_of(getattr(self, name))
-            if found != shape:
-                raise InputError(f"EnergeticBlocks: {name} has shape {found}; a mesh of {n} elements needs {shape}: "
-                                 "use energetic_blocks(...)")
 
     @property
     def steps(self) -> int:
@@ -102,59 +91,52 @@ def energetic_blocks(
     return EnergeticBlocks(mesh, c_p, c_s, dt, single, double, hyper)
 
 
-class Marching:
-    """Solve the block Toeplitz system step by step; the first block is factored once.
-
-    fixed: (2n,) unknowns whose displacement is given; symmetric: which form.
+def marched(
+    blocks: EnergeticBlocks, fixed: NDArray[np.bool_], forces: Array, prescribed: Array | None = None, *,
+    symmetric: bool = True,
+) -> tuple[Array, Array, Array]:
+    """Return displacements (steps, 2n, R) at the ends of the steps, tractions (steps, 4n, R) and nodal forces
+    (steps, 2n, R) in them, reactions included, for R right-hand sides: forces (steps, 2n, R), and ``prescribed``
+    (steps, 2n, R), read at ``fixed`` unknowns (2n,) only. For density 1: divide forces by rho before, multiply after.
     """
+    steps, unknowns, count = forces.shape
+    if steps > blocks.steps:
+        raise InputError(f"boundary elements: forces for {steps} steps, but the operator has {blocks.steps}; "
+                         "assemble it with more steps")
+    mass, free = blocks.mesh.mass, ~fixed
+    v0 = cho_factor(0.5 * (blocks.single[0] + blocks.single[0].T))
+    right = blocks.double[0] + 0.5 * mass
+    left = right.T if symmetric else mass.T
+    v0_right = cho_solve(v0, right)
+    s0 = left @ v0_right
+    if symmetric:
+        s0 -= blocks.hyper[0]
+        s0 = 0.5 * (s0 + s0.T)
+    factor = lu_factor(s0[np.ix_(free, free)]) if free.any() else None
+    u, p = np.zeros((steps, unknowns, count)), np.empty((steps, 2 * unknowns, count))
+    total, before = forces.copy(), np.zeros((unknowns, count))
+    for k in range(steps):
+        past = summed(blocks.single[k:0:-1], p[:k]) - summed(blocks.double[k:0:-1], u[:k])
+        v0_early = cho_solve(v0, 0.5 * mass @ before - past)
+        known = left @ v0_early
+        if symmetric and k:
+            known = known + _adjoint(blocks, p[:k], u[:k])
+        if prescribed is not None:
+            u[k, fixed] = prescribed[k, fixed] - before[fixed]
+        if factor is not None:
+            pull = known + s0[:, fixed] @ u[k, fixed]
+            u[k, free] = lu_solve(factor, (forces[k] - pull)[free])
+        p[k] = v0_right @ u[k] + v0_early
+        total[k] = np.where(free[:, None], forces[k], known + s0 @ u[k])
+        before = before + u[k]
+    return np.cumsum(u, axis=0, out=u), p, total
 
-    def __init__(self, blocks: EnergeticBlocks, fixed: NDArray[np.bool_], *, symmetric: bool = True) -> None:
-        self.blocks, self.symmetric, self.free = blocks, symmetric, ~fixed
-        self.mass = blocks.mesh.mass
-        self.v0 = cho_factor(0.5 * (blocks.single[0] + blocks.single[0].T))
-        self.right = blocks.double[0] + 0.5 * self.mass
-        self.left = self.right.T if symmetric else self.mass.T
-        self.v0_right = cho_solve(self.v0, self.right)
-        self.s0 = self.left @ self.v0_right
-        if symmetric:
-            self.s0 -= blocks.hyper[0]
-            self.s0 = 0.5 * (self.s0 + self.s0.T)
-        self.factor = lu_factor(self.s0[np.ix_(self.free, self.free)]) if self.free.any() else None
 
-    def run(self, forces: Array, prescribed: Array | None = None) -> tuple[Array, Array, Array]:
-        """Return displacements (steps, 2n, R) at the ends of the steps, tractions (steps, 4n, R) and nodal forces
-        (steps, 2n, R) in them, reactions included, for R right-hand sides: forces (steps, 2n, R), and prescribed
-        (steps, 2n, R), read at fixed unknowns only. For density 1: divide forces by rho before, multiply after."""
-        steps, unknowns, count = forces.shape
-        if steps > self.blocks.steps:
-            raise InputError(f"boundary elements: forces for {steps} steps, but the operator has {self.blocks.steps}; "
-                             "assemble it with more steps")
-        u, p = np.zeros((steps, unknowns, count)), np.empty((steps, 2 * unknowns, count))
-        total, before = forces.copy(), np.zeros((unknowns, count))
-        q = np.empty_like(p) if self.symmetric else p
-        for k in range(steps):
-            past = summed(self.blocks.single[k:0:-1], p[:k]) - summed(self.blocks.double[k:0:-1], u[:k])
-            early = 0.5 * self.mass @ before - past
-            v0_early = cho_solve(self.v0, early)
-            known = self.left @ v0_early + self._past(k, p, q, u)
-            if prescribed is not None:
-                u[k, ~self.free] = prescribed[k, ~self.free] - before[~self.free]
-            if self.factor is not None:
-                pull = known + self.s0[:, ~self.free] @ u[k, ~self.free]
-                u[k, self.free] = lu_solve(self.factor, (forces[k] - pull)[self.free])
-            p[k] = self.v0_right @ u[k] + v0_early
-            total[k] = np.where(self.free[:, None], forces[k], known + self.s0 @ u[k])
-            if self.symmetric:
-                q[k] = p[k] - p[k - 1] if k else p[k]
-            before = before + u[k]
-        return np.cumsum(u, axis=0, out=u), p, total
-
-    def _past(self, k: int, p: Array, q: Array, u: Array) -> Array:
-        """Return the sum over earlier steps of K' p - D u; q are the jumps of p. Zero in the unsymmetric form."""
-        if k == 0 or not self.symmetric:
-            return np.zeros(u.shape[1:])
-        adjoint = summed(self.blocks.double[k:0:-1].swapaxes(1, 2), q[:k]) - self.blocks.double[0].T @ p[k - 1]
-        return adjoint - summed(self.blocks.hyper[k:0:-1], u[:k])
+def _adjoint(blocks: EnergeticBlocks, p: Array, u: Array) -> Array:
+    """Return the sum of K' p - D u over the k earlier steps of the symmetric form; K' acts on the jumps of p."""
+    k, jumps = len(p), np.diff(p, axis=0, prepend=0.0)
+    adjoint = summed(blocks.double[k:0:-1].swapaxes(1, 2), jumps) - blocks.double[0].T @ p[-1]
+    return adjoint - summed(blocks.hyper[k:0:-1], u)
 
 
 def summed(blocks: Array, values: Array) -> Array:

@@ -17,7 +17,7 @@ from ..core.algebra import Array
 from ..core.checks import array, flag, instance, integers, mask, number, provides, shape_of
 from ..core.errors import InputError
 from .boundary_mesh import BoundaryMesh
-from .energetic import EnergeticBlocks, Marching, summed
+from .energetic import EnergeticBlocks, marched, summed
 
 Mask = NDArray[np.bool_]
 
@@ -70,14 +70,6 @@ class PoincareSteklov:
         """Return the time step [s]."""
         return self.blocks.dt
 
-    def apply(self, displacement: ArrayLike) -> Array:
-        """Return (steps, 2, n) nodal forces [N/m] of displacements (steps, 2, n) at t_1, t_2, ...; 0 at t_0."""
-        return applied(self, displacement)
-
-    def solve(self, forces: ArrayLike) -> Array:
-        """Return (steps, 2, n) displacements under nodal forces (steps, 2, n): the inverse, no support anywhere."""
-        return freed(self, forces)
-
     def load_shape(self, dimensions: int) -> tuple[int | None, ...]:
         """Return the shape of the nodal forces of a problem."""
         return None, 2, len(self.mesh)
@@ -85,7 +77,8 @@ class PoincareSteklov:
     def motion(self, forces: Array, fixed: Mask, prescribed: Array | None) -> tuple[Array, Array, Array]:
         """Return the motion by one march; forces: (steps, 1, 2n)."""
         given = None if prescribed is None else prescribed[:, :, None]
-        u, p, total = self._marching(fixed).run(forces.swapaxes(1, 2) / self.rho, given)
+        loads = forces.swapaxes(1, 2) / self.rho
+        u, p, total = marched(self.blocks, fixed, loads, given, symmetric=self.symmetric)
         return u[:, :, 0], self.rho * p[:, :, 0], self.rho * total[:, :, 0]
 
     def condense(
@@ -99,11 +92,8 @@ class PoincareSteklov:
         if prescribed is not None:
             given = np.zeros_like(columns)
             given[:, :, -1] = prescribed
-        u = self._marching(fixed).run(columns, given)[0][:, unknowns]
+        u = marched(self.blocks, fixed, columns, given, symmetric=self.symmetric)[0][:, unknowns]
         return np.ascontiguousarray(u[:, :, :-1]), np.ascontiguousarray(u[:, :, -1])
-
-    def _marching(self, fixed: Mask) -> Marching:
-        return Marching(self.blocks, fixed, symmetric=self.symmetric)
 
 
 @dataclass(frozen=True)
@@ -233,15 +223,3 @@ class BoundaryProblem:
             W, u_free, nodes, mesh.points[nodes], mesh.node_normals(elements)[nodes],
             mesh.node_lengths(elements)[nodes], self.operator.dt, mesh.node_turns(elements)[nodes],
         )
-
-
-def applied(operator: BodyOperator, displacement: ArrayLike) -> Array:
-    """Return the nodal forces (steps, 2, n) of a motion prescribed everywhere."""
-    u = array(type(operator).__name__, "displacement", displacement, operator.load_shape(3), unit="m")
-    return BoundaryProblem(operator, np.zeros_like(u), np.ones(u.shape[1:], bool), u).solve().forces
-
-
-def freed(operator: BodyOperator, forces: ArrayLike) -> Array:
-    """Return the displacement (steps, 2, n) under nodal forces without any support."""
-    given = array(type(operator).__name__, "forces", forces, operator.load_shape(3), unit="N/m")
-    return BoundaryProblem(operator, given).solve().displacement
