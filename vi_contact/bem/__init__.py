@@ -7,7 +7,7 @@ In this order: a ``BoundaryMesh``, ``energetic_blocks``, ``PoincareSteklov``, ``
 3.137
 """
 
-from .boundary_mesh import BoundaryMesh, circle, from_segments, polygon, smooth_curve
+from .boundary_mesh import BoundaryMesh, circle, from_segments, polygon
 from .boundary_operators import Galerkin, OperatorMatrices
 from .contact import BoundaryContact, Conditions, conditions_on
 from .contact_run import ContactLedger, ContactRun, ledger, march_contact
@@ -20,16 +20,14 @@ from .loads import traction_forces
 from .poincare_steklov import BoundaryMotion, BoundaryProblem, CondensedCompliance, PoincareSteklov
 from .quadrature import Orders
 from .radial_table import RadialTable
-from .storage import load_blocks, save_blocks, stored_blocks
+from .storage import stored_blocks
 from .two_bodies import TwoBodies
 from .uzawa_space_time import SpaceTimeUzawa
 
 __all__ = [
-    "BoundaryContact", "BoundaryMesh", "BoundaryMotion", "BoundaryProblem", "CondensedCompliance",
-    "Conditions", "ContactLedger", "ContactRun", "ConvolutionOperator", "EnergeticBlocks",
-    "Frequencies", "Galerkin", "LaplaceKernels", "OperatorMatrices", "Orders", "PoincareSteklov",
-    "RadialTable", "SpaceTimeUzawa", "TimeKernels", "TwoBodies", "circle", "conditions_on",
-    "convolution_operator",
-    "energetic_blocks", "from_segments", "interior_displacement", "ledger", "load_blocks", "march_contact",
-    "polygon", "save_blocks", "smooth_curve", "stored_blocks", "traction_forces",
+    "BoundaryContact", "BoundaryMesh", "BoundaryMotion", "BoundaryProblem", "CondensedCompliance", "Conditions",
+    "ContactLedger", "ContactRun", "ConvolutionOperator", "EnergeticBlocks", "Frequencies", "Galerkin",
+    "LaplaceKernels", "OperatorMatrices", "Orders", "PoincareSteklov", "RadialTable", "SpaceTimeUzawa", "TimeKernels",
+    "TwoBodies", "circle", "conditions_on", "convolution_operator", "energetic_blocks", "from_segments",
+    "interior_displacement", "ledger", "march_contact", "polygon", "stored_blocks", "traction_forces",
 ]

@@ -178,25 +178,13 @@ def polygon(corners: ArrayLike, h: float | Sequence[int], *, exterior: bool = Fa
     return BoundaryMesh(points, labels=np.repeat(np.arange(len(start)), counts), exterior=exterior)
 
 
-def smooth_curve(curve: Callable[[Array], Array], count: int, *, exterior: bool = False) -> BoundaryMesh:
-    """Mesh a closed curve: `count` chords at equal steps of its parameter in [0, 1), curve(parameters) -> (m, 2)."""
-    function("smooth_curve", "curve", curve, "give a function of parameters (m,) that returns points (m, 2)")
-    counted("smooth_curve", "count", whole("smooth_curve", "count", count, least=3), "elements", most=MOST_ELEMENTS)
-    points = array("smooth_curve", "what curve(parameters) returns", curve(np.arange(count) / count), (count, 2))
-    return BoundaryMesh(points, exterior=exterior)
-
-
 def circle(radius: float, count: int, *, centre: ArrayLike = (0.0, 0.0), exterior: bool = False) -> BoundaryMesh:
     """Return a disk of `count` chords, starting at its lowest point; exterior: the space around a round hole."""
     middle = array("circle", "centre", centre, (2,), unit="m")
     number("circle", "radius", radius, positive=True, unit="m")
-    turn = -2.0 * np.pi if exterior else 2.0 * np.pi
-
-    def point(t: Array) -> Array:
-        angle = turn * t - 0.5 * np.pi
-        return middle + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-
-    return smooth_curve(point, count, exterior=exterior)
+    counted("circle", "count", whole("circle", "count", count, least=3), "elements", most=MOST_ELEMENTS)
+    angle = (-2.0 * np.pi if exterior else 2.0 * np.pi) * (np.arange(count) / count) - 0.5 * np.pi
+    return BoundaryMesh(middle + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1), exterior=exterior)
 
 
 def from_segments(

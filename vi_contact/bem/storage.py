@@ -1,4 +1,4 @@
-"""Save boundary element blocks (HDF5): they depend on geometry, wave speeds and time step, on no load or density."""
+"""Keep boundary element blocks in a file (HDF5): they depend on geometry, wave speeds and time step only."""
 
 from __future__ import annotations
 
@@ -20,85 +20,60 @@ FORMAT = "vi_contact boundary element blocks, 2"
 EQUAL = 1e-12  # relative difference up to which geometry, speeds and time step count as equal
 
 
-def save_blocks(path: str | Path, blocks: EnergeticBlocks) -> None:
-    """Write the blocks; an existing file is replaced once the new one is complete."""
-    checks.instance("save_blocks", "blocks", blocks, EnergeticBlocks, "give those of energetic_blocks")
-    target, mesh = _target("save_blocks", path), blocks.mesh
+def stored_blocks(
+    path: str | Path, mesh: BoundaryMesh, material: LinearElastic, *, dt: float, steps: int
+) -> EnergeticBlocks:
+    """Return the first `steps` blocks of the file if it exists; else compute and write them.
+
+    Raises InputError, naming what differs, when the file belongs to another mesh, material or time step, holds fewer
+    steps, or is no such file, and for a file that cannot be written.
+    """
+    owner = "stored_blocks"
+    target = checks.path(owner, "path", path)
+    if not target.parent.is_dir():
+        raise InputError(f"{owner}: there is no folder {checks.shown(str(target.parent))}; make it first")
+    if target.exists():
+        check_body(mesh, material, Orders())
+        steps = checks.whole(owner, "steps", steps, least=1)
+        return _read(target, mesh, material, checks.number(owner, "dt", dt, positive=True, unit="s"), steps)
+    blocks = energetic_blocks(mesh, material, dt=dt, steps=steps)
 
     def fill(file: Any) -> None:
-        file.attrs.update(format=FORMAT, c_p=blocks.c_p, c_s=blocks.c_s, dt=blocks.dt, exterior=mesh.exterior)
+        file.attrs.update(format=FORMAT, c_p=blocks.c_p, c_s=blocks.c_s, dt=dt, exterior=mesh.exterior)
         file["points"], file["loop_sizes"] = mesh.points, np.array(mesh.loop_sizes)
         file["single"], file["double"], file["hyper"] = blocks.single, blocks.double, blocks.hyper
 
     try:
         hdf5_atomically(target, fill)
     except OSError as error:
-        raise InputError(f"save_blocks: {target.name} cannot be written ({checks.shown(str(error))}); give a file in a "
+        raise InputError(f"{owner}: {target.name} cannot be written ({checks.shown(str(error))}); give a file in a "
                          "folder with room that may be written to") from error
-
-
-def load_blocks(
-    path: str | Path, mesh: BoundaryMesh, material: LinearElastic, *, dt: float, steps: int
-) -> EnergeticBlocks:
-    """Load the first `steps` blocks of a file written by save_blocks.
-
-    Raises InputError, naming what differs, when the file belongs to another mesh, material or time step, holds fewer
-    steps, or is no such file.
-    """
-    import h5py
-
-    checks.path("load_blocks", "path", path)
-    check_body(mesh, material, Orders())
-    steps = checks.whole("load_blocks", "steps", steps, least=1)
-    dt = checks.number("load_blocks", "dt", dt, positive=True, unit="s")
-    try:
-        file = h5py.File(path, "r")
-    except OSError as error:
-        raise InputError(f"{Path(path).name}: no readable HDF5 file; assemble the operator and save it") from error
-    with file:
-        try:
-            return _read(Path(path).name, file, mesh, material, dt, steps)
-        except InputError:
-            raise
-        except (KeyError, ValueError, TypeError, OSError, AttributeError) as error:
-            raise InputError(f"{Path(path).name}: a damaged file of boundary element blocks "
-                             f"({checks.shown(str(error))}); assemble the operator and save it again") from error
-
-
-def _read(
-    name: str, file: Any, mesh: BoundaryMesh, material: LinearElastic, dt: float, steps: int
-) -> EnergeticBlocks:
-    if file.attrs.get("format") != FORMAT:
-        raise InputError(f"{name}: no boundary element blocks of this version; give a file written by save_blocks")
-    different = _differences(file, mesh, material, dt, steps)
-    if different:
-        raise InputError(f"{name} holds the operator of another problem ({'; '.join(different)}); "
-                         "assemble the operator of this one")
-    n = len(mesh)
-    shapes = {"single": (steps, 4 * n, 4 * n), "double": (steps, 4 * n, 2 * n), "hyper": (steps, 2 * n, 2 * n)}
-    found = {key: checks.array(name, key, file[key][:steps], shape) for key, shape in shapes.items()}
-    return EnergeticBlocks(mesh, material.c_p, material.c_s, dt, **found)
-
-
-def stored_blocks(
-    path: str | Path, mesh: BoundaryMesh, material: LinearElastic, *, dt: float, steps: int
-) -> EnergeticBlocks:
-    """Load the blocks if the file exists, else compute and save them."""
-    if _target("stored_blocks", path).exists():
-        return load_blocks(path, mesh, material, dt=dt, steps=steps)
-    blocks = energetic_blocks(mesh, material, dt=dt, steps=steps)
-    save_blocks(path, blocks)
     return blocks
 
 
-def _target(owner: str, path: str | Path) -> Path:
-    target = checks.path(owner, "path", path)
-    if not target.parent.is_dir():
-        raise InputError(f"{owner}: there is no folder {checks.shown(str(target.parent))}; make it first")
-    return target
+def _read(path: Path, mesh: BoundaryMesh, material: LinearElastic, dt: float, steps: int) -> EnergeticBlocks:
+    import h5py
+
+    try:
+        with h5py.File(path, "r") as file:
+            different = _differences(file, mesh, material, dt, steps)
+            if different:
+                raise InputError(f"{path.name} holds the operator of another problem ({'; '.join(different)}); "
+                                 "assemble the operator of this one")
+            n = len(mesh)
+            shapes = {"single": (4 * n, 4 * n), "double": (4 * n, 2 * n), "hyper": (2 * n, 2 * n)}
+            found = {key: checks.array(path.name, key, file[key][:steps], (steps, *shapes[key])) for key in shapes}
+    except InputError:
+        raise
+    except (KeyError, ValueError, TypeError, OSError, AttributeError) as error:
+        raise InputError(f"{path.name}: no HDF5 file of boundary element blocks, or a damaged one "
+                         f"({checks.shown(str(error))}); remove it, and it is made again") from error
+    return EnergeticBlocks(mesh, material.c_p, material.c_s, dt, **found)
 
 
 def _differences(file: Any, mesh: BoundaryMesh, material: LinearElastic, dt: float, steps: int) -> list[str]:
+    if file.attrs["format"] != FORMAT:
+        return [f"in the format {checks.shown(file.attrs['format'])}, here '{FORMAT}'"]
     points = file["points"][:]
     if points.shape != mesh.points.shape:
         return [f"{len(points)} elements, here {len(mesh)}"]
