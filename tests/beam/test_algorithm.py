@@ -16,6 +16,7 @@ from vi_contact.beam.values import Rod, Start, TimoshenkoBeam
 from vi_contact.core.errors import InputError, StepFailure
 
 pytestmark = pytest.mark.serial
+FREE = source.readings()["none"]
 # (a2, reading): E at t = .02 .1 .5 1 1.5 2, tip at .1 .5 1 2, friction loss, viscous loss, Newton updates; as printed
 TABLE = {
     (0.001, "none"): "20.8301 20.8062 20.7067 20.6190 20.5204 20.3971 -.47161 -1.83104 -2.25985 .98011 0 .44245 1.000",
@@ -88,9 +89,9 @@ def test_qualitative_statements(runs: dict[tuple[float, str], BeamRun]) -> None:
 
 def test_without_viscosity_and_friction_energy_stays() -> None:
     """V6.1: "an unreasonable increase of the energy" for very small a2 is no property of the scheme."""
-    found = run(0.0, source.no_force)
+    found = run(0.0, FREE)
     assert np.ptp(found.energy) <= 2.5e-9
-    rigid = run(0.0, source.no_force, steps=1, start=Start(v=lambda x: -x, u=lambda x: -x / 200.0,
+    rigid = run(0.0, FREE, steps=1, start=Start(v=lambda x: -x, u=lambda x: -x / 200.0,
                                                            omega=lambda x: -np.ones_like(x)))
     assert rigid.energy[0] == pytest.approx(23.3384, abs=5e-5)
 
@@ -98,16 +99,16 @@ def test_without_viscosity_and_friction_energy_stays() -> None:
 def test_counts_of_longer_steps() -> None:
     """V6.1: reading C with dt = 0.005 takes 2.035 and 2.028 passes, the confirming one counted (2.0250, 2.0125)."""
     for a2, passes in ((0.001, 2.035), (2.0, 2.0275)):
-        found = run(a2, source.reading_c(0.005), dt=0.005, steps=400)
+        found = run(a2, source.readings(0.005)["C"], dt=0.005, steps=400)
         assert found.mean_updates + 1.0 == pytest.approx(passes, abs=1e-12)
 
 
 def test_published_newton_can_run_away() -> None:
     """Reading B with dt = 0.005: slips are large beside eps. StepFailure names the step; the safeguard converges."""
     with pytest.raises(StepFailure, match=r"step 297, t = 1\.485 s: Newton's method .* 60 updates .* safeguard=True"):
-        run(0.001, source.reading_b, dt=0.005, steps=400)
+        run(0.001, source.readings()["B"], dt=0.005, steps=400)
     safe = RegularisedFriction(0.002)
-    found = run(0.001, source.reading_b, dt=0.005, steps=400, friction=safe)
+    found = run(0.001, source.readings()["B"], dt=0.005, steps=400, friction=safe)
     assert np.all(np.diff(found.energy) < 0.0) and np.max(np.abs(found.history["energy_defect"])) <= 1e-8
     assert found.history["newton"].max() < 20
 
@@ -161,15 +162,15 @@ BAD: dict[str, tuple[Callable[[], object], str]] = {
     "published": (lambda: Elements(10, published_end=True), "reduced_shear=False"),
     "eps": (lambda: RegularisedFriction(0.0), "eps is 0.0; give a finite number above zero"),
     "iterations": (lambda: RegularisedFriction(1e-3, max_iterations=0), "max_iterations is 0"),
-    "dt": (lambda: run(0.0, source.no_force, dt=-1.0, m=4), "dt is -1.0; give a finite number above zero in s"),
-    "reading": (lambda: source.reading_c(0.0), "dt is 0.0; give a finite number above zero in s"),
-    "steps": (lambda: run(0.0, source.no_force, steps=0, m=4), "steps is 0"),
+    "dt": (lambda: run(0.0, FREE, dt=-1.0, m=4), "dt is -1.0; give a finite number above zero in s"),
+    "reading": (lambda: source.readings(0.0), "dt is 0.0; give a finite number above zero in s"),
+    "steps": (lambda: run(0.0, FREE, steps=0, m=4), "steps is 0"),
     "force": (lambda: run(0.0, lambda t: -1.0, m=4), r"force\(0 s\) is -1\.0; give zero or a positive"),
     "mu": (lambda: run(0.0, lambda t: 1.0, m=4, mu=lambda t, rate: np.nan), r"mu\(0 s, 5 m/s\) is nan; give"),
-    "load": (lambda: run(0.0, source.no_force, m=4, load=lambda t: np.inf), r"load\(0 s\) is inf; give a finite"),
+    "load": (lambda: run(0.0, FREE, m=4, load=lambda t: np.inf), r"load\(0 s\) is inf; give a finite"),
     "text": (lambda: run(0.0, lambda t: "10", m=4), r"force\(0 s\) is '10'; give zero"),
     "later": (lambda: run(0.0, lambda t: np.nan if t > 0.1 else 1.0, m=4), r"force\(0\.10\d* s\) is nan"),
-    "start": (lambda: run(0.0, source.no_force, m=4, start=Start(u=lambda x: x[:2])), r"u\(x\).* has shape \(2,\)"),
+    "start": (lambda: run(0.0, FREE, m=4, start=Start(u=lambda x: x[:2])), r"u\(x\).* has shape \(2,\)"),
 }
 
 

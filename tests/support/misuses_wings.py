@@ -196,7 +196,7 @@ def beams() -> Table:
          runs | {"dt": POSITIVE, "steps": STEPS, "scheme": but(THING, "list")}),
         (beam.StepForces, {"dt": 0.1, "forces": (1.0, 2.0)},
          {"dt": POSITIVE, "forces": RAGGED | {"text": "ab", "nan": (nan,), "number": 1.0}}),
-        (beam.reading_c, {"dt": 0.1}, {"dt": POSITIVE}),
+        (beam.readings, {"dt": 0.1}, {"dt": POSITIVE}),
     ]
 
 

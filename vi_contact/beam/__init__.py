@@ -6,25 +6,15 @@
 (2.0, 2.0)
 """
 
-from .algorithm import BeamRun, BeamStep, BeamStepper, Snapshot, run_beam
+from .algorithm import BeamRun, BeamStepper, Snapshot, run_beam
 from .contract import StepForces, beam_problem, rod_forces, rod_problem, rubbing_problem
 from .elements import Elements
-from .source_data import (
-    published_elements,
-    published_friction,
-    published_mu,
-    published_start,
-    reading_a,
-    reading_b,
-    reading_c,
-    readings,
-)
+from .source_data import published_elements, published_friction, published_mu, published_start, readings
 from .tip import ExactFriction, RegularisedFriction, Slip, TipFriction
 from .values import Rod, Start, TimoshenkoBeam
 
 __all__ = [
-    "BeamRun", "BeamStep", "BeamStepper", "Elements", "ExactFriction", "RegularisedFriction", "Rod", "Slip",
-    "Snapshot", "Start", "StepForces", "TimoshenkoBeam", "TipFriction", "beam_problem",
-    "published_elements", "published_friction", "published_mu", "published_start", "reading_a", "reading_b",
-    "reading_c", "readings", "rod_forces", "rod_problem", "rubbing_problem", "run_beam",
+    "BeamRun", "BeamStepper", "Elements", "ExactFriction", "RegularisedFriction", "Rod", "Slip", "Snapshot", "Start",
+    "StepForces", "TimoshenkoBeam", "TipFriction", "beam_problem", "published_elements", "published_friction",
+    "published_mu", "published_start", "readings", "rod_forces", "rod_problem", "rubbing_problem", "run_beam",
 ]

@@ -22,7 +22,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from itertools import count, islice
 from pathlib import Path
 
@@ -30,16 +29,18 @@ import numpy as np
 
 from ..core import checks
 from ..core.algebra import Array, SerialFactor, SerialMatrix
-from ..core.checks import array, counted, function, instance, number, provides, shown, whole
-from ..core.errors import InputError, StepFailure
-from .elements import BeamMatrices, Elements, beam_matrices
-from .tip import ExactFriction, Slip, TipFriction
+from ..core.checks import counted, function, instance, number, provides, whole
+from ..core.errors import StepFailure
+from ..core.files import write_csv
+from .elements import Elements, beam_matrices
+from .tip import ExactFriction, TipFriction
 from .values import Start, TimoshenkoBeam
 
 COLUMNS = (
     "t", "u_tip", "v_tip", "friction_force", "slip", "normal_force", "mu", "newton", "energy_kinetic", "energy_strain",
     "work_input", "loss_damping", "loss_friction",
 )
+
 
 @dataclass(frozen=True)
 class Snapshot:
@@ -75,12 +76,7 @@ class BeamRun:
     def save(self, path: str | Path) -> Path:
         """Write the history as CSV, a line per time."""
         file = checks.path("BeamRun.save", "the path", path)
-        if not file.parent.is_dir():
-            raise InputError(f"BeamRun.save: there is no folder {shown(str(file.parent))}; make it first")
-        columns = list(self.history)
-        table = np.column_stack([self.history[name] for name in columns])
-        np.savetxt(file, table, fmt="%.17g", delimiter=",", header=",".join(columns), comments="")
-        return file
+        return write_csv(file, list(self.history), np.column_stack(list(self.history.values())).tolist())
 
     def summary(self) -> str:
         """Return the energies, losses, tip and iterations in a few lines."""
@@ -100,23 +96,9 @@ class BeamRun:
 
 
 @dataclass(frozen=True)
-class BeamStep:
-    """Hold the end of a step: t [s], y and w there, increment of y, slip of the tip; |r_N| [N], mu and load [N/m]."""
-
-    t: float
-    y: Array
-    w: Array
-    increment: Array
-    slip: Slip
-    normal_force: float
-    mu: float
-    load: float
-
-
-@dataclass(frozen=True)
 class BeamStepper:
-    """Make condensed steps. ``normal_force``: t -> |r_N| >= 0 [N]; ``mu``: (t, slip rate [m/s] >= 0) -> coefficient;
-    ``load``: t -> uniform force along the beam [N/m], or None. InputError for dt <= 0."""
+    """Describe a beam and what acts on it. ``normal_force``: t -> |r_N| >= 0 [N]; ``mu``: (t, slip rate [m/s] >= 0) ->
+    coefficient; ``load``: t -> uniform force along the beam [N/m], or None. InputError for dt <= 0."""
 
     beam: TimoshenkoBeam
     elements: Elements
@@ -138,41 +120,8 @@ class BeamStepper:
         if self.load is not None:
             function(owner, "load", self.load, "give a function of t in N/m, or None")
 
-    @cached_property
-    def matrices(self) -> BeamMatrices:
-        """Return M, S and the unit load."""
-        return beam_matrices(self.beam, self.elements)
-
-    def steps(self, y: Array, w: Array) -> Iterator[BeamStep]:
-        """Yield steps without end, from y, w at t = 0. InputError for a bad force or coefficient; StepFailure with the
-        number of the step and its time."""
-        unknowns = (2 * self.elements.count,)
-        y, w = array("BeamStepper", "y", y, unknowns), array("BeamStepper", "w", w, unknowns)
-        M, S, dt = self.matrices.M, self.matrices.S, self.dt
-        P = ((2.0 / dt**2) * M + (self.beam.viscosity / dt + 0.5) * S).tocsr()
-        T = SerialFactor(SerialMatrix(P[:-1, :-1]))
-        p = P[:-1, -1].toarray().ravel()
-        column = T.solve(p)
-        c = float(P[-1, -1] - p @ column)
-        for k in count():
-            t = k * dt
-            N, mu, f = self._given(t, abs(float(w[-1])))
-            r = (2.0 / dt) * (M @ w) - S @ y + f * self.matrices.load
-            free = T.solve(r[:-1])
-            g = float(r[-1] - p @ free)
-            try:
-                slip = self.friction.solve(c, g, mu * N)
-            except StepFailure as failure:
-                raise StepFailure(f"step {k + 1}, t = {t + dt:.6g} s: {failure}") from None
-            increment = np.append(free - slip.s * column, slip.s)
-            y, w = y + increment, (2.0 / dt) * increment - w
-            if not (np.all(np.isfinite(y)) and np.all(np.isfinite(w))):
-                raise StepFailure(f"step {k + 1}, t = {t + dt:.6g} s: the beam's motion is no finite number; check the "
-                                  "loads and the state at the start")
-            yield BeamStep((k + 1) * dt, y, w, increment, slip, N, mu, f)
-
-    def _given(self, t: float, rate: float) -> tuple[float, float, float]:
-        """(|r_N|, mu, load) at a time, checked."""
+    def given(self, t: float, rate: float) -> tuple[float, float, float]:
+        """Return (|r_N|, mu, load) at a time and slip rate, checked."""
         owner, at = "BeamStepper", f"({t:.6g} s)"
         N = number(owner, f"normal_force{at}", self.normal_force(t), not_negative=True, unit="N")
         mu = number(owner, f"mu({t:.6g} s, {rate:.6g} m/s)", self.mu(t, rate), not_negative=True)
@@ -190,40 +139,51 @@ def run_beam(stepper: BeamStepper, start: Start, *, steps: int, every: int = 0) 
     kept = (len(COLUMNS) + 1) * steps + (4 * stepper.elements.count * (steps // every) if every else 0)
     counted("run_beam", f"a run of {steps} steps", kept, "numbers to keep")
     x = stepper.elements.nodes(stepper.beam.length)
-    y = np.concatenate([start.at("theta", x), start.at("u", x)])
-    w = np.concatenate([start.at("omega", x), start.at("v", x)])
-    rows: list[tuple[float, ...]] = [(0.0, y[-1], w[-1], *[0.0] * 5, *_energies(stepper, y, w), 0.0, 0.0, 0.0)]
-    snapshots = [_snapshot(0.0, y, w)] if every else []
-    for k, step in enumerate(islice(stepper.steps(y, w), steps), start=1):
-        rows.append(_row(stepper, step))
+    y0 = np.concatenate([start.at("theta", x), start.at("u", x)])
+    w0 = np.concatenate([start.at("omega", x), start.at("v", x)])
+    rows, snapshots = list[tuple[float, ...]](), list[Snapshot]()
+    for k, (row, y, w) in enumerate(islice(_states(stepper, y0, w0), steps + 1)):
+        rows.append(row)
         if every and k % every == 0:
-            snapshots.append(_snapshot(step.t, step.y, step.w))
+            values = np.zeros((4, len(x) + 1))
+            values[:, 1:] = np.stack([y.reshape(2, -1), w.reshape(2, -1)], axis=1).reshape(4, -1)
+            snapshots.append(Snapshot(row[0], values))
     return BeamRun(np.insert(x, 0, 0.0), _history(rows), tuple(snapshots))
 
 
-def _snapshot(t: float, y: Array, w: Array) -> Snapshot:
-    m = len(y) // 2
-    values = np.zeros((4, m + 1))
-    values[:, 1:] = y[:m], w[:m], y[m:], w[m:]
-    return Snapshot(t, values)
+def _states(stepper: BeamStepper, y: Array, w: Array) -> Iterator[tuple[tuple[float, ...], Array, Array]]:
+    """Yield (values by COLUMNS, works and losses of the step alone; y, w) at the start and after every step, without
+    end."""
+    matrices, dt, viscosity = beam_matrices(stepper.beam, stepper.elements), stepper.dt, stepper.beam.viscosity
+    M, S = matrices.M, matrices.S
 
+    def energies() -> tuple[float, float]:
+        return 0.5 * float(w @ (M @ w)), 0.5 * float(y @ (S @ y))
 
-def _energies(stepper: BeamStepper, y: Array, w: Array) -> tuple[float, float]:
-    matrices = stepper.matrices
-    return 0.5 * float(w @ (matrices.M @ w)), 0.5 * float(y @ (matrices.S @ y))
-
-
-def _row(stepper: BeamStepper, step: BeamStep) -> tuple[float, ...]:
-    """Values of a step by COLUMNS, works and losses its own."""
-    matrices, slip, moved = stepper.matrices, step.slip, step.increment
-    kinetic, strain = _energies(stepper, step.y, step.w)
-    work = step.load * float(matrices.load @ moved)
-    viscous = stepper.beam.viscosity / stepper.dt * float(moved @ (matrices.S @ moved))
-    if not np.isfinite(kinetic + strain + work):
-        raise StepFailure(f"t = {step.t:.6g} s: the energy of the beam is no finite number; check the loads and "
-                          "the state at the start")
-    return (step.t, step.y[-1], step.w[-1], slip.force, slip.s, step.normal_force, step.mu, slip.updates, kinetic,
-            strain, work, viscous, slip.force * slip.s)
+    yield (0.0, y[-1], w[-1], *[0.0] * 5, *energies(), 0.0, 0.0, 0.0), y, w
+    P = ((2.0 / dt**2) * M + (viscosity / dt + 0.5) * S).tocsr()
+    T = SerialFactor(SerialMatrix(P[:-1, :-1]))
+    p = P[:-1, -1].toarray().ravel()
+    column = T.solve(p)
+    c = float(P[-1, -1] - p @ column)
+    for k in count():
+        t, at = k * dt, f"step {k + 1}, t = {k * dt + dt:.6g} s"
+        N, mu, f = stepper.given(t, abs(float(w[-1])))
+        r = (2.0 / dt) * (M @ w) - S @ y + f * matrices.load
+        free = T.solve(r[:-1])
+        try:
+            slip = stepper.friction.solve(c, float(r[-1] - p @ free), mu * N)
+        except StepFailure as failure:
+            raise StepFailure(f"{at}: {failure}") from None
+        moved = np.append(free - slip.s * column, slip.s)
+        y, w = y + moved, (2.0 / dt) * moved - w
+        kinetic, strain = energies()
+        work, viscous = f * float(matrices.load @ moved), viscosity / dt * float(moved @ (S @ moved))
+        if not np.isfinite(kinetic + strain + work):
+            raise StepFailure(f"{at}: the beam's motion or its energy is no finite number; check the loads and the "
+                              "state at the start")
+        yield ((k + 1) * dt, y[-1], w[-1], slip.force, slip.s, N, mu, slip.updates, kinetic, strain, work, viscous,
+               slip.force * slip.s), y, w
 
 
 def _history(rows: list[tuple[float, ...]]) -> dict[str, Array]:

@@ -22,27 +22,6 @@ FORCE = 1.0e5  # |r_N(0)| [N]
 DT, STEPS = 0.002, 1000
 
 
-def reading_a(t: float) -> float:
-    """Return 10⁵/(100 t) [N], and 10⁵ at t = 0."""
-    return FORCE / (100.0 * t) if t > 0.0 else FORCE
-
-
-def reading_b(t: float) -> float:
-    """Return 10⁵/100^t [N], t in seconds."""
-    return float(FORCE * 100.0**-t)
-
-
-def reading_c(dt: float = DT) -> Force:
-    """Return the function 10⁵/100^(t/dt) [N]: a hundredth in every step of dt [s]. InputError unless dt > 0."""
-    number("reading_c", "dt", dt, positive=True, unit="s")
-    return lambda t: float(FORCE * 100.0 ** -(t / dt))
-
-
-def no_force(t: float) -> float:
-    """Return zero: the tip is free."""
-    return 0.0
-
-
 def published_mu(t: float, rate: float) -> float:
     """Return mu = |slip rate|/100 [-], rate in m/s."""
     return abs(rate) / 100.0
@@ -64,5 +43,12 @@ def published_friction(eps: float = 0.002) -> RegularisedFriction:
 
 
 def readings(dt: float = DT) -> dict[str, Force]:
-    """Return all readings by their letters, and "none"."""
-    return {"none": no_force, "A": reading_a, "B": reading_b, "C": reading_c(dt)}
+    """Return the readings of |r_N| [N] as functions of t [s] by their letters, and "none", a free tip; dt [s] is the
+    step of reading C. InputError unless dt > 0."""
+    number("readings", "dt", dt, positive=True, unit="s")
+    return {
+        "none": lambda t: 0.0,
+        "A": lambda t: FORCE / (100.0 * t) if t > 0.0 else FORCE,
+        "B": lambda t: float(FORCE * 100.0**-t),
+        "C": lambda t: float(FORCE * 100.0 ** -(t / dt)),
+    }
