@@ -39,9 +39,7 @@ class ElementPairs:
         self.b: Array = (ends - starts)[second].T
         self.offset: Array = (starts[first] - starts[second]).T
         self.h: Array = np.maximum(mesh.lengths[first], mesh.lengths[second])
-        corners = np.stack([
-            np.hypot(*(p[first] - q[second]).T) for p in (starts, ends) for q in (starts, ends)
-        ])
+        corners = np.stack([np.hypot(*(p[first] - q[second]).T) for p in (starts, ends) for q in (starts, ends)])
         self.r_max: Array = corners.max(axis=0)
         self.same = first == second
         self.shares_end = mesh.after[first] == second

@@ -129,9 +129,7 @@ class _Passages:
         self._evaluations = Evaluations()
         self.contacts: list[LayerContact] = []
 
-    def run(
-        self, start: float, t_end: float, q: Array, v: Array, inside: bool
-    ) -> tuple[float, Array, Array, bool]:
+    def run(self, start: float, t_end: float, q: Array, v: Array, inside: bool) -> tuple[float, Array, Array, bool]:
         """Integrate to the next crossing of the edge; (t, q, v, whether there was one)."""
         system, n = self._system, len(q)
         layer = self._layer.at(abs(system.normal_rate(q, v))) if inside and self._layer.speed is None else self._layer

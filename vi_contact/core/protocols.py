@@ -124,9 +124,7 @@ class ImpactLaw(Protocol):
 class MassLaw(Protocol):
     """Choose the mass matrix that contact is marched with."""
 
-    def apply(
-        self, system: SemiDiscreteSystem, surface: ContactSurface, *, tangential: bool
-    ) -> SemiDiscreteSystem:
+    def apply(self, system: SemiDiscreteSystem, surface: ContactSurface, *, tangential: bool) -> SemiDiscreteSystem:
         """Return ``system`` with the wanted mass matrix, as ``system.changed(M=…, massless=…)``, or as it is.
 
         Args:

@@ -146,9 +146,7 @@ def _on_first_side(
     return np.asarray(ahead > 0.0)
 
 
-def _doubled(
-    arrays: MeshArrays, nodes: Rows, sides: Rows, owner: Rows, one: Rows, other: Rows
-) -> tuple[Rows, Array]:
+def _doubled(arrays: MeshArrays, nodes: Rows, sides: Rows, owner: Rows, one: Rows, other: Rows) -> tuple[Rows, Array]:
     """Give each node a copy for every part of its cells that facets (rows `one`, `other`) connect: (cells, points)."""
     n = len(arrays.points)
     around, column = np.nonzero(np.isin(arrays.cells, nodes))

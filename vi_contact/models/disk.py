@@ -118,5 +118,4 @@ class Momentum:
 
     def _row(self, state: State) -> Row:
         impulse = self._system.M @ state.v
-        return {f"momentum_{name}": self._system.algebra.dot(motion, impulse)
-                for name, motion in self._motions.items()}
+        return {f"momentum_{name}": self._system.algebra.dot(motion, impulse) for name, motion in self._motions.items()}

@@ -54,9 +54,7 @@ def static_equilibrium(
 class Equilibria:
     """Solve static stages of one problem, with one factorisation, or none, for all."""
 
-    def __init__(
-        self, problem: ContactProblem, *, solver: Solver | None = None, tolerance: float = TOLERANCE
-    ) -> None:
+    def __init__(self, problem: ContactProblem, *, solver: Solver | None = None, tolerance: float = TOLERANCE) -> None:
         system, solver = problem.static_load, solver or Automatic()
         self._problem = problem
         self._K = EffectiveMatrix(system.K, system.algebra, space=system.space, inertia=(0.0, system.M))

@@ -89,9 +89,7 @@ def _normals(side: Side, ends: Array) -> Array:
     return np.asarray(np.where(outward[:, None] < 0.0, -normals, normals))
 
 
-def _pieces(
-    ends: Array, normal: Array, ends2: Array, normals2: Array
-) -> Iterator[tuple[float, float, int, Array]]:
+def _pieces(ends: Array, normal: Array, ends2: Array, normals2: Array) -> Iterator[tuple[float, float, int, Array]]:
     """(low, high, segment of side 2, its coordinates at low and high) of each piece of a segment of side 1, in its
     coordinate from 0 to 1: where several segments lie opposite, the nearest."""
     along = ends[1] - ends[0]
@@ -112,9 +110,7 @@ def _pieces(
             yield start, end, segment, (np.array([start, end]) - place[segment, 0]) / slope[nearest]
 
 
-def _integrals(
-    pieces: list[tuple[float, float, int, Array]], length: float
-) -> tuple[Array, dict[int, Array]]:
+def _integrals(pieces: list[tuple[float, float, int, Array]], length: float) -> tuple[Array, dict[int, Array]]:
     """∫ phi phiᵀ (2, 2) over the pieces, and by segment of side 2 ∫ phi_i phi_j (2, 2)."""
     own, mixed = np.zeros((2, 2)), dict[int, Array]()
     for low, high, segment, across in pieces:

@@ -132,9 +132,7 @@ def _faces(space: FemSpace, one: Side, around: Boundary, angle: float) -> list[t
     return found
 
 
-def _by_face(
-    faces: Sequence[tuple[Side, Array]], two: Side, matching: Matching, size: float
-) -> tuple[Nodes, Matched]:
+def _by_face(faces: Sequence[tuple[Side, Array]], two: Side, matching: Matching, size: float) -> tuple[Nodes, Matched]:
     """(nodes with the normals and weights of their faces, what they face), ordered by number. Faces in front of nothing
     are left out where the matching leaves out parts of sides, unless all are."""
     refusal, found = None, []

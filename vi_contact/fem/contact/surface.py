@@ -122,9 +122,7 @@ def one_per_direction(whole: Nodes, nodes: Nodes, directions: Array, gap: Array)
     return replace(nodes, weights=weights).pick(kept), directions[kept], gap[kept]
 
 
-def contact_space(
-    owner: str, system: SemiDiscreteSystem, groups: Mapping[str, Facets], points: Any
-) -> FemSpace:
+def contact_space(owner: str, system: SemiDiscreteSystem, groups: Mapping[str, Facets], points: Any) -> FemSpace:
     """Return the space of a system; InputError for another kind, groups of another mesh, and a list of no points."""
     space = space_of(owner, system)
     for meaning, group in groups.items():

@@ -20,8 +20,7 @@ from .text import NUMBER, TextFile
 STEP = 33
 """Place of the time step among the real header values of COSMOS, from 0."""
 
-_FIRST = re.compile(r"^\s*+(?:un)?corrected accelerogram|\(\s*+format\s++v[\d.]++ with \d++ text lines",
-                    re.IGNORECASE)
+_FIRST = re.compile(r"^\s*+(?:un)?corrected accelerogram|\(\s*+format\s++v[\d.]++ with \d++ text lines", re.IGNORECASE)
 _COUNT = re.compile(r"^\s*+(\d++)\s")
 _QUANTITY = re.compile(r"\b(accel|veloc|displ)\w*+", re.IGNORECASE)
 _SAMPLES = re.compile(r"\b(?:pts|spaced|data)\b", re.IGNORECASE)

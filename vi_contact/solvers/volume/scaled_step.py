@@ -95,11 +95,7 @@ class ScaledStep:
         if broken:
             return np.nan, np.nan, np.nan
         size = self._norm * y_max * self.x_ref / self.r_ref + self._b_max
-        return (
-            fraction(force_max, max(self._b_max, Ax_max)),
-            fraction(gap_max, y_max),
-            fraction(force_max, size),
-        )
+        return (fraction(force_max, max(self._b_max, Ax_max)), fraction(gap_max, y_max), fraction(force_max, size))
 
     def verdict(self, y: Array, F: Array) -> int:
         """Return a SNES convergence reason: 0 to go on, 2 solved to round-off, 4 below the tolerance and no longer

@@ -145,9 +145,7 @@ class Parts:
     moved: bool = False
 
 
-def _wall(
-    shape: wall.Wall, comm: Any, *, case: str = "b", weight: bool = False, base_inertia: str = "whole"
-) -> Parts:
+def _wall(shape: wall.Wall, comm: Any, *, case: str = "b", weight: bool = False, base_inertia: str = "whole") -> Parts:
     model = wall.build(shape, comm, weight=weight, base_inertia=base_inertia)
     recorders = run.Energy(), run.Contact(), run.Probe(model.probes())
     return Parts(model.system, model.surface(case), model.tags, weight, recorders)

@@ -152,9 +152,7 @@ def _shown(value: float | None) -> str:
 def _claim(study: IDA, out: Path) -> None:
     """Notes in the folder whose it is; InputError when it is another study's."""
     case = _digest(to_json(study.case.tables).encode())
-    records = {
-        one.name: [_digest(path.read_bytes()) for path in one.files if path.is_file()] for one in study.shakings
-    }
+    records = {one.name: [_digest(path.read_bytes()) for path in one.files if path.is_file()] for one in study.shakings}
     old = read_json(out / STUDY)
     if old is not None:
         kept = old.get("records")
