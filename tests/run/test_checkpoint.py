@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 from marched_chain import NEWMARK, chain, difference, equal_files, round_off, rubbing_box, run, run_wall, wall
 
-from vi_contact.core.errors import InputError
+from vi_contact.core.errors import InputError, ViContactError
+from vi_contact.core.surfaces import ContactSurface
 from vi_contact.laws.impact import ImpulseUpdate, Inelastic
 from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.run.recorders import Contact, Energy
@@ -24,6 +25,7 @@ from vi_contact.schemes.moreau_jean import MoreauJean
 from vi_contact.schemes.ss22 import SS22
 from vi_contact.schemes.trapezoidal import Trapezoidal
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
+from vi_contact.solvers import Iterative
 
 
 @pytest.mark.slow
@@ -187,6 +189,33 @@ def test_restart_with_friction_on_the_same_ranks(comm: Any, shared_tmp: Path, sc
     assert straight.state.r_t is not None and problem.surface.some(straight.state.r_t != 0.0)
     assert difference(parts.state, straight.state) <= round_off(comm)
     assert comm.size > 1 or equal_files(shared_tmp / "parts", shared_tmp / "straight")
+
+
+def test_arrays_of_many_points_are_gathered_on_one_rank(
+    comm: Any, shared_tmp: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a default run nothing else is, checkpoint and restart included; every rank reads the same from the file."""
+    pytest.importorskip("dolfinx")
+    straight = run_wall(comm, None, 27)
+
+    def refuse(*_: Any) -> None:
+        raise AssertionError("gathered on every rank")
+
+    monkeypatch.setattr(ContactSurface, "everywhere", refuse)
+    monkeypatch.setattr("vi_contact.core.sizes.OWN_CONDITIONS", 0)
+    monkeypatch.setattr("vi_contact.run.files.table.SHARED", 1)
+    problem, solver = wall(comm), Iterative(tolerance=1e-12)
+    alone = run_wall(comm, None, 27, problem=problem, solver=solver)
+    run_wall(comm, shared_tmp, 22, problem=problem, solver=solver)
+    kept = run_wall(comm, shared_tmp, 27, problem=problem, solver=solver, restart=True)
+    assert straight.history["active"].any()
+    for name in ("pressure", "gap", "active"):
+        values = straight.history[name]
+        for found in (kept.history, *([alone.history] if comm.rank == 0 else [])):
+            assert np.allclose(found[name], values, rtol=0.0, atol=1e-8 * np.abs(values).max()), name
+        if comm.rank:
+            with pytest.raises(ViContactError, match=f"'{name}' of more than 1 points is on rank 0 only: give the run"):
+                alone.history[name]
 
 
 def test_restart_with_another_mass_matrix_is_refused(comm: Any, shared_tmp: Path) -> None:

@@ -281,7 +281,7 @@ def rows(count: int) -> list[Row]:
 def written(folder: Path, count: int, *, save_at: int | None = None) -> HistoryFiles:
     """Files of so many rows, still open."""
     made = rows(count)
-    files = HistoryFiles(folder, Table(COLUMNS, made[0]), chain_problem(2).surface)
+    files = HistoryFiles(folder, Table(COLUMNS, made[0]), {name: np.zeros(2) for name in history_module.GEOMETRY})
     for row in made[1:]:
         files.append(row)
         if row["k"] == save_at:

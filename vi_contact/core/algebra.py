@@ -55,6 +55,18 @@ def from_each(comm: Comm, value: Any) -> list[Any]:
     return found
 
 
+def on_first(comm: Comm, numbers: Indices, rows: Any) -> Any:
+    """Return the rows (m, …) of all ranks on rank 0, each in the place of its number, and none, (0, …), on the others.
+    Collective."""
+    parts = comm.gather((numbers, rows))
+    if parts is None:
+        return rows[:0]
+    every, found = (np.concatenate(part) for part in zip(*parts, strict=True))
+    placed = np.empty_like(found)
+    placed[every] = found
+    return placed
+
+
 class Matrix(Protocol):
     """Provide products with a square sparse matrix whose rows are distributed like the vectors it multiplies."""
 

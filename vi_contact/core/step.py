@@ -242,7 +242,8 @@ class Report:
 
 
 class Recorder(Protocol):
-    """Listen to the loop: name columns once, and fill a row after every step. Values are equal on every rank."""
+    """Listen to the loop: name columns once, and fill a row after every step. Numbers are equal on every rank; arrays
+    count on rank 0, and may be empty on the others."""
 
     def columns(self) -> Mapping[str, tuple[str, str]]:
         """Return what ``start`` and ``row`` fill in: name -> (unit, meaning). Called after ``start``, always the same.

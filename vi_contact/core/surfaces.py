@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .algebra import Array, Comm, Indices, Mask, Matrix, SerialComm, largest, total
+from .algebra import Array, Comm, Indices, Mask, Matrix, SerialComm, largest, on_first, total
 from .checks import function, number, shown
 from .companion import Companion
 from .errors import InputError
@@ -96,6 +96,10 @@ class ContactSurface:
         whole[self.slots] = values
         return self.comm.sum(whole).astype(np.asarray(values).dtype)
 
+    def on_first(self, values: NDArray[Any]) -> Any:
+        """Return the same (total, …) on rank 0, and none, (0, …), on the others. Collective; for output."""
+        return on_first(self.comm, self.slots, values)
+
     @cached_property
     def corners(self) -> tuple[Indices, ...]:
         """Return the conditions of each node that has several, in the order of the nodes."""
@@ -158,11 +162,7 @@ class ContactSurface:
         """Return what the obstacle moves along the tangents between two times, (m, d-1) [m]; None for one at rest."""
         return None if self.slide is None else self.slide(end) - self.slide(start)
 
-    def moving(
-        self,
-        towards: Motion | None = None,
-        along: Motion | None = None,
-    ) -> ContactSurface:
+    def moving(self, towards: Motion | None = None, along: Motion | None = None) -> ContactSurface:
         """Return the surface on an obstacle that moves: ``towards`` the body and ``along`` the tangents, t [s] -> [m],
         one value for all points or arrays of shape (m,) and (m, d-1), in the order of ``points``. A moving obstacle is
         not turned; its points face the same nodes."""

@@ -1,6 +1,6 @@
 """Listen to the loop: each recorder names its columns once and fills a row after every step.
 
-Rows hold numbers (one column of ``history.csv`` each) or arrays (HDF5 only). Values are equal on every rank.
+Rows hold numbers (one column of ``history.csv`` each), equal on every rank, or arrays (HDF5 only), those of rank 0.
 Displacements and velocities are those of the equations: relative to the ground when an excitation shakes the body.
 """
 
@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..core.algebra import Array, Indices, SerialComm, total
+from ..core.algebra import Array, Indices, total
 from ..core.checks import array, attributes, column_name, instance
 from ..core.errors import InputError, StepFailure
 from ..core.problem import ContactProblem
@@ -106,9 +106,7 @@ class Energy:
         system, new = self._problem.equations, report.new
         free = energies(system, new.u, report.v_minus)
         before_impact = replace(new, v=report.v_minus)
-        step = energy_balance(
-            self._problem, report.old, before_impact, report.balance, before=self._now, after=free
-        )
+        step = energy_balance(self._problem, report.old, before_impact, report.balance, before=self._now, after=free)
         self._now = free
         if new.v is not report.v_minus:  # the impact law changed it; displacements do not jump
             momentum = system.M @ new.v
@@ -126,13 +124,13 @@ class Contact:
 
     gap = gap0 - u_n, plus the shortening of a deformable support; pressure = r_n / weight; the force on the body is
     -Σ r_n n; its point of action is Σ r_n X / Σ r_n (NaN while the contact is open). Arrays (total,) are of all
-    conditions by their numbers, as the points in ``history.h5`` are, the same on every rank.
+    conditions by their numbers, as the points in ``history.h5`` are, on rank 0; on others they are empty.
 
     With friction also: the friction force on the body, the largest slip, and arrays (total, d - 1) in the tangents of
     the nodal frames: traction_t = r_t / weight, that of the body on its support, and slip = B_t u, the tangential
     displacement on the support (also of points that are open).
 
-    ``arrays=False`` leaves the arrays out: then no rank gathers them, and the numbers are reduced, a dozen at a time.
+    Numbers are reduced, a dozen at a time. ``arrays=False`` leaves the arrays out: then nothing is gathered.
     """
 
     arrays: bool = True
@@ -169,44 +167,47 @@ class Contact:
         """Return the row of the initial contact: of a gravity stage, or open."""
         surface, self._problem, self._frictional = problem.surface, problem, problem.frictional
         self._axes = AXES[: surface.points.shape[1]]
-        self._whole, self._comm = (surface.whole(), SerialComm()) if self.arrays else (surface, surface.comm)
-        self._weight = total(self._comm, self._whole.weights.sum())
+        self._weight = total(surface.comm, surface.weights.sum())
         return self._row(state)
 
     def row(self, report: Report) -> Row:
         return self._row(report.new)
 
     def _row(self, state: State) -> Row:
-        surface, whole, d = self._problem.surface, self._whole, len(self._axes)
-        gap = surface.gap(state.t) - surface.normal_values(state.u) + surface.compliance * state.r_n
-        found = np.column_stack([gap, state.r_n, state.active, *(self._rubbing(state) if self._frictional else ())])
-        found = surface.everywhere(found) if self.arrays else found
-        gap, r_n, active = found[:, 0].copy(), found[:, 1].copy(), found[:, 2] > 0.0
-        pressure, traction, slip = r_n / whole.weights, found[:, 3 : 2 + d].copy(), found[:, 2 + d :].copy()
-        sums = [whole.weights[active].sum(), active.sum(), r_n.sum(), *(r_n @ whole.normals), *(r_n @ whole.points)]
-        closed, count, resultant, *vectors = self._comm.sum(np.array(sums, dtype=float)).tolist()
+        surface, d, r_n = self._problem.surface, len(self._axes), state.r_n
+        gap = surface.gap(state.t) - surface.normal_values(state.u) + surface.compliance * r_n
+        pressure, (traction, slip) = r_n / surface.weights, self._rubbing(state)
+        sums = [surface.weights[state.active].sum(), state.active.sum(), r_n.sum()]
+        sums += [*(r_n @ surface.normals), *(r_n @ surface.points)]
+        closed, count, resultant, *vectors = surface.comm.sum(np.array(sums, dtype=float)).tolist()
         force, place = [0.0 - one for one in vectors[:d]], vectors[d:]  # not -one: no negative zeros
         depth, highest, farthest = self._largest(gap, pressure, slip)
         values = [
             1.0 - closed / self._weight if self._weight else 1.0, int(count), resultant, *force,
             *(one / resultant if resultant else np.nan for one in place), -depth, highest,
         ]
-        values += [pressure, gap, active] if self.arrays else []
         values += [*self._friction_force(state), farthest] if self._frictional else []
-        values += [traction, slip] if self._frictional and self.arrays else []
-        return dict(zip(self.columns(), values, strict=True))
+        row = dict(zip((name for name in self.columns() if name not in self._ARRAYS), values, strict=True))
+        return row | (self._whole(pressure, gap, state.active, traction, slip) if self.arrays else {})
+
+    def _whole(self, *each: Any) -> dict[str, Any]:
+        """The arrays of all conditions on rank 0, by one message of each rank."""
+        found = self._problem.surface.on_first(np.column_stack(each))
+        rubbing = np.hsplit(found[:, 3:], 2) if self._frictional else ()
+        parts = found[:, 0], found[:, 1], found[:, 2] > 0.0, *rubbing
+        return {name: part.copy() for name, part in zip(self._ARRAYS, parts, strict=False)}
 
     def _largest(self, gap: Array, pressure: Array, slip: Array) -> list[float]:
         """The largest depth, pressure and slip of all conditions; nan without any."""
         if not self._problem.surface.total:
             return [np.nan, np.nan, np.nan]
         tops = [-gap.min(), pressure.max(), np.linalg.norm(slip, axis=1).max()] if len(gap) else [-np.inf] * 3
-        return self._comm.max(np.array(tops)).tolist()
+        return self._problem.surface.comm.max(np.array(tops)).tolist()
 
     def _rubbing(self, state: State) -> tuple[Array, Array]:
-        """Tangential tractions and slips (m, d - 1)."""
+        """Tangential tractions and slips (m, d - 1); (m, 0) without friction."""
         surface = self._problem.surface
-        slip = surface.slip(state.u, state.t)
+        slip = surface.slip(state.u, state.t) if self._frictional else np.zeros((surface.count, 0))
         return (np.zeros_like(slip) if state.r_t is None else state.r_t / surface.weights[:, None]), slip
 
     def _friction_force(self, state: State) -> list[float]:

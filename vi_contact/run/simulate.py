@@ -91,7 +91,7 @@ def simulate(
         place, checksum = _place(method, source, state, changed)
         plan = step_plan(dt, steps, t_end, place.t_start)
         place = replace(place, state=method.scheme.start(problem, place.state, plan.dt(place.base)))
-        table = Table(*_started(problem, recorders, place.state), None if folder is None else folder / HISTORY_H5)
+        table = Table(*_started(problem, recorders, place.state), None if folder is None else folder / HISTORY_H5, comm)
         stored = None if source is None else StoredRows(source, table, place.state.k, checksum)
         if stored is not None:
             _started(problem, recorders, place.state, _restored(table, stored, comm))
@@ -163,12 +163,13 @@ def _started(
 
 
 def _restored(table: Table, stored: StoredRows, comm: Comm) -> Row:
-    """Put the rows of an earlier run into the table, on every rank; the last of them. Collective."""
+    """Put the rows of an earlier run into the table, arrays on rank 0 only; the last of them. Collective."""
     blocks = stored.blocks()
     last: Row = {}
     while True:
-        block: Block | None = comm.bcast(on_root(comm, lambda: next(blocks, None)))
+        whole = on_root(comm, lambda: next(blocks, None))
+        block: Block | None = comm.bcast(whole and {name: whole[name] for name in table.numbers})
         if block is None:
             return last
-        table.restore(block)
+        table.restore(whole or block)
         last = {name: values[-1] for name, values in block.items()}

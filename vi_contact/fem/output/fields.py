@@ -25,7 +25,7 @@ import h5py
 import numpy as np
 import ufl
 
-from ...core.algebra import Array, Indices, Mask
+from ...core.algebra import Array, Indices, Mask, on_first
 from ...core.checks import attributes
 from ...core.files import FIELDS, FIELDS_INDEX, frames_of, hdf5_atomically, on_root, write_atomically
 from ...core.problem import ContactProblem
@@ -64,9 +64,7 @@ class VonMises:
         return np.asarray(compat.assemble_vector(self._form).array_r / self._volume)
 
 
-_CELLS = {
-    (1, 2): "Polyline", (2, 3): "Triangle", (2, 4): "Quadrilateral", (3, 4): "Tetrahedron", (3, 8): "Hexahedron"
-}
+_CELLS = {(1, 2): "Polyline", (2, 3): "Triangle", (2, 4): "Quadrilateral", (3, 4): "Tetrahedron", (3, 8): "Hexahedron"}
 """XDMF's name of a cell by its dimension and number of vertices."""
 
 _VECTORS = ("u", "v", "a")
@@ -104,24 +102,13 @@ class FrameWriter:
         self._names = _VECTORS + (_RUBBING if problem.frictional else ())
         self._von_mises = VonMises(space.forms)
         owned, slots = problem.surface.owned, problem.surface.slots
-        self._contact_nodes = self._by_number(space.ids[owned] // space.dimension, slots)
+        self._contact_nodes = on_first(space.comm, slots, space.ids[owned] // space.dimension)
         self._type, mine = _cells(space.mesh)
         self._cell_numbers = np.asarray(space.mesh.topology.original_cell_index[: len(mine)], dtype=np.int64)
-        points = self._by_number(_three(space.points), space.nodes)
-        cells = self._by_number(mine, self._cell_numbers)
+        points = on_first(space.comm, space.nodes, _three(space.points))
+        cells = on_first(space.comm, self._cell_numbers, mine)
         self._shape = (len(points), *cells.shape)
         on_root(space.comm, partial(self._start, points, cells, kept))
-
-    def _by_number(self, owned: Any, numbers: Indices) -> Any:
-        """Rows of owned nodes, cells or conditions, on rank 0 as rows of all in input order; none elsewhere.
-        Collective."""
-        parts = self._space.comm.gather((numbers, owned))
-        if parts is None:
-            return owned[:0]
-        every, rows = (np.concatenate(part) for part in zip(*parts, strict=True))
-        placed = np.empty_like(rows)
-        placed[every] = rows
-        return placed
 
     def _start(self, points: Array, cells: Array, kept: Mapping[int, float]) -> None:
         """Rank 0: the mesh, the index of the frames that are kept, and then no others."""
@@ -167,15 +154,14 @@ class FrameWriter:
             space.expand(problem.cartesian(x), state.t, derivative)
             for derivative, x in enumerate((state.u, state.v, acceleration))
         ]
-        stress = self._by_number(self._von_mises(moving[0]), self._cell_numbers)
+        stress = on_first(space.comm, self._cell_numbers, self._von_mises(moving[0]))
         slipping = np.zeros(problem.surface.count, dtype=bool)
         if problem.frictional:
             moving += self._rubbing(state)
             slipping = slipping if report is None else slipped(report)
-        vectors = self._by_number(np.hstack([_three(nodal) for nodal in moving]), space.nodes)
+        vectors = on_first(space.comm, space.nodes, np.hstack([_three(nodal) for nodal in moving]))
         surface = problem.surface
-        each = np.column_stack([state.r_n / surface.weights, state.active, slipping])
-        each = self._by_number(each, surface.slots)
+        each = surface.on_first(np.column_stack([state.r_n / surface.weights, state.active, slipping]))
         on_root(space.comm, partial(self._write, state, vectors, stress, each))
 
     def _rubbing(self, state: State) -> list[Array]:

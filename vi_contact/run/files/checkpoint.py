@@ -34,6 +34,7 @@ from .identity import FIXED, difference, identity
 log = logging.getLogger(__name__)
 Arrays = dict[str, Any]
 MEMORY = "memory_"
+CONTACT = ("r_n", "active", "r_t")  # arrays of the conditions
 SAID = 200  # characters of a foreign reason
 
 
@@ -98,11 +99,11 @@ def checksum(arrays: Mapping[str, Any]) -> str:
 
 
 def _split(problem: ContactProblem, state: State) -> tuple[Arrays, Arrays]:
-    """(arrays of owned unknowns, arrays that are the same on every rank)."""
+    """(arrays of owned unknowns, arrays that are the same on every rank, or on rank 0 only)."""
     comm = problem.system.algebra.comm
     vectors: Arrays = {"u": state.u, "v": state.v}
     contact: Arrays = {"r_n": state.r_n, "active": state.active} | ({} if state.r_t is None else {"r_t": state.r_t})
-    same = {name: problem.surface.everywhere(array) for name, array in contact.items()}
+    same = {name: problem.surface.on_first(array) for name, array in contact.items()}
     for name in sorted(state.memory):
         array = np.asarray(state.memory[name])
         kind = same if largest(comm, array.shape != state.u.shape) else vectors
@@ -120,16 +121,12 @@ def read_checkpoint(
     the scheme begins without memory.
     """
     file, comm = folder / CHECKPOINT, problem.system.algebra.comm
-    about, arrays = comm.bcast(on_root(comm, lambda: _read(file, problem)))
+    whole = on_root(comm, lambda: _read(file, problem))
+    about = comm.bcast(whole and whole[0])
     other = _compare(file, problem, scheme, dt, about, changed)
-    ids = problem.system.space.ids
-    mine = np.searchsorted(np.sort(np.concatenate(comm.bcast(comm.gather(ids)))), ids)
-    for name in about["vectors"]:
-        arrays[name] = arrays[name][mine]
-    memory = {name.removeprefix(MEMORY): array for name, array in arrays.items() if name.startswith(MEMORY)}
-    slots = problem.surface.slots
-    contact: Arrays = {name: arrays[name][slots] if name in arrays else None for name in ("r_n", "active", "r_t")}
-    state = State(about["t"], about["k"], arrays["u"], arrays["v"], memory=memory, **contact)
+    arrays = _own(problem, about["vectors"], whole and whole[1])
+    memory = {name.removeprefix(MEMORY): arrays.pop(name) for name in list(arrays) if name.startswith(MEMORY)}
+    state = State(about["t"], about["k"], memory=memory, **arrays)
     if "format" not in about and memory:
         _check_memory(file, problem, scheme, state, about)
     if other:  # what the scheme keeps in mind was made of the old problem's matrices and loads
@@ -138,6 +135,22 @@ def read_checkpoint(
     if "dt" in other:
         place = replace(place, t_start=state.t, k_start=place.number, base=0)
     return place, about.get("rows", "")
+
+
+def _own(problem: ContactProblem, vectors: list[str], whole: Arrays | None) -> Arrays:
+    """This rank's rows of arrays that rank 0 has as a whole: every rank's are sent by themselves. Collective."""
+    comm = problem.system.algebra.comm
+    parts = comm.gather((problem.system.space.ids, problem.surface.slots)) or [()] * comm.size
+    every = np.sort(np.concatenate([part[0] for part in parts])) if whole else None
+    own: Arrays = {}
+    for rank, part in enumerate(parts):
+        found: Arrays = dict(whole or {})
+        if every is not None:
+            rows = dict.fromkeys(vectors, np.searchsorted(every, part[0])) | dict.fromkeys(CONTACT, part[1])
+            found = {name: values[rows[name]] if name in rows else values for name, values in found.items()}
+        found = comm.bcast(found)
+        own = found if rank == comm.rank else own
+    return own
 
 
 def _compare(
@@ -159,9 +172,7 @@ def _compare(
     return names
 
 
-def _check_memory(
-    file: Path, problem: ContactProblem, scheme: Scheme, state: State, about: Mapping[str, Any]
-) -> None:
+def _check_memory(file: Path, problem: ContactProblem, scheme: Scheme, state: State, about: Mapping[str, Any]) -> None:
     """InputError when a checkpoint without checksum lacks what the scheme keeps in mind. Collective."""
     dt = about["run"].get("dt")
     if about["run"].get("scheme") != repr(scheme):

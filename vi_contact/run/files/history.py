@@ -12,7 +12,7 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
@@ -20,9 +20,9 @@ from typing import Any
 import h5py
 import numpy as np
 
+from ...core.algebra import Array
 from ...core.files import hdf5_atomically, to_json, write_all, write_atomically
 from ...core.step import Row
-from ...core.surfaces import ContactSurface
 from .folder import COLUMNS, FORMAT, HISTORY_CSV, HISTORY_H5, JOURNAL
 from .stored_rows import StoredArrays, StoredRows, line_of, read_blocks, record_of
 from .table import Block, Table
@@ -33,16 +33,16 @@ GROWTH = 1.25  # history.h5 is rewritten when it has grown by this factor: what 
 
 
 class HistoryFiles:
-    """Keep the files of a table (rank 0 only), of contact points ``whole``. Every method may raise OSError.
+    """Keep the files of a table (rank 0 only) and the GEOMETRY of contact points. Every method may raise OSError.
 
     ``stored``: the rows of an earlier run that this one continues, in the same folder (later ones are dropped) or in
     another; without them the table has its first row only.
     """
 
     def __init__(
-        self, folder: Path, table: Table, whole: ContactSurface, stored: StoredRows | None = None
+        self, folder: Path, table: Table, geometry: Mapping[str, Array], stored: StoredRows | None = None
     ) -> None:
-        self._folder, self._table, self._surface = folder, table, whole
+        self._folder, self._table, self._geometry = folder, table, geometry
         self._rows = self._saved = self._tail = self._last = 0
         self._hash = hashlib.sha256()
         self._journal: Any = None
@@ -144,7 +144,7 @@ class HistoryFiles:
                 dataset[kept : kept + n] = block[name]
             kept += n
         for name, unit in GEOMETRY.items():
-            file.create_dataset(f"contact/{name}", data=getattr(self._surface, name)).attrs["unit"] = unit
+            file.create_dataset(f"contact/{name}", data=self._geometry[name]).attrs["unit"] = unit
 
     def close(self) -> None:
         """Write all rows into history.h5 and leave no journal; what cannot be written stays in the other files."""

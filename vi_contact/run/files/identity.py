@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.algebra import Array, from_each
+from ...core.algebra import Array, Indices, from_each
 from ...core.problem import ContactProblem
 from ...core.step import Scheme
 from ...core.surfaces import ContactSurface
@@ -133,9 +133,15 @@ def _loads(system: SemiDiscreteSystem, probes: Sequence[Array], early: Sequence[
 
 def _sampled(values: Array) -> Numbers:
     """Sums of a row of numbers, with weights that see each of them."""
-    size = float(np.abs(values).sum())
-    places = np.arange(len(values))
-    return [(float(w @ values), size) for w in (np.ones(len(values)), probe(places, 1), probe(places, 2))]
+    *sums, size = _sums(values, np.arange(len(values)))
+    return [(value, size) for value in sums]
+
+
+def _sums(values: Array, places: Indices) -> list[float]:
+    """Three sums of numbers with weights of their places, and that of their sizes."""
+    values = np.ascontiguousarray(values, dtype=float)
+    weights = np.ones(len(values)), probe(places, 1), probe(places, 2)
+    return [*(float(w @ values) for w in weights), float(np.abs(values).sum())]
 
 
 def _excitation(problem: ContactProblem, times: Array) -> Numbers:
@@ -172,8 +178,8 @@ def _contact(surface: ContactSurface, early: Sequence[float]) -> Numbers:
 
 def _columns(surface: ContactSurface, arrays: Sequence[Array]) -> Numbers:
     """Sums of values (m,) of the contact conditions of all ranks. Collective."""
-    whole = surface.everywhere(np.column_stack([np.asarray(values, dtype=float) for values in arrays]))
-    return [pair for values in whole.T for pair in _sampled(np.ascontiguousarray(values))]
+    sums = surface.comm.sum(np.array([_sums(values, surface.slots) for values in arrays]))
+    return [(value, size) for *values, size in sums.tolist() for value in values]
 
 
 def _of_all_points(law: Any, surface: ContactSurface) -> Any:

@@ -20,7 +20,7 @@ from ...core.algebra import Array
 from ...core.errors import InputError
 from ...core.step import Row
 from .folder import HISTORY_CSV, HISTORY_H5, JOURNAL, check_folder_format
-from .table import BLOCK, Block, Table
+from .table import Block, Table
 
 
 def line_of(table: Table, row: Row) -> bytes:
@@ -76,7 +76,7 @@ def read_blocks(
     none."""
     done = first
     while True:
-        lines = [line for line in islice(csv, BLOCK) if line.endswith(b"\n")]
+        lines = [line for line in islice(csv, table.block) if line.endswith(b"\n")]
         numbers = numbers_of(csv.name, lines, len(table.numbers), done)
         steps = numbers[:, table.numbers.index("k")]
         if len(steps) and not np.array_equal(steps, steps[0] + np.arange(len(steps))):
@@ -89,7 +89,7 @@ def read_blocks(
         done += n
         if k is not None and n and steps[n - 1] == k:
             return
-        if n < BLOCK:
+        if n < table.block:
             if k is None:
                 return
             raise InputError(f"'{csv.name}' does not reach step {k} of the checkpoint: restore it or start a new run")

@@ -11,13 +11,15 @@ from typing import Any
 import h5py
 import numpy as np
 
-from ...core.algebra import Array
+from ...core.algebra import Array, Comm, SerialComm
 from ...core.checks import shown
 from ...core.errors import InputError, ViContactError
 from ...core.step import Columns, Row
 
-BLOCK = 256  # rows that are turned into columns together
+BLOCK = 256  # rows that are turned into columns together, or those of so many bytes of arrays:
+BYTES = 16 * 2**20
 KEPT = 64 * 2**20  # bytes of histories that stay in memory of a run with a folder, on each rank
+SHARED = 10_000  # rows of an array (contact points) up to which every rank gets it at the end
 
 LEDGER = (
     ("work_input", "input work"),
@@ -35,19 +37,22 @@ Block = dict[str, Array]  # column -> values of some rows: (rows,) float64, or (
 
 
 class Table:
-    """Hold columns and rows of a run, the same on every rank.
+    """Hold columns and rows of a run: numbers on every rank, arrays on rank 0.
 
     Attributes:
         columns: column -> (unit, meaning). first: the row it was made with. count: rows so far.
-        numbers: columns of history.csv, in order; arrays: the others, which only HDF5 holds, each with a sample.
+        numbers: columns of history.csv, in order; arrays: on rank 0 the others, which only HDF5 holds, with a sample.
         file: the history.h5 of a run with a folder, which has the rows too: beyond KEPT bytes the memory lets them go.
+        block: how many rows are turned into columns, read or written together.
     """
 
-    def __init__(self, columns: Columns, first: Row, file: Path | None = None) -> None:
-        self.columns, self.first, self.file, self.count = columns, first, file, 0
+    def __init__(self, columns: Columns, first: Row, file: Path | None = None, comm: Comm | None = None) -> None:
+        self.columns, self.first, self.file, self.count, self._comm = columns, first, file, 0, comm or SerialComm()
         self.check(first)
         self.numbers = [name for name in columns if not isinstance(first[name], np.ndarray)]
-        self.arrays = {name: np.array(first[name]) for name in columns if isinstance(first[name], np.ndarray)}
+        arrays = [] if self._comm.rank else [name for name in columns if name not in self.numbers]
+        self.arrays = {name: np.array(first[name]) for name in arrays}
+        self.block = max(1, min(BLOCK, BYTES // max(sum(one.nbytes for one in self.arrays.values()), 1)))
         self._open: list[Row] = []
         self._blocks: list[Block] = []
         self._size, self._kept = 0, True
@@ -68,7 +73,7 @@ class Table:
         """Add one more row."""
         self._open.append(row)
         self.count += 1
-        if len(self._open) == BLOCK:
+        if len(self._open) == self.block:
             self._gather()
 
     def _gather(self) -> None:
@@ -104,27 +109,30 @@ class Table:
 
     def history(self) -> Mapping[str, Array]:
         """Return column -> values of all rows: (rows,) float64, or (rows, *shape of the arrays); of too many rows for
-        the memory as they are in the file."""
+        the memory, or points for every rank, as they are in the file. Collective."""
         self._gather()
-        if not self._kept and self.file is not None:
-            return StoredHistory(self.file, list(self.columns), self.count)
-        names = [*self.numbers, *self.arrays]
-        return {name: np.concatenate([block[name] for block in self._blocks]) for name in names}
+        names = [*self.numbers, *self.arrays] if self._kept else []
+        kept = {name: np.concatenate([block[name] for block in self._blocks]) for name in names}
+        if self._comm.size > 1:
+            small = all(len(one) <= SHARED for one in self.arrays.values())
+            shared = self._comm.bcast({name: kept[name] for name in self.arrays if small and name in kept})
+            kept |= shared
+        return kept if len(kept) == len(self.columns) else StoredHistory(self.file, kept, list(self.columns))
 
 
 class StoredHistory(Mapping[str, Array]):
-    """Hold histories that are read column by column from history.h5 when somebody asks.
+    """Hold histories that are read column by column from history.h5 when somebody asks, but for those that are kept.
 
-    ViContactError when the file is not there any more, or no longer holds these rows.
+    ViContactError when there is no file, or not any more, or it no longer holds these rows.
     """
 
-    def __init__(self, file: Path, names: list[str], rows: int) -> None:
-        self._file, self._names, self._rows = file, names, rows
+    def __init__(self, file: Path | None, kept: Block, names: list[str]) -> None:
+        self._file, self._kept, self._names = file, kept, names
         self._stamp = self._now()
 
     def _now(self) -> tuple[int, int] | None:
         try:
-            status = os.stat(self._file)
+            status = os.stat(self._file or "")
         except OSError:
             return None
         return status.st_mtime_ns, status.st_size
@@ -132,6 +140,11 @@ class StoredHistory(Mapping[str, Array]):
     def __getitem__(self, name: str) -> Array:
         if name not in self._names:
             raise KeyError(name)
+        if name in self._kept:
+            return self._kept[name]
+        if self._file is None:
+            raise ViContactError(f"'{name}' of more than {SHARED} points is on rank 0 only: give the run an output "
+                                 "folder (out=), from which every rank reads it")
         if self._stamp is None or self._now() != self._stamp:
             raise ViContactError(f"'{self._file}', where the histories of this run are, has been replaced or is not on "
                                  "this machine: give every run a folder of its own, on a shared disk")

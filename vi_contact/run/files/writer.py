@@ -15,10 +15,9 @@ from ...core.algebra import Array
 from ...core.files import frames_of, on_root, to_json, write_atomically
 from ...core.problem import ContactProblem
 from ...core.step import Report, Row, State
-from ...core.surfaces import ContactSurface
 from .checkpoint import RestartPoint, write_checkpoint
 from .folder import ABOUT, FORMAT, LOG, SUMMARY, clear, remove_litter
-from .history import HistoryFiles
+from .history import GEOMETRY, HistoryFiles
 from .log import RunLog, versions
 from .stored_rows import StoredRows, times_of
 from .table import Table
@@ -74,7 +73,9 @@ class Writer:
         folder = self._folder
         if folder is None:
             return
-        on_root(self._comm, partial(self._make, folder, self._problem.surface.whole()))
+        surface = self._problem.surface
+        geometry = {name: surface.on_first(getattr(surface, name)) for name in GEOMETRY}
+        on_root(self._comm, partial(self._make, folder, geometry))
         if self._settings is not None:
             kept = on_root(self._comm, lambda: self._frames_of(folder)) or {}
             self._fields = self._settings.open(self._problem, folder, kept)
@@ -85,12 +86,12 @@ class Writer:
         """Step -> time of the frames that an earlier part of the run has left."""
         return times_of(folder, set(frames_of(folder))) if self._continued else {}
 
-    def _make(self, folder: Path, whole: ContactSurface) -> None:
+    def _make(self, folder: Path, geometry: Mapping[str, Array]) -> None:
         remove_litter(folder)
         if not self._continued:
             clear(folder)
         self._log = RunLog(folder / LOG, append=self._continued)
-        self._files = HistoryFiles(folder, self._table, whole, self._stored)
+        self._files = HistoryFiles(folder, self._table, geometry, self._stored)
         about = {"format": FORMAT, "vi_contact": versions()["vi_contact"]}
         write_atomically(folder / ABOUT, (to_json(about) + "\n").encode())
 
