@@ -11,7 +11,10 @@ import subprocess
 import sys
 import time
 import tomllib
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,10 +22,15 @@ import pytest
 pytest.importorskip("dolfinx")
 
 from vi_contact.cli.entry import main
-from vi_contact.core.errors import InputError
+from vi_contact.core.algebra import SerialComm
+from vi_contact.core.errors import InputError, OutOfTime
 from vi_contact.ground_motion import Record, arias, pga, psa, read_record, scaled, tapered
 from vi_contact.plots.ida import DemandPanel, plot_ida
+from vi_contact.run.files.folder import locked
+from vi_contact.run.wall_time import WallTime
 from vi_contact.studies import IDA, read_case, run_ida
+from vi_contact.studies.cases.library import located
+from vi_contact.studies.cases.own_case import open_case
 from vi_contact.studies.cases.toml_file import toml_value
 from vi_contact.studies.ida.measures import demand, fractiles, intensity
 from vi_contact.studies.ida.runs import OneRun, Shaking, executed
@@ -74,7 +82,7 @@ def again(folder: Path, **more: object) -> tuple[list[dict[str, object]], list[s
     asked: dict[str, object] = {
         "motions": MOTIONS, "demands": DEMANDS, "scales": (1.0, 2.0), "intensity": "sa:0.1",
     }
-    running = {key: more.pop(key) for key in ("jobs", "part", "launch") if key in more}
+    running = {key: more.pop(key) for key in ("jobs", "part", "launch", "wall_time") if key in more}
     return run_ida(IDA(read_case("wall.toml"), **(asked | more)), folder, say=said.append, **running), said
 
 
@@ -169,11 +177,37 @@ def test_stopping_stops_the_runs(study: Path, monkeypatch: pytest.MonkeyPatch) -
     wrong = OneRun(case, shaking, 1.0, study / "runs" / "wrong", "it cannot")
     long = OneRun(case, shaking, 1.0, study / "runs" / "long")
     start = time.monotonic()
-    rows = executed([long, wrong], 2, ("sh", "-c", "sleep 3600"))
+    rows = executed([long, wrong], 2, ("sh", "-c", "sleep 3600"), WallTime())
     assert next(rows)["reason"] == "it cannot"
     with pytest.raises(KeyboardInterrupt):
         rows.throw(KeyboardInterrupt())
     assert time.monotonic() - start < 600.0 and not (long.folder / "row.json").exists()
+
+
+def test_a_wall_time_ends_a_study(study: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
+    """Every run gets what is left; one that ends with status 75 leaves no row, and without time left none is begun."""
+    monkeypatch.setattr("vi_contact.run.wall_time.age", lambda: 100.0)
+    run = OneRun(read_case("wall.toml"), Shaking("motion_1", (Path("motion_1.at2"),)), 1.0, study / "runs" / "long")
+    assert run.command((), WallTime("5"))[-2:] == ["--wall-time", "3:15"]
+    with pytest.raises(OutOfTime, match="200 s left of the wall time 5 ended the study: give the same command again"):
+        list(executed([run], 1, ("sh", "-c", "exit 75"), WallTime("5")))
+    assert not (run.folder / "row.json").exists()
+    before = table(study)
+    asked = ["ida", "wall.toml", "--motions", *MOTIONS, "--scales", "1,3", "--edp", *DEMANDS, "--out", str(study)]
+    assert main([*asked, "--wall-time", "1:45"]) == 75
+    assert "5 s left of the wall time 1:45" in capsys.readouterr().err and table(study) == before
+    with pytest.raises(InputError, match="none that Slurm reads"):
+        again(study, wall_time="soon")
+
+
+def test_one_study_at_a_time_in_a_folder(study: Path, tmp_path: Path) -> None:
+    """The same part of one is refused while it runs, another part is not; so is a second beam or layer."""
+    beam = tmp_path / "beam"
+    beam.mkdir()
+    with locked(SerialComm(), study), locked(SerialComm(), beam), ThreadPoolExecutor(1) as other:
+        assert other.submit(again, study, part=(2, 3)).exception() is None
+        for call in (partial(again, study), partial(open_case(located("beam")).run, SerialComm(), beam)):
+            assert "another run writes into" in str(other.submit(call).exception())
 
 
 def test_another_study_is_refused(study: Path) -> None:

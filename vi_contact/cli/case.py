@@ -15,7 +15,7 @@ from ..studies.cases.library import FOLDER, builtin_cases, located
 from ..studies.cases.short_settings import ShortOptions
 from ..studies.cases.toml_file import read_toml
 from .errors import world
-from .options import add_settings
+from .options import WALL_TIME, add_settings
 
 
 def add_case_commands(commands: Any) -> None:
@@ -38,9 +38,7 @@ def add_case_commands(commands: Any) -> None:
     run.add_argument("--restart", action="store_true", help="continue the run in the output folder from its checkpoint")
     run.add_argument("--restart-changed", action="store_true", dest="changed",
                      help="the same, also when the problem is another one than that of the checkpoint")
-    run.add_argument("--wall-time", metavar="TIME",
-                     help="end with a checkpoint, and status 75, before so much time since the start is over: "
-                     "hours:minutes:seconds, or what else Slurm reads as --time")
+    run.add_argument("--wall-time", metavar="TIME", help=WALL_TIME)
     add_settings(run)
     run.add_argument("--check", action="store_true", help="read the case and stop: nothing is computed")
     run.add_argument("--quiet", action="store_true", help="no progress line")

@@ -8,9 +8,9 @@ import signal
 from typing import Any
 
 from ..core.checks import shown
-from ..core.errors import InputError, ViContactError
+from ..core.errors import InputError, OutOfTime, ViContactError
 from ..studies.cases.library import located
-from .options import add_settings
+from .options import WALL_TIME, add_settings
 
 
 def add_ida_commands(commands: Any) -> None:
@@ -32,6 +32,7 @@ def add_ida_commands(commands: Any) -> None:
     one.add_argument("--jobs", type=int, default=1, metavar="N", help="runs at the same time (default 1)")
     one.add_argument("--part", type=_part, default=(1, 1), metavar="I/N", help="only every N-th run, for job arrays")
     one.add_argument("--launch", default="", metavar="WORDS", help="in front of every run, such as 'mpirun -n 4'")
+    one.add_argument("--wall-time", metavar="TIME", help=f"{WALL_TIME}; every run gets what is left")
     add_settings(one)
     one.set_defaults(run=_ida)
 
@@ -72,8 +73,10 @@ def _ida(options: argparse.Namespace) -> str:
     try:
         rows = run_ida(
             study, options.out, jobs=options.jobs, part=options.part, launch=launch,
-            say=lambda line: print(line, flush=True),
+            say=lambda line: print(line, flush=True), wall_time=options.wall_time,
         )
+    except OutOfTime:
+        raise
     except KeyboardInterrupt:
         raise ViContactError("interrupted: give the same command again to go on") from None
     failed = sum(row["status"] != "finished" for row in rows)

@@ -16,6 +16,8 @@ from ..core.errors import InputError
 
 MOST_SPACED = 100_000  # periods or frequencies of a spectrum
 PICTURES = (".png", ".pdf", ".svg")
+WALL_TIME = ("end with a checkpoint, and status 75, before so much time since the start is over: hours:minutes:seconds "
+             "or what else Slurm reads as --time")
 
 
 def add_settings(command: argparse.ArgumentParser) -> None:

@@ -35,7 +35,7 @@ LOCK = ".lock"
 LOG = "run.log"
 SUMMARY = "summary.json"
 FILES = (ABOUT, CHECKPOINT, COLUMNS, FIELDS_INDEX, HISTORY_CSV, HISTORY_H5, JOURNAL, LOG, SUMMARY)  # of a run
-_held: dict[Path, int] = {}  # folders that this process has locked -> the thread that did
+_held: dict[Path, int] = {}  # locks that this process has -> the thread that took them
 
 
 def run_folder(comm: Comm, path: str | Path) -> Path:
@@ -89,28 +89,29 @@ def remove_litter(folder: Path) -> None:
 
 
 @contextmanager
-def locked(comm: Comm, folder: Path | None) -> Iterator[None]:
-    """Refuse other runs that want the folder, while it lasts, with one sentence on all their ranks. Collective.
+def locked(comm: Comm, folder: Path | None, name: str = LOCK) -> Iterator[None]:
+    """Refuse other runs that want the folder, or this part of it, while it lasts, with one sentence on all their ranks.
+    Collective.
 
     Rank 0 holds a lock (flock) on a file in the folder. What a killed run leaves of it holds nobody up. Within the same
     thread it may be taken again. On a file system that knows no locks there is none, which is logged.
     """
-    mine = None if folder is None else on_root(comm, lambda: _take(folder))
+    mine = None if folder is None else on_root(comm, lambda: _take(folder, name))
     try:
         yield
     finally:
         if mine is not None and folder is not None:  # removed while locked: who opens it meanwhile makes a new one
-            _held.pop(folder.resolve(), None)
-            (folder / LOCK).unlink(missing_ok=True)
+            _held.pop(folder.resolve() / name, None)
+            (folder / name).unlink(missing_ok=True)
             mine.close()
 
 
-def _take(folder: Path) -> Any:
+def _take(folder: Path, name: str) -> Any:
     """The open, locked file; None when this thread has the lock already."""
-    if _held.get(folder.resolve()) == threading.get_ident():
+    if _held.get(folder.resolve() / name) == threading.get_ident():
         return None
     while True:
-        file = open(folder / LOCK, "a+b", buffering=0)  # noqa: SIM115
+        file = open(folder / name, "a+b", buffering=0)  # noqa: SIM115
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
@@ -119,12 +120,12 @@ def _take(folder: Path) -> Any:
         except OSError as error:
             log.warning("'%s' is on a file system without locks (%s): see to it that no other run writes there",
                         folder, error.strerror)
-        if _is_there(folder / LOCK, file):
+        if _is_there(folder / name, file):
             break
         file.close()  # the run that had it has removed it since
     file.truncate(0)
     file.write(f"process {os.getpid()} on {socket.gethostname()}".encode())
-    _held[folder.resolve()] = threading.get_ident()
+    _held[folder.resolve() / name] = threading.get_ident()
     return file
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from ...core.algebra import Comm, SerialComm
 from ...core.errors import InputError
 from ...core.files import on_root
-from ...run.files.folder import run_folder
+from ...run.files.folder import locked, run_folder
 from .beam_study import BeamStudy
 from .layer_study import LayerStudy
 from .library import base_folder, check_format, keep_copy
@@ -38,8 +38,9 @@ class OwnCase:
 
         def alone() -> str:
             folder = run_folder(SerialComm(), out)
-            found = self.study.run(folder)
-            keep_copy(self.path, self.settings, folder, SerialComm())
+            with locked(SerialComm(), folder):
+                found = self.study.run(folder)
+                keep_copy(self.path, self.settings, folder, SerialComm())
             return found
 
         return on_root(comm, alone) or ""

@@ -22,13 +22,15 @@ from typing import Any
 
 import numpy as np
 
-from ...core.algebra import Array
+from ...core.algebra import Array, SerialComm
 from ...core.errors import InputError
 from ...core.files import to_json, write_atomically, write_csv
 from ...fem.mesh import alone
 from ...ground_motion import scaled
 from ...plots.ida import DemandPanel, plot_ida
+from ...run.files.folder import LOCK, locked
 from ...run.files.reading import read_run
+from ...run.wall_time import WallTime
 from ..cases.case import Case
 from ..cases.parsing import nearest
 from .measures import Demand, Intensity, demand, fractiles, intensity
@@ -99,7 +101,7 @@ class IDA:
 
 def run_ida(
     study: IDA, out: str | Path, *, jobs: int = 1, part: tuple[int, int] = (1, 1), launch: Sequence[str] = (),
-    say: Callable[[str], None] = print,
+    say: Callable[[str], None] = print, wall_time: str | None = None,
 ) -> list[Row]:
     """Make the runs that have not finished yet, and the table and figure of all that are in ``out``; returns its rows.
 
@@ -112,26 +114,29 @@ def run_ida(
         part: (i, n): only every n-th run from the i-th on, for job arrays that share the folder.
         launch: words in front of the command of a run, ("mpirun", "-n", "4").
         say: takes a line about each run.
+        wall_time: as of ``simulate``: every run gets what is left of it, and ends with a checkpoint before it is over.
     Raises:
-        InputError: a folder of another study, a part or number of jobs that makes no sense, inside mpirun.
-        KeyboardInterrupt: after the runs have been told to stop; call again to go on.
+        InputError: a folder of another study, or in which the same part runs, a part or number of jobs that makes no
+            sense, inside mpirun.
+        KeyboardInterrupt: after the runs have been told to stop; OutOfTime: likewise. Call again to go on.
     """
     refuse_mpirun()
     if jobs < 1 or not 1 <= part[0] <= part[1]:
         raise InputError(f"jobs = {jobs}, part = {part[0]}/{part[1]}: give at least one job, and 1 <= i <= n for i/n")
-    out = Path(out)
+    out, end = Path(out), WallTime(wall_time)
     _claim(study, out)
-    every = study.runs(out)
-    mine = every[part[0] - 1 :: part[1]]
-    left = [run for run in mine if run.done() is None]
-    if left:
-        _check_demands(study)
-    say(f"{len(every)} runs, {len(mine)} of them here, {len(mine) - len(left)} finished before")
-    for number, row in enumerate(executed(left, jobs, launch), start=1):
-        _tell(study, out)
-        say(f"[{number}/{len(left)}] {row['record']} x {_shown(row['scale'])}: {row['status']}"
-            + (f": {row['reason']}" if row["reason"] else ""))
-    return _tell(study, out, draw=True)
+    with locked(SerialComm(), out, LOCK if part[1] == 1 else f"{LOCK}-{part[0]}-of-{part[1]}"):
+        every = study.runs(out)
+        mine = every[part[0] - 1 :: part[1]]
+        left = [run for run in mine if run.done() is None]
+        if left:
+            _check_demands(study)
+        say(f"{len(every)} runs, {len(mine)} of them here, {len(mine) - len(left)} finished before")
+        for number, row in enumerate(executed(left, jobs, launch, end), start=1):
+            _tell(study, out)
+            say(f"[{number}/{len(left)}] {row['record']} x {_shown(row['scale'])}: {row['status']}"
+                + (f": {row['reason']}" if row["reason"] else ""))
+        return _tell(study, out, draw=True)
 
 
 def _check_demands(study: IDA) -> None:

@@ -16,12 +16,13 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from ...core.errors import InputError
+from ...core.errors import InputError, OutOfTime
 from ...core.files import to_json, write_atomically
 from ...ground_motion import Record, scaled
 from ...ground_motion.excitation import GroundMotion
 from ...run.files.folder import CHECKPOINT, SUMMARY
 from ...run.files.reading import read_object
+from ...run.wall_time import WallTime
 from ..cases.case import Case, read_case
 from ..cases.toml_file import toml_value
 
@@ -29,6 +30,7 @@ ROW = "row.json"
 SAID = "failure.txt"
 ATTEMPTS = 5  # of a run that ends without a word: Gmsh 4.8, asked before it is initialised, does that now and then
 PATIENCE = 20.0  # seconds for a run to save its state
+ASIDE = 5.0  # seconds of a wall time for the beginning and the end of a process
 _MPI = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_RANK")  # in the environment of what mpirun has started
 
 
@@ -112,12 +114,17 @@ class OneRun:
             row = self.keep("", 0)  # it outlived the process that had started it
         return row if row is not None and row["status"] == "finished" else None
 
-    def command(self, launch: Sequence[str]) -> list[str]:
-        """Return the command that runs it, from its checkpoint where there is one."""
+    def command(self, launch: Sequence[str], end: WallTime) -> list[str]:
+        """Return the command that runs it, from its checkpoint where there is one; OutOfTime when nothing of the wall
+        time is left for it."""
         own = [sys.executable, "-m", "vi_contact", "run", str(self.case.path), "--out", str(self.folder), "--quiet"]
         settings = (*self.case.settings, *self.shaking.settings(self.case, self.factor))
         made = [word for setting in settings for word in ("--set", setting)]
         made += [word for package in self.case.allowed for word in ("--allow", package)]
+        if end.text is not None:
+            if (left := int(end.left - ASIDE)) < 1:
+                raise _over(end)
+            made += ["--wall-time", f"{left // 60}:{left % 60:02d}"]
         return [*launch, *own, *made, *(["--restart"] if (self.folder / CHECKPOINT).is_file() else [])]
 
     def keep(self, said: str, code: int) -> dict[str, Any]:
@@ -136,24 +143,32 @@ class OneRun:
         write_atomically(self.folder / ROW, to_json(row).encode())
         return row
 
-    def start(self, launch: Sequence[str]) -> subprocess.Popen[str]:
+    def start(self, launch: Sequence[str], end: WallTime) -> subprocess.Popen[str]:
         """Start it, in the environment without what MPI of this process may have put there."""
         package = str(Path(__file__).resolve().parents[2])
         way = os.pathsep.join([package, *filter(None, [os.environ.get("PYTHONPATH")])])
         environment = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"} | dict(os.environ) | {"PYTHONPATH": way}
+        command = self.command(launch, end)
         (self.folder / ROW).unlink(missing_ok=True)
         (self.folder / SUMMARY).unlink(missing_ok=True)
         try:
             return subprocess.Popen(
-                self.command(launch), env=environment, text=True, encoding="utf-8", errors="replace",
+                command, env=environment, text=True, encoding="utf-8", errors="replace",
                 stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True,
             )
         except OSError as error:
             raise InputError(f"'{error.filename}' cannot be started ({error.strerror}): give another launch") from None
 
 
-def executed(runs: Sequence[OneRun], jobs: int, launch: Sequence[str]) -> Iterator[dict[str, Any]]:
-    """Run them, so many at a time, and yield the row of each when it ends. Left early, it stops those that go on."""
+def _over(end: WallTime) -> OutOfTime:
+    """Return what ends a study whose wall time is nearly over."""
+    return OutOfTime(f"{max(end.left, 0.0):.0f} s left of the wall time {end.text} ended the study: give the same "
+                     "command again to go on")
+
+
+def executed(runs: Sequence[OneRun], jobs: int, launch: Sequence[str], end: WallTime) -> Iterator[dict[str, Any]]:
+    """Run them, so many at a time, and yield the row of each when it ends. Left early, it stops those that go on;
+    OutOfTime when one of them has ended with its status."""
     stopped, lock = threading.Event(), threading.Lock()
     going: set[subprocess.Popen[str]] = set()
 
@@ -161,7 +176,7 @@ def executed(runs: Sequence[OneRun], jobs: int, launch: Sequence[str]) -> Iterat
         with lock:
             if stopped.is_set():
                 raise KeyboardInterrupt
-            process = run.start(launch)
+            process = run.start(launch, end)
             going.add(process)
         said = process.communicate()[0]
         with lock:
@@ -175,6 +190,8 @@ def executed(runs: Sequence[OneRun], jobs: int, launch: Sequence[str]) -> Iterat
             return run.keep(f"vi-contact: {run.wrong}", 1)
         for _ in range(ATTEMPTS):
             said, code = attempt(run)
+            if code == os.EX_TEMPFAIL:
+                raise _over(end)
             if code <= 0 or said.strip():
                 break
         return run.keep(said, code)
