@@ -1,10 +1,6 @@
 """The ball of tetrahedra: groups where they belong, nodes on the sphere, graded cells, the same mesh every time."""
 
-import os
-import subprocess
-import sys
 from math import pi
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -91,17 +87,6 @@ def test_ball_leaves_gmsh_options_alone():
         assert gmsh.option.getNumber("Mesh.MeshSizeExtendFromBoundary") != 0
     finally:
         gmsh.finalize()
-
-
-def test_ball_script_runs_by_file(tmp_path):
-    script = Path(__file__).resolve().parents[2] / "meshes" / "ball.py"
-    options = ["--radius", "0.01", "--size", "2e-4", "--foot", "8e-4", "--eighth", "-o", "ball.msh"]
-    done = subprocess.run(
-        [sys.executable, str(script), *options], cwd=tmp_path, capture_output=True, text=True, timeout=600,
-        env=dict(os.environ), check=False,
-    )
-    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
-    assert "cut" in arrays_from_file(tmp_path / "ball.msh").facet_groups
 
 
 @pytest.mark.parametrize(

@@ -5,12 +5,15 @@ import os
 import signal
 import subprocess
 import sys
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from vi_contact import meshes
 from vi_contact.core.errors import InputError
+from vi_contact.meshes.__main__ import parser
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.extract import arrays_from_file, arrays_from_script
 from vi_contact.meshes.gmsh_session import session, write
@@ -206,33 +209,37 @@ def run(*arguments, cwd):
     return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=600, env=dict(os.environ))
 
 
-def test_wall_script_runs_through_the_link_without_installation(tmp_path):
-    script = SOURCE_TREE / "meshes" / "wall.py"
+def test_the_folder_of_the_source_tree_writes_meshes_without_installation(tmp_path):
     options = ["--height", 4, "--width", 2, "--divisions", 2, 4, "--triangles", "-o", "wall.msh"]
-    done = run(script, *options, cwd=tmp_path)
+    done = run(SOURCE_TREE / "meshes", "wall", *options, cwd=tmp_path)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
     wall = arrays_from_file(tmp_path / "wall.msh")
     assert (wall.cell, len(wall.cells)) == ("triangle", 16)
     assert np.array_equal(wall.points.max(axis=0), [2.0, 4.0])
 
 
-def test_mesh_scripts_run_as_modules_and_by_file(tmp_path):
-    done = run("-m", "vi_contact.meshes.wall", "--size", 2, "-o", tmp_path / "wall.msh", cwd=SOURCE_TREE)
+def test_the_room_writes_meshes_as_a_module(tmp_path):
+    options = ["--lengths", 1, 2, 3, "--divisions", 1, 2, 3, "--simplices", "--angle", 0.1, "-o", tmp_path / "it.msh"]
+    done = run("-m", "vi_contact.meshes", "block", *options, cwd=SOURCE_TREE)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
-    assert arrays_from_file(tmp_path / "wall.msh").cell == "quadrilateral"
-    options = ["--lengths", 1, 2, 3, "--divisions", 1, 2, 3, "--simplices", "--angle", 0.1, "-o", "block.msh"]
-    done = run(SOURCE_TREE / "meshes" / "block.py", *options, cwd=tmp_path)
-    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
-    assert len(arrays_from_file(tmp_path / "block.msh").cells) == 36
+    assert len(arrays_from_file(tmp_path / "it.msh").cells) == 36
 
 
-def test_mesh_scripts_explain_bad_input_in_one_line(tmp_path):
-    done = run(SOURCE_TREE / "meshes" / "wall.py", "--size", -1, cwd=tmp_path)
-    assert done.returncode == 1
-    assert done.stderr == "cell size -1.0 m must be positive and no larger than the wall's sides\n"
-    done = run(SOURCE_TREE / "meshes" / "block.py", "-o", "nowhere/block.msh", cwd=tmp_path)
-    assert done.returncode == 1
-    assert done.stderr.count("\n") == 1 and "nowhere does not exist" in done.stderr
+@pytest.mark.parametrize("shape", ["ball", "block", "channel", "disk", "wall"])
+def test_every_number_of_a_shape_is_an_option(shape: str, capsys):
+    with pytest.raises(SystemExit, match="^0$"):
+        parser().parse_args([shape, "--help"])
+    said = capsys.readouterr().out
+    for field in fields(getattr(meshes, f"{shape.capitalize()}Mesh")):
+        assert field.name in ("corner", "deform") or f"--{field.name.replace('_', '-')} " in said.replace("]", " ")
+
+
+def test_meshes_explain_bad_input_in_one_line(tmp_path):
+    for words, said in ((("wall", "--size", -1), "cell size -1.0 m must be positive and no larger than the wall's"),
+                        (("block", "-o", "nowhere/block.msh"), "nowhere does not exist")):
+        done = run(SOURCE_TREE / "meshes", *words, cwd=tmp_path)
+        assert done.returncode == 1
+        assert done.stderr.count("\n") == 1 and said in done.stderr
 
 
 # The user's Gmsh ------------------------------------------------------------------------------------------------------

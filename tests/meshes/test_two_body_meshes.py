@@ -1,8 +1,5 @@
 """Meshes of two bodies: blocks side by side, joints and cracks cut open, sides welded together."""
 
-import os
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -10,7 +7,7 @@ import pytest
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.cut import CutOpen, Welded, cut_open, welded
-from vi_contact.meshes.extract import arrays_from_file, arrays_from_script
+from vi_contact.meshes.extract import arrays_from_script
 from vi_contact.meshes.from_arrays import add_arrays
 from vi_contact.meshes.gmsh_session import session, write
 from vi_contact.meshes.rows import cell_sides, number_alike
@@ -211,20 +208,3 @@ def test_bodies_of_gmsh_geometry():
     cut = arrays_from_script(CutOpen(Dam(True), "joint0", inside="dam"))
     assert len(bodies(cut)) == 2 and {"joint0_1", "joint0_2"} == set(cut.facet_groups)
     assert np.ptp(cut.points[np.unique(cut.facet_groups["joint0_1"])], axis=0) == pytest.approx([1.0, 0.0], abs=1e-12)
-
-
-def test_two_blocks_by_itself(tmp_path):
-    """The script writes what the class builds; wrong sizes end with a sentence."""
-    target = tmp_path / "blocks.msh"
-    script = os.path.join(os.path.dirname(__file__), "..", "..", "meshes", "two_blocks.py")
-
-    def run(*options: str) -> subprocess.CompletedProcess[str]:
-        command = [sys.executable, script, *options, "-o", str(target)]
-        return subprocess.run(command, capture_output=True, text=True, check=False, env=dict(os.environ))
-
-    done = run("--lower", "2", "1", "--upper", "1", "1", "--divisions", "4", "2", "3", "2", "--offset", "0.5")
-    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
-    read = arrays_from_file(target)
-    assert read.points.shape == (15 + 12, 2) and set(read.cell_groups) == {"lower", "upper"}
-    done = run("--lower", "-1", "1")
-    assert done.returncode == 1 and "must be positive numbers of metres" in done.stderr

@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """Mesh a quarter or an eighth of a ball by tetrahedra, finest at its lowest point, which lies on or strikes a plane.
 
 The ball touches the plane y = 0 at the origin, its centre is (0, R, 0), and the planes x = 0 and z = 0 are planes of
@@ -10,19 +9,13 @@ eighth, "cut" (y = R).
 from __future__ import annotations
 
 import math
-import sys
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-if not __package__:  # run as a file of the source tree, maybe not installed
-    sys.path[0] = str(Path(__file__).resolve().parents[2])
-
 from vi_contact.core.checks import MOST_CELLS, attributes, counted
 from vi_contact.core.errors import InputError
-from vi_contact.meshes.command_line import run_script
 from vi_contact.meshes.gmsh_session import options
 
 _TRIANGLE = 2  # Gmsh's number
@@ -121,11 +114,3 @@ def _add_foot(model: Any, sphere: int, foot: float) -> None:
     entity = model.addDiscreteEntity(2)
     model.mesh.addElementsByType(entity, _TRIANGLE, [], triangles[near].reshape(-1))
     model.setPhysicalName(2, model.addPhysicalGroup(2, [entity]), "foot")
-
-
-if __name__ == "__main__":  # ball.py --radius 0.01 --size 2e-5 --foot 2e-4 -o ball.msh
-    run_script(
-        BallMesh, radius="[m]", size="of the cells at the foot [m]", foot="distance from the lowest point [m]",
-        growth="of the cell size per distance", coarsest="cell size [m], a quarter of the radius unless given",
-        eighth="the lower half of the quarter",
-    )

@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """Mesh a bar, rectangle or box, evenly divided, if wanted bent by a smooth map and turned: the body of most tests.
 
 Physical groups: cells "block"; boundary "left", "right" (x lowest, highest), "bottom", "top" (y), "back", "front" (z,
@@ -8,20 +7,14 @@ front towards the viewer). A bar has the first two, a rectangle four, a box six.
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-if not __package__:  # run as a file of the source tree, maybe not installed
-    sys.path[0] = str(Path(__file__).resolve().parents[2])
-
 from vi_contact.core.checks import MOST_CELLS, counted
 from vi_contact.core.errors import InputError
-from vi_contact.meshes.command_line import run_script
 from vi_contact.meshes.grid import Array, add_grid, lattice
 
 SIDES = (("left", "right"), ("bottom", "top"), ("back", "front"))
@@ -76,10 +69,3 @@ def check_box(lengths: Sequence[float], divisions: Sequence[int]) -> None:
     if not all(n == n // 1 and n >= 1 for n in divisions):
         raise InputError(f"divisions {tuple(divisions)} must be whole numbers of cells, at least 1")
     counted("mesh", f"divisions {tuple(divisions)}", math.prod(divisions), "cells", most=MOST_CELLS)
-
-
-if __name__ == "__main__":  # block.py --lengths 2 1 --divisions 4 2 --simplices -o block.msh
-    run_script(
-        BlockMesh, lengths="one to three lengths [m]", divisions="cells along each length",
-        simplices="triangles or tetrahedra", angle="rotation about the origin [rad]",
-    )

@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """Mesh a U-shaped channel in a soil layer on bedrock (Fig. 6 of the boundary method): two bodies, nodes of their own.
 
 Physical groups: cells "channel", "soil"; boundary "bedrock" (y = 0), "left_side", "right_side" (x = 0, width),
@@ -11,19 +10,13 @@ first.
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
-
-if not __package__:  # run as a file of the source tree, maybe not installed
-    sys.path[0] = str(Path(__file__).resolve().parents[2])
 
 from vi_contact.core.checks import MOST_CELLS, attributes, counted
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.channel_grid import channel_grid
-from vi_contact.meshes.command_line import run_script
 from vi_contact.meshes.from_arrays import add_arrays
 
 
@@ -115,12 +108,3 @@ def _add_body(
         held = [curve for curve, one in zip(curves, names, strict=True) if one == group]
         model.setPhysicalName(1, model.addPhysicalGroup(1, held), group)
     model.setPhysicalName(2, model.addPhysicalGroup(2, [surface]), name)
-
-
-if __name__ == "__main__":  # channel.py --width 24 --depth 8 --size 0.25 --far 1 --triangles -o channel.msh
-    run_script(
-        ChannelMesh, width="of the layer [m]", depth="of the layer [m]", outer_width="of the channel [m]",
-        height="of the channel [m]", wall="thickness [m]", slab="thickness [m]", size="of the cells [m]",
-        left="x of the channel's left side [m], in the middle unless given", far="cells at bedrock and sides [m]",
-        triangles="instead of quadrilaterals",
-    )

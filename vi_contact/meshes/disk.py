@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """Mesh a disk by triangles of one size, its left half the mirror image of the right one: a ball in the plane.
 
 The disk touches the line y = 0 at the origin, its centre is (0, R). Physical groups: cells "disk"; boundary "foot" (the
@@ -8,20 +7,14 @@ arc within an angle of the lowest point: the contact side) and "rest". Symmetric
 from __future__ import annotations
 
 import math
-import sys
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-if not __package__:  # run as a file of the source tree, maybe not installed
-    sys.path[0] = str(Path(__file__).resolve().parents[2])
-
 from vi_contact.core.checks import MOST_CELLS, counted
 from vi_contact.core.errors import InputError
-from vi_contact.meshes.command_line import run_script
 
 _LINE, _TRIANGLE = 1, 2  # Gmsh's numbers
 
@@ -95,7 +88,3 @@ def _mirrored(model: Any, dimension: int, entity: int, kind: int, image: npt.NDA
 
 def _name(model: Any, dimension: int, name: str, entities: list[int]) -> None:
     model.setPhysicalName(dimension, model.addPhysicalGroup(dimension, entities), name)
-
-
-if __name__ == "__main__":  # disk.py --radius 0.5 --size 0.04 -o disk.msh
-    run_script(DiskMesh, radius="[m]", size="of the cells [m]", foot="half the angle of the contact side [rad]")

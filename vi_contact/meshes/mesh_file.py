@@ -38,7 +38,7 @@ def safe_copy(file: Path, folder: Path) -> Path:
         raise InputError(f"mesh file {shown(str(file))} cannot be read ({why}") from None
     if not there:
         what = str(file) if "\0" not in str(file) else shown(str(file))
-        raise InputError(f"mesh file {what} does not exist: check the path or write it with a script of folder meshes")
+        raise InputError(f"mesh file {what} does not exist: check the path, or write it as by python3 meshes wall")
     if copy.stat().st_size == 0:
         raise InputError(f"mesh file {file} is empty: write it again")
     with open(copy, "rb") as opened, mmap.mmap(opened.fileno(), 0, access=mmap.ACCESS_READ) as data:

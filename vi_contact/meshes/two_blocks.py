@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """Mesh bars, rectangles or boxes that touch without sharing a node: bodies of their own, meshed each for itself.
 
 Physical groups of a body called "lower": cells "lower"; boundary "lower_left", "lower_right" (x lowest, highest),
@@ -7,18 +6,12 @@ Physical groups of a body called "lower": cells "lower"; boundary "lower_left", 
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
-
-if not __package__:  # run as a file of the source tree, maybe not installed
-    sys.path[0] = str(Path(__file__).resolve().parents[2])
 
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.block import SIDES, BlockMesh
-from vi_contact.meshes.command_line import run_script
 from vi_contact.meshes.grid import add_grid
 
 
@@ -74,25 +67,3 @@ class TwoBlocks:
     def build(self, gmsh: Any) -> None:
         """Add both to Gmsh's current model."""
         self.blocks().build(gmsh)
-
-
-def _on_top(
-    lower: tuple[float, ...] = (1.0, 1.0), upper: tuple[float, ...] = (1.0, 1.0),
-    divisions: tuple[int, ...] = (1, 1, 1, 1), offset: tuple[float, ...] = (0.0, 0.0), gap: float = 0.0,
-    simplices: bool = False, angle: float = 0.0,
-) -> TwoBlocks:
-    """Return two blocks of these lengths [m], the first half of the divisions those of the lower one."""
-    half = len(divisions) // 2
-    blocks = [
-        BlockMesh(lengths=lengths, divisions=parts, simplices=simplices)
-        for lengths, parts in ((lower, divisions[:half]), (upper, divisions[half:]))
-    ]
-    return TwoBlocks(lower=blocks[0], upper=blocks[1], offset=offset, gap=gap, angle=angle)
-
-
-if __name__ == "__main__":  # two_blocks.py --lower 2 1 --upper 1 1 --divisions 8 4 5 5 --offset 0.5
-    run_script(
-        _on_top, lower="lengths of the lower block [m]", upper="lengths of the upper block [m]",
-        divisions="of the lower, of the upper", offset="of the upper block, x and z [m]", gap="between them [m]",
-        simplices="triangles or tetrahedra", angle="rotation about the origin [rad]",
-    )

@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """Mesh the wall of Fig. 2 of the boundary method: a rectangle on its base, one-sided supports along its right side.
 
 Physical groups: cells "wall"; boundary "base" (y = 0), "face" (x = width: the contact side), "top", "back" (x = 0). The
@@ -7,18 +6,12 @@ defaults are the mesh of the published example: 8 x 12 cells, 40 boundary nodes 
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
-
-if not __package__:  # run as a file of the source tree, maybe not installed
-    sys.path[0] = str(Path(__file__).resolve().parents[2])
 
 from vi_contact.core.checks import MOST_CELLS, counted
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.block import check_box
-from vi_contact.meshes.command_line import run_script
 from vi_contact.meshes.grid import add_grid, lattice
 
 _PUBLISHED = (8, 12)
@@ -72,10 +65,3 @@ def _build_irregular(wall: WallMesh, gmsh: Any, size: float) -> None:
     if not wall.triangles:
         model.mesh.setRecombine(2, surface)
     model.mesh.generate(2)
-
-
-if __name__ == "__main__":  # wall.py --height 9 --width 6 --divisions 8 12 --triangles -o wall.msh
-    run_script(
-        WallMesh, height="[m]", width="[m]", divisions="cells along width and height, 8 12 unless given",
-        size="cell size of an irregular mesh [m]", triangles="instead of quadrilaterals",
-    )

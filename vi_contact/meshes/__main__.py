@@ -1,0 +1,44 @@
+"""Write a mesh of this room to a file: ``python3 meshes wall --height 9 --size 0.5 -o wall.msh``."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from dataclasses import MISSING, fields
+from pathlib import Path
+
+if not __package__:  # run as a folder of the source tree, maybe not installed
+    sys.path[0] = str(Path(__file__).resolve().parents[2])
+
+from vi_contact import meshes
+from vi_contact.core.errors import InputError
+from vi_contact.meshes.gmsh_session import write
+
+SHAPES = {name.removesuffix("Mesh").lower(): name for name in meshes.__all__ if name.endswith("Mesh")}
+
+
+def parser() -> argparse.ArgumentParser:
+    """Build the parser: a command for every shape, an option for each of its numbers, which its docstring explains."""
+    top = argparse.ArgumentParser(prog="meshes", description=__doc__)
+    commands = top.add_subparsers(dest="shape", required=True, metavar=f"{{{','.join(SHAPES)}}}")
+    for shape, name in SHAPES.items():
+        mesh = getattr(meshes, name)
+        one = commands.add_parser(shape, description=mesh.__doc__, argument_default=argparse.SUPPRESS)
+        for field in fields(mesh):
+            option, kind = f"--{field.name.replace('_', '-')}", str(field.type)  # annotations are texts
+            if kind == "bool":
+                one.add_argument(option, action="store_true")
+            elif kind.startswith(("float", "tuple")):
+                one.add_argument(option, type=int if "int" in kind else float, required=field.default is MISSING,
+                                 nargs="+" if kind.startswith("tuple") else None)
+        one.add_argument("-o", "--output", default=f"{shape}.msh")
+    return top
+
+
+if __name__ == "__main__":
+    given = vars(parser().parse_args())
+    mesh, output = getattr(meshes, SHAPES[given.pop("shape")]), given.pop("output")
+    try:
+        write(mesh(**{name: tuple(x) if isinstance(x, list) else x for name, x in given.items()}), output)
+    except InputError as error:
+        sys.exit(str(error))
