@@ -42,7 +42,7 @@ from ...solvers.automatic import Automatic
 from .library import base_folder, check_format, keep_copy
 from .own_classes import packages
 from .parsing import Words, arguments, nearest, read
-from .table_calls import Call, Callee, Group, Named, Node, Spot, Value, callee, needs_body, nodes_in
+from .table_calls import Call, Callee, Group, Node, Spot, build, callee, needs_body, nodes_in
 from .toml_file import read_toml, with_settings
 from .vocabulary import MeshFile, Parts, words
 
@@ -93,7 +93,7 @@ class Case:
         """Return a value of [run]; None where it is left out, or made of other things."""
         run = self.nodes["run"]
         found = run.arguments.get(key) if isinstance(run, Call) else None
-        return found.value if isinstance(found, Value) else None
+        return None if isinstance(found, Call) else found
 
     def excitations(self, **context: Any) -> tuple[Excitation, ...]:
         """Return what shakes the body; record files are read here."""
@@ -173,7 +173,7 @@ class Case:
 
     def _made(self, table: str, **context: Any) -> Any:
         """Return what a table makes; None where there is none."""
-        return self.nodes[table].build(context) if table in self.nodes else None
+        return build(self.nodes[table], context) if table in self.nodes else None
 
     def _several(self, table: str, **context: Any) -> tuple[Any, ...]:
         """Return what a table, or an array of tables, makes, as a tuple."""
@@ -268,8 +268,8 @@ def _node(name: str, tables: Mapping[str, Any], spot: Spot, known: Words) -> Nod
             value = _with_materials(value, tables.get("material", {}))
         return arguments(value, asked, spot, known)
     node = read(value, asked, spot, known)
-    if name == "material" and isinstance(node, Named):
-        known.named[LinearElastic] = dict(node.items)  # before the system names them
+    if name == "material" and isinstance(node, dict):
+        known.named[LinearElastic] = node  # before the system names them
     return node
 
 

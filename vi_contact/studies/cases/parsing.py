@@ -13,7 +13,7 @@ from typing import Any, Union, get_args, get_origin
 from ...core.checks import SHOWN, shown
 from ...core.errors import InputError
 from .own_classes import own_class
-from .table_calls import GROUP, Call, Callee, Group, Items, Named, Node, Spot, Value, callee
+from .table_calls import GROUP, Call, Callee, Group, Node, Spot, callee
 
 
 @dataclass(frozen=True)
@@ -81,13 +81,13 @@ def _members(hint: Any) -> list[Any]:
 def _scalar(value: Any, member: Any, spot: Spot, words: Words) -> Node | None:
     """Return the node, or None where the value is nothing of this type."""
     if member in (Any, object):
-        return Value(value)
+        return value
     if isinstance(value, bool):
-        return Value(value) if member is bool else None
+        return value if member is bool else None
     if isinstance(value, int | float) and member is float:
-        return Value(float(value))
+        return float(value)
     if isinstance(value, int) and member is int:
-        return Value(value)
+        return value
     if not isinstance(value, str):
         return None
     if member in words.groups:
@@ -101,8 +101,8 @@ def _scalar(value: Any, member: Any, spot: Spot, words: Words) -> Node | None:
     if _is_path(member):
         if not value.strip():
             raise spot.wrong("is empty: give the path of a file or folder")
-        return Value(words.folder / value)
-    return Value(value) if member is str else None
+        return words.folder / value
+    return value if member is str else None
 
 
 def _is_path(member: Any) -> bool:
@@ -121,7 +121,7 @@ def _list(value: list[Any], members: list[Any], spot: Spot, words: Words) -> Nod
     if wrong is not None:
         raise wrong
     if any(member in (Any, object) for member in members):
-        return Value(value)
+        return value
     raise spot.wrong(f"is a list: give {_expected(members, words)}")
 
 
@@ -129,13 +129,13 @@ def _is_list(member: Any) -> bool:
     return get_origin(member) in (tuple, list, Sequence)
 
 
-def _items(value: list[Any], kinds: tuple[Any, ...], fixed: bool, spot: Spot, words: Words) -> Items:
+def _items(value: list[Any], kinds: tuple[Any, ...], fixed: bool, spot: Spot, words: Words) -> tuple[Node, ...]:
     if not fixed or kinds[-1] is Ellipsis:
         kinds = (kinds[0],) * len(value)
     elif len(kinds) != len(value):
         raise spot.wrong(f"has {len(value)} entries: give {len(kinds)}")
     pairs = enumerate(zip(value, kinds, strict=True), start=1)
-    return Items(tuple(read(one, kind, spot.entry(number), words) for number, (one, kind) in pairs))
+    return tuple(read(one, kind, spot.entry(number), words) for number, (one, kind) in pairs)
 
 
 def _table(value: dict[str, Any], members: list[Any], spot: Spot, words: Words) -> Node:
@@ -150,7 +150,7 @@ def _table(value: dict[str, Any], members: list[Any], spot: Spot, words: Words) 
     for member in members:
         if get_origin(member) in (Mapping, dict):
             kind = get_args(member)[1]
-            return Named({key: read(one, kind, spot.at(key), words) for key, one in value.items()})
+            return {key: read(one, kind, spot.at(key), words) for key, one in value.items()}
     raise spot.wrong(f"is a table: give {_expected(members, words)}")
 
 

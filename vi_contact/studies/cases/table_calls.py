@@ -5,28 +5,23 @@
     mu = 0.3
 
 ``read`` turns a value of the file into a node by the type hint of the parameter it is for, and refuses what does not
-fit in one sentence with file, table and key. ``node.build(context)`` makes the calls; the context supplies what no file
-holds: communicator, mesh, its groups, system; excitations, time step and scheme for what must know them. Nothing of the
-file is ever evaluated as code.
+fit in one sentence with file, table and key. ``build(node, context)`` makes the calls; the context supplies what no
+file holds: communicator, mesh, its groups, system; excitations, time step and scheme for what must know them. Nothing
+of the file is ever evaluated as code.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, is_dataclass
 from inspect import Parameter, signature
-from typing import Any, Protocol, get_type_hints
+from typing import Any, get_type_hints
 
 from ...core.errors import InputError
 
 Context = Mapping[str, Any]
+Node = Any  # what has been read: a Group or Call, a tuple or dict of nodes; all else stands for itself
 GIVEN = ("comm", "mesh", "system", "excitations", "run_dt")  # parameters that the context supplies
-
-
-class Node(Protocol):
-    """Hold a value that has been read; ``build`` makes it."""
-
-    def build(self, context: Context) -> Any: ...
 
 
 @dataclass(frozen=True)
@@ -61,16 +56,6 @@ class Spot:
 
 
 @dataclass(frozen=True)
-class Value:
-    """Hold a plain value."""
-
-    value: Any
-
-    def build(self, context: Context) -> Any:
-        return self.value
-
-
-@dataclass(frozen=True)
 class Group:
     """Name a group of the mesh."""
 
@@ -98,26 +83,6 @@ class Group:
 
 
 GROUP = {"Facets": "a boundary group", "Cells": "a cell group"}
-
-
-@dataclass(frozen=True)
-class Items:
-    """Hold a list; it becomes a tuple."""
-
-    items: tuple[Node, ...]
-
-    def build(self, context: Context) -> Any:
-        return tuple(one.build(context) for one in self.items)
-
-
-@dataclass(frozen=True)
-class Named:
-    """Hold a table of names."""
-
-    items: Mapping[str, Node]
-
-    def build(self, context: Context) -> Any:
-        return {name: one.build(context) for name, one in self.items.items()}
 
 
 @dataclass(frozen=True)
@@ -154,7 +119,7 @@ class Call:
     """Call a function; its InputErrors get the place in the file."""
 
     callee: Callee
-    arguments: Mapping[str, Node]
+    arguments: dict[str, Node]
     spot: Spot = field(compare=False)
 
     def build(self, context: Context) -> Any:
@@ -162,7 +127,7 @@ class Call:
         if lacking:
             raise self.spot.inside(f"{self.callee.name} asks for the {lacking[0]}, not known yet: give numbers")
         supplied = {name: context[name] for name in self.callee.given}
-        arguments = {name: node.build(context) for name, node in self.arguments.items()}
+        arguments = build(self.arguments, context)
         try:
             return self.callee.function(**supplied, **arguments)
         except InputError as error:
@@ -175,15 +140,18 @@ def needs_body(node: Node) -> bool:
                for one in nodes_in(node))
 
 
+def build(node: Node, context: Context) -> Any:
+    """Return what a node makes."""
+    if isinstance(node, Group | Call):
+        return node.build(context)
+    if isinstance(node, dict):
+        return {name: build(one, context) for name, one in node.items()}
+    return tuple(build(one, context) for one in node) if isinstance(node, tuple) else node
+
+
 def nodes_in(node: Node) -> Iterator[Node]:
     """Yield the node and all nodes in it."""
     yield node
-    inside: Iterable[Node] = ()
-    if isinstance(node, Call):
-        inside = node.arguments.values()
-    elif isinstance(node, Items):
-        inside = node.items
-    elif isinstance(node, Named):
-        inside = node.items.values()
-    for one in inside:
+    inside = node.arguments if isinstance(node, Call) else node
+    for one in inside.values() if isinstance(inside, dict) else inside if isinstance(inside, tuple) else ():
         yield from nodes_in(one)
