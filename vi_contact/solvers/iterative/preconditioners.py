@@ -1,8 +1,13 @@
-"""Precondition the free unknowns: w M⁻¹ w with a mask w, and M⁻¹ one of Jacobi, block Jacobi with ICC(0), and GAMG.
+"""Precondition the free unknowns: w M⁻¹ w with a mask w, and M⁻¹ one of Jacobi, ICC(0), and GAMG.
 
-ICC and Jacobi are made of the whole A, once. GAMG is made of A with the held rows and columns replaced by their
-diagonal, or its coarse grids would believe the contact open; its interpolation is kept, and only the Galerkin products
-are renewed, when more than a tenth of the contact set has moved since.
+ICC and Jacobi are made of the whole A, once. On several ranks each has the incomplete factor of its own rows and one
+layer of its neighbours' (additive Schwarz). Their sum counts a row as often as there are factors that hold it; to
+divide by the square root of that number on either side takes this back, and M stays symmetric. Counted twice, the
+layer would be no gain.
+
+GAMG is made of A with the held rows and columns replaced by their diagonal, or its coarse grids would believe the
+contact open; its interpolation is kept, and only the Galerkin products are renewed, when more than a tenth of the
+contact set has moved since.
 """
 
 from __future__ import annotations
@@ -29,14 +34,49 @@ DEFAULTS: dict[str, Options] = {
     ICC: {"pc_type": "bjacobi", "sub_pc_type": "icc"},
     GAMG: {"pc_type": "gamg", "pc_gamg_threshold": 0.01, "pc_gamg_reuse_interpolation": True},
 }
+OVERLAP: Options = {"pc_type": "asm", "pc_asm_type": "basic"}  # of one layer
+
+
+def defaults(kind: str, ranks: int) -> Options:
+    """Return PETSc's options of a kind on so many ranks."""
+    return {**DEFAULTS[kind], **OVERLAP} if kind == ICC and ranks > 1 else DEFAULTS[kind]
+
+
+def shares(inverse: Any, template: Any) -> Array:
+    """Return 1/sqrt(k) of every row, k the number of overlapping subdomains of a PETSc preconditioner that hold it.
+    Collective."""
+    ones, count = template.duplicate(), template.duplicate()
+    ones.set(1.0)
+    count.set(1.0)
+    if inverse.getType() == "asm":
+        parts = [(solver, solver.getPC()) for solver in inverse.getASMSubKSP()]
+        for solver, factor in parts:
+            copies = PETSc.PC().create(factor.comm)
+            copies.setOperators(*factor.getOperators())
+            copies.setType("none")
+            solver.setPC(copies)
+        inverse.apply(ones, count)
+        for solver, factor in parts:
+            solver.setPC(factor)
+    return np.asarray(1.0 / np.sqrt(count.array_r))
 
 
 class Masked:
-    """Apply w M⁻¹ w: the context of a PETSc shell preconditioner. ``inverse``: M⁻¹ as a PETSc preconditioner."""
+    """Apply w M⁻¹ w: the context of a PETSc shell preconditioner. ``inverse``: M⁻¹ as a PETSc preconditioner, without
+    the shares of its subdomains, which are in w."""
 
     def __init__(self, inverse: Any, template: Any) -> None:
         self._inverse, self._r, self._z = inverse, template.duplicate(), template.duplicate()
-        self.weights: Array = np.ones(template.getLocalSize())
+        self._weights = self._shares = shares(inverse, template)
+
+    @property
+    def weights(self) -> Array:
+        """Return w, 0 in rows that are held; set without the shares."""
+        return self._weights
+
+    @weights.setter
+    def weights(self, weights: Array) -> None:
+        self._weights = weights * self._shares
 
     def apply(self, _pc: Any, r: Any, z: Any) -> None:
         """Apply w M⁻¹ w to r: PETSc vectors."""

@@ -32,9 +32,9 @@ from .failures import stopped
 from .friction import Friction
 from .layout import Nodewise
 from .operator import Operator
-from .preconditioners import DEFAULTS, Masked, inverse
+from .preconditioners import Masked, defaults, inverse
 from .projected_gradients import largest_eigenvalue, projected_gradients
-from .regime import KINDS, chosen, courant
+from .regime import ICC, KINDS, chosen, courant
 from .search import Search, search
 from .work import Work
 
@@ -47,7 +47,7 @@ class Iterative:
     """Hold the settings of the iterative volume route, for any number of ranks.
 
     Attributes:
-        preconditioner: "jacobi", "icc" (block Jacobi with incomplete Cholesky factors), "gamg" (algebraic multigrid
+        preconditioner: "jacobi", "icc" (incomplete Cholesky factors, one on each rank), "gamg" (algebraic multigrid
             with rigid body modes), or "auto": by the Courant number that A shows, up to 0.5, 30, and beyond. PETSc's
             options may name another.
         petsc_options: of the preconditioner, without prefix, e.g. {"pc_gamg_threshold": 0.02}; ICC's sub_pc_…;
@@ -101,7 +101,7 @@ class PreparedIterative:
         with self.work.set_up():
             blocks = nodewise.blocks()
         self._operator = Operator(blocks, self.work)
-        layers = OptionLayers(settings.prefix, DEFAULTS[self.kind], settings.petsc_options)
+        layers = OptionLayers(settings.prefix, defaults(self.kind, A.algebra.comm.size), settings.petsc_options)
         self._inverse = inverse(self.kind, nodewise, blocks, surface, layers, self.work)
         self._masked = Masked(self._inverse.pc, blocks.createVecLeft())
         self._cg = ConjugateGradients(self._operator, self._masked)
@@ -115,8 +115,9 @@ class PreparedIterative:
         number, asked = courant(A), self._settings.preconditioner
         kind = chosen(number, A.space is not None) if asked == AUTO else asked
         if A.algebra.comm.rank == 0:
-            log.info("Iterative: preconditioner %s, %s at Courant number %.3g", kind,
-                     "chosen" if asked == AUTO else "asked for", number)
+            layer = kind == ICC and A.algebra.comm.size > 1
+            log.info("Iterative: preconditioner %s, %s at Courant number %.3g%s", kind,
+                     "chosen" if asked == AUTO else "asked for", number, "; ranks overlap by a layer" if layer else "")
         return kind
 
     @property
