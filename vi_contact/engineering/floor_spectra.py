@@ -16,7 +16,8 @@ import numpy as np
 from ..core.algebra import Array
 from ..core.checks import array, counted, flag, instance, number
 from ..core.errors import InputError
-from ..ground_motion import Record, ResponseSpectrum, response_spectrum
+from ..ground_motion.record import Record
+from ..ground_motion.spectra import ResponseSpectrum, response_spectrum
 from .peak_values import column_of
 
 BANDWIDTH = 40.0

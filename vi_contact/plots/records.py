@@ -9,20 +9,14 @@ from typing import Any
 import numpy as np
 
 from ..core.algebra import Array
+from ..core.units import STANDARD_GRAVITY
 from ..engineering.floor_spectra import TransferFunction
 from ..engineering.peak_values import Loop
-from ..ground_motion import (
-    STANDARD_GRAVITY,
-    UNITS,
-    EC8Spectrum,
-    Record,
-    ResponseSpectrum,
-    arias,
-    d5_95,
-    husid,
-    integrated,
-    pga,
-)
+from ..ground_motion.ec8 import EC8Spectrum
+from ..ground_motion.intensity import arias, d5_95, husid, pga
+from ..ground_motion.processing import integrated
+from ..ground_motion.record import UNITS, Record
+from ..ground_motion.spectra import ResponseSpectrum
 from .histories import canvas, length_unit, panels, plain, plain_numbers, save, scaled
 
 SAMPLES_A_PERIOD = 10

@@ -12,9 +12,11 @@ import numpy as np
 
 from ..core.algebra import Array
 from ..core.errors import InputError
+from ..core.units import STANDARD_GRAVITY
 from ..engineering.floor_spectra import recorded_motion
 from ..engineering.peak_values import Peak, peaks
-from ..ground_motion import STANDARD_GRAVITY, Record, response_spectrum
+from ..ground_motion.record import Record
+from ..ground_motion.spectra import response_spectrum
 from ..run.files.reading import RunFolder
 from .histories import LEDGER, STYLE, log_axis, plain_numbers, scaled, shaken
 from .maps import arc_position, draw_map, thinned

@@ -13,8 +13,8 @@ from ..core.algebra import Array
 from ..core.checks import flag, number, provides
 from ..core.problem_checks import EXCITATION
 from ..core.protocols import Excitation
-from ..ground_motion import Record
 from ..ground_motion.excitation import GroundMotion
+from ..ground_motion.record import Record
 
 
 class UpgoingVelocity:

@@ -21,8 +21,10 @@ from ...core.corners import FEATURE_ANGLE
 from ...core.system import SemiDiscreteSystem
 from ...fem import BodyForce, Cells, CompliantBase, Dashpots, Facets, Prescribed, Traction
 from ...fem.contact.matching import Matching
-from ...ground_motion import Processing, Record, read_record, synthetic
-from ...ground_motion.formats.reader import LARGEST_PEAK
+from ...ground_motion.chain import Processing
+from ...ground_motion.formats.reader import LARGEST_PEAK, read_record
+from ...ground_motion.kanai_tajimi import synthetic
+from ...ground_motion.record import Record
 from ...laws.impact import VelocityUpdate
 from ...laws.materials import Damping, LinearElastic, Section
 from ...meshes.gmsh_session import MeshScript

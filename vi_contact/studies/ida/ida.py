@@ -26,7 +26,7 @@ from ...core.algebra import Array, SerialComm
 from ...core.errors import InputError
 from ...core.files import to_json, write_atomically, write_csv
 from ...fem.mesh import alone
-from ...ground_motion import scaled
+from ...ground_motion.processing import scaled
 from ...plots.ida import DemandPanel, plot_ida
 from ...run.files.folder import LOCK, locked
 from ...run.files.reading import read_run

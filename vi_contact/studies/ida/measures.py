@@ -10,7 +10,8 @@ import numpy as np
 
 from ...core.algebra import Array
 from ...core.errors import InputError
-from ...ground_motion import Record, arias, cav, housner_intensity, pga, pgd, pgv, psa
+from ...ground_motion.intensity import arias, cav, housner_intensity, pga, pgd, pgv, psa
+from ...ground_motion.record import Record
 
 _WAYS: dict[str, tuple[Callable[[Array], float], str]] = {
     "max": (lambda values: float(np.fmax.reduce(values)), "largest value of"),

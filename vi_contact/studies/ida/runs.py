@@ -18,8 +18,9 @@ from typing import Any
 
 from ...core.errors import InputError, OutOfTime
 from ...core.files import to_json, write_atomically
-from ...ground_motion import Record, scaled
 from ...ground_motion.excitation import GroundMotion
+from ...ground_motion.processing import scaled
+from ...ground_motion.record import Record
 from ...run.files.folder import CHECKPOINT, SUMMARY
 from ...run.files.reading import read_object
 from ...run.wall_time import WallTime
