@@ -27,8 +27,7 @@ from vi_contact.core.problem import ContactProblem
 from vi_contact.core.surfaces import ContactSurface
 from vi_contact.fem.mesh import Facets
 from vi_contact.meshes.block import BlockMesh
-from vi_contact.meshes.extract import MeshArrays
-from vi_contact.meshes.from_arrays import add_arrays
+from vi_contact.meshes.extract import MeshArrays, add_arrays
 from vi_contact.meshes.two_blocks import Blocks
 from vi_contact.soil.moving_base import base_motion
 from vi_contact.solvers.volume.route import Volume

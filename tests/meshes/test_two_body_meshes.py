@@ -7,8 +7,7 @@ import pytest
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.cut import CutOpen, Welded, cut_open, welded
-from vi_contact.meshes.extract import arrays_from_script
-from vi_contact.meshes.from_arrays import add_arrays
+from vi_contact.meshes.extract import add_arrays, arrays_from_script
 from vi_contact.meshes.gmsh_session import session, write
 from vi_contact.meshes.rows import cell_sides, number_alike
 from vi_contact.meshes.two_blocks import Blocks, TwoBlocks

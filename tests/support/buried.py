@@ -13,8 +13,7 @@ from vi_contact import Condensed, ContactProblem, LinearElastic, State, fem, sta
 from vi_contact.core.surfaces import ContactSurface, empty_surface
 from vi_contact.core.system import SemiDiscreteSystem
 from vi_contact.exact.racking import BoxFrame
-from vi_contact.meshes.extract import MeshArrays
-from vi_contact.meshes.from_arrays import add_arrays
+from vi_contact.meshes.extract import MeshArrays, add_arrays
 from vi_contact.meshes.grid import add_grid
 
 GAMMA = 1e-3

@@ -25,8 +25,7 @@ from vi_contact.fem.loads import Traction
 from vi_contact.fem.mesh import build_mesh
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.cut import Welded
-from vi_contact.meshes.extract import MeshArrays
-from vi_contact.meshes.from_arrays import add_arrays, arrays_of
+from vi_contact.meshes.extract import MeshArrays, add_arrays, arrays_of
 from vi_contact.meshes.rows import cell_sides
 from vi_contact.models.embedded import CONTACT, Embedded, build
 from vi_contact.models.square import concrete

@@ -11,7 +11,6 @@ from __future__ import annotations
 from ..core.lazy import lazy
 
 _CONTENTS = {
-    "baseline": ("baseline_corrected",),
     "chain": ("Processing", "scaled_to_arias", "scaled_to_pga", "scaled_to_psa"),
     "ec8": ("EC8Spectrum",),
     "excitation": ("GroundMotion",),
@@ -23,7 +22,10 @@ _CONTENTS = {
         "pgd", "pgv", "predominant_period", "psa", "rms", "significant_duration",
     ),
     "kanai_tajimi": ("Envelope", "KanaiTajimi", "synthetic"),
-    "processing": ("filtered", "integrated", "padded", "resampled", "scaled", "tapered", "trimmed", "without_mean"),
+    "processing": (
+        "baseline_corrected", "filtered", "integrated", "padded", "resampled", "scaled", "tapered", "trimmed",
+        "without_mean",
+    ),
     "record": ("STANDARD_GRAVITY", "UNITS", "Record"),
     "spectra": ("ResponseSpectrum", "fourier_spectrum", "response_spectrum"),
 }

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 from ..core.checks import number
 from ..core.errors import InputError
-from .baseline import baseline_corrected
 from .intensity import arias, pga, psa
-from .processing import filtered, padded, resampled, scaled, tapered, trimmed, without_mean
+from .processing import baseline_corrected, filtered, padded, resampled, scaled, tapered, trimmed, without_mean
 from .record import Record
 
 

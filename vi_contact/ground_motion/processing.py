@@ -1,4 +1,4 @@
-"""Scale, resample, integrate, cut, lengthen, taper and filter records.
+"""Scale, resample, integrate, cut, lengthen, taper and filter records, and correct their baselines.
 
 Every function returns a new value and notes what it did. Between samples the acceleration is a straight line.
 """
@@ -6,6 +6,7 @@ Every function returns a new value and notes what it did. Between samples the ac
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -17,6 +18,9 @@ from .record import Record
 
 LARGEST_RATIO = 1000
 """Numerator and denominator of old dt / new dt may not exceed this; the filter grows with them."""
+
+HIGHEST = 6
+"""Highest degree of a baseline: beyond it a polynomial follows the shaking itself."""
 
 
 def scaled(record: Record, *, factor: float) -> Record:
@@ -112,8 +116,8 @@ def without_mean(record: Record, *, until: float | None = None) -> Record:
     return record.changed(record.acceleration - mean, f"mean{where} removed: {mean:.6g} m/s2")
 
 
-def tapered(record: Record, *, fraction: float = 0.05, start: bool = True, end: bool = True) -> Record:
-    """Bring both ends (or one) to zero by half a cosine over `fraction` of the record's duration.
+def tapered(record: Record, *, fraction: float = 0.05) -> Record:
+    """Bring both ends to zero by half a cosine over `fraction` of the record's duration.
 
     w(t) = (1 - cos(pi t / (fraction T))) / 2 at the start, mirrored at the end; 1 between.
     Raises InputError unless 0 < fraction <= 0.5.
@@ -122,10 +126,8 @@ def tapered(record: Record, *, fraction: float = 0.05, start: bool = True, end: 
         raise InputError(f"tapered: fraction is {fraction!r}; give more than 0 and at most 0.5 of the duration")
     ramp = np.minimum(record.times / (fraction * record.duration), 1.0)
     window = 0.5 * (1.0 - np.cos(math.pi * ramp))
-    weights = (window if start else 1.0) * (window[::-1] if end else 1.0)
-    ends = " and ".join(name for name, used in (("start", start), ("end", end)) if used)
-    return record.changed(record.acceleration * weights,
-                          f"cosine taper over {100 * fraction:g} % at {ends or 'no end'}")
+    note = f"cosine taper over {100 * fraction:g} % at start and end"
+    return record.changed(record.acceleration * (window * window[::-1]), note)
 
 
 def filtered(record: Record, *, low: float | None = None, high: float | None = None, order: int = 4,
@@ -163,3 +165,31 @@ def filtered(record: Record, *, low: float | None = None, high: float | None = N
     kind = "band-pass" if len(corners) == 2 else "high-pass" if low is not None else "low-pass"
     passes = "causal" if causal else "zero phase (two passes)"
     return record.changed(samples, f"Butterworth {kind} {band} Hz, order {order}, {passes}")
+
+
+def baseline_corrected(record: Record, *, degree: int = 2, displacement: bool = False) -> Record:
+    """Return the record minus p(t) = sum c_k (t/T)^k, k = 0..degree, T its duration; c fits the integrated motion.
+
+    c minimises the sum of squares of the velocity left over (of the displacement, if `displacement`), subject to
+    v(T) = u(T) = 0; v and u are those of `integrated`, so both end at zero to round-off. A second correction
+    changes nothing, and a record that is itself such a polynomial becomes zero.
+    Raises InputError unless degree is a whole number from 1 to 6 and below the number of samples.
+    """
+    if degree not in range(1, min(HIGHEST, record.acceleration.size - 1) + 1):
+        raise InputError(f"baseline_corrected: degree is {degree!r}; give a whole number from 1 to {HIGHEST}, below "
+                         "the number of samples")
+    powers = (record.times / record.duration)[:, None] ** np.arange(degree + 1)
+    motions = [integrated(replace(record, acceleration=column)) for column in powers.T]
+    basis = np.array([motion[int(displacement)] for motion in motions]).T
+    target = integrated(record)[int(displacement)]
+    ends = np.array([[motion[k][-1] for motion in motions] for k in (0, 1)])
+    scale = np.array([[record.duration], [record.duration**2]])
+    wanted = np.array([[part[-1]] for part in integrated(record)]) / scale
+    coefficients = np.linalg.lstsq(ends / scale, wanted, rcond=None)[0][:, 0]  # one that ends at rest, and
+    free = np.linalg.svd(ends / scale)[2][2:].T  # combinations of those that change nothing at the end
+    if free.shape[1]:
+        rest = np.linalg.lstsq(basis @ free, target - basis @ coefficients, rcond=None)[0]
+        coefficients = coefficients + free @ rest
+    kind = "displacement" if displacement else "velocity"
+    note = f"baseline: polynomial of degree {degree} fitted to the {kind}, v = u = 0 at the end"
+    return record.changed(record.acceleration - powers @ coefficients, note)

@@ -17,8 +17,7 @@ from scipy.spatial import cKDTree
 
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
-from vi_contact.meshes.extract import MeshArrays
-from vi_contact.meshes.from_arrays import Source, add_arrays, arrays_of
+from vi_contact.meshes.extract import MeshArrays, Source, add_arrays, arrays_of
 from vi_contact.meshes.rows import Mask, Rows, cell_sides, number_alike
 
 

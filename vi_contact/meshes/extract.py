@@ -1,4 +1,4 @@
-"""Turn Gmsh's current model into plain arrays: nodes renumbered, groups named, what solvers choke on refused.
+"""Turn Gmsh's current model into plain arrays: nodes renumbered, groups named, what solvers choke on refused; and back.
 
 DOLFINx's own readers fail on node tags that do not start at 1, on facets in two groups and on missing groups, so
 nothing of them is used. Vertices stay in Gmsh's order here.
@@ -21,6 +21,7 @@ from vi_contact.meshes.gmsh_session import MeshScript, session
 from vi_contact.meshes.mesh_file import safe_copy
 from vi_contact.meshes.rows import GMSH_NUMBERS, Mask, Rows, number_alike
 
+Source = MeshScript | str | Path
 _Elements = dict[int, tuple[Rows, Rows]]
 """Gmsh's number of a type -> node tags (n, n_vertices) of its elements, and the entity (n,) that holds each."""
 
@@ -199,3 +200,47 @@ def _at_same_place(places: Array, points: Array) -> Rows:
     tolerance = 1e-10 * np.ptp(points, axis=0).max()
     distance, nearest = cKDTree(points).query(places, k=2)
     return np.where((distance[:, 0] <= tolerance) & (distance[:, 1] > tolerance), nearest[:, 0], -1)
+
+
+def arrays_of(source: Source) -> MeshArrays:
+    """Return the arrays of a mesh file or of a script; InputError like `extract`."""
+    return arrays_from_file(source) if isinstance(source, str | Path) else arrays_from_script(source)
+
+
+def add_arrays(gmsh: Any, arrays: MeshArrays) -> None:
+    """Add a mesh to the empty current model: its points in order, a discrete entity for every set of groups."""
+    d = arrays.points.shape[1]
+    cell, side = GMSH_NUMBERS[arrays.cell]
+    points = np.zeros((len(arrays.points), 3))
+    points[:, :d] = arrays.points
+    home = gmsh.model.addDiscreteEntity(d)  # holds the nodes
+    gmsh.model.mesh.addNodes(d, home, 1 + np.arange(len(points)), points.reshape(-1))
+    _add_groups(gmsh, d, cell, arrays.cells, arrays.cell_groups)
+    _add_groups(gmsh, d - 1, side, *_members(arrays.facet_groups))
+
+
+def _members(groups: dict[str, Rows]) -> tuple[Rows, dict[str, Mask]]:
+    """Return the rows of all groups, each once, and which of them are in each group."""
+    if not groups:
+        return np.zeros((0, 1), dtype=np.int64), {}
+    numbers = number_alike(*groups.values())
+    unique, first = np.unique(np.concatenate(numbers), return_index=True)
+    rows = np.concatenate(list(groups.values()))[first]
+    return rows, {name: np.isin(unique, own) for name, own in zip(groups, numbers, strict=True)}
+
+
+def _add_groups(gmsh: Any, dim: int, kind: int, rows: Rows, groups: dict[str, Mask]) -> None:
+    """Add the physical groups of elements that may be in several."""
+    if not groups:
+        return
+    table = np.column_stack(list(groups.values()))
+    signatures, place = np.unique(table, axis=0, return_inverse=True)
+    entities = []
+    for number in range(len(signatures)):
+        entities.append(gmsh.model.addDiscreteEntity(dim))
+        own = rows[place.reshape(-1) == number]
+        gmsh.model.mesh.addElementsByType(entities[-1], kind, [], 1 + own.reshape(-1))
+    for column, name in enumerate(groups):
+        held = [entity for entity, signature in zip(entities, signatures, strict=True) if signature[column]]
+        if held:
+            gmsh.model.setPhysicalName(dim, gmsh.model.addPhysicalGroup(dim, held), name)

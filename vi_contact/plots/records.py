@@ -98,15 +98,10 @@ def plot_loop(
     return save(figure, path)
 
 
-def plot_transfer(
-    found: TransferFunction, path: str | Path, *, title: str, theory: TransferFunction | None = None
-) -> Path:
-    """Draw the amplitude over frequency, both logarithmic; a theory dashed."""
+def plot_transfer(found: TransferFunction, path: str | Path, *, title: str) -> Path:
+    """Draw the amplitude over frequency, both logarithmic."""
     figure, ((axis,),) = canvas(1, 1, (7.5, 4.5))
-    axis.loglog(found.frequencies, found.amplitude, color="black", lw=1.0, label="computed")
-    if theory is not None:
-        axis.loglog(theory.frequencies, theory.amplitude, "--", color="tab:red", lw=1.0, label="theory")
-        axis.legend(fontsize=8)
+    axis.loglog(found.frequencies, found.amplitude, color="black", lw=1.0)
     plain_numbers(axis.xaxis)
     axis.axhline(1.0, color="0.6", lw=0.6)
     frequency, amplitude = found.peak
