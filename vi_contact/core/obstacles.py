@@ -91,7 +91,8 @@ class HalfSpace:
 
 @dataclass(frozen=True)
 class AnalyticGap:
-    """Give the gap g0(x) as a function of points (k, d) -> (k,) [m], measured along the body's outward normal."""
+    """Give the gap g0(x) as a function of points (k, d) -> (k,) [m], measured along the body's outward normal. It is
+    asked for the points of each rank by themselves: let no gap depend on other points, as on their mean or lowest."""
 
     function: Callable[[Array], Array]
 
