@@ -11,6 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 from marched_chain import NEWMARK, chain, difference, equal_files, round_off, rubbing_box, run, run_wall, wall
@@ -248,3 +249,8 @@ def test_restart_on_another_number_of_ranks(comm: Any, shared_tmp: Path) -> None
         size = np.nanmax(np.abs(values)) or 1.0
         for other in (spread, gathered):
             assert np.allclose(other.history[name], values, rtol=0.0, atol=1e-10 * size, equal_nan=True), name
+    if comm.rank == 0:  # points and their order are those of one rank
+        with h5py.File(shared_tmp / "alone" / "history.h5") as one, h5py.File(shared_tmp / "all" / "history.h5") as two:
+            assert len(one["contact/points"]) == len(one["pressure"][0]) > 1
+            assert np.array_equal(one["contact/points"], two["contact/points"])
+            assert np.allclose(one["contact/weights"], two["contact/weights"], rtol=1e-12, atol=0.0)

@@ -163,7 +163,7 @@ class Session:
         rest = f"ended the run after step {self.place.state.k}, t = {self.place.state.t:.6g} s: {writer.rest}"
         if number:
             raise Interrupted(f"{Signals(number).name} {rest}", number)
-        raise OutOfTime(f"{max(self.wall_time.left, 0.0):.0f} s left of the wall time {self.wall_time.text} {rest}")
+        raise OutOfTime(f"{self.wall_time.words} {rest}")
 
     def _keep(self, state: State, report: Report, writer: Writer) -> None:
         """Everything that is recorded of a step, be it a base step or a part of one."""

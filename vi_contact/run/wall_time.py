@@ -63,6 +63,11 @@ class WallTime:
         return self._end - age()
 
     @property
+    def words(self) -> str:
+        """Return the same for a sentence."""
+        return f"{max(self.left, 0.0):.0f} s left of the wall time {self.text}"
+
+    @property
     def unsure(self) -> bool:
         """Say whether nobody knows yet how long a checkpoint takes, although it matters."""
         return math.isnan(self._saving) and self._end < math.inf

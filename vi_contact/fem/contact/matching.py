@@ -103,8 +103,8 @@ class NodeToNode:
 
 
 def _opposite(one: Nodes, two: Nodes, places: Indices, reach: Array) -> tuple[Indices, Array, Mask]:
-    """(the nearest node opposite each one of side 1 among these ``places`` (m, k) on side 2, the first of equally near
-    ones, -1 for none; how far along the normal it is, infinite for none; whether all that are there face away)."""
+    """(the first of the nearest nodes opposite each one of side 1 among these ``places`` (m, k) on side 2, -1 for none;
+    how far along the normal, infinite for none; whether all that are there face away)."""
     offset = two.points[places] - one.points[:, None, :]
     along = np.einsum("ijk,ik->ij", offset, one.normals)
     beside = np.linalg.norm(offset - along[:, :, None] * one.normals[:, None, :], axis=2)

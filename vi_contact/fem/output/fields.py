@@ -4,13 +4,7 @@ input mesh.
 Every file is replaced as a whole and the index names only frames that are complete, so that ParaView can open it at any
 moment, also while the run goes on or after it was killed. Nothing in the files depends on the number of ranks.
 
-Per node: u [m], v [m/s] and a [m/s²] as 3-vectors along the axes, relative to the ground when an excitation shakes the
-body (a: of the step's equation of motion, without the jumps of an impact law; zero in the first frame);
-contact_pressure [Pa]; contact_status: 0 not a contact node, 1 open, 2 closed; at nodes with several faces both are of
-the face that is pressed most, or closed. Per cell: von_mises [Pa].
-With friction closed nodes stick (2) or slipped (3) in the step of the frame, those of the first frame stick; and there
-are contact_traction_t [Pa], the tangential traction of the body on its support, and slip [m], the tangential
-displacement on it, of open nodes too: 3-vectors along the axes, zero at other nodes.
+What a frame holds: docs/reference/files.md. In the first one a is zero, and with friction all closed nodes stick.
 """
 
 from __future__ import annotations

@@ -139,16 +139,12 @@ def read_checkpoint(
 
 def _own(problem: ContactProblem, vectors: list[str], whole: Arrays | None) -> Arrays:
     """This rank's rows of arrays that rank 0 has as a whole: every rank's are sent by themselves. Collective."""
-    comm = problem.system.algebra.comm
-    parts = comm.gather((problem.system.space.ids, problem.surface.slots)) or [()] * comm.size
-    every = np.sort(np.concatenate([part[0] for part in parts])) if whole else None
-    own: Arrays = {}
-    for rank, part in enumerate(parts):
-        found: Arrays = dict(whole or {})
-        if every is not None:
-            rows = dict.fromkeys(vectors, np.searchsorted(every, part[0])) | dict.fromkeys(CONTACT, part[1])
-            found = {name: values[rows[name]] if name in rows else values for name, values in found.items()}
-        found = comm.bcast(found)
+    comm, own = problem.system.algebra.comm, dict[str, Any]()
+    parts = comm.gather((problem.system.space.ids, problem.surface.slots)) or [((), ())] * comm.size
+    every = np.sort(np.concatenate([ids for ids, _ in parts]))
+    for rank, (ids, slots) in enumerate(parts):
+        rows = dict.fromkeys(vectors, np.searchsorted(every, ids)) | dict.fromkeys(CONTACT, slots)
+        found = comm.bcast({name: values[rows.get(name, ...)] for name, values in (whole or {}).items()})
         own = found if rank == comm.rank else own
     return own
 

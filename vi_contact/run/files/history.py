@@ -1,7 +1,6 @@
 """Keep the rows of a run in files from the step they were computed in; the memory need not hold them.
 
 ``history.csv``      one line per step with all numbers, written through at once: a killed run loses nothing.
-``columns.json``     unit and meaning of every column.
 ``history.h5``       numbers and arrays with units as attributes, and the contact geometry; replaced as a whole
                      at checkpoints, once it has grown by a quarter, and at the end.
 ``history.journal``  the array columns of the steps since then (float64: k, then the arrays of the row).

@@ -1,12 +1,8 @@
 """Incremental dynamic analysis: one structure under many motions, each at many intensities, in one tidy table.
 
-Vamvatsikos and Cornell, Earthquake Engng Struct. Dyn. 31 (2002). The folder of a study:
-
-    ida.csv        a line per run: record, scale, intensity, demands, worst certificate, steps, status, reason
-    columns.json   unit and meaning of its columns
-    ida.png        intensity over demand, a curve per record, 16, 50 and 84 % fractiles
-    ida.json       the case and the records, so that no other study is mixed in
-    runs/NAME_xSCALE/   the folder of every run, and its row
+Vamvatsikos and Cornell, Earthquake Engng Struct. Dyn. 31 (2002). In the folder of a study, beside ``ida.csv``,
+``columns.json`` and ``ida.png``: ``ida.json``, the case and the records, so that no other study is mixed in, and
+``runs/NAME_xSCALE``, the folder of every run, with its row.
 """
 
 from __future__ import annotations

@@ -32,6 +32,7 @@ SAID = "failure.txt"
 ATTEMPTS = 5  # of a run that ends without a word: Gmsh 4.8, asked before it is initialised, does that now and then
 PATIENCE = 20.0  # seconds for a run to save its state
 ASIDE = 5.0  # seconds of a wall time for the beginning and the end of a process
+AGAIN = "ended the study: give the same command again to go on"
 _MPI = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_RANK")  # in the environment of what mpirun has started
 
 
@@ -124,7 +125,7 @@ class OneRun:
         made += [word for package in self.case.allowed for word in ("--allow", package)]
         if end.text is not None:
             if (left := int(end.left - ASIDE)) < 1:
-                raise _over(end)
+                raise OutOfTime(f"{end.words} {AGAIN}")
             made += ["--wall-time", f"{left // 60}:{left % 60:02d}"]
         return [*launch, *own, *made, *(["--restart"] if (self.folder / CHECKPOINT).is_file() else [])]
 
@@ -161,12 +162,6 @@ class OneRun:
             raise InputError(f"'{error.filename}' cannot be started ({error.strerror}): give another launch") from None
 
 
-def _over(end: WallTime) -> OutOfTime:
-    """Return what ends a study whose wall time is nearly over."""
-    return OutOfTime(f"{max(end.left, 0.0):.0f} s left of the wall time {end.text} ended the study: give the same "
-                     "command again to go on")
-
-
 def executed(runs: Sequence[OneRun], jobs: int, launch: Sequence[str], end: WallTime) -> Iterator[dict[str, Any]]:
     """Run them, so many at a time, and yield the row of each when it ends. Left early, it stops those that go on;
     OutOfTime when one of them has ended with its status."""
@@ -192,7 +187,7 @@ def executed(runs: Sequence[OneRun], jobs: int, launch: Sequence[str], end: Wall
         for _ in range(ATTEMPTS):
             said, code = attempt(run)
             if code == os.EX_TEMPFAIL:
-                raise _over(end)
+                raise OutOfTime(f"{end.words} {AGAIN}")
             if code <= 0 or said.strip():
                 break
         return run.keep(said, code)
