@@ -25,7 +25,7 @@ from vi_contact.cli.entry import main
 from vi_contact.core.algebra import SerialComm
 from vi_contact.core.errors import InputError, OutOfTime
 from vi_contact.ground_motion import Record, arias, pga, psa, read_record, scaled, tapered
-from vi_contact.plots.ida import DemandPanel, plot_ida
+from vi_contact.plots.studies import DemandPanel, plot_ida
 from vi_contact.run.files.folder import locked
 from vi_contact.run.wall_time import WallTime
 from vi_contact.studies import IDA, read_case, run_ida

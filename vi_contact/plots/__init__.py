@@ -12,11 +12,10 @@ _CONTENTS = {
     "channel_mesh": ("animate",),
     "deformed": ("read_frames", "read_tractions"),
     "histories": ("plot_certificate", "plot_energy", "plot_excitation", "plot_points", "plot_runs"),
-    "ida": ("plot_ida",),
     "maps": ("plot_contact",),
     "records": ("plot_loop", "plot_motion", "plot_spectra", "plot_transfer"),
     "report": ("plot_report",),
     "run_pictures": ("draw_run", "illustrate"),
-    "studies": ("plot_beam_energies", "plot_particle", "plot_shapes", "plot_tips"),
+    "studies": ("plot_beam_energies", "plot_ida", "plot_particle", "plot_shapes", "plot_tips"),
 }
 __all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)

@@ -23,7 +23,7 @@ from ...core.errors import InputError
 from ...core.files import to_json, write_atomically, write_csv
 from ...fem.mesh import alone
 from ...ground_motion.processing import scaled
-from ...plots.ida import DemandPanel, plot_ida
+from ...plots.studies import DemandPanel, plot_ida
 from ...run.files.folder import LOCK, locked
 from ...run.files.reading import read_run
 from ...run.wall_time import WallTime
