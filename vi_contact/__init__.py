@@ -10,9 +10,9 @@ from __future__ import annotations
 
 from . import schemes
 from .core.lazy import lazy
-from .core.version import __version__
 
 _CONTENTS = {
+    "core.version": ("__version__",),
     "core.errors": ("InputError", "Interrupted", "OutOfTime", "StepFailure", "ViContactError"),
     "laws.materials": (
         "LinearElastic", "MassProportional", "NoDamping", "PlaneStrain", "PlaneStress", "Rayleigh", "Solid",
@@ -44,9 +44,4 @@ _CONTENTS = {
     "run.files.reading": ("read_run",),
     "run.cross_check": ("CrossChecked", "cross_check"),
 }
-_names, __getattr__, _ = lazy(__name__, _CONTENTS)
-__all__ = ["__version__", *_names]
-
-
-def __dir__() -> list[str]:
-    return __all__
+__all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)

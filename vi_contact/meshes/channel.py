@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ import numpy as np
 from vi_contact.core.checks import MOST_CELLS, attributes, counted
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.extract import MeshArrays, add_arrays
-from vi_contact.meshes.grid import Array
+from vi_contact.meshes.grid import Array, add_outline
 from vi_contact.meshes.rows import Mask, Rows
 
 
@@ -88,29 +89,12 @@ def _build_irregular(mesh: ChannelMesh, gmsh: Any, far: float) -> None:
     u = [(x[1], y[3]), (x[1], y[1]), (x[4], y[1]), (x[4], y[3])]  # what both bodies share
     inside = [(x[3], y[3]), (x[3], y[2]), (x[2], y[2]), (x[2], y[3])]
     names = [*(f"channel_{side}" for side in sides), "channel_top", *["channel_inside"] * 3, "channel_top"]
-    _add_body(gmsh.model, "channel", u + inside, names, [mesh.size] * 8, mesh)
+    shared = [max(round(math.dist(one, two) / mesh.size), 1) for one, two in pairwise(u)]  # on both bodies
+    add_outline(gmsh.model, "channel", u + inside, names, [mesh.size] * 8, shared)
     layer = [(x[5], y[3]), (x[5], 0.0), (0.0, 0.0), (0.0, y[3])]
     names = [*(f"soil_{side}" for side in sides), "surface", "right_side", "bedrock", "left_side", "surface"]
-    _add_body(gmsh.model, "soil", u + layer, names, [mesh.size] * 4 + [far] * 4, mesh)
+    add_outline(gmsh.model, "soil", u + layer, names, [mesh.size] * 4 + [far] * 4, shared)
     gmsh.model.mesh.generate(2)
-
-
-def _add_body(
-    model: Any, name: str, outline: Sequence[tuple[float, float]], names: Sequence[str], sizes: Sequence[float],
-    mesh: ChannelMesh,
-) -> None:
-    """Add a surface within an outline; its first three curves are the interface, divided alike on both bodies."""
-    points = [model.geo.addPoint(*place, 0.0, size) for place, size in zip(outline, sizes, strict=True)]
-    curves = [model.geo.addLine(one, two) for one, two in zip(points, [*points[1:], points[0]], strict=True)]
-    for i in range(3):
-        cells = round(math.dist(outline[i], outline[i + 1]) / mesh.size)
-        model.geo.mesh.setTransfiniteCurve(curves[i], max(cells, 1) + 1)
-    surface = model.geo.addPlaneSurface([model.geo.addCurveLoop(curves)])
-    model.geo.synchronize()
-    for group in dict.fromkeys(names):
-        held = [curve for curve, one in zip(curves, names, strict=True) if one == group]
-        model.setPhysicalName(1, model.addPhysicalGroup(1, held), group)
-    model.setPhysicalName(2, model.addPhysicalGroup(2, [surface]), name)
 
 
 def channel_grid(x: Sequence[float], y: Sequence[float], size: float, *, triangles: bool = False) -> MeshArrays:

@@ -46,6 +46,27 @@ def add_grid(
         model.mesh.addElementsByType(entity, types[d - 1], [], _cells(np.asarray(face), simplices).reshape(-1))
 
 
+def add_outline(
+    model: Any, name: str, outline: Sequence[tuple[float, float]], names: Sequence[str], sizes: Sequence[float],
+    cells: Sequence[int] = (),
+) -> int:
+    """Add a surface within an outline, its curves in the groups ``names``; return its tag, to be meshed irregularly.
+
+    ``sizes``: of the cells at the corners [m]; ``cells``: exact numbers of them on the first curves.
+    """
+    points = [model.geo.addPoint(*place, 0.0, size) for place, size in zip(outline, sizes, strict=True)]
+    curves = [model.geo.addLine(one, two) for one, two in zip(points, [*points[1:], points[0]], strict=True)]
+    for curve, count in zip(curves, cells, strict=False):
+        model.geo.mesh.setTransfiniteCurve(curve, count + 1)
+    surface: int = model.geo.addPlaneSurface([model.geo.addCurveLoop(curves)])
+    model.geo.synchronize()
+    for group in dict.fromkeys(names):
+        held = [curve for curve, one in zip(curves, names, strict=True) if one == group]
+        model.setPhysicalName(1, model.addPhysicalGroup(1, held), group)
+    model.setPhysicalName(2, model.addPhysicalGroup(2, [surface]), name)
+    return surface
+
+
 def _add_entity(model: Any, dim: int, name: str, boundary: Sequence[int] = ()) -> int:
     entity: int = model.addDiscreteEntity(dim, -1, list(boundary))
     model.setPhysicalName(dim, model.addPhysicalGroup(dim, [entity]), name)

@@ -12,7 +12,7 @@ from typing import Any
 from vi_contact.core.checks import MOST_CELLS, counted
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.block import check_box
-from vi_contact.meshes.grid import add_grid, lattice
+from vi_contact.meshes.grid import add_grid, add_outline, lattice
 
 _PUBLISHED = (8, 12)
 
@@ -53,15 +53,8 @@ class WallMesh:
 
 
 def _build_irregular(wall: WallMesh, gmsh: Any, size: float) -> None:
-    model = gmsh.model
     corners = ((0.0, 0.0), (wall.width, 0.0), (wall.width, wall.height), (0.0, wall.height))
-    points = [model.geo.addPoint(x, y, 0.0, size) for x, y in corners]
-    curves = [model.geo.addLine(points[i - 1], points[i]) for i in (1, 2, 3, 0)]
-    surface = model.geo.addPlaneSurface([model.geo.addCurveLoop(curves)])
-    model.geo.synchronize()
-    for name, curve in zip(("base", "face", "top", "back"), curves, strict=True):
-        model.setPhysicalName(1, model.addPhysicalGroup(1, [curve]), name)
-    model.setPhysicalName(2, model.addPhysicalGroup(2, [surface]), "wall")
+    surface = add_outline(gmsh.model, "wall", corners, ("base", "face", "top", "back"), [size] * 4)
     if not wall.triangles:
-        model.mesh.setRecombine(2, surface)
-    model.mesh.generate(2)
+        gmsh.model.mesh.setRecombine(2, surface)
+    gmsh.model.mesh.generate(2)
