@@ -138,7 +138,7 @@ def read_checkpoint(
 
 
 def _own(problem: ContactProblem, vectors: list[str], whole: Arrays | None) -> Arrays:
-    """This rank's rows of arrays that rank 0 has as a whole: every rank's are sent by themselves. Collective."""
+    """Return this rank's rows of arrays that rank 0 has as a whole; they are sent rank by rank. Collective."""
     comm, own = problem.system.algebra.comm, dict[str, Any]()
     parts = comm.gather((problem.system.space.ids, problem.surface.slots)) or [((), ())] * comm.size
     every = np.sort(np.concatenate([ids for ids, _ in parts]))
