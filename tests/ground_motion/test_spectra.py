@@ -13,7 +13,6 @@ from vi_contact.ground_motion import (
     Record,
     arias,
     baseline_corrected,
-    bracketed_duration,
     cav,
     d5_95,
     fourier_spectrum,
@@ -199,8 +198,6 @@ def test_durations_and_rms_of_a_constant_acceleration():
     assert significant_duration(record, 0.05, 0.75) == pytest.approx(7.0, rel=1e-12)
     assert d5_95(record) == significant_duration(record, 0.05, 0.95) and rms(record) == pytest.approx(2.0, rel=1e-13)
     assert np.allclose(husid(record), arias(record) * np.linspace(0.0, 1.0, 101), rtol=1e-12, atol=1e-14)
-    assert bracketed_duration(Record(acceleration=[0.0, 0.6, 0.1, -0.5, 0.4], dt=0.1), 0.5) == pytest.approx(0.2)
-    assert bracketed_duration(record, 2.1) == 0.0
 
 
 def test_housner_intensity_of_a_step():
@@ -225,7 +222,7 @@ def test_periods_of_a_sine_and_of_two():
     (lambda r: response_spectrum(r, np.array([math.nan])), "positive"),
     (lambda r: response_spectrum(r, np.array([1.0]), damping=1.0), "damping is 1.0"),
     (lambda r: response_spectrum(r, np.array([1.0]), damping=-0.1), "damping"),
-    (lambda r: significant_duration(r, 0.9, 0.1), "fractions"), (lambda r: bracketed_duration(r, 0.0), "threshold"),
+    (lambda r: significant_duration(r, 0.9, 0.1), "fractions"),
     (lambda r: mean_period(Record(acceleration=np.zeros(9), dt=0.1)), "0.25 to 20 Hz"),
     (lambda r: predominant_period(Record(acceleration=np.ones(9), dt=2.0)), "resolves no period"),
 ])

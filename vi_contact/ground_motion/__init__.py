@@ -18,8 +18,8 @@ _CONTENTS = {
     "formats.writer": ("write_at2", "write_columns", "write_path_series"),
     "info": ("record_info",),
     "intensity": (
-        "arias", "bracketed_duration", "cav", "d5_95", "housner_intensity", "husid", "mean_period", "pga", "pga_time",
-        "pgd", "pgv", "predominant_period", "psa", "rms", "significant_duration",
+        "arias", "cav", "d5_95", "housner_intensity", "husid", "mean_period", "pga", "pga_time", "pgd", "pgv",
+        "predominant_period", "psa", "rms", "significant_duration",
     ),
     "kanai_tajimi": ("Envelope", "KanaiTajimi", "synthetic"),
     "processing": (

@@ -65,14 +65,6 @@ def significant_duration(record: Record, start: float, end: float) -> float:
     return float(last - first)
 
 
-def bracketed_duration(record: Record, threshold: float) -> float:
-    """Return the time between the first and the last sample with |a| >= threshold [m/s²], zero if there is none [s]."""
-    if not threshold > 0.0:
-        raise InputError(f"bracketed_duration: threshold is {threshold!r}; give a positive acceleration in m/s²")
-    above = np.flatnonzero(np.abs(record.acceleration) >= threshold)
-    return float((above[-1] - above[0]) * record.dt) if above.size else 0.0
-
-
 def cav(record: Record) -> float:
     """Return the cumulative absolute velocity, the integral of |a| [m/s], exact for straight lines between samples."""
     a, b = np.abs(record.acceleration[:-1]), np.abs(record.acceleration[1:])

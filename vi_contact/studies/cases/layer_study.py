@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -16,7 +14,7 @@ from ...boundary_layer.particle import ParticleImpact, layer_for
 from ...boundary_layer.trajectory import passage
 from ...core.checks import check_word
 from ...core.errors import InputError
-from ...core.files import write_atomically
+from ...core.files import write_csv
 from ...plots.studies import plot_particle
 
 TABLE = "impacts.csv"
@@ -67,9 +65,7 @@ class LayerStudy:
         """Write the table of all impacts into the folder; return it as text."""
         rows = [(one.layer.k, one.layer.c, *(_closed(one) if self.closed else _integrated(one, self.metric)))
                 for one in self.impacts]
-        text = io.StringIO(newline="")
-        csv.writer(text, lineterminator="\n").writerows([COLUMNS, *rows])
-        write_atomically(folder / TABLE, text.getvalue().encode())
+        write_csv(folder / TABLE, COLUMNS, rows)
         lines = ["{:>12} {:>12} {:>9} {:>9} {:>12} {:>12} {:>12}".format(*COLUMNS)]
         for k, c, e, poisson, *others in rows:
             lines.append(f"{k:12.6g} {c:12.6g} {e:9.6f} {poisson:9.6f}" + "".join(f" {one:12.6g}" for one in others))
