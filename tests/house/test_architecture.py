@@ -12,6 +12,7 @@ import subprocess
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -59,8 +60,13 @@ class Import:
     own: bool
 
 
-def imports(source: str, text: str) -> Iterator[Import]:
-    tree = ast.parse(text)
+@cache
+def imports(source: str, text: str) -> tuple[Import, ...]:
+    """All imports of a module; every text is parsed once for all tests."""
+    return tuple(_imports(source, ast.parse(text)))
+
+
+def _imports(source: str, tree: ast.Module) -> Iterator[Import]:
     functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
     late = {id(inner) for function in functions for inner in ast.walk(function)}
     for node in ast.walk(tree):
