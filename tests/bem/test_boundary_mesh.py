@@ -72,7 +72,7 @@ def test_curves_and_outside():
     (lambda: BoundaryMesh(np.array([(0, 0), (1, 0.0)])), "three or more"),
     (lambda: BoundaryMesh(np.array([(0, 0), (1, 0), (1, 0), (0, 1.0)])), "no length"),
     (lambda: BoundaryMesh(np.array([(0, 0), (1, 0), (np.nan, 1.0)])), "finite"),
-    (lambda: BoundaryMesh(np.array(SQUARE), labels=np.zeros(3, int)), "one per element"),
+    (lambda: BoundaryMesh(np.array(SQUARE), labels=np.zeros(3, int)), "labels has shape"),
     (lambda: polygon([(0, 0), (1, 1), (1, 0), (0, 1)], 0.1), "crosses itself near .* cross"),
     (lambda: polygon([(0, 0), (1, 1), (1, 0), (0, 1)], (2, 1, 2, 1)), r"crosses or touches itself at \(0\.5, 0\.5\)"),
     (lambda: polygon([(0, 0), (2, 0), (1, 0), (1, 1)], 0.5), "crosses or touches itself"),
@@ -84,8 +84,8 @@ def test_curves_and_outside():
     (lambda: from_segments(SQUARE, [(0, 1), (1, 9), (9, 0)]), "name the points 0 to 9, there are 4"),
     (lambda: polygon(SQUARE, 0.5).nodes_of([0, 1]), "give a boolean mask"),
     (lambda: polygon(SQUARE, 0.0), "above zero"),
-    (lambda: polygon(SQUARE, (1, 2, 3)), "as many numbers"),
-    (lambda: from_segments(SQUARE, [(0, 1), (1, 2), (2, 3), (3, 0)], labels=[1]), "one per segment"),
+    (lambda: polygon(SQUARE, (1, 2, 3)), "of a side has shape"),
+    (lambda: from_segments(SQUARE, [(0, 1), (1, 2), (2, 3), (3, 0)], labels=[1]), "labels has shape"),
 ])
 def test_what_is_refused(bad, message):
     with pytest.raises(InputError, match=message):

@@ -43,13 +43,12 @@ class BoundaryMesh:
     def __post_init__(self) -> None:
         points = array("BoundaryMesh", "points", self.points, (None, 2), unit="m")
         counted("BoundaryMesh", "points", len(points), "elements", most=MOST_ELEMENTS)
-        given = np.atleast_1d(np.asarray(self.loop_sizes, object))
-        sizes = tuple(whole("BoundaryMesh", "the size of a loop", size, least=1) for size in given) or (len(points),)
+        sizes = tuple(integers("BoundaryMesh", "loop_sizes", self.loop_sizes, (None,)).tolist()) or (len(points),)
         if min(sizes) < 3 or sum(sizes) != len(points):
             raise InputError(f"BoundaryMesh: loops of {sizes} nodes, {len(points)} points; a loop has three or more")
         flag("BoundaryMesh", "exterior", self.exterior)
-        labels = _labels("BoundaryMesh", self.labels, len(points), "element") if shape_of(self.labels) != (0,) else None
-        labels = np.zeros(len(points), np.int64) if labels is None else labels
+        tags = np.zeros(len(points)) if shape_of(self.labels) == (0,) else self.labels
+        labels = integers("BoundaryMesh", "labels", tags, (len(points),))
         for name, value in (("points", points), ("loop_sizes", sizes), ("labels", labels)):
             object.__setattr__(self, name, value)
         if self.lengths.min() <= 1e-12 * self.size:
@@ -162,10 +161,9 @@ def polygon(corners: ArrayLike, h: float | Sequence[int], *, exterior: bool = Fa
     if len(start) < 3:
         raise InputError(f"polygon: {len(start)} corners; give three or more")
     sides = np.roll(start, -1, axis=0) - start
-    if isinstance(h, Sequence | np.ndarray) and not isinstance(h, str) and shape_of(h) != ():
-        if len(h) != len(start):
-            raise InputError(f"polygon: {len(start)} sides need as many numbers of elements, {len(h)} were given")
-        counts = np.array([whole("polygon", "the number of elements of a side", one, least=1) for one in h])
+    if shape_of(h) != ():
+        counts = integers("polygon", "the number of elements of a side", h, (len(start),))
+        whole("polygon", "the number of elements of a side", int(counts.min()), least=1)
     else:
         length = number("polygon", "the element length h", h, positive=True, unit="m")
         with np.errstate(over="ignore"):
@@ -201,12 +199,5 @@ def from_segments(
         raise InputError(f"from_segments: segments name the points {pairs.min()} to {pairs.max()}, there are "
                          f"{len(coordinates)}; number points from 0 on")
     order, sizes = ordered_loops(coordinates, pairs, exterior=exterior)
-    tags = np.zeros(len(pairs), np.int64) if labels is None else _labels("from_segments", labels, len(pairs), "segment")
+    tags = integers("from_segments", "labels", np.zeros(len(pairs)) if labels is None else labels, (len(pairs),))
     return BoundaryMesh(coordinates[order[:, 0]], sizes, tags[order[:, 1]], exterior)
-
-
-def _labels(owner: str, labels: ArrayLike, count: int, things: str) -> NDArray[np.int64]:
-    found = integers(owner, "labels", labels, (None,))
-    if len(found) != count:
-        raise InputError(f"{owner}: {len(found)} labels for {count} {things}s; give one per {things}")
-    return found

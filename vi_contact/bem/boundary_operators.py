@@ -44,11 +44,11 @@ def check_body(mesh: BoundaryMesh, material: LinearElastic, orders: Orders) -> N
 
 @dataclass(frozen=True)
 class OperatorMatrices:
-    """Hold single (4n, 4n) <V p, psi>, double (4n, 2n) <K u, psi>, hyper (2n, 2n) <D u, v>, None if not asked."""
+    """Hold single (4n, 4n) <V p, psi>, double (4n, 2n) <K u, psi>, hyper (2n, 2n) <D u, v>."""
 
     single: NDArray
     double: NDArray
-    hyper: NDArray | None
+    hyper: NDArray
 
 
 class Galerkin:
@@ -65,9 +65,9 @@ class Galerkin:
         self.pairs = ElementPairs(mesh)
 
     def assemble(self, kernels: Callable[[Array], KernelSet], fronts: Sequence[float] = ()) -> OperatorMatrices:
-        """Return the matrices of the operators that the kernels have."""
+        """Return the matrices of the three operators."""
         single, double, hyper = np.split(self._moments(kernels, fronts), (N_SINGLE, N_SINGLE + N_DOUBLE))
-        return OperatorMatrices(self._single(single), self._double(double), self._hyper(hyper) if len(hyper) else None)
+        return OperatorMatrices(self._single(single), self._double(double), self._hyper(hyper))
 
     def _moments(self, kernels: Callable, fronts: Sequence[float]) -> NDArray:
         """Return (k, pairs, 2, 2) integrals [m²] of the stacked kernels against phi_a(x) phi_b(y)."""
@@ -165,8 +165,7 @@ def integrands(kernels: KernelSet, d: Array, r: Array) -> NDArray:
     rows = [g1 - g2 * xx, -g2 * xy, g1 - g2 * yy]
     phi, dphi, ddiff, g1, g2 = kernels.double
     rows += [dphi * d[0], dphi * d[1], ddiff * d[0], ddiff * d[1], phi, g1 - g2 * xx, -g2 * xy, g1 - g2 * yy]
-    if kernels.hyper is not None:
-        phi, dphi, ddiff, g1, g2, inertia_p, inertia_s = kernels.hyper
-        rows += [inertia_p, inertia_s, phi, g1 - g2 * xx, -g2 * xy, g1 - g2 * yy,
-                 dphi * d[0], dphi * d[1], ddiff * d[0], ddiff * d[1]]
+    phi, dphi, ddiff, g1, g2, inertia_p, inertia_s = kernels.hyper
+    rows += [inertia_p, inertia_s, phi, g1 - g2 * xx, -g2 * xy, g1 - g2 * yy,
+             dphi * d[0], dphi * d[1], ddiff * d[0], ddiff * d[1]]
     return np.stack(rows)

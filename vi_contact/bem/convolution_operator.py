@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.algebra import Array
+from ..core.algebra import Array, Indices, Mask
 from ..core.checks import counted, flag
 from ..laws.materials import LinearElastic
 from .boundary_mesh import BoundaryMesh
@@ -24,7 +24,6 @@ from .fundamental_solution import LaplaceKernels
 from .quadrature import Orders
 from .radial_table import RadialTable
 
-Mask = NDArray[np.bool_]
 # |s| h/c_S reaches 100 with small steps; points cost nothing per frequency
 ORDERS = Orders(far=6, near=8, touching=32, close=16)
 PANEL = 1.5  # width of the panels of the radial table, in c_S dt: functions there are exp(-s r/c_S), |s| dt up to 4
@@ -68,7 +67,7 @@ class ConvolutionOperator:
         return table.at_ends(u), traction, np.where(fixed, reaction, forces.transpose(0, 2, 1) @ widths)
 
     def condense(
-        self, forces: Array, fixed: Mask, prescribed: Array | None, unknowns: NDArray[np.int64]
+        self, forces: Array, fixed: Mask, prescribed: Array | None, unknowns: Indices
     ) -> tuple[Array, Array]:
         """Return W, by frequencies, and u_free of CondensedCompliance for these unknowns."""
         table, free, moving = self.frequencies, ~fixed, ~fixed[unknowns]
@@ -112,7 +111,6 @@ def convolution_operator(
     steklov, to_traction = np.empty((count, 2 * n, 2 * n), complex), np.empty((count, 4 * n, 2 * n), complex)
     for i, s in enumerate(table.s.ravel()):
         unit = galerkin.assemble(LaplaceKernels(complex(s), material.c_p, material.c_s))
-        assert unit.hyper is not None
         right = unit.double + 0.5 * mesh.mass
         to_traction[i] = rho * np.linalg.solve(unit.single, right)
         steklov[i] = (right.T @ to_traction[i] - rho * unit.hyper) if symmetric else mesh.mass.T @ to_traction[i]

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..core.algebra import Array
+from ..core.algebra import Array, Indices
 from ..core.checks import instance
 from ..core.errors import InputError
 from .boundary_mesh import BoundaryMesh
 from .loops import distances, point_at
 
-Index = NDArray[np.int64]
 NEAR_LENGTHS = 3.0  # pairs closer than this many element lengths get the finer rule
 CLOSE = 0.9  # pairs whose elements are this share of the longer one's length apart are integrated with their feet
 
@@ -33,8 +31,8 @@ class ElementPairs:
         instance("boundary elements", "the mesh", mesh, BoundaryMesh, "give a BoundaryMesh, for example polygon(...)")
         first, second = np.triu_indices(len(mesh))
         starts, ends = mesh.points, mesh.points[mesh.after]
-        self.first: Index = first
-        self.second: Index = second
+        self.first: Indices = first
+        self.second: Indices = second
         self.a: Array = (ends - starts)[first].T
         self.b: Array = (ends - starts)[second].T
         self.offset: Array = (starts[first] - starts[second]).T

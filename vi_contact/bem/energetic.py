@@ -59,11 +59,10 @@ def check_time_step(mesh: BoundaryMesh, c_p: float, dt: float) -> None:
     """Raise InputError unless 0.05 <= c_P dt / h <= 8, h the longest element."""
     number("boundary elements", "the time step dt", dt, positive=True, unit="s")
     ratio = c_p * dt / float(mesh.lengths.max())
-    advice = f"c_P dt / h is {ratio:.3g} (h = {mesh.lengths.max():.3g} m, dt = {dt:.3g} s), good is 0.5 to 2"
-    if ratio < SMALLEST_RATIO:
-        raise InputError(f"boundary elements: {advice}; enlarge the time step or refine the mesh")
-    if ratio > GREATEST_RATIO:
-        raise InputError(f"boundary elements: {advice}; reduce the time step or coarsen the mesh")
+    if not SMALLEST_RATIO <= ratio <= GREATEST_RATIO:
+        what = "enlarge the time step or refine" if ratio < SMALLEST_RATIO else "reduce the time step or coarsen"
+        raise InputError(f"boundary elements: c_P dt / h is {ratio:.3g} (h = {mesh.lengths.max():.3g} m, "
+                         f"dt = {dt:.3g} s), good is 0.5 to 2; {what} the mesh")
 
 
 def energetic_blocks(
@@ -85,7 +84,6 @@ def energetic_blocks(
     for j in range(steps):
         t = (j + 1) * dt
         now = galerkin.assemble(TimeKernels(t, c_p, c_s), (c_s * t, c_p * t))
-        assert now.hyper is not None
         single[j], double[j], hyper[j] = now.single - a, (now.double - b) / dt, (now.hyper - c - change) / dt**2
         a, b, c, change = now.single, now.double, now.hyper, now.hyper - c
     return EnergeticBlocks(mesh, c_p, c_s, dt, single, double, hyper)

@@ -33,7 +33,7 @@ SMALL = 0.7  # below this the Bessel function minus its pole is summed as a powe
 
 
 class KernelSet(NamedTuple):
-    """Hold what the Galerkin layer integrates, arrays of the shape of r; ``hyper`` None leaves that operator out.
+    """Hold what the Galerkin layer integrates, arrays of the shape of r.
 
     single: (g1, g2) of G (density 1); double: (phi, dphi, ddiff, g1, g2) with phi = Phi_S, dphi = Phi_S'/r, ddiff =
     (Phi_P - Phi_S)'/r, a prime being d/dr; hyper: the same and (inertia_p, inertia_s), inertia_a = s² Phi_a (in time:
@@ -42,7 +42,7 @@ class KernelSet(NamedTuple):
 
     single: tuple[NDArray, ...]
     double: tuple[NDArray, ...]
-    hyper: tuple[NDArray, ...] | None = None
+    hyper: tuple[NDArray, ...]
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,6 @@ class TimeKernels:
     t: float
     c_p: float
     c_s: float
-    hyper: bool = True
 
     def __post_init__(self) -> None:
         _check_speeds(self)
@@ -134,8 +133,6 @@ class TimeKernels:
         # r F_n' = (n-1) F_n - t F_(n-1) and Q_n = F_n'/r, dQ_n = Q_n^S - Q_n^P
         dq4 = (5.0 * t * dq3 - t**2 * dq2 + slow * (3.0 * f2_s - t * f1_s) - fast * (3.0 * f2_p - t * f1_p)) / 9.0
         double = f2_s / TWO_PI, -root_s * inverse / TWO_PI, -dq2 / TWO_PI, *tensor(f2_s * slow, f2_p * fast, dq4)
-        if not self.hyper:
-            return KernelSet(single, double)
         f3_s = 0.25 * (3.0 * t * f2_s - root_s**2 * f1_s)
         f3_p = 0.25 * (3.0 * t * f2_p - root_p**2 * f1_p)
         dq5 = (7.0 * t * dq4 - t**2 * dq3 + slow * (4.0 * f3_s - t * f2_s) - fast * (4.0 * f3_p - t * f2_p)) / 16.0

@@ -11,7 +11,7 @@ from ..core.algebra import Array
 from ..core.checks import array, instance, integers, shape_of
 from ..core.errors import InputError
 from .boundary_mesh import BoundaryMesh
-from .boundary_operators import N_SINGLE, double_local, integrands, joined_at_nodes, tensor
+from .boundary_operators import N_DOUBLE, N_SINGLE, double_local, integrands, joined_at_nodes, tensor
 from .fundamental_solution import TimeKernels
 from .loops import distances
 from .poincare_steklov import BoundaryMotion, PoincareSteklov
@@ -69,7 +69,7 @@ def _moments(mesh: BoundaryMesh, x: Array, t: float, c_p: float, c_s: float) -> 
     """Return (k, points * n, 2) integrals over each element of the stacked kernels against its shape functions."""
     n, along = len(mesh), mesh.points[mesh.after] - mesh.points
     group = max(1, 4000 // n)
-    kernels = TimeKernels(t, c_p, c_s, hyper=False)
+    kernels = TimeKernels(t, c_p, c_s)
     for first in range(0, len(x), group):
         count = len(x[first : first + group])
         offset = (x[first : first + group, None] - mesh.points).reshape(-1, 2)
@@ -85,7 +85,7 @@ def _moments(mesh: BoundaryMesh, x: Array, t: float, c_p: float, c_s: float) -> 
         r = np.hypot(*d)
         heard = r < c_p * t
         d, r, eta, owner, weight = d[:, heard], r[heard], eta[heard], owner[heard], weight[heard]
-        values = integrands(kernels(r), d, r)
+        values = integrands(kernels(r), d, r)[: N_SINGLE + N_DOUBLE]
         matrix = at_points(np.stack([1.0 - eta, eta], axis=1) * weight[:, None], owner, count * n)
         yield np.asarray(matrix @ values.T).T.reshape(len(values), count * n, 2)
 

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..core.algebra import Array
+from ..core.algebra import Array, Indices
 from ..core.errors import InputError
 
-Index = NDArray[np.int64]
 TOUCHING = 1e-12  # of the size of the boundary: nearer is the same place
 
 
@@ -55,7 +53,7 @@ def check_size(points: Array, sizes: tuple[int, ...]) -> None:
                              "leaves no area to compute with; give points of a plane body, in units of its size")
 
 
-def check_simple(points: Array, after: Index) -> None:
+def check_simple(points: Array, after: Indices) -> None:
     """Raise InputError when two elements cross, or a node lies on an element of which it is no end."""
     a, b = points, points[after]
     _check_touching(points, after)
@@ -75,7 +73,7 @@ def check_simple(points: Array, after: Index) -> None:
                          f"{j} cross; give a boundary that does not meet itself")
 
 
-def _check_touching(points: Array, after: Index) -> None:
+def _check_touching(points: Array, after: Indices) -> None:
     distance = distances(points[:, None], points, points[after])
     index = np.arange(len(points))
     distance[index, index] = distance[after, index] = np.inf
@@ -97,7 +95,7 @@ def point_at(point: Array) -> str:
     return f"({point[0]:.4g}, {point[1]:.4g})"
 
 
-def ordered_loops(points: Array, segments: Index, *, exterior: bool) -> tuple[Index, tuple[int, ...]]:
+def ordered_loops(points: Array, segments: Indices, *, exterior: bool) -> tuple[Indices, tuple[int, ...]]:
     """Return ((n, 2) start point and number of each segment, loop after loop; sizes of the loops), body on the left."""
     ends = np.bincount(segments.ravel(), minlength=len(points))
     if len(segments) == 0 or (ends[np.unique(segments)] != 2).any():
@@ -124,7 +122,7 @@ def ordered_loops(points: Array, segments: Index, *, exterior: bool) -> tuple[In
     return _turned(points, loops, exterior)
 
 
-def _turned(points: Array, loops: list[list[tuple[int, int]]], exterior: bool) -> tuple[Index, tuple[int, ...]]:
+def _turned(points: Array, loops: list[list[tuple[int, int]]], exterior: bool) -> tuple[Indices, tuple[int, ...]]:
     chains = [np.array(loop, np.int64) for loop in loops]
     curves = [points[chain[:, 0]] for chain in chains]
     turned = []

@@ -11,15 +11,13 @@ from functools import cached_property
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ..core.algebra import Array
+from ..core.algebra import Array, Indices, Mask
 from ..core.checks import array, flag, instance, integers, mask, number, provides, shape_of
 from ..core.errors import InputError
 from .boundary_mesh import BoundaryMesh
 from .energetic import EnergeticBlocks, marched, summed
-
-Mask = NDArray[np.bool_]
 
 
 class BodyOperator(Protocol):
@@ -41,7 +39,7 @@ class BodyOperator(Protocol):
         ...
 
     def condense(
-        self, forces: Array, fixed: Mask, prescribed: Array | None, unknowns: NDArray[np.int64]
+        self, forces: Array, fixed: Mask, prescribed: Array | None, unknowns: Indices
     ) -> tuple[Array, Array]:
         """Return W and u_free of CondensedCompliance for these unknowns."""
         ...
@@ -82,7 +80,7 @@ class PoincareSteklov:
         return u[:, :, 0], self.rho * p[:, :, 0], self.rho * total[:, :, 0]
 
     def condense(
-        self, forces: Array, fixed: Mask, prescribed: Array | None, unknowns: NDArray[np.int64]
+        self, forces: Array, fixed: Mask, prescribed: Array | None, unknowns: Indices
     ) -> tuple[Array, Array]:
         """Return W and u_free of CondensedCompliance for these unknowns, in one march with 2m + 1 columns."""
         columns = np.zeros((len(forces), 2 * len(self.mesh), len(unknowns) + 1))
@@ -134,7 +132,7 @@ class CondensedCompliance:
 
     W: Array
     u_free: Array
-    nodes: NDArray[np.int64]
+    nodes: Indices
     points: Array
     normals: Array
     lengths: Array
@@ -191,7 +189,7 @@ class BoundaryProblem:
         return self.operator.dt * np.arange(1, len(self.forces) + 1)
 
     @cached_property
-    def contact_nodes(self) -> NDArray[np.int64]:
+    def contact_nodes(self) -> Indices:
         """Return (m,) numbers of the nodes of the contact boundary."""
         if self.contact is None or not np.any(self.contact):
             raise InputError("BoundaryProblem: no contact boundary; give `contact`, the mask of its elements")

@@ -21,12 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_matrix
 
-from ..core.algebra import Array
+from ..core.algebra import Array, Indices
 from ..core.checks import whole
 from .element_pairs import ElementPairs
 from .rules import gauss, graded, linear, pieces, roots, smoothed, stretched
 
-Index = NDArray[np.int64]
 Rule = tuple[Array, Array]
 MOST_POINTS = 200  # Gauss points a rule may have
 CHUNK = 40_000  # points evaluated at once: keeps the arrays in the cache
@@ -59,8 +58,8 @@ class PointSet:
     equal blocks of len(weight); d: (2, m) x - y [m]; r: (m,) its length; xi, eta, weight: (m,), or one block of them.
     """
 
-    pairs: Index
-    owner: Index | None
+    pairs: Indices
+    owner: Indices | None
     d: Array
     r: Array
     xi: Array
@@ -87,7 +86,7 @@ class PointSet:
         return np.stack([(1 - xi) * (1 - eta), (1 - xi) * eta, xi * (1 - eta), xi * eta], 1) * self.weight[:, None]
 
 
-def at_points(weighted: Array, owner: Index, count: int) -> csc_matrix:
+def at_points(weighted: Array, owner: Indices, count: int) -> csc_matrix:
     """Return (k count, m) that adds up values at m points times k weighted shape functions (m, k) of their owners."""
     k = weighted.shape[1]
     rows, columns = k * owner[:, None] + np.arange(k), np.arange(0, weighted.size + 1, k)
@@ -117,7 +116,7 @@ def point_sets(pairs: ElementPairs, fronts: Sequence[float], orders: Orders = Or
         yield from _at_corners(pairs, corner, fronts, orders.touching, sharp=sharp)
 
 
-def _products(pairs: ElementPairs, chosen: Index, order: int) -> Iterator[PointSet]:
+def _products(pairs: ElementPairs, chosen: Indices, order: int) -> Iterator[PointSet]:
     x, w = gauss(order)
     xi, eta = np.repeat(x, order), np.tile(x, order)
     weight = np.repeat(w, order) * np.tile(w, order)
@@ -128,14 +127,14 @@ def _products(pairs: ElementPairs, chosen: Index, order: int) -> Iterator[PointS
         yield PointSet(part, None, d, np.hypot(*d), xi, eta, weight)
 
 
-def _flat(pairs: ElementPairs, chosen: Index, owner: Index, xi: Array, eta: Array, weight: Array) -> PointSet:
+def _flat(pairs: ElementPairs, chosen: Indices, owner: Indices, xi: Array, eta: Array, weight: Array) -> PointSet:
     pair = chosen[owner]
     d = pairs.offset[:, pair] + pairs.a[:, pair] * xi - pairs.b[:, pair] * eta
     return PointSet(chosen, owner, d, np.hypot(*d), xi, eta, weight)
 
 
 def _split(
-    pairs: ElementPairs, chosen: Index, fronts: Sequence[float], outer: Rule, inner: Rule, *, close: bool = False
+    pairs: ElementPairs, chosen: Indices, fronts: Sequence[float], outer: Rule, inner: Rule, *, close: bool = False
 ) -> Iterator[PointSet]:
     """Split the outer integral where fronts reach the second element's ends or graze it, the inner one at the fronts.
 
@@ -149,8 +148,8 @@ def _split(
 
 
 def _outer(
-    pairs: ElementPairs, part: Index, fronts: Sequence[float], rule: Rule, close: bool
-) -> tuple[Index, Array, Array]:
+    pairs: ElementPairs, part: Indices, fronts: Sequence[float], rule: Rule, close: bool
+) -> tuple[Indices, Array, Array]:
     """Return (pair in ``part``, xi, weight) of the points on the first elements."""
     breaks = _outer_breaks(pairs, part, fronts)
     if close:
@@ -165,8 +164,8 @@ def _outer(
 
 
 def _inner(
-    pairs: ElementPairs, pair: Index, xi: Array, scale: Array, fronts: Sequence[float], rule: Rule, close: bool
-) -> tuple[Index, Array, Array]:
+    pairs: ElementPairs, pair: Indices, xi: Array, scale: Array, fronts: Sequence[float], rule: Rule, close: bool
+) -> tuple[Indices, Array, Array]:
     """Return (row of ``xi``, eta, weight) of the points on the second elements that the last front has reached."""
     d, b = pairs.offset[:, pair] + pairs.a[:, pair] * xi, pairs.b[:, pair]
     b2, projection, d2 = (b**2).sum(0), (d * b).sum(0), (d**2).sum(0)
@@ -183,7 +182,7 @@ def _inner(
     return np.repeat(row, len(rule[0])), eta.ravel(), weight.ravel()
 
 
-def _feet(pairs: ElementPairs, part: Index) -> tuple[Array, Array]:
+def _feet(pairs: ElementPairs, part: Indices) -> tuple[Array, Array]:
     """Return (p, 2) xi of the feet of the second element's ends on the line of the first, and their heights over it."""
     offset, a, b = pairs.offset[:, part], pairs.a[:, part], pairs.b[:, part]
     a2 = (a**2).sum(0)
@@ -193,7 +192,7 @@ def _feet(pairs: ElementPairs, part: Index) -> tuple[Array, Array]:
     return np.stack(feet, axis=1), np.stack(heights, axis=1)
 
 
-def _outer_breaks(pairs: ElementPairs, part: Index, fronts: Sequence[float]) -> Array:
+def _outer_breaks(pairs: ElementPairs, part: Indices, fronts: Sequence[float]) -> Array:
     """Return (p, 6 per front) xi where the first element is a front away from an end of the second, or its line."""
     offset, a, b = pairs.offset[:, part], pairs.a[:, part], pairs.b[:, part]
     a2 = (a**2).sum(0)
@@ -209,7 +208,7 @@ def _outer_breaks(pairs: ElementPairs, part: Index, fronts: Sequence[float]) -> 
     return np.concatenate(breaks, axis=1) if breaks else np.empty((len(part), 0))
 
 
-def _on_one_element(pairs: ElementPairs, chosen: Index, fronts: Sequence[float], order: int) -> Iterator[PointSet]:
+def _on_one_element(pairs: ElementPairs, chosen: Indices, fronts: Sequence[float], order: int) -> Iterator[PointSet]:
     """Integrate once in z = |xi - eta|, on which alone r depends, split at the fronts; two points across are exact."""
     row, low, length = _reached(np.hypot(*pairs.a[:, chosen]), fronts)
     x, w = graded(order)
@@ -223,7 +222,7 @@ def _on_one_element(pairs: ElementPairs, chosen: Index, fronts: Sequence[float],
                 np.concatenate([small.ravel(), large.ravel()]), np.tile(weight, 2))
 
 
-def _reached(distance: Array, fronts: Sequence[float]) -> tuple[Index, Array, Array]:
+def _reached(distance: Array, fronts: Sequence[float]) -> tuple[Indices, Array, Array]:
     """Return the pieces, as of ``pieces``, that the last front has reached, of [0, 1] where r is x times a distance."""
     row, low, length = pieces(np.array(fronts, float) / distance[:, None])
     heard = (low + 0.5 * length) * distance[row] < max(fronts, default=np.inf)
@@ -231,7 +230,7 @@ def _reached(distance: Array, fronts: Sequence[float]) -> tuple[Index, Array, Ar
 
 
 def _at_corners(
-    pairs: ElementPairs, chosen: Index, fronts: Sequence[float], order: int, *, sharp: bool
+    pairs: ElementPairs, chosen: Indices, fronts: Sequence[float], order: int, *, sharp: bool
 ) -> Iterator[PointSet]:
     """Place points at (u, u w) and (u w, u) from the corner: r = u R(w), inner integral in u split at fronts/R(w).
 

@@ -76,7 +76,7 @@ class RadialTable(Galerkin):
 
     def _moments(self, kernels: Callable, fronts: Sequence[float]) -> NDArray:
         kernel_set: KernelSet = kernels(self.nodes)
-        assert kernel_set.hyper is not None and not len(fronts)
+        assert not len(fronts)
         phi, dphi, ddiff, g1, g2, inertia_p, inertia_s = kernel_set.hyper
         one, xx, xy, yy, d_x, d_y = self._matrices
         smooth = dphi + 1.0 / (TWO_PI * self.nodes**2)

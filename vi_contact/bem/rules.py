@@ -5,11 +5,9 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..core.algebra import Array
+from ..core.algebra import Array, Indices
 
-Index = NDArray[np.int64]
 FLAT = 1e-6  # least height of a singularity over a piece, over the length of the piece
 
 
@@ -34,7 +32,7 @@ def graded(n: int) -> tuple[Array, Array]:
     return x**3 * (10.0 - 15.0 * x + 6.0 * x**2), 30.0 * w * (x * (1.0 - x)) ** 2
 
 
-def pieces(breaks: Array) -> tuple[Index, Array, Array]:
+def pieces(breaks: Array) -> tuple[Indices, Array, Array]:
     """Return (row, start, length) of the parts into which each row of breaks cuts [0, 1]; NaN is no break."""
     inner = np.clip(np.nan_to_num(breaks, nan=0.0), 0.0, 1.0)
     ends = np.zeros((len(breaks), 1)), np.ones((len(breaks), 1))
