@@ -105,7 +105,7 @@ def test_three_dimensions() -> None:
 def test_bad_parts_are_refused() -> None:
     rows = history(FOOTING, [[0.0, 1.0, 0.0]], [[0.0] * 3])
     for data, text in (
-        ({"centre": (0.0,)}, "coordinates"),
+        ({"centre": (0.0,)}, "the centre has shape"),
         ({"centre": (0.0, 0.0), "where": lambda x, n: x[:, 0] > 9.0}, "no contact points"),
         ({"centre": (0.0, 0.0), "where": lambda x, n: np.arange(2)}, "boolean mask"),
     ):

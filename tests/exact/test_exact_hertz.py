@@ -11,7 +11,6 @@ from vi_contact.exact.hertz import (
     HertzImpact,
     HertzLine,
     HertzPoint,
-    RoundPunch,
     StripPunch,
     contact_modulus,
     contact_radius,
@@ -63,23 +62,18 @@ def test_point_pressure_bends_the_half_space_to_the_sphere():
     assert 2.0 / 230.0 * quad(point.pressure, 0.0, a)[0] == pytest.approx(point.approach, rel=1e-7)
 
 
-def test_punches_are_flat():
-    """V2.5: total force; depth from Boussinesq on the axis; equal sinking of the strip; edge exponent -1/2."""
-    strip, disc = StripPunch(half_width=2.0, force=3.0), RoundPunch(radius=2.0, force=3.0, modulus=5.0)
+def test_a_punch_is_flat():
+    """V2.5: total force; equal sinking; edge exponent -1/2."""
+    strip = StripPunch(half_width=2.0, force=3.0)
     angle = (np.arange(20000) + 0.5) * math.pi / 20000
     s = -2.0 * np.cos(angle)
     weight = math.pi / 20000 * 2.0 * np.sin(angle) * strip.pressure(s)
     assert weight.sum() == pytest.approx(3.0, rel=1e-12)
     sunk = [(weight * np.log(np.abs(x - s))).sum() for x in (0.0, 0.7, 1.9)]
     assert sunk == pytest.approx(np.full(3, sunk[0]), abs=1e-3)
-    half = 0.5 * angle
-    r, dr = 2.0 * np.sin(half), math.pi / 40000 * 2.0 * np.cos(half)
-    assert (2.0 * math.pi * r * disc.pressure(r) * dr).sum() == pytest.approx(3.0, rel=1e-8)
-    assert 2.0 / 5.0 * (disc.pressure(r) * dr).sum() == pytest.approx(disc.depth, rel=1e-12)
-    for punch in (strip, disc):
-        near, far = punch.pressure(2.0 - 1e-6), punch.pressure(2.0 - 1e-4)
-        assert math.log(near / far) / math.log(1e-2) == pytest.approx(-0.5, abs=1e-4)
-        assert punch.pressure([2.0, 2.1]).tolist() == [math.inf, 0.0]
+    near, far = strip.pressure(2.0 - 1e-6), strip.pressure(2.0 - 1e-4)
+    assert math.log(near / far) / math.log(1e-2) == pytest.approx(-0.5, abs=1e-4)
+    assert strip.pressure([2.0, 2.1]).tolist() == [math.inf, 0.0]
 
 
 def test_impact_numbers():

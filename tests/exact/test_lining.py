@@ -9,7 +9,7 @@ from thin_lining import ThinLining
 from vi_contact import LinearElastic
 from vi_contact.core.errors import InputError
 from vi_contact.exact.lining import ThickLining
-from vi_contact.exact.racking import BoxFrame, ChannelFrame, racking_ratio
+from vi_contact.exact.racking import BoxFrame, racking_ratio
 from vi_contact.exact.rigid_wall import RigidWall
 
 pytestmark = pytest.mark.serial
@@ -20,7 +20,7 @@ CONCRETE, SOIL, GAMMA = LinearElastic(E=25e9, nu=0.2, rho=2400.0), LinearElastic
 def test_thrust_on_a_rigid_wall(nu: float, thrust: float):
     wall = RigidWall(height=1.0, rho=1.0, nu=nu)
     assert wall.thrust(1.0) == pytest.approx(thrust, abs=5e-4)
-    assert wall.thrust_height() == pytest.approx(0.5986, abs=5e-5)
+    assert wall.moment(1.0) / wall.thrust(1.0) == pytest.approx(0.5986, abs=5e-5)
     assert RigidWall(height=3.0, rho=2.0, nu=nu).thrust(4.0) == pytest.approx(2.0 * 4.0 * 9.0 * wall.thrust(1.0))
 
 
@@ -31,7 +31,7 @@ def test_thrust_on_a_rigid_wall(nu: float, thrust: float):
 def test_thrust_on_a_wall_that_turns(flexibility: float, thrust: float, height: float):
     wall = RigidWall(height=1.0, rho=1.0, nu=1 / 3, simple=True, flexibility=flexibility)
     assert wall.thrust(1.0) == pytest.approx(thrust, abs=5.5e-4)
-    assert wall.thrust_height() == pytest.approx(height, abs=5.5e-4)
+    assert wall.moment(1.0) / wall.thrust(1.0) == pytest.approx(height, abs=5.5e-4)
 
 
 def test_pressure_integrates_to_thrust_and_moment():
@@ -47,7 +47,6 @@ def test_flexibility_of_frames():
     """The example of S3.4: Vs 150 m/s, rho 1900 kg/m³, t 0.4 m, E 30 GPa in plane strain."""
     G, bending = 1900.0 * 150.0**2, 30e9 / (1.0 - 0.2**2) * 0.4**3 / 12.0
     assert BoxFrame(6.0, 4.0, bending, bending, bending).flexibility(G) == pytest.approx(2.565, abs=5e-4)
-    assert ChannelFrame(6.0, 4.0, bending, bending).flexibility(G) == pytest.approx(7.18, abs=5e-3)
     equal = G / 24.0 * (4.0**2 * 6.0 / bending + 4.0 * 6.0**2 / bending)
     assert BoxFrame(6.0, 4.0, bending, bending, bending).flexibility(G) == pytest.approx(equal, rel=1e-13)
 

@@ -75,6 +75,9 @@ def test_refinement_changes_nothing():
 def test_wrong_data_are_refused():
     with pytest.raises(InputError, match="mu is -0.1"):
         SlidingBlock(mu=-0.1)
-    for times, values in (([0.0, 1.0], [0.0]), ([1.0, 0.0], [0.0, 0.0]), ([0.0, 1.0], [0.0, math.nan])):
-        with pytest.raises(InputError, match="times not decreasing"):
+    for times, values, words in (
+        ([0.0, 1.0], [0.0], "has shape"), ([1.0, 0.0], [0.0, 0.0], "give them in order"),
+        ([0.0, 1.0], [0.0, math.nan], "is nan at"),
+    ):
+        with pytest.raises(InputError, match=words):
             BLOCK.history(times, values)

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..core.algebra import Array
 from ..core.checks import array, column_name, instance
@@ -14,7 +15,7 @@ from ..core.problem import ContactProblem
 from ..core.step import Columns, Report, Row, State
 
 
-def racking(corners: Array, displacements: Array) -> tuple[Array, Array]:
+def racking(corners: ArrayLike, displacements: Array) -> tuple[Array, Array]:
     """Return (racking, rotation) of four corners (4, 2) [m] moved by (..., 4, 2) [m]; each (...,), in radians.
 
     The displacement gradient G that fits the corners best, u = a + G X, gives racking = du_x/dy + du_y/dx and rotation
@@ -22,9 +23,7 @@ def racking(corners: Array, displacements: Array) -> tuple[Array, Array]:
     bottom and top (Wang 1993: the racking ratio is this over the free field's shear strain).
     InputError for corners on one line.
     """
-    x = np.asarray(corners, dtype=float)
-    if x.shape != (4, 2):
-        raise InputError(f"racking needs four corners of two coordinates, these have the shape {x.shape}")
+    x = array("racking", "corners", corners, (4, 2), unit="m")
     arms = x - x.mean(axis=0)
     gram = arms.T @ arms
     if np.linalg.eigvalsh(gram)[0] <= 1e-12 * np.trace(gram):
@@ -49,7 +48,7 @@ class Racking:
             raise InputError("Racking: frames is empty; give labels and four corners each, or leave it out")
         for label, corners in self.frames.items():
             column_name("racking label", label)
-            racking(array("Racking", f"the corners of '{label}'", corners, (None, None)), np.zeros((4, 2)))
+            racking(array("Racking", f"the table of four corners '{label}'", corners, (4, 2), unit="m"), np.zeros((4, 2)))
 
     def columns(self) -> Columns:
         """Name the columns racking_<label>, rotation_<label>."""
@@ -75,6 +74,6 @@ class Racking:
         u = self._problem.cartesian(state.u)
         for label, nodes in self._nodes.items():
             values = self._problem.system.space.sample(u, nodes, state.t)
-            shear, turn = racking(np.asarray(self.frames[label], dtype=float), values)
+            shear, turn = racking(self.frames[label], values)
             found[f"racking_{label}"], found[f"rotation_{label}"] = float(shear), float(turn)
         return found

@@ -20,7 +20,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..core.algebra import Array, Mask
-from ..core.checks import array, column_name, function, instance, provides
+from ..core.checks import array, column_name, function, instance, mask, provides
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.step import AXES, Columns, Report, Row, State
@@ -62,25 +62,21 @@ class Part:
     ) -> None:
         check_part(name, centre, where, normal)
         points, normals = geometry.points, geometry.normals
-        mask = np.ones(len(points), dtype=bool) if where is None else np.asarray(where(points, normals))
-        if mask.dtype != bool or mask.shape != (len(points),):
-            raise InputError(f"part '{name}': where must return a boolean mask of shape ({len(points)},)")
-        if not mask.any():
+        given = np.ones(len(points), dtype=bool) if where is None else where(points, normals)
+        chosen = mask(f"part '{name}'", "what where(points, normals) returns", given, (len(points),))
+        if not chosen.any():
             raise InputError(f"part '{name}' has no contact points: change its mask")
-        self.centre = np.asarray(centre, dtype=float)
-        if self.centre.shape != points.shape[1:]:
-            raise InputError(f"part '{name}': the centre has {self.centre.size} coordinates, give {points.shape[1]}")
-        self.mask, self.weights = mask, geometry.weights[mask]
-        self.normals, self.arms = normals[mask], points[mask] - self.centre
+        self.centre = array(f"part '{name}'", "the centre", centre, points.shape[1:], unit="metres")
+        self.mask, self.weights = chosen, geometry.weights[chosen]
+        self.normals, self.arms = normals[chosen], points[chosen] - self.centre
         self.normal = self._direction(name, normal)
         self.tangents = tangent_vectors(self.normals)
-        self.shared = len(np.unique(points[mask], axis=0)) < int(mask.sum())
+        self.shared = len(np.unique(points[chosen], axis=0)) < int(chosen.sum())
         self.name, self.dimension = name, points.shape[1]
 
     def _direction(self, name: str, given: Sequence[float] | None) -> Array:
-        direction = self.weights @ self.normals if given is None else np.asarray(given, dtype=float)
-        if direction.shape != self.centre.shape:
-            raise InputError(f"part '{name}': normal has {direction.size} components, give {self.centre.size}")
+        direction = self.weights @ self.normals if given is None else given
+        direction = array(f"part '{name}'", "normal", direction, self.centre.shape)
         size = float(np.linalg.norm(direction))
         if size <= 1e-6 * (self.weights.sum() if given is None else 1.0):
             raise InputError(f"part '{name}': its contact directions cancel, give normal= the direction of N")

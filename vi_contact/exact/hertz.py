@@ -1,4 +1,4 @@
-"""Solve Hertz contact of smooth bodies, the quasi-static impact of a sphere, and flat rigid punches on an elastic
+"""Solve Hertz contact of smooth bodies, the quasi-static impact of a sphere, and a flat rigid punch on an elastic
 half-space, all without friction (Johnson 1985, ch. 2 to 4 and 11).
 
 Bodies of moduli E_i, nu_i and radii R_i touch without friction, with E* and R from
@@ -175,35 +175,7 @@ class StripPunch:
 
     def pressure(self, x: ArrayLike) -> Array:
         """Return p(x) [Pa] at the distance x from the centre line, 0 beside the punch, infinite at its edge."""
-        return self.force / math.pi * _inverse_root(self.half_width, x)
-
-
-@dataclass(frozen=True)
-class RoundPunch:
-    """Describe a round punch of radius a under `force` F: p = F/(2 pi a sqrt(a² - r²)), depth = F/(2 E* a).
-
-    radius a [m], force [N], modulus E* = E/(1 - nu²) [Pa]. Raises InputError unless all are finite and positive.
-    """
-
-    radius: float
-    force: float
-    modulus: float
-
-    def __post_init__(self) -> None:
-        attributes(self, positive=("radius", "force", "modulus"))
-
-    @property
-    def depth(self) -> float:
-        """Return the depth to which it sinks [m]."""
-        return self.force / (2.0 * self.modulus * self.radius)
-
-    def pressure(self, r: ArrayLike) -> Array:
-        """Return p(r) [Pa] at the distance r from the axis, 0 beside the punch, infinite at its edge."""
-        return self.force / (2.0 * math.pi * self.radius) * _inverse_root(self.radius, r)
-
-
-def _inverse_root(a: float, x: ArrayLike) -> Array:
-    """Return 1/sqrt(a² - x²), 0 for |x| > a."""
-    square = a**2 - np.asarray(x, dtype=float) ** 2
-    with np.errstate(divide="ignore"):
-        return np.where(square < 0.0, 0.0, 1.0 / np.sqrt(np.maximum(square, 0.0)))
+        square = self.half_width**2 - np.asarray(x, dtype=float) ** 2
+        with np.errstate(divide="ignore"):
+            root = 1.0 / np.sqrt(np.maximum(square, 0.0))
+        return self.force / math.pi * np.where(square < 0.0, 0.0, root)

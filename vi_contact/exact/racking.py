@@ -37,24 +37,6 @@ class BoxFrame:
         return shear_modulus * self.height * self.width**2 / (12.0 * self.roof) * psi
 
 
-@dataclass(frozen=True)
-class ChannelFrame:
-    """Describe an open channel: two walls that stand on a slab. width, height [m]; E I of walls and slab [N m²/m]."""
-
-    width: float
-    height: float
-    wall: float
-    slab: float
-
-    def __post_init__(self) -> None:
-        attributes(self, positive=("width", "height", "wall", "slab"))
-
-    def flexibility(self, shear_modulus: float) -> float:
-        """Return F = G/12 [2 H² W/(E I_wall) + H W²/(E I_slab)]."""
-        H, W = self.height, self.width
-        return shear_modulus / 12.0 * (2.0 * H**2 * W / self.wall + H * W**2 / self.slab)
-
-
 def racking_ratio(flexibility: float, nu: float) -> float:
     """Return R of a box in soil of Poisson's ratio nu, 0 (rigid) to 4 (1 - nu) (a hole).
 

@@ -74,9 +74,5 @@ class RigidWall:
         return self._unit(acceleration) * self.height * (THRUST - TURNED * MOMENT * yielding)
 
     def moment(self, acceleration: float) -> float:
-        """Return M [N] about the foot of the wall."""
+        """Return M [N] about the foot of the wall; M/Q is the height of the thrust, 0.5986 H if it cannot turn."""
         return self._unit(acceleration) * self.height**2 * MOMENT / (1.0 + THRUST * self.kappa * self.flexibility)
-
-    def thrust_height(self, acceleration: float = 1.0) -> float:
-        """Return the height [m] of the thrust above the rock, M/Q; 0.5986 H for a wall that cannot turn."""
-        return self.moment(acceleration) / self.thrust(acceleration)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core.algebra import Array
-from ..core.checks import attributes
+from ..core.checks import array, attributes
 from ..core.errors import InputError
 from .bouncing_bar import first_root
 
@@ -50,10 +50,10 @@ class SlidingBlock:
         times [s], not decreasing, a time given twice is a jump; acceleration [m/s²]; all of shape (n,). Raises
         InputError when the shapes differ, a number is not finite or the times decrease.
         """
-        t, a = np.asarray(times, dtype=float), np.asarray(acceleration, dtype=float)
-        if t.ndim != 1 or t.shape != a.shape or not np.isfinite([t, a]).all() or np.any(np.diff(t) < 0.0):
-            raise InputError(f"SlidingBlock: {t.shape} times and {a.shape} accelerations; give one finite value for "
-                             "each time, times not decreasing")
+        t = array("SlidingBlock", "times", times, (None,), unit="s")
+        a = array("SlidingBlock", "acceleration", acceleration, t.shape, unit="m/s²")
+        if np.any(np.diff(t) < 0.0):
+            raise InputError("SlidingBlock: times decrease; give them in order")
         u, v = np.zeros_like(t), np.zeros_like(t)
         for n in range(len(t) - 1):
             u[n + 1], v[n + 1] = self._interval(u[n], v[n], a[n], a[n + 1], t[n + 1] - t[n])

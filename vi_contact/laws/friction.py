@@ -100,22 +100,14 @@ class SlipRateCoulomb:
             return Coulomb(speed)
         values = self.mu(speed)
         found = np.asarray(values)
-        if found.dtype.kind not in "iuf":
-            raise InputError(
-                f"SlipRateCoulomb: mu returns {shown(values)}; return real coefficients, one per slip rate"
-            )
-        if found.shape not in ((), speed.shape):
-            raise InputError(
-                f"SlipRateCoulomb: mu returns shape {found.shape} for {len(speed)} slip rates; return one coefficient "
-                "per rate"
-            )
+        if found.dtype.kind not in "iuf" or found.shape not in ((), speed.shape):
+            raise InputError(f"SlipRateCoulomb: mu returns {shown(values)}, of shape {found.shape} for {len(speed)} "
+                             "slip rates; return one real coefficient per rate")
         found = np.broadcast_to(found.astype(float), speed.shape)
         wrong = np.flatnonzero(~(np.isfinite(found) & (found >= 0.0)))
         if len(wrong):
-            raise InputError(
-                f"SlipRateCoulomb: mu({speed[wrong[0]]:.6g} m/s) is {found[wrong[0]]:.6g}; let it return zero or a "
-                "positive finite number for every slip rate from 0 on"
-            )
+            raise InputError(f"SlipRateCoulomb: mu({speed[wrong[0]]:.6g} m/s) is {found[wrong[0]]:.6g}; let it return "
+                             "zero or a positive finite number for every slip rate from 0 on")
         return Coulomb(found)
 
     def limit(self, r_n: Array, weights: Array, scale: float) -> Array:
