@@ -48,7 +48,8 @@ class Racking:
             raise InputError("Racking: frames is empty; give labels and four corners each, or leave it out")
         for label, corners in self.frames.items():
             column_name("racking label", label)
-            racking(array("Racking", f"the table of four corners '{label}'", corners, (4, 2), unit="m"), np.zeros((4, 2)))
+            meaning = f"the table of four corners '{label}'"
+            racking(array("Racking", meaning, corners, (4, 2), unit="m"), np.zeros((4, 2)))
 
     def columns(self) -> Columns:
         """Name the columns racking_<label>, rotation_<label>."""
