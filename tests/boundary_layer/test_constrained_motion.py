@@ -7,11 +7,11 @@ import pytest
 from layer_numbers import DEEPEST, DURATION, RESTITUTION, C, K
 from scipy.special import ellipk
 
-from vi_contact.boundary_layer import trajectory
+from vi_contact.boundary_layer import motion as layer_motions
 from vi_contact.boundary_layer.bilateral import bilateral_motion
 from vi_contact.boundary_layer.layer import Layer
 from vi_contact.boundary_layer.metric import Metric, normal_mass
-from vi_contact.boundary_layer.motion import ConstrainedSystem, Evaluations
+from vi_contact.boundary_layer.motion import ConstrainedSystem
 from vi_contact.boundary_layer.particle import ParticleImpact, damping_ratio, layer_for, restitution
 from vi_contact.boundary_layer.rigid_body import Ellipsoid, RigidBody, rotation
 from vi_contact.boundary_layer.trajectory import LayerContact, Trajectory, layer_motion
@@ -309,6 +309,6 @@ def test_no_motion_goes_on_for_ever(name):
 
 def test_evaluations_are_counted(monkeypatch):
     """A force that varies without end stops at the bound, with the time it has come to."""
-    monkeypatch.setattr(trajectory, "Evaluations", lambda: Evaluations(2000))
+    monkeypatch.setattr(layer_motions, "EVALUATIONS", 2000)
     with pytest.raises(StepFailure, match="did not get beyond t = .* in 2000 evaluations"):
         pushed(lambda t: 1e9 * np.sin(1e9 * t))

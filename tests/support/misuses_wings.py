@@ -234,7 +234,7 @@ def layers() -> Table:
         (layer_motion, motion | {"system": ready, "layer": layer, "t_end": 0.1}, {
             "system": OTHER | {"body": RigidBody(**body)}, "layer": OTHER, "q0": values | two | {"outside": [-1.0]},
             "v0": values | two, "t_end": POSITIVE, "metric": THING, "contacts": but(COUNT, "none"), "rtol": POSITIVE,
-            "method": {"text": "euler", "class": dict}, "refine": COUNT}),
+            "refine": COUNT}),
         (bilateral_motion, motion | {"systems": [ready], "times": [0.0, 0.1]}, {
             "systems": {"none": None, "one": ready, "texts": ["a"], "empty": []}, "q0": values | two,
             "v0": values | two,

@@ -154,8 +154,8 @@ def run_beam(stepper: BeamStepper, start: Start, *, steps: int, every: int = 0) 
 def _states(stepper: BeamStepper, y: Array, w: Array) -> Iterator[tuple[tuple[float, ...], Array, Array]]:
     """Yield (values by COLUMNS, works and losses of the step alone; y, w) at the start and after every step, without
     end."""
-    matrices, dt, viscosity = beam_matrices(stepper.beam, stepper.elements), stepper.dt, stepper.beam.viscosity
-    M, S = matrices.M, matrices.S
+    dt, viscosity = stepper.dt, stepper.beam.viscosity
+    M, S, uniform = beam_matrices(stepper.beam, stepper.elements)
 
     def energies() -> tuple[float, float]:
         return 0.5 * float(w @ (M @ w)), 0.5 * float(y @ (S @ y))
@@ -169,7 +169,7 @@ def _states(stepper: BeamStepper, y: Array, w: Array) -> Iterator[tuple[tuple[fl
     for k in count():
         t, at = k * dt, f"step {k + 1}, t = {k * dt + dt:.6g} s"
         N, mu, f = stepper.given(t, abs(float(w[-1])))
-        r = (2.0 / dt) * (M @ w) - S @ y + f * matrices.load
+        r = (2.0 / dt) * (M @ w) - S @ y + f * uniform
         free = T.solve(r[:-1])
         try:
             slip = stepper.friction.solve(c, float(r[-1] - p @ free), mu * N)
@@ -178,7 +178,7 @@ def _states(stepper: BeamStepper, y: Array, w: Array) -> Iterator[tuple[tuple[fl
         moved = np.append(free - slip.s * column, slip.s)
         y, w = y + moved, (2.0 / dt) * moved - w
         kinetic, strain = energies()
-        work, viscous = f * float(matrices.load @ moved), viscosity / dt * float(moved @ (S @ moved))
+        work, viscous = f * float(uniform @ moved), viscosity / dt * float(moved @ (S @ moved))
         if not np.isfinite(kinetic + strain + work):
             raise StepFailure(f"{at}: the beam's motion or its energy is no finite number; check the loads and the "
                               "state at the start")

@@ -188,11 +188,11 @@ class _Part:
 
     @classmethod
     def of_beam(cls, beam: TimoshenkoBeam, elements: Elements, start: Start, load: History | None) -> _Part:
-        x, found = elements.nodes(beam.length), beam_matrices(beam, elements)
+        x, (M, S, uniform) = elements.nodes(beam.length), beam_matrices(beam, elements)
         y = np.concatenate([start.at("theta", x), start.at("u", x)])
         w = np.concatenate([start.at("omega", x), start.at("v", x)])
-        loads = () if load is None else ((found.load, _given("load", load, "N/m")),)
-        return cls(found.M, found.S, beam.viscosity, loads, y, w, beam.rho * beam.area * found.load)
+        loads = () if load is None else ((uniform, _given("load", load, "N/m")),)
+        return cls(M, S, beam.viscosity, loads, y, w, beam.rho * beam.area * uniform)
 
 
 def _given(name: str, history: History, unit: str) -> History:

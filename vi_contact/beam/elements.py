@@ -55,20 +55,9 @@ class Elements:
         return np.linspace(0.0, number("Elements.nodes", "length", length, positive=True, unit="m"), self.count + 1)[1:]
 
 
-@dataclass(frozen=True)
-class BeamMatrices:
-    """Hold mass and stiffness of y = (theta_1 … theta_m, u_1 … u_m): ½ wᵀMw and ½ yᵀSy are energies [J]. C = a2 S.
-
-    ``load``: a unit of distributed force [N/m] on the unknowns.
-    """
-
-    M: Any
-    S: Any
-    load: Array
-
-
-def beam_matrices(beam: TimoshenkoBeam, elements: Elements) -> BeamMatrices:
-    """Assemble M1, M2, K1, K2, L1 of section 7 with their coefficients, sparse."""
+def beam_matrices(beam: TimoshenkoBeam, elements: Elements) -> tuple[Any, Any, Array]:
+    """Assemble (M, S, unit of distributed force [N/m]) of y = (theta_1 … theta_m, u_1 … u_m), sparse: ½ wᵀMw and ½ yᵀSy
+    are energies [J], C = a2 S; from M1, M2, K1, K2, L1 of section 7 with their coefficients."""
     m, h = elements.count, beam.length / elements.count
     lines, slopes = _lines(S), _line_slopes(S) / h
     turn, bend = lines, slopes
@@ -94,7 +83,7 @@ def beam_matrices(beam: TimoshenkoBeam, elements: Elements) -> BeamMatrices:
     M = sp.block_diag([beam.rho * beam.inertia * M1, beam.rho * beam.area * M2]).tocsr()
     stiffness = sp.bmat([[EI * K1 + KAG * N1, -KAG * L1], [-KAG * L1.T, KAG * K2]]).tocsr()
     load = np.concatenate([np.zeros(m), _uniform(m, h)])
-    return BeamMatrices(M, stiffness, load)
+    return M, stiffness, load
 
 
 def rod_matrices(rod: Rod, count: int) -> tuple[Any, Any, Array]:

@@ -21,9 +21,9 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from ..core.algebra import Array
-from ..core.checks import array, instance, number, several, shown
+from ..core.checks import array, instance, several, shown
 from ..core.errors import InputError, StepFailure
-from .motion import ConstrainedSystem, Evaluations, one_sentence
+from .motion import ConstrainedSystem, Evaluations, check_tolerance, one_sentence
 
 
 @dataclass(frozen=True)
@@ -57,8 +57,7 @@ def bilateral_motion(
     q, v, times = (array(owner, name, value, (None,)) for name, value in (("q0", q0), ("v0", v0), ("times", times)))
     if len(times) < 2 or np.any(np.diff(times) <= 0.0):
         raise InputError(f"{owner}: times are {shown(times)}; give two or more that increase, the first the start")
-    if number(owner, "rtol", rtol, positive=True) >= 1.0:
-        raise InputError(f"{owner}: rtol is {rtol}; give a relative tolerance below 1")
+    check_tolerance(owner, rtol)
     for system in systems:
         system.check(q, v, float(times[0]))
     n, evaluations = len(q), Evaluations()

@@ -122,14 +122,14 @@ class ConstrainedSystem:
 class Evaluations:
     """Count what an integration in time spends, so that no motion goes on for ever; t: the time it has come to [s]."""
 
-    def __init__(self, most: int = EVALUATIONS) -> None:
-        self.most, self.spent, self.t = most, 0, 0.0
+    def __init__(self) -> None:
+        self.spent, self.t = 0, 0.0
 
     def spend(self, t: float) -> None:
         """Count one evaluation; StepFailure, naming the time, when everything is spent."""
         self.spent, self.t = self.spent + 1, t
-        if self.spent > self.most:
-            raise StepFailure(f"the motion did not get beyond t = {t:.6g} s in {self.most} evaluations of its "
+        if self.spent > EVALUATIONS:
+            raise StepFailure(f"the motion did not get beyond t = {t:.6g} s in {EVALUATIONS} evaluations of its "
                               "acceleration: give a shorter time, a larger rtol, or forces that vary less")
 
 
@@ -141,6 +141,12 @@ def one_sentence() -> Iterator[None]:
     except (ArithmeticError, np.linalg.LinAlgError) as error:
         raise StepFailure(f"the motion could not be integrated, its numbers left their range ({error}): check forces, "
                           "masses and the state at the start") from error
+
+
+def check_tolerance(owner: str, rtol: float) -> None:
+    """Raise InputError unless it is a relative tolerance, 0 < rtol < 1."""
+    if number(owner, "rtol", rtol, positive=True) >= 1.0:
+        raise InputError(f"{owner}: rtol is {rtol}; give a relative tolerance below 1")
 
 
 def check_positive(owner: str, meaning: str, matrix: Any, unit: str) -> None:

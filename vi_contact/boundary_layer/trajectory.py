@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
 from ..core.algebra import Array
-from ..core.checks import array, instance, number, shown, whole
+from ..core.checks import array, instance, number, whole
 from ..core.errors import InputError, StepFailure
 from .layer import Layer
 from .metric import Metric
-from .motion import ConstrainedSystem, Evaluations, one_sentence
-
-METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")  # of scipy.integrate.solve_ivp
+from .motion import ConstrainedSystem, Evaluations, check_tolerance, one_sentence
 
 
 @dataclass(frozen=True)
@@ -55,12 +52,12 @@ class Trajectory:
 
 def layer_motion(
     system: ConstrainedSystem, layer: Layer, *, q0: Array, v0: Array, t_end: float, metric: Metric = Metric.DOMINANT,
-    contacts: int | None = None, rtol: float = 1e-11, method: str = "DOP853", refine: int = 1,
+    contacts: int | None = None, rtol: float = 1e-11, refine: int = 1,
 ) -> Trajectory:
     """Compute the motion from (q0, v0) at t = 0 to t_end, or to the end of so many contacts.
 
-    ``metric``: the reading of the law. ``rtol``: relative tolerance of scipy's solve_ivp; ``refine``: rows of the
-    trajectory for each of its steps, which are large, by its own interpolation.
+    ``metric``: the reading of the law. ``rtol``: relative tolerance of the integration by Dormand and Prince's method
+    of order 8; ``refine``: rows of the trajectory for each of its steps, which are large, by its own interpolation.
 
     Raises:
         InputError: the start is not inside the admissible set (rho > 0), or in the layer while V is not known; a
@@ -73,11 +70,15 @@ def layer_motion(
     instance(owner, "metric", metric, Metric, "give Metric.DOMINANT, FULL, BLENDED or FLAT")
     q, v = array(owner, "q0", q0, (None,)), array(owner, "v0", v0, (None,))
     system.check(q, v)
-    _check_options(t_end, contacts, rtol, method, refine)
+    number(owner, "t_end", t_end, positive=True, unit="s")
+    if contacts is not None:
+        whole(owner, "contacts", contacts, least=1)
+    check_tolerance(owner, rtol)
+    whole(owner, "refine", refine, least=1, most=10_000)
     rho = float(system.rho(q))
     if not rho > 0.0:
         raise InputError(f"the motion starts at distance rho = {rho:g}, outside the admissible set: start at rho > 0")
-    passages = _Passages(system, layer, metric, {"rtol": rtol, "method": method}, refine)
+    passages = _Passages(system, layer, metric, rtol, refine)
     inside = rho < layer.width or (rho == layer.width and system.normal_rate(q, v) < 0.0)
     t = 0.0
     with one_sentence():
@@ -101,18 +102,6 @@ def passage(layer: Layer, mass: float, speed: float, metric: Metric, *, rtol: fl
     return found
 
 
-def _check_options(t_end: float, contacts: int | None, rtol: float, method: str, refine: int) -> None:
-    owner = "layer_motion"
-    number(owner, "t_end", t_end, positive=True, unit="s")
-    if contacts is not None:
-        whole(owner, "contacts", contacts, least=1)
-    if number(owner, "rtol", rtol, positive=True) >= 1.0:
-        raise InputError(f"{owner}: rtol is {rtol}; give a relative tolerance below 1")
-    if method not in METHODS:
-        raise InputError(f"{owner}: method is {shown(method)}; give {', '.join(METHODS)}")
-    whole(owner, "refine", refine, least=1, most=10_000)
-
-
 class _Passages:
     """Flights and passages through the layer one after the other.
 
@@ -120,11 +109,8 @@ class _Passages:
     resolved beside a q of 1 m.
     """
 
-    def __init__(
-        self, system: ConstrainedSystem, layer: Layer, metric: Metric, options: dict[str, Any], refine: int
-    ) -> None:
-        self._system, self._layer, self._metric = system, layer, metric
-        self._options, self._refine = options | {"dense_output": refine > 1}, refine
+    def __init__(self, system: ConstrainedSystem, layer: Layer, metric: Metric, rtol: float, refine: int) -> None:
+        self._system, self._layer, self._metric, self._rtol, self._refine = system, layer, metric, rtol, refine
         self._parts: list[tuple[Array, Array, Array, Array, Array]] = []
         self._evaluations = Evaluations()
         self.contacts: list[LayerContact] = []
@@ -133,7 +119,7 @@ class _Passages:
         """Integrate to the next crossing of the edge; (t, q, v, whether there was one)."""
         system, n = self._system, len(q)
         layer = self._layer.at(abs(system.normal_rate(q, v))) if inside and self._layer.speed is None else self._layer
-        width, rtol = layer.width, self._options["rtol"]
+        width = layer.width
 
         def rates(t: float, y: Array) -> Array:
             self._evaluations.spend(start + t)
@@ -157,14 +143,15 @@ class _Passages:
             raise StepFailure(f"the velocities or accelerations at t = {start:.6g} s are not finite: check what the "
                               "system's functions return there")
         pace = max(float(np.max(np.abs(v))), layer.speed or 0.0, self._pace(start, q, v, layer, inside))
-        atol = rtol * np.r_[np.full(n, way), np.full(len(v), pace)]
+        atol = self._rtol * np.r_[np.full(n, way), np.full(len(v), pace)]
         found = solve_ivp(
-            rates, (0.0, t_end - start), np.r_[np.zeros(n), v], events=(edge, turn), atol=atol, **self._options
+            rates, (0.0, t_end - start), np.r_[np.zeros(n), v], events=(edge, turn), atol=atol, rtol=self._rtol,
+            method="DOP853", dense_output=self._refine > 1,
         )
         if found.status < 0:
             raise StepFailure(
                 f"the motion could not be integrated beyond t = {start + found.t[-1]:.6g} s at rho = "
-                f"{system.rho(q + found.y[:n, -1]):.3g}: give a larger rtol or another method ({found.message})"
+                f"{system.rho(q + found.y[:n, -1]):.3g}: give a larger rtol ({found.message})"
             )
         places, speeds = q + found.y[:n].T, found.y[n:].T
         t = np.interp(np.arange(self._refine * (len(found.t) - 1) + 1) / self._refine, np.arange(len(found.t)), found.t)

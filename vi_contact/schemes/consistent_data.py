@@ -82,11 +82,12 @@ def _with_contact(problem: ContactProblem, state: State, force: Array, dt: float
 def mass_matrix(problem: ContactProblem) -> EffectiveMatrix:
     """Return M, with ones in place of the empty rows of massless unknowns."""
     system, massless = problem.equations, problem.equations.massless
-    if massless is None:
-        matrix: EffectiveMatrix = system.cached("mass", lambda: EffectiveMatrix(system.M, system.algebra))
-    else:
-        regular = system.algebra.with_identity_rows
-        matrix = system.cached("mass", lambda: EffectiveMatrix(regular(system.M, massless), system.algebra))
+
+    def made() -> EffectiveMatrix:
+        M = system.M if massless is None else system.algebra.with_identity_rows(system.M, massless)
+        return EffectiveMatrix(M, system.algebra)
+
+    matrix: EffectiveMatrix = system.cached("mass", made)
     return matrix
 
 

@@ -95,11 +95,9 @@ class LinearMultistep(BalanceStep):
         b = (beta, 0.5 + gamma - 2.0 * beta, 0.5 - gamma + beta)
         return cls(a=(gamma, 1.0 - 2.0 * gamma, gamma - 1.0), b=b, gamma=(1.0, -2.0, 1.0))
 
-    def _velocity_factor(self, dt: float) -> float:
-        return self.a[0] / (dt * self.b[0])
-
-    def _acceleration_factor(self, dt: float) -> float:
-        return self.gamma[0] / (self.mu * dt**2 * self.b[0])
+    def _factors(self, dt: float) -> tuple[float, float]:
+        """Return dv/du and da/du of the newest level."""
+        return self.a[0] / (dt * self.b[0]), self.gamma[0] / (self.mu * dt**2 * self.b[0])
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
         """Return the state with a past, unless it brings one for this dt; massless nodes come into equilibrium, once.
@@ -131,7 +129,8 @@ class LinearMultistep(BalanceStep):
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
         """Return A of the module's equations."""
-        return problem.equations.effective(m=self._acceleration_factor(dt), c=self._velocity_factor(dt), k=1.0)
+        damping, inertia = self._factors(dt)
+        return problem.equations.effective(m=inertia, c=damping, k=1.0)
 
     def _levels(self, state: State) -> dict[str, Array]:
         """u, v, a at the q levels before the step, 1 = newest."""
@@ -162,10 +161,9 @@ class LinearMultistep(BalanceStep):
     def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
         """Return the state with velocity and acceleration from eqs. 11c,d; the levels move one down."""
         levels = self._levels(state)
-        v_known, a_known = self._known(levels, dt)
-        v = v_known + self._velocity_factor(dt) * result.x
-        v = massless_take(problem, (result.x - state.u) / dt, v)
-        a = massless_take(problem, 0.0, a_known + self._acceleration_factor(dt) * result.x)
+        (v_known, a_known), (by_v, by_a) = self._known(levels, dt), self._factors(dt)
+        v = massless_take(problem, (result.x - state.u) / dt, v_known + by_v * result.x)
+        a = massless_take(problem, 0.0, a_known + by_a * result.x)
         reaction = problem.surface.reaction_load(result.r_n, len(v), result.r_t)
         newest = {"a_0": a, "reaction_0": reaction, "dt": state.memory["dt"], "t": np.array([step.t])}
         return State(step.t, step.k, result.x, v, result.r_n, result.active, levels | newest, result.r_t)

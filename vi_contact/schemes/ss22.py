@@ -12,7 +12,7 @@ Source: Zienkiewicz, Wood and Taylor, in the form with two weights: docs/referen
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from ..core.checks import real, shown
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.step import Balance, State, StepProblem, StepResult
-from .base import SingleStep, position_step, stepped
+from .base import SingleStep, means, position_step, stepped
 
 
 @dataclass(frozen=True)
@@ -61,11 +61,6 @@ class SS22(SingleStep):
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
         """Return the averages of the residual equation."""
         alpha = (new.v - old.v) / dt
-        return Balance(
-            u=old.u + self.theta1 * dt * old.v + 0.5 * self.theta2 * dt**2 * alpha,
-            v=old.v + self.theta1 * dt * alpha,
-            a=alpha,
-            f=problem.equations.load(old.t + self.theta1 * dt),
-            r_n=new.r_n,
-            r_t=new.r_t,
-        )
+        u = old.u + self.theta1 * dt * old.v + 0.5 * self.theta2 * dt**2 * alpha
+        mean = means(old, new, dt, u=u, f=problem.equations.load(old.t + self.theta1 * dt))
+        return replace(mean, v=old.v + self.theta1 * dt * alpha)

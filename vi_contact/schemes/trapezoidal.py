@@ -24,7 +24,7 @@ from ..core.problem import ContactProblem
 from ..core.protocols import MassLaw
 from ..core.step import Balance, State, StepProblem, StepResult
 from ..laws.mass import Redistributed
-from .base import check_balance, position_step, stepped
+from .base import check_balance, means, position_step, stepped
 from .consistent_data import equilibrated, massless_take
 
 
@@ -80,11 +80,6 @@ class Trapezoidal:
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
         """Return the means of both ends."""
         load = problem.equations.load
-        return Balance(
-            u=0.5 * (old.u + new.u),
-            v=(new.u - old.u) / dt,
-            a=(new.v - old.v) / dt,
-            f=0.5 * (load(old.t) + load(new.t)),
-            r_n=0.5 * (old.r_n + new.r_n),
-            r_t=None if new.r_t is None else 0.5 * (new.r_t if old.r_t is None else old.r_t + new.r_t),
-        )
+        r_t = None if new.r_t is None else 0.5 * (new.r_t if old.r_t is None else old.r_t + new.r_t)
+        end = means(old, new, dt, u=0.5 * (old.u + new.u), f=0.5 * (load(old.t) + load(new.t)))
+        return replace(end, r_n=0.5 * (old.r_n + new.r_n), r_t=r_t)
