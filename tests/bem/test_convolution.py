@@ -155,7 +155,7 @@ def test_plane_pulses(operators, shear):
     wave, errors = pulse(shear=shear), []
     for k in (5, 10):
         operator = operators[k]
-        forces = traction_forces(operator.mesh, wave.traction, dt=operator.dt, steps=operator.steps)
+        forces = traction_forces(operator.mesh, wave.traction, dt=operator.dt, steps=operator.frequencies.steps)
         exact = np.array([wave.displacement(operator.mesh.points, operator.dt * (j + 1)).T for j in range(4 * k)])
         found = BoundaryProblem(operator, forces).solve().displacement[: 4 * k]
         errors.append(np.linalg.norm(found - exact) / np.linalg.norm(exact))
@@ -249,7 +249,7 @@ def test_density_and_the_unsymmetric_form(operators):
 def test_errors(operators):
     """One sentence each, naming the thing and the remedy."""
     operator = operators[5]
-    n, steps = len(operator.mesh), operator.steps
+    n, steps = len(operator.mesh), operator.frequencies.steps
     forces = np.zeros((steps, 2, n))
     with pytest.raises(InputError, match="above zero"):
         Frequencies(-1.0, 3)

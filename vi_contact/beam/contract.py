@@ -245,23 +245,11 @@ def _problem(x: Array, along: _Part, across: _Part | None, gap: float, friction:
         v0=np.concatenate([part.v0 for part in parts]),
         space=space,
     )
-    mass = None if across is None else ConsistentMass()
-    return ContactProblem(system, _tip(x[-1], space, gap), friction=friction, mass=mass)
-
-
-def _tip(length: float, space: BeamSpace, gap: float) -> ContactSurface:
-    """One contact point, its weight 1: pressures are forces."""
     d = space.dimension
     tangents = np.array([[space.unknowns - 1]]) if space.beam else np.zeros((1, 0), dtype=np.int64)
-    return ContactSurface(
-        comm=SerialComm(),
-        points=np.eye(1, d) * length,
-        normals=np.eye(1, d),
-        weights=np.ones(1),
-        gap0=np.array([gap]),
-        bilateral=np.zeros(1, dtype=bool),
-        compliance=np.zeros(1),
-        owned=np.array([space.along - 1]),
-        slots=np.array([0]),
-        tangents=tangents,
+    tip = ContactSurface(  # one contact point, its weight 1: pressures are forces
+        comm=SerialComm(), points=np.eye(1, d) * x[-1], normals=np.eye(1, d), weights=np.ones(1),
+        gap0=np.array([gap]), bilateral=np.zeros(1, dtype=bool), compliance=np.zeros(1),
+        owned=np.array([space.along - 1]), slots=np.array([0]), tangents=tangents,
     )
+    return ContactProblem(system, tip, friction=friction, mass=None if across is None else ConsistentMass())

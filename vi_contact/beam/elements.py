@@ -22,7 +22,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..core.algebra import Array
-from ..core.checks import counted, flag, number, whole
+from ..core.checks import attributes, counted, number, whole
 from ..core.errors import InputError
 from .values import Rod, TimoshenkoBeam
 
@@ -45,8 +45,7 @@ class Elements:
 
     def __post_init__(self) -> None:
         counted("Elements", "count", whole("Elements", "count", self.count, least=2), "elements", most=MOST)
-        for name in ("reduced_shear", "published_end"):
-            flag("Elements", name, getattr(self, name))
+        attributes(self, flags=("reduced_shear", "published_end"))
         if self.published_end and self.reduced_shear:
             raise InputError("Elements: the published end function goes with reduced_shear=False, as in the source")
 

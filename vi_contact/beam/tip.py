@@ -15,7 +15,7 @@ import math
 from dataclasses import dataclass
 from typing import Protocol
 
-from ..core.checks import attributes, flag, whole
+from ..core.checks import attributes
 from ..core.errors import StepFailure
 
 
@@ -63,11 +63,8 @@ class RegularisedFriction:
     safeguard: bool = True
 
     def __post_init__(self) -> None:
-        attributes(self, positive=("eps", "tolerance"))
-        if self.absolute is not None:
-            attributes(self, positive=("absolute",))
-        whole("RegularisedFriction", "max_iterations", self.max_iterations, least=1)
-        flag("RegularisedFriction", "safeguard", self.safeguard)
+        given = () if self.absolute is None else ("absolute",)
+        attributes(self, positive=("eps", "tolerance", *given), counts=("max_iterations",), flags=("safeguard",))
 
     def solve(self, c: float, g: float, limit: float) -> Slip:
         """Return the zero of F. StepFailure when max_iterations updates do not reach the tolerance."""

@@ -42,11 +42,6 @@ class ConvolutionOperator:
     to_traction: NDArray
 
     @property
-    def steps(self) -> int:
-        """Return the number of time steps, that of every history."""
-        return self.frequencies.steps
-
-    @property
     def dt(self) -> float:
         """Return the time step [s]."""
         return self.frequencies.dt
@@ -54,7 +49,7 @@ class ConvolutionOperator:
     def load_shape(self, dimensions: int) -> tuple[int, ...]:
         """Return the shape of the nodal forces of a problem; in four dimensions the second is that of the stages."""
         stages = (2,) if dimensions == 4 else ()
-        return self.steps, *stages, 2, len(self.mesh)
+        return self.frequencies.steps, *stages, 2, len(self.mesh)
 
     def motion(self, forces: Array, fixed: Mask, prescribed: Array | None) -> tuple[Array, Array, Array]:
         """Return the motion by frequencies; forces: (steps, 2 or 1, 2n)."""

@@ -61,13 +61,13 @@ class TwoBodies:
     def _weld(self) -> Weld:
         relative, interface = self.relative, np.asarray(self.one.contact, bool)
         elements = np.zeros(len(interface), bool) if self.welded is None else np.asarray(self.welded, bool)
-        if elements.shape != interface.shape or (elements & ~interface).any():
-            raise InputError("TwoBodies: `welded` must be a mask of elements of body 1 that are in its `contact`, too")
+        if (elements & ~interface).any():
+            raise InputError("TwoBodies: `welded` has elements of body 1 that are not in its `contact`; add them there")
         mesh = self.one.operator.mesh
         contact = interface & ~elements
         relative = replace(relative, lengths=mesh.node_lengths(contact)[relative.nodes],
                            normals=mesh.node_normals(contact)[relative.nodes])
-        return weld(relative, mesh.nodes_of(elements)[relative.nodes])
+        return Weld(relative, mesh.nodes_of(elements)[relative.nodes])
 
     def condensed(self) -> CondensedCompliance:
         """Return the compliance of the contact nodes, for BoundaryContact; ``normals`` point from body 1 to body 2."""
@@ -96,47 +96,36 @@ def matching(points: Array, others: Array) -> Indices:
     return nearest
 
 
-@dataclass(frozen=True, eq=False)
 class Weld:
-    """Eliminate weld forces: ``contact`` is what is left. Masks (2m,) of unknowns; responses: (steps, |I|, 2m_c + 1)
-    weld forces after unit contact forces in step 0, and, in the last column, without any."""
+    """Hold the relative displacement of masked nodes (m,) at zero from the first step on: ``contact`` is what is left
+    of a compliance when the weld forces are eliminated."""
 
-    contact: CondensedCompliance
-    welded: Mask
-    touching: Mask
-    responses: Array
+    def __init__(self, compliance: CondensedCompliance, nodes: Mask) -> None:
+        W, steps = compliance.W, len(compliance.W)
+        flexibility = W[0].diagonal()
+        self._welded = welded = np.tile(nodes, 2) & (flexibility > SUPPORTED * flexibility.max())
+        self._touching = touching = np.tile(~nodes, 2)
+        inner, cross, across = W[:, welded][:, :, welded], W[:, welded][:, :, touching], W[:, touching][:, :, welded]
+        known = np.concatenate([cross, compliance.u_free[:, welded, None]], axis=2)
+        # (steps, |I|, 2m_c + 1) weld forces after unit contact forces in step 0, in the last column without any
+        self._responses = responses = np.zeros_like(known)
+        left = np.concatenate([W[:, touching][:, :, touching], compliance.u_free[:, touching, None]], axis=2)
+        if welded.any():
+            factor = cho_factor(0.5 * (inner[0] + inner[0].T))
+            for k in range(steps):
+                early = summed(inner[k:0:-1], responses[:k]) if k else 0.0
+                responses[k] = -cho_solve(factor, known[k] + early)
+            left += np.array([summed(across[k::-1], responses[: k + 1]) for k in range(steps)])
+        kept = {name: getattr(compliance, name)[~nodes] for name in ("nodes", "points", "normals", "lengths")}
+        W, u_free = np.ascontiguousarray(left[:, :, :-1]), np.ascontiguousarray(left[:, :, -1])
+        self.contact = replace(compliance, W=W, u_free=u_free, **kept)
 
     def forces(self, contact_forces: Array) -> Array:
         """Return (steps, 2m): contact forces (steps, 2m_c) and the weld forces that go with them."""
-        everything = np.zeros((len(contact_forces), len(self.welded)))
-        everything[:, self.touching] = contact_forces
-        if self.welded.any():
+        everything = np.zeros((len(contact_forces), len(self._welded)))
+        everything[:, self._touching] = contact_forces
+        if self._welded.any():
             for k in range(len(contact_forces)):
-                follow = summed(self.responses[k::-1, :, :-1], contact_forces[: k + 1, :, None])[:, 0]
-                everything[k, self.welded] = self.responses[k, :, -1] + follow
+                follow = summed(self._responses[k::-1, :, :-1], contact_forces[: k + 1, :, None])[:, 0]
+                everything[k, self._welded] = self._responses[k, :, -1] + follow
         return everything
-
-
-def weld(compliance: CondensedCompliance, nodes: Mask) -> Weld:
-    """Hold the relative displacement of masked nodes (m,) at zero from the first step on."""
-    W, steps = compliance.W, len(compliance.W)
-    flexibility = W[0].diagonal()
-    welded = np.tile(nodes, 2) & (flexibility > SUPPORTED * flexibility.max())
-    touching = np.tile(~nodes, 2)
-    inner, cross, across = W[:, welded][:, :, welded], W[:, welded][:, :, touching], W[:, touching][:, :, welded]
-    known = np.concatenate([cross, compliance.u_free[:, welded, None]], axis=2)
-    responses = np.zeros_like(known)
-    if welded.any():
-        factor = cho_factor(0.5 * (inner[0] + inner[0].T))
-        for k in range(steps):
-            early = summed(inner[k:0:-1], responses[:k]) if k else 0.0
-            responses[k] = -cho_solve(factor, known[k] + early)
-    left = np.concatenate([W[:, touching][:, :, touching], compliance.u_free[:, touching, None]], axis=2)
-    if welded.any():
-        left += np.array([summed(across[k::-1], responses[: k + 1]) for k in range(steps)])
-    contact = replace(
-        compliance, W=np.ascontiguousarray(left[:, :, :-1]), u_free=np.ascontiguousarray(left[:, :, -1]),
-        nodes=compliance.nodes[~nodes], points=compliance.points[~nodes], normals=compliance.normals[~nodes],
-        lengths=compliance.lengths[~nodes],
-    )
-    return Weld(contact, welded, touching, responses)

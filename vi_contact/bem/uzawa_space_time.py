@@ -18,7 +18,7 @@ import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 
 from ..core.algebra import Array
-from ..core.checks import attributes, instance, whole
+from ..core.checks import attributes, instance
 from ..core.errors import InputError, StepFailure
 from ..core.step import StepProblem, StepResult
 from ..laws.friction import project
@@ -46,12 +46,8 @@ class SpaceTimeUzawa:
     window: int | None = None
 
     def __post_init__(self) -> None:
-        attributes(self, positive=("tolerance",))
-        whole("SpaceTimeUzawa", "max_iterations", self.max_iterations, least=1)
-        if self.rho is not None:
-            attributes(self, positive=("rho",))
-        if self.window is not None:
-            whole("SpaceTimeUzawa", "window", self.window, least=1)
+        rho, window = (() if getattr(self, name) is None else (name,) for name in ("rho", "window"))
+        attributes(self, positive=("tolerance", *rho), counts=("max_iterations", *window))
 
     def solve(self, contact: BoundaryContact) -> ContactRun:
         """Solve the problem; StepFailure when ``max_iterations`` do not reach the tolerance."""

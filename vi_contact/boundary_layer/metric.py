@@ -16,9 +16,6 @@ from __future__ import annotations
 
 from enum import Enum
 
-import numpy as np
-
-from ..core.algebra import Array
 from .layer import Layer
 
 
@@ -46,8 +43,3 @@ class Metric(Enum):
             return g * (rate**2 / rho + force / (g * ratio) + free / ratio - free)
         ratio *= {Metric.FULL: 1.0, Metric.FLAT: 0.0}.get(self, float(layer.cut_off(rho)))
         return (force - g * ratio * (free - rate**2 / rho)) / (1.0 + ratio)
-
-
-def normal_mass(M: Array, A: Array) -> float:
-    """Return g_11 = 1/(A M⁻¹ Aᵀ): the mass that the boundary feels. M (n, n), A (n,)."""
-    return float(1.0 / (A @ np.linalg.solve(M, A)))

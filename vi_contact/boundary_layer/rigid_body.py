@@ -22,7 +22,6 @@ from ..core.algebra import Array
 from ..core.checks import array, number, shape_of
 from ..core.errors import InputError
 from .layer import sized
-from .metric import normal_mass
 from .motion import ConstrainedSystem, check_positive
 
 
@@ -115,7 +114,8 @@ class RigidBody:
 
     def normal_mass(self, q: Array) -> float:
         """Return g_11 of (50) [kg]."""
-        return normal_mass(self.matrix, self.gradient(q))
+        A = self.gradient(q)
+        return float(1.0 / (A @ np.linalg.solve(self.matrix, A)))
 
     def after_impact(self, q: Array, v: Array, e: float) -> Array:
         """Return v⁺ (6,) of the impact map."""

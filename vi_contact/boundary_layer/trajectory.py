@@ -142,7 +142,9 @@ class _Passages:
         if not np.all(np.isfinite(rates(0.0, np.r_[np.zeros(n), v]))):
             raise StepFailure(f"the velocities or accelerations at t = {start:.6g} s are not finite: check what the "
                               "system's functions return there")
-        pace = max(float(np.max(np.abs(v))), layer.speed or 0.0, self._pace(start, q, v, layer, inside))
+        most = float(np.max(np.abs(self._acceleration(start, q, v, layer, inside)[0])))
+        reached = float(np.sqrt(most * layer.width)) or 1.0  # the speed over the width; 1 where nothing moves
+        pace = max(float(np.max(np.abs(v))), layer.speed or 0.0, reached)
         atol = self._rtol * np.r_[np.full(n, way), np.full(len(v), pace)]
         found = solve_ivp(
             rates, (0.0, t_end - start), np.r_[np.zeros(n), v], events=(edge, turn), atol=atol, rtol=self._rtol,
@@ -164,11 +166,6 @@ class _Passages:
             deepest, when = min(((float(system.rho(q + y[:n])), float(t)) for y, t in turns), default=(width, 0.0))
             self.contacts.append(LayerContact(start, start + float(found.t[-1]), *rate, deepest, start + when))
         return start + float(found.t[-1]), places[-1], speeds[-1], crossed
-
-    def _pace(self, t: float, q: Array, v: Array, layer: Layer, inside: bool) -> float:
-        """The speed [m/s] that the acceleration reaches over the width; 1 where nothing moves."""
-        most = float(np.max(np.abs(self._acceleration(t, q, v, layer, inside)[0])))
-        return float(np.sqrt(most * layer.width)) or 1.0
 
     def _acceleration(self, t: float, q: Array, v: Array, layer: Layer, inside: bool) -> tuple[Array, float]:
         """(v̇, lambda); NaN where a trial stage has left the admissible set, which makes the integrator step back."""

@@ -8,7 +8,7 @@ contact forces are those of the waves alone.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -67,11 +67,10 @@ class Redistributed:
         lumped = algebra.local(*lumped_entries(surface, nodal), system.rows)
         bulk = algebra.combine([(1.0 - self.lumping, system.M), (self.lumping, lumped)])
         levels = from_neighbours(system, massless, contact, nodal)
-        moved = _congruent(system, levels, bulk)
-        C = None if system.C is None else _congruent(system, levels, system.C)
-        load = system.load
-        for P in levels:
-            load = load.handed_over(P)
+        moved, C, load = bulk, system.C, system.load
+        for P in levels:  # the last one is applied to velocities first
+            moved, load = algebra.congruence(P, moved), load.handed_over(P)
+            C = None if C is None else algebra.congruence(P, C)
         corrections = [
             _inertia_correction(system, moved, body & ~contact, body, nodal) for body in _bodies(system, ~contact)
         ]
@@ -95,17 +94,10 @@ def _contact_unknowns(system: SemiDiscreteSystem, surface: ContactSurface, tange
     contact[surface.owned] = True
     massless = contact.copy()
     contact[surface.tangents[surface.tangents >= 0]] = True
-    if surface.coupling is not None:  # relative unknowns: nodes of both sides lose their inertia as a whole
-        contact |= _faced(system, surface.coupling, contact)
+    if surface.coupling is not None:  # relative unknowns: nodes of both sides lose their inertia as a whole, for with
+        faced = system.algebra.entries(surface.coupling, np.flatnonzero(contact))  # mass on side 2 they would ring
+        contact[named(system, faced.indices)] = True
     return (contact.copy() if tangential or surface.coupling is not None else massless), contact
-
-
-def _faced(system: SemiDiscreteSystem, coupling: Matrix, contact: Mask) -> Mask:
-    """The unknowns of side 2 that contact nodes face: with mass they would ring between the springs of both bodies.
-    Collective."""
-    algebra, faced = system.algebra, np.zeros(system.rows, dtype=bool)
-    faced[named(system, algebra.entries(coupling, np.flatnonzero(contact)).indices)] = True
-    return faced
 
 
 def _row_sums(system: SemiDiscreteSystem) -> Array:
@@ -124,19 +116,6 @@ def _refuse_negative(system: SemiDiscreteSystem, nodal: Array) -> None:
         )
 
 
-def _congruent(system: SemiDiscreteSystem, levels: Sequence[Matrix], A: Matrix) -> Matrix:
-    """PᵀAP for the product P of the levels, the last one applied to velocities first."""
-    for P in levels:
-        A = system.algebra.congruence(P, A)
-    return A
-
-
-def _motions(system: SemiDiscreteSystem, x: Array) -> Array:
-    """Rigid motions (rows, modes) in the nodal frames, x (rows, d) from the middle; in 1D also the uniform stretch."""
-    rigid = rigid_motions(system.influence, x)
-    return rigid if x.shape[1] > 1 else np.column_stack([rigid, system.influence[:, 0] * x[:, 0]])
-
-
 def _inertia_correction(system: SemiDiscreteSystem, moved: Matrix, inner: Mask, body: Mask, nodal: Array) -> Matrix:
     """D of one body: smallest nodal masses m_i p(x_i) on its inner nodes, p a symmetric (d, d) matrix of polynomials of
     degree 2, such that Rᵀ(M* + D)R = RᵀMR for its rigid motions R."""
@@ -145,7 +124,10 @@ def _inertia_correction(system: SemiDiscreteSystem, moved: Matrix, inner: Mask, 
     high = comm.max(np.max(points[body], axis=0, initial=-np.inf))
     low = -comm.max(np.max(-points[body], axis=0, initial=-np.inf))
     x = (points - 0.5 * (low + high)) / max(float(np.max(high - low)), 1e-300)
-    R = _motions(system, x) * body[:, None]
+    R = rigid_motions(system.influence, x)
+    if d == 1:  # the uniform stretch too
+        R = np.column_stack([R, system.influence[:, 0] * x[:, 0]])
+    R = R * body[:, None]
     if system.tied is not None and largest(comm, (body & system.tied).any()):
         R = R[:, :d]
     upper = np.triu_indices(R.shape[1])

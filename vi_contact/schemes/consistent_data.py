@@ -45,15 +45,10 @@ def consistent_acceleration(problem: ContactProblem, state: State, dt: float) ->
     if system.massless is None:
         return _with_contact(problem, state, force, dt)
     moving = np.where(system.massless, 0.0, force)
-    return _moved(problem, moving, system.massless), force - moving
-
-
-def _moved(problem: ContactProblem, force: Array, massless: Mask) -> Array:
-    """M⁻¹ f, zero on massless unknowns."""
-    system = problem.equations
     if small(system.algebra.comm, system.rows, 0):
-        return mass_matrix(problem).factor.solve(force)
-    return solve_free(system.algebra, system.M, force, massless, np.zeros_like(force))
+        return mass_matrix(problem).factor.solve(moving), force - moving
+    a = solve_free(system.algebra, system.M, moving, system.massless, np.zeros_like(force))
+    return a, force - moving
 
 
 def _with_contact(problem: ContactProblem, state: State, force: Array, dt: float) -> tuple[Array, Array]:

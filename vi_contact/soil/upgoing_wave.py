@@ -29,18 +29,14 @@ class UpgoingVelocity:
         self._a, self._v = [excitation.acceleration(0.0)], [0.0]
 
     def __call__(self, t: float) -> Array:
-        return self.share * self._speed(t) * np.asarray(self.excitation.direction, dtype=float)
-
-    def _speed(self, t: float) -> float:
-        """Integral of the acceleration from 0 to t."""
-        if t <= 0.0:
-            return 0.0
+        t = max(t, 0.0)
         k = int(t / self.dt)
         while len(self._v) < k + 2:
             self._a.append(self.excitation.acceleration(len(self._a) * self.dt))
             self._v.append(self._v[-1] + 0.5 * self.dt * (self._a[-2] + self._a[-1]))
         s = t - k * self.dt
-        return self._v[k] + self._a[k] * s + 0.5 * (self._a[k + 1] - self._a[k]) / self.dt * s**2
+        speed = self._v[k] + self._a[k] * s + 0.5 * (self._a[k + 1] - self._a[k]) / self.dt * s**2
+        return self.share * speed * np.asarray(self.excitation.direction, dtype=float)
 
 
 def upgoing(
