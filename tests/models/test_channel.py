@@ -25,6 +25,7 @@ from vi_contact.models.channel.sides import DashpotSides, Fixed, Rollers, TiedSi
 from vi_contact.studies.cases.case import read_case
 from vi_contact.studies.cases.library import located
 from vi_contact.studies.cases.short_settings import ShortOptions
+from vi_contact.studies.cases.table_calls import build as build_call
 from vi_contact.studies.cases.toml_file import read_toml
 
 COMM = MPI.COMM_WORLD
@@ -235,13 +236,13 @@ def test_the_case_that_ships_is_the_channel_of_the_figures():
     """Shape, materials, harmonic and time step are those of the model, its reference that of the catalogue."""
     case = built_in()
     assert case.excitations() == (CHANNEL.harmonic(),)
-    assert case.nodes["run"].build({}) == {"dt": CHANNEL.time_step(), "steps": 400}
-    given = {key: node.build({}) for key, node in case.nodes["model"].arguments.items()}
+    assert build_call(case.nodes["run"], {}) == {"dt": CHANNEL.time_step(), "steps": 400}
+    given = {key: build_call(node, {}) for key, node in case.nodes["model"].arguments.items()}
     shape = {one.name: given.get(one.name) for one in fields(ChannelMesh) if one.name in given}
     assert ChannelMesh(**shape) == CHANNEL.shape
     assert (given["soil"], given["concrete"], given["damping"]) == (CHANNEL.soil, CHANNEL.concrete, CHANNEL.damping)
-    assert case.nodes["escalation"].build({})[0] == REFERENCE
-    impact = case.nodes["impact"].build({})
+    assert build_call(case.nodes["escalation"], {})[0] == REFERENCE
+    impact = build_call(case.nodes["impact"], {})
     assert isinstance(impact, vc.Inelastic) and isinstance(impact.update, vc.ImpulseUpdate)
 
 

@@ -17,6 +17,7 @@ from vi_contact.core.protocols import Excitation, FrictionLaw, ImpactLaw, MassLa
 from vi_contact.core.step import Recorder, Scheme, Solver
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.mass import ConsistentMass
+from vi_contact.run.wall_time import WallTime
 from vi_contact.studies import read_case
 from vi_contact.studies.cases.own_classes import defect
 from vi_contact.studies.cases.vocabulary import words
@@ -151,7 +152,7 @@ def test_classes_of_allowed_packages(folder: Path, monkeypatch: pytest.MonkeyPat
 def test_runs_of_a_study_are_allowed_the_same(folder: Path) -> None:
     motion = ("excitation.type=GroundMotion", "excitation.record=m.at2")
     case = read_case(folder / "case.toml", law("pack:Law", *motion), allow=("pack", "other"))
-    command = OneRun(case, Shaking("m", (Path("m.at2"),)), 1.0, folder / "run").command(())
+    command = OneRun(case, Shaking("m", (Path("m.at2"),)), 1.0, folder / "run").command((), WallTime())
     assert command[-4:] == ["--allow", "pack", "--allow", "other"]
 
 
