@@ -113,10 +113,11 @@ class Table:
         self._gather()
         names = [*self.numbers, *self.arrays] if self._kept else []
         kept = {name: np.concatenate([block[name] for block in self._blocks]) for name in names}
-        if self._comm.size > 1:
-            small = all(len(one) <= SHARED for one in self.arrays.values())
-            shared = self._comm.bcast({name: kept[name] for name in self.arrays if small and name in kept})
-            kept |= shared
+        shared = [name for name in self.arrays if name in kept and self.arrays[name].shape[:1] <= (SHARED,)]
+        pieces = self._comm.bcast({name: 1 + kept[name].nbytes // BYTES for name in shared})
+        for name, count in pieces.items() if self._comm.size > 1 else ():  # messages of MPI hold 2 GB at most
+            parts: list[Any] = [None] * count if self._comm.rank else np.array_split(kept[name], count)
+            kept[name] = np.concatenate([self._comm.bcast(part) for part in parts])
         return kept if len(kept) == len(self.columns) else StoredHistory(self.file, kept, list(self.columns))
 
 
