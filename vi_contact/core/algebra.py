@@ -56,8 +56,7 @@ def from_each(comm: Comm, value: Any) -> list[Any]:
 
 
 def on_first(comm: Comm, numbers: Indices, rows: Any) -> Any:
-    """Return the rows (m, …) of all ranks on rank 0, each in the place of its number, and none, (0, …), on the others.
-    Collective."""
+    """Return the rows (m, …) of all ranks on rank 0, in the places of their numbers; elsewhere none. Collective."""
     parts = comm.gather((numbers, rows))
     if parts is None:
         return rows[:0]

@@ -124,10 +124,9 @@ def read_checkpoint(
     whole = on_root(comm, lambda: _read(file, problem))
     about = comm.bcast(whole and whole[0])
     other = _compare(file, problem, scheme, dt, about, changed)
-    arrays = _own(problem, about["vectors"], whole and whole[1])
+    arrays: Arrays = {"r_t": None} | _own(problem, about["vectors"], whole and whole[1])
     memory = {name.removeprefix(MEMORY): array for name, array in arrays.items() if name.startswith(MEMORY)}
-    named: Arrays = {name: arrays.get(name) for name in ("u", "v", *CONTACT)}
-    state = State(about["t"], about["k"], memory=memory, **named)
+    state = State(about["t"], about["k"], memory=memory, **{name: arrays[name] for name in ("u", "v", *CONTACT)})
     if "format" not in about and memory:
         _check_memory(file, problem, scheme, state, about)
     if other:  # what the scheme keeps in mind was made of the old problem's matrices and loads
