@@ -72,7 +72,8 @@ class RegularisedFriction:
         for updates in range(self.max_iterations + 1):
             root = math.hypot(s, self.eps)
             F = root * (c * s - g) + limit * s
-            if abs(F) <= self._stop(c, g, limit, s):
+            round_off = 1e-15 * (abs(c * s) + abs(g) + limit) * root
+            if abs(F) <= (self.tolerance * c * self.eps**2 + round_off if self.absolute is None else self.absolute):
                 return Slip(s, limit * s / root, updates)
             if self.safeguard:
                 low, high = (s, high) if F < 0.0 else (low, s)
@@ -86,10 +87,3 @@ class RegularisedFriction:
             f"Newton's method for the slip of the tip did not converge in {updates} updates (|F| = {abs(F):.1e} N m): "
             "take a smaller time step, a larger eps, safeguard=True or ExactFriction()"
         )
-
-    def _stop(self, c: float, g: float, limit: float, s: float) -> float:
-        """The largest |F| that counts as zero."""
-        if self.absolute is not None:
-            return self.absolute
-        size = abs(c * s) + abs(g) + limit
-        return self.tolerance * c * self.eps**2 + 1e-15 * size * math.hypot(s, self.eps)

@@ -55,8 +55,13 @@ def check_size(points: Array, sizes: tuple[int, ...]) -> None:
 
 def check_simple(points: Array, after: Indices) -> None:
     """Raise InputError when two elements cross, or a node lies on an element of which it is no end."""
-    a, b = points, points[after]
-    _check_touching(points, after)
+    a, b, index = points, points[after], np.arange(len(points))
+    distance = distances(points[:, None], a, b)
+    distance[index, index] = distance[after, index] = np.inf
+    node, element = np.unravel_index(int(distance.argmin()), distance.shape)
+    if distance[node, element] <= TOUCHING * np.hypot(*np.ptp(points, axis=0)):
+        raise InputError(f"BoundaryMesh: the boundary crosses or touches itself at {point_at(points[node])}, where "
+                         f"node {node} lies on element {element}; give a boundary that does not meet itself")
 
     def side(p: Array, q: Array, x: Array) -> Array:
         return (q[:, None, 0] - p[:, None, 0]) * (x[None, :, 1] - p[:, None, 1]) - (
@@ -64,23 +69,12 @@ def check_simple(points: Array, after: Indices) -> None:
         ) * (x[None, :, 0] - p[:, None, 0])
 
     splits = side(a, b, a) * side(a, b, b) < 0.0
-    index = np.arange(len(points))
     neighbours = (after[:, None] == index) | (after[None, :] == index[:, None]) | np.eye(len(points), dtype=bool)
     crossing = splits & splits.T & ~neighbours
     if crossing.any():
         i, j = np.argwhere(crossing)[0]
         raise InputError(f"BoundaryMesh: the boundary crosses itself near {point_at(a[i])}, where elements {i} and "
                          f"{j} cross; give a boundary that does not meet itself")
-
-
-def _check_touching(points: Array, after: Indices) -> None:
-    distance = distances(points[:, None], points, points[after])
-    index = np.arange(len(points))
-    distance[index, index] = distance[after, index] = np.inf
-    node, element = np.unravel_index(int(distance.argmin()), distance.shape)
-    if distance[node, element] <= TOUCHING * np.hypot(*np.ptp(points, axis=0)):
-        raise InputError(f"BoundaryMesh: the boundary crosses or touches itself at {point_at(points[node])}, where "
-                         f"node {node} lies on element {element}; give a boundary that does not meet itself")
 
 
 def distances(x: Array, start: Array, end: Array) -> Array:

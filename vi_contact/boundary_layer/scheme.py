@@ -101,12 +101,14 @@ class BoundaryLayer(Midpoint):
         old, free, rate, weights = (np.ascontiguousarray(column) for column in values.T)
         pressure = np.zeros(surface.total)
         if min(old.min(), free.min()) < self.law.layer.width:
-            G = _compliance(problem, A, step.scale) * (step.scale * weights)
+            kept: WeakKeyDictionary[EffectiveMatrix, Array] = problem.equations.cached("layer", WeakKeyDictionary)
+            if A not in kept:  # B A⁻¹ Bᵀ (m, m), made once for every A
+                kept[A] = np.asarray(Condensed().prepare(A, surface, step.scale).delassus)
+            G = kept[A] * (step.scale * weights)
             pressure = self._pressure(step, G, free, old, rate, dt)
         reaction = surface.weights * pressure[surface.slots]
         b = step.b - step.scale * surface.reaction_load(reaction, len(step.b))
-        fields = {name: getattr(step, name) for name in StepProblem.__dataclass_fields__}
-        return LayeredStep(**fields | {"b": b, "active": np.zeros(surface.count, dtype=bool)}, layer=reaction)
+        return LayeredStep(**vars(step) | {"b": b, "active": np.zeros(surface.count, dtype=bool)}, layer=reaction)
 
     def _rate(self, problem: ContactProblem, state: State, gap: Array) -> Array:
         """ẏ = w_0 [1/s]: carried inside the layer, from the velocities outside."""
@@ -150,11 +152,3 @@ class BoundaryLayer(Midpoint):
         rate = 2.0 / dt * np.log(np.maximum(gap / old, 1e-300)) - self._rate(problem, state, old)
         memory = {RATE: surface.reaction_load(rate, len(new.u))}  # vectors of unknowns pass through checkpoints
         return replace(new, r_n=new.r_n + reaction, active=gap < self.law.layer.width, memory=memory)
-
-
-def _compliance(problem: ContactProblem, A: EffectiveMatrix, scale: float) -> Array:
-    """B A⁻¹ Bᵀ (m, m), made once for every A."""
-    kept: WeakKeyDictionary[EffectiveMatrix, Array] = problem.equations.cached("boundary layer", WeakKeyDictionary)
-    if A not in kept:
-        kept[A] = np.asarray(Condensed().prepare(A, problem.surface, scale).delassus)
-    return kept[A]

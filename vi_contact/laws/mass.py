@@ -61,9 +61,13 @@ class Redistributed:
         if surface.total == 0:
             return system
         massless, contact = _contact_unknowns(system, surface, tangential)
-        nodal = _row_sums(system)
-        _refuse_negative(system, nodal)
-        algebra = system.algebra
+        algebra, nodal, own = system.algebra, _row_sums(system), system.M.diagonal()
+        wrong = int(total(algebra.comm, np.sum((own > 0.0) & (nodal <= LIGHT * own))))  # as of elements of higher order
+        if wrong:
+            raise InputError(
+                f"redistributed mass needs positive row sums of M and {wrong} unknowns have none: give the problem "
+                "mass=ConsistentMass(), or elements of first order"
+            )
         lumped = algebra.local(*lumped_entries(surface, nodal), system.rows)
         bulk = algebra.combine([(1.0 - self.lumping, system.M), (self.lumping, lumped)])
         levels = from_neighbours(system, massless, contact, nodal)
@@ -103,17 +107,6 @@ def _contact_unknowns(system: SemiDiscreteSystem, surface: ContactSurface, tange
 def _row_sums(system: SemiDiscreteSystem) -> Array:
     """Lumped mass of every unknown, in any nodal frames: sum over directions c of r_c (M r_c)."""
     return np.asarray(sum(r * (system.M @ r) for r in system.influence.T))
-
-
-def _refuse_negative(system: SemiDiscreteSystem, nodal: Array) -> None:
-    """InputError for nodal masses that are no masses, as row sums of elements of higher order are. Collective."""
-    own = system.M.diagonal()
-    wrong = int(total(system.algebra.comm, np.sum((own > 0.0) & (nodal <= LIGHT * own))))
-    if wrong:
-        raise InputError(
-            f"redistributed mass needs positive row sums of M and {wrong} unknowns have none: give the problem "
-            "mass=ConsistentMass(), or elements of first order"
-        )
 
 
 def _inertia_correction(system: SemiDiscreteSystem, moved: Matrix, inner: Mask, body: Mask, nodal: Array) -> Matrix:

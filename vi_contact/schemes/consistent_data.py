@@ -24,7 +24,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core.algebra import Array, EffectiveMatrix, Mask, max_abs
+from ..core.algebra import Array, EffectiveMatrix, max_abs
 from ..core.free_unknowns import solve_free
 from ..core.problem import ContactProblem
 from ..core.sizes import small
@@ -53,10 +53,14 @@ def consistent_acceleration(problem: ContactProblem, state: State, dt: float) ->
 
 def _with_contact(problem: ContactProblem, state: State, force: Array, dt: float) -> tuple[Array, Array]:
     """Solve the small problem of points that rest on their support."""
-    surface = problem.surface
+    surface, rigid = problem.surface, problem.surface.compliance == 0.0
     compression = surface.normal_values(state.u) - surface.gap(state.t)
-    springs = surface.reaction_load(_spring_reactions(surface, compression), len(force))
-    resting = _resting(surface, compression, state)
+    pressed = np.divide(compression, surface.compliance, out=np.zeros(surface.count), where=~rigid)
+    pressed = np.where(surface.bilateral, pressed, np.maximum(pressed, 0.0))  # only bilateral springs pull
+    springs = surface.reaction_load(pressed, len(force))
+    u_max, v_max = ROUND_OFF * surface.comm.max(np.array([max_abs(state.u), max_abs(state.v)]))
+    still = (compression >= -u_max) & (np.abs(surface.normal_values(state.v)) <= v_max)
+    resting = np.asarray((still | surface.bilateral) & rigid)
     rate = None  # of slip: the tangential velocity relative to the obstacle [m/s]
     if problem.frictional:
         rate, sliding = surface.tangential_values(state.v), surface.sliding(state.t, state.t + dt)
@@ -92,22 +96,6 @@ def rigid_part(surface: ContactSurface) -> ContactSurface:
     return replace(surface, compliance=np.zeros(surface.count), bilateral=surface.bilateral & rigid)
 
 
-def _spring_reactions(surface: ContactSurface, compression: Array) -> Array:
-    """Return the reactions of compliant points; only bilateral ones pull."""
-    soft = surface.compliance > 0.0
-    r_n = np.divide(compression, surface.compliance, out=np.zeros(surface.count), where=soft)
-    return np.where(surface.bilateral, r_n, np.maximum(r_n, 0.0))
-
-
-def _resting(surface: ContactSurface, compression: Array, state: State) -> Mask:
-    """Mark rigid points that touch and do not move, and all rigid bilateral ones."""
-    rigid = surface.compliance == 0.0
-    local = np.array([max_abs(state.u), max_abs(state.v)])
-    u_max, v_max = ROUND_OFF * surface.comm.max(local)
-    still = (compression >= -u_max) & (np.abs(surface.normal_values(state.v)) <= v_max)
-    return np.asarray((still | surface.bilateral) & rigid)
-
-
 def equilibrated(problem: ContactProblem, state: State) -> State:
     """Return the state with its massless unknowns, if any, in equilibrium, and with the reactions that belong to it.
 
@@ -118,7 +106,10 @@ def equilibrated(problem: ContactProblem, state: State) -> State:
         return state
     load = system.load(state.t) - system.K @ np.where(layer, 0.0, state.u)
     A = system.cached("massless block", lambda: EffectiveMatrix(system.algebra.block(system.K, layer), system.algebra))
-    surface = _within(problem.surface, layer)
+    place = np.where(layer, np.cumsum(layer) - 1, -1)  # among the massless unknowns, as all normal ones are
+    surface = problem.surface
+    tangents = np.where(surface.tangents >= 0, place[surface.tangents], -1)
+    surface = replace(surface, owned=place[surface.owned], tangents=tangents, basis=None, coupling=None, dual=None)
     step = StepProblem(
         A=A, b=load[layer], bound=surface.gap(state.t), surface=surface, scale=1.0, guess=state.u[layer],
         active=state.active, t=state.t, k=state.k, friction=problem.friction,
@@ -129,13 +120,6 @@ def equilibrated(problem: ContactProblem, state: State) -> State:
     u = state.u.copy()
     u[layer] = result.x
     return replace(state, u=u, r_n=result.r_n, r_t=result.r_t, active=result.active)
-
-
-def _within(surface: ContactSurface, layer: Mask) -> ContactSurface:
-    """Return the surface on the massless unknowns alone, among which all normal ones are."""
-    place = np.where(layer, np.cumsum(layer) - 1, -1)
-    tangents = np.where(surface.tangents >= 0, place[surface.tangents], -1)
-    return replace(surface, owned=place[surface.owned], tangents=tangents, basis=None, coupling=None, dual=None)
 
 
 def massless_take(problem: ContactProblem, given: Array | float, x: Array) -> Array:

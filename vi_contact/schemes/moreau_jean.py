@@ -32,7 +32,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..core.algebra import Array, EffectiveMatrix, Mask, largest, max_abs
+from ..core.algebra import Array, EffectiveMatrix, largest, max_abs
 from ..core.checks import between, flag
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
@@ -112,7 +112,9 @@ class MoreauJean(SingleStep):
         force = self._load(problem, state.t, dt) - system.K @ (state.u + self.theta * left * dt * state.v)
         if system.C is not None:
             force -= system.C @ (left * state.v)
-        closed = _closed(problem, state, dt)
+        middle = surface.gap(state.t + 0.5 * dt) - surface.normal_values(state.u + 0.5 * dt * state.v)
+        size = largest(surface.comm, max(max_abs(state.u), dt * max_abs(state.v)))
+        closed = np.asarray((middle <= ROUND_OFF * size) | surface.bilateral)  # if nothing stops them; and held points
         sliding = surface.sliding(state.t, state.t + dt)
         slip = np.zeros((surface.count, surface.tangents.shape[1])) if sliding is None else sliding / dt
         return StepProblem(
@@ -129,11 +131,3 @@ class MoreauJean(SingleStep):
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
         """Return the averages of the equation above."""
         return means(old, new, dt, u=old.u + self.theta * (new.u - old.u), f=self._load(problem, old.t, dt))
-
-
-def _closed(problem: ContactProblem, state: State, dt: float) -> Mask:
-    """Points whose gap is closed in the middle of the step if nothing stops them, and bilateral ones."""
-    surface = problem.surface
-    gap = surface.gap(state.t + 0.5 * dt) - surface.normal_values(state.u + 0.5 * dt * state.v)
-    size = largest(surface.comm, max(max_abs(state.u), dt * max_abs(state.v)))
-    return np.asarray((gap <= ROUND_OFF * size) | surface.bilateral)

@@ -89,11 +89,8 @@ class FreeFieldSide:
         blocks = self.space.facet_blocks(self.given.facets.indices)
         self._rows = np.abs(self.space.points[blocks, 1][:, None] - self.column.heights).argmin(axis=1)
         self._blocks = blocks
-        self._check_foot()
-
-    def _check_foot(self) -> None:
-        held = total(self.space.comm, self.space.held[self._blocks[self._rows == 0]].sum())
-        name, compliant = self.given.facets.name, self._ground.lets_waves_in
+        held = total(self.space.comm, self.space.held[blocks[self._rows == 0]].sum())
+        name, compliant = given.facets.name, self._ground.lets_waves_in
         if not compliant and held < 2:
             raise InputError(f"the lowest node of free-field side '{name}' is not held: clamp or prescribe the base, "
                              "or give the side its CompliantBase")
