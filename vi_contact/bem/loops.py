@@ -64,9 +64,8 @@ def check_simple(points: Array, after: Indices) -> None:
                          f"node {node} lies on element {element}; give a boundary that does not meet itself")
 
     def side(p: Array, q: Array, x: Array) -> Array:
-        return (q[:, None, 0] - p[:, None, 0]) * (x[None, :, 1] - p[:, None, 1]) - (
-            q[:, None, 1] - p[:, None, 1]
-        ) * (x[None, :, 0] - p[:, None, 0])
+        along, away = (q - p)[:, None], x - p[:, None]
+        return np.asarray(along[..., 0] * away[..., 1] - along[..., 1] * away[..., 0])
 
     splits = side(a, b, a) * side(a, b, b) < 0.0
     neighbours = (after[:, None] == index) | (after[None, :] == index[:, None]) | np.eye(len(points), dtype=bool)

@@ -143,10 +143,8 @@ class CondensedCompliance:
         owner = "CondensedCompliance"
         m = len(integers(owner, "nodes", self.nodes, (None,)))
         steps = len(array(owner, "W", self.W, (None, 2 * m, 2 * m), unit="m²/N"))
-        array(owner, "u_free", self.u_free, (steps, 2 * m), unit="m")
-        for name in ("points", "normals"):
-            array(owner, name, getattr(self, name), (m, 2))
-        array(owner, "lengths", self.lengths, (m,), unit="m")
+        for name, shape in (("u_free", (steps, 2 * m)), ("points", (m, 2)), ("normals", (m, 2)), ("lengths", (m,))):
+            array(owner, name, getattr(self, name), shape)
         number(owner, "dt", self.dt, positive=True, unit="s")
 
     def displacement(self, forces: Array) -> Array:

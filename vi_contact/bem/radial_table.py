@@ -65,7 +65,9 @@ class RadialTable(Galerkin):
         for points in point_sets(self.pairs, (), self.orders):
             shapes, inverse = points.shapes(), 1.0 / points.r**2
             interpolation = self.interpolation(points.r)
-            for block, factor in zip(blocks, _factors(points.d, inverse), strict=True):
+            x, y = points.d
+            factors = (np.ones_like(inverse), x**2 * inverse, x * y * inverse, y**2 * inverse, x, y)
+            for block, factor in zip(blocks, factors, strict=True):
                 block.append(shapes.multiply(factor).tocsr() @ interpolation)
             poles.append(np.stack([shapes @ (-d * inverse / TWO_PI) for d in points.d]))
             order.append((4 * points.pairs[:, None] + np.arange(4)).ravel())
@@ -93,7 +95,3 @@ def _product(matrix: csr_matrix, columns: list[NDArray]) -> NDArray:
     """Multiply a real matrix by k complex columns, without a complex copy of the matrix: (k, rows)."""
     values = np.ascontiguousarray(np.stack(columns, axis=1), complex)
     return np.asarray(matrix @ values.view(float)).view(complex).T
-
-
-def _factors(d: Array, inverse: Array) -> tuple[Array, ...]:
-    return np.ones_like(inverse), d[0] ** 2 * inverse, d[0] * d[1] * inverse, d[1] ** 2 * inverse, d[0], d[1]
