@@ -16,10 +16,9 @@ _CONTENTS = {
     "excitation": ("GroundMotion",),
     "formats.reader": ("read_record",),
     "formats.writer": ("write_at2", "write_columns", "write_path_series"),
-    "info": ("record_info",),
     "intensity": (
         "arias", "cav", "d5_95", "housner_intensity", "husid", "mean_period", "pga", "pga_time", "pgd", "pgv",
-        "predominant_period", "psa", "rms", "significant_duration",
+        "predominant_period", "psa", "record_info", "rms", "significant_duration",
     ),
     "kanai_tajimi": ("Envelope", "KanaiTajimi", "synthetic"),
     "processing": (

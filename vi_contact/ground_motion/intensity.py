@@ -1,4 +1,4 @@
-"""Measure how strong a record is: peaks, Arias intensity, durations, intensities and periods read from spectra."""
+"""Measure how strong a record is: peaks, Arias intensity, durations, what spectra say; and tell what it holds."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ..core.algebra import Array
 from ..core.errors import InputError
 from ..core.units import STANDARD_GRAVITY
 from .processing import integrated
-from .record import Record
+from .record import UNITS, Record
 from .spectra import fourier_spectrum, response_spectrum
 
 
@@ -115,3 +115,35 @@ def mean_period(record: Record) -> float:
     if not np.any(power > 0.0):
         raise InputError("mean_period: the record holds nothing from 0.25 to 20 Hz; use a longer or finer one")
     return float(np.sum(power / frequencies[inside]) / np.sum(power))
+
+
+def record_info(record: Record) -> str:
+    """Return the table of a record: where it comes from, peaks, intensities, what is left at its end, notes."""
+    peak = pga(record)
+    velocity, displacement = integrated(record)
+    rows = [
+        ("file", record.source),
+        ("format", record.format),
+        ("title", record.title or "(none)"),
+        ("station", record.station or "(not stated)"),
+        ("component", record.component or "(not stated)"),
+        ("units", f"{record.units} (1 {record.units} = {UNITS[record.units]:g} m/s2)"),
+        ("samples", f"{record.acceleration.size}"),
+        ("dt", f"{record.dt:g} s"),
+        ("duration", f"{record.duration:g} s"),
+        ("PGA", f"{peak:.4g} m/s2 = {peak / STANDARD_GRAVITY:.4g} g at t = {pga_time(record):g} s"),
+        ("PGV", f"{pgv(record):.4g} m/s"),
+        ("PGD", f"{pgd(record):.4g} m"),
+        ("Arias intensity", f"{arias(record):.4g} m/s"),
+        ("D5-95", f"{d5_95(record):.4g} s"),
+        ("CAV", f"{cav(record):.4g} m/s"),
+        ("RMS", f"{rms(record):.4g} m/s2"),
+        ("Housner intensity", f"{housner_intensity(record):.4g} m, 5 % damping, 0.1 to 2.5 s"),
+        ("predominant period", f"{predominant_period(record):.3g} s" if peak > 0.0 else "(all zero)"),
+        ("mean period", f"{mean_period(record):.3g} s" if peak > 0.0 else "(all zero)"),
+        ("final velocity", f"{velocity[-1]:.4g} m/s"),
+        ("final displacement", f"{displacement[-1]:.4g} m"),
+        ("sha256", record.sha256),
+    ]
+    rows += [("note", note) for note in record.notes]
+    return "\n".join(f"{name:<20}{value}" for name, value in rows)
