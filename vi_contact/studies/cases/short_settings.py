@@ -83,12 +83,22 @@ class ShortOptions:
 
     def _methods(self, tables: Mapping[str, Any]) -> list[str]:
         """Replace scheme and solver; schemes that need no impact law run without the one of the case."""
+        if self.scheme is None and self.solver is None:
+            return []
+        from ...core.step import Scheme
+        from ...solvers.condensed import SmallMethod
+        from ...solvers.volume.route import Method
+        from .vocabulary import names_of  # late: it needs the finite elements, which not every case does
+
         found = []
         if self.scheme is not None:
-            found.append(f"scheme={toml_value(_scheme(self.scheme))}")
+            found.append(f"scheme={_named('scheme', self.scheme, dict.fromkeys(names_of(Scheme), ()))}")
             if "impact" in tables and self.scheme not in IMPULSIVE and ":" not in self.scheme:
                 found.append("impact=")
-        return found if self.solver is None else [*found, f"solver={toml_value(_solver(self.solver))}"]
+        if self.solver is not None:
+            methods = {"Automatic": (), "Condensed": names_of(SmallMethod), "Iterative": (), "Volume": names_of(Method)}
+            found.append(f"solver={_named('solver', self.solver, methods)}")
+        return found
 
     def _scale(self, tables: Mapping[str, Any]) -> list[str]:
         if self.scale is None:
@@ -123,27 +133,12 @@ def _tables(value: Any) -> list[dict[str, Any]]:
     return [one for one in (value if isinstance(value, list) else [value]) if isinstance(one, dict)]
 
 
-def _scheme(name: str) -> dict[str, Any]:
-    from ...core.step import Scheme
-    from .vocabulary import names_of  # late: it needs the finite elements, which not every case does
-
-    return _named("scheme", name, dict.fromkeys(names_of(Scheme), ()))
-
-
-def _solver(name: str) -> dict[str, Any]:
-    from ...solvers.condensed import SmallMethod
-    from ...solvers.volume.route import Method
-    from .vocabulary import names_of
-
-    methods = {"Automatic": (), "Condensed": names_of(SmallMethod), "Iterative": (), "Volume": names_of(Method)}
-    return _named("solver", name, methods)
-
-
-def _named(kind: str, name: str, methods: Mapping[str, Sequence[str]]) -> dict[str, Any]:
-    """Return the table of one of the keys, or of the one that a method belongs to; a class of others has a colon."""
+def _named(kind: str, name: str, methods: Mapping[str, Sequence[str]]) -> str:
+    """Return the table of one of the keys, or of the one that a method belongs to, as TOML; a class of others has a
+    colon."""
     for owner, names in methods.items():
         if name in names:
-            return {"type": owner, "method": {"type": name}}
+            return toml_value({"type": owner, "method": {"type": name}})
     if name not in methods and ":" not in name:
         raise InputError(f"unknown {kind} {shown(name)}: {nearest(name, [*methods, *chain(*methods.values())])}")
-    return {"type": name}
+    return toml_value({"type": name})
