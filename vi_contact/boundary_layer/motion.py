@@ -68,9 +68,7 @@ class ConstrainedSystem:
         array(owner, "gradient(q) at the start", self.gradient(q), (n,))
         if callable(self.mass):
             check_positive(owner, "the mass matrix", self.mass(q), "kg")
-        if self.matrix(q).shape != (n, n):
-            raise InputError(f"{owner}: the mass matrix has shape {self.matrix(q).shape} and there are {n} velocities; "
-                             "give one row for each")
+        array(owner, f"the mass matrix of {n} velocities", self.matrix(q), (n, n), unit="kg")
         if self.force is not None:
             array(owner, "force(t, q, v) at the start", self.force(t, q, v), (n,))
         if self.rates is not None:

@@ -59,8 +59,7 @@ class AlphaStep(BalanceStep, ABC):
         of dt."""
         if np.array_equal(state.memory.get("of", ()), self._mark(state.t)):
             return state
-        state = equilibrated(problem, state)
-        return self._restarted(problem, state, dt)
+        return self._restarted(problem, equilibrated(problem, state), dt)
 
     def jump(self, problem: ContactProblem, state: State, v: Array, dt: float) -> State:
         """Return the state with the acceleration that fits the new velocity."""

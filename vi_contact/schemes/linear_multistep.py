@@ -101,8 +101,7 @@ class LinearMultistep(BalanceStep):
         """
         memory = state.memory
         if not np.array_equal(memory.get("t", ()), [state.t]):
-            state = equilibrated(problem, state)
-            return self._restarted(problem, state, dt)
+            return self._restarted(problem, equilibrated(problem, state), dt)
         if np.array_equal(memory["dt"], [dt]) and f"a_{len(self.a) - 2}" in memory:
             return state
         return self._with_past(state, memory["a_0"], memory["reaction_0"], dt)

@@ -46,8 +46,7 @@ class Trapezoidal:
         """Return the state with massless nodes in equilibrium; once, not on restarts and changes of dt."""
         if "force" in state.memory:
             return state
-        state = equilibrated(problem, state)
-        return self._with_force(problem, state)
+        return self._with_force(problem, equilibrated(problem, state))
 
     def _with_force(self, problem: ContactProblem, state: State) -> State:
         """Keep f - K u - Bᵀr of the state: the next step starts with it."""
