@@ -1,0 +1,167 @@
+#!/usr/bin/env python3
+"""What a step of a small system costs, as a multiple of the same mathematics in bare numpy, in one run.
+
+    python3 benchmarks/small_systems.py [--steps 400] [--rounds 7] [--json FILE]
+
+The wall of 8 x 12 cells, 216 unknowns, 11 contact points, harmonic motion, Zienkiewicz-Wood-Taylor step, impact rule.
+``march`` yields certified steps; ``simulate`` also keeps energies, contact and a run folder. The bare loop below has
+right-hand side, substitutions, search of the contact set, certificate and impact rule, and no names. Processor time of
+the thread, the three timed in turn; set-up (assembly excluded) is in all of them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ[name] = "1"
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+import numpy as np  # noqa: E402
+import scipy.sparse as sp  # noqa: E402
+from mpi4py import MPI  # noqa: E402
+from scipy.linalg import lapack  # noqa: E402
+from scipy.sparse.linalg import splu  # noqa: E402
+
+import vi_contact as vc  # noqa: E402
+from vi_contact.core.state_checks import initial_state  # noqa: E402
+from vi_contact.models.wall import Wall, build  # noqa: E402
+
+SCHEME = vc.ZienkiewiczWoodTaylor(phi=0.5)
+
+
+class Bare:
+    """The wall as arrays, and its steps as 40 lines of numpy and scipy."""
+
+    def __init__(self, problem: vc.ContactProblem, dt: float) -> None:
+        equations, self.dt, self.load = problem.equations, dt, problem.equations.load
+        self.M, self.K = (self._csr(matrix) for matrix in (equations.M, equations.K))
+        self.A = (4.0 / dt**2 * self.M + self.K).tocsr()
+        self.points, self.gap0, self.state = problem.surface.owned, problem.surface.gap0, initial_state(problem)
+
+    @staticmethod
+    def _csr(matrix: Any) -> sp.csr_matrix:
+        ends, columns, values = matrix.mat.getValuesCSR()
+        return sp.csr_matrix((values, columns, ends))
+
+    def march(self, steps: int) -> tuple[np.ndarray, float]:
+        """Return the last displacement and the worst certificate."""
+        M, K, A, dt, points, gap0 = self.M, self.K, self.A, self.dt, self.points, self.gap0
+        factor = splu(A.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+        units = np.zeros((A.shape[0], len(points)))
+        units[points, np.arange(len(points))] = 1.0
+        columns = factor.solve(units)
+        G, norm, largest = columns[points], np.abs(columns[points]).sum(axis=1).max(), A.diagonal().max()
+        u, v, t, worst = self.state.u, self.state.v, 0.0, 0.0
+        active, known = np.zeros(len(points), dtype=bool), b""
+        for _ in range(steps):
+            guess = u + dt * v
+            b = 2.0 * self.load(t + 0.5 * dt) + M @ guess * (4.0 / dt**2) - K @ u
+            x, r = factor.solve(b), np.zeros(len(points))
+            q = gap0 - x[points]
+            if active.any() or q.min() < 0.0:
+                while True:
+                    if active.tobytes() != known:
+                        known, chosen = active.tobytes(), np.flatnonzero(active)
+                        rows = G[chosen]
+                        lower = lapack.dpotrf(rows[:, chosen], lower=1)[0] if len(chosen) else None
+                    r, w = np.zeros(len(points)), q
+                    if lower is not None:
+                        part = lapack.dpotrs(lower, -q[chosen], lower=1)[0]
+                        r[chosen], w = part, q + part @ rows
+                    wrong = np.where(active, r, w) < -1e-15 * norm * np.abs(r).max()
+                    if not wrong.any():
+                        break
+                    active = active ^ wrong
+                active, r = active & (r > 0.0), np.maximum(r, 0.0)
+                x = x - columns @ r
+                x[points[active]] = gap0[active]
+            worst = max(worst, self._certificate(A @ x, b, x, r, guess, active, largest))
+            v = v + 2.0 * ((x - u) / dt - v)
+            v[points[active]] = 0.0
+            u, t = x, t + dt
+        return u, worst
+
+    def _certificate(self, Ax: Any, b: Any, x: Any, r: Any, guess: Any, active: Any, largest: float) -> float:
+        """The residuals of vi_contact's certificate without friction."""
+        residual, gap = Ax - b, self.gap0 - x[self.points]
+        residual[self.points] += r
+        x_max, b_max, r_max = np.abs(x).max(), np.abs(b).max(), np.abs(r).max()
+        x_ref, r_ref = max(x_max, np.abs(guess).max()), max(b_max, r_max)
+        if not x_ref > 0.0 < r_ref:
+            return 0.0
+        balance = np.abs(residual).max() / max(b_max, np.abs(Ax).max(), 1e-5 * largest * x_max)
+        apart = np.abs(np.where(active, gap, 0.0)).max() / x_ref
+        return max(balance, -gap.min() / x_ref, -r.min() / r_ref, apart, np.abs(np.where(active, 0.0, r)).max() / r_ref)
+
+
+def spent(work: Callable[[], Any]) -> tuple[float, Any]:
+    """(processor time [s], result)."""
+    begin = time.thread_time()
+    result = work()
+    return time.thread_time() - begin, result
+
+
+def measured(steps: int, rounds: int) -> list[dict[str, Any]]:
+    """Return the rows of march and simulate."""
+    model = build(Wall(divisions=(8, 12)), MPI.COMM_WORLD)
+    problem, dt = model.problem("b"), model.time_step()
+    bare, worst = Bare(problem, dt), [0.0]
+
+    def march() -> np.ndarray:
+        for _, report in vc.march(problem, scheme=SCHEME, dt=dt, steps=steps):
+            worst[0] = max(worst[0], report.certificate.worst)
+        return report.new.u
+
+    def simulate() -> np.ndarray:
+        with tempfile.TemporaryDirectory() as folder:
+            return vc.simulate(problem, scheme=SCHEME, dt=dt, steps=steps, out=folder, progress=False).state.u
+
+    routes: dict[str, Callable[[], Any]] = {"march": march, "simulate": simulate}
+    found, expected = {name: [] for name in ("bare", *routes)}, bare.march(steps)
+    for name, work in routes.items():
+        off = np.abs(work() - expected[0]).max() / np.abs(expected[0]).max()
+        if not off < 1e-9:
+            raise SystemExit(f"{name} and the bare loop differ by {off:.1e}: they do not march the same problem")
+    for _ in range(rounds):
+        for name, work in {"bare": lambda: bare.march(steps), **routes}.items():
+            found[name].append(spent(work)[0] / steps)
+    factorisation = spent(lambda: SCHEME.effective_matrix(problem, dt).factor)[0]
+    set_up = spent(lambda: next(vc.march(problem, scheme=SCHEME, dt=dt, steps=1)))[0]
+    common = {
+        "unknowns": model.system.space.unknowns, "points": problem.surface.total, "dimension": 2, "problem": "wall",
+        "friction": False, "setup_seconds": set_up, "setup_over_factorisation": set_up / factorisation,
+        "certificate": worst[0], "bare_seconds_per_step": float(np.median(found["bare"])),
+    }
+    return [common | {"method": name, "ratio_median": float(np.median(ratios)), "ratio_mean": float(np.mean(ratios)),
+                      "seconds_per_step": float(np.median(found[name]))}
+            for name in routes if (ratios := np.divide(found[name], found["bare"])) is not None]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--steps", type=int, default=400)
+    parser.add_argument("--rounds", type=int, default=7)
+    parser.add_argument("--json", type=Path, help="write the rows into this file")
+    options = parser.parse_args()
+    rows = measured(options.steps, options.rounds)
+    print(f"{'unknowns':>8} {'points':>6}  {'method':<9} {'ratio':>6} {'mean':>6} {'us/step':>8} {'bare us':>8} "
+          f"{'certificate':>11}")
+    for row in rows:
+        print(f"{row['unknowns']:>8} {row['points']:>6}  {row['method']:<9} {row['ratio_median']:>6.2f} "
+              f"{row['ratio_mean']:>6.2f} {1e6 * row['seconds_per_step']:>8.0f} "
+              f"{1e6 * row['bare_seconds_per_step']:>8.0f} {row['certificate']:>11.1e}")
+    if options.json:
+        options.json.write_text(json.dumps(rows, indent=2) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
