@@ -163,7 +163,7 @@ def test_a_rank_that_fails_alone_ends_the_others(monkeypatch, capsys, error, oth
 
     monkeypatch.setitem(sys.modules, "mpi4py.MPI", SimpleNamespace(COMM_WORLD=World))
     monkeypatch.setattr(cli_errors, "PATIENCE", 0.0)
-    monkeypatch.setattr("vi_contact.cli.entry.parser", lambda: SimpleNamespace(
+    monkeypatch.setattr("vi_contact.cli.entry.parser", lambda *_: SimpleNamespace(
         parse_args=lambda words: SimpleNamespace(run=fails)))
     if others == "wait":
         with pytest.raises(SystemExit, match="1"):

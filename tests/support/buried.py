@@ -14,7 +14,7 @@ from vi_contact.core.surfaces import ContactSurface, empty_surface
 from vi_contact.core.system import SemiDiscreteSystem
 from vi_contact.exact.racking import BoxFrame
 from vi_contact.meshes.extract import MeshArrays, add_arrays
-from vi_contact.meshes.grid import add_grid
+from vi_contact.meshes.grid import Grid, add_grids
 
 GAMMA = 1e-3
 
@@ -35,14 +35,14 @@ class Rings:
             "lining": np.linspace(self.inner, self.outer, across + 1),
             "soil": np.geomspace(self.outer, self.far, soil + 1),
         }
-        first = 1
+        grids = []
         for name, radius in radii.items():
             r, a = np.meshgrid(radius, angle, indexing="ij")
             nodes = np.stack([r * np.cos(a), r * np.sin(a)], axis=-1)
             nodes[:, -1, 0] = 0.0
             sides = [(f"{name}_in", f"{name}_out"), (f"{name}_x", f"{name}_y")]
-            add_grid(gmsh, nodes, simplices=False, body=name, sides=sides, first=first)
-            first += r.size
+            grids.append(Grid(nodes, False, name, sides))
+        add_grids(gmsh, grids)
 
 
 def graded(start: float, end: float, first: float, divisions: int) -> np.ndarray:

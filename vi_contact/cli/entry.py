@@ -12,8 +12,6 @@ from ..core.version import __version__
 from .case import add_case_commands
 from .errors import Parser, check_words, fail_together, printable, told, world
 from .ida import add_ida_commands
-from .motion import add_motion_commands
-from .report import add_report_commands
 
 _DESCRIPTION = """Dynamic unilateral contact of elastic structures: exact non-penetration, a closed energy ledger and a
 certificate for every time step. Run under "mpirun -n N" for any number of ranks. Options -vi_contact_volume_... go to
@@ -21,15 +19,19 @@ PETSc (for example -vi_contact_volume_snes_monitor)."""
 _PETSC = "-vi_contact_"
 
 
-def parser() -> argparse.ArgumentParser:
-    """Build the parser of all commands and options."""
+def parser(command: str = "") -> argparse.ArgumentParser:
+    """Build the parser of all commands and options; of those for runs alone, which need less, when one is given."""
     top = Parser(prog="vi-contact", description=_DESCRIPTION)
     top.add_argument("--version", action="version", version=f"vi-contact {__version__}")
     commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
     add_case_commands(commands)
     add_ida_commands(commands)
-    add_motion_commands(commands)
-    add_report_commands(commands)
+    if command not in commands.choices:
+        from .motion import add_motion_commands
+        from .report import add_report_commands
+
+        add_motion_commands(commands)
+        add_report_commands(commands)
     return top
 
 
@@ -49,7 +51,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     own, petsc = split_petsc(sys.argv[1:] if arguments is None else arguments)
 
     def command() -> None:
-        options = parser().parse_args(own)
+        options = parser(own[0] if own else "").parse_args(own)
         if petsc:
             import petsc4py
 

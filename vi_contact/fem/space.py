@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 from petsc4py import PETSc
-from scipy.sparse.csgraph import connected_components
 
 from ..core.algebra import Array, Indices, Mask, largest, total
 from ..core.checks import instance, refuse
@@ -44,6 +43,8 @@ def body_numbers(mesh: Any) -> Indices:
 def _smallest(first: Any, second: Any, numbers: Indices) -> Indices:
     """The smallest number (n,) among those that edges first-second join each one to."""
     graph = sp.coo_matrix((np.ones(len(first)), (first, second)), shape=(len(numbers), len(numbers)))
+    from scipy.sparse.csgraph import connected_components  # late: it takes a while
+
     _, part = connected_components(graph, directed=False)
     smallest = np.full(part.max(initial=-1) + 1, np.iinfo(np.int64).max)
     np.minimum.at(smallest, part, numbers)

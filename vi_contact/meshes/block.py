@@ -15,7 +15,7 @@ import numpy as np
 
 from vi_contact.core.checks import MOST_CELLS, counted
 from vi_contact.core.errors import InputError
-from vi_contact.meshes.grid import Array, add_grid, lattice
+from vi_contact.meshes.grid import Array, Grid, add_grids, lattice
 
 SIDES = (("left", "right"), ("bottom", "top"), ("back", "front"))
 
@@ -57,7 +57,11 @@ class BlockMesh:
 
     def build(self, gmsh: Any) -> None:
         """Add the block to Gmsh's current model."""
-        add_grid(gmsh, self.points(), simplices=self.simplices, body="block", sides=SIDES[: len(self.lengths)])
+        add_grids(gmsh, self.grids())
+
+    def grids(self) -> list[Grid]:
+        """Return the one grid it is."""
+        return [Grid(self.points(), self.simplices, "block", SIDES[: len(self.lengths)])]
 
 
 def check_box(lengths: Sequence[float], divisions: Sequence[int]) -> None:

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
@@ -99,6 +98,8 @@ def welded(arrays: MeshArrays, first: str, second: str) -> MeshArrays:
     """
     one, two = (np.unique(_group(arrays, name)) for name in (first, second))
     size = float(np.ptp(arrays.points, axis=0).max())
+    from scipy.spatial import cKDTree  # late: it takes a while
+
     distance, nearest = cKDTree(arrays.points[one]).query(arrays.points[two])
     if distance.max(initial=0.0) > 1e-9 * size:
         where = ", ".join(f"{x:g}" for x in arrays.points[two[np.argmax(distance)]])

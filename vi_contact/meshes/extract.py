@@ -6,18 +6,18 @@ nothing of them is used. Vertices stay in Gmsh's order here.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.checks import Array, check_cells, check_folds, check_sides
 from vi_contact.meshes.gmsh_session import MeshScript, session
+from vi_contact.meshes.grid import Grid
 from vi_contact.meshes.mesh_file import safe_copy
 from vi_contact.meshes.rows import GMSH_NUMBERS, Mask, Rows, number_alike
 
@@ -56,10 +56,35 @@ def arrays_from_file(path: str | Path) -> MeshArrays:
 
 
 def arrays_from_script(mesh: MeshScript) -> MeshArrays:
-    """Build a mesh in memory. Raises InputError like `extract`."""
+    """Build a mesh in memory, without Gmsh where it is made of grids. Raises InputError like `extract`."""
+    source = type(mesh).__name__
+    grids: Sequence[Grid] = getattr(mesh, "grids", list)()
+    if grids:
+        return _of_grids(grids, source)
     with session() as gmsh:
         mesh.build(gmsh)
-        return extract(gmsh, type(mesh).__name__)
+        return extract(gmsh, source)
+
+
+def _of_grids(grids: Sequence[Grid], source: str) -> MeshArrays:
+    """Return the arrays that `extract` would find in a model of these grids."""
+    parts = [grid.numbered() for grid in grids]
+    first = np.cumsum([0] + [len(points) for points, _, _ in parts])
+    body = np.repeat(np.arange(len(grids)), [len(cells) for _, cells, _ in parts])
+    points = np.concatenate([points for points, _, _ in parts])
+    cells = np.concatenate([first[i] + cells for i, (_, cells, _) in enumerate(parts)])
+    facets = {name: first[i] + rows for i, (_, _, sides) in enumerate(parts) for name, rows in sides.items()}
+    cell = next(name for name, (number, _) in GMSH_NUMBERS.items() if number == grids[0].kinds[-1])
+    _check_finite(points, source)
+    check_cells(points, cells, cell, source)
+    check_folds(points, cells, cell, source)
+    check_sides(facets, cells, cell, source)
+    return MeshArrays(cell, points, cells, {grid.body: body == i for i, grid in enumerate(grids)}, facets)
+
+
+def _check_finite(points: Array, source: str) -> None:
+    if not np.isfinite(points).all():
+        raise InputError(f"{source} has nodes whose coordinates are no numbers: write it again from Gmsh")
 
 
 def extract(gmsh: Any, source: str) -> MeshArrays:
@@ -150,8 +175,7 @@ def _coordinates(model: Any, tags: Rows, source: str) -> Array:
     if not np.array_equal(known[place], tags):
         raise InputError(f"{source} has cells on nodes it does not define: write it again from Gmsh")
     points: Array = np.asarray(coordinates, dtype=np.float64).reshape(-1, 3)[place]
-    if not np.isfinite(points).all():
-        raise InputError(f"{source} has nodes whose coordinates are no numbers: write it again from Gmsh")
+    _check_finite(points, source)
     return points
 
 
@@ -198,6 +222,8 @@ def _facets(model: Any, entities: list[int], kind: int, tags: Rows, points: Arra
 def _at_same_place(places: Array, points: Array) -> Rows:
     """Find for each place the one point there, -1 if there is none or more than one (two bodies in touch)."""
     tolerance = 1e-10 * np.ptp(points, axis=0).max()
+    from scipy.spatial import cKDTree  # late: few meshes need it
+
     distance, nearest = cKDTree(points).query(places, k=2)
     return np.where((distance[:, 0] <= tolerance) & (distance[:, 1] > tolerance), nearest[:, 0], -1)
 

@@ -1,8 +1,12 @@
-"""Mesh bars, rectangles and boxes node by node: Gmsh's transfinite curves are only exact to 1e-11."""
+"""Mesh bars, rectangles and boxes node by node: Gmsh's transfinite curves are only exact to 1e-11.
+
+A script that says which ``grids`` it is made of needs no Gmsh to become arrays, only to be written as a file.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import permutations
 from typing import Any
 
@@ -21,29 +25,53 @@ def lattice(lengths: Sequence[float], divisions: Sequence[int]) -> Array:
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
 
 
-def add_grid(
-    gmsh: Any, nodes: Array, *, simplices: bool, body: str, sides: Sequence[tuple[str, str]], first: int = 1
-) -> None:
-    """Add a structured mesh to the current model as discrete entities with named physical groups.
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """Describe a structured mesh of one body.
 
     `nodes` (n_1+1, ..., n_d+1, d) are the points of the deformed lattice [m]; `sides[a]` names the two sides on which
     lattice index a is lowest and highest; `body` names all cells. `simplices` splits every box along its diagonal
-    (Kuhn). `first` is the tag of the first node: above those of the bodies that are there already.
+    (Kuhn).
     """
-    d = nodes.shape[-1]
-    shape = nodes.shape[:-1]
-    number = np.arange(np.prod(shape)).reshape(shape, order="F")
-    tags = first + number
-    points = np.zeros((tags.size, 3))
-    points[number.reshape(-1), :d] = nodes.reshape(-1, d)
-    model, types = gmsh.model, _SIMPLEX_TYPE if simplices else _BOX_TYPE
-    boundary = [_add_entity(model, d - 1, name) for pair in sides for name in pair]
-    volume = _add_entity(model, d, body, boundary)
-    model.mesh.addNodes(d, volume, first + np.arange(tags.size), points.reshape(-1))
-    model.mesh.addElementsByType(volume, types[d], [], _cells(tags, simplices).reshape(-1))
-    faces = [np.take(tags, end, axis=axis) for axis in range(d) for end in (0, -1)]
-    for entity, face in zip(boundary, faces, strict=True):
-        model.mesh.addElementsByType(entity, types[d - 1], [], _cells(np.asarray(face), simplices).reshape(-1))
+
+    nodes: Array
+    simplices: bool
+    body: str
+    sides: Sequence[tuple[str, str]]
+
+    @property
+    def kinds(self) -> tuple[int, ...]:
+        """Return Gmsh's numbers of the shapes of 0, 1, ... d dimensions."""
+        return (_SIMPLEX_TYPE if self.simplices else _BOX_TYPE)[: self.nodes.shape[-1] + 1]
+
+    def numbered(self) -> tuple[Array, npt.NDArray[np.int_], dict[str, npt.NDArray[np.int_]]]:
+        """Return points (n, d), cells and the facets of every side as rows of points."""
+        *shape, d = self.nodes.shape
+        number = np.arange(np.prod(shape)).reshape(shape, order="F")
+        points = np.empty((number.size, d))
+        points[number.reshape(-1)] = self.nodes.reshape(-1, d)
+        faces = {
+            name: _cells(np.asarray(np.take(number, end, axis=axis)), self.simplices)
+            for axis, pair in enumerate(self.sides) for name, end in zip(pair, (0, -1), strict=True)
+        }
+        return points, _cells(number, self.simplices), faces
+
+
+def add_grids(gmsh: Any, grids: Sequence[Grid]) -> None:
+    """Add structured meshes to the current model as discrete entities with named physical groups."""
+    model, first = gmsh.model, 1  # tag of the first node
+    for grid in grids:
+        points, cells, faces = grid.numbered()
+        n, d = points.shape
+        boundary = [_add_entity(model, d - 1, name) for name in faces]
+        volume = _add_entity(model, d, grid.body, boundary)
+        places = np.zeros((n, 3))
+        places[:, :d] = points
+        model.mesh.addNodes(d, volume, first + np.arange(n), places.reshape(-1))
+        model.mesh.addElementsByType(volume, grid.kinds[d], [], (first + cells).reshape(-1))
+        for entity, face in zip(boundary, faces.values(), strict=True):
+            model.mesh.addElementsByType(entity, grid.kinds[d - 1], [], (first + face).reshape(-1))
+        first += n
 
 
 def add_outline(

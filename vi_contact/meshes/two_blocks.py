@@ -12,7 +12,7 @@ from typing import Any
 
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.block import SIDES, BlockMesh
-from vi_contact.meshes.grid import add_grid
+from vi_contact.meshes.grid import Grid, add_grids
 
 
 @dataclass(frozen=True)
@@ -28,12 +28,14 @@ class Blocks:
 
     def build(self, gmsh: Any) -> None:
         """Add the blocks to Gmsh's current model."""
-        first = 1
-        for name, block in self.blocks.items():
-            nodes = block.points()
-            sides = [(f"{name}_{low}", f"{name}_{high}") for low, high in SIDES[: nodes.shape[-1]]]
-            add_grid(gmsh, nodes, simplices=block.simplices, body=name, sides=sides, first=first)
-            first += nodes[..., 0].size
+        add_grids(gmsh, self.grids())
+
+    def grids(self) -> list[Grid]:
+        """Return the grids of all bodies."""
+        return [
+            Grid(one.points(), one.simplices, name, [(f"{name}_{low}", f"{name}_{high}") for low, high in sides])
+            for name, one in self.blocks.items() for sides in [SIDES[: len(one.lengths)]]
+        ]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,7 +12,7 @@ from typing import Any
 from vi_contact.core.checks import MOST_CELLS, counted
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.block import check_box
-from vi_contact.meshes.grid import add_grid, add_outline, lattice
+from vi_contact.meshes.grid import Grid, add_grids, add_outline, lattice
 
 _PUBLISHED = (8, 12)
 
@@ -47,9 +47,13 @@ class WallMesh:
         if self.size is not None:
             _build_irregular(self, gmsh, self.size)
             return
+        add_grids(gmsh, self.grids())
+
+    def grids(self) -> list[Grid]:
+        """Return the grid it is, none of an irregular mesh."""
         nodes = lattice((self.width, self.height), self.divisions or _PUBLISHED)
-        sides = (("back", "face"), ("base", "top"))
-        add_grid(gmsh, nodes, simplices=self.triangles, body="wall", sides=sides)
+        grid = Grid(nodes, self.triangles, "wall", (("back", "face"), ("base", "top")))
+        return [grid] if self.size is None else []
 
 
 def _build_irregular(wall: WallMesh, gmsh: Any, size: float) -> None:

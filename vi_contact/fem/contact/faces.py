@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 import ufl
-from scipy.sparse.csgraph import connected_components
 
 from ...core.algebra import Array, Indices, Mask, from_each
 from ...core.checks import number
@@ -135,6 +134,8 @@ def _components(count: int, links: list[Indices]) -> Indices:
     """Number of the connected part of each of ``count`` things."""
     one, other = np.concatenate([np.zeros((2, 0), dtype=np.int64), *links], axis=1)
     graph = sp.coo_matrix((np.ones(len(one)), (one, other)), shape=(count, count))
+    from scipy.sparse.csgraph import connected_components  # late: it takes a while
+
     return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
 
 

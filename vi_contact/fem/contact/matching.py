@@ -10,7 +10,6 @@ from typing import Any, Protocol
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.spatial import cKDTree
 
 from ...core.algebra import Array, Indices, Mask
 from ...core.checks import attributes
@@ -90,6 +89,8 @@ class NodeToNode:
     def _partners(self, one: Side, two: Side, size: float) -> Indices:
         """Place of the nearest node opposite among those of side 2, -1 for none."""
         x, count, reach = one.nodes.points, len(two.nodes.points), self.tolerance * _spacing(one.nodes.points, size)
+        from scipy.spatial import cKDTree  # late: it takes a while
+
         away, nearby = cKDTree(two.nodes.points).query(x, k=np.arange(1, min(NEARBY, count) + 1))
         partner, along, turned = _opposite(one.nodes, two.nodes, np.sort(nearby, axis=1), reach)
         # what is nearer along the normal lies in a ball of this size: unless all of it was looked at, all nodes are
@@ -129,4 +130,6 @@ def _spacing(points: Array, size: float) -> Array:
     """Distance of each node to the next one of the same side [m]; the size of the mesh for a single node."""
     if len(points) == 1:
         return np.array([size])
+    from scipy.spatial import cKDTree
+
     return np.asarray(cKDTree(points).query(points, k=2)[0][:, 1])

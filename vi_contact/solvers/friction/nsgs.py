@@ -18,7 +18,6 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from scipy.optimize import brentq
 
 from ...core.algebra import Array, Mask
 from ...core.checks import attributes
@@ -116,6 +115,8 @@ def on_disk(S: Array, q: Array, limit: Callable[[Array], float]) -> Array:
         return reaction(1.0)
     if outside(0.0) >= 0.0:
         return np.zeros(len(q))
+    from scipy.optimize import brentq  # late: it takes a while
+
     root = brentq(outside, 0.0, 1.0, xtol=1e-300, rtol=8.9e-16, maxiter=200)
     r = reaction(root)
     size, radius = float(np.linalg.norm(r)), limit(r)

@@ -11,17 +11,25 @@ from ...core.algebra import Comm, SerialComm
 from ...core.errors import InputError
 from ...core.files import on_root
 from ...run.files.folder import locked, run_folder
-from .beam_study import BeamStudy
-from .layer_study import LayerStudy
 from .library import base_folder, check_format, keep_copy
 from .parsing import Words, arguments
-from .table_calls import Spot, callee
+from .table_calls import Callee, Spot, callee
 from .toml_file import read_toml, with_settings
 
 if TYPE_CHECKING:
+    from .beam_study import BeamStudy
     from .case import Case
+    from .layer_study import LayerStudy
 
-STUDIES = {"beam": callee(BeamStudy), "layer": callee(LayerStudy)}
+STUDIES = ("beam", "layer")
+
+
+def _study(name: str) -> Callee:
+    """The call of a study; what it needs is imported late."""
+    from .beam_study import BeamStudy
+    from .layer_study import LayerStudy
+
+    return callee({"beam": BeamStudy, "layer": LayerStudy}[name])
 
 
 @dataclass(frozen=True)
@@ -67,6 +75,6 @@ def study_of(path: Path, tables: Mapping[str, Any]) -> BeamStudy | LayerStudy:
     table = tables[name]
     if not isinstance(table, dict):
         raise InputError(f"{path}: [{name}] is no table: give its keys below it")
-    node = arguments(table, STUDIES[name], Spot(str(path), "", name), Words(base_folder(path), {}, {}, (), {}))
+    node = arguments(table, _study(name), Spot(str(path), "", name), Words(base_folder(path), {}, {}, (), {}))
     study: BeamStudy | LayerStudy = node.build({})
     return study

@@ -14,7 +14,6 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from importlib import import_module
-from importlib.metadata import entry_points
 from inspect import Parameter, getattr_static, isfunction, signature
 from typing import Any
 
@@ -46,6 +45,8 @@ def own_class(text: str, kinds: Sequence[Any], allowed: Sequence[str], spot: Spo
     asked = [kind for kind in kinds if is_protocol(kind)]
     if not asked:
         raise spot.inside(f"has the type '{text}', and takes no classes but its own: leave the type out to see them")
+    from importlib.metadata import entry_points  # late: it takes a while
+
     module, name = found.groups()
     allowed = (*allowed, *(one.value.partition(":")[0].strip() for one in entry_points(group=GROUP)))
     if not _within(module, allowed):
