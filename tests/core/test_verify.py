@@ -135,6 +135,7 @@ def test_a_wide_gap_blunts_nothing():
 def test_units_do_not_matter():
     """x in units of a millionth, r in units of a thousand: A, b and bounds follow, the certificate stays."""
     step, result = pressed()
+    step = replace(step, A=EffectiveMatrix(step.A.matrix, step.A.algebra))  # A x by one product on both sides
     length, force = 2.0**20, 2.0**-10  # powers of two: bit-equal
     A = EffectiveMatrix(step.A.algebra.combine([(force / length, step.A.matrix)]), step.A.algebra)
     wrong = replace(result, x=result.x + 1e-7, r_n=result.r_n - 0.5)

@@ -8,13 +8,14 @@ returned by ``dot`` and by ``Comm`` are the same number on every rank.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any, Protocol, SupportsFloat
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.linalg.blas import idamax
 from scipy.sparse.linalg import splu
 
 Array = NDArray[np.float64]
@@ -23,8 +24,10 @@ Indices = NDArray[np.int64]
 
 
 def max_abs(x: Array) -> float:
-    """Return max |x| over the entries given, 0 for none; NaN stays NaN. Half the time of forming |x|."""
-    return max(float(x.max()), -float(x.min())) if x.size else 0.0
+    """Return max |x| over the entries given, 0 for none; NaN stays NaN, which the search for the largest may miss."""
+    if x.ndim != 1:
+        return max(float(x.max()), -float(x.min())) if x.size else 0.0
+    return abs(float(x[idamax(x)])) if x.size and x.dot(x) >= 0.0 else 0.0 * float(x.sum())
 
 
 class Comm(Protocol):
@@ -41,7 +44,7 @@ class Comm(Protocol):
 
 def largest(comm: Comm, value: SupportsFloat) -> float:
     """Return the largest of the ranks' values, the same on every rank; of truth values: 1 where one rank says True."""
-    return float(comm.max(np.array([float(value)]))[0])
+    return float(value) if comm.size == 1 else float(comm.max(np.array([float(value)]))[0])
 
 
 def total(comm: Comm, value: SupportsFloat) -> float:
@@ -133,14 +136,17 @@ class EffectiveMatrix:
     """Hold the matrix A of a step and its factor. A prepared solver belongs to one of these; it lives as long as dt.
 
     ``space``: what its unknowns mean (core.system.Space); ``inertia``: (m, M) of A = m M + c C + k K. None: not known.
+    ``image(x)``: A x, made of products with M, C and K that others need too, where that is told.
     """
 
     def __init__(
-        self, matrix: Matrix, algebra: Algebra, *, space: Any = None, inertia: tuple[float, Matrix] | None = None
+        self, matrix: Matrix, algebra: Algebra, *, space: Any = None, inertia: tuple[float, Matrix] | None = None,
+        image: Callable[[Array], Array] | None = None,
     ) -> None:
         self.matrix = matrix
         self.algebra = algebra
         self.space, self.inertia = space, inertia
+        self.image = matrix.__matmul__ if image is None else image
 
     @cached_property
     def factor(self) -> Factor:

@@ -56,6 +56,10 @@ class State:
     memory: Mapping[str, Array] = field(default_factory=dict)
     r_t: Array | None = None
 
+    def with_velocity(self, v: Array) -> State:
+        """Return the state with another velocity."""
+        return State(self.t, self.k, self.u, v, self.r_n, self.active, self.memory, self.r_t)
+
 
 @dataclass(frozen=True)
 class StepProblem:

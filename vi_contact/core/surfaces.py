@@ -85,7 +85,17 @@ class ContactSurface:
 
     def some(self, found: Mask) -> bool:
         """Say whether the mask (m,) is True for a condition of any rank. Collective."""
-        return bool(largest(self.comm, np.any(found)))
+        return bool(largest(self.comm, found.any()))
+
+    @cached_property
+    def rigid(self) -> Mask:
+        """Return which of these conditions have no spring."""
+        return self.compliance == 0.0
+
+    @cached_property
+    def plain(self) -> bool:
+        """Say whether all conditions of this rank are rigid and unilateral."""
+        return bool(self.rigid.all() and not self.bilateral.any())
 
     def everywhere(self, values: NDArray[Any]) -> Any:
         """Return (total, …) the values (m, …) of all conditions, by their numbers and the same on every rank, of one

@@ -12,6 +12,7 @@ from .algebra import Algebra, Array, EffectiveMatrix, Mask, Matrix
 from .checks import array, function, instance, provides, several, shown
 from .companion import Companion
 from .errors import InputError
+from .products import Remembered
 
 
 class Space(Protocol):
@@ -41,6 +42,7 @@ class Space(Protocol):
         ...
 
 
+KEPT = {"M": 5, "C": 4, "K": 2}  # products with each: what a step and the next one may ask for again
 PAIR = "give pairs of a vector [N] and a function of the time"
 
 
@@ -101,6 +103,8 @@ class Load:
 def _factor(history: Callable[[float], float], t: float) -> float:
     """The value of a history; NaN and infinity are told of the load as a whole."""
     value = history(t)
+    if isinstance(value, float):
+        return value
     if np.ndim(value) or np.asarray(value).dtype.kind not in "iuf":
         what = f"the history of a load or excitation is {shown(value)} at t = {t:g} s"
         raise InputError(f"{what}: return one real number")
@@ -184,16 +188,55 @@ class SemiDiscreteSystem:
             self._cache[name] = make()
         return self._cache[name]
 
+    def product(self, name: str, x: Array) -> Array:
+        """Return M x, C x or K x, read-only; made once for each of the last frozen vectors (core.products)."""
+        found: Array = (self._cache.get(name) or self._remembered(name))(x)
+        return found
+
+    def _remembered(self, name: str) -> Remembered:
+        matrix = getattr(self, name)
+        found: Remembered = self.cached(name, lambda: Remembered(matrix.__matmul__, KEPT[name]))
+        return found
+
+    def load_at(self, t: float) -> Array:
+        """Return f(t), read-only; made once for each of the last two times, unless something is marched beside it."""
+        if self.companions:
+            return self.load(t)
+        return self.cached("loads", lambda: Remembered(self.load, 2))(float(t))
+
+    def rates(self, u0: Array, u1: Array, v0: Array, v1: Array, dt: float) -> tuple[Array, Array]:
+        """Return (u1 - u0)/dt and (v1 - v0)/dt; the products C and M of them are made of those with their ends."""
+
+        def change(name: str, x0: Array, x1: Array) -> Array:
+            product = self._remembered(name)
+            return product.know((x1 - x0) / dt, lambda: (product(x1) - product(x0)) / dt)
+
+        return (u1 - u0) / dt if self.C is None else change("C", u0, u1), change("M", v0, v1)
+
     def changed(self, **values: Any) -> SemiDiscreteSystem:
         """Return the same system with other values of the attributes that are named, and no factor of the old one."""
         return replace(self, **values, _cache={})
 
-    def effective(self, *, m: float, c: float, k: float) -> EffectiveMatrix:
-        """Return A = m M + c C + k K for all steps of one size; its factor is made when it is first needed."""
+    def effective(self, *, m: float, c: float, k: float, shares: bool = False) -> EffectiveMatrix:
+        """Return A = m M + c C + k K for all steps of one size; its factor is made when it is first needed.
+
+        ``shares``: whether the scheme needs M x, C x and K x in its next step, so that A x may be made of them.
+        """
         terms = [(m, self.M), (k, self.K)]
         if self.C is not None:
             terms.append((c, self.C))
-        return EffectiveMatrix(self.algebra.combine(terms), self.algebra, space=self.space, inertia=(m, self.M))
+
+        def image(x: Array) -> Array:
+            total = m * self.product("M", x)
+            total += self.product("K", x) if k == 1.0 else k * self.product("K", x)
+            if self.C is not None:
+                total += c * self.product("C", x)
+            return total
+
+        matrix = self.algebra.combine(terms)
+        return EffectiveMatrix(
+            matrix, self.algebra, space=self.space, inertia=(m, self.M), image=image if shares else None
+        )
 
     def with_load(self, *terms: tuple[Array, Callable[[float], float]]) -> SemiDiscreteSystem:
         """Return the same system with separable loads vector * history(t) added."""

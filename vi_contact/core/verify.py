@@ -19,32 +19,39 @@ def kkt_residual(step: StepProblem, result: StepResult) -> Certificate:
     """Return the certificate of a step: how well (x, r_n) satisfies the inequality problem. Definitions:
     ``Certificate``."""
     surface, x, r_n = step.surface, result.x, result.r_n
-    Ax = step.A @ x
+    Ax = step.A.image(x)
     residual = Ax - step.b
-    residual += surface.reaction_load(r_n, len(x), result.r_t)
-    gap = step.bound - surface.normal_values(x) + surface.compliance * r_n / step.scale
-    free, closed = ~surface.bilateral, result.active | surface.bilateral
-    maxima = _maxima(
-        step, residual, step.b, Ax, x, step.guess, r_n, np.minimum(gap[free], 0.0), np.minimum(r_n[free], 0.0),
-        gap[closed], r_n[~closed],
-    )
-    residual_max, b_max, Ax_max, x_max, guess_max, r_max, behind, pull, apart, open_force = maxima
+    if result.r_t is None:
+        residual[surface.owned] += r_n
+    else:
+        residual += surface.reaction_load(r_n, len(x), result.r_t)
+    gap, closed = step.bound - surface.normal_values(x), result.active
+    lowest = gap, r_n
+    if not surface.plain:
+        gap += surface.compliance * r_n / step.scale
+        closed, lowest = closed | surface.bilateral, (gap[~surface.bilateral], r_n[~surface.bilateral])
+    maxima = _maxima(step, residual, step.b, Ax, x, step.guess, r_n, gap[closed], r_n[~closed], lowest=lowest)
+    residual_max, b_max, Ax_max, x_max, guess_max, r_max, apart, open_force, behind, pull = maxima
     x_ref, r_ref = max(x_max, guess_max), max(b_max, r_max)
     cone, dissipation = _friction_residuals(step, result, x_ref, r_ref)
+    away, loose = _over(apart, x_ref), _over(open_force, r_ref)
     return Certificate(
         equilibrium=_over(residual_max, max(b_max, Ax_max, ROUNDED * step.A.largest * x_max)),
         penetration=_over(behind, x_ref),
         tension=_over(pull, r_ref),
-        complementarity=float(np.maximum(_over(apart, x_ref), _over(open_force, r_ref))),  # keeps NaN
+        complementarity=away if away >= loose or np.isnan(away) else loose,  # keeps NaN
         cone=cone,
         dissipation=dissipation,
     )
 
 
-def _maxima(step: StepProblem, *arrays: Array) -> Array:
-    """Largest sizes of the entries on all ranks, by one reduction; infinite for NaN, which no reduction keeps."""
-    sizes = np.array([max_abs(array) for array in arrays])
-    return step.surface.comm.max(np.where(np.isnan(sizes), np.inf, sizes))
+def _maxima(step: StepProblem, *arrays: Array, lowest: tuple[Array, ...] = ()) -> list[float]:
+    """Largest sizes of the entries on all ranks, and of the negative ones of ``lowest``, by one reduction; infinite for
+    NaN, which no reduction keeps."""
+    sizes = [*map(max_abs, arrays), *(-float(np.minimum.reduce(array, initial=0.0)) for array in lowest)]
+    sizes = [size if size >= 0.0 else np.inf for size in sizes]
+    comm = step.surface.comm
+    return sizes if comm.size == 1 else comm.max(np.array(sizes)).tolist()
 
 
 def _friction_residuals(step: StepProblem, result: StepResult, x_ref: float, r_ref: float) -> tuple[float, float]:
@@ -65,8 +72,9 @@ def _friction_residuals(step: StepProblem, result: StepResult, x_ref: float, r_r
 
 def _over(value: float, reference: float) -> float:
     """value/reference, with 0/0 = 0 (nothing happens, nothing is wrong); NaN for infinity over infinity."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return 0.0 if value == 0.0 and reference < np.inf else float(np.float64(value) / np.float64(reference))
+    if value == 0.0 and reference < np.inf:
+        return 0.0
+    return value / reference if reference else np.inf
 
 
 @dataclass(frozen=True)
@@ -104,15 +112,15 @@ class Energies:
 
 
 def energies(system: SemiDiscreteSystem, u: Array, v: Array) -> Energies:
-    """Return the energies of displacement u and velocity v: two products."""
-    momentum, elastic = system.M @ v, system.K @ u
+    """Return the energies of displacement u and velocity v: two products, unless they are known."""
+    momentum, elastic = system.product("M", v), system.product("K", u)
     kinetic, strain = 0.5 * _dots(system, (v, momentum), (u, elastic))
     return Energies(momentum, elastic, float(kinetic), float(strain))
 
 
 def _dots(system: SemiDiscreteSystem, *pairs: tuple[Array, Array], sums: tuple[float, ...] = ()) -> Array:
     """Inner products, and sums over the ranks, with one reduction for all."""
-    return system.algebra.comm.sum(np.array([*(x @ y for x, y in pairs), *sums]))
+    return system.algebra.comm.sum(np.array([*(x.dot(y) for x, y in pairs), *sums]))
 
 
 def energy_balance(
@@ -135,17 +143,16 @@ def energy_balance(
     du = new.u - old.u
     pushed, dragged = _obstacle_work(problem, old.t, new.t, balance)
     rubbing = 0.0 if balance.r_t is None else np.sum(balance.r_t * surface.tangential_values(du))
-    work, inertia, kinetic, stiffness, damping, lost, *local = _dots(
+    work, inertia, kinetic, stiffness, lost, *local = _dots(
         system,
         (du, balance.f),
-        (du, system.M @ balance.a),
+        (du, system.product("M", balance.a)),
         (0.5 * (old.v + new.v), after.momentum - before.momentum),
         (balance.u - 0.5 * (old.u + new.u), after.elastic - before.elastic),
-        (du, np.zeros_like(du) if system.C is None else system.C @ balance.v),
         (balance.r_n, surface.normal_values(du)),
-        sums=(rubbing, pushed, dragged),
+        sums=(rubbing, pushed, dragged, 0.0 if system.C is None else du.dot(system.product("C", balance.v))),
     )
-    rubbing, pushed, dragged = local
+    rubbing, pushed, dragged, damping = local
     return StepEnergy(
         change=after.total - before.total,
         input=float(work + pushed + dragged),

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..core.algebra import EffectiveMatrix
 from ..core.problem import ContactProblem
+from ..core.products import frozen
 from ..core.protocols import Impact
 from ..core.state_checks import initial_state
 from ..core.step import Report, Scheme, Solver, State
@@ -63,12 +64,14 @@ class March:
         self.base, self.halved, self.ended, self.dt = base, halved, True, float("nan")
 
     def __iter__(self) -> Iterator[tuple[State, Report]]:
+        sizes: list[float] = []
         while self.base < self._step_plan.steps:
             dt = self._step_plan.dt(self.base)
             self._method.bind()  # another run of the problem may be under way
-            sizes = [dt / 2**level for level in range(self._step_plan.halvings + 1)]
-            self._matrices = {size: self._matrices[size] for size in sizes if size in self._matrices}
-            self._solvers = {size: self._solvers[size] for size in sizes if size in self._solvers}
+            if not sizes or sizes[0] != dt:
+                sizes = [dt / 2**level for level in range(self._step_plan.halvings + 1)]
+                self._matrices = {size: self._matrices[size] for size in sizes if size in self._matrices}
+                self._solvers = {size: self._solvers[size] for size in sizes if size in self._solvers}
             self._state, self.dt = self._restarted(dt), dt
             levels = [0]  # how often the parts of the base step that are left were halved
             while levels:
@@ -101,6 +104,8 @@ class March:
             return None
         free = scheme.finish(problem, state, step, result, dt)
         new = after_impact(problem, scheme, state, free, dt)
+        for vector in (free.u, free.v, new.u, new.v):
+            frozen(vector)  # what is known of them stays true
         averages = partial(scheme.balance, problem, state, free, dt)
         return Report(problem, state, new, free.v, step, result, certificate, averages, escalated)
 
@@ -111,8 +116,7 @@ def after_impact(problem: ContactProblem, scheme: Scheme, old: State, new: State
     law, surface = problem.impact, problem.surface
     if law is None:
         return new
-    solid = surface.compliance == 0.0
-    active = new.active & solid
+    active = new.active & surface.rigid
     if not surface.some(active):
         return new
     impact = Impact(surface.normal_values(old.v), surface.normal_values(new.v), active, active & ~old.active)

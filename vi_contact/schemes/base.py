@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import replace
 
 from ..core.algebra import Array, EffectiveMatrix, Mask
 from ..core.errors import InputError
@@ -37,7 +36,7 @@ class SingleStep:
 
     def jump(self, problem: ContactProblem, state: State, v: Array, dt: float) -> State:
         """Return the state with the new velocity: nothing is to be restarted."""
-        return replace(state, v=v)
+        return state.with_velocity(v)
 
 
 class BalanceStep:
@@ -73,9 +72,10 @@ def stepped(step: StepProblem, result: StepResult, u: Array, v: Array) -> State:
     return State(step.t, step.k, u, v, result.r_n / step.scale, result.active, r_t=r_t)
 
 
-def means(old: State, new: State, dt: float, *, u: Array, f: Array) -> Balance:
+def means(problem: ContactProblem, old: State, new: State, dt: float, *, u: Array, f: Array) -> Balance:
     """Return the equation of a step with mean u and f, mean rates of u and v, and the reactions of the new state."""
-    return Balance(u=u, v=(new.u - old.u) / dt, a=(new.v - old.v) / dt, f=f, r_n=new.r_n, r_t=new.r_t)
+    v, a = problem.equations.rates(old.u, new.u, old.v, new.v, dt)
+    return Balance(u=u, v=v, a=a, f=f, r_n=new.r_n, r_t=new.r_t)
 
 
 def check_balance(name: str, problem: ContactProblem) -> None:

@@ -55,17 +55,18 @@ class ContactStabilisedNewmark(SingleStep):
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
         """Return A = 4/dt² M + 2/dt C + K."""
-        return problem.equations.effective(m=4.0 / dt**2, c=2.0 / dt, k=1.0)
+        return problem.equations.effective(m=4.0 / dt**2, c=2.0 / dt, k=1.0, shares=True)
 
     def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem:
         """Return the step with b of the module's equations."""
         system = problem.equations
-        u_p, active = state.u + dt * state.v, state.active
+        u_p, active = free, _ = state.u + dt * state.v, state.active
         if self.projected:
-            u_p, active = admissible(problem, state, u_p, dt)
-        b = 2.0 * system.load(state.t + 0.5 * dt) + system.M @ (4.0 / dt**2 * u_p) - system.K @ state.u
+            u_p, active = admissible(problem, state, free, dt)
+        Mu = system.product("M", state.u) + dt * system.product("M", state.v) if u_p is free else system.M @ u_p
+        b = 2.0 * system.load_at(state.t + 0.5 * dt) + 4.0 / dt**2 * Mu - system.product("K", state.u)
         if system.C is not None:
-            b += system.C @ (2.0 / dt * state.u)
+            b += 2.0 / dt * system.product("C", state.u)
         return position_step(problem, state, A, dt, b=b, scale=2.0, guess=u_p, active=active)
 
     def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
@@ -74,7 +75,7 @@ class ContactStabilisedNewmark(SingleStep):
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
         """Return the averages of the equation above."""
-        return means(old, new, dt, u=0.5 * (old.u + new.u), f=problem.equations.load(old.t + 0.5 * dt))
+        return means(problem, old, new, dt, u=0.5 * (old.u + new.u), f=problem.equations.load_at(old.t + 0.5 * dt))
 
 
 def admissible(problem: ContactProblem, state: State, u: Array, dt: float) -> tuple[Array, Mask]:

@@ -63,7 +63,7 @@ class AlphaStep(BalanceStep, ABC):
 
     def jump(self, problem: ContactProblem, state: State, v: Array, dt: float) -> State:
         """Return the state with the acceleration that fits the new velocity."""
-        return self._restarted(problem, replace(state, v=v), dt)
+        return self._restarted(problem, state.with_velocity(v), dt)
 
     def _restarted(self, problem: ContactProblem, state: State, dt: float) -> State:
         a, reaction = consistent_acceleration(problem, state, dt)
@@ -86,11 +86,11 @@ class AlphaStep(BalanceStep, ABC):
         0."""
         system, w = problem.equations, self.weights
         v, a = self._known(state, dt)
-        b = system.load(state.t + dt)
-        b -= system.M @ (((1.0 - w.alpha_m) * a + w.alpha_m * state.memory["a"]) / (1.0 - w.alpha_f))
+        mean = ((1.0 - w.alpha_m) * a + w.alpha_m * state.memory["a"]) / (1.0 - w.alpha_f)
+        b = system.load_at(state.t + dt) - system.M @ mean
         if w.alpha_f != 0.0:
             ratio = w.alpha_f / (1.0 - w.alpha_f)
-            b += ratio * (system.load(state.t) - system.K @ state.u - state.memory["reaction"])
+            b += ratio * (system.load_at(state.t) - system.product("K", state.u) - state.memory["reaction"])
             v = v + ratio * state.v
         if system.C is not None:
             b -= system.C @ v
@@ -115,7 +115,7 @@ class AlphaStep(BalanceStep, ABC):
 def weighted(problem: ContactProblem, old: State, new: State, m: float, f: float, level: str = "") -> Balance:
     """Return (1 - m) and m of the accelerations, (1 - f) and f of everything else at the ends of a step. ``level``: of
     the memory's names."""
-    load, surface, r0 = problem.equations.load, problem.surface, old.memory[f"reaction{level}"]
+    load, surface, r0 = problem.equations.load_at, problem.surface, old.memory[f"reaction{level}"]
     return Balance(
         u=(1.0 - f) * new.u + f * old.u, v=(1.0 - f) * new.v + f * old.v,
         a=(1.0 - m) * new.memory[f"a{level}"] + m * old.memory[f"a{level}"],

@@ -108,7 +108,7 @@ class LinearMultistep(BalanceStep):
 
     def jump(self, problem: ContactProblem, state: State, v: Array, dt: float) -> State:
         """Return the state with the past of the new velocity."""
-        return self._restarted(problem, replace(state, v=v), dt)
+        return self._restarted(problem, state.with_velocity(v), dt)
 
     def _restarted(self, problem: ContactProblem, state: State, dt: float) -> State:
         return self._with_past(state, *consistent_acceleration(problem, state, dt), dt)
@@ -149,7 +149,7 @@ class LinearMultistep(BalanceStep):
         """Return the step with b = f(t_p) - M a_known - C v_known."""
         system = problem.equations
         v, a = self._known(self._levels(state), dt)
-        b = system.load(state.t + dt) - system.M @ a
+        b = system.load_at(state.t + dt) - system.M @ a
         if system.C is not None:
             b -= system.C @ v
         return position_step(problem, state, A, dt, b=b, scale=1.0)

@@ -91,10 +91,10 @@ class MoreauJean(SingleStep):
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
         """Return A = M + theta dt C + theta² dt² K."""
-        return problem.equations.effective(m=1.0, c=self.theta * dt, k=(self.theta * dt) ** 2)
+        return problem.equations.effective(m=1.0, c=self.theta * dt, k=(self.theta * dt) ** 2, shares=True)
 
     def _load(self, problem: ContactProblem, t: float, dt: float) -> Array:
-        load = problem.equations.load
+        load = problem.equations.load_at
         return (1.0 - self.theta) * load(t) + self.theta * load(t + dt)
 
     def _target(self, problem: ContactProblem, state: State, dt: float) -> Array:
@@ -109,17 +109,19 @@ class MoreauJean(SingleStep):
         """Return the step with b = M v0 + dt (f_θ - K (u0 + theta (1 - theta) dt v0) - (1 - theta) C v0), and the bound
         on velocities."""
         system, surface, left = problem.equations, problem.surface, 1.0 - self.theta
-        force = self._load(problem, state.t, dt) - system.K @ (state.u + self.theta * left * dt * state.v)
+        force = self._load(problem, state.t, dt) - system.product("K", state.u)
+        force -= self.theta * left * dt * system.product("K", state.v)
         if system.C is not None:
-            force -= system.C @ (left * state.v)
+            force -= left * system.product("C", state.v)
         middle = surface.gap(state.t + 0.5 * dt) - surface.normal_values(state.u + 0.5 * dt * state.v)
         size = largest(surface.comm, max(max_abs(state.u), dt * max_abs(state.v)))
         closed = np.asarray((middle <= ROUND_OFF * size) | surface.bilateral)  # if nothing stops them; and held points
         sliding = surface.sliding(state.t, state.t + dt)
         slip = np.zeros((surface.count, surface.tangents.shape[1])) if sliding is None else sliding / dt
         return StepProblem(
-            A=A, b=system.M @ state.v + dt * force, bound=np.where(closed, self._target(problem, state, dt), np.inf),
-            surface=surface, scale=dt, guess=state.v, active=closed, t=state.t + dt, k=state.k + 1,
+            A=A, b=system.product("M", state.v) + dt * force,
+            bound=np.where(closed, self._target(problem, state, dt), np.inf), surface=surface, scale=dt, guess=state.v,
+            active=closed, t=state.t + dt, k=state.k + 1,
             friction=problem.friction, slip0=slip if problem.frictional else None, rate_factor=1.0,
         )
 
@@ -130,4 +132,4 @@ class MoreauJean(SingleStep):
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
         """Return the averages of the equation above."""
-        return means(old, new, dt, u=old.u + self.theta * (new.u - old.u), f=self._load(problem, old.t, dt))
+        return means(problem, old, new, dt, u=old.u + self.theta * (new.u - old.u), f=self._load(problem, old.t, dt))

@@ -47,7 +47,7 @@ class SS22(SingleStep):
         """Return the step with b = A (u0 + dt v0) + (f - C v0 - K (u0 + theta1 dt v0))/theta2."""
         system = problem.equations
         guess = state.u + dt * state.v
-        force = system.load(state.t + self.theta1 * dt) - system.K @ (state.u + self.theta1 * dt * state.v)
+        force = system.load_at(state.t + self.theta1 * dt) - system.K @ (state.u + self.theta1 * dt * state.v)
         if system.C is not None:
             force -= system.C @ state.v
         b = A @ guess + force / self.theta2
@@ -62,5 +62,5 @@ class SS22(SingleStep):
         """Return the averages of the residual equation."""
         alpha = (new.v - old.v) / dt
         u = old.u + self.theta1 * dt * old.v + 0.5 * self.theta2 * dt**2 * alpha
-        mean = means(old, new, dt, u=u, f=problem.equations.load(old.t + self.theta1 * dt))
+        mean = means(problem, old, new, dt, u=u, f=problem.equations.load_at(old.t + self.theta1 * dt))
         return replace(mean, v=old.v + self.theta1 * dt * alpha)

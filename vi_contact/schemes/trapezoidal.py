@@ -52,22 +52,23 @@ class Trapezoidal:
         """Keep f - K u - Bᵀr of the state: the next step starts with it."""
         system = problem.equations
         reaction = problem.surface.reaction_load(state.r_n, system.rows, state.r_t)
-        return replace(state, memory={"force": system.load(state.t) - system.K @ state.u - reaction})
+        return replace(state, memory={"force": system.load_at(state.t) - system.product("K", state.u) - reaction})
 
     def jump(self, problem: ContactProblem, state: State, v: Array, dt: float) -> State:
         """Return the state with the new velocity; forces do not depend on it."""
-        return replace(state, v=v)
+        return state.with_velocity(v)
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
         """Return A = 4/dt² M + 2/dt C + K."""
-        return problem.equations.effective(m=4.0 / dt**2, c=2.0 / dt, k=1.0)
+        return problem.equations.effective(m=4.0 / dt**2, c=2.0 / dt, k=1.0, shares=True)
 
     def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem:
         """Return the step with b of the module's equations."""
         system = problem.equations
-        b = state.memory["force"] + system.load(state.t + dt) + system.M @ (4.0 / dt**2 * (state.u + dt * state.v))
+        b = state.memory["force"] + system.load_at(state.t + dt)
+        b += 4.0 / dt**2 * (system.product("M", state.u) + dt * system.product("M", state.v))
         if system.C is not None:
-            b += system.C @ (2.0 / dt * state.u)
+            b += 2.0 / dt * system.product("C", state.u)
         return position_step(problem, state, A, dt, b=b, scale=1.0)
 
     def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
@@ -78,7 +79,7 @@ class Trapezoidal:
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
         """Return the means of both ends."""
-        load = problem.equations.load
+        load = problem.equations.load_at
         r_t = None if new.r_t is None else 0.5 * (new.r_t if old.r_t is None else old.r_t + new.r_t)
-        end = means(old, new, dt, u=0.5 * (old.u + new.u), f=0.5 * (load(old.t) + load(new.t)))
+        end = means(problem, old, new, dt, u=0.5 * (old.u + new.u), f=0.5 * (load(old.t) + load(new.t)))
         return replace(end, r_n=0.5 * (old.r_n + new.r_n), r_t=r_t)

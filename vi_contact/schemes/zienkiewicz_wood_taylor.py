@@ -35,20 +35,19 @@ class ZienkiewiczWoodTaylor(SingleStep):
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
         """Return A = M/(phi dt)² + C/(phi dt) + K."""
-        return problem.equations.effective(m=1.0 / (self.phi * dt) ** 2, c=1.0 / (self.phi * dt), k=1.0)
+        return problem.equations.effective(m=1.0 / (self.phi * dt) ** 2, c=1.0 / (self.phi * dt), k=1.0, shares=True)
 
     def _load(self, problem: ContactProblem, state: State, dt: float) -> Array:
-        return problem.equations.load(state.t + self.phi * dt)
+        return problem.equations.load_at(state.t + self.phi * dt)
 
     def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem:
         """Return the step with b = f/phi + M (u0 + dt v0)/(phi dt)² + C u0/(phi dt) - (1 - phi)/phi K u0."""
-        system = problem.equations
-        phi = self.phi
+        system, phi = problem.equations, self.phi
         b = self._load(problem, state, dt) / phi
-        b += (system.M @ (state.u + dt * state.v)) / (phi * dt) ** 2
-        b -= (1.0 - phi) / phi * (system.K @ state.u)
+        b += (system.product("M", state.u) + dt * system.product("M", state.v)) / (phi * dt) ** 2
+        b -= (1.0 - phi) / phi * system.product("K", state.u)
         if system.C is not None:
-            b += system.C @ (state.u / (phi * dt))
+            b += system.product("C", state.u) / (phi * dt)
         return position_step(problem, state, A, dt, b=b, scale=1.0 / phi)
 
     def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
@@ -58,4 +57,4 @@ class ZienkiewiczWoodTaylor(SingleStep):
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
         """Return the averages of the equation above."""
-        return means(old, new, dt, u=old.u + self.phi * (new.u - old.u), f=self._load(problem, old, dt))
+        return means(problem, old, new, dt, u=old.u + self.phi * (new.u - old.u), f=self._load(problem, old, dt))

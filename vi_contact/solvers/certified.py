@@ -7,6 +7,7 @@ stiffness, is corrected by what it leaves over (``correction``) before it is jud
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import isfinite
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from ..core.algebra import EffectiveMatrix, largest
 from ..core.certificate import Certificate
 from ..core.errors import StepFailure
 from ..core.problem import ContactProblem
+from ..core.products import frozen
 from ..core.stages import stage
 from ..core.step import PreparedSolver, Solver, StepProblem, StepResult
 from ..core.surfaces import ContactSurface
@@ -59,6 +61,7 @@ class CertifiedSolver:
             except StepFailure as failure:
                 tried.append(str(failure))
                 continue
+            frozen(result.x)
             certificate = kkt_residual(step, result)
             if max(NEAR * self._tolerance, result.aim) < certificate.worst < FAR:
                 solve, goal = self._get(rank).solve, NEAR * self._tolerance
@@ -74,7 +77,7 @@ class CertifiedSolver:
 
 def refuse_nan(step: StepProblem) -> None:
     """Raise StepFailure for a NaN, which would spread silently; asked of all ranks, so that all stop."""
-    if largest(step.surface.comm, not np.isfinite(np.sum(step.b))):
+    if largest(step.surface.comm, not isfinite(np.add.reduce(step.b))):
         raise StepFailure(
             f"the load of step {step.k} at t = {step.t:.6g} s contains NaN or infinite values: "
             "check the excitation, the tractions and the initial data"

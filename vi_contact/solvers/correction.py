@@ -21,6 +21,7 @@ import numpy as np
 from ..core.algebra import Array
 from ..core.certificate import Certificate
 from ..core.errors import StepFailure
+from ..core.products import frozen
 from ..core.protocols import FrictionLaw
 from ..core.step import StepProblem, StepResult
 from ..core.verify import kkt_residual
@@ -62,7 +63,7 @@ def left_over(step: StepProblem, answer: StepResult, share: float) -> StepProble
     surface, x = step.surface, answer.x
     r_n, r_t = kept(step, answer, share)
     return replace(
-        step, b=step.b - step.A @ x - surface.reaction_load(r_n, len(x), r_t),
+        step, b=step.b - step.A.image(x) - surface.reaction_load(r_n, len(x), r_t),
         bound=step.bound - surface.normal_values(x) + surface.compliance * r_n / step.scale, guess=np.zeros_like(x),
         active=answer.active,
         friction=step.friction if step.slip0 is None or share == 1.0 else Share(step.friction, share),
@@ -104,6 +105,7 @@ def corrected(
             better = added(step, result, solve(left_over(step, result, share)), share)
         except StepFailure:
             break
+        frozen(better.x)
         found, before = kkt_residual(step, better), certificate.worst
         if not found.worst < before:
             break

@@ -122,13 +122,16 @@ class _Sets:
 
     def _wrong(self, active: Mask, r: Array, w: Array) -> Mask:
         """Rows whose sign is wrong by more than rounding: grazing rows (r = w = 0) fit either side."""
-        return np.asarray((np.where(active, r, w) < -self._scaled.rounding(r)) & ~self._bilateral)
+        wrong = np.where(active, r, w) < -self._scaled.rounding(r)
+        return wrong if self._scaled.unilateral else wrong & ~self._bilateral
 
     def _positive(self, r: Array) -> Array:
         return np.where(self._bilateral, r, np.maximum(r, 0.0))
 
     def _cut(self, r: Array, w: Array, gap: Array) -> tuple[Array, Array]:
         """Cut reactions that are negative by rounding, so that r >= 0 holds exactly."""
+        if np.minimum.reduce(r, initial=0.0) >= 0.0:
+            return r, w
         cut = self._positive(r)
         return (cut, gap + self._scaled.matrix @ cut) if (cut != r).any() else (r, w)
 

@@ -17,6 +17,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from math import isfinite
 
 import numpy as np
 from scipy.linalg import lapack
@@ -68,9 +70,15 @@ class ScaledLCP:
         """Return the gap below which there are rounding errors of q + G r only."""
         return 4.0 * EPS * self.norm * max_abs(r)
 
+    @cached_property
+    def unilateral(self) -> bool:
+        """Say whether no row is bilateral."""
+        return not self.bilateral.any()
+
     def complementarity(self, r: Array, w: Array) -> float:
         """Return max |min(r, w)| over unilateral rows, max |w| over bilateral ones."""
-        return max_abs(np.where(self.bilateral, w, np.minimum(r, w)))
+        least = np.minimum(r, w)
+        return max_abs(least if self.unilateral else np.where(self.bilateral, w, least))
 
 
 @dataclass(frozen=True)
@@ -155,7 +163,7 @@ def check_gap(q: Array, bilateral: Mask) -> None:
     """Raise InputError unless q has one entry a row, finite or (in unilateral rows) +inf."""
     if q.shape != bilateral.shape:
         raise InputError(f"q has shape {q.shape} but the Delassus operator has {bilateral.size} rows: they must match.")
-    if not np.isfinite(q).all() and not np.where(bilateral, np.isfinite(q), q > -np.inf).all():
+    if not isfinite(np.add.reduce(q)) and not np.where(bilateral, np.isfinite(q), q > -np.inf).all():
         raise InputError("q contains NaN, -inf, or +inf in a bilateral row: only +inf in unilateral rows is allowed.")
 
 

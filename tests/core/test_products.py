@@ -1,0 +1,98 @@
+"""Nothing twice: the products with M, C and K that a step makes, counted, and what is remembered of them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from marched_chain import chain
+
+from vi_contact.core.algebra import SerialMatrix
+from vi_contact.core.products import Remembered, frozen
+from vi_contact.run.recorders import Energy
+from vi_contact.run.simulate import simulate
+from vi_contact.schemes.contact_stabilised import ContactStabilisedNewmark
+from vi_contact.schemes.moreau_jean import MoreauJean
+from vi_contact.schemes.newmark import Newmark
+from vi_contact.schemes.trapezoidal import Trapezoidal
+from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
+from vi_contact.solvers.condensed import Condensed
+
+pytestmark = pytest.mark.serial
+FEW, MANY = 20, 120
+
+
+def per_step(monkeypatch: pytest.MonkeyPatch, scheme: Any, *, damping: float, ledger: bool, **more: Any) -> float:
+    """Products a step of a chain that hits its walls, with the ledger or without."""
+    made = [0]
+
+    def counted(matrix: SerialMatrix, x: np.ndarray) -> np.ndarray:
+        made[0] += 1
+        return np.asarray(matrix.csr @ x)
+
+    monkeypatch.setattr(SerialMatrix, "__matmul__", counted)
+    counts = []
+    for steps in (FEW, MANY):
+        made[0] = 0
+        problem = chain(damping=damping, **more)
+        found = simulate(
+            problem, scheme=scheme, solver=Condensed(), dt=5e-3, steps=steps, record=[Energy()] if ledger else [],
+            progress=False,
+        )
+        counts.append(made[0])
+    assert found.facts["worst_certificate"] < 1e-11
+    return (counts[1] - counts[0]) / (MANY - FEW)
+
+
+@pytest.mark.parametrize("ledger", [False, True], ids=["march", "ledger"])
+@pytest.mark.parametrize("scheme", [
+    ZienkiewiczWoodTaylor(), ZienkiewiczWoodTaylor(0.7), Trapezoidal(), MoreauJean(),
+    ContactStabilisedNewmark(projected=False),
+], ids=repr)
+def test_a_step_makes_three_products(monkeypatch, scheme, ledger):
+    """M u, M v and K u serve the right-hand side, the certificate, the ledger and the next step; C u with damping (and
+    C v where the step is one in velocities; the ledger asks for C (u1 - u0)/dt)."""
+    assert per_step(monkeypatch, scheme, damping=0.0, ledger=ledger, impact=None) <= 3.0
+    in_velocities = ledger and isinstance(scheme, MoreauJean)
+    assert per_step(monkeypatch, scheme, damping=1e-4, ledger=ledger, impact=None) <= 4.0 + 1.0 * in_velocities
+
+
+def test_an_impact_costs_one_more(monkeypatch):
+    """M v of the velocity that the impact law made, in the steps that it changes only."""
+    assert 3.0 < per_step(monkeypatch, ZienkiewiczWoodTaylor(), damping=0.0, ledger=True) < 4.0
+
+
+def test_others_make_no_more_than_before(monkeypatch):
+    assert per_step(monkeypatch, Newmark(), damping=0.0, ledger=True, impact=None) <= 5.0
+
+
+def test_only_vectors_that_nobody_writes_to_are_remembered():
+    asked: list[float] = []
+
+    def double(x: np.ndarray) -> np.ndarray:
+        asked.append(float(x[0]))
+        return 2.0 * x
+
+    remembered, x = Remembered(double, 2), np.array([1.0, 2.0])
+    assert remembered(x).tolist() == [2.0, 4.0]
+    x[0] = 5.0
+    assert remembered(x).tolist() == [10.0, 4.0]  # made anew
+    frozen(x)
+    first = remembered(x)
+    assert remembered(x) is first and asked == [1.0, 5.0, 5.0]
+    with pytest.raises(ValueError, match="read-only"):
+        first[0] = 0.0
+    remembered(frozen(np.zeros(2)))
+    remembered(frozen(np.ones(2)))
+    assert remembered(x) is not first  # only so many are kept
+    told = remembered.know(np.array([7.0]), lambda: np.array([0.5]))
+    assert remembered(told).tolist() == [0.5]
+    assert remembered(told.copy()).tolist() == [14.0]  # equal numbers in another place are another vector
+
+
+def test_the_load_of_a_time_is_made_once():
+    problem = chain()
+    system = problem.equations
+    assert system.load_at(0.3) is system.load_at(0.3) and np.array_equal(system.load_at(0.3), system.load(0.3))
+    assert system.load_at(0.4) is not system.load_at(0.3)
