@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import re
+import time
 import tracemalloc
 from pathlib import Path
 from typing import Any
@@ -411,3 +412,35 @@ def test_folders_of_another_format(tmp_path: Path) -> None:
     about.unlink()
     assert len(read_run(tmp_path).history["t"]) == 11
     assert len(run(tmp_path, 20, restart=True).history["t"]) == 21 and about.exists()
+
+
+@pytest.mark.serial
+def test_rows_wait_for_each_other_but_not_for_long(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rows are written in blocks: before every checkpoint, and when the next step might make one late."""
+    monkeypatch.setattr("vi_contact.run.files.writer.LATEST", 1e9)
+    path, found = tmp_path / "history.csv", {}
+
+    class Slow:
+        """Sees how many rows are in the file while a step is recorded; step 23 takes long."""
+
+        def columns(self) -> dict[str, tuple[str, str]]:
+            return {"seen": ("-", "rows in history.csv")}
+
+        def start(self, *_: Any) -> dict[str, float]:
+            return {"seen": 0.0}
+
+        def row(self, report: Any) -> dict[str, float]:
+            found[report.new.k] = path.read_bytes().count(b"\n") - 1
+            if report.new.k == 23:
+                time.sleep(0.02)
+                monkeypatch.setattr("vi_contact.run.files.writer.LATEST", 0.01)
+            if report.new.k == 24:
+                monkeypatch.setattr("vi_contact.run.files.writer.LATEST", 1e9)
+            return {"seen": 0.0}
+
+    simulate(
+        chain_problem(5), scheme=ZienkiewiczWoodTaylor(), solver=Condensed(), dt=5e-3, steps=30, out=tmp_path,
+        record=[Slow()], checkpoint_every=10,
+    )
+    assert found[10] == 1 and found[11] == found[20] == 11 and found[21] == found[23] == 21 and found[24] == 24
+    assert path.read_bytes().count(b"\n") == 32

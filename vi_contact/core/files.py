@@ -75,10 +75,17 @@ def sentence(error: OSError) -> str:
     return f"'{path}' cannot be read or written ({error.strerror or error}): choose another output folder"
 
 
-def write_atomically(path: Path, data: bytes) -> None:
-    """Write a file that has its old content or all of the new one, whatever happens; OSError names it."""
-    with _whole_or_not_at_all(path) as file:
+def write_atomically(path: Path, data: bytes, *, safe: bool = True) -> None:
+    """Write a file that has its old content or all of the new one, whatever happens; OSError names it. ``safe``: even
+    when the power fails, which takes a while."""
+    with _whole_or_not_at_all(path, safe) as file:
         write_all(file, data)
+
+
+def push(path: Path) -> None:
+    """Push a file, if there is one, onto the medium."""
+    with suppress(FileNotFoundError), open(path, "rb") as file:
+        os.fsync(file.fileno())
 
 
 def write_all(file: Any, data: bytes) -> None:
@@ -118,13 +125,14 @@ def _plain(value: Any) -> Any:
 
 
 @contextmanager
-def _whole_or_not_at_all(path: Path) -> Iterator[Any]:
+def _whole_or_not_at_all(path: Path, safe: bool = True) -> Iterator[Any]:
     """Open an unbuffered file beside ``path`` that takes its place at the end; OSError names ``path``."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
         with open(temporary, "w+b", buffering=0) as file:
             yield file
-            os.fsync(file.fileno())
+            if safe:
+                os.fsync(file.fileno())
         os.replace(temporary, path)
     except OSError as error:
         with suppress(OSError):

@@ -7,7 +7,8 @@ Displacements and velocities are those of the equations: relative to the ground 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from math import isfinite
 from typing import Any, ClassVar
 
 import numpy as np
@@ -17,14 +18,15 @@ from ..core.checks import array, attributes, column_name, instance
 from ..core.errors import InputError, StepFailure
 from ..core.problem import ContactProblem
 from ..core.step import AXES, Columns, Report, Row, State
-from ..core.verify import energies, energy_balance
+from ..core.verify import Energies, energies, energy_balance
 
 
 def refuse_overflow(row: Row) -> None:
     """Raise StepFailure for a number beyond those of the machine: infinite, or NaN in the energy ledger."""
     for name, value in row.items():
-        ledger = name.startswith(("energy_", "work_", "loss_"))
-        if isinstance(value, float) and (np.isinf(value) or (ledger and np.isnan(value))):
+        if not isinstance(value, float) or isfinite(value):
+            continue
+        if np.isinf(value) or name.startswith(("energy_", "work_", "loss_")):
             raise StepFailure(
                 f"step {row['k']} at t = {row['t']:.6g} s: {name} is {value}, beyond the numbers of the machine: check "
                 "the sizes and units of loads, motions and initial data"
@@ -50,11 +52,12 @@ class Steps:
     def _row(self, state: State, iterations: int = 0, certificate: float = 0.0, escalated: bool = False) -> Row:
         ground = self._problem.ground_acceleration(state.t)
         values = (state.t, state.k, int(iterations), certificate, int(escalated), *ground.tolist())
-        return dict(zip(self.columns(), values, strict=True))
+        return dict(zip(self._names, values, strict=True))
 
     def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
         """Return the initial row: no iterations and no certificate were needed, so zeros."""
         self._problem, self._axes = problem, AXES[: problem.system.influence.shape[1]]
+        self._names = tuple(self.columns())
         return self._row(state)
 
     def row(self, report: Report) -> Row:
@@ -99,18 +102,19 @@ class Energy:
         return self._row()
 
     def _row(self) -> Row:
-        return {"energy_kinetic": self._now.kinetic, "energy_strain": self._now.strain} | self._sums
+        return {"energy_kinetic": self._now.kinetic, "energy_strain": self._now.strain, **self._sums}
 
     @np.errstate(over="ignore", invalid="ignore")  # what overflows is told by refuse_overflow
     def row(self, report: Report) -> Row:
         system, new = self._problem.equations, report.new
         free = energies(system, new.u, report.v_minus)
-        before_impact = replace(new, v=report.v_minus)
+        before_impact = new if new.v is report.v_minus else new.with_velocity(report.v_minus)
         step = energy_balance(self._problem, report.old, before_impact, report.balance, before=self._now, after=free)
         self._now = free
         if new.v is not report.v_minus:  # the impact law changed it; displacements do not jump
-            momentum = system.M @ new.v
-            self._now = replace(free, momentum=momentum, kinetic=0.5 * system.algebra.dot(new.v, momentum))
+            momentum = system.product("M", new.v)
+            kinetic = 0.5 * system.algebra.dot(new.v, momentum)
+            self._now = Energies(momentum, free.elastic, kinetic, free.strain)
         impact = free.kinetic - self._now.kinetic
         losses = (step.input, step.damping, step.contact, step.friction, impact, step.algorithmic, step.defect)
         for term, loss in zip(self._SUMS, losses, strict=True):
@@ -168,6 +172,7 @@ class Contact:
         surface, self._problem, self._frictional = problem.surface, problem, problem.frictional
         self._axes = AXES[: surface.points.shape[1]]
         self._weight = total(surface.comm, surface.weights.sum())
+        self._numbers = [name for name in self.columns() if name not in self._ARRAYS]
         return self._row(state)
 
     def row(self, report: Report) -> Row:
@@ -176,38 +181,42 @@ class Contact:
     def _row(self, state: State) -> Row:
         surface, d, r_n = self._problem.surface, len(self._axes), state.r_n
         gap = surface.gap(state.t) - surface.normal_values(state.u) + surface.compliance * r_n
-        pressure, (traction, slip) = r_n / surface.weights, self._rubbing(state)
+        pressure, rubbing = r_n / surface.weights, self._rubbing(state) if self._frictional else ()
         sums = [surface.weights[state.active].sum(), state.active.sum(), r_n.sum()]
         sums += [*(r_n @ surface.normals), *(r_n @ surface.points)]
         closed, count, resultant, *vectors = surface.comm.sum(np.array(sums, dtype=float)).tolist()
         force, place = [0.0 - one for one in vectors[:d]], vectors[d:]  # not -one: no negative zeros
-        depth, highest, farthest = self._largest(gap, pressure, slip)
+        depth, highest, *farthest = self._largest(gap, pressure, *rubbing[1:])
         values = [
             1.0 - closed / self._weight if self._weight else 1.0, int(count), resultant, *force,
             *(one / resultant if resultant else np.nan for one in place), -depth, highest,
         ]
-        values += [*self._friction_force(state), farthest] if self._frictional else []
-        row = dict(zip((name for name in self.columns() if name not in self._ARRAYS), values, strict=True))
-        return row | (self._whole(pressure, gap, state.active, traction, slip) if self.arrays else {})
+        values += [*self._friction_force(state), *farthest] if self._frictional else []
+        row = dict(zip(self._numbers, values, strict=True))
+        return row | (self._whole(pressure, gap, state.active, *rubbing) if self.arrays else {})
 
     def _whole(self, *each: Any) -> dict[str, Any]:
         """The arrays of all conditions on rank 0, by one message of each rank."""
+        if self._problem.surface.comm.size == 1:
+            return dict(zip(self._ARRAYS, each, strict=False))
         found = self._problem.surface.on_first(np.column_stack(each))
         rubbing = np.hsplit(found[:, 3:], 2) if self._frictional else ()
         parts = found[:, 0], found[:, 1], found[:, 2] > 0.0, *rubbing
         return {name: part.copy() for name, part in zip(self._ARRAYS, parts, strict=False)}
 
-    def _largest(self, gap: Array, pressure: Array, slip: Array) -> list[float]:
+    def _largest(self, gap: Array, pressure: Array, *slip: Array) -> list[float]:
         """The largest depth, pressure and slip of all conditions; nan without any."""
         if not self._problem.surface.total:
-            return [np.nan, np.nan, np.nan]
-        tops = [-gap.min(), pressure.max(), np.linalg.norm(slip, axis=1).max()] if len(gap) else [-np.inf] * 3
+            return [np.nan] * (2 + len(slip))
+        some = len(gap) > 0
+        tops = [-gap.min(), pressure.max()] if some else [-np.inf] * 2
+        tops += [np.linalg.norm(one, axis=1).max() if some else -np.inf for one in slip]
         return self._problem.surface.comm.max(np.array(tops)).tolist()
 
     def _rubbing(self, state: State) -> tuple[Array, Array]:
-        """Tangential tractions and slips (m, d - 1); (m, 0) without friction."""
+        """Tangential tractions and slips (m, d - 1)."""
         surface = self._problem.surface
-        slip = surface.slip(state.u, state.t) if self._frictional else np.zeros((surface.count, 0))
+        slip = surface.slip(state.u, state.t)
         return (np.zeros_like(slip) if state.r_t is None else state.r_t / surface.weights[:, None]), slip
 
     def _friction_force(self, state: State) -> list[float]:

@@ -7,7 +7,7 @@ import time
 from collections import deque
 from collections.abc import Mapping, Sequence
 from contextlib import closing, suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from signal import Signals
 from typing import Any, Protocol
@@ -139,7 +139,7 @@ class Session:
                 self.dt, self.halved = loop.dt, loop.halved
                 worst = max(worst, report.certificate.worst)
                 if loop.ended:
-                    self.place = replace(place, state=state, base=loop.base, halved=loop.halved)
+                    self.place = RestartPoint(state, place.t_start, place.k_start, loop.base, loop.halved)
                     writer.frame(report, self.place.number)
                     if self.place.number % self.checkpoint_every == 0 or self.wall_time.unsure:
                         self._checkpoint(writer)
@@ -171,11 +171,10 @@ class Session:
             log.warning("step %d, t = %.6g s: escalated to %s", state.k, state.t, report.result.method)
         row: dict[str, Any] = {}
         for recorder in self.recorders:
-            row |= recorder.row(report)
+            row.update(recorder.row(report))
         self.table.check(row)
         refuse_overflow(row)
         writer.append(row)
-        self.table.append(row)  # after the disk: a checkpoint never knows a step that history.csv does not
         self.last = report
 
     def _measure(self) -> None:
@@ -196,6 +195,8 @@ class Session:
 
     def _rescue(self, writer: Writer, status: str, reason: str, seconds: float) -> None:
         """Save what there is. A checkpoint of the last base step only on one rank: others might not come."""
+        with suppress(Exception):
+            writer.flush(alone=True)
         with suppress(Exception):
             if self._comm.size == 1:
                 self._checkpoint(writer)

@@ -64,10 +64,12 @@ class RestartPoint:
 
 
 def write_checkpoint(
-    folder: Path, problem: ContactProblem, place: RestartPoint, *, of: Mapping[str, Any], rows: str = ""
+    folder: Path, problem: ContactProblem, place: RestartPoint, *, of: Mapping[str, Any], rows: str = "",
+    safe: bool = True,
 ) -> None:
     """Replace the checkpoint in the folder. ``of``: the "run", as ``identity`` sees it over a "span" of times [s];
-    ``rows``: checksum of the histories up to here. Collective; ViContactError on all ranks when the disk refuses it."""
+    ``rows``: checksum of the histories up to here; ``safe``: whether these are on the medium, and the checkpoint shall
+    be. Collective; ViContactError on all ranks when the disk refuses it."""
     state = place.state
     vectors, same = _split(problem, state)
     gathered = problem.system.algebra.comm.gather((problem.system.space.ids, vectors))
@@ -83,7 +85,7 @@ def write_checkpoint(
         arrays["about"] = np.array(about)
         buffer = io.BytesIO()
         np.savez(buffer, checksum=np.array(checksum(arrays)), **arrays)
-        write_atomically(folder / CHECKPOINT, buffer.getvalue())
+        write_atomically(folder / CHECKPOINT, buffer.getvalue(), safe=safe)
 
     on_root(problem.system.algebra.comm, write)
 

@@ -1,8 +1,9 @@
 """Keep the rows of a run in files from the step they were computed in; the memory need not hold them.
 
-``history.csv``      one line per step with all numbers, written through at once: a killed run loses nothing.
+``history.csv``      one line per step with all numbers, written at least once a second and before every checkpoint:
+                     a killed run loses no more.
 ``history.h5``       numbers and arrays with units as attributes, and the contact geometry; replaced as a whole
-                     at checkpoints, once it has grown by a quarter, and at the end.
+                     at checkpoints, every ten seconds if it has grown by a quarter, and at the end.
 ``history.journal``  the array columns of the steps since then (float64: k, then the arrays of the row).
 """
 
@@ -11,6 +12,7 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
+import time
 from collections.abc import Iterator, Mapping
 from contextlib import closing, suppress
 from pathlib import Path
@@ -20,14 +22,15 @@ import h5py
 import numpy as np
 
 from ...core.algebra import Array
-from ...core.files import hdf5_atomically, to_json, write_all, write_atomically
+from ...core.files import hdf5_atomically, push, to_json, write_all, write_atomically
 from ...core.step import Row
 from .folder import COLUMNS, FORMAT, HISTORY_CSV, HISTORY_H5, JOURNAL
-from .stored_rows import StoredArrays, StoredRows, line_of, read_blocks, record_of
+from .stored_rows import StoredArrays, StoredRows, lines_of, read_blocks, records_of
 from .table import Block, Table
 
 STRIDE = 2**20  # bytes that are copied at once
 GEOMETRY = {"points": "m", "normals": "-", "weights": "m²", "gap0": "m", "bilateral": "-"}  # of contact points, units
+PUSH, SAVE = 1.0, 10.0  # seconds after which rows are pushed onto the medium, and history.h5 is rewritten, again
 GROWTH = 1.25  # history.h5 is rewritten when it has grown by this factor: what is written stays in proportion
 
 
@@ -45,6 +48,7 @@ class HistoryFiles:
         self._rows = self._saved = self._tail = self._last = 0
         self._hash = hashlib.sha256()
         self._journal: Any = None
+        self._pushed = self._made = time.monotonic()
         columns = {name: {"unit": unit, "meaning": meaning} for name, (unit, meaning) in table.columns.items()}
         write_atomically(folder / COLUMNS, (to_json(columns) + "\n").encode())
         if stored is None:
@@ -73,15 +77,22 @@ class HistoryFiles:
         if self._table.arrays:
             self._journal = open(self._folder / JOURNAL, "wb", buffering=0)  # noqa: SIM115
 
-    def append(self, row: Row) -> None:
-        """Write a row onto the disk; a line that the disk has no room for is taken back as a whole."""
-        line, record = line_of(self._table, row), record_of(self._table, row) if self._table.arrays else b""
-        if record:
-            self._write(self._journal, record)
-        self._write(self._csv, line)
-        self._hash.update(line)
-        self._hash.update(record)
-        self._rows, self._last = self._rows + 1, int(row["k"])
+    def append(self, *rows: Row) -> None:
+        """Write rows onto the disk; those that it has no room for are taken back, all of them."""
+        lines, names = lines_of(self._table, rows), ("k", *self._table.arrays)
+        records = records_of(self._table, {name: np.array([row[name] for row in rows]) for name in names})
+        if self._journal is not None:
+            start = self._journal.tell()
+            self._write(self._journal, b"".join(records))
+        try:
+            self._write(self._csv, b"".join(lines))
+        except OSError:
+            if self._journal is not None:
+                _take_back(self._journal, start)
+            raise
+        for line, record in zip(lines, records, strict=True):
+            self._hash.update(line + record)
+        self._rows, self._last = self._rows + len(rows), int(rows[-1]["k"])
 
     def checksum(self, k: int) -> str:
         """Return the checksum of the rows up to step k, for its checkpoint; later ones are of a base step that is not
@@ -98,17 +109,22 @@ class HistoryFiles:
         try:
             write_all(file, data)
         except OSError as error:
-            with suppress(OSError):
-                file.truncate(start)
+            _take_back(file, start)
             raise OSError(error.errno, error.strerror, file.name) from error
 
-    def sync(self) -> None:
-        """Push rows onto the medium before a checkpoint relies on them; history.h5 when it has grown enough."""
-        os.fsync(self._csv.fileno())
-        if self._journal is not None:
-            os.fsync(self._journal.fileno())
-        if self._rows >= GROWTH * self._saved:
+    def sync(self) -> bool:
+        """Push rows onto the medium unless that was done a moment ago, history.h5 when it has grown enough; say whether
+        a checkpoint can rely on them even when the power fails."""
+        now = time.monotonic()
+        if now - self._pushed < PUSH:
+            return False
+        for file in filter(None, (self._csv, self._journal)):
+            os.fsync(file.fileno())
+        if now - self._made >= SAVE and self._rows >= GROWTH * self._saved:
             self.save()
+            self._made = time.monotonic()
+        self._pushed = time.monotonic()
+        return True
 
     def save(self) -> None:
         """Write history.h5 with all rows; the journal starts anew."""
@@ -148,12 +164,20 @@ class HistoryFiles:
     def close(self) -> None:
         """Write all rows into history.h5 and leave no journal; what cannot be written stays in the other files."""
         try:
+            push(self._folder / HISTORY_CSV)
             self.save()
         finally:
             for file in filter(None, (self._csv, self._journal)):
                 with suppress(OSError):
                     file.close()
         (self._folder / JOURNAL).unlink(missing_ok=True)
+
+
+def _take_back(file: Any, start: int) -> None:
+    """Cut off what was written last."""
+    with suppress(OSError):
+        file.truncate(start)
+        file.seek(start)
 
 
 def _copy(old: h5py.Dataset, new: h5py.Dataset, rows: int) -> None:

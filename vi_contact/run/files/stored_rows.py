@@ -7,7 +7,7 @@ checksum over lines and arrays, which the checkpoint keeps.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import closing, suppress
 from itertools import islice
 from pathlib import Path
@@ -23,16 +23,19 @@ from .folder import HISTORY_CSV, HISTORY_H5, JOURNAL, check_folder_format
 from .table import Block, Table
 
 
-def line_of(table: Table, row: Row) -> bytes:
-    """Return a line of history.csv: whole numbers stay whole, all others are floats that read back to the last bit."""
-    values = [row[name] for name in table.numbers]
-    return (",".join([repr(v if type(v) is int else float(v)) for v in values]) + "\n").encode()
+def lines_of(table: Table, rows: Sequence[Row]) -> list[bytes]:
+    """Return lines of history.csv: whole numbers stay whole, all others are floats that read back to the last bit."""
+    values = [[v if type(v) is int else float(v) for v in map(row.__getitem__, table.numbers)] for row in rows]
+    return [line + b"\n" for line in repr(values).replace(" ", "").encode()[2:-2].split(b"],[")]
 
 
-def record_of(table: Table, row: Row) -> bytes:
-    """Return the arrays of a row as the journal has them: float64, k first."""
-    arrays = [np.asarray(row[name], dtype=float).ravel() for name in table.arrays]
-    return np.concatenate([[float(row["k"])], *arrays]).tobytes()
+def records_of(table: Table, block: Block) -> list[bytes]:
+    """Return the arrays of rows as the journal has them: float64, k first; empty ones when there are none."""
+    n = len(block["k"])
+    if not table.arrays:
+        return [b""] * n
+    arrays = [np.asarray(block[name], dtype=float).reshape(n, -1) for name in ("k", *table.arrays)]
+    return [record.tobytes() for record in np.hstack(arrays)]
 
 
 class StoredRows:
@@ -58,11 +61,9 @@ class StoredRows:
                 raise InputError(f"'{path}' holds other columns than this run records: restart with the same recorders")
             self.length = len(header)
             for lines, block in read_blocks(csv, self._table, arrays, k=self.k):
-                for i, line in enumerate(lines):
+                for line, record in zip(lines, records_of(self._table, block), strict=True):
                     self.length += len(line)
-                    self.hash.update(line)
-                    if self._table.arrays:
-                        self.hash.update(record_of(self._table, {name: values[i] for name, values in block.items()}))
+                    self.hash.update(line + record)
                 yield block
             if self._checksum and self.hash.hexdigest() != self._checksum:
                 raise InputError(f"the histories in '{self.folder}' are not those of the checkpoint, a file of them is "

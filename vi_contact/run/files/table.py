@@ -48,6 +48,7 @@ class Table:
 
     def __init__(self, columns: Columns, first: Row, file: Path | None = None, comm: Comm | None = None) -> None:
         self.columns, self.first, self.file, self.count, self._comm = columns, first, file, 0, comm or SerialComm()
+        self._types: set[type] = set()
         self.check(first)
         self.numbers = [name for name in columns if not isinstance(first[name], np.ndarray)]
         arrays = [] if self._comm.rank else [name for name in columns if name not in self.numbers]
@@ -62,12 +63,15 @@ class Table:
     def check(self, row: Row) -> None:
         """Raise InputError for a row whose recorder, one of your own, fills other columns than it announced, or not
         with numbers."""
+        if row.keys() == self.columns.keys() and self._types.issuperset(map(type, row.values())):
+            return
         for name in sorted(row.keys() ^ self.columns.keys()):
             raise InputError(f"a recorder announces the column '{name}' without filling it, or the other way round: "
                              "let columns(), start() and row() name the same")
         for name, value in row.items():
             if not isinstance(value, int | float | np.generic | np.ndarray) or isinstance(value, np.str_):
                 raise InputError(f"column '{name}' is {shown(value)}: let its recorder return a number or an array")
+        self._types.update(map(type, row.values()))
 
     def append(self, row: Row) -> None:
         """Add one more row."""

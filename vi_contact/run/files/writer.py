@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import partial
@@ -11,18 +12,19 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ...core.algebra import Array
-from ...core.files import frames_of, on_root, to_json, write_atomically
+from ...core.algebra import Array, SerialComm, largest
+from ...core.files import frames_of, on_root, push, to_json, write_atomically
 from ...core.problem import ContactProblem
 from ...core.step import Report, Row, State
 from .checkpoint import RestartPoint, write_checkpoint
-from .folder import ABOUT, FORMAT, LOG, SUMMARY, clear, remove_litter
+from .folder import ABOUT, CHECKPOINT, FORMAT, LOG, SUMMARY, clear, remove_litter
 from .history import GEOMETRY, HistoryFiles
 from .log import RunLog, versions
 from .stored_rows import StoredRows, times_of
 from .table import Table
 
 log = logging.getLogger(__name__)
+LATEST = 0.5  # seconds that a row may wait, the next step included, if that takes as long as this one
 
 
 class OpenFields(Protocol):
@@ -60,6 +62,8 @@ class Writer:
         self._files: HistoryFiles | None = None
         self._log: RunLog | None = None
         self._saved = -1
+        self._waiting: list[Row] = []
+        self._taken = self._written = time.monotonic()
 
     @property
     def rest(self) -> str:
@@ -96,14 +100,28 @@ class Writer:
         write_atomically(folder / ABOUT, (to_json(about) + "\n").encode())
 
     def append(self, row: Row) -> None:
-        """Write a row of the histories onto the disk."""
-        if self._folder is not None:
-            on_root(self._comm, lambda: self._append(row))
+        """Take a row of the histories; it is written, with all that wait, when the next one might be late."""
+        if self._folder is None:
+            self._table.append(row)
+            return
+        self._waiting.append(row)
+        before, self._taken = self._taken, time.monotonic()
+        if largest(self._comm, 2.0 * self._taken - before - self._written > LATEST):
+            self.flush()
 
-    def _append(self, row: Row) -> None:
+    def flush(self, *, alone: bool = False) -> None:
+        """Write the rows that wait, and put them into the table: a checkpoint never knows one that the disk refused.
+        Collective, unless other ranks might not come (``alone``)."""
+        if self._waiting:
+            on_root(SerialComm() if alone else self._comm, self._flush)
+            for row in self._waiting:
+                self._table.append(row)
+            self._waiting, self._written = [], time.monotonic()
+
+    def _flush(self) -> None:
         if self._log is not None and self._files is not None:
             self._log.check()
-            self._files.append(row)
+            self._files.append(*self._waiting)
 
     def frame(self, report: Report, number: int) -> None:
         """Write a frame of the fields at the end of a base step, when one is due by its number."""
@@ -113,19 +131,19 @@ class Writer:
     def checkpoint(self, place: RestartPoint, of: Callable[[], Mapping[str, Any]]) -> None:
         """Write a checkpoint of this place, unless there is one already. ``of``: what problem it is."""
         k = place.state.k
+        self.flush()
         if self._folder is None or self._saved == k:
             return
-        checksum = on_root(self._comm, lambda: self._sync(k)) or ""
-        write_checkpoint(self._folder, self._problem, place, of=of(), rows=checksum)
+        checksum, safe = self._comm.bcast(on_root(self._comm, lambda: self._sync(k)))
+        write_checkpoint(self._folder, self._problem, place, of=of(), rows=checksum, safe=safe)
         self._saved = k
         if self._comm.rank == 0:
             log.info("checkpoint of step %d", k)
 
-    def _sync(self, k: int) -> str:
+    def _sync(self, k: int) -> tuple[str, bool]:
         if self._files is None:
-            return ""
-        self._files.sync()
-        return self._files.checksum(k)
+            return "", True
+        return self._files.checksum(k), self._files.sync()
 
     def close(self, facts: Mapping[str, Any]) -> None:
         """Write the last version of every file."""
@@ -147,6 +165,7 @@ class Writer:
             finally:
                 if self._files is not None:
                     self._files.close()
+                push(self._folder / CHECKPOINT)
             if self._log is not None:
                 self._log.check()
         finally:
