@@ -100,14 +100,13 @@ def test_V12_energy_after_five_periods():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("projected", [True, False])
 @pytest.mark.parametrize("courant", [1.0, 0.5, 0.1])
 @pytest.mark.parametrize("name", BARS)
-def test_V95_energy_never_rises(name, courant, projected):
-    """V9.5, V9.1, V9.7: no step gains 1e-11 E0 under constant load, every ledger closes, nothing penetrates."""
+def test_V95_energy_never_rises(name, courant):
+    """V9.5, V9.7: no step gains 1e-11 E0 under constant load, every ledger closes, nothing penetrates. (Kane's form is
+    the midpoint rule step by step, see above; the energy of that one: V9.1 in its own file.)"""
     body, rate, steps, E0 = BARS[name]
-    scheme = ContactStabilisedNewmark(projected)
-    found = course(body(25, **MASS), scheme, dt=courant / rate, steps=round(steps / courant))
+    found = course(body(25, **MASS), STABILISED, dt=courant / rate, steps=round(steps / courant))
     assert found.rise <= 1e-11 * E0
     assert abs(found.defect) <= 1e-10 * found.largest
     assert found.min_gap >= -1e-12

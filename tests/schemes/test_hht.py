@@ -43,13 +43,13 @@ def test_alpha_zero_is_newmark() -> None:
 
 @pytest.mark.slow
 def test_V92_mass_at_the_contact() -> None:
-    """V1.3, four bounces, Courant number one: no gain on consistent mass; with a dt that resolves the highest frequency
-    (Courant number 0.1) the energy multiplies. On redistributed mass neither (V9.4)."""
+    """V1.3, four bounces at Courant number one: no gain on consistent mass; two with a dt that resolves the highest
+    frequency (Courant number 0.1): the energy multiplies. On redistributed mass neither (V9.4)."""
     for mass, courant, low, high in (
         (ConsistentMass(), 1.0, 0.94, 0.96), (Redistributed(), 1.0, 0.95, 0.965), (ConsistentMass(), 0.1, 2.0, 30.0),
-        (Redistributed(), 0.1, 0.975, 0.981),
+        (Redistributed(), 0.1, 0.977, 0.983),
     ):
         problem = period_three(50, mass=mass) if courant < 1.0 else period_three(100, mass=mass)
         dt = courant / problem.equations.rows
-        *_, last = run(problem, HHT(-0.1), dt=dt, steps=round(12 / dt))
+        *_, last = run(problem, HHT(-0.1), dt=dt, steps=round((12 if courant == 1.0 else 6) / dt))
         assert low < energy(problem, last.new) / 0.125 < high

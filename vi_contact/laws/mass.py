@@ -98,8 +98,8 @@ def _contact_unknowns(system: SemiDiscreteSystem, surface: ContactSurface, tange
     contact[surface.owned] = True
     massless = contact.copy()
     contact[surface.tangents[surface.tangents >= 0]] = True
-    if surface.coupling is not None:  # relative unknowns: nodes of both sides lose their inertia as a whole, for with
-        faced = system.algebra.entries(surface.coupling, np.flatnonzero(contact))  # mass on side 2 they would ring
+    if surface.coupling is not None:  # relative unknowns: nodes of both sides lose their inertia as a whole
+        faced = system.algebra.entries(surface.coupling, np.flatnonzero(contact))  # side 2, which would ring with mass
         contact[named(system, faced.indices)] = True
     return (contact.copy() if tangential or surface.coupling is not None else massless), contact
 
