@@ -63,9 +63,13 @@ class ContactProblem:
 
     @cached_property
     def turned(self) -> SemiDiscreteSystem:
-        """Return the system in the nodal frames, every body in its own unknowns."""
-        surface = self.surface
-        return self.system if surface.basis is None else self.system.in_basis(surface.basis, surface.dual)
+        """Return the system in the nodal frames, every body in its own unknowns: one for all problems on a surface."""
+        system, basis, dual = self.system, self.surface.basis, self.surface.dual
+        known: dict[Any, SemiDiscreteSystem] = system.cached("turned", dict)
+        if basis is not None and basis not in known:
+            known.clear()  # it takes as much memory as the system
+            known[basis] = system.in_basis(basis, dual)
+        return system if basis is None else known[basis]
 
     def _relative(self, system: SemiDiscreteSystem) -> SemiDiscreteSystem:
         return system if self.surface.coupling is None else system.in_relative(self.surface.coupling)

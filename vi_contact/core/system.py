@@ -154,7 +154,7 @@ class SemiDiscreteSystem:
     notes: tuple[str, ...] = ()
     absolute: bool = False
     companions: tuple[Companion, ...] = ()
-    _cache: dict[str, Any] = field(default_factory=dict, compare=False, repr=False)
+    _cache: dict[str, Any] = field(init=False, default_factory=dict, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         for name in ("M", "K") if self.C is None else ("M", "K", "C"):
@@ -215,7 +215,7 @@ class SemiDiscreteSystem:
 
     def changed(self, **values: Any) -> SemiDiscreteSystem:
         """Return the same system with other values of the attributes that are named, and no factor of the old one."""
-        return replace(self, **values, _cache={})
+        return replace(self, **values)
 
     def effective(self, *, m: float, c: float, k: float, shares: bool = False) -> EffectiveMatrix:
         """Return A = m M + c C + k K for all steps of one size; its factor is made when it is first needed.
@@ -254,36 +254,24 @@ class SemiDiscreteSystem:
 
         Initial values and influence vectors turn with T⁻¹: ``dual`` is T⁻ᵀ, T itself where it is orthogonal (None).
         """
-        turn, inverse = self.algebra.congruence, (T if dual is None else dual).transpose_apply
-        influence = np.column_stack([inverse(column) for column in self.influence.T])
-        return self.changed(
-            M=turn(T, self.M),
-            C=None if self.C is None else turn(T, self.C),
-            K=turn(T, self.K),
-            load=self.load.in_basis(T),
-            influence=influence,
-            base_mass=_columns(self.base_mass, T.transpose_apply),
-            u0=inverse(self.u0),
-            v0=inverse(self.v0),
-        )
+        return self._in_unknowns(T, (T if dual is None else dual).transpose_apply)
 
     def in_relative(self, R: Matrix) -> SemiDiscreteSystem:
         """Return the same system in the unknowns ǔ of û = R ǔ, in which contact points move relative to the other body.
 
         R = 1 + N with N N = 0 (nobody's partner is somebody's partner), so that R⁻¹ = 2 - R.
         """
+        return self._in_unknowns(R, lambda x: 2.0 * x - R @ x)
+
+    def _in_unknowns(self, T: Matrix, inverse: Callable[[Array], Array]) -> SemiDiscreteSystem:
         turn = self.algebra.congruence
-
-        def inverse(x: Array) -> Array:
-            return 2.0 * x - R @ x
-
         return self.changed(
-            M=turn(R, self.M),
-            C=None if self.C is None else turn(R, self.C),
-            K=turn(R, self.K),
-            load=self.load.in_basis(R),
-            influence=np.column_stack([inverse(column) for column in self.influence.T]),
-            base_mass=_columns(self.base_mass, R.transpose_apply),
+            M=turn(T, self.M),
+            C=None if self.C is None else turn(T, self.C),
+            K=turn(T, self.K),
+            load=self.load.in_basis(T),
+            influence=_columns(self.influence, inverse),
+            base_mass=_columns(self.base_mass, T.transpose_apply),
             u0=inverse(self.u0),
             v0=inverse(self.v0),
         )

@@ -15,7 +15,6 @@ from weakref import WeakSet
 
 import numpy as np
 import ufl
-from petsc4py import PETSc
 
 from ..core.algebra import Array, Mask, largest
 from ..core.errors import InputError
@@ -27,7 +26,7 @@ from .assembly_checks import check_body, check_boundaries, check_initial
 from .dashpots import BoundaryLoads, DashpotMatrix, Dashpots, describe_boundaries
 from .loads import ActingLoad, BodyForce, Prescribed, Traction, as_tuple, evaluate
 from .mesh import Cells, Facets
-from .petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc, triple_product
+from .petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc, give_back
 from .space import FemSpace
 from .ties import Tied
 
@@ -77,21 +76,22 @@ def assemble(
     space = FemSpace(mesh, tuple(Prescribed(facets) for facets in held) + moved, as_tuple(tied))
     forms = ElasticForms(space, cell_materials(mesh, material), section, damping)
     algebra = PetscAlgebra(mesh.comm)
-    mass, stiffness, damper = forms.matrices()
     absorbers = [DashpotMatrix(space, forms, one) for one in boundaries]
     acting = [one.dashpots.loads(one, forms) for one in absorbers]
-    dampers = [(1.0, PetscMatrix(one)) for one in (damper, *(one.mat for one in absorbers)) if one is not None]
-    damper = as_petsc(algebra.combine(dampers)).mat if dampers else None
-    load = assemble_loads(space, section, as_tuple(loads), (stiffness, damper, mass))
-
-    def reduced(full: Any) -> PetscMatrix:
-        return PetscMatrix(triple_product(full, space.selection))
-
-    rigid, M = _rigid(space), reduced(mass)
+    load = assemble_loads(space, section, as_tuple(loads))
+    rigid = _rigid(space)
+    K, pull = _reduced(forms.matrix("K"), space, 0)  # one after the other: each is large before it is reduced
+    dampers = ([forms.matrix("C")] if forms.damped else []) + [one.mat for one in absorbers]
+    terms = [(1.0, PetscMatrix(one)) for one in dampers]
+    damper = as_petsc(algebra.combine(terms)).mat if terms else None
+    C, viscous = _reduced(damper, space, 1) if terms else (None, ())
+    mass = forms.matrix("M")
+    momenta = _momenta(space, PetscMatrix(mass)) if base_inertia else []
+    M, inertial = _reduced(mass, space, 2)
+    load = replace(load, general=load.general + pull, viscous=viscous, inertial=inertial)
     system = SemiDiscreteSystem(
-        algebra=algebra, M=M, C=None if damper is None else reduced(damper), K=reduced(stiffness),
-        load=_with_boundaries(load, acting), influence=rigid,
-        base_mass=_base_mass(space, PetscMatrix(mass), M, rigid) if base_inertia else None,
+        algebra=algebra, M=M, C=C, K=K, load=_with_boundaries(load, acting), influence=rigid,
+        base_mass=np.column_stack([one - M @ r for one, r in zip(momenta, rigid.T, strict=True)]) if momenta else None,
         u0=_initial(space, "initial displacement", initial_displacement),
         v0=_initial(space, "initial velocity", initial_velocity),
         space=space, floating=floats(space), tied=space.tied_unknowns,
@@ -99,8 +99,8 @@ def assemble(
         companions=tuple(one for part in (*moved, *acting) for one in part.companions),
     )
     forms.own(system)
-    del mass, stiffness, damper, absorbers
-    PETSc.garbage_cleanup(M.mat.comm)  # matrices of all nodes, which PETSc keeps until it is asked on all ranks
+    del absorbers, dampers, terms, damper, mass
+    give_back(mesh.comm)
     return system
 
 
@@ -116,10 +116,20 @@ def _with_boundaries(load: Load, acting: Sequence[BoundaryLoads]) -> Load:
     return replace(load, general=load.general + elastic, viscous=load.viscous + viscous)
 
 
-def _base_mass(space: FemSpace, full: PetscMatrix, M: PetscMatrix, rigid: Array) -> Array:
-    """Pᵀ M_full r - M r_free for every direction: what accelerated prescribed nodes pull on the free ones."""
-    whole = [np.tile(direction, (len(space.nodes), 1)).ravel() for direction in np.eye(space.dimension)]
-    return np.column_stack([space.pull(full @ r) - M @ free for r, free in zip(whole, rigid.T, strict=True)])
+def _reduced(
+    full: Any, space: FemSpace, derivative: int
+) -> tuple[PetscMatrix, tuple[Callable[[float], Array], ...]]:
+    """(PᵀAP, the load of prescribed motions); the full matrix is destroyed."""
+    moves = any(condition.moves for condition in space.prescribed)
+    pull = (_prescribed_load(space, derivative, full),) if moves else ()
+    part = space.reduced(full)
+    full.destroy()
+    return PetscMatrix(part), pull
+
+
+def _momenta(space: FemSpace, full: PetscMatrix) -> list[Array]:
+    """Pᵀ M_full r for every direction: less M r, what accelerated prescribed nodes pull on the free ones."""
+    return [space.pull(full @ np.tile(direction, len(space.nodes))) for direction in np.eye(space.dimension)]
 
 
 class ElasticForms:
@@ -129,7 +139,10 @@ class ElasticForms:
         self.space, self.section = space, section
         cells = compat.cell_space(space.mesh)
         names = ("lame", "shear", "rho", "alpha_rho", "beta", "lame_out")
+        self.damped = any(any(damping.coefficients(material)) for _, material in materials)
         self.fields = {name: compat.function(cells) for name in names}
+        if not self.damped:
+            self.fields["alpha_rho"] = self.fields["beta"]  # zeros
         for indices, material in materials:
             lame, shear = section.elastic_constants(material)
             alpha, beta = damping.coefficients(material)
@@ -138,7 +151,6 @@ class ElasticForms:
             values = (lame, shear, material.rho, alpha * material.rho, beta, lame_out)
             for name, value in zip(names, values, strict=True):
                 self.fields[name].x.array[indices] = section.thickness * value if name != "beta" else value
-        self.damped = any(any(damping.coefficients(material)) for _, material in materials)
         self._matrices: dict[str, WeakSet[Any]] = {name: WeakSet() for name in ("M", "C", "K")}
 
     def own(self, system: SemiDiscreteSystem) -> None:
@@ -157,18 +169,15 @@ class ElasticForms:
         eps = ufl.sym(ufl.grad(u))
         return self.fields["lame"] * ufl.tr(eps) * ufl.Identity(self.space.dimension) + 2 * self.fields["shear"] * eps
 
-    def matrices(self) -> tuple[Any, Any, Any | None]:
-        """Assemble the full mass, stiffness and damping matrices (PETSc), before elimination."""
+    def matrix(self, name: str) -> Any:
+        """Assemble the full matrix M, K, or C of the materials (PETSc), before elimination."""
         u, v = ufl.TrialFunction(self.space.V), ufl.TestFunction(self.space.V)
-        mass = self.fields["rho"] * ufl.inner(u, v) * ufl.dx
-        stiffness = ufl.inner(self.stress(u), ufl.sym(ufl.grad(v))) * ufl.dx
-        M, K = (compat.assemble_matrix(compat.compile_form(form)) for form in (mass, stiffness))
-        if not self.damped:
-            return M, K, None
-        beta = self.fields["beta"]
-        damper = self.fields["alpha_rho"] * ufl.inner(u, v) * ufl.dx
-        damper += beta * ufl.inner(self.stress(u), ufl.sym(ufl.grad(v))) * ufl.dx
-        return M, K, compat.assemble_matrix(compat.compile_form(damper))
+        fields, inertia, stiffness = self.fields, ufl.inner(u, v), ufl.inner(self.stress(u), ufl.sym(ufl.grad(v)))
+        form = {
+            "M": fields["rho"] * inertia * ufl.dx, "K": stiffness * ufl.dx,
+            "C": fields["alpha_rho"] * inertia * ufl.dx + fields["beta"] * stiffness * ufl.dx,
+        }[name]
+        return compat.assemble_matrix(compat.compile_form(form))
 
 
 def cell_materials(mesh: Any, material: Materials) -> list[tuple[Any, LinearElastic]]:
@@ -191,13 +200,11 @@ def cell_materials(mesh: Any, material: Materials) -> list[tuple[Any, LinearElas
     return [(cells.indices, one) for cells, one in material]
 
 
-def assemble_loads(space: FemSpace, section: Section, loads: tuple[Any, ...], full: tuple[Any, Any, Any]) -> Load:
-    """Assemble f(t) on the free unknowns: tractions, body forces and the pull of prescribed motions."""
+def assemble_loads(space: FemSpace, section: Section, loads: tuple[Any, ...]) -> Load:
+    """Assemble f(t) on the free unknowns: tractions and body forces."""
     constant = np.zeros(len(space.ids))
     separable: list[tuple[Array, Callable[[float], float]]] = []
     general: list[Callable[[float], Array]] = []
-    viscous: list[Callable[[float], Array]] = []
-    inertial: list[Callable[[float], Array]] = []
     for load in loads:
         integrate = _integrator(space, section, load)
         name = type(load).__name__
@@ -207,13 +214,7 @@ def assemble_loads(space: FemSpace, section: Section, loads: tuple[Any, ...], fu
             constant += integrate(evaluate(name, load.value, space.points, 0.0, space.comm))
         else:
             general.append(_field_load(space, name, load.value, integrate))
-    if any(condition.moves for condition in space.prescribed):
-        stiffness, damper, mass = full
-        general.append(_prescribed_load(space, 0, stiffness))
-        inertial.append(_prescribed_load(space, 2, mass))
-        if damper is not None:
-            viscous.append(_prescribed_load(space, 1, damper))
-    return Load(constant, tuple(separable), tuple(general), tuple(viscous), tuple(inertial))
+    return Load(constant, tuple(separable), tuple(general))
 
 
 def _field_load(
@@ -236,8 +237,8 @@ def _integrator(space: FemSpace, section: Section, load: ActingLoad) -> Callable
 
 def _prescribed_load(space: FemSpace, derivative: int, full: Any) -> Callable[[float], Array]:
     """A part of -Pᵀ(K U + C U' + M U''): that of a derivative and its matrix."""
-    matrix = PetscMatrix(full)
-    return lambda t: -space.pull(matrix @ space.prescribed_values(t, derivative))
+    matrix, held = PetscMatrix(space.held_columns(full)), space.held.ravel()
+    return lambda t: -space.pull(matrix @ space.prescribed_values(t, derivative)[held])
 
 
 def _initial(space: FemSpace, name: str, value: Initial) -> Array:

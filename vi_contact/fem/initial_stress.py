@@ -25,7 +25,7 @@ from ..core.state_checks import check_problem_given, check_sizes
 from ..core.step import State
 from ..core.system import Load, SemiDiscreteSystem
 from . import compat
-from .petsc_algebra import PetscMatrix, triple_product
+from .petsc_algebra import PetscMatrix
 from .space import FemSpace, known_matrices, space_of
 
 
@@ -49,7 +49,7 @@ def geometric_stiffness(problem: ContactProblem, state: State) -> SemiDiscreteSy
     known_matrices("geometric_stiffness", system, "K")
     u0 = problem.cartesian(state.u)
     full = initial_stress_matrix(space, space.expand(u0, state.t))
-    reduced = PetscMatrix(triple_product(full, space.selection))
+    reduced = PetscMatrix(space.reduced(full))
     load = replace(system.load, constant=system.load.constant + reduced @ u0)
     if any(condition.moves for condition in space.prescribed):
         load = _with_prescribed(space, PetscMatrix(full), load, state.t)

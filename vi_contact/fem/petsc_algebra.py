@@ -12,6 +12,7 @@ from petsc4py import PETSc
 
 from ..core.algebra import Array, Factor, Indices, Mask, Matrix, identity_with, total
 from ..core.errors import InputError
+from ..core.stages import trim
 
 PREFIX = "vi_contact_factor_"
 OWN_FACTOR = {
@@ -205,8 +206,7 @@ class PetscAlgebra:
 
     def combine(self, terms: Sequence[tuple[float, Matrix]]) -> Matrix:
         total = None
-        for _, matrix in terms[:1]:
-            PETSc.garbage_cleanup(as_petsc(matrix).mat.comm)
+        give_back(self.comm.mpi)
         for factor, matrix in terms:
             mat = as_petsc(matrix).mat
             if total is None:
@@ -275,15 +275,18 @@ class PetscAlgebra:
 
 
 def triple_product(K: Any, P: Any) -> Any:
-    """Return PᵀKP of PETSc matrices. What PETSc makes holds K and P for as long as it lives; a copy of it does not.
-
-    Matrices that nobody holds any more are freed here: PETSc keeps them until all ranks ask it to.
-    """
-    PETSc.garbage_cleanup(K.comm)
+    """Return PᵀKP of PETSc matrices, a copy: what PETSc makes holds K and P for as long as it lives."""
+    give_back(K.comm)
     product = K.PtAP(P)
     made = product.duplicate(copy=True)
     product.destroy()
     return made
+
+
+def give_back(comm: Any) -> None:
+    """Free the PETSc objects that nobody holds any more: PETSc keeps them until all ranks ask it to. Collective."""
+    PETSc.garbage_cleanup(comm)
+    trim()
 
 
 def as_petsc(matrix: Matrix) -> PetscMatrix:

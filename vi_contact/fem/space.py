@@ -19,7 +19,7 @@ from . import compat
 from .groups import components_of
 from .loads import Prescribed, evaluate_here
 from .mesh import Facets, node_numbers
-from .petsc_algebra import MpiComm, PetscMatrix
+from .petsc_algebra import MpiComm, PetscMatrix, triple_product
 from .ties import PLACE_TOLERANCE, Pairs, Tied, paired
 
 
@@ -85,7 +85,6 @@ class FemSpace:
         nodes: original node numbers of the owned blocks; points: their coordinates (k, d).
         ids: rank-independent numbers of the free unknowns (node * d + component).
         unknowns: number of free unknowns on all ranks.
-        selection: P with u_full = P u_free + prescribed; ``pull`` is Pᵀ on forces.
     """
 
     def __init__(self, mesh: Any, prescribed: tuple[Prescribed, ...], tied: Sequence[Tied] = ()) -> None:
@@ -113,8 +112,7 @@ class FemSpace:
         self.ids: Indices = ids.ravel()[self.free]
         self.unknowns = int(total(self.comm, self.free.sum()))
         self.free_index: Indices = np.where(self.free, np.cumsum(self.free) - 1, -1)
-        self.selection = self._selection(pairs)
-        self._P = PetscMatrix(self.selection) if pairs else None
+        self._P = PetscMatrix(self._selection(pairs)) if pairs else None
         self.forms: Any = None  # the ElasticForms of the system made on it; stress output needs them
 
     @property
@@ -235,6 +233,19 @@ class FemSpace:
     def pull(self, force: Array) -> Array:
         """Pull back by Pᵀ: forces on all owned components -> on the free ones; tied nodes count at their partners."""
         return force[self.free] if self._P is None else self._P.transpose_apply(force)
+
+    def reduced(self, full: Any) -> Any:
+        """Reduce a PETSc matrix of all components to PᵀAP of the free ones. Collective."""
+        return triple_product(full, self._P.mat) if self._P is not None else self._columns(full, self.free, self.free)
+
+    def held_columns(self, full: Any) -> Any:
+        """Return the columns of prescribed components of a PETSc matrix of all. Collective."""
+        return self._columns(full, np.ones_like(self.free), self.held.ravel())
+
+    def _columns(self, full: Any, *chosen: Mask) -> Any:
+        first = full.getOwnershipRange()[0]
+        numbers = [(first + np.flatnonzero(mask)).astype(PETSc.IntType) for mask in chosen]
+        return full.createSubMatrix(*(PETSc.IS().createGeneral(one, comm=full.comm) for one in numbers))
 
     def restrict(self, full: Array) -> Array:
         """Restrict nodal values (owned nodes, d) to the free vector."""
