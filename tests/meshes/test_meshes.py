@@ -234,6 +234,12 @@ def test_every_number_of_a_shape_is_an_option(shape: str, capsys):
         assert field.name in ("corner", "deform") or f"--{field.name.replace('_', '-')} " in said.replace("]", " ")
 
 
+def test_a_script_of_the_source_tree_is_the_command_of_its_shape(tmp_path):
+    done = run(SOURCE_TREE / "meshes" / "wall.py", "--divisions", 2, 4, "-o", "wall.msh", cwd=tmp_path)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert len(arrays_from_file(tmp_path / "wall.msh").cells) == 8
+
+
 def test_meshes_explain_bad_input_in_one_line(tmp_path):
     for words, said in ((("wall", "--size", -1), "cell size -1.0 m must be positive and no larger than the wall's"),
                         (("block", "-o", "nowhere/block.msh"), "nowhere does not exist")):

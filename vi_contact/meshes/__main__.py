@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Sequence
 from dataclasses import MISSING, fields
 from pathlib import Path
 
@@ -35,10 +36,15 @@ def parser() -> argparse.ArgumentParser:
     return top
 
 
-if __name__ == "__main__":
-    given = vars(parser().parse_args())
+def main(words: Sequence[str]) -> None:
+    """Write the mesh that the words of a command ask for, or end with a sentence."""
+    given = vars(parser().parse_args(words))
     mesh, output = getattr(meshes, SHAPES[given.pop("shape")]), given.pop("output")
     try:
         write(mesh(**{name: tuple(x) if isinstance(x, list) else x for name, x in given.items()}), output)
     except InputError as error:
         sys.exit(str(error))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

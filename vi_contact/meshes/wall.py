@@ -6,8 +6,13 @@ defaults are the mesh of the published example: 8 x 12 cells, 40 boundary nodes 
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
+
+if not __package__:  # run as a file of the source tree, maybe not installed
+    sys.path[0] = str(Path(__file__).resolve().parents[2])
 
 from vi_contact.core.checks import MOST_CELLS, counted
 from vi_contact.core.errors import InputError
@@ -62,3 +67,9 @@ def _build_irregular(wall: WallMesh, gmsh: Any, size: float) -> None:
     if not wall.triangles:
         gmsh.model.mesh.setRecombine(2, surface)
     gmsh.model.mesh.generate(2)
+
+
+if __name__ == "__main__":  # python3 meshes/wall.py is python3 meshes wall
+    from vi_contact.meshes.__main__ import main
+
+    main([Path(__file__).stem, *sys.argv[1:]])
