@@ -6,7 +6,8 @@
 The wall of 8 x 12 cells, 216 unknowns, 11 contact points, harmonic motion, Zienkiewicz-Wood-Taylor step, impact rule.
 ``march`` yields certified steps; ``simulate`` also keeps energies, contact and a run folder. The bare loop below has
 right-hand side, substitutions, search of the contact set, certificate and impact rule, and no names. Processor time of
-the thread, the three timed in turn; set-up (assembly excluded) is in all of them.
+the thread, the three timed in turn; set-up (assembly excluded) is in all of them. Start-up is the processor time of
+``vi-contact run wall`` from command to first step, over that of importing scipy and dolfinx, each in its own process.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import subprocess
 import sys
 import tempfile
 import time
@@ -103,6 +105,33 @@ class Bare:
         return max(balance, -gap.min() / x_ref, -r.min() / r_ref, apart, np.abs(np.where(active, 0.0, r)).max() / r_ref)
 
 
+LIBRARIES = "import time, scipy, dolfinx; print(time.process_time())"
+FIRST_STEP = """
+import os, sys, time
+from importlib import import_module
+
+def told(*_, **__):
+    print(time.process_time(), flush=True)
+    os._exit(0)
+
+import_module("vi_contact.run.march").March._attempt = told  # imported by the command in any case
+from vi_contact.cli.entry import main
+main(["run", "wall", "--quiet", "--out", sys.argv[1]])
+"""
+
+
+def start_up(rounds: int) -> tuple[float, float]:
+    """Processor time [s] from command to first step, and that of importing the libraries; medians, caches warm."""
+    found: dict[str, list[float]] = {FIRST_STEP: [], LIBRARIES: []}
+    with tempfile.TemporaryDirectory() as folder:
+        for _ in range(rounds + 1):
+            for code, times in found.items():
+                command = [sys.executable, "-c", code, folder]
+                times.append(float(subprocess.run(command, capture_output=True, text=True, check=True).stdout))
+    first, libraries = (float(np.median(times[1:])) for times in found.values())
+    return first, libraries
+
+
 def spent(work: Callable[[], Any]) -> tuple[float, Any]:
     """(processor time [s], result)."""
     begin = time.thread_time()
@@ -159,6 +188,9 @@ def main() -> None:
         print(f"{row['unknowns']:>8} {row['points']:>6}  {row['method']:<9} {row['ratio_median']:>6.2f} "
               f"{row['ratio_mean']:>6.2f} {1e6 * row['seconds_per_step']:>8.0f} "
               f"{1e6 * row['bare_seconds_per_step']:>8.0f} {row['certificate']:>11.1e}")
+    first, libraries = start_up(options.rounds)
+    print(f"start-up: {first:.2f} s to the first step, {first / libraries:.2f} times scipy and dolfinx")
+    rows.append({"method": "start-up", "seconds": first, "ratio_median": first / libraries})
     if options.json:
         options.json.write_text(json.dumps(rows, indent=2) + "\n", encoding="utf-8")
 
