@@ -28,12 +28,10 @@ _REFUSED = (errno.EACCES, errno.EPERM, errno.EROFS)
 
 def frames_of(folder: Path) -> dict[int, tuple[Path, str]]:
     """Return where the frames of an XDMF series in a run folder are: step -> (HDF5 file, group in it)."""
-    import h5py
-
     single = [path for path in (folder / FIELDS).glob("frame_*.h5") if path.stem[6:].isdecimal()]
     found = {int(path.stem[6:]): (path, "/") for path in single}
     for path in (folder / FIELDS).glob("frames_*.h5"):
-        with h5py.File(path, "r") as file:
+        with open_hdf5(path) as file:
             found |= {int(name): (path, f"/{name}") for name in file}
     return found
 
@@ -138,6 +136,13 @@ def _whole_or_not_at_all(path: Path, safe: bool = True) -> Iterator[Any]:
         with suppress(OSError):
             temporary.unlink(missing_ok=True)
         raise OSError(error.errno, error.strerror or str(error), str(path)) from error
+
+
+def open_hdf5(path: Path) -> Any:
+    """Open an HDF5 file to be read."""
+    import h5py  # late: no step needs it
+
+    return h5py.File(path, "r")
 
 
 def hdf5_atomically(path: Path, fill: Callable[[Any], None]) -> None:

@@ -224,7 +224,7 @@ class Session:
     def _facts(self, status: str, reason: str, seconds: float) -> dict[str, Any]:
         """The content of summary.json."""
         return (
-            {"status": status, "reason": reason, "versions": versions()}
+            {"status": status, "reason": reason, "versions": versions("h5py")}
             | self.settings()
             | {"restarted_from_step": self.resumed_from}
             | self.table.facts()

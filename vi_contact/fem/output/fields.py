@@ -15,13 +15,12 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 import ufl
 
 from ...core.algebra import Array, Indices, Mask, on_first
 from ...core.checks import attributes
-from ...core.files import FIELDS, FIELDS_INDEX, frames_of, hdf5_atomically, on_root, write_atomically
+from ...core.files import FIELDS, FIELDS_INDEX, frames_of, hdf5_atomically, on_root, open_hdf5, write_atomically
 from ...core.problem import ContactProblem
 from ...core.step import Report, State
 from .. import compat
@@ -109,7 +108,7 @@ class FrameWriter:
         folder = self._folder / FIELDS
         folder.mkdir(exist_ok=True)
 
-        def fill(file: h5py.File) -> None:
+        def fill(file: Any) -> None:
             file["points"], file["cells"] = points, cells
 
         hdf5_atomically(folder / "mesh.h5", fill)
@@ -125,10 +124,10 @@ class FrameWriter:
     def _collect(self, target: Path, steps: Sequence[int]) -> None:
         """Put these frames into one file, in the place of the one that has this name."""
 
-        def fill(file: h5py.File) -> None:
+        def fill(file: Any) -> None:
             for k in steps:
                 path, group = self._places[k]
-                with h5py.File(path, "r") as one:
+                with open_hdf5(path) as one:
                     one.copy(group, file, name=f"{k:06d}")
 
         hdf5_atomically(target, fill)
@@ -176,7 +175,7 @@ class FrameWriter:
     def _write(self, state: State, vectors: Array, stress: Array, contact: Array) -> None:
         pressure, status = self._contact(*contact.T)
 
-        def fill(file: h5py.File) -> None:
+        def fill(file: Any) -> None:
             for i, name in enumerate(self._names):
                 file[name] = vectors[:, 3 * i : 3 * i + 3]
             file["von_mises"], file["contact_pressure"], file["contact_status"] = stress, pressure, status

@@ -18,11 +18,10 @@ from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 
 from ...core.algebra import Array
-from ...core.files import hdf5_atomically, push, to_json, write_all, write_atomically
+from ...core.files import hdf5_atomically, open_hdf5, push, to_json, write_all, write_atomically
 from ...core.step import Row
 from .folder import COLUMNS, FORMAT, HISTORY_CSV, HISTORY_H5, JOURNAL
 from .stored_rows import StoredArrays, StoredRows, lines_of, read_blocks, records_of
@@ -140,7 +139,7 @@ class HistoryFiles:
         hdf5_atomically(self._folder / HISTORY_H5, lambda file: self._fill(file, blocks, kept))
         self._saved = self._rows
 
-    def _fill(self, file: h5py.File, blocks: Iterator[Block], kept: int) -> None:
+    def _fill(self, file: Any, blocks: Iterator[Block], kept: int) -> None:
         file.attrs["format"] = FORMAT
         found = {}
         for name, (unit, meaning) in self._table.columns.items():
@@ -150,7 +149,7 @@ class HistoryFiles:
             if sample.size:
                 found[name] = dataset
         if kept:
-            with h5py.File(self._folder / HISTORY_H5, "r") as old:
+            with open_hdf5(self._folder / HISTORY_H5) as old:
                 for name, dataset in found.items():
                     _copy(old[name], dataset, kept)
         for block in blocks:
@@ -180,7 +179,7 @@ def _take_back(file: Any, start: int) -> None:
         file.seek(start)
 
 
-def _copy(old: h5py.Dataset, new: h5py.Dataset, rows: int) -> None:
+def _copy(old: Any, new: Any, rows: int) -> None:
     """The first rows, a part of at most STRIDE bytes at a time."""
     step = max(1, STRIDE * rows // max(new.nbytes, 1))
     for i in range(0, rows, step):

@@ -8,6 +8,7 @@ import sys
 import time
 from contextlib import suppress
 from datetime import timedelta
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -60,8 +61,10 @@ class RunLog:
             self._file.close()
 
 
-def versions() -> dict[str, str]:
-    """Return the version of everything that computes in this process."""
+def versions(*needed: str) -> dict[str, str]:
+    """Return the version of everything that computes in this process, and of what else is needed to write."""
+    for name in needed:
+        import_module(name)
     names = [name for name in ("numpy", "scipy", "h5py", "petsc4py", "mpi4py", "dolfinx") if name in sys.modules]
     own = {"vi_contact": __version__, "python": platform.python_version()}
     return own | {name: str(sys.modules[name].__version__) for name in names}

@@ -13,11 +13,11 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 
 from ...core.algebra import Array
 from ...core.errors import InputError
+from ...core.files import open_hdf5
 from ...core.step import Row
 from .folder import HISTORY_CSV, HISTORY_H5, JOURNAL, check_folder_format
 from .table import Block, Table
@@ -121,7 +121,7 @@ class StoredArrays:
             shape = rows, width
             self._journal = np.memmap(path, dtype=float, mode="r", shape=shape) if rows else np.zeros(shape)
             with suppress(OSError):  # missing or damaged: the journal may still have all
-                self._file = h5py.File(self._path, "r")
+                self._file = open_hdf5(self._path)
 
     def close(self) -> None:
         """Close history.h5."""

@@ -8,12 +8,12 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 
 from ...core.algebra import Array, Comm, SerialComm
 from ...core.checks import shown
 from ...core.errors import InputError, ViContactError
+from ...core.files import open_hdf5
 from ...core.step import Columns, Row
 
 BLOCK = 256  # rows that are turned into columns together, or those of so many bytes of arrays:
@@ -153,7 +153,7 @@ class StoredHistory(Mapping[str, Array]):
         if self._stamp is None or self._now() != self._stamp:
             raise ViContactError(f"'{self._file}', where the histories of this run are, has been replaced or is not on "
                                  "this machine: give every run a folder of its own, on a shared disk")
-        with h5py.File(self._file, "r") as file:
+        with open_hdf5(self._file) as file:
             return np.asarray(file[name][()])
 
     def __iter__(self) -> Iterator[str]:
