@@ -8,7 +8,8 @@ A block of two layers, ten times stiffer above, on a wavy rigid plane: all of it
 default scheme at Courant numbers C = c_p dt / h of 1 and 10 after a common history at C = 10, the block thrown; and, at
 C = 100 and in statics, of a block at rest whose top is pushed down slowly. For the same steps the plain linear problem
 is solved too: same A, load, tolerance, preconditioner and guess, no contact. Times are processor time
-of the busiest rank; a product is one with A as AIJ, timed in the same run. ``peak_bytes`` counts set-up,
+of the busiest rank, ``flops`` its operations in a step, as PETSc counts them: how ranks share the work, whatever else
+the machine does. A product is one with A as AIJ, timed in the same run. ``peak_bytes`` counts set-up,
 ``bytes_per_unknown`` what there is while stepping (Linux), Python, mesh, M, K, and A included. Beside it, on small
 blocks, the condensed route.
 """
@@ -171,11 +172,11 @@ class Watched:
         return self
 
     def solve(self, step: Any) -> Any:
-        before, start = self.counts(), time.process_time()
+        before, operations, start = self.counts(), PETSc.Log.getFlops(), time.process_time()
         result = self.prepared.solve(step)
-        spent = busiest(time.process_time() - start)
+        spent, flops = busiest(time.process_time() - start), busiest(PETSc.Log.getFlops() - operations)
         counts = {key: value - before[key] for key, value in self.counts().items()}
-        self.rows.append({"seconds": spent, "iterations": result.iterations, **counts})
+        self.rows.append({"seconds": spent, "flops": flops, "iterations": result.iterations, **counts})
         self.last = [*self.last[-1:], step]
         return result
 
@@ -266,7 +267,7 @@ def row(
         "newton_steps": mean["iterations"] if given.mu else 0.0, "products": mean["products"] if own else None,
         "renewals": mean["renewals"], "largest_renewals": max(one["renewals"] for one in watched.rows),
         "cpu_products": mean["seconds"] / product, "setup_products": busiest(watched.setup) / product,
-        "seconds": mean["seconds"], "product_seconds": product,
+        "seconds": mean["seconds"], "flops": mean["flops"], "product_seconds": product,
         "over_linear": None if not linear else mean["linear_iterations"] / linear,
         "peak_bytes": resident, "bytes_per_unknown": resident / given.unknowns, "certificate": worst,
         "ranks": COMM.size,
@@ -304,7 +305,7 @@ def small_rows(steps: int) -> Iterator[dict[str, Any]]:
 
 SHOWN = ("unknowns", "points", "closed", "element", "courant", "mu", "method", "preconditioner", "iterations",
          "linear_iterations", "over_linear", "products", "renewals", "cpu_products", "setup_products", "seconds",
-         "bytes_per_unknown", "certificate")
+         "flops", "bytes_per_unknown", "certificate")
 
 
 def told(found: dict[str, Any]) -> str:
