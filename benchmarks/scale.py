@@ -60,9 +60,9 @@ def busiest(seconds: float) -> float:
 class Memory:
     """Largest resident memory of all ranks together since the last ``forget`` [bytes]; zero where it is not told."""
 
-    def forget(self) -> None:
+    def forget(self, comm: Any = COMM) -> None:
         gc.collect()
-        PETSc.garbage_cleanup(COMM)  # what nobody holds any more; PETSc frees it on all ranks together
+        PETSc.garbage_cleanup(comm)  # what nobody holds any more here; PETSc frees it on all ranks together
         with suppress(OSError):
             Path("/proc/self/clear_refs").write_text("5")
 
@@ -226,7 +226,7 @@ def dynamic(given: Block, state: vc.State | None, courant: float, solver: Any, s
         closed.append(float(COMM.allreduce(int(report.new.active.sum()))))
         if len(closed) == warm:
             watched.rows.clear()
-            MEMORY.forget()
+            MEMORY.forget(given.problem.system.algebra.comm.mpi)  # the mesh has one of its own
     return row(given, watched, courant, worst, float(np.mean(closed[warm:])), report.step.A)
 
 
