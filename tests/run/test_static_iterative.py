@@ -55,7 +55,7 @@ PROBLEMS: dict[str, tuple[Callable[[], vc.ContactProblem], int]] = {  # name -> 
     "stack in space": (lambda: stack(3), 770),
     "channel": (channel, 3800),
     "pushed and rubbing": (lambda: replace(standing(push=1e3, **SPACE), friction=vc.Coulomb(0.5)), 900),
-    "channel that rubs": (lambda: replace(channel(), friction=vc.Coulomb(0.5)), 25_000),
+    "channel that rubs": (lambda: replace(channel(), friction=vc.Coulomb(0.5)), 8000),
 }
 
 
@@ -82,9 +82,8 @@ def test_as_with_a_factor(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     assert np.array_equal(found.active, exact.active)
     if found.r_t is not None and exact.r_t is not None:
         assert max_over_ranks(COMM, found.r_t - exact.r_t) <= 1e-9 * max_over_ranks(COMM, exact.r_n)
-    prepared = Watched.prepared  # with friction GMRES may stagnate on weak springs, and then gets stronger ones
-    assert len(prepared) <= 1 + problem.frictional and all(one.kind == "gamg" for one in prepared)
-    assert sum(one.work.linear_iterations for one in prepared) <= most
+    (prepared,) = Watched.prepared
+    assert prepared.kind == "gamg" and prepared.work.linear_iterations <= most
 
 
 @pytest.mark.parametrize("kind", ["jacobi", "icc"])

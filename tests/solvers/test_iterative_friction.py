@@ -25,7 +25,6 @@ from vi_contact.solvers import Iterative
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.volume.route import ReducedNewton, Volume
 
-CLOSE = 3e-11
 NAMES = ["coulomb", "coulomb field", "tresca", "tresca field", "slip rate"]
 
 
@@ -37,7 +36,7 @@ def parallel(request: pytest.FixtureRequest) -> Iterator[bool]:
 
 
 def prepared(c: Case, kind: str = "icc", **settings: Any) -> Any:
-    return Iterative(kind, tolerance=CLOSE, **settings).prepare(c.step.A, c.step.surface, c.step.scale)
+    return Iterative(kind, **settings).prepare(c.step.A, c.step.surface, c.step.scale)
 
 
 def solve(c: Case, solver: Any = None) -> StepResult:
@@ -49,7 +48,7 @@ def solve(c: Case, solver: Any = None) -> StepResult:
 def sound(c: Case, result: StepResult) -> None:
     """The certificate with room; cone and dissipation but for the last digits; what sticks is where it was."""
     certificate = kkt_residual(c.step, result)
-    assert certificate.worst <= 1.1 * CLOSE and certificate.cone <= 1e-14
+    assert certificate.worst <= 3.3e-10 and certificate.cone <= 1e-14
     slip = c.step.surface.tangential_values(result.x) - c.step.slip0
     limit = c.step.friction_at(slip).limit(result.r_n, c.step.surface.weights, c.step.scale)
     assert not np.any(slip[np.linalg.norm(result.r_t, axis=1) < 0.999 * limit])
@@ -114,7 +113,7 @@ def test_disks_agree_with_the_condensed_route(parallel: bool, kind: str, law: An
     seen = []
     for seed in range(5):
         c, _ = spatial(law, seed, parallel=parallel)
-        result = solve(c, Iterative(kind, tolerance=CLOSE))
+        result = solve(c, Iterative(kind))
         agree(c, result, solve(c, Condensed()))
         sound(c, result)
         assert result.iterations <= 12
@@ -221,7 +220,7 @@ def test_work_is_counted_and_a_warm_start_is_one(parallel: bool) -> None:
     assert work.newton_steps == result.iterations == len(result.history) - 1 > 1
     assert work.linear_iterations > work.newton_steps
     assert work.products <= work.linear_iterations + 2 * work.newton_steps + 1
-    assert result.history[-1] <= 0.5 * CLOSE and result.method == "Iterative(icc)" and result.aim == CLOSE
+    assert result.history[-1] <= 1.5e-10 and result.method == "Iterative(icc)" and result.aim == 3e-10
     before = work.linear_iterations
     again = solver.solve(c.starting_at(result))
     assert again.iterations == 0 and work.linear_iterations == before
@@ -256,7 +255,7 @@ def test_solvers_are_freed(parallel: bool) -> None:
         solver.solve(c.step)
         friction = solver._friction
         alive = [weakref.ref(part) for part in (solver, friction, friction.gmres)]
-        assert friction.ksp.getType() == "gmres"
+        assert friction.gmres.gmres.getType() == "gmres"
         del solver, friction
         assert [reference() for reference in alive] == [None] * len(alive)
     finally:

@@ -2,7 +2,8 @@
 
 PETSc sees the whole operator and a preconditioner that masks: directions have no part in held rows, so that iterates
 and inner products are those of the reduced system, and the residual that PETSc carries along is, in held rows, the
-reaction there. To look at the signs costs no product.
+reaction there. To look at the signs costs no product, and to go on from a known residual costs none either: PETSc
+solves for the correction.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from ..volume.snes import weakly
 from .operator import Operator
 from .preconditioners import Masked
 
-Watch = Callable[[int, Array, Array], int]
+Watch = Callable[[int, Array, Callable[[], Array]], int]
 SOLVED, WRONG_SIGNS = 3, 2  # of PETSc's reasons: below an absolute, a relative tolerance
 STAGNATED, NOT_A_NUMBER, INDEFINITE = -3, -9, -10  # too many iterations; not a number; indefinite matrix
 
@@ -36,25 +37,20 @@ class ConjugateGradients:
         self.ksp.setOperators(shell)
         self.ksp.setType("cg")
         self.ksp.setNormType(PETSc.KSP.NormType.NONE)  # the watch forms its own
-        self.ksp.setInitialGuessNonzero(True)
         self.ksp.setTolerances(max_it=np.iinfo(np.int32).max)
         self.ksp.setConvergenceTest(weakly(self._test))
         self.ksp.pc.setType("python")
         self.ksp.pc.setPythonContext(masked)
 
-    def solve(self, load: Array, x: Array, watch: Watch) -> tuple[Array, Array, int]:
-        """Return (x, residual, PETSc's reason) of where ``watch(iterations, residual, x)`` returned a reason."""
-        self._watch = watch
-        self._b.array[:] = load
-        self._x.array[:] = x
+    def solve(self, residual: Array, x: Array, watch: Watch) -> tuple[Array, Array, int]:
+        """Return (x, residual, PETSc's reason) of where ``watch(iterations, residual, x)`` returned a reason; its x is
+        a function. ``residual``: that of x, with which it begins."""
+        self._watch, self._start = watch, x
+        self._b.array[:] = residual
         self.ksp.solve(self._b, self._x)
         self._operator.work.linear_iterations += self.ksp.getIterationNumber()
-        return np.array(self._x.array_r), np.array(self._residual.array_r), int(self.ksp.getConvergedReason())
+        return x + self._x.array_r, np.array(self._residual.array_r), int(self.ksp.getConvergedReason())
 
     def _test(self, ksp: Any, iteration: int, _norm: float) -> int:
         ksp.buildResidual(self._residual)
-        return self._watch(iteration, self._residual.array_r, ksp.getSolution().array_r)
-
-    def destroy(self) -> None:
-        """Free the PETSc object; collective."""
-        self.ksp.destroy()
+        return self._watch(iteration, self._residual.array_r, lambda: self._start + ksp.getSolution().array_r)

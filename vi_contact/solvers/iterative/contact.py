@@ -78,8 +78,11 @@ class Contact:
 
     def reactions(self, x: Array, residual: Array) -> Array:
         """Return r_n of the closed conditions, zero of the others; ``residual``: load - (A + K_s) x."""
-        there = np.where(self.soft, self.k * (x[self.rows] - self.bound), residual[self.rows])
-        return np.where(self.closed, there, 0.0)
+        return np.where(self.soft, self.spring_forces(x), np.where(self.closed, residual[self.rows], 0.0))
+
+    def spring_forces(self, x: Array) -> Array:
+        """Return the forces of the closed springs, zero of all other conditions."""
+        return np.where(self.closed & self.soft, self.k * (x[self.rows] - self.bound), 0.0)
 
     def body_forces(self, x: Array, residual: Array, load: Array) -> float:
         """Return the largest |A x| on this rank, without the springs."""

@@ -8,8 +8,6 @@ reactions are put on their cone, and tangents that stick where they were.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ...core.algebra import Array, Comm, Mask, largest, max_abs
@@ -24,7 +22,7 @@ from .friction_krylov import Gmres, Held, Turned
 from .friction_laws import LawOfStep
 from .friction_states import Limits, States, Tangents
 from .layout import Layout
-from .measures import Measured
+from .measures import Measured, Worth
 from .operator import Operator
 from .preconditioners import Inverse
 
@@ -32,21 +30,12 @@ SHARE = 1e-2  # of the residual of a linear problem that GMRES may leave
 AHEAD = 0.1  # of what Newton's last step left: it leaves less and less
 ROUND = 1e-4  # of the largest friction limit: residual at which coefficients that are given are taken anew
 CIRCLES = 15  # Newton steps after which limits are given,
-GIVEN = 8  # for so many rounds at first, and twice as many every time after
+GIVEN, MOST_GIVEN = 8, 256  # for so many rounds at first, and twice as many every time after
 STEPS = 150  # of Newton
 
 
-@dataclass(frozen=True)
-class Reactions:
-    """Hold r_n (m,), r_t and slip (m, d - 1) of an answer."""
-
-    r_n: Array
-    r_t: Array
-    slip: Array
-
-
 class Friction:
-    """Solve steps with friction of one A. ``ksp``: PETSc's linear solver."""
+    """Solve steps with friction of one A. ``last``: r_n (m,), r_t and slip (m, d - 1) of the answer before."""
 
     def __init__(
         self, surface: ContactSurface, contact: Contact, layout: Layout, diagonal: Array, operator: Operator,
@@ -57,19 +46,16 @@ class Friction:
         self.inverse, self.tolerance, self.name = inverse, tolerance, name
         self.tangents = Tangents(surface, layout.places, diagonal)
         turned = Turned(inverse.pc, operator.blocks.createVecLeft(), self.tangents)
-        self.gmres = Gmres(operator, contact, turned, patience)
-        self.last: Reactions | None = None
-
-    @property
-    def ksp(self) -> object:
-        """Return PETSc's linear solver."""
-        return self.gmres.ksp
+        self.gmres = Gmres(self.comm, operator, contact, turned, patience)
+        self.last: tuple[Array, Array, Array] | None = None
+        self.worth = Worth(surface.comm, 3, tolerance)
 
     def solve(self, step: StepProblem) -> StepResult:
         """Return the step; StepFailure, on all ranks, with the history of residuals when there is no answer."""
         newton = Newton(self, step)
         while not newton.solved():
             newton.advance()
+        self.worth.keep()
         result, self.last = newton.answer()
         return result
 
@@ -94,16 +80,16 @@ class Newton:
     def _predicted(self) -> States:
         """The states of the last reactions and the predicted slip; without any, points stick where they touch."""
         of, slip = self.of, self._slip()
-        last = of.last
-        if last is None:
+        if of.last is None:
             none = np.zeros(len(slip))
             limits = self.law(np.zeros_like(slip), none, none)
             return States(of.tangents, limits, (none, of.tangents.c[:, None] * slip), slip,
                           stuck=of.contact.closed & (limits.slope > 0.0))
-        r_n = np.where(of.contact.closed, last.r_n, 0.0)
-        y_t = last.r_t + of.tangents.c[:, None] * slip
+        last_r_n, last_r_t, last_slip = of.last
+        r_n = np.where(of.contact.closed, last_r_n, 0.0)
+        y_t = last_r_t + of.tangents.c[:, None] * slip
         return States(of.tangents, self._limits(slip, r_n, y_t), (r_n, y_t), slip,
-                      stuck=of.contact.closed & ~np.any(last.slip, axis=1) & (last.r_n > 0.0))
+                      stuck=of.contact.closed & ~np.any(last_slip, axis=1) & (last_r_n > 0.0))
 
     def _slip(self) -> Array:
         """B_t x - slip0 (m, d - 1), zero where a tangent is prescribed."""
@@ -162,10 +148,10 @@ class Newton:
         self.history.append(self.error / force if 0.0 < force < np.inf else self.error)
         if not np.isfinite(self.error):
             raise self._stopped(*SAID[NOT_A_NUMBER])
-        small = self.error <= 0.5 * of.tolerance * force and not any_wrong
-        if small and self.law.settled:
+        self.goal = of.worth.goal(self.error, self.scales, self.x, self.r_n, self.r_t, begin=self.steps == 0)
+        if self.law.settled and self.error <= self.goal and not any_wrong:
             return True
-        if not self.law.settled and not any_wrong and self.error <= max(ROUND * limit, 0.5 * of.tolerance * force):
+        if not self.law.settled and not any_wrong and self.error <= max(ROUND * limit, self.goal):
             self.law.advance(self.slip, self.r_n)
             self.limits = self._limits(self.slip, self.r_n, self.r_t)
             return self.solved()
@@ -180,7 +166,7 @@ class Newton:
         """Give limits or coefficients for some rounds, from which Newton begins anew."""
         self.of.operator.work.fallbacks += self._rounds == GIVEN
         self.law.give(self._rounds, self.slip, self.r_n)
-        self._newton, self._rounds = 0, 2 * self._rounds
+        self._newton, self._rounds = 0, min(2 * self._rounds, MOST_GIVEN)
 
     def _wrong(self, error: float) -> Mask:
         """Conditions whose signs are wrong by more than the error of the residual."""
@@ -196,7 +182,7 @@ class Newton:
         residual[rows] = of.tangents.flat(self.states.residual(self.r_n, self.r_t, self.slip)) * of.gmres.free[rows]
         last = self.history[-2:]
         share = min(SHARE, AHEAD * last[1] / last[0]) if last[0] > 0.0 and len(last) > 1 else SHARE
-        dx, left, reason = of.gmres.solve(residual, share, 0.2 * of.tolerance * self.scales.force)
+        dx, left, reason = of.gmres.solve(residual, share, 0.5 * self.goal)
         if reason < 0:
             raise self._stopped(*SAID.get(reason, ("GMRES broke down", OTHER)))
         of.operator.work.newton_steps += 1
@@ -208,7 +194,7 @@ class Newton:
     def _next(self, error: float) -> tuple[States, Mask]:
         """The states at x, and the conditions that close or open with them."""
         of, contact = self.of, self.of.contact
-        wrong = self._wrong(0.0 if error <= 0.5 * of.tolerance * self.scales.force else error)
+        wrong = self._wrong(0.0 if error <= self.goal else error)
         stiffness = np.where(contact.soft, contact.k, contact.diagonal)
         pressed = stiffness * (self.x[contact.rows] - contact.bound)
         y_n = np.where(wrong, np.where(contact.closed, 0.0, pressed), self.r_n)
@@ -217,7 +203,7 @@ class Newton:
         limits = self._limits(self.slip, y_n, y_t)
         return States(of.tangents, limits, (y_n, y_t), self.slip, before=self.states), wrong
 
-    def answer(self) -> tuple[StepResult, Reactions]:
+    def answer(self) -> tuple[StepResult, tuple[Array, Array, Array]]:
         """Return the result, and what the next step begins with."""
         of, contact = self.of, self.of.contact
         pulls = ~contact.bilateral & (self.r_n < 0.0)
@@ -234,7 +220,7 @@ class Newton:
             x=x, r_n=self.r_n, active=contact.closed.copy(), iterations=self.steps, method=of.name, r_t=r_t,
             history=tuple(self.history), aim=of.tolerance,
         )
-        return result, Reactions(self.r_n, r_t, slip)
+        return result, (self.r_n, r_t, slip)
 
     def _stopped(self, words: str, remedy: str) -> StepFailure:
         """The failure, with the history of residuals."""

@@ -1,4 +1,5 @@
-"""Solve the linear problem of given friction states by PETSc's GMRES: it is not symmetric where points slip.
+"""Solve the linear problem of given friction states by PETSc's GMRES: it is not symmetric where points slip. Where none
+does, conjugate gradients serve, which do not stagnate on weak springs.
 
 The preconditioner is that of the frictionless step, made once: w W M⁻¹ W w, with zeros in w for closed normals and
 sticking tangents, and in the tangent plane of a point that slips
@@ -16,7 +17,7 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from ...core.algebra import Array, Indices
+from ...core.algebra import Array, Comm, Indices, largest
 from .conjugate_gradients import SOLVED, STAGNATED
 from .contact import Contact
 from .friction_states import States, Tangents, dot
@@ -25,6 +26,7 @@ from .preconditioners import Masked
 
 RESTART = 60
 LEFT = 0.5  # g over c
+SPREAD = 3.0  # a residual is a norm of rows, at most so many times the largest: the last ones are less spread
 FALL = 0.1  # of the residual that is no stagnation
 
 
@@ -78,29 +80,31 @@ class Linearised:
 
 
 class Gmres:
-    """Run PETSc's KSP ``gmres``, preconditioned from the right; ``ksp`` is the PETSc object."""
+    """Run PETSc's KSP ``gmres``, preconditioned from the right, or ``cg`` where no point slips."""
 
-    def __init__(self, operator: Operator, contact: Contact, turned: Turned, patience: int) -> None:
-        self._operator, self._turned, self._contact = operator, turned, contact
+    def __init__(self, comm: Comm, operator: Operator, contact: Contact, turned: Turned, patience: int) -> None:
+        self._comm, self._operator, self._turned, self._contact = comm, operator, turned, contact
         self._linearised = Linearised(operator, contact)
         shell = PETSc.Mat().createPython(operator.blocks.getSizes(), self._linearised, comm=operator.blocks.comm)
         shell.setUp()
         self._b, self._x = shell.createVecs()
         self._patience = patience
-        self.ksp = PETSc.KSP().create(shell.comm)
-        self.ksp.setOperators(shell)
-        self.ksp.setType("gmres")
-        self.ksp.setGMRESRestart(RESTART)
-        self.ksp.setPCSide(PETSc.PC.Side.RIGHT)
-        self.ksp.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
-        self.ksp.pc.setType("python")
-        self.ksp.pc.setPythonContext(turned)
+        self.cg, self.gmres = (PETSc.KSP().create(shell.comm) for _ in range(2))
+        for ksp, kind in ((self.cg, "cg"), (self.gmres, "gmres")):
+            ksp.setOperators(shell)
+            ksp.setType(kind)
+            ksp.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
+            ksp.pc.setType("python")
+            ksp.pc.setPythonContext(turned)
+        self.gmres.setGMRESRestart(RESTART)
+        self.gmres.setPCSide(PETSc.PC.Side.RIGHT)
 
     def take(self, states: States) -> None:
         """Take the linear problem of these states and of the closed set of the contact."""
         self._turned.take(self._contact, states)
         self._linearised.states = states
         self._linearised.free = (self._turned.weights > 0.0).astype(float)
+        self._slips = bool(largest(self._comm, np.any(states.slips)))
 
     @property
     def free(self) -> Array:
@@ -108,13 +112,15 @@ class Gmres:
         return self._linearised.free
 
     def solve(self, residual: Array, share: float, goal: float) -> tuple[Array, float, int]:
-        """Return (dx, norm of what is left, PETSc's reason): ``share`` of the residual, or ``goal``, is left."""
+        """Return (dx, norm of what is left, PETSc's reason): ``share`` is left, or about ``goal`` in a row."""
         self._b.array[:] = residual
         self._x.set(0.0)
-        self.ksp.setTolerances(rtol=share, atol=goal, divtol=1e10, max_it=self._patience)
-        self.ksp.solve(self._b, self._x)
-        self._operator.work.linear_iterations += self.ksp.getIterationNumber()
-        left, reason = float(self.ksp.getResidualNorm()), int(self.ksp.getConvergedReason())
+        spread = min(self._b.norm() / (self._b.norm(PETSc.NormType.INFINITY) or 1.0), SPREAD)
+        ksp = self.gmres if self._slips else self.cg
+        ksp.setTolerances(rtol=share, atol=goal * spread, divtol=1e10, max_it=self._patience)
+        ksp.solve(self._b, self._x)
+        self._operator.work.linear_iterations += ksp.getIterationNumber()
+        left, reason = float(ksp.getResidualNorm()), int(ksp.getConvergedReason())
         if reason == STAGNATED and left <= FALL * self._b.norm():
             reason = SOLVED  # as far as it came: Newton goes on from there
         return np.array(self._x.array_r), left, reason

@@ -11,14 +11,20 @@ from ...core.step import StepProblem
 from ...core.verify import ROUNDED
 from .contact import Contact
 
+GOAL = 0.5  # of the tolerance: estimates may be wrong, and the carried residual is not the one formed afresh
+HALVED = 0.5  # of the residual, at least, between two answers that are compared
+LEAST = 3e-4  # of the forces: reactions below are not asked for to so many digits
+ROUND_OFF = 1e-15  # of |A||x| and of the forces: what a residual cannot fall below
+
 
 @dataclass(frozen=True)
 class Measures:
-    """Hold what residuals are relative to: forces of the equilibrium, reactions, displacements; maxima over ranks."""
+    """Hold what residuals are relative to: forces, reactions, displacements; and their round-off. Maxima over ranks."""
 
     force: float
     reaction: float
     displacement: float
+    round_off: float
 
 
 class Measured:
@@ -34,7 +40,40 @@ class Measured:
         local = np.array([self._b, contact.body_forces(x, residual, load), max_abs(x), self._guess,
                           max_abs(contact.reactions(x, residual))])
         b, Ax, size, guess, reaction = self._comm.max(np.where(np.isnan(local), np.inf, local))
-        return Measures(max(b, Ax, ROUNDED * self._largest * size), max(b, reaction), max(size, guess))
+        whole = self._largest * size
+        force = max(b, Ax, ROUNDED * whole)
+        return Measures(force, max(b, reaction), max(size, guess), ROUND_OFF * max(whole, force))
+
+
+class Worth:
+    """Estimate how small a residual has to be for x and reactions that are known to ``tolerance`` of the largest so
+    far: from what they changed by since it was larger. What the last step showed of the conditioning is kept."""
+
+    def __init__(self, comm: Comm, parts: int, tolerance: float) -> None:
+        self._comm, self._goal = comm, GOAL * tolerance
+        self._per_norm = self._sizes = self._largest = np.zeros(parts)
+        self._seen: tuple[float, list[Array]] = (0.0, [])
+
+    def keep(self) -> None:
+        """Keep the last answer: it is one of a step."""
+        self._largest = np.maximum(self._largest, self._sizes)
+
+    def goal(self, norm: float, of: Measures, *answer: Array, begin: bool) -> float:
+        """Return the residual to stop at: what x and reactions need, but for round-off, or a share of the tolerance.
+        ``norm``: the present one; ``begin``: there is no larger one to compare with. Collective."""
+        last, seen = self._seen
+        if begin or norm <= HALVED * last:
+            changes = [] if begin else [one - old for one, old in zip(answer, seen, strict=True)]
+            largest = self._comm.max(np.array([max_abs(one) for one in (*answer, *changes)]))
+            self._seen = norm, [np.array(one) for one in answer]
+            self._sizes = largest[: len(answer)]
+            if not begin:
+                self._per_norm = largest[len(answer) :] / last
+        least = [of.displacement, *[LEAST * of.force] * (len(answer) - 1)]
+        wanted = np.maximum(np.maximum(self._sizes, self._largest), least)
+        moved = self._per_norm > 0.0
+        needed = np.min(wanted[moved] / self._per_norm[moved], initial=np.inf)
+        return float(min(self._goal * of.force, max(self._goal * needed, of.round_off)))
 
 
 def largest_free(comm: Comm, residual: Array, weights: Array) -> float:

@@ -63,10 +63,6 @@ class Projected:
         masked.weights = np.where(free, self._weights, 0.0)
         return self._root * masked(self._root * phi)
 
-    def not_definite(self) -> Exception:
-        """Return what ends the search."""
-        return Indefinite()
-
     def solve(self, x: Array) -> tuple[Array, int]:
         """Return (x, reason) of the search from x; the closed set of ``contact`` is then that of x."""
         of = self.of
@@ -157,7 +153,7 @@ class Face:
         image = self._problem.apply(p)
         curvature = self._problem.dot(p, image)
         if not curvature > 0.0:
-            raise self._problem.not_definite()
+            raise Indefinite
         return image, curvature
 
 

@@ -31,6 +31,7 @@ from .contact import Contact
 from .failures import stopped
 from .friction import Friction
 from .layout import Nodewise
+from .measures import Worth
 from .operator import Operator
 from .preconditioners import Masked, defaults, inverse
 from .projected_gradients import largest_eigenvalue, projected_gradients
@@ -53,7 +54,7 @@ class Iterative:
         petsc_options: of the preconditioner, without prefix, e.g. {"pc_gamg_threshold": 0.02}; ICC's sub_pc_…;
             options of the command line go before them.
         prefix: what these options are called on the command line and in PETSC_OPTIONS.
-        tolerance: residuals of the step, measured as its certificate, at which it stops.
+        tolerance: at which it stops, of residuals, measured as the certificate, and of errors of the answer, estimated.
         changes: of the contact set in a step without friction; after more, or when a set comes twice, projected
             gradients go on.
         patience: linear iterations within which the residual has to fall tenfold.
@@ -108,7 +109,7 @@ class PreparedIterative:
         self._diagonal = np.array(blocks.getDiagonal().array_r)
         self._contact = Contact(surface, scale, layout.places[surface.owned], self._diagonal, layout.missing)
         self._norm: float | None = None
-        self._surface = surface
+        self._surface, self._worth = surface, Worth(surface.comm, 2, settings.tolerance)
 
     def _chosen(self, A: EffectiveMatrix) -> str:
         """The preconditioner, said in the log."""
@@ -152,7 +153,7 @@ class PreparedIterative:
         before = self.work.linear_iterations
         of = Search(
             step, layout.padded(step.b), contact, operator=self._operator, masked=self._masked, inverse=self._inverse,
-            tolerance=settings.tolerance, patience=settings.patience,
+            worth=self._worth, tolerance=settings.tolerance, patience=settings.patience,
         )
         x, residual, changes, reason = search(of, self._cg, layout.padded(step.guess), settings.changes)
         if reason == WRONG_SIGNS:
@@ -162,6 +163,7 @@ class PreparedIterative:
             x, residual, reason = projected_gradients(of, self._diagonal, self._norm, x)
         if reason != SOLVED:
             raise stopped(self._name, reason, self.work.linear_iterations - before, of.history)
+        self._worth.keep()
         return StepResult(
             x=layout.stripped(x),
             r_n=contact.reactions(x, residual),

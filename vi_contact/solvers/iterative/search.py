@@ -12,17 +12,18 @@ last digit that the certificate sees.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ...core.algebra import Array, Comm, Mask, largest, total
 from ...core.step import StepProblem
 from .conjugate_gradients import NOT_A_NUMBER, SOLVED, STAGNATED, WRONG_SIGNS, ConjugateGradients
 from .contact import Contact
-from .measures import Measured, largest_free
+from .measures import Measured, Worth, largest_free
 from .operator import Operator
 from .preconditioners import Inverse, Masked
 
-GOAL = 0.7  # of the tolerance: the rest is for what the carried residual and the one formed afresh differ by
 FALL = 0.1  # of the residual between two looks at the signs
 
 
@@ -31,12 +32,12 @@ class Search:
 
     def __init__(
         self, step: StepProblem, b: Array, contact: Contact, *, operator: Operator, masked: Masked, inverse: Inverse,
-        tolerance: float, patience: int,
+        worth: Worth, tolerance: float, patience: int,
     ) -> None:
         self.contact, self.operator, self.masked, self.inverse = contact, operator, masked, inverse
         self.comm: Comm = step.surface.comm
         self.b, self.tolerance, self.patience = b, tolerance, patience
-        self.measured = Measured(step, b)
+        self.measured, self.worth, self.goal = Measured(step, b), worth, 0.0
         self.history: list[float] = []
         self._sets: set[float] = set()
         contact.begin(step)
@@ -55,33 +56,28 @@ class Search:
         self._sets.add(name)
         return not known
 
-    def watch(self, iteration: int, residual: Array, x: Array) -> int:
-        """Return whether conjugate gradients may stop, as PETSc takes it; 0 to go on."""
+    def watch(self, iteration: int, residual: Array, at: Callable[[], Array]) -> int:
+        """Return whether conjugate gradients may stop, as PETSc takes it; 0 to go on. ``at()``: x."""
         norm = largest_free(self.comm, residual, self.masked.weights)
         if not np.isfinite(norm):
             return NOT_A_NUMBER
-        if iteration == 0:
-            self.look(norm, x, residual, 0)
-        if norm <= self.goal:
-            self._note(norm)
-            return SOLVED
-        if norm <= self._mark:
+        if iteration == 0 or norm <= max(self.goal, self._mark):
+            x = at()
             self.look(norm, x, residual, iteration)
-            if largest(self.comm, np.any(self.wrong(x, residual, norm))):
+            if norm <= self.goal:
+                return SOLVED
+            if iteration and largest(self.comm, np.any(self.wrong(x, residual, norm))):
                 return WRONG_SIGNS
         if iteration - self._since < self.patience:
             return 0
-        self._note(norm)
+        self.look(norm, at(), residual, iteration)
         return STAGNATED
 
     def look(self, norm: float, x: Array, residual: Array, iteration: int = 0) -> None:
-        """Take the references at x, and note the residual."""
+        """Take the references at x, and note the residual; ``goal``: how small it has to become."""
         self._mark, self._since = FALL * norm, iteration
         self.scales = self.measured(self.contact, x, residual, self.load)
-        self.goal = GOAL * self.tolerance * self.scales.force
-        self._note(norm)
-
-    def _note(self, norm: float) -> None:
+        self.goal = self.worth.goal(norm, self.scales, x, self.contact.reactions(x, residual), begin=iteration == 0)
         self.history.append(norm / self.scales.force if self.scales.force > 0.0 else norm)
 
     def wrong(self, x: Array, residual: Array, error: float) -> Mask:
@@ -101,13 +97,29 @@ class Search:
         return norm <= self.tolerance * self.scales.force
 
 
+    def change(self, wrong: Mask, x: Array, residual: Array) -> tuple[Array, Array, bool]:
+        """Change the set, and return (x, residual, whether the set is a new one): a product where a rigid support
+        closes. One that opens leaves the residual as it is, and springs change it in their rows alone."""
+        contact = self.contact
+        moves = largest(self.comm, np.any(wrong & ~contact.closed & ~contact.soft))
+        before = contact.spring_forces(x)
+        contact.change(wrong)
+        new = self.take_set()
+        if moves:
+            contact.place(x)
+            return x, self.load - (self.operator @ x), new
+        residual[contact.rows] += before - contact.spring_forces(x)
+        return x, residual, new
+
+
 def search(of: Search, cg: ConjugateGradients, x: Array, changes: int) -> tuple[Array, Array, int, int]:
     """Return (x, residual, changes of the set, reason) of the search from x. The reason is SOLVED, or PETSc's for
     stopping, or WRONG_SIGNS when a set came twice or the set changed more often than ``changes``. Collective."""
     contact, count, refinements = of.contact, 0, 0
+    contact.place(x)
+    residual = of.load - (of.operator @ x)
     while True:
-        contact.place(x)
-        x, residual, reason = cg.solve(of.load, x, of.watch)
+        x, residual, reason = cg.solve(residual, x, of.watch)
         if reason not in (SOLVED, WRONG_SIGNS):
             return x, residual, count, reason
         norm = 0.0
@@ -125,7 +137,7 @@ def search(of: Search, cg: ConjugateGradients, x: Array, changes: int) -> tuple[
             continue
         if count == changes:
             return x, residual, count, WRONG_SIGNS
-        contact.change(wrong)
         count += 1
-        if not of.take_set():
+        x, residual, new = of.change(wrong, x, residual)
+        if not new:
             return x, residual, count, WRONG_SIGNS
