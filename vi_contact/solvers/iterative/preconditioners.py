@@ -43,8 +43,7 @@ def defaults(kind: str, ranks: int) -> Options:
 
 
 def shares(inverse: Any, template: Any) -> Array:
-    """Return 1/sqrt(k) of every row, k the number of overlapping subdomains of a PETSc preconditioner that hold it.
-    Collective."""
+    """Return 1/sqrt(k) of every row, k the number of a PETSc preconditioner's subdomains that hold it. Collective."""
     ones, count = template.duplicate(), template.duplicate()
     ones.set(1.0)
     count.set(1.0)
