@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy.linalg.blas import idamax
 from scipy.sparse.linalg import splu
 
+AT_ONCE = 10_000  # nodes whose rows are stored in blocks: bounds the memory
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Indices = NDArray[np.int64]
@@ -267,6 +268,20 @@ def serial(matrix: Matrix) -> SerialMatrix:
     if not isinstance(matrix, SerialMatrix):
         raise TypeError(f"SerialAlgebra got a {type(matrix).__name__}")
     return matrix
+
+
+def upper_blocks(rows: sp.csr_matrix, width: int, first: int) -> tuple[Indices, Indices, Array]:
+    """Return (ends, columns, blocks) of the upper triangle of these rows, the first of which has the number ``first``,
+    in blocks of ``width``."""
+    counts, columns, values = [np.zeros(1, dtype=np.int64)], [rows.indices[:0]], [np.zeros((0, width, width))]
+    for start in range(0, rows.shape[0], AT_ONCE * width):
+        blocks = rows[start : start + AT_ONCE * width].tobsr((width, width))
+        row = np.repeat(np.arange(len(blocks.indptr) - 1), np.diff(blocks.indptr))
+        upper = blocks.indices >= (first + start) // width + row
+        counts.append(np.bincount(row[upper], minlength=len(blocks.indptr) - 1))
+        columns.append(blocks.indices[upper])
+        values.append(blocks.data[upper])
+    return np.cumsum(np.concatenate(counts)), np.concatenate(columns), np.concatenate(values)
 
 
 def identity_with(n: int, rows: Indices, entries: sp.csr_matrix, *, first: int) -> sp.coo_matrix:

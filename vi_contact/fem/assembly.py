@@ -23,6 +23,7 @@ from ..core.system import Load, SemiDiscreteSystem
 from ..laws.materials import Damping, LinearElastic, Section
 from . import compat
 from .assembly_checks import check_body, check_boundaries, check_initial
+from .compact import algebra_for
 from .dashpots import BoundaryLoads, DashpotMatrix, Dashpots, describe_boundaries
 from .loads import ActingLoad, BodyForce, Prescribed, Traction, as_tuple, evaluate
 from .mesh import Cells, Facets
@@ -75,19 +76,19 @@ def assemble(
     check_initial(mesh, displacement=initial_displacement, velocity=initial_velocity)
     space = FemSpace(mesh, tuple(Prescribed(facets) for facets in held) + moved, as_tuple(tied))
     forms = ElasticForms(space, cell_materials(mesh, material), section, damping)
-    algebra = PetscAlgebra(mesh.comm)
+    algebra = algebra_for(mesh.comm, space.dimension, space.unknowns)
     absorbers = [DashpotMatrix(space, forms, one) for one in boundaries]
     acting = [one.dashpots.loads(one, forms) for one in absorbers]
     load = assemble_loads(space, section, as_tuple(loads))
     rigid = _rigid(space)
-    K, pull = _reduced(forms.matrix("K"), space, 0)  # one after the other: each is large before it is reduced
+    K, pull = _reduced(forms.matrix("K"), space, algebra, 0)  # one after the other: each is large before it is reduced
     dampers = ([forms.matrix("C")] if forms.damped else []) + [one.mat for one in absorbers]
     terms = [(1.0, PetscMatrix(one)) for one in dampers]
-    damper = as_petsc(algebra.combine(terms)).mat if terms else None
-    C, viscous = _reduced(damper, space, 1) if terms else (None, ())
+    damper = as_petsc(PetscAlgebra(mesh.comm).combine(terms)).mat if terms else None
+    C, viscous = _reduced(damper, space, algebra, 1) if terms else (None, ())
     mass = forms.matrix("M")
     momenta = _momenta(space, PetscMatrix(mass)) if base_inertia else []
-    M, inertial = _reduced(mass, space, 2)
+    M, inertial = _reduced(mass, space, algebra, 2)
     load = replace(load, general=load.general + pull, viscous=viscous, inertial=inertial)
     system = SemiDiscreteSystem(
         algebra=algebra, M=M, C=C, K=K, load=_with_boundaries(load, acting), influence=rigid,
@@ -117,14 +118,14 @@ def _with_boundaries(load: Load, acting: Sequence[BoundaryLoads]) -> Load:
 
 
 def _reduced(
-    full: Any, space: FemSpace, derivative: int
+    full: Any, space: FemSpace, algebra: PetscAlgebra, derivative: int
 ) -> tuple[PetscMatrix, tuple[Callable[[float], Array], ...]]:
-    """(PᵀAP, the load of prescribed motions); the full matrix is destroyed."""
+    """(Pᵀ A P as the algebra stores it, the load of prescribed motions); the full matrix is destroyed."""
     moves = any(condition.moves for condition in space.prescribed)
     pull = (_prescribed_load(space, derivative, full),) if moves else ()
     part = space.reduced(full)
     full.destroy()
-    return PetscMatrix(part), pull
+    return algebra.held(part), pull
 
 
 def _momenta(space: FemSpace, full: PetscMatrix) -> list[Array]:

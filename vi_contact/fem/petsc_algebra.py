@@ -58,33 +58,38 @@ class MpiComm:
 
 
 class PetscMatrix:
-    """Hold an AIJ matrix behind the ``Matrix`` protocol; ``mat`` is the PETSc object."""
+    """Hold an AIJ matrix behind the ``Matrix`` protocol; ``stored`` is the PETSc object, ``mat`` too unless it is
+    stored otherwise: then it is made anew (``fem.compact``)."""
 
     def __init__(self, mat: Any) -> None:
-        self.mat = mat
+        self.stored = mat
         self._x, self._y = mat.createVecs()
 
     @property
+    def mat(self) -> Any:
+        return self.stored
+
+    @property
     def rows(self) -> int:
-        return int(self.mat.getLocalSize()[0])
+        return int(self.stored.getLocalSize()[0])
 
     @property
     def bytes(self) -> float:
         """Return the bytes of the entries of this rank and their columns."""
-        return _ENTRY * float(self.mat.getInfo(PETSc.Mat.InfoType.LOCAL)["nz_allocated"])
+        return _ENTRY * float(self.stored.getInfo(PETSc.Mat.InfoType.LOCAL)["nz_allocated"])
 
     def __matmul__(self, x: Array) -> Array:
         self._x.array[:] = x
-        self.mat.mult(self._x, self._y)
+        self.stored.mult(self._x, self._y)
         return np.array(self._y.array_r)
 
     def transpose_apply(self, x: Array) -> Array:
         self._y.array[:] = x
-        self.mat.multTranspose(self._y, self._x)
+        self.stored.multTranspose(self._y, self._x)
         return np.array(self._x.array_r)
 
     def diagonal(self) -> Array:
-        return np.array(self.mat.getDiagonal().array_r)
+        return np.array(self.stored.getDiagonal().array_r)
 
 
 class PetscFactor:
@@ -209,30 +214,29 @@ class PetscAlgebra:
         give_back(self.comm.mpi)
         for factor, matrix in terms:
             mat = as_petsc(matrix).mat
+            own = mat is as_petsc(matrix).stored
             if total is None:
-                total = mat.copy()
+                total = mat.copy() if own else mat
                 total.scale(factor)
             else:
                 # M, C and K come from the same mesh and space: same sparsity unless a basis change dropped entries
                 total.axpy(factor, mat, structure=PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+                if not own:
+                    mat.destroy()
         if total is None:
             raise ValueError("combine needs at least one term")
-        return PetscMatrix(total)
+        return self.held(total)
+
+    def held(self, mat: Any) -> PetscMatrix:
+        """Return a PETSc matrix that nobody else needs as this algebra stores it."""
+        return PetscMatrix(mat)
 
     def congruence(self, T: Matrix, K: Matrix) -> Matrix:
-        return PetscMatrix(triple_product(as_petsc(K).mat, as_petsc(T).mat))
+        return self.held(triple_product(as_petsc(K).mat, as_petsc(T).mat))
 
     def local(self, rows: Indices, columns: Indices, values: Array, n: int) -> Matrix:
         places = rows, self.first(n) + np.asarray(columns)
-        return self._matrix(sp.coo_matrix((values, places), shape=(n, self._all(n))))
-
-    def _matrix(self, rows: sp.coo_matrix) -> PetscMatrix:
-        """The square matrix of which this rank owns these rows, columns numbered over all ranks."""
-        entries, kind, n = sp.csr_matrix(rows), PETSc.IntType, rows.shape[0]
-        csr = (entries.indptr.astype(kind), entries.indices.astype(kind), entries.data)
-        mat = PETSc.Mat().createAIJ(((n, None), (n, None)), csr=csr, comm=self.comm.mpi)
-        mat.assemble()
-        return PetscMatrix(mat)
+        return PetscMatrix(aij_of(sp.coo_matrix((values, places), shape=(n, self._all(n))), self.comm.mpi))
 
     def first(self, n: int) -> int:
         return int(self.comm.mpi.exscan(n) or 0)
@@ -246,12 +250,12 @@ class PetscAlgebra:
         chosen = PETSc.IS().createGeneral((start + rows).astype(PETSc.IntType), comm=mat.comm)
         whole = PETSc.IS().createStride(last - first, first, 1, comm=mat.comm)
         part = mat.createSubMatrix(chosen, whole)
-        ends, columns, values = part.getValuesCSR()
+        found = rows_of(part)
         part.destroy()
-        return sp.csr_matrix((values, columns, ends), shape=(len(rows), mat.getSize()[1]))
+        return found
 
     def replaced_rows(self, n: int, rows: Indices, entries: sp.csr_matrix) -> Matrix:
-        return self._matrix(identity_with(n, rows, entries, first=self.first(n)))
+        return PetscMatrix(aij_of(identity_with(n, rows, entries, first=self.first(n)), self.comm.mpi))
 
     def with_identity_rows(self, A: Matrix, mask: Mask) -> Matrix:
         every = np.arange(len(mask))
@@ -272,6 +276,21 @@ class PetscAlgebra:
 
     def dot(self, x: Array, y: Array) -> float:
         return total(self.comm, x @ y)
+
+
+def rows_of(mat: Any) -> sp.csr_matrix:
+    """Return a copy of the owned rows of a PETSc AIJ matrix, columns numbered over all ranks."""
+    ends, columns, values = mat.getValuesCSR()
+    return sp.csr_matrix((values, columns, ends), shape=(mat.getLocalSize()[0], mat.getSize()[1]))
+
+
+def aij_of(rows: sp.spmatrix, comm: Any) -> Any:
+    """Return the square PETSc matrix with these rows of this rank, columns numbered over all ranks. Collective."""
+    entries, kind, n = sp.csr_matrix(rows), PETSc.IntType, rows.shape[0]
+    csr = (entries.indptr.astype(kind), entries.indices.astype(kind), entries.data)
+    mat = PETSc.Mat().createAIJ(((n, None), (n, None)), csr=csr, comm=comm)
+    mat.assemble()
+    return mat
 
 
 def triple_product(K: Any, P: Any) -> Any:

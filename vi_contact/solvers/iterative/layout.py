@@ -8,13 +8,14 @@ others would break the blocks: it gets them back here as unknowns that are alway
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 from petsc4py import PETSc
 
-from ...core.algebra import Array, EffectiveMatrix, Indices, SerialMatrix, largest
+from ...core.algebra import Array, EffectiveMatrix, Indices, SerialMatrix, largest, upper_blocks
 
 
 @dataclass(frozen=True)
@@ -75,26 +76,29 @@ class Nodewise:
     """Make matrices of A in whole nodes."""
 
     def __init__(self, A: EffectiveMatrix) -> None:
-        self.A, self.source, self.layout = A, assembled(A), layout_of(A)
+        self.A, self.layout = A, layout_of(A)
         self._selection: Any = None
+
+    @cached_property
+    def source(self) -> Any:
+        """Return A as AIJ."""
+        return assembled(self.A)
 
     def blocks(self) -> Any:
         """Return A in symmetric blocks (SBAIJ), or its own AIJ where blocks have one entry. Collective."""
-        layout, kind = self.layout, PETSc.IntType
-        if layout.width == 1:
+        layout, kind, d = self.layout, PETSc.IntType, self.layout.width
+        stored = getattr(self.A.matrix, "stored", None)
+        if d == 1:
             return self.source
-        mat = self.source if layout.complete else self.entries()
+        if layout.complete and stored is not None and "sbaij" in stored.getType() and stored.getBlockSize() == d:
+            stored.setOption(PETSc.Mat.Option.SPD, True)
+            return stored
+        mat = assembled(self.A) if layout.complete else self.entries()
         indptr, columns, values = mat.getValuesCSR()
-        first, d = mat.getOwnershipRange()[0], layout.width
-        rows = sp.csr_matrix((values, columns, indptr), shape=(layout.size, mat.getSize()[1])).tobsr((d, d))
-        if not layout.complete:
-            mat.destroy()
-        del indptr, columns, values
-        row = np.repeat(np.arange(layout.size // d), np.diff(rows.indptr))
-        upper = rows.indices >= first // d + row
-        ends = np.append(0, np.cumsum(np.bincount(row[upper], minlength=layout.size // d)))
-        arrays = (ends.astype(kind), rows.indices[upper].astype(kind), rows.data[upper])
-        made = PETSc.Mat().createSBAIJ(self._sizes(), d, csr=arrays, comm=self.source.comm)
+        rows = sp.csr_matrix((values, columns, indptr), shape=(layout.size, mat.getSize()[1]))
+        ends, columns, values = upper_blocks(rows, d, mat.getOwnershipRange()[0])
+        arrays = (ends.astype(kind), columns.astype(kind), values)
+        made = PETSc.Mat().createSBAIJ(self._sizes(), d, csr=arrays, comm=mat.comm)
         made.assemble()
         made.setOption(PETSc.Mat.Option.SPD, True)
         return made

@@ -96,11 +96,11 @@ class PreparedIterative:
     def __init__(self, settings: Iterative, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> None:
         self._settings, self.work = settings, Work()
         nodewise = Nodewise(A)
-        PETSc.garbage_cleanup(nodewise.source.comm)
         self._layout = layout = nodewise.layout
         self.kind = self._chosen(A)
         with self.work.set_up():
             blocks = nodewise.blocks()
+        PETSc.garbage_cleanup(blocks.comm)
         self._operator = Operator(blocks, self.work)
         layers = OptionLayers(settings.prefix, defaults(self.kind, A.algebra.comm.size), settings.petsc_options)
         self._inverse = inverse(self.kind, nodewise, blocks, surface, layers, self.work)
