@@ -30,6 +30,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "cli/test_fuzz_cli.py": "cli.errors",
     "cli/test_entry.py": "cli.options studies.cases.library studies.cases.own_case",
     "cli/test_motion.py": "plots.records",
+    "core/test_contact_last.py": "core.compiled",
     "core/test_friction_certificate.py": "core.certificate core.protocols",
     "core/test_identity.py": "run.method",
     "core/test_step.py": "core.errors core.problem",
@@ -79,6 +80,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "schemes/test_massless_contact.py": "solvers.beside_steps",
     "schemes/test_trapezoidal.py": "schemes.base",
     "soil/test_free_field.py": "core.companion core.problem_checks soil.companion soil.upgoing_wave",
+    "solvers/test_condensed_on_finite_elements.py": "core.condensation fem.copied_factor",
     "solvers/test_friction_condensed.py": "solvers.certified solvers.friction.newton",
     "solvers/test_friction_methods.py":
         "solvers.friction.fixed_point solvers.friction.given_forces solvers.friction.linear "

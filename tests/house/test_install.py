@@ -58,4 +58,5 @@ def test_the_cases_that_ship_are_installed() -> None:
     assert len(files) == 4 and all(any(fnmatch(file, one) for one in patterns) for file in files)
     others = [path for path in (ROOT / "vi_contact").rglob("*") if path.is_file() and "__pycache__" not in path.parts
               and path.suffix not in (".py", ".toml", ".typed")]
-    assert not others, others
+    named = project["tool"]["setuptools"]["package-data"]["vi_contact.core"]
+    assert [path.relative_to(ROOT / "vi_contact" / "core").as_posix() for path in others] == named

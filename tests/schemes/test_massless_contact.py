@@ -37,15 +37,17 @@ def factorised(monkeypatch: pytest.MonkeyPatch) -> Iterator[Rows]:
     """Rows, on all ranks, of every matrix that is factorised."""
     found: Rows = []
 
-    def watched(make: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
-        def factor(algebra: Any, A: Any) -> Any:
-            found.append(total(algebra.comm, A.rows))
-            return make(algebra, A)
+    def watched(make: Callable[..., Any]) -> Callable[..., Any]:
+        def factor(algebra: Any, A: Any, *last: Any) -> Any:
+            made = make(algebra, A, *last)
+            found.extend([] if made is None else [total(algebra.comm, A.rows)])
+            return made
 
         return factor
 
     for algebra in (PetscAlgebra, SerialAlgebra):
-        monkeypatch.setattr(algebra, "factor", watched(algebra.factor))
+        for name in ("factor", "contact_last"):
+            monkeypatch.setattr(algebra, name, watched(getattr(algebra, name)))
     yield found
 
 

@@ -19,7 +19,6 @@ from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.run.march import march
 from vi_contact.schemes.trapezoidal import Trapezoidal
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
-from vi_contact.solvers import condensed
 from vi_contact.solvers.certified import TOLERANCE, CertifiedSolver
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.friction.newton import FrictionNewton
@@ -83,16 +82,6 @@ def test_nothing_is_made_without_friction() -> None:
     result, certificate, _ = solver.solve(SCHEME.step(rubbing, state, A, DT))
     assert result.r_t is not None and result.r_t.any() and prepared._friction is not None
     assert result.method == "condensed FrictionNewton" and certificate.worst <= 1e-14
-
-
-def test_stored_columns_and_a_second_substitution_give_the_same(monkeypatch: Any) -> None:
-    one = reports(rough())
-    assert any(report.result.r_t.any() for report in one)
-    monkeypatch.setattr(condensed, "STORED_ENTRIES", 0)
-    again = reports(rough())
-    for report, other in zip(one, again, strict=True):
-        assert report.certificate.worst <= 1e-13
-        np.testing.assert_allclose(other.new.u, report.new.u, rtol=0.0, atol=1e-13)
 
 
 def test_the_order_of_conditions_has_no_effect() -> None:

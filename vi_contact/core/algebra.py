@@ -130,6 +130,11 @@ class Algebra(Protocol):
         ...
 
     def factor(self, A: Matrix) -> Factor: ...
+    def contact_last(self, A: Matrix, last: Indices) -> Any:
+        """Return a factor with these unknowns last, a ``core.contact_last.ContactLast``; they are numbered over all
+        ranks and the same on every rank. None where ``factor`` serves better or there is none. Collective."""
+        ...
+
     def dot(self, x: Array, y: Array) -> float: ...
 
 
@@ -148,6 +153,15 @@ class EffectiveMatrix:
         self.algebra = algebra
         self.space, self.inertia = space, inertia
         self.image = matrix.__matmul__ if image is None else image
+        self._last: tuple[Indices, Any] | None = None
+
+    def contact_last(self, last: Indices) -> Any:
+        """Return the factor with these unknowns last (see ``Algebra``), which is then ``factor`` too. Collective."""
+        if self._last is None or not np.array_equal(self._last[0], last):
+            self._last = last, self.algebra.contact_last(self.matrix, last)
+            if self._last[1] is not None:
+                self.__dict__.setdefault("factor", self._last[1])
+        return self._last[1]
 
     @cached_property
     def factor(self) -> Factor:
@@ -258,6 +272,9 @@ class SerialAlgebra:
 
     def factor(self, A: Matrix) -> Factor:
         return SerialFactor(serial(A))
+
+    def contact_last(self, A: Matrix, last: Indices) -> None:
+        return None
 
     def dot(self, x: Array, y: Array) -> float:
         return float(x @ y)

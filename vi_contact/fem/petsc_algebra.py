@@ -11,8 +11,10 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from ..core.algebra import Array, Factor, Indices, Mask, Matrix, identity_with, total
+from ..core.contact_last import ContactLast
 from ..core.errors import InputError
 from ..core.stages import trim
+from .copied_factor import contact_last
 
 PREFIX = "vi_contact_factor_"
 OWN_FACTOR = {
@@ -21,6 +23,7 @@ OWN_FACTOR = {
     "pc_factor_mat_solver_type": "petsc",
     "pc_factor_mat_ordering_type": "amd",
 }
+DEFAULTS = ("redundant_", "mat_mumps_icntl_20")  # options that are set here
 FULL_ROW = 40.0  # entries of a row: 2D meshes have fewer, 3D meshes more
 FEW_ROWS = 10_000  # with full rows: beyond, MUMPS' dense blocks pay
 COPIED_ROWS = 300_000  # with sparse rows: a copy of the factor on every rank takes about 0.5 GB here
@@ -95,10 +98,10 @@ class PetscMatrix:
 class PetscFactor:
     """Hold a Cholesky factor and its substitutions.
 
-    PETSc's own factorisation with minimum degree ordering where it serves (``_own_serves``): its substitutions are 4 to
-    15 times as fast as those of MUMPS. On several ranks each keeps a whole copy of it, so that results do
-    not depend on the order of messages, as those of MUMPS do. MUMPS takes the rest: large 3D matrices, and what is too
-    large to be copied.
+    For matrices without contact unknowns, and where CHOLMOD is not to be had: PETSc's own factorisation with minimum
+    degree ordering where it serves (``_own_serves``): its substitutions are 4 to 15 times as fast as those of MUMPS. On
+    several ranks each keeps a whole copy of it, so that results do not depend on the order of messages, as those of
+    MUMPS do. MUMPS takes the rest: large 3D matrices on several ranks, and what is too large to be copied.
     Options with the prefix vi_contact_factor_ choose otherwise. InputError when the matrix cannot be factorised.
     """
 
@@ -195,6 +198,11 @@ def _own_serves(mat: Any) -> bool:
     return bool(mat.comm.size == 1 or rows <= COPIED_ROWS)
 
 
+def _chosen() -> bool:
+    """Whether options of the user choose the factor."""
+    return any(not name.startswith(DEFAULTS) for name in PETSc.Options(PREFIX).getAll())
+
+
 def _default_options(values: Mapping[str, object]) -> None:
     """PETSc options of the factor that hold unless the user has given them."""
     database = PETSc.Options(PREFIX)
@@ -273,6 +281,11 @@ class PetscAlgebra:
 
     def factor(self, A: Matrix) -> Factor:
         return PetscFactor(as_petsc(A))
+
+    def contact_last(self, A: Matrix, last: Indices) -> ContactLast | None:
+        mat = as_petsc(A).mat
+        serves = not _chosen() and (self.comm.size == 1 or _own_serves(mat))
+        return contact_last(self.comm, mat, last) if serves else None
 
     def dot(self, x: Array, y: Array) -> float:
         return total(self.comm, x @ y)

@@ -16,13 +16,16 @@ here is a nodal law; on a fine mesh it has no macroscopic effect.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
+import scipy.sparse as sp
 
-from ..core.algebra import Array, Factor, Indices, total
+from ..core.algebra import Array, EffectiveMatrix, Indices, max_abs, total
 from ..core.checks import between, function
+from ..core.condensation import condense
 from ..core.corners import with_open_faces
 from ..core.free_unknowns import solve_free
 from ..core.protocols import Impact
@@ -30,7 +33,8 @@ from ..core.sizes import small
 from ..core.surfaces import ContactSurface
 from ..core.system import SemiDiscreteSystem
 
-STORED_ENTRIES = 200_000  # of M⁻¹Bᵀ over all ranks: beyond it a back-substitution is cheaper than the product
+BELOW = 1e-17  # of the largest entry of a column of M⁻¹Bᵀ: what is left out
+STORED = 20  # entries a row of M⁻¹Bᵀ: half a substitution reads more in two dimensions
 UPDATE = "give ComponentReset() or ImpulseUpdate()"
 
 
@@ -62,9 +66,9 @@ class ComponentReset:
 class ImpulseUpdate:
     """Apply an impulse on the chosen contact unknowns: the M-orthogonal projection onto the wanted velocities.
 
-    The system keeps the factor of M, and M⁻¹Bᵀ when it is small: one back-substitution per contact point at first, then
-    one per impact or a dense product. Large systems are not factorised: M (v⁺ - v⁻) = 0 off the chosen unknowns, by
-    conjugate gradients to round-off at every impact.
+    The system keeps M condensed onto the contact unknowns, and M⁻¹Bᵀ where it is sparse, as it decays to round-off
+    within thirty elements; else an impact costs half a substitution (``core.condensation``). Large systems are not
+    factorised: M (v⁺ - v⁻) = 0 off the chosen unknowns, by conjugate gradients to round-off at every impact.
     """
 
     def __call__(self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array) -> Array:
@@ -83,20 +87,24 @@ class ImpulseUpdate:
         chosen: Indices = np.flatnonzero(~np.isnan(jump))
         if len(chosen) == 0:
             return v
-        factor, columns, delassus = system.cached("impulse update", lambda: _prepared(system, surface))
+        flexibility, response = system.cached("impulse update", lambda: _prepared(system, surface))
         impulse = np.zeros(surface.total)
-        impulse[chosen] = np.linalg.solve(delassus[np.ix_(chosen, chosen)], jump[chosen])
-        if columns is not None:
-            return np.asarray(v + columns @ impulse)
-        return np.asarray(v + factor.solve(surface.reaction_load(impulse[surface.slots], system.rows)))
+        impulse[chosen] = np.linalg.solve(flexibility[np.ix_(chosen, chosen)], jump[chosen])
+        return np.asarray(v + response(impulse))
 
 
-def _prepared(system: SemiDiscreteSystem, surface: ContactSurface) -> tuple[Factor, Array | None, Array]:
-    """The factor of M, the owned rows of M⁻¹Bᵀ or None, and B M⁻¹Bᵀ. Collective."""
-    comm, factor = system.algebra.comm, system.algebra.factor(system.M)
-    keep = total(comm, system.rows * surface.total) <= STORED_ENTRIES
-    columns = factor.solve_units(surface.owned, surface.slots, surface.total, None if keep else surface.owned)
-    return factor, columns if keep else None, surface.everywhere(columns[surface.owned] if keep else columns)
+def _prepared(system: SemiDiscreteSystem, surface: ContactSurface) -> tuple[Array, Callable[[Array], Array]]:
+    """B M⁻¹Bᵀ, and what gives the owned rows of M⁻¹Bᵀ times impulses. Collective."""
+    condensed = condense(EffectiveMatrix(system.M, system.algebra), surface)
+    columns = []
+    for impulse in np.eye(surface.total):
+        column = condensed.response(impulse)
+        column[np.abs(column) < BELOW * surface.comm.max(np.array([max_abs(column)]))] = 0.0
+        columns.append(sp.csr_matrix(column))
+        if total(surface.comm, sum(one.nnz for one in columns)) > STORED * total(surface.comm, system.rows):
+            return condensed.flexibility, condensed.response
+    stored = sp.csr_matrix(sp.vstack(columns).T) if columns else sp.csr_matrix((system.rows, 0))
+    return condensed.flexibility, lambda impulse: np.asarray(stored @ impulse)
 
 
 @dataclass(frozen=True)

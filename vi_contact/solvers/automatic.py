@@ -1,8 +1,8 @@
 """Choose the route by the size of the problem: condensed where it is faster, iterative where it is not.
 
-Condensing costs one factor of A and a back-substitution for every contact unknown, once per dt, and a step then two
-back-substitutions; the iterative route costs some tens of products with A every step, and next to nothing before. In
-the plane factors stay sparse, in space they do not: the rule and what it was measured on are in docs/guide/solvers.md.
+Condensing costs one factor of A, once per dt, and a step then one forward and one backward substitution; the iterative
+route costs some tens of products with A every step, and next to nothing before. In the plane factors stay sparse, in
+space they do not: the rule and what it was measured on are in docs/guide/solvers.md.
 """
 
 from __future__ import annotations

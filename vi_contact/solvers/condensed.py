@@ -6,24 +6,27 @@ With the one factorisation of A and the unit vectors E of the normal unknowns:
     G = EᵀA⁻¹E (+ compliance/scale)    Delassus operator, the flexibility b~ of eq. 39; G⁻¹ is the matrix D~ of eq. 49
     q = bound - Eᵀx_free               gap that is left; z~ = D~ Eᵀx_free in eq. 49
     0 <= r ⊥ q + G r >= 0              the small problem: eq. 42 in r, eqs. 46, 49 in the displacements
-    x = A⁻¹ (b - E r)                  one more back-substitution, or a dense product with the stored A⁻¹E
+    x = A⁻¹ (b - E r)
 
-A step costs one back-substitution, the small problem and the correction, whatever the number of contact changes.
-With friction the tangential unknowns of the contact points are kept too: ``friction.condensed``.
+A step costs one forward and one backward substitution and the small problem, whatever the number of contact changes:
+``core.condensation``. With friction the tangential unknowns of the contact points are kept too: ``friction.condensed``.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
 
-from ..core.algebra import Array, EffectiveMatrix, Mask, total
+from ..core.algebra import Array, EffectiveMatrix, Mask
 from ..core.checks import instance, on_all, provides
+from ..core.condensation import Condensation, condense
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.sizes import refuse_dense
+from ..core.stages import stage
 from ..core.step import StepProblem, StepResult
 from ..core.surfaces import ContactSurface
 from .friction.condensed import CondensedFriction
@@ -32,8 +35,6 @@ from .friction.problem import FrictionMethod, inner_method
 from .friction.slip_rate import RateIteration
 from .normal.active_set import ActiveSet
 from .normal.lcp import LCPResult
-
-STORED_ENTRIES = 200_000  # of A⁻¹E over all ranks: beyond it a second back-substitution is cheaper than the product
 
 
 class SmallMethod(Protocol):
@@ -83,8 +84,8 @@ class Condensed:
                lambda: problem.friction.limit(np.zeros(surface.count), surface.weights, 1.0))
 
     def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> PreparedCondensed:
-        """Factorise A and condense it; once per time step size. InputError for more contact conditions than a dense
-        matrix suits."""
+        """Return what condenses A, once per time step size, at the first step: that tells whether it rubs. InputError
+        for more contact conditions than a dense matrix suits."""
         refuse_dense("Condensed()", surface.total)
         return PreparedCondensed(self, A, surface, scale)
 
@@ -93,77 +94,62 @@ class PreparedCondensed:
     """Solve the condensed problem of one A. ``delassus`` and ``schur`` are G and D~ (dense, equal on all ranks)."""
 
     def __init__(self, settings: Condensed, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> None:
-        self._settings, self._A, self._surface = settings, A, surface
+        self._settings, self._A, self._surface, self._scale = settings, A, surface, scale
         self._friction: CondensedFriction | None = None
-        self._columns: Array | None = None
-        self._rigid = surface.compliance == 0.0
-        self._name = f"condensed {type(settings.method).__name__}"
-        A.factor  # noqa: B018  made here, so that the first step is not charged for it
-        extra = surface.everywhere(surface.compliance) / scale
-        self.delassus: Array = np.zeros((0, 0))
-        if surface.total:
-            self.delassus = self._form(extra)
-            self._small = settings.method.prepare(self.delassus, surface.everywhere(surface.bilateral))
+        self._rigid = surface.everywhere(surface.compliance == 0.0)
+        self._name = f"condensed {type(settings.method).__name__}" if surface.total else "linear"
+        if surface.tangents.shape[1] == 0:
+            self._normal  # noqa: B018  nothing rubs in one dimension
 
-    def _form(self, extra: Array) -> Array:
-        """G, symmetrised; keeps A⁻¹E when it is small."""
-        surface, A = self._surface, self._A
-        keep = total(surface.comm, A.matrix.rows * surface.total) <= STORED_ENTRIES
-        rows = None if keep else surface.owned
-        columns = A.factor.solve_units(surface.owned, surface.slots, surface.total, rows)
-        G = surface.everywhere(columns[surface.owned] if keep else columns)
-        self._columns = columns if keep else None
-        return np.asarray(0.5 * (G + G.T) + np.diag(extra))
+    @cached_property
+    def _normal(self) -> tuple[Condensation, Any]:
+        """A condensed onto the normal unknowns, and the method for the small problem."""
+        made, bilateral = self._condensed(frictional=False), self._surface.everywhere(self._surface.bilateral)
+        return made, self._settings.method.prepare(made.flexibility, bilateral)
+
+    @stage("condensing")
+    def _condensed(self, *, frictional: bool) -> Condensation:
+        """A condensed, with the compliance of the support in its flexibility."""
+        made, surface = condense(self._A, self._surface, frictional=frictional), self._surface
+        extra = surface.everywhere(surface.compliance) / self._scale
+        normal = np.arange(surface.total) * (len(made.there) // max(surface.total, 1))
+        made.flexibility[normal, normal] += extra
+        return made
+
+    @property
+    def delassus(self) -> Array:
+        """Return G of the normal unknowns."""
+        return self._normal[0].flexibility
 
     @property
     def schur(self) -> Array:
         """Return D~ = G⁻¹: reactions of the contact points to unit normal displacements (eq. 49)."""
         return np.asarray(np.linalg.inv(self.delassus))
 
-    def solve(self, step: StepProblem) -> StepResult:
-        """Return x, r_n and the active set of a step."""
-        x, surface = self._A.factor.solve(step.b), self._surface
-        if surface.total == 0:
-            none = np.zeros(0)
-            return StepResult(x, none, none.astype(bool), 0, "linear")
-        if step.slip0 is not None:
-            return self._with_friction(step, x)
-        gap, guess = surface.everywhere(np.column_stack([step.bound - surface.normal_values(x), step.active])).T
-        small: LCPResult = self._small.solve(np.ascontiguousarray(gap), guess > 0.0)
-        if small.r.any():
-            x = self._corrected(x, small.r, step)
-        return StepResult(x, small.r[surface.slots], small.active[surface.slots], small.iterations, self._name)
-
     @property
     def friction(self) -> CondensedFriction:
         """Return the small problem with friction, made at the first step that has some."""
         if self._friction is None:
-            method, rates, keep = self._settings.friction_method, self._settings.rates, self._columns is not None
-            self._friction = CondensedFriction(method, self._A, self._surface, self.delassus, rates=rates, keep=keep)
+            method, rates = self._settings.friction_method, self._settings.rates
+            self._friction = CondensedFriction(method, self._condensed(frictional=True), self._surface, rates=rates)
         return self._friction
 
-    def _with_friction(self, step: StepProblem, x: Array) -> StepResult:
-        """The step with tangential reactions."""
-        small, mine = self.friction.solve(step, x), self._surface.slots
-        if small.r.any():
-            x = self._corrected(x, small.r[:, 0], step, small.r[:, 1:])
-            self.friction.hold_sticking(x, step, small)
-        name, r = f"condensed {type(self._settings.friction_method).__name__}", small.r[mine]
-        return StepResult(
-            x, r[:, 0].copy(), small.active[mine], small.iterations, name, r_t=r[:, 1:].copy(), history=small.history
-        )
+    def solve(self, step: StepProblem) -> StepResult:
+        """Return x, r_n and the active set of a step."""
+        if step.slip0 is not None and self._surface.total:
+            return self._with_friction(step)
+        surface, (condensed, small) = self._surface, self._normal
+        bound, guess = surface.everywhere(np.column_stack([step.bound, step.active])).T
+        found: LCPResult = small.solve(bound - condensed.free(step.b), guess > 0.0)
+        x = condensed.answer(found.r, (found.r != 0.0) & self._rigid, bound)
+        mine = surface.slots
+        return StepResult(x, found.r[mine], found.active[mine], found.iterations, self._name)
 
-    def _corrected(self, x: Array, r: Array, step: StepProblem, r_t: Array | None = None) -> Array:
-        """A⁻¹(b - E r_n - F r_t) for the reactions of all ranks; unknowns on a rigid support are put on their bound,
-        which removes round-off only."""
-        surface, mine = self._surface, self._surface.slots
-        if self._columns is None:
-            along = None if r_t is None else r_t[mine]
-            x = self._A.factor.solve(step.b - surface.reaction_load(r[mine], len(x), along))
-        elif r_t is None:
-            x = x - self._columns @ r
-        else:
-            x = x - self._columns @ r - self.friction.columns @ r_t.ravel()
-        closed = (r[mine] != 0.0) & self._rigid
-        x[surface.owned[closed]] = step.bound[closed]
-        return x
+    def _with_friction(self, step: StepProblem) -> StepResult:
+        """The step with tangential reactions."""
+        x, small = self.friction.solve(step, self._rigid)
+        name, r = f"condensed {type(self._settings.friction_method).__name__}", small.r[self._surface.slots]
+        return StepResult(
+            x, r[:, 0].copy(), small.active[self._surface.slots], small.iterations, name, r_t=r[:, 1:].copy(),
+            history=small.history,
+        )

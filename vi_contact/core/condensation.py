@@ -1,0 +1,98 @@
+"""Condense A onto contact unknowns c: their flexibility, their motion without reactions, and the answer to reactions.
+
+    G = (A⁻¹)_cc,    free: (A⁻¹b)_c,    answer: x = A⁻¹(b - r) with reactions r on c
+
+With the contact unknowns last in the factor (``contact_last``) a step costs one forward and one backward substitution,
+and G comes from the corner of the factor. Where there is no such factor it costs two whole ones, and G one for each
+contact unknown. Contact values here are those of all ranks, on every rank: the normal unknowns by the numbers of the
+conditions or, with friction, (r_n, r_t) node by node. What cannot move (a prescribed tangent) stays at zero.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import lapack
+
+from .algebra import Array, EffectiveMatrix, Indices, Mask
+from .contact_last import ContactLast
+from .surfaces import ContactSurface
+
+
+def condense(A: EffectiveMatrix, surface: ContactSurface, *, frictional: bool = False) -> Last | _Twice:
+    """Factorise A and condense it onto the normal unknowns of the surface, with friction the tangential ones too.
+    Collective."""
+    mine, first = surface.owned[:, None], A.algebra.first(A.matrix.rows)
+    if frictional:
+        mine = np.hstack([mine, surface.tangents])
+    unknowns = surface.everywhere(np.where(mine >= 0, mine + first, -1)).ravel()
+    last = unknowns[unknowns >= 0]
+    factor = A.contact_last(last) if len(np.unique(last)) == len(last) else None
+    if factor is not None:
+        return Last(factor, unknowns >= 0)
+    places = surface.slots[:, None] * mine.shape[1] + np.arange(mine.shape[1])
+    return _Twice(A, surface, mine[mine >= 0], places[mine >= 0], unknowns >= 0)
+
+
+class Last:
+    """Hold A condensed onto k contact unknowns, which come last in its factor. ``free`` begins a step, ``answer`` ends
+    it; collective. ``flexibility`` (k, k); ``there`` (k,): what can move."""
+
+    def __init__(self, factor: ContactLast, there: Mask) -> None:
+        self._factor, self.there, corner = factor, there, factor.corner
+        inverse = lapack.dpotri(corner, lower=1)[0] if len(corner) else corner
+        self.flexibility: Array = np.zeros((len(there), len(there)))
+        self.flexibility[np.ix_(there, there)] = np.tril(inverse) + np.tril(inverse, -1).T
+
+    def free(self, b: Array) -> Array:
+        """Return x_c (k,) of A⁻¹b."""
+        self._y = self._factor.forward(b)
+        self._x = np.zeros(len(self.there))
+        self._x[self.there] = self._factor.free(self._y)
+        return self._x
+
+    def answer(self, r: Array, held: Mask, values: Array) -> Array:
+        """Return x = A⁻¹(b - r), owned rows, with ``held`` unknowns (k,) on these values: it removes round-off only."""
+        x, there = self._x[self.there], self.there
+        if r.any():
+            x = self._factor.free(self._y - self._factor.reduced(r[there]))
+        return self._factor.backward(np.where(held[there], values[there], x))
+
+    def response(self, r: Array) -> Array:
+        """Return A⁻¹ r, owned rows, of forces r (k,)."""
+        self._factor.unloaded()
+        return self._factor.backward(self._factor.free(self._factor.reduced(r[self.there])))
+
+
+class _Twice:
+    """Hold the same with any factor of A; ``owned`` contact unknowns of this rank and their ``places`` among all."""
+
+    def __init__(
+        self, A: EffectiveMatrix, surface: ContactSurface, owned: Indices, places: Indices, there: Mask
+    ) -> None:
+        self._A, self._comm, self._owned, self._places, self.there = A, surface.comm, owned, places, there
+        G = self._everywhere(A.factor.solve_units(owned, places, len(there), owned))
+        self.flexibility: Array = 0.5 * (G + G.T)
+
+    def _everywhere(self, values: Array) -> Array:
+        whole = np.zeros((len(self.there), *values.shape[1:]))
+        whole[self._places] = values
+        return self._comm.sum(whole)
+
+    def free(self, b: Array) -> Array:
+        self._b, self._x = b, self._A.factor.solve(b)
+        return self._everywhere(self._x[self._owned])
+
+    def answer(self, r: Array, held: Mask, values: Array) -> Array:
+        load, mine = self._b.copy(), held[self._places]
+        load[self._owned] -= r[self._places]
+        x = self._A.factor.solve(load) if r.any() else self._x
+        x[self._owned[mine]] = values[self._places[mine]]
+        return x
+
+    def response(self, r: Array) -> Array:
+        load = np.zeros(self._A.matrix.rows)
+        load[self._owned] = r[self._places]
+        return self._A.factor.solve(load)
+
+
+Condensation = Last | _Twice

@@ -1,0 +1,138 @@
+/* Factorise A = L L' by CHOLMOD with given unknowns last, and substitute: compiled once for every user, see contact_last.py.
+
+   CHOLMOD is linked as PETSc links it, and never copied into this package: its supernodal part is under the GPL. Matrices
+   come as the lower triangle in compressed columns with sorted rows. Functions that can fail return CHOLMOD's status. */
+#include <cholmod.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct {
+    cholmod_common common;
+    cholmod_factor *L;
+    cholmod_dense *X, *Y, *E;
+} Factor;
+
+static cholmod_sparse lower_triangle(int n, int *p, int *i, double *x) {
+    cholmod_sparse A;
+    memset(&A, 0, sizeof A);
+    A.nrow = A.ncol = n;
+    A.nzmax = p[n];
+    A.p = p; A.i = i; A.x = x;
+    A.stype = -1;
+    A.itype = CHOLMOD_INT; A.xtype = x ? CHOLMOD_REAL : CHOLMOD_PATTERN; A.dtype = CHOLMOD_DOUBLE;
+    A.sorted = A.packed = 1;
+    return A;
+}
+
+static void start(cholmod_common *common) {
+    cholmod_start(common);
+    common->print = 0;
+    common->nmethods = 1;
+    common->final_ll = 1;
+    common->try_catch = 1;
+}
+
+/* An order of little fill, in which the elimination tree is numbered child before parent. */
+int order(int n, int *p, int *i, int dissect, int *perm) {
+    cholmod_common common;
+    cholmod_sparse A = lower_triangle(n, p, i, NULL);
+    start(&common);
+    common.method[0].ordering = dissect ? CHOLMOD_METIS : CHOLMOD_AMD;
+    common.supernodal = CHOLMOD_SIMPLICIAL;
+    cholmod_factor *L = cholmod_analyze(&A, &common);
+    int status = L ? CHOLMOD_OK : common.status ? common.status : CHOLMOD_INVALID;
+    if (L) memcpy(perm, L->Perm, n * sizeof(int));
+    cholmod_free_factor(&L, &common);
+    cholmod_finish(&common);
+    return status;
+}
+
+void release(Factor *f) {
+    cholmod_free_dense(&f->X, &f->common);
+    cholmod_free_dense(&f->Y, &f->common);
+    cholmod_free_dense(&f->E, &f->common);
+    cholmod_free_factor(&f->L, &f->common);
+    cholmod_finish(&f->common);
+    free(f);
+}
+
+/* Factorise in this order, which stays as it is: what is last in it is last in L. */
+int factorise(int n, int *p, int *i, double *x, int *perm, Factor **made) {
+    cholmod_sparse A = lower_triangle(n, p, i, x);
+    Factor *f = calloc(1, sizeof(Factor));
+    *made = NULL;
+    if (!f) return CHOLMOD_OUT_OF_MEMORY;
+    start(&f->common);
+    f->common.method[0].ordering = CHOLMOD_GIVEN;
+    f->common.postorder = 0;
+    f->common.supernodal = CHOLMOD_SUPERNODAL;
+    f->L = cholmod_analyze_p(&A, perm, NULL, 0, &f->common);
+    if (f->L) cholmod_factorize(&A, f->L, &f->common);
+    int status = f->L && f->L->minor == f->L->n && f->L->is_super ? f->common.status : CHOLMOD_NOT_POSDEF;
+    if (status == CHOLMOD_OK) *made = f;
+    else release(f);
+    return status;
+}
+
+/* The entries of the first `inner` columns, counted when p is NULL; zeros that supernodes store are left out. Each column
+   begins with its diagonal entry, inverted. `corner`: the other columns, dense (m, m), column by column. */
+long columns(const Factor *f, int inner, long *p, int *i, double *x, double *corner) {
+    const cholmod_factor *L = f->L;
+    const int *first = L->super, *from = L->pi, *at = L->px, *rows = L->s;
+    const long m = L->n - inner;
+    long count = 0;
+    for (size_t k = 0; k < L->nsuper; k++) {
+        const int *row = rows + from[k];
+        const long high = from[k + 1] - from[k];
+        for (int j = first[k]; j < first[k + 1]; j++) {
+            const double *value = (const double *) L->x + at[k] + (j - first[k]) * high;
+            if (j < inner && p) p[j] = count;
+            for (long r = j - first[k]; r < high; r++) {
+                if (j >= inner) {
+                    if (corner) corner[(row[r] - inner) + m * (j - inner)] = value[r];
+                } else if (value[r] != 0.0) {
+                    if (p) { i[count] = row[r]; x[count] = row[r] == j ? 1.0 / value[r] : value[r]; }
+                    count++;
+                }
+            }
+        }
+    }
+    if (p) p[inner] = count;
+    return count;
+}
+
+/* y <- L^-1 y on the first `inner` columns. */
+void forward(int inner, const long *p, const int *i, const double *x, double *restrict y) {
+    for (int j = 0; j < inner; j++) {
+        const double t = y[j] *= x[p[j]];
+        for (long k = p[j] + 1; k < p[j + 1]; k++) y[i[k]] -= x[k] * t;
+    }
+}
+
+/* y <- L^-T y on the first `inner` columns. Memory is read downwards, within columns too: one stream for the processor. */
+void backward(int inner, const long *p, const int *i, const double *x, double *restrict y) {
+    for (int j = inner - 1; j >= 0; j--) {
+        double s = 0.0, t = 0.0, u = 0.0, w = 0.0;
+        long k = p[j + 1] - 1;
+        for (; k - 3 > p[j]; k -= 4) {
+            s += x[k] * y[i[k]]; t += x[k - 1] * y[i[k - 1]];
+            u += x[k - 2] * y[i[k - 2]]; w += x[k - 3] * y[i[k - 3]];
+        }
+        for (; k > p[j]; k--) s += x[k] * y[i[k]];
+        y[j] = (y[j] - ((s + t) + (u + w))) * x[p[j]];
+    }
+}
+
+/* y <- L^-1 y (CHOLMOD_L, 4), L^-T y (CHOLMOD_Lt, 5), or A^-1 y (CHOLMOD_A, 0), by supernodes. */
+int substitute(Factor *f, int system, double *y) {
+    cholmod_dense B;
+    memset(&B, 0, sizeof B);
+    B.nrow = B.d = B.nzmax = f->L->n;
+    B.ncol = 1;
+    B.x = y;
+    B.xtype = CHOLMOD_REAL; B.dtype = CHOLMOD_DOUBLE;
+    if (!cholmod_solve2(system, f->L, &B, NULL, &f->X, NULL, &f->Y, &f->E, &f->common))
+        return f->common.status;
+    memcpy(y, f->X->x, sizeof(double) * f->L->n);
+    return CHOLMOD_OK;
+}

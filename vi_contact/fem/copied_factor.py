@@ -1,0 +1,45 @@
+"""Factorise PETSc matrices with contact unknowns last: by CHOLMOD, a whole copy of the factor on every rank."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..core.algebra import Array, Indices, largest
+from ..core.compiled import library
+from ..core.contact_last import ContactLast
+
+
+def contact_last(comm: Any, mat: Any, last: Indices) -> ContactLast | None:
+    """Return the factor of an AIJ matrix on an MpiComm; None without CHOLMOD, and where it cannot: not positive
+    definite, which PETSc says better, or too large. Collective."""
+    functions = library(comm)
+    if functions is None:
+        return None
+    ends, columns, values = mat.getValuesCSR()
+    rows = sp.csr_matrix((values, columns, ends), shape=(len(ends) - 1, mat.getSize()[1]))
+    made = None
+    try:
+        if comm.size == 1:
+            made = ContactLast(functions, rows, last)
+        else:
+            whole, first = sp.vstack(comm.mpi.allgather(rows), format="csr"), mat.getOwnershipRange()
+            made = ContactLast(functions, whole, last, whole=_gathering(comm.mpi, mat), mine=slice(*first))
+    except ArithmeticError:
+        pass
+    return None if largest(comm, made is None) else made
+
+
+def _gathering(mpi: Any, mat: Any) -> Callable[[Array], Array]:
+    """What gathers the owned entries of a vector, into one array again and again."""
+    ends = mat.getOwnershipRanges()
+    counts, x = np.diff(ends), np.empty(ends[-1])
+
+    def whole(b: Array) -> Array:
+        mpi.Allgatherv(np.ascontiguousarray(b), [x, counts])
+        return x
+
+    return whole
