@@ -32,7 +32,7 @@ def large(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     """From its call on every problem is large, and nothing may be factorised."""
 
     def begin() -> None:
-        def refuse(*_: Any) -> None:
+        def refuse(*_: Any, **__: Any) -> None:
             raise AssertionError("factorised")
 
         monkeypatch.setattr(sizes, "OWN_UNKNOWNS", 0)
