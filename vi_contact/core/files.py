@@ -64,10 +64,8 @@ def sentence(error: OSError) -> str:
     """Return one sentence: what happened to which file, and the remedy."""
     path = error.filename or "the output folder"
     if error.errno in _FULL:
-        return (
-            f"the disk is full: '{path}' could not be written; what was written before is kept, "
-            "free some space and restart from the last checkpoint"
-        )
+        return (f"the disk is full: '{path}' could not be written; what was written before is kept, free some space "
+                "and restart from the last checkpoint")
     if error.errno in _REFUSED:
         return f"'{path}' cannot be written ({error.strerror}): choose another output folder or change its permissions"
     return f"'{path}' cannot be read or written ({error.strerror or error}): choose another output folder"

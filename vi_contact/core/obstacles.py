@@ -56,10 +56,8 @@ class HalfSpace:
     def __post_init__(self) -> None:
         point, normal = (array("HalfSpace", name, getattr(self, name), (None,)) for name in ("point", "normal"))
         if not normal.any() or not np.isfinite(np.linalg.norm(normal)) or len(point) != len(normal):
-            raise InputError(
-                f"HalfSpace(point={self.point}, normal={self.normal}): give a point and a nonzero normal "
-                "with the same number of components"
-            )
+            raise InputError(f"HalfSpace(point={self.point}, normal={self.normal}): give a point and a nonzero normal "
+                             "with the same number of components")
 
     @property
     def unit_normal(self) -> Array:
@@ -69,16 +67,12 @@ class HalfSpace:
 
     def _check(self, points: Array, normals: Array) -> None:
         if points.shape[1] != len(self.normal):
-            raise InputError(
-                f"HalfSpace has {len(self.normal)} components but the body has {points.shape[1]}: "
-                "give one per dimension"
-            )
+            raise InputError(f"HalfSpace has {len(self.normal)} components but the body has {points.shape[1]}: give "
+                             "one per dimension")
         away = normals @ self.unit_normal > 1e-9  # a side at right angles may touch with its edge
         if np.any(away) and np.any(away & ~np.isin(alike(points), alike(points)[~away])):  # a corner has several
-            raise InputError(
-                f"HalfSpace normal {self.normal} points away from the body: turn its sign, "
-                "it must point out of the obstacle towards the contact boundary"
-            )
+            raise InputError(f"HalfSpace normal {self.normal} points away from the body: turn its sign, it must point "
+                             "out of the obstacle towards the contact boundary")
 
     def directions(self, points: Array, normals: Array) -> Array:
         self._check(points, normals)
@@ -105,10 +99,8 @@ class AnalyticGap:
     def gap(self, points: Array, normals: Array) -> Array:
         gap = np.asarray(self.function(points))
         if gap.shape != (len(points),) or gap.dtype.kind not in "iuf":
-            raise InputError(
-                f"AnalyticGap returned shape {gap.shape} of {gap.dtype} for {len(points)} points: return one gap per "
-                "point, a real number"
-            )
+            raise InputError(f"AnalyticGap returned shape {gap.shape} of {gap.dtype} for {len(points)} points: return "
+                             "one gap per point, a real number")
         return gap.astype(float)
 
 
@@ -146,8 +138,6 @@ def admissible_gap(gap: Array, points: Array, size: float) -> Array:
     if len(gap) and gap.min() < -1e-12 * size:
         worst = int(np.argmin(gap))
         where = ", ".join(f"{x:g}" for x in points[worst])
-        raise InputError(
-            f"the body penetrates its obstacle by {-gap[worst]:.3g} m at ({where}) before the first step: "
-            "move the obstacle or the mesh so that every initial gap is >= 0"
-        )
+        raise InputError(f"the body penetrates its obstacle by {-gap[worst]:.3g} m at ({where}) before the first step: "
+                         "move the obstacle or the mesh so that every initial gap is >= 0")
     return np.maximum(gap, 0.0)

@@ -34,15 +34,11 @@ def check_parts(problem: Any) -> None:
     for excitation in excitations:
         _check_excitation(excitation, system)
     if system.absolute and excitations:
-        raise InputError(
-            "a compliant base is shaken by its own upgoing motion: leave the excitation of the problem out, its "
-            "inertia load is that of a rigid base"
-        )
+        raise InputError("a compliant base is shaken by its own upgoing motion: leave the excitation of the problem "
+                         "out, its inertia load is that of a rigid base")
     if surface.space is not None and surface.space is not system.space:
-        raise InputError(
-            "ContactProblem: the contact surface was made for another system, whose unknowns are others: make it for "
-            "this one, fem.contact_surface(system, …)"
-        )
+        raise InputError("ContactProblem: the contact surface was made for another system, whose unknowns are others: "
+                         "make it for this one, fem.contact_surface(system, …)")
     if surface.comm.size != system.algebra.comm.size:
         raise InputError(f"ContactProblem: the surface is shared by {surface.comm.size} ranks and the system by "
                          f"{system.algebra.comm.size}: make both on the same ranks")
@@ -56,10 +52,8 @@ def _check_excitation(excitation: Any, system: SemiDiscreteSystem) -> None:
     provides("ContactProblem", "excitation", excitation, EXCITATION, remedy)
     array("ContactProblem", "the direction of an excitation", excitation.direction, (None,))
     if len(excitation.direction) != system.influence.shape[1]:
-        raise InputError(
-            f"excitation direction {excitation.direction} has {len(excitation.direction)} components but the body has "
-            f"{system.influence.shape[1]}: give one component per dimension"
-        )
+        raise InputError(f"excitation direction {excitation.direction} has {len(excitation.direction)} components but "
+                         f"the body has {system.influence.shape[1]}: give one component per dimension")
 
 
 def _of_system(system: SemiDiscreteSystem) -> Iterator[str]:

@@ -57,8 +57,7 @@ def initial_state(problem: ContactProblem, t: float = 0.0) -> State:
     sizes = np.array([np.max(-gap, initial=-np.inf), max_abs(system.u0), np.max(surface.gap0, initial=0.0)])
     behind, *size = surface.comm.max(sizes)
     if behind > 1e-9 * max(size):
-        raise InputError(
-            f"the initial displacement penetrates the obstacle by {behind:.3g} m: reduce it or enlarge the gap"
-        )
+        raise InputError(f"the initial displacement penetrates the obstacle by {behind:.3g} m: reduce it or enlarge "
+                         "the gap")
     none = np.zeros(surface.count)
     return State(t, 0, system.u0.copy(), system.v0.copy(), none, surface.bilateral.copy())

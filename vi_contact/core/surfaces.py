@@ -182,8 +182,7 @@ class ContactSurface:
             return lambda t: _spread(name, way(t), shape, t)
 
         return replace(
-            self,
-            motion=None if towards is None else spread("towards", towards, (self.count,)),
+            self, motion=None if towards is None else spread("towards", towards, (self.count,)),
             slide=None if along is None else spread("along", along, (self.count, self.tangents.shape[1])),
         )
 
@@ -271,14 +270,7 @@ def empty_surface(comm: Comm, dimension: int) -> ContactSurface:
     """Return a surface without any contact: the linear comparison case."""
     none = np.zeros(0, dtype=np.int64)
     return ContactSurface(
-        comm=comm,
-        points=np.zeros((0, dimension)),
-        normals=np.zeros((0, dimension)),
-        weights=np.zeros(0),
-        gap0=np.zeros(0),
-        bilateral=np.zeros(0, dtype=bool),
-        compliance=np.zeros(0),
-        owned=none,
-        slots=none,
+        comm=comm, points=np.zeros((0, dimension)), normals=np.zeros((0, dimension)), weights=np.zeros(0),
+        gap0=np.zeros(0), bilateral=np.zeros(0, dtype=bool), compliance=np.zeros(0), owned=none, slots=none,
         tangents=np.zeros((0, max(dimension - 1, 0)), dtype=np.int64),
     )

@@ -144,21 +144,15 @@ def energy_balance(
     pushed, dragged = _obstacle_work(problem, old.t, new.t, balance)
     rubbing = 0.0 if balance.r_t is None else np.sum(balance.r_t * surface.tangential_values(du))
     work, inertia, kinetic, stiffness, lost, *local = _dots(
-        system,
-        (du, balance.f),
-        (du, system.product("M", balance.a)),
+        system, (du, balance.f), (du, system.product("M", balance.a)),
         (0.5 * (old.v + new.v), after.momentum - before.momentum),
-        (balance.u - 0.5 * (old.u + new.u), after.elastic - before.elastic),
-        (balance.r_n, surface.normal_values(du)),
+        (balance.u - 0.5 * (old.u + new.u), after.elastic - before.elastic), (balance.r_n, surface.normal_values(du)),
         sums=(rubbing, pushed, dragged, 0.0 if system.C is None else du.dot(system.product("C", balance.v))),
     )
     rubbing, pushed, dragged, damping = local
     return StepEnergy(
-        change=after.total - before.total,
-        input=float(work + pushed + dragged),
-        damping=float(damping),
-        contact=float(lost + pushed),
-        friction=float(rubbing + dragged),
+        change=after.total - before.total, input=float(work + pushed + dragged), damping=float(damping),
+        contact=float(lost + pushed), friction=float(rubbing + dragged),
         algorithmic=float(inertia - kinetic + stiffness),
     )
 

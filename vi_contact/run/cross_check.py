@@ -223,15 +223,8 @@ class PreparedCrossCheck:
 
 
 def cross_check(
-    problem: ContactProblem,
-    *,
-    scheme: Scheme | None = None,
-    solvers: Sequence[Solver],
-    dt: TimeSteps,
-    steps: int,
-    state: State | None = None,
-    references: Sequence[Reference] = (),
-    bound: float = 0.02,
+    problem: ContactProblem, *, scheme: Scheme | None = None, solvers: Sequence[Solver], dt: TimeSteps, steps: int,
+    state: State | None = None, references: Sequence[Reference] = (), bound: float = 0.02,
 ) -> CrossChecked:
     """March with the first solver and compare the others with it at every step; see ``worst`` and ``report()``.
 

@@ -19,15 +19,8 @@ from .time_steps import StepPlan, TimeSteps, step_plan
 
 
 def march(
-    problem: ContactProblem,
-    *,
-    scheme: Scheme | None = None,
-    solver: Solver | None = None,
-    dt: TimeSteps,
-    steps: int | None = None,
-    t_end: float | None = None,
-    state: State | None = None,
-    escalation: Sequence[Solver] = (),
+    problem: ContactProblem, *, scheme: Scheme | None = None, solver: Solver | None = None, dt: TimeSteps,
+    steps: int | None = None, t_end: float | None = None, state: State | None = None, escalation: Sequence[Solver] = (),
     tolerance: float = TOLERANCE,
 ) -> Iterator[tuple[State, Report]]:
     """Yield (state, report) after every certified step.

@@ -107,7 +107,5 @@ def check_state(owner: str, problem: ContactProblem, state: State, *, dt: float,
     if inside > SLACK * tolerance * max(sizes):
         worst = np.concatenate(from_each(surface.comm, surface.points[gap == -inside]))[0]
         where = ", ".join(f"{x:g}" for x in worst)
-        raise InputError(
-            f"{owner}: the state lies {inside:.3g} m inside the obstacle at ({where}): start from one with every "
-            "gap >= 0"
-        )
+        raise InputError(f"{owner}: the state lies {inside:.3g} m inside the obstacle at ({where}): start from one "
+                         "with every gap >= 0")

@@ -119,10 +119,8 @@ class Proximal:
             self._stiffen(STIFFER)
         if progress.best is not None and progress.certified:
             return progress.best
-        raise StepFailure(
-            f"the static stage of a body held by contact alone was not solved ({why}): start closer to the obstacle, "
-            "use stiffer supports, the solver Condensed(), or hold a part of the body"
-        )
+        raise StepFailure(f"the static stage of a body held by contact alone was not solved ({why}): start closer to "
+                          "the obstacle, use stiffer supports, the solver Condensed(), or hold a part of the body")
 
     def _iterate(self, answer: StepResult, progress: _Progress) -> None:
         """From the answer; StepFailure of the solver, or when it has spent too many iterations."""
@@ -188,10 +186,9 @@ class Proximal:
         stopped = self.step.surface.some(self._closes(motion))
         if energy == 0.0 or bending > RIGID * energy or work < DRIVEN * energy or stopped:
             return
-        raise InputError(
-            f"the body has no static equilibrium: its loads {self._way(motion.d)} and neither contact nor a "
-            "prescribed displacement stops that; hold it there, change the loads, or start the dynamics from rest"
-        )
+        raise InputError(f"the body has no static equilibrium: its loads {self._way(motion.d)} and neither contact nor "
+                         "a prescribed displacement stops that; hold it there, change the loads, or start the dynamics "
+                         "from rest")
 
     def _way(self, d: Array) -> str:
         """Where a motion goes: the direction of its momentum, if it has one."""

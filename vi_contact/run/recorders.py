@@ -27,10 +27,8 @@ def refuse_overflow(row: Row) -> None:
         if not isinstance(value, float) or isfinite(value):
             continue
         if np.isinf(value) or name.startswith(("energy_", "work_", "loss_")):
-            raise StepFailure(
-                f"step {row['k']} at t = {row['t']:.6g} s: {name} is {value}, beyond the numbers of the machine: check "
-                "the sizes and units of loads, motions and initial data"
-            )
+            raise StepFailure(f"step {row['k']} at t = {row['t']:.6g} s: {name} is {value}, beyond the numbers of the "
+                              "machine: check the sizes and units of loads, motions and initial data")
 
 
 class Steps:

@@ -31,25 +31,12 @@ __all__ = ["Solution", "simulate"]
 
 
 def simulate(
-    problem: ContactProblem,
-    *,
-    scheme: Scheme | None = None,
-    solver: Solver | None = None,
-    dt: TimeSteps,
-    t_end: float | None = None,
-    steps: int | None = None,
-    record: Sequence[Recorder] | None = None,
-    out: str | Path | None = None,
-    state: State | None = None,
-    escalation: Sequence[Solver] = (),
-    tolerance: float = TOLERANCE,
-    checkpoint_every: int = 100,
-    restart: bool | str | Path = False,
-    changed: bool = False,
-    progress: bool = True,
-    fields: FieldWriter | None = None,
-    cross_check: Comparison | None = None,
-    wall_time: str | None = None,
+    problem: ContactProblem, *, scheme: Scheme | None = None, solver: Solver | None = None, dt: TimeSteps,
+    t_end: float | None = None, steps: int | None = None, record: Sequence[Recorder] | None = None,
+    out: str | Path | None = None, state: State | None = None, escalation: Sequence[Solver] = (),
+    tolerance: float = TOLERANCE, checkpoint_every: int = 100, restart: bool | str | Path = False,
+    changed: bool = False, progress: bool = True, fields: FieldWriter | None = None,
+    cross_check: Comparison | None = None, wall_time: str | None = None,
 ) -> Solution:
     """March to t_end, or for so many steps, and records. Collective; every rank gets the solution.
 

@@ -43,11 +43,9 @@ def energy_warning(facts: Mapping[str, Any]) -> str | None:
     """Return a sentence when the run had more energy than was put in, by more than CREATED of the largest energy."""
     if facts.get("energy_created", 0.0) <= CREATED:
         return None
-    return (
-        f"contact and time scheme created {100 * facts['energy_created']:.3g} % of the largest energy of the run: take "
-        "a smaller dt (a wave should not cross more than two elements in a step), HalvedAtImpact, or a dissipative "
-        "scheme such as ContactStabilisedNewmark() or HHT()"
-    )
+    return (f"contact and time scheme created {100 * facts['energy_created']:.3g} % of the largest energy of the run: "
+            "take a smaller dt (a wave should not cross more than two elements in a step), HalvedAtImpact, or a "
+            "dissipative scheme such as ContactStabilisedNewmark() or HHT()")
 
 
 def sampling_warning(excitations: Sequence[Excitation], dt: float) -> str | None:
@@ -56,10 +54,9 @@ def sampling_warning(excitations: Sequence[Excitation], dt: float) -> str | None
     finest = min((one.record.dt for one in excitations if isinstance(one, GroundMotion)), default=dt)
     if dt <= finest * (1.0 + 1e-6):
         return None
-    return (
-        f"the time step of {dt:g} s is longer than the {finest:g} s of the record, whose peaks fall between the steps: "
-        "take a shorter dt, or bring the record to it by resampled(record, dt), which takes out what dt cannot carry"
-    )
+    return (f"the time step of {dt:g} s is longer than the {finest:g} s of the record, whose peaks fall between the "
+            "steps: take a shorter dt, or bring the record to it by resampled(record, dt), which takes out what dt "
+            "cannot carry")
 
 
 def _lines(facts: Mapping[str, Any]) -> list[str]:

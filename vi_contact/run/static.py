@@ -80,11 +80,7 @@ class Equilibria:
 
 
 def quasi_static(
-    problem: ContactProblem,
-    times: Iterable[float],
-    *,
-    solver: Solver | None = None,
-    state: State | None = None,
+    problem: ContactProblem, times: Iterable[float], *, solver: Solver | None = None, state: State | None = None,
     tolerance: float = TOLERANCE,
 ) -> Iterator[State]:
     """Yield the equilibrium at each of the times, from where the one before left the body. v = 0; k counts stages.
@@ -106,10 +102,8 @@ def quasi_static(
     check_problem_given("quasi_static", problem)
     check_methods("quasi_static", solver, (), tolerance)
     if problem.friction.at(np.zeros(problem.surface.count)) is not problem.friction:
-        raise InputError(
-            f"load steps with {problem.friction}: slip between them has no rate; use Coulomb with the coefficient of "
-            "slow sliding, or march through the history in time"
-        )
+        raise InputError(f"load steps with {problem.friction}: slip between them has no rate; use Coulomb with the "
+                         "coefficient of slow sliding, or march through the history in time")
     if state is None:
         state = initial_state(problem)
     else:
