@@ -126,10 +126,9 @@ class BoundaryContact:
         directions = np.asarray(self.obstacle.directions(points, normals))
         if np.max(np.abs(directions - normals)) <= 1e-9:  # the obstacle follows the boundary; a plane has one direction
             where = ", ".join(f"{x:g}" for x in points[corner])
-            raise InputError(
-                f"BoundaryContact: the contact boundary turns by {np.degrees(turns[corner]):.3g} degrees at ({where}): "
-                "give conditions=conditions_on(mesh, compliance, one side, other side), a condition on each"
-            )
+            raise InputError(f"BoundaryContact: the contact boundary turns by {np.degrees(turns[corner]):.3g} degrees "
+                             f"at ({where}): give conditions=conditions_on(mesh, compliance, one side, other side), a "
+                             "condition on each")
 
     @property
     def count(self) -> int:

@@ -157,10 +157,7 @@ def ledger(run: ContactRun, motion: BoundaryMotion, loads: Array, *, supported: 
 
 
 def run_steps(
-    contact: BoundaryContact,
-    solved: Callable[[StepProblem], StepResult],
-    *,
-    iterations: Array | None = None,
+    contact: BoundaryContact, solved: Callable[[StepProblem], StepResult], *, iterations: Array | None = None,
     history: tuple[float, ...] = (),
 ) -> ContactRun:
     """Take all steps, each answered by ``solved``, into a run with certificates."""

@@ -63,10 +63,9 @@ class ElementPairs:
                                              "angle if two sides meet near by")
         if self.corner[pair]:
             near, remedy = "has a sharp or uneven corner", "widen its angle or make its two elements more equal"
-        raise InputError(
-            f"boundary elements: the boundary {near} at {point_at(mesh.points[second])}, where elements {first} and "
-            f"{second} are {apart:.3g} m apart, less than 1/20 of the {h:.3g} m of the longer one; {remedy}"
-        )
+        raise InputError(f"boundary elements: the boundary {near} at {point_at(mesh.points[second])}, where elements "
+                         f"{first} and {second} are {apart:.3g} m apart, less than 1/20 of the {h:.3g} m of the longer "
+                         f"one; {remedy}")
 
     def __len__(self) -> int:
         return len(self.first)

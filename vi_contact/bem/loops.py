@@ -36,10 +36,8 @@ def check_orientation(points: Array, sizes: tuple[int, ...], *, exterior: bool) 
     loops = np.split(points, np.cumsum(sizes)[:-1])
     for i, (loop, forward) in enumerate(zip(loops, should_run_forward(loops, exterior=exterior), strict=True)):
         if (signed_area(loop) > 0.0) != forward:
-            raise InputError(
-                f"BoundaryMesh: loop {i} has the wrong orientation, normals would point into the body; "
-                f"reverse its points or set exterior={not exterior}"
-            )
+            raise InputError(f"BoundaryMesh: loop {i} has the wrong orientation, normals would point into the body; "
+                             f"reverse its points or set exterior={not exterior}")
 
 
 def check_size(points: Array, sizes: tuple[int, ...]) -> None:
@@ -93,10 +91,8 @@ def ordered_loops(points: Array, segments: Indices, *, exterior: bool) -> tuple[
     ends = np.bincount(segments.ravel(), minlength=len(points))
     if len(segments) == 0 or (ends[np.unique(segments)] != 2).any():
         bad = int(np.argmax((ends != 2) & (ends > 0)))
-        raise InputError(
-            f"the boundary curve is open or branches at point {bad} ({points[bad].tolist()}), where {int(ends[bad])} "
-            "segments meet; give every segment of closed curves"
-        )
+        raise InputError(f"the boundary curve is open or branches at point {bad} ({points[bad].tolist()}), where "
+                         f"{int(ends[bad])} segments meet; give every segment of closed curves")
     at_point: dict[int, list[int]] = {}
     for number, pair in enumerate(segments.tolist()):
         for point in pair:

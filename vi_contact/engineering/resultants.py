@@ -88,10 +88,8 @@ class Part:
         at_points = -r_n[:, :, None] * self.normals
         if r_t is not None:
             if self.shared and self.dimension == 3:
-                raise InputError(
-                    f"part '{self.name}' has points with two contact directions, whose friction has no frame of its "
-                    "own in three dimensions: leave them out of the mask"
-                )
+                raise InputError(f"part '{self.name}' has points with two contact directions, whose friction has no "
+                                 "frame of its own in three dimensions: leave them out of the mask")
             at_points = at_points - np.einsum("rkc,kdc->rkd", r_t[:, self.mask], self.tangents)
         force = 0.0 + at_points.sum(axis=1)
         thrust = r_n.sum(axis=1)

@@ -136,10 +136,9 @@ class DashpotMatrix:
             both = np.intersect1d(self.dashpots.facets.indices, condition.facets.indices)
             resisted = self._resistance(self._matrix(both)) > NO_RESISTANCE * total
             if any(resisted[c] for c in components_of("prescribed", condition.components, self.space.dimension)):
-                raise InputError(
-                    f"boundary '{name}' has dashpots in a direction that is prescribed on '{condition.facets.name}': "
-                    "never hold and damp one component, leave out the one or the other"
-                )
+                raise InputError(f"boundary '{name}' has dashpots in a direction that is prescribed on "
+                                 f"'{condition.facets.name}': never hold and damp one component, leave out the one or "
+                                 "the other")
 
     def moved_by(self, motion: Callable[[float], Array], factor: float) -> Callable[[float], Array]:
         """Return the load factor Pᵀ D v(t), v the same at all nodes."""

@@ -93,10 +93,8 @@ class Tags(dict[str, Any]):
     def __missing__(self, name: str) -> Any:
         facets = [key for key, group in self.items() if isinstance(group, Facets)]
         cells = [key for key, group in self.items() if isinstance(group, Cells)]
-        raise InputError(
-            f"mesh has no group '{name}'; its boundary groups are {', '.join(facets) or 'none'},"
-            f" its cell groups {', '.join(cells)}: name it in Gmsh as a physical group"
-        )
+        raise InputError(f"mesh has no group '{name}'; its boundary groups are {', '.join(facets) or 'none'}, its cell "
+                         f"groups {', '.join(cells)}: name it in Gmsh as a physical group")
 
 
 def alone() -> MPI.Comm:

@@ -18,9 +18,7 @@ from .copied_factor import contact_last
 
 PREFIX = "vi_contact_factor_"
 OWN_FACTOR = {
-    "ksp_type": "preonly",
-    "pc_type": "cholesky",
-    "pc_factor_mat_solver_type": "petsc",
+    "ksp_type": "preonly", "pc_type": "cholesky", "pc_factor_mat_solver_type": "petsc",
     "pc_factor_mat_ordering_type": "amd",
 }
 DEFAULTS = ("redundant_", "mat_mumps_icntl_20")  # options that are set here
@@ -138,10 +136,8 @@ class PetscFactor:
         except PETSc.Error:
             failed = True
         if failed:
-            raise InputError(
-                "the effective matrix cannot be factorised: it is singular or contains NaN; check the materials, and "
-                "that every part of the body is clamped or has mass"
-            )
+            raise InputError("the effective matrix cannot be factorised: it is singular or contains NaN; check the "
+                             "materials, and that every part of the body is clamped or has mass")
 
     @property
     def bytes(self) -> float:

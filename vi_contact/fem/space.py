@@ -265,10 +265,8 @@ class FemSpace:
             distance = np.linalg.norm(self.points - point, axis=1)
             nearest = -largest(self.comm, -np.min(distance, initial=np.inf))
             if nearest > 0.05 * self.size:
-                raise InputError(
-                    f"point ({', '.join(f'{x:g}' for x in point)}) is {nearest:.3g} m away from the nearest node: "
-                    "give a point of the body"
-                )
+                raise InputError(f"point ({', '.join(f'{x:g}' for x in point)}) is {nearest:.3g} m away from the "
+                                 "nearest node: give a point of the body")
             close = self.nodes[distance <= nearest + 1e-9 * self.size]
             found[i] = -int(largest(self.comm, -float(np.min(close, initial=np.iinfo(np.int64).max))))
         return found

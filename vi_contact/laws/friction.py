@@ -204,8 +204,6 @@ def _checked(law: str, meaning: str, value: Any) -> Any:
 def _nodal(law: str, name: str, value: Any, count: int) -> Array:
     """The value as an array that broadcasts over the nodes."""
     if isinstance(value, tuple) and len(value) != count:
-        raise InputError(
-            f"{law}: {name} has {len(value)} values but there are {count} contact points: give one number, or one "
-            "per contact point in the order of surface.points"
-        )
+        raise InputError(f"{law}: {name} has {len(value)} values but there are {count} contact points: give one "
+                         "number, or one per contact point in the order of surface.points")
     return np.asarray(value, dtype=float)

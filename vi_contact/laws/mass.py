@@ -64,10 +64,8 @@ class Redistributed:
         algebra, nodal, own = system.algebra, _row_sums(system), system.M.diagonal()
         wrong = int(total(algebra.comm, np.sum((own > 0.0) & (nodal <= LIGHT * own))))  # as of elements of higher order
         if wrong:
-            raise InputError(
-                f"redistributed mass needs positive row sums of M and {wrong} unknowns have none: give the problem "
-                "mass=ConsistentMass(), or elements of first order"
-            )
+            raise InputError(f"redistributed mass needs positive row sums of M and {wrong} unknowns have none: give "
+                             "the problem mass=ConsistentMass(), or elements of first order")
         lumped = algebra.local(*lumped_entries(surface, nodal), system.rows)
         bulk = algebra.combine([(1.0 - self.lumping, system.M), (self.lumping, lumped)])
         levels = from_neighbours(system, massless, contact, nodal)
@@ -142,10 +140,8 @@ def _inertia_correction(system: SemiDiscreteSystem, moved: Matrix, inner: Mask, 
     entries = [share if i is j else 0.5 * share for share, (i, j) in zip(shares, pairs, strict=True)]
     moved_most = largest(comm, max_abs(np.concatenate(entries)))
     if moved_most > LARGEST_CORRECTION:
-        raise InputError(
-            f"the mesh is too coarse for redistributed mass, keeping the inertia would change nodal masses by "
-            f"{100 * moved_most:.0f} %: refine it, or give the problem mass=ConsistentMass()"
-        )
+        raise InputError("the mesh is too coarse for redistributed mass, keeping the inertia would change nodal masses "
+                         f"by {100 * moved_most:.0f} %: refine it, or give the problem mass=ConsistentMass()")
     i, j = (np.concatenate([pair[side] for pair in pairs]) for side in (0, 1))
     value = 0.5 * np.concatenate(shares) * nodal[i]
     both = np.concatenate([i, j]), np.concatenate([j, i])

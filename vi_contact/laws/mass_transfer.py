@@ -48,10 +48,8 @@ def from_neighbours(system: SemiDiscreteSystem, massless: Mask, contact: Mask, n
         elif exact:
             exact = False  # too few neighbours to tell a rotation: translations will do
         else:
-            raise InputError(
-                "the mass of some contact nodes has nowhere to go, no node behind them carries any: refine the mesh "
-                "across the body, or give the problem mass=ConsistentMass()"
-            )
+            raise InputError("the mass of some contact nodes has nowhere to go, no node behind them carries any: "
+                             "refine the mesh across the body, or give the problem mass=ConsistentMass()")
     return levels[::-1]
 
 

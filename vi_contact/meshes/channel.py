@@ -54,10 +54,9 @@ class ChannelMesh:
         given = () if self.far is None else ("far",)
         attributes(self, positive=("width", "depth", "outer_width", "height", "wall", "slab", "size", *given))
         if not (2.0 * self.wall < self.outer_width and self.slab < self.height < self.depth):
-            raise InputError(
-                f"channel {self.outer_width} x {self.height} m with walls of {self.wall} m and a slab of {self.slab} m "
-                f"does not fit a layer {self.depth} m deep: it needs room inside, and soil under it"
-            )
+            raise InputError(f"channel {self.outer_width} x {self.height} m with walls of {self.wall} m and a slab of "
+                             f"{self.slab} m does not fit a layer {self.depth} m deep: it needs room inside, and soil "
+                             "under it")
         if not 0.0 < self.x[1] < self.x[4] < self.width:
             ends = f"from x = {self.x[1]} to {self.x[4]} m"
             raise InputError(f"channel {ends} needs soil on both sides: keep it between 0 and {self.width} m")
@@ -131,11 +130,8 @@ def channel_grid(x: Sequence[float], y: Sequence[float], size: float, *, triangl
     }
     channel = np.arange(len(cells) + len(soil_cells)) < len(cells)
     return MeshArrays(
-        "triangle" if triangles else "quadrilateral",
-        np.concatenate([points, soil_points]),
-        np.concatenate([cells, soil_cells + len(points)]),
-        {"channel": channel, "soil": ~channel},
-        facets,
+        "triangle" if triangles else "quadrilateral", np.concatenate([points, soil_points]),
+        np.concatenate([cells, soil_cells + len(points)]), {"channel": channel, "soil": ~channel}, facets,
     )
 
 

@@ -61,10 +61,8 @@ def check_sides(groups: dict[str, Rows], cells: Rows, cell: str, source: str) ->
     for name, numbers in zip(groups, named, strict=True):
         if missing := int(np.sum(~found_in(numbers, sides))):
             facets = "1 facet that is" if missing == 1 else f"{missing} facets that are"
-            raise InputError(
-                f"boundary group '{name}' of {source} has {facets} no side of a cell: remove duplicate nodes, and"
-                " curves or surfaces that do not bound the named cells"
-            )
+            raise InputError(f"boundary group '{name}' of {source} has {facets} no side of a cell: remove duplicate "
+                             "nodes, and curves or surfaces that do not bound the named cells")
 
 
 def _normals(x: Array) -> Array:

@@ -103,17 +103,13 @@ def welded(arrays: MeshArrays, first: str, second: str) -> MeshArrays:
     distance, nearest = cKDTree(arrays.points[one]).query(arrays.points[two])
     if distance.max(initial=0.0) > 1e-9 * size:
         where = ", ".join(f"{x:g}" for x in arrays.points[two[np.argmax(distance)]])
-        raise InputError(
-            f"group '{second}' has a node at ({where}), {distance.max():.3g} m away from every node of '{first}': "
-            "weld only sides that are divided alike"
-        )
+        raise InputError(f"group '{second}' has a node at ({where}), {distance.max():.3g} m away from every node of "
+                         f"'{first}': weld only sides that are divided alike")
     target = np.arange(len(arrays.points))
     target[two] = one[nearest]
     kept, number = np.unique(target, return_inverse=True)
     return replace(
-        arrays,
-        points=arrays.points[kept],
-        cells=number[arrays.cells],
+        arrays, points=arrays.points[kept], cells=number[arrays.cells],
         facet_groups={name: number[rows] for name, rows in arrays.facet_groups.items()},
     )
 

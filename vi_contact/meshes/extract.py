@@ -155,10 +155,8 @@ def _first_order(model: Any, elements: _Elements, dim: int, source: str) -> tupl
         raise InputError(f"{source} has no cells: mesh the geometry in Gmsh before saving it")
     names = {kind: model.mesh.getElementProperties(kind)[0] for kind in elements}
     if high := [kind for kind in elements if model.mesh.getElementProperties(kind)[2] > 1]:
-        raise InputError(
-            f"{source} has cells of higher order ({names[high[0]]}), but nodal contact conditions are exact only on"
-            " first-order cells (P1, Q1): mesh it with Mesh.ElementOrder = 1"
-        )
+        raise InputError(f"{source} has cells of higher order ({names[high[0]]}), but nodal contact conditions are "
+                         "exact only on first-order cells (P1, Q1): mesh it with Mesh.ElementOrder = 1")
     if len(elements) > 1:
         raise InputError(f"{source} mixes cells ({', '.join(sorted(names.values()))}): mesh it with cells of one type")
     known = {number: cell for cell, (number, _) in GMSH_NUMBERS.items()}
@@ -184,10 +182,8 @@ def _flat(points: Array, d: int, source: str) -> Array:
     away = np.abs(points[:, d:]).max(initial=0.0)
     if away > 1e-9 * np.ptp(points, axis=0).max():
         plane, missing = ("plane z = 0", "volume") if d == 2 else ("axis y = z = 0", "surface")
-        raise InputError(
-            f"{source} has no cells of dimension {d + 1} and leaves the {plane} by {away:.3g} m: move it there, or name"
-            f" the {missing} as a physical group so that Gmsh saves its cells"
-        )
+        raise InputError(f"{source} has no cells of dimension {d + 1} and leaves the {plane} by {away:.3g} m: move it "
+                         f"there, or name the {missing} as a physical group so that Gmsh saves its cells")
     return np.ascontiguousarray(points[:, :d])
 
 

@@ -51,14 +51,12 @@ def _check_magic(data: mmap.mmap, file: Path) -> None:
     if data[: len(MAGIC)] == MAGIC:
         return
     if file.suffix.lower() in _SCRIPTS:
-        raise InputError(
-            f"mesh file {file} is a Gmsh script, which may run commands, and is not read: mesh it yourself and give the"
-            f" result, as by gmsh -2 {file.name} -o {file.stem}.msh (-3 for a body in space)"
-        )
-    raise InputError(
-        f"mesh file {file} does not begin with $MeshFormat, so it is no mesh of Gmsh's own format: write it from Gmsh"
-        f" as .msh, or convert it as by gmsh -save {file.name} -o {file.stem}.msh if you trust it"
-    )
+        raise InputError(f"mesh file {file} is a Gmsh script, which may run commands, and is not read: mesh it "
+                         f"yourself and give the result, as by gmsh -2 {file.name} -o {file.stem}.msh (-3 for a body "
+                         "in space)")
+    raise InputError(f"mesh file {file} does not begin with $MeshFormat, so it is no mesh of Gmsh's own format: write "
+                     f"it from Gmsh as .msh, or convert it as by gmsh -save {file.name} -o {file.stem}.msh if you "
+                     "trust it")
 
 
 def _check_sections(data: mmap.mmap, file: Path) -> None:

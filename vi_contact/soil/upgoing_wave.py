@@ -40,10 +40,7 @@ class UpgoingVelocity:
 
 
 def upgoing(
-    motion: Record | Excitation,
-    *,
-    direction: tuple[float, ...] = (1.0, 0.0),
-    dt: float | None = None,
+    motion: Record | Excitation, *, direction: tuple[float, ...] = (1.0, 0.0), dt: float | None = None,
     outcrop: bool = True,
 ) -> UpgoingVelocity:
     """Return the upgoing velocity of a motion: half its velocity, or all when ``outcrop`` is False (already upgoing).
