@@ -63,10 +63,8 @@ class BeamSpace:
         start, end = 0.5 * float(self.x[0]), float(self.x[-1])
         off = points[:, 0] < start, points[:, 0] > end * (1.0 + 1e-12), np.any(points[:, 1:] != 0.0, axis=1)
         if np.any(off):
-            raise InputError(
-                f"points {points.tolist()} are not all on the moving part of the beam: give x from {start:g} to "
-                f"{end:g} on the axis"
-            )
+            raise InputError(f"points {points.tolist()} are not all on the moving part of the beam: give x from "
+                             f"{start:g} to {end:g} on the axis")
         return np.abs(points[:, :1] - self.x).argmin(axis=1)
 
     def sample(self, u: Array, nodes: Indices, t: float, derivative: int = 0) -> Array:
@@ -116,9 +114,8 @@ def rubbing_problem(
     """Set up rod and beam of one length: the beam rubs with the rod's contact force. InputError for two lengths."""
     _check("rubbing_problem", elements, (start, rod_start), load, rod=rod, beam=beam, friction=friction)
     if rod.length != beam.length:
-        raise InputError(
-            f"the rod is {rod.length:g} m long and the beam {beam.length:g} m: they are one body, give one length"
-        )
+        raise InputError(f"the rod is {rod.length:g} m long and the beam {beam.length:g} m: they are one body, give "
+                         "one length")
     x = elements.nodes(beam.length)
     bar = _Part.of_rod(rod, elements, rod_start or Start())
     return _problem(x, bar, _Part.of_beam(beam, elements, start or Start(), load), rod.gap, friction)
@@ -234,16 +231,11 @@ def _problem(x: Array, along: _Part, across: _Part | None, gap: float, friction:
     M = SerialMatrix(sp.block_diag([part.M for part in parts]))
     inertia = sp.block_diag([part.inertia[:, None] for part in parts]).toarray()
     system = SemiDiscreteSystem(
-        algebra=SerialAlgebra(),
-        M=M,
+        algebra=SerialAlgebra(), M=M,
         C=SerialMatrix(sp.block_diag([part.viscosity * part.K for part in parts])) if damped else None,
-        K=SerialMatrix(sp.block_diag([part.K for part in parts])),
-        load=Load(np.zeros(space.unknowns), tuple(loads)),
-        influence=influence,
-        base_mass=inertia - np.column_stack([M @ rigid for rigid in influence.T]),
-        u0=np.concatenate([part.u0 for part in parts]),
-        v0=np.concatenate([part.v0 for part in parts]),
-        space=space,
+        K=SerialMatrix(sp.block_diag([part.K for part in parts])), load=Load(np.zeros(space.unknowns), tuple(loads)),
+        influence=influence, base_mass=inertia - np.column_stack([M @ rigid for rigid in influence.T]),
+        u0=np.concatenate([part.u0 for part in parts]), v0=np.concatenate([part.v0 for part in parts]), space=space,
     )
     d = space.dimension
     tangents = np.array([[space.unknowns - 1]]) if space.beam else np.zeros((1, 0), dtype=np.int64)

@@ -83,7 +83,6 @@ class RegularisedFriction:
                 s = 0.5 * (low + high)
             if not math.isfinite(s):
                 break
-        raise StepFailure(
-            f"Newton's method for the slip of the tip did not converge in {updates} updates (|F| = {abs(F):.1e} N m): "
-            "take a smaller time step, a larger eps, safeguard=True or ExactFriction()"
-        )
+        raise StepFailure(f"Newton's method for the slip of the tip did not converge in {updates} updates (|F| = "
+                          f"{abs(F):.1e} N m): take a smaller time step, a larger eps, safeguard=True or "
+                          "ExactFriction()")

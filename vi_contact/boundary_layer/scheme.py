@@ -76,10 +76,9 @@ class BoundaryLayer(Midpoint):
         gap = surface.everywhere(surface.gap(state.t) - surface.normal_values(state.u))
         if len(gap) and not gap.min() > 0.0:
             where = int(np.argmin(gap))
-            raise InputError(
-                f"contact point {where} starts with gap {gap[where]:.3g} m, outside the admissible set of the layer, "
-                "gap > 0: move the obstacle back by the layer's width, for example with ContactLayer.set_back(surface)"
-            )
+            raise InputError(f"contact point {where} starts with gap {gap[where]:.3g} m, outside the admissible set of "
+                             "the layer, gap > 0: move the obstacle back by the layer's width, for example with "
+                             "ContactLayer.set_back(surface)")
         return state
 
     def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem:
@@ -91,10 +90,8 @@ class BoundaryLayer(Midpoint):
         old = surface.gap(state.t) - surface.normal_values(state.u)
         closed, away = surface.comm.max(np.array([np.max(-old, initial=-np.inf), max_abs(step.bound - old)]))
         if not closed < 0.0:
-            raise StepFailure(
-                f"step {step.k} at t = {step.t:.6g} s begins with a gap of {-closed:.1e} m, a rounding error beside "
-                f"displacements of {away:.1e} m: make the layer wider"
-            )
+            raise StepFailure(f"step {step.k} at t = {step.t:.6g} s begins with a gap of {-closed:.1e} m, a rounding "
+                              f"error beside displacements of {away:.1e} m: make the layer wider")
         free = step.bound - surface.normal_values(A.factor.solve(step.b))
         rate = self._rate(problem, state, old)
         values = surface.everywhere(np.column_stack([old, free, rate, surface.weights]))
@@ -136,10 +133,8 @@ class BoundaryLayer(Midpoint):
                     break
                 share *= 0.5
             rho = rho + share * change
-        raise StepFailure(
-            f"the layer's reactions of step {step.k} at t = {step.t:.6g} s were not found in {NEWTON_STEPS} Newton "
-            "steps: reduce the time step, or make the layer wider"
-        )
+        raise StepFailure(f"the layer's reactions of step {step.k} at t = {step.t:.6g} s were not found in "
+                          f"{NEWTON_STEPS} Newton steps: reduce the time step, or make the layer wider")
 
     def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
         """Return the midpoint's state; its reactions are the layer's, its active points those inside the layer."""

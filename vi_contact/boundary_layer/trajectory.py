@@ -93,10 +93,8 @@ def layer_motion(
 def passage(layer: Layer, mass: float, speed: float, metric: Metric, *, rtol: float, refine: int = 1) -> Trajectory:
     """Return how ``mass`` [kg] on a line crosses the layer, entered with ``speed`` [m/s]; InputError if it stays."""
     particle = ConstrainedSystem(np.array([[mass]]), lambda q: float(q[0]), lambda q: np.ones(1))
-    found = layer_motion(
-        particle, layer, q0=np.array([layer.width]), v0=np.array([-speed]), t_end=1e6 * layer.width / speed,
-        metric=metric, contacts=1, rtol=rtol, refine=refine,
-    )
+    found = layer_motion(particle, layer, q0=np.array([layer.width]), v0=np.array([-speed]),
+                         t_end=1e6 * layer.width / speed, metric=metric, contacts=1, rtol=rtol, refine=refine)
     if not found.contacts:
         raise InputError("the layer holds the body back for ever: give it more k or less c")
     return found
@@ -146,15 +144,11 @@ class _Passages:
         reached = float(np.sqrt(most * layer.width)) or 1.0  # the speed over the width; 1 where nothing moves
         pace = max(float(np.max(np.abs(v))), layer.speed or 0.0, reached)
         atol = self._rtol * np.r_[np.full(n, way), np.full(len(v), pace)]
-        found = solve_ivp(
-            rates, (0.0, t_end - start), np.r_[np.zeros(n), v], events=(edge, turn), atol=atol, rtol=self._rtol,
-            method="DOP853", dense_output=self._refine > 1,
-        )
+        found = solve_ivp(rates, (0.0, t_end - start), np.r_[np.zeros(n), v], events=(edge, turn), atol=atol,
+                          rtol=self._rtol, method="DOP853", dense_output=self._refine > 1)
         if found.status < 0:
-            raise StepFailure(
-                f"the motion could not be integrated beyond t = {start + found.t[-1]:.6g} s at rho = "
-                f"{system.rho(q + found.y[:n, -1]):.3g}: give a larger rtol ({found.message})"
-            )
+            raise StepFailure(f"the motion could not be integrated beyond t = {start + found.t[-1]:.6g} s at rho = "
+                              f"{system.rho(q + found.y[:n, -1]):.3g}: give a larger rtol ({found.message})")
         places, speeds = q + found.y[:n].T, found.y[n:].T
         t = np.interp(np.arange(self._refine * (len(found.t) - 1) + 1) / self._refine, np.arange(len(found.t)), found.t)
         y = found.sol(t) if self._refine > 1 else found.y

@@ -63,18 +63,13 @@ def _ida(options: argparse.Namespace) -> str:
     for files in motions:
         if not all(files):
             raise InputError(f"--motions {','.join(files)}: give FILE, or FILE,FILE")
-    study = IDA(
-        read_case(located(options.case), options.settings, allow=options.allow),
-        motions, options.edp,
-        scales=options.scales or (), levels=options.levels or (), intensity=options.im,
-    )
+    study = IDA(read_case(located(options.case), options.settings, allow=options.allow), motions, options.edp,
+                scales=options.scales or (), levels=options.levels or (), intensity=options.im)
     for signum in (signal.SIGINT, signal.SIGTERM):  # a scheduler's end of time is as Ctrl-C, also in the background
         signal.signal(signum, signal.default_int_handler)
     try:
-        rows = run_ida(
-            study, options.out, jobs=options.jobs, part=options.part, launch=launch,
-            say=lambda line: print(line, flush=True), wall_time=options.wall_time,
-        )
+        rows = run_ida(study, options.out, jobs=options.jobs, part=options.part, launch=launch,
+                       say=lambda line: print(line, flush=True), wall_time=options.wall_time)
     except OutOfTime:
         raise
     except KeyboardInterrupt:

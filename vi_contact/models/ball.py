@@ -63,10 +63,8 @@ class Ball:
         """Return the mesh, fine where the sphere of volume 4/3 pi R³ is going to touch."""
         sphere = 4.0 / 3.0 * math.pi * self.radius**3
         a = self.impact(self.material.rho * sphere).deepest.contact_radius
-        return BallMesh(
-            radius=self.radius, size=a / self.cells, foot=FOOT * a, growth=CELL_GROWTH / self.cells,
-            coarsest=self.radius / self.cells,
-        )
+        return BallMesh(radius=self.radius, size=a / self.cells, foot=FOOT * a, growth=CELL_GROWTH / self.cells,
+                        coarsest=self.radius / self.cells)
 
 
 @dataclass(frozen=True)

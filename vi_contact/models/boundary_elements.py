@@ -53,8 +53,7 @@ def unloaded(operator: PoincareSteklov, *, contact: Mask, **more: Any) -> Bounda
 
 
 def square_problem(
-    elements: int, material: LinearElastic, *, dt: float, steps: int, pressure: Load = lambda t: 1.0,
-    side: float = 1.0,
+    elements: int, material: LinearElastic, *, dt: float, steps: int, pressure: Load = lambda t: 1.0, side: float = 1.0,
 ) -> BoundaryProblem:
     """Set up [-a/2, a/2]² of ``elements`` per side, pressed on its top; its bottom may come into contact."""
     a, h = _halves("square_problem", side, elements)

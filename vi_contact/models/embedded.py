@@ -104,10 +104,8 @@ def build(embedded: Embedded, comm: Any, *, mesh: Callable[[], Any] | None = Non
     around = embedded.block or box.material
     materials = [(tags[name], box.material) for name in BOX]
     materials += [(tags[name], around) for name in GROUND + WALLS]
-    system = assemble(
-        built, materials, section=PlaneStrain(),
-        loads=Traction(tags["head_top"], (0.0, -box.pressure), history=box.history),
-        clamped=[tags[f"{name}_bottom"] for name in GROUND],
-    )  # fmt: skip
+    system = assemble(built, materials, section=PlaneStrain(),
+                      loads=Traction(tags["head_top"], (0.0, -box.pressure), history=box.history),
+                      clamped=[tags[f"{name}_bottom"] for name in GROUND])  # fmt: skip
     pairs = [contact_pair(system, tags[one], tags[two]) for one, two in CONTACT]
     return EmbeddedModel(embedded, system, joined_surfaces(*pairs).with_frictionless_corners())

@@ -190,11 +190,9 @@ def build(block: RockingBlock, comm: Any) -> RockingModel:
     """
     width, height, gravity = block.shape.width, block.shape.height, block.shape.gravity
     mesh, tags = build_mesh(BlockMesh(lengths=(width, height), divisions=block.divisions), comm)
-    system = assemble(
-        mesh, block.material, section=PlaneStress(1.0), damping=block.damping,
-        prescribed=Prescribed(tags["bottom"], components=(0,)),
-        loads=BodyForce((0.0, -block.material.rho * gravity)),
-    )
+    system = assemble(mesh, block.material, section=PlaneStress(1.0), damping=block.damping,
+                      prescribed=Prescribed(tags["bottom"], components=(0,)),
+                      loads=BodyForce((0.0, -block.material.rho * gravity)))
     ground = HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))
     whole = ContactProblem(system, contact_surface(system, tags["bottom"], obstacle=ground))
     heavy = geometric_stiffness(whole, static_equilibrium(whole))

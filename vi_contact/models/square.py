@@ -51,12 +51,8 @@ class Square:
 
 def concrete(cells: int = 20) -> Square:
     """Describe a box of concrete on steel, 1 m wide: c_P = 3253 m/s, c_S = 1992 m/s, 4 MPa tanh((t/15 ms)²)."""
-    return Square(
-        cells=cells,
-        material=LinearElastic.from_wave_speeds(3253.0, 1992.0, 2400.0),
-        pressure=4.0e6,
-        history=lambda t: math.tanh((t / 0.015) ** 2),
-    )
+    return Square(cells=cells, material=LinearElastic.from_wave_speeds(3253.0, 1992.0, 2400.0), pressure=4.0e6,
+                  history=lambda t: math.tanh((t / 0.015) ** 2))
 
 
 @dataclass(frozen=True)

@@ -114,13 +114,9 @@ class WallModel:
         Schemes with massless contact nodes take no impact law: give impact=None, and leave mass to them. An impact law
         runs on consistent mass unless another is given.
         """
-        return ContactProblem(
-            self.system,
-            self.surface(case),
-            impact=impact,
-            mass=ConsistentMass() if impact is not None and mass is None else mass,
-            excitation=self.harmonic() if excitation is None else excitation,
-        )
+        return ContactProblem(self.system, self.surface(case), impact=impact,
+                              mass=ConsistentMass() if impact is not None and mass is None else mass,
+                              excitation=self.harmonic() if excitation is None else excitation)
 
     def harmonic(self, amplitude: float = 1.0) -> Harmonic:
         """Return a_g = a0 sin(2 pi f t), f = f1/2. CHOSEN: Fig. 3 prints neither amplitude nor period; a0 = 1 m/s²."""
@@ -144,13 +140,6 @@ def build(wall: Wall, comm: Any, *, weight: bool = False, base_inertia: str = "w
     check_word("base_inertia", base_inertia, list(BASE_INERTIA))
     mesh, tags = build_mesh(wall.mesh(), comm)
     loads = (BodyForce((0.0, -wall.material.rho * STANDARD_GRAVITY)),) if weight else ()
-    system = assemble(
-        mesh,
-        wall.material,
-        section=PlaneStress(wall.thickness),
-        clamped=tags["base"],
-        loads=loads,
-        damping=wall.damping,
-        base_inertia=base_inertia == "whole",
-    )
+    system = assemble(mesh, wall.material, section=PlaneStress(wall.thickness), clamped=tags["base"], loads=loads,
+                      damping=wall.damping, base_inertia=base_inertia == "whole")
     return WallModel(wall, mesh, tags, replace(system, notes=(*system.notes, BASE_INERTIA[base_inertia])))

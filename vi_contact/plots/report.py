@@ -73,10 +73,8 @@ def plot_report(
     fonts = {"font.size": 7, "axes.titlesize": 8, "axes.labelsize": 7}
     with matplotlib.rc_context(STYLE | fonts | {"text.parse_math": False}):  # a dollar of a title is no formula
         figure = Figure(figsize=PAGE)
-        grid = figure.add_gridspec(
-            lines, 2, left=SIDES[0], right=SIDES[1], top=TOP, bottom=table + 0.06 + GAP / PAGE[1] - 0.05,
-            hspace=GAP / height, wspace=0.24,
-        )
+        grid = figure.add_gridspec(lines, 2, left=SIDES[0], right=SIDES[1], top=TOP,
+                                   bottom=table + 0.06 + GAP / PAGE[1] - 0.05, hspace=GAP / height, wspace=0.24)
         _header(figure, run, title or f"Run {run.folder.resolve().name}")
         for i, panel in enumerate(panels):
             last_alone = i == len(panels) - 1 and i % 2 == 0
@@ -280,11 +278,9 @@ def _table(axis: Any, rows: Sequence[Peak]) -> None:
          f"{row.min:.4g}", f"{row.t_min:.4g}"]
         for row in rows
     ]
-    table = axis.table(
-        cellText=cells, colLabels=["column", "quantity", "unit", "max", "at t [s]", "min", "at t [s]"],
-        colWidths=[0.18, 0.42, 0.06, 0.09, 0.08, 0.09, 0.08], cellLoc="left", colLoc="left",
-        bbox=(0.0, 0.0, 1.0, 1.0), edges="horizontal",
-    )
+    table = axis.table(cellText=cells, colLabels=["column", "quantity", "unit", "max", "at t [s]", "min", "at t [s]"],
+                       colWidths=[0.18, 0.42, 0.06, 0.09, 0.08, 0.09, 0.08], cellLoc="left", colLoc="left",
+                       bbox=(0.0, 0.0, 1.0, 1.0), edges="horizontal")
     for cell in table.get_celld().values():
         cell.set_linewidth(0.3)
         cell.PAD = 0.02

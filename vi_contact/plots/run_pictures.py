@@ -43,10 +43,9 @@ def draw_histories(
         labels = [name.removeprefix(f"u_{axis}_") for name in history
                   if name.startswith(f"u_{axis}_") and not name.endswith(SOIL)]
         if any(np.any(history[f"u_{axis}_{label}"]) for label in labels):
-            drawn.append(plot_points(
-                history, labels, out / f"displacements_{axis}.png", title=plain(title), component=axis,
-                unilateral=unilateral if axis == "x" else None, reference=reference,
-            ))
+            drawn.append(plot_points(history, labels, out / f"displacements_{axis}.png", title=plain(title),
+                                     component=axis, unilateral=unilateral if axis == "x" else None,
+                                     reference=reference))
     if "energy_defect" in history:
         drawn.append(plot_energy(history, out / "energy.png"))
     drawn.append(plot_certificate(history, out / "certificate.png"))
@@ -83,10 +82,8 @@ def illustrate(run: RunFolder, folder: Path, *, title: str = "Buried channel") -
         }
         widest = float(run.history["t"][int(np.argmax(sum(tops.values())))])
         times, magnified = film(run.folder, widest)
-        drawn.append(animate(
-            run.folder, folder / "channel.gif", title=title, history=run.history, openings=tops, times=times.tolist(),
-            magnified=magnified,
-        ))
+        drawn.append(animate(run.folder, folder / "channel.gif", title=title, history=run.history, openings=tops,
+                             times=times.tolist(), magnified=magnified))
     return drawn
 
 

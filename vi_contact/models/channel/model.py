@@ -114,14 +114,10 @@ class ChannelModel:
             impact, mass: schemes with massless contact nodes take no impact law: give impact=None, and leave mass to
                 them. An impact law runs on consistent mass unless another is given.
         """
-        return ContactProblem(
-            self.system,
-            self.surface.bilateral_everywhere() if bilateral else self.surface,
-            friction=friction or Frictionless(),
-            impact=impact,
-            mass=ConsistentMass() if impact is not None and mass is None else mass,
-            excitation=self.channel.harmonic() if excitation is None else excitation,
-        )
+        return ContactProblem(self.system, self.surface.bilateral_everywhere() if bilateral else self.surface,
+                              friction=friction or Frictionless(), impact=impact,
+                              mass=ConsistentMass() if impact is not None and mass is None else mass,
+                              excitation=self.channel.harmonic() if excitation is None else excitation)
 
     def recorders(self) -> tuple[Recorder, ...]:
         """Return recorders: energy, contact, probes on channel (u_x_1, ...) and soil (u_x_1_soil, ...), openings."""
@@ -204,15 +200,8 @@ def build(
         absorbing.append(base.absorber(tags))
     else:
         held.append(Prescribed(tags["bedrock"], **motion))  # last: the corners are its own
-    system = assemble(
-        mesh,
-        [(tags["channel"], channel.concrete), (tags["soil"], channel.soil)],
-        section=PlaneStrain(),
-        prescribed=held,
-        dashpots=absorbing,
-        damping=channel.damping,
-        **ends,
-    )
+    system = assemble(mesh, [(tags["channel"], channel.concrete), (tags["soil"], channel.soil)], section=PlaneStrain(),
+                      prescribed=held, dashpots=absorbing, damping=channel.damping, **ends)
     system = weighted(system, weighing)
     pairs = [contact_pair(system, tags[f"channel_{side}"], tags[f"soil_{side}"]) for side in SIDES]
     return ChannelModel(channel, mesh, tags, system, joined_surfaces(*pairs).with_frictionless_corners())

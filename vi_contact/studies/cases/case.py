@@ -164,12 +164,11 @@ class Case:
         with locked(ranks, None if folder is None else run_folder(ranks, folder)):
             if folder is not None:
                 keep_copy(self.path, self.settings, folder, ranks)
-            return simulate(
-                problem, scheme=self._made("scheme"), solver=solver, state=state, out=folder, restart=restart,
-                record=self._recorders(parts),
-                escalation=self._several("escalation"), fields=self._made("fields"), progress=progress,
-                cross_check=solver if isinstance(solver, CrossChecked) else None, wall_time=wall_time, **own,
-            )
+            return simulate(problem, scheme=self._made("scheme"), solver=solver, state=state, out=folder,
+                            restart=restart, record=self._recorders(parts), escalation=self._several("escalation"),
+                            fields=self._made("fields"), progress=progress,
+                            cross_check=solver if isinstance(solver, CrossChecked) else None, wall_time=wall_time,
+                            **own)
 
     def _made(self, table: str, **context: Any) -> Any:
         """Return what a table makes; None where there is none."""

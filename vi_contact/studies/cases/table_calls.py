@@ -105,13 +105,9 @@ def callee(
     found = signature(function).parameters
     parameters = {key: one for key, one in found.items() if one.kind not in (one.VAR_POSITIONAL, one.VAR_KEYWORD)}
     settable = [one for one in parameters if one not in given and (not only or one in only)]
-    return Callee(
-        name or getattr(function, "__name__", ""),
-        function,
-        {one: hints.get(one, Any) for one in settable},
-        frozenset(one for one in settable if parameters[one].default is Parameter.empty),
-        tuple(one for one in parameters if one in given),
-    )
+    return Callee(name or getattr(function, "__name__", ""), function, {one: hints.get(one, Any) for one in settable},
+                  frozenset(one for one in settable if parameters[one].default is Parameter.empty),
+                  tuple(one for one in parameters if one in given))
 
 
 @dataclass(frozen=True)

@@ -154,10 +154,9 @@ class OneRun:
         (self.folder / ROW).unlink(missing_ok=True)
         (self.folder / SUMMARY).unlink(missing_ok=True)
         try:
-            return subprocess.Popen(
-                command, env=environment, text=True, encoding="utf-8", errors="replace",
-                stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True,
-            )
+            return subprocess.Popen(command, env=environment, text=True, encoding="utf-8", errors="replace",
+                                    stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                                    start_new_session=True)
         except OSError as error:
             raise InputError(f"'{error.filename}' cannot be started ({error.strerror}): give another launch") from None
 
