@@ -61,9 +61,7 @@ class ConvolutionOperator:
         widths = WIDTHS if forces.shape[1] > 1 else np.ones(1)
         return table.at_ends(u), traction, np.where(fixed, reaction, forces.transpose(0, 2, 1) @ widths)
 
-    def condense(
-        self, forces: Array, fixed: Mask, prescribed: Array | None, unknowns: Indices
-    ) -> tuple[Array, Array]:
+    def condense(self, forces: Array, fixed: Mask, prescribed: Array | None, unknowns: Indices) -> tuple[Array, Array]:
         """Return W, by frequencies, and u_free of CondensedCompliance for these unknowns."""
         table, free, moving = self.frequencies, ~fixed, ~fixed[unknowns]
         places = np.searchsorted(np.flatnonzero(free), unknowns[moving])

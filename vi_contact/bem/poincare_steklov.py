@@ -38,9 +38,7 @@ class BodyOperator(Protocol):
         under forces (steps, pieces of a step, 2n) and prescribed displacements (steps, 2n) of fixed unknowns (2n,)."""
         ...
 
-    def condense(
-        self, forces: Array, fixed: Mask, prescribed: Array | None, unknowns: Indices
-    ) -> tuple[Array, Array]:
+    def condense(self, forces: Array, fixed: Mask, prescribed: Array | None, unknowns: Indices) -> tuple[Array, Array]:
         """Return W and u_free of CondensedCompliance for these unknowns."""
         ...
 
@@ -79,9 +77,7 @@ class PoincareSteklov:
         u, p, total = marched(self.blocks, fixed, loads, given, symmetric=self.symmetric)
         return u[:, :, 0], self.rho * p[:, :, 0], self.rho * total[:, :, 0]
 
-    def condense(
-        self, forces: Array, fixed: Mask, prescribed: Array | None, unknowns: Indices
-    ) -> tuple[Array, Array]:
+    def condense(self, forces: Array, fixed: Mask, prescribed: Array | None, unknowns: Indices) -> tuple[Array, Array]:
         """Return W and u_free of CondensedCompliance for these unknowns, in one march with 2m + 1 columns."""
         columns = np.zeros((len(forces), 2 * len(self.mesh), len(unknowns) + 1))
         columns[0, unknowns, np.arange(len(unknowns))] = 1.0 / self.rho

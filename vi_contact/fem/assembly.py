@@ -24,7 +24,7 @@ from ..laws.materials import Damping, LinearElastic, Section
 from . import compat
 from .assembly_checks import check_body, check_boundaries, check_initial
 from .compact import algebra_for
-from .dashpots import BoundaryLoads, DashpotMatrix, Dashpots, describe_boundaries
+from .dashpots import DashpotMatrix, Dashpots, describe_boundaries
 from .loads import ActingLoad, BodyForce, Prescribed, Traction, as_tuple, evaluate
 from .mesh import Cells, Facets
 from .petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc, give_back
@@ -80,18 +80,22 @@ def assemble(
     absorbers = [DashpotMatrix(space, forms, one) for one in boundaries]
     acting = [one.dashpots.loads(one, forms) for one in absorbers]
     load = assemble_loads(space, section, as_tuple(loads))
-    rigid = _rigid(space)
+    rigid = np.column_stack([space.restrict(one) for one in space.translations])
     K, pull = _reduced(forms.matrix("K"), space, algebra, 0)  # one after the other: each is large before it is reduced
     dampers = ([forms.matrix("C")] if forms.damped else []) + [one.mat for one in absorbers]
     terms = [(1.0, PetscMatrix(one)) for one in dampers]
     damper = as_petsc(PetscAlgebra(mesh.comm).combine(terms)).mat if terms else None
     C, viscous = _reduced(damper, space, algebra, 1) if terms else (None, ())
     mass = forms.matrix("M")
-    momenta = _momenta(space, PetscMatrix(mass)) if base_inertia else []
+    # less M r, what accelerated prescribed nodes pull on the free ones
+    momenta = [space.pull(PetscMatrix(mass) @ one) for one in space.translations] if base_inertia else []
     M, inertial = _reduced(mass, space, algebra, 2)
-    load = replace(load, general=load.general + pull, viscous=viscous, inertial=inertial)
+    load = replace(
+        load, inertial=inertial, general=(*load.general, *pull, *(one for part in acting for one in part.elastic)),
+        viscous=(*viscous, *(one for part in acting for one in part.viscous)),
+    )
     system = SemiDiscreteSystem(
-        algebra=algebra, M=M, C=C, K=K, load=_with_boundaries(load, acting), influence=rigid,
+        algebra=algebra, M=M, C=C, K=K, load=load, influence=rigid,
         base_mass=np.column_stack([one - M @ r for one, r in zip(momenta, rigid.T, strict=True)]) if momenta else None,
         u0=_initial(space, "initial displacement", initial_displacement),
         v0=_initial(space, "initial velocity", initial_velocity),
@@ -105,18 +109,6 @@ def assemble(
     return system
 
 
-def _rigid(space: FemSpace) -> Array:
-    """(n, d) unit translations of the free unknowns."""
-    return np.column_stack([space.restrict(np.tile(e, (len(space.nodes), 1))) for e in np.eye(space.dimension)])
-
-
-def _with_boundaries(load: Load, acting: Sequence[BoundaryLoads]) -> Load:
-    """Add what boundaries put on the body to the load."""
-    elastic = tuple(one for part in acting for one in part.elastic)
-    viscous = tuple(one for part in acting for one in part.viscous)
-    return replace(load, general=load.general + elastic, viscous=load.viscous + viscous)
-
-
 def _reduced(
     full: Any, space: FemSpace, algebra: PetscAlgebra, derivative: int
 ) -> tuple[PetscMatrix, tuple[Callable[[float], Array], ...]]:
@@ -126,11 +118,6 @@ def _reduced(
     part = space.reduced(full)
     full.destroy()
     return algebra.held(part), pull
-
-
-def _momenta(space: FemSpace, full: PetscMatrix) -> list[Array]:
-    """Pᵀ M_full r for every direction: less M r, what accelerated prescribed nodes pull on the free ones."""
-    return [space.pull(full @ np.tile(direction, len(space.nodes))) for direction in np.eye(space.dimension)]
 
 
 class ElasticForms:
@@ -207,33 +194,27 @@ def assemble_loads(space: FemSpace, section: Section, loads: tuple[Any, ...]) ->
     separable: list[tuple[Array, Callable[[float], float]]] = []
     general: list[Callable[[float], Array]] = []
     for load in loads:
-        integrate = _integrator(space, section, load)
-        name = type(load).__name__
+        at = _integrated(space, section, load)
         if load.history is not None:
-            separable.append((integrate(evaluate(name, load.value, space.points, 0.0, space.comm)), load.history))
+            separable.append((at(0.0), load.history))
         elif load.is_constant:
-            constant += integrate(evaluate(name, load.value, space.points, 0.0, space.comm))
+            constant += at(0.0)
         else:
-            general.append(_field_load(space, name, load.value, integrate))
+            general.append(at)
     return Load(constant, tuple(separable), tuple(general))
 
 
-def _field_load(
-    space: FemSpace, name: str, value: Any, integrate: Callable[[Array], Array]
-) -> Callable[[float], Array]:
-    return lambda t: integrate(evaluate(name, value, space.points, t, space.comm))
-
-
-def _integrator(space: FemSpace, section: Section, load: ActingLoad) -> Callable[[Array], Array]:
-    """Nodal values (owned, d) -> Pᵀ ∫ interpolated value · v, as one product with a matrix assembled here."""
+def _integrated(space: FemSpace, section: Section, load: ActingLoad) -> Callable[[float], Array]:
+    """t -> Pᵀ ∫ interpolated value · v, as one product with a matrix assembled here."""
     g, v = ufl.TrialFunction(space.V), ufl.TestFunction(space.V)
     form = ufl.inner(load.acting(g, space.mesh), v) * load.measure(space.mesh)
     matrix = PetscMatrix(compat.assemble_matrix(compat.compile_form(form)))
 
-    def integrate(values: Array) -> Array:
+    def at(t: float) -> Array:
+        values = evaluate(type(load).__name__, load.value, space.points, t, space.comm)
         return space.pull(section.thickness * (matrix @ values.ravel()))
 
-    return integrate
+    return at
 
 
 def _prescribed_load(space: FemSpace, derivative: int, full: Any) -> Callable[[float], Array]:

@@ -26,7 +26,7 @@ import ufl
 from ..core.algebra import Array
 from ..core.checks import attributes, function, instance
 from ..core.errors import InputError
-from ..laws.materials import LinearElastic
+from ..laws.materials import LinearElastic, Section
 from . import compat
 from .groups import components_of, facets_of
 from .mesh import Facets
@@ -108,7 +108,12 @@ class DashpotMatrix:
 
     def __init__(self, space: FemSpace, forms: Any, dashpots: Dashpots) -> None:
         self.space, self.dashpots = space, dashpots
-        self._normal, self._tangential = _resistances(forms, dashpots)
+        moduli = (forms.fields[name].x.array for name in ("lame", "shear", "rho"))  # times the thickness
+        cellwise = []
+        for values in impedances(dashpots, forms.section, *moduli):
+            cellwise.append(compat.function(compat.cell_space(space.mesh)))
+            cellwise[-1].x.array[:] = values
+        self._normal, self._tangential = cellwise
         self.mat = self._matrix(dashpots.facets.indices)
         self._refuse_held()
 
@@ -123,9 +128,8 @@ class DashpotMatrix:
 
     def _resistance(self, mat: Any) -> Array:
         """∫ e_c·D e_c of every direction c, on all ranks."""
-        whole, count = PetscMatrix(mat), len(self.space.nodes)
-        directions = [np.tile(e, count) for e in np.eye(self.space.dimension)]
-        return self.space.comm.sum(np.array([e @ (whole @ e) for e in directions]))
+        whole = PetscMatrix(mat)
+        return self.space.comm.sum(np.array([e @ (whole @ e) for e in self.space.translations]))
 
     def _refuse_held(self) -> None:
         name, total = self.dashpots.facets.name, self._resistance(self.mat).sum()
@@ -142,8 +146,8 @@ class DashpotMatrix:
 
     def moved_by(self, motion: Callable[[float], Array], factor: float) -> Callable[[float], Array]:
         """Return the load factor Pᵀ D v(t), v the same at all nodes."""
-        count, whole = len(self.space.nodes), PetscMatrix(self.mat)
-        rows = [self.space.pull(whole @ np.tile(e, count)) for e in np.eye(self.space.dimension)]
+        whole = PetscMatrix(self.mat)
+        rows = [self.space.pull(whole @ e) for e in self.space.translations]
         columns, name = factor * np.column_stack(rows), type(self.dashpots).__name__
 
         def load(t: float) -> Array:
@@ -155,18 +159,13 @@ class DashpotMatrix:
         return load
 
 
-def _resistances(forms: Any, dashpots: Dashpots) -> tuple[Any, Any]:
-    """Cellwise fields: thickness · (normal rho c_P, tangential rho c_S) of the cells or of the given material."""
-    lame, shear, rho = (forms.fields[name].x.array for name in ("lame", "shear", "rho"))  # times the thickness
+def impedances(dashpots: Dashpots, section: Section, lame: Any, shear: Any, rho: Any) -> tuple[Any, Any]:
+    """Return thickness · (normal rho c_P, tangential rho c_S): of the ground beside the dashpots, whose constants given
+    here hold the thickness already, or of their own material."""
     if dashpots.material is not None:
-        thickness, rho = forms.section.thickness, forms.section.thickness * dashpots.material.rho
-        lame, shear = (thickness * value for value in forms.section.elastic_constants(dashpots.material))
-    fields = []
-    for factor, modulus in ((dashpots.normal, lame + 2.0 * shear), (dashpots.tangential, shear)):
-        field_ = compat.function(compat.cell_space(forms.space.mesh))
-        field_.x.array[:] = factor * np.sqrt(modulus * rho)
-        fields.append(field_)
-    return fields[0], fields[1]
+        rho = section.thickness * dashpots.material.rho
+        lame, shear = (section.thickness * value for value in section.elastic_constants(dashpots.material))
+    return dashpots.normal * np.sqrt((lame + 2.0 * shear) * rho), dashpots.tangential * np.sqrt(shear * rho)
 
 
 def describe_boundaries(boundaries: Sequence[Dashpots], rank: int) -> tuple[str, ...]:

@@ -138,7 +138,8 @@ def _distribute(comm: MPI.Comm, produce: Callable[[], MeshArrays]) -> tuple[Mesh
     original = np.asarray(mesh.topology.original_cell_index, dtype=np.int64)
     for name, mask in arrays.cell_groups.items():
         tags[name] = Cells(name, np.flatnonzero(mask[original]).astype(np.int32), mesh)
-    facets, *named = number_alike(_facet_vertices(mesh), *arrays.facet_groups.values())
+    everyone = compat.entities_to_geometry(mesh, mesh.topology.dim - 1, np.arange(local_count(mesh, 1), dtype=np.int32))
+    facets, *named = number_alike(node_numbers(mesh)[everyone], *arrays.facet_groups.values())
     for name, numbers in zip(arrays.facet_groups, named, strict=True):
         tags[name] = Facets(name, np.flatnonzero(found_in(facets, numbers)).astype(np.int32), mesh)
     return mesh, tags
@@ -149,9 +150,3 @@ def _on_root(comm: MPI.Comm, produce: Callable[[], MeshArrays]) -> MeshArrays:
     arrays = on_root(MpiComm(comm), produce)
     groups = comm.bcast(arrays and replace(arrays, points=arrays.points[:0], cells=arrays.cells[:0]))
     return arrays or groups
-
-
-def _facet_vertices(mesh: Mesh) -> npt.NDArray[np.int64]:
-    """Vertices of every local facet in input numbers, (n_facets, n_facet_vertices)."""
-    everyone = np.arange(local_count(mesh, 1), dtype=np.int32)
-    return node_numbers(mesh)[compat.entities_to_geometry(mesh, mesh.topology.dim - 1, everyone)]

@@ -194,11 +194,6 @@ def _own_serves(mat: Any) -> bool:
     return bool(mat.comm.size == 1 or rows <= COPIED_ROWS)
 
 
-def _chosen() -> bool:
-    """Whether options of the user choose the factor."""
-    return any(not name.startswith(DEFAULTS) for name in PETSc.Options(PREFIX).getAll())
-
-
 def _default_options(values: Mapping[str, object]) -> None:
     """PETSc options of the factor that hold unless the user has given them."""
     database = PETSc.Options(PREFIX)
@@ -239,14 +234,11 @@ class PetscAlgebra:
         return self.held(triple_product(as_petsc(K).mat, as_petsc(T).mat))
 
     def local(self, rows: Indices, columns: Indices, values: Array, n: int) -> Matrix:
-        places = rows, self.first(n) + np.asarray(columns)
-        return PetscMatrix(aij_of(sp.coo_matrix((values, places), shape=(n, self._all(n))), self.comm.mpi))
+        places, every = (rows, self.first(n) + np.asarray(columns)), int(self.comm.mpi.allreduce(n))
+        return PetscMatrix(aij_of(sp.coo_matrix((values, places), shape=(n, every)), self.comm.mpi))
 
     def first(self, n: int) -> int:
         return int(self.comm.mpi.exscan(n) or 0)
-
-    def _all(self, n: int) -> int:
-        return int(self.comm.mpi.allreduce(n))
 
     def entries(self, A: Matrix, rows: Indices) -> sp.csr_matrix:
         mat = as_petsc(A).mat
@@ -279,8 +271,9 @@ class PetscAlgebra:
         return PetscFactor(as_petsc(A))
 
     def contact_last(self, A: Matrix, last: Indices) -> ContactLast | None:
-        mat = as_petsc(A).mat
-        serves = not _chosen() and (self.comm.size == 1 or _own_serves(mat))
+        mat, given = as_petsc(A).mat, PETSc.Options(PREFIX).getAll()
+        chosen = any(not name.startswith(DEFAULTS) for name in given)  # options of the user choose the factor
+        serves = not chosen and (self.comm.size == 1 or _own_serves(mat))
         return contact_last(self.comm, mat, last) if serves else None
 
     def dot(self, x: Array, y: Array) -> float:
@@ -293,11 +286,12 @@ def rows_of(mat: Any) -> sp.csr_matrix:
     return sp.csr_matrix((values, columns, ends), shape=(mat.getLocalSize()[0], mat.getSize()[1]))
 
 
-def aij_of(rows: sp.spmatrix, comm: Any) -> Any:
-    """Return the square PETSc matrix with these rows of this rank, columns numbered over all ranks. Collective."""
+def aij_of(rows: sp.spmatrix, comm: Any, columns: int | None = None) -> Any:
+    """Return the PETSc matrix with these rows of this rank, columns numbered over all ranks; ``columns``: how many this
+    rank owns, as many as rows unless given. Collective."""
     entries, kind, n = sp.csr_matrix(rows), PETSc.IntType, rows.shape[0]
     csr = (entries.indptr.astype(kind), entries.indices.astype(kind), entries.data)
-    mat = PETSc.Mat().createAIJ(((n, None), (n, None)), csr=csr, comm=comm)
+    mat = PETSc.Mat().createAIJ(((n, None), (n if columns is None else columns, None)), csr=csr, comm=comm)
     mat.assemble()
     return mat
 

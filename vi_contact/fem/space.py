@@ -19,7 +19,7 @@ from . import compat
 from .groups import components_of
 from .loads import Prescribed, evaluate_here
 from .mesh import Facets, node_numbers
-from .petsc_algebra import MpiComm, PetscMatrix, triple_product
+from .petsc_algebra import MpiComm, PetscMatrix, aij_of, triple_product
 from .ties import PLACE_TOLERANCE, Pairs, Tied, paired
 
 
@@ -116,6 +116,11 @@ class FemSpace:
         self.forms: Any = None  # the ElasticForms of the system made on it; stress output needs them
 
     @property
+    def translations(self) -> list[Array]:
+        """Return the unit translation in every direction, full vectors."""
+        return [np.tile(e, len(self.nodes)) for e in np.eye(self.dimension)]
+
+    @property
     def bytes(self) -> int:
         """Return the bytes of the mesh on this rank."""
         return compat.mesh_bytes(self.mesh)
@@ -173,11 +178,7 @@ class FemSpace:
                         column[d * row + c] = leader[c]
         kept = np.flatnonzero(column >= 0)
         ones = sp.csr_matrix((np.ones(len(kept)), (kept, column[kept])), shape=(rows, self.unknowns))
-        kind = PETSc.IntType
-        csr = (ones.indptr.astype(kind), ones.indices.astype(kind), ones.data)
-        P = PETSc.Mat().createAIJ(((rows, None), (columns, None)), csr=csr, comm=self.mesh.comm)
-        P.assemble()
-        return P
+        return aij_of(ones, self.mesh.comm, columns)
 
     @property
     def tied_unknowns(self) -> Mask | None:

@@ -81,24 +81,20 @@ class ChannelMesh:
 
     def build(self, gmsh: Any) -> None:
         """Add both bodies to Gmsh's current model."""
+        x, y, size = self.x, self.y, self.size
         if self.far is None:
-            add_arrays(gmsh, channel_grid(self.x, self.y, self.size, triangles=self.triangles))
-        else:
-            _build_irregular(self, gmsh, self.far)
-
-
-def _build_irregular(mesh: ChannelMesh, gmsh: Any, far: float) -> None:
-    x, y = mesh.x, mesh.y
-    sides = ("left", "base", "right")
-    u = [(x[1], y[3]), (x[1], y[1]), (x[4], y[1]), (x[4], y[3])]  # what both bodies share
-    inside = [(x[3], y[3]), (x[3], y[2]), (x[2], y[2]), (x[2], y[3])]
-    names = [*(f"channel_{side}" for side in sides), "channel_top", *["channel_inside"] * 3, "channel_top"]
-    shared = [max(round(math.dist(one, two) / mesh.size), 1) for one, two in pairwise(u)]  # on both bodies
-    add_outline(gmsh.model, "channel", u + inside, names, [mesh.size] * 8, shared)
-    layer = [(x[5], y[3]), (x[5], 0.0), (0.0, 0.0), (0.0, y[3])]
-    names = [*(f"soil_{side}" for side in sides), "surface", "right_side", "bedrock", "left_side", "surface"]
-    add_outline(gmsh.model, "soil", u + layer, names, [mesh.size] * 4 + [far] * 4, shared)
-    gmsh.model.mesh.generate(2)
+            add_arrays(gmsh, channel_grid(x, y, size, triangles=self.triangles))
+            return
+        sides = ("left", "base", "right")
+        u = [(x[1], y[3]), (x[1], y[1]), (x[4], y[1]), (x[4], y[3])]  # what both bodies share
+        inside = [(x[3], y[3]), (x[3], y[2]), (x[2], y[2]), (x[2], y[3])]
+        names = [*(f"channel_{side}" for side in sides), "channel_top", *["channel_inside"] * 3, "channel_top"]
+        shared = [max(round(math.dist(one, two) / size), 1) for one, two in pairwise(u)]  # on both bodies
+        add_outline(gmsh.model, "channel", u + inside, names, [size] * 8, shared)
+        layer = [(x[5], y[3]), (x[5], 0.0), (0.0, 0.0), (0.0, y[3])]
+        names = [*(f"soil_{side}" for side in sides), "surface", "right_side", "bedrock", "left_side", "surface"]
+        add_outline(gmsh.model, "soil", u + layer, names, [size] * 4 + [self.far] * 4, shared)
+        gmsh.model.mesh.generate(2)
 
 
 def channel_grid(x: Sequence[float], y: Sequence[float], size: float, *, triangles: bool = False) -> MeshArrays:

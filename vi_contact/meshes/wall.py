@@ -49,24 +49,20 @@ class WallMesh:
 
     def build(self, gmsh: Any) -> None:
         """Add the wall to Gmsh's current model."""
-        if self.size is not None:
-            _build_irregular(self, gmsh, self.size)
+        if self.size is None:
+            add_grids(gmsh, self.grids())
             return
-        add_grids(gmsh, self.grids())
+        corners = ((0.0, 0.0), (self.width, 0.0), (self.width, self.height), (0.0, self.height))
+        surface = add_outline(gmsh.model, "wall", corners, ("base", "face", "top", "back"), [self.size] * 4)
+        if not self.triangles:
+            gmsh.model.mesh.setRecombine(2, surface)
+        gmsh.model.mesh.generate(2)
 
     def grids(self) -> list[Grid]:
         """Return the grid it is, none of an irregular mesh."""
         nodes = lattice((self.width, self.height), self.divisions or _PUBLISHED)
         grid = Grid(nodes, self.triangles, "wall", (("back", "face"), ("base", "top")))
         return [grid] if self.size is None else []
-
-
-def _build_irregular(wall: WallMesh, gmsh: Any, size: float) -> None:
-    corners = ((0.0, 0.0), (wall.width, 0.0), (wall.width, wall.height), (0.0, wall.height))
-    surface = add_outline(gmsh.model, "wall", corners, ("base", "face", "top", "back"), [size] * 4)
-    if not wall.triangles:
-        gmsh.model.mesh.setRecombine(2, surface)
-    gmsh.model.mesh.generate(2)
 
 
 if __name__ == "__main__":  # python3 meshes/wall.py is python3 meshes wall

@@ -25,7 +25,7 @@ from ..core.problem import ContactProblem
 from ..core.problem_checks import EXCITATION
 from ..core.protocols import Excitation
 from ..fem import compat
-from ..fem.dashpots import BoundaryLoads, CompliantBase, DashpotMatrix, Dashpots
+from ..fem.dashpots import BoundaryLoads, CompliantBase, DashpotMatrix, Dashpots, impedances
 from ..fem.petsc_algebra import PetscMatrix
 from ..fem.space import FemSpace
 from ..laws.materials import Section
@@ -102,7 +102,8 @@ class FreeFieldSide:
         """The column on its base."""
         ground, column = self._ground, self.column
         if isinstance(ground, CompliantBase):
-            return column.on_dashpots(*_foot(column, ground, self._section), ground.motion)
+            normal, shear = impedances(ground, self._section, column.lame[0], column.shear[0], column.rho[0])
+            return column.on_dashpots(float(shear), float(normal), ground.motion)
         return column.on_rigid_base(lambda t: ground.at(t)[2], lambda t: ground.at(t)[1])
 
     def motion(self, t: float) -> tuple[Array, Array]:
@@ -135,15 +136,6 @@ class FreeFieldSide:
         force = np.zeros((len(self.space.nodes), 2))
         force[self._blocks] = at_nodes[self._rows]
         return self.space.pull(force.ravel())
-
-
-def _foot(column: SoilColumn, base: CompliantBase, section: Section) -> tuple[float, float]:
-    """Impedances (rho c_S, rho c_P) below the column, with the thickness, as in the column's own moduli."""
-    lame, shear, rho = column.lame[0], column.shear[0], column.rho[0]
-    if base.material is not None:
-        rho = section.thickness * base.material.rho
-        lame, shear = (section.thickness * value for value in section.elastic_constants(base.material))
-    return base.tangential * float(np.sqrt(shear * rho)), base.normal * float(np.sqrt((lame + 2.0 * shear) * rho))
 
 
 def _column(space: FemSpace, forms: Any, given: FreeField) -> tuple[SoilColumn, float]:
