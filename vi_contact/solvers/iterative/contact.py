@@ -130,6 +130,5 @@ class Contact:
         return float(np.sum(k * np.maximum(x[rows] + t * d[rows] - bound, 0.0) * d[rows]))
 
     def fingerprint(self) -> float:
-        """Return a number of the closed set of this rank: the sum over ranks tells two sets apart, in all likelihood.
-        """
+        """Return a number of the closed set of this rank, whose sum over ranks tells sets apart, in all likelihood."""
         return float(zlib.crc32(np.packbits(self.closed).tobytes()))

@@ -18,7 +18,7 @@ from ...laws.friction import project
 from .conjugate_gradients import NOT_A_NUMBER
 from .contact import Contact
 from .failures import OTHER, SAID, told
-from .friction_krylov import Gmres, Held, Turned
+from .friction_krylov import Gmres, Turned
 from .friction_laws import LawOfStep
 from .friction_states import Limits, States, Tangents
 from .layout import Layout
@@ -107,7 +107,7 @@ class Newton:
         x[of.tangents.rows[sticks]] = origin[sticks]
         of.operator.set_springs(*contact.sprung)
         of.gmres.take(states)
-        of.inverse.follow(Held(contact, states))
+        of.inverse.follow(np.concatenate([contact.held, states.held]))
         self.load = contact.load(self.b)
         moved = changed is None or bool(np.any(changed)) or not np.array_equal(x, self.x)
         if largest(of.comm, moved):
@@ -127,8 +127,7 @@ class Newton:
         return self.law(slip, r_n, np.linalg.norm(y_t, axis=1) / self.of.tangents.c)
 
     def _rubbed(self) -> Array:
-        """The friction (m, d - 1) that the law allows next to r_t: along the slip, where that is certain, or the
-        projection."""
+        """The friction (m, d - 1) that the law allows next to r_t: along a slip that is certain, or the projection."""
         limit, size = self.limits(self.r_n), np.linalg.norm(self.slip, axis=1)
         y_t = self.r_t + self.of.tangents.c[:, None] * self.slip
         along = self.slip * (limit / np.where(size > 0.0, size, 1.0))[:, None]
@@ -171,8 +170,7 @@ class Newton:
     def _wrong(self, error: float) -> Mask:
         """Conditions whose signs are wrong by more than the error of the residual."""
         least = 0.5 * self.of.tolerance * self.scales.reaction
-        return self.of.contact.wrong(self.x, self.r_n, error=error, least_force=least,
-                                     x_ref=self.scales.displacement)
+        return self.of.contact.wrong(self.x, self.r_n, error=error, least_force=least, x_ref=self.scales.displacement)
 
     def advance(self) -> None:
         """Solve the linear problem of the states, and take those of its solution."""

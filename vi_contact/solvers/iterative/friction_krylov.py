@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from ...core.algebra import Array, Comm, Indices, largest
+from ...core.algebra import Array, Comm, largest
 from .conjugate_gradients import SOLVED, STAGNATED
 from .contact import Contact
 from .friction_states import States, Tangents, dot
@@ -124,10 +124,3 @@ class Gmres:
         if reason == STAGNATED and left <= FALL * self._b.norm():
             reason = SOLVED  # as far as it came: Newton goes on from there
         return np.array(self._x.array_r), left, reason
-
-
-class Held:
-    """Tell a preconditioner which rows are held: normals and tangents."""
-
-    def __init__(self, contact: Contact, states: States) -> None:
-        self.held: Indices = np.concatenate([contact.held, states.held])

@@ -77,7 +77,6 @@ class Nodewise:
 
     def __init__(self, A: EffectiveMatrix) -> None:
         self.A, self.layout = A, layout_of(A)
-        self._selection: Any = None
 
     @cached_property
     def source(self) -> Any:
@@ -98,7 +97,7 @@ class Nodewise:
         rows = sp.csr_matrix((values, columns, indptr), shape=(layout.size, mat.getSize()[1]))
         ends, columns, values = upper_blocks(rows, d, mat.getOwnershipRange()[0])
         arrays = (ends.astype(kind), columns.astype(kind), values)
-        made = PETSc.Mat().createSBAIJ(self._sizes(), d, csr=arrays, comm=mat.comm)
+        made = PETSc.Mat().createSBAIJ(((layout.size, None),) * 2, d, csr=arrays, comm=mat.comm)
         made.assemble()
         made.setOption(PETSc.Mat.Option.SPD, True)
         return made
@@ -108,7 +107,7 @@ class Nodewise:
 
         Rows of missing components hold the largest diagonal entry of A.
         """
-        mat = self.source.PtAP(self._selected(), result=result)
+        mat = self.source.PtAP(self._selected, result=result)
         mat.setBlockSize(self.layout.width)
         mat.setOption(PETSc.Mat.Option.KEEP_NONZERO_PATTERN, True)
         if not self.layout.complete:
@@ -117,19 +116,16 @@ class Nodewise:
         mat.setOption(PETSc.Mat.Option.SPD, True)
         return mat
 
-    def _sizes(self) -> Any:
-        return ((self.layout.size, None), (self.layout.size, None))
-
+    @cached_property
     def _selected(self) -> Any:
         """P of A -> PᵀAP, with zeros stored for the other components of a node: that fills the blocks."""
-        if self._selection is None:
-            layout, kind, d = self.layout, PETSc.IntType, self.layout.width
-            n = len(layout.places)
-            first = self.source.comm.tompi4py().scan(layout.size) - layout.size
-            columns = (layout.places // d * d)[:, None] + np.arange(d)
-            values = (columns == layout.places[:, None]).astype(float)
-            csr = (np.arange(0, d * n + 1, d).astype(kind), (first + columns).ravel().astype(kind), values.ravel())
-            sizes = (self.source.getSizes()[0], (layout.size, None))
-            self._selection = PETSc.Mat().createAIJ(sizes, csr=csr, comm=self.source.comm)
-            self._selection.assemble()
-        return self._selection
+        layout, kind, d = self.layout, PETSc.IntType, self.layout.width
+        n = len(layout.places)
+        first = self.source.comm.tompi4py().scan(layout.size) - layout.size
+        columns = (layout.places // d * d)[:, None] + np.arange(d)
+        values = (columns == layout.places[:, None]).astype(float)
+        csr = (np.arange(0, d * n + 1, d).astype(kind), (first + columns).ravel().astype(kind), values.ravel())
+        selection = PETSc.Mat().createAIJ((self.source.getSizes()[0], (layout.size, None)), csr=csr,
+                                          comm=self.source.comm)
+        selection.assemble()
+        return selection

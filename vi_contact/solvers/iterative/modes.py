@@ -22,19 +22,16 @@ def rigid_modes(A: EffectiveMatrix, surface: ContactSurface, layout: Layout, tem
     modes = [(component == i).astype(float) for i in range(d)]
     for i in range(d):
         modes += [np.where(component == j, x[:, i], np.where(component == i, -x[:, j], 0.0)) for j in range(i + 1, d)]
-    return orthonormal([_vector(template, layout.padded(_unknowns(surface, mode))) for mode in modes])
+    vectors = [template.duplicate() for _ in modes]
+    for vector, mode in zip(vectors, modes, strict=True):
+        vector.array[:] = layout.padded(_unknowns(surface, mode))
+    return orthonormal(vectors)
 
 
 def _unknowns(surface: ContactSurface, u: Array) -> Array:
     """The unknowns of the equations of displacements along the axes: T⁻¹ u, then R⁻¹ = 2 - R."""
     turned = surface.in_frames(u)
     return turned if surface.coupling is None else 2.0 * turned - surface.coupling @ turned
-
-
-def _vector(template: Any, values: Array) -> Any:
-    vector = template.duplicate()
-    vector.array[:] = values
-    return vector
 
 
 def orthonormal(vectors: list[Any]) -> list[Any]:

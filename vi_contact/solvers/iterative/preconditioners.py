@@ -12,7 +12,7 @@ contact set has moved since.
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from petsc4py import PETSc
@@ -90,41 +90,20 @@ class Masked:
         return np.asarray(self.weights * self._z.array_r)
 
 
-class Holds(Protocol):
-    """Say which rows are held: of closed conditions, and of points that stick."""
+class Inverse:
+    """Hold M⁻¹ as the PETSc preconditioner ``pc``: Jacobi and ICC, which do not depend on the contact set."""
 
-    @property
-    def held(self) -> Indices: ...
-
-
-class Inverse(Protocol):
-    """Hold M⁻¹ as the PETSc preconditioner ``pc``, and follow the contact set."""
-
-    pc: Any
+    def __init__(self, matrix: Any, layers: OptionLayers, work: Work) -> None:
+        self.pc = made(matrix, layers, work)
 
     def begin(self) -> None:
         """Begin a step."""
-        ...
 
-    def follow(self, contact: Holds) -> None:
-        """Make M anew for the rows that are held, when it is time to. Collective."""
-        ...
+    def follow(self, held: Indices) -> None:
+        """Make M anew for the rows that closed conditions and sticking points hold, if it is time to. Collective."""
 
 
-class Constant:
-    """Hold a preconditioner that does not depend on the contact set: Jacobi and ICC."""
-
-    def __init__(self, blocks: Any, layers: OptionLayers, work: Work) -> None:
-        self.pc = made(blocks, layers, work)
-
-    def begin(self) -> None:
-        """Do nothing."""
-
-    def follow(self, contact: Holds) -> None:
-        """Do nothing."""
-
-
-class Multigrid:
+class Multigrid(Inverse):
     """Hold GAMG, or what else the options say, of an AIJ matrix that is renewed for the contact set.
 
     The interpolation is that of the whole A with its rigid modes, in which no set has left a trace.
@@ -137,7 +116,7 @@ class Multigrid:
             if nodewise.A.space is not None:
                 modes = rigid_modes(nodewise.A, surface, nodewise.layout, self._matrix.createVecLeft())
                 self._matrix.setNearNullSpace(PETSc.NullSpace().create(vectors=modes, comm=self._matrix.comm))
-        self.pc = made(self._matrix, layers, work)
+        super().__init__(self._matrix, layers, work)
         self._built: Mask = np.zeros(nodewise.layout.size, dtype=bool)
         self._left = RENEWALS
 
@@ -145,15 +124,15 @@ class Multigrid:
         """Begin a step: it has its own number of renewals."""
         self._left = RENEWALS
 
-    def follow(self, contact: Holds) -> None:
+    def follow(self, held: Indices) -> None:
         """Make the Galerkin products anew when more than a tenth of the held rows have changed since."""
-        held = np.zeros_like(self._built)
-        held[contact.held] = True
-        moved, size = self._comm.sum(np.array([np.sum(held ^ self._built), np.sum(held)], dtype=float))
+        mask = np.zeros_like(self._built)
+        mask[held] = True
+        moved, size = self._comm.sum(np.array([np.sum(mask ^ self._built), np.sum(mask)], dtype=float))
         if self._left and moved > DRIFT * size:
             self._left -= 1
-            self._built = held
-            self._renew(contact.held)
+            self._built = mask
+            self._renew(held)
 
     def _renew(self, held: Indices) -> None:
         matrix, work = self._matrix, self._work
@@ -166,12 +145,6 @@ class Multigrid:
             self.pc.setOperators(matrix)
             self.pc.setUp()
         work.renewals += 1
-
-
-def inverse(kind: str, nodewise: Nodewise, blocks: Any, surface: ContactSurface, layers: OptionLayers, work: Work
-            ) -> Inverse:
-    """Return M⁻¹ of a kind; ``blocks``: A as its products store it. Collective."""
-    return Multigrid(nodewise, surface, layers, work) if kind == GAMG else Constant(blocks, layers, work)
 
 
 def made(matrix: Any, layers: OptionLayers, work: Work) -> Any:

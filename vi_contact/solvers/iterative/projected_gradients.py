@@ -114,11 +114,6 @@ class Face:
         """Start the conjugate directions anew."""
         self._direction = self._problem.precondition(self.phi, self.free)
 
-    def move_to(self, r: Array) -> None:
-        """Go to r with an exact gradient and start the conjugate directions anew."""
-        self._place(r, self._problem.apply(r) + self._problem.q)
-        self._turn()
-
     def advance(self) -> None:
         """Take one step: conjugate gradient or expansion on the face, or proportioning off it."""
         dot = self._problem.dot
@@ -141,7 +136,9 @@ class Face:
             self._direction = z - (self._problem.dot(z, image) / curvature) * p
         else:
             self._place(np.maximum(self.r - feasible * p, lower), self.gradient - feasible * image)
-            self.move_to(np.maximum(self.r - self._step * self.phi, lower))
+            r = np.maximum(self.r - self._step * self.phi, lower)
+            self._place(r, self._problem.apply(r) + self._problem.q)  # an exact gradient
+            self._turn()
 
     def _release(self) -> None:
         image, curvature = self._curvature(self.beta)

@@ -33,9 +33,9 @@ from .friction import Friction
 from .layout import Nodewise
 from .measures import Worth
 from .operator import Operator
-from .preconditioners import Masked, defaults, inverse
+from .preconditioners import Inverse, Masked, Multigrid, defaults
 from .projected_gradients import largest_eigenvalue, projected_gradients
-from .regime import ICC, KINDS, chosen, courant
+from .regime import GAMG, ICC, KINDS, chosen, courant
 from .search import Search, search
 from .work import Work
 
@@ -90,8 +90,7 @@ class Iterative:
 
 
 class PreparedIterative:
-    """Solve steps of one A. ``work``: what it has done so far; ``kind``: its preconditioner; ``ksp``: PETSc's object.
-    """
+    """Solve steps of one A. ``work``: what it has done; ``kind``: its preconditioner; ``ksp``: PETSc's object."""
 
     def __init__(self, settings: Iterative, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> None:
         self._settings, self.work = settings, Work()
@@ -103,7 +102,8 @@ class PreparedIterative:
         PETSc.garbage_cleanup(blocks.comm)
         self._operator = Operator(blocks, self.work)
         layers = OptionLayers(settings.prefix, defaults(self.kind, A.algebra.comm.size), settings.petsc_options)
-        self._inverse = inverse(self.kind, nodewise, blocks, surface, layers, self.work)
+        self._inverse = (Multigrid(nodewise, surface, layers, self.work) if self.kind == GAMG
+                         else Inverse(blocks, layers, self.work))
         self._masked = Masked(self._inverse.pc, blocks.createVecLeft())
         self._cg = ConjugateGradients(self._operator, self._masked)
         self._diagonal = np.array(blocks.getDiagonal().array_r)
@@ -165,10 +165,6 @@ class PreparedIterative:
             raise stopped(self._name, reason, self.work.linear_iterations - before, of.history)
         self._worth.keep()
         return StepResult(
-            x=layout.stripped(x),
-            r_n=contact.reactions(x, residual),
-            active=contact.closed.copy(),
-            iterations=changes,
-            method=self._name,
-            aim=settings.tolerance,
+            x=layout.stripped(x), r_n=contact.reactions(x, residual), active=contact.closed.copy(), iterations=changes,
+            method=self._name, aim=settings.tolerance,
         )

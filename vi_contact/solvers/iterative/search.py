@@ -50,7 +50,7 @@ class Search:
         self.masked.weights = contact.weights()
         self.operator.set_springs(*contact.sprung)
         self.load = contact.load(self.b)
-        self.inverse.follow(contact)
+        self.inverse.follow(contact.held)
         name = total(self.comm, contact.fingerprint())
         known = name in self._sets
         self._sets.add(name)
@@ -95,7 +95,6 @@ class Search:
     def certain(self, norm: float) -> bool:
         """Say whether a residual formed afresh is small enough."""
         return norm <= self.tolerance * self.scales.force
-
 
     def change(self, wrong: Mask, x: Array, residual: Array) -> tuple[Array, Array, bool]:
         """Change the set, and return (x, residual, whether the set is a new one): a product where a rigid support
