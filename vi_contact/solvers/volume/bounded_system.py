@@ -82,17 +82,12 @@ class BoundedSystem:
     def start(self, step: StepProblem) -> Array:
         """Return the guess, with springs at rest and the predicted contacts on their bounds."""
         z = np.concatenate([step.guess, step.guess[self.feet]])
-        closed = self.predicted(step)
+        closed = (step.active | self.surface.bilateral) & np.isfinite(step.bound)
         z[self.bounded[closed]] = step.bound[closed]
         return z
 
-    def predicted(self, step: StepProblem) -> Mask:
-        """Return (m,) the contact set to start from."""
-        return (step.active | self.surface.bilateral) & np.isfinite(step.bound)
-
     def reactions(self, f: Array) -> Array:
-        """Return (m,) r_n from the residual f = A z - b; on a spring k (x_n - w). Meaningful where the bound is
-        active."""
+        """Return (m,) r_n from the residual f = A z - b; on a spring k (x_n - w). Valid where the bound is active."""
         return np.asarray(-f[self.bounded])
 
     def norm(self) -> float:
@@ -128,8 +123,7 @@ class BoundedSystem:
 
 
 def renumbered(comm: Comm, old_size: int, new_size: int, columns: Any) -> tuple[int, Indices, int]:
-    """Return the first global number of this rank, global column numbers and total, where every rank's part grows at
-    its end."""
+    """Return this rank's first global number, global column numbers and total, where ranks' parts grow at their end."""
     sizes = np.zeros((comm.size, 2))
     sizes[comm.rank] = old_size, new_size
     sizes = comm.sum(sizes)

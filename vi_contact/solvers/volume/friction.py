@@ -35,8 +35,7 @@ EXTRAPOLATION = Anderson(depth=5, after=3)
 
 @dataclass(frozen=True)
 class Found:
-    """Hold the solution of a sequence of problems, or of one: r_n (m,), slip (L,), zero where points stick, SNES
-    iterations."""
+    """Hold the solution of one problem or of a sequence: r_n (m,), slip (L,), 0 where points stick, SNES iterations."""
 
     state: FrictionUnknowns
     r_n: Array

@@ -89,8 +89,7 @@ class FrictionUnknowns:
 
 
 class ScaledFrictionStep(ScaledStep):
-    """Evaluate F(y), y = (z/x_ref, lambda/r_ref, gamma r_ref/x_ref), with bounds on y, for the step and thresholds set
-    last."""
+    """Evaluate F(y), y = (z/x_ref, lambda/r_ref, gamma r_ref/x_ref), with bounds, for the step and limits set last."""
 
     def __init__(self, friction: FrictionSystem, tolerance: float) -> None:
         super().__init__(friction.body, tolerance)

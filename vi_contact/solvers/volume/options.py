@@ -21,8 +21,7 @@ DIRECT = ("lu", "cholesky")
 
 
 class OptionLayers:
-    """Hold defaults and the user's own options under a prefix; ``in_force`` puts them into PETSc's database for a
-    while."""
+    """Hold defaults and the user's own options under a prefix; ``in_force`` puts them into PETSc's database."""
 
     def __init__(self, prefix: str, defaults: Options, own: Options) -> None:
         self.prefix = prefix
@@ -113,11 +112,8 @@ def _check_unsymmetric(snes: Any, layers: OptionLayers, wanted: str, what: str, 
 
 def _check_type(snes: Any, wanted: str, layers: OptionLayers) -> None:
     if snes.getType() != wanted:
-        refuse(
-            f"option {layers.prefix}snes_type {snes.getType()}",
-            f"the method was set up for {wanted}",
-            "choose the method by Volume(method=...)",
-        )
+        refuse(f"option {layers.prefix}snes_type {snes.getType()}", f"the method was set up for {wanted}",
+               "choose the method by Volume(method=...)")
 
 
 def _check_line_search(layers: OptionLayers) -> None:

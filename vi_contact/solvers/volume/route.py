@@ -89,12 +89,11 @@ class Volume:
         instance("Volume", "petsc_options", self.petsc_options, Mapping, "give a dict of PETSc options without prefix")
         instance("Volume", "prefix", self.prefix, str, "give a text such as 'vi_contact_volume_'")
         if not 0.0 < real(self.tolerance) < 1.0:
-            raise InputError(f"Volume tolerance is {shown(self.tolerance)}: give a relative error below 1, such as "
-                             "1e-9")
+            tolerance = shown(self.tolerance)
+            raise InputError(f"Volume tolerance is {tolerance}: give a relative error below 1, such as 1e-9")
 
     def check(self, problem: ContactProblem) -> None:
-        """Raise InputError for friction that the method cannot carry, without a tangent, or of a wrong number of
-        values."""
+        """Raise InputError for friction that the method cannot carry, without a tangent, or of wrong length."""
         if not problem.frictional:
             return
         surface, law = problem.surface, problem.friction
@@ -128,11 +127,7 @@ class PreparedVolume:
         self._scaled = ScaledStep(self._system, settings.tolerance)
         self._name = f"Volume({getattr(settings.method, 'petsc_type', type(settings.method).__name__)})"
         self._friction: VolumeFriction | None = None
-        self._driver: Driver | None = self._make()
-
-    def _make(self) -> Driver:
-        driver: Driver = self._method.driver(self._scaled, self._layers)
-        return driver
+        self._driver: Driver | None = self._method.driver(self._scaled, self._layers)
 
     def _friction_method(self) -> VolumeFriction:
         """The problem with friction, made at the first step that has some, in the place of the other one."""
@@ -184,23 +179,13 @@ class PreparedVolume:
 
     def _solve(self, step: StepProblem) -> StepResult:
         """The step without friction."""
-        if self._driver is None:
-            self._driver = self._make()
+        driver: Driver = self._driver or self._method.driver(self._scaled, self._layers)
+        self._driver = driver
         self._scaled.set(step, self._system.start(step))
-        y, F, reason, iterations = self._driver.run()
+        y, F, reason, iterations = driver.run()
         if reason <= 0 and not self._scaled.accepts(y, F):
-            raise stopped(self._name, self._driver.reasons, reason, iterations, self._scaled.worst)
-        return self._result(y, F, iterations)
-
-    def _result(self, y: Array, F: Array, iterations: int) -> StepResult:
-        """x, and r_n on the active set. Off it r_n is zero, so that what is left of F shows in the certificate."""
+            raise stopped(self._name, driver.reasons, reason, iterations, self._scaled.worst)
         system, scaled = self._system, self._scaled
         active = scaled.active(y, F)
-        r_n = np.where(active, system.reactions(F * scaled.r_ref), 0.0)
-        return StepResult(
-            x=y[: system.rows] * scaled.x_ref,
-            r_n=r_n,
-            active=active,
-            iterations=iterations,
-            method=self._name,
-        )
+        r_n = np.where(active, system.reactions(F * scaled.r_ref), 0.0)  # what is left of F shows in the certificate
+        return StepResult(y[: system.rows] * scaled.x_ref, r_n, active, iterations, self._name)

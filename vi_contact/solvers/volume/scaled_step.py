@@ -21,7 +21,7 @@ ROUND_OFF = 1e-14  # backward error |A z - b| / (|A| |z| + |b|), largest entries
 
 
 class ScaledStep:
-    """Evaluate F(y) = (A x_ref y - b) / r_ref with bounds on y, for the step set last."""
+    """Evaluate F(y) = (A x_ref y - b) / r_ref with bounds on y, for the step set last. ``worst``: error found last."""
 
     def __init__(self, system: BoundedSystem, tolerance: float) -> None:
         self.system, self.tolerance = system, tolerance
@@ -41,7 +41,7 @@ class ScaledStep:
         self.lower, self.upper = lower / self.x_ref, upper / self.x_ref
         self.start = start / self.x_ref
         self._b_max = b_max / self.r_ref
-        self._worst = np.inf
+        self.worst = np.inf
 
     def _along(self, b: Array, b_max: float) -> float:
         """Size of the minimiser of ½ zᵀA z - bᵀz along b: the size of z when nothing else is known."""
@@ -80,8 +80,7 @@ class ScaledStep:
         return np.asarray((self.upper[i] - y[i] < -F[i]) | (self.lower[i] == self.upper[i]))
 
     def errors(self, y: Array, F: Array) -> tuple[float, float, float]:
-        """Return the largest |F| off the active set and |gap| on it, relative as in the certificate; backward error of
-        F."""
+        """Return the largest |F| off the active set and |gap| on it, as in the certificate; backward error of F."""
         system, i = self.system, self.system.bounded
         active = self.active(y, F)
         gap = (self.upper[i] - y[i])[active]
@@ -106,8 +105,8 @@ class ScaledStep:
         force, gap, backward = self.errors(y, F)
         if np.isnan(force):
             return NOT_A_NUMBER
-        worst, before = max(force, gap), self._worst
-        self._worst = worst
+        worst, before = max(force, gap), self.worst
+        self.worst = worst
         if backward <= ROUND_OFF and worst <= self.tolerance and gap <= ROUND_OFF:
             return int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_ABS)
         if 0.5 * before < worst <= self.tolerance and np.isfinite(before):
@@ -117,13 +116,8 @@ class ScaledStep:
     def accepts(self, y: Array, F: Array) -> bool:
         """Return True below the tolerance: a solver whose line search fails at the floor of round-off is done."""
         force, gap, _ = self.errors(y, F)
-        self._worst = max(force, gap)
-        return self._worst <= self.tolerance
-
-    @property
-    def worst(self) -> float:
-        """Return the larger error found last."""
-        return self._worst
+        self.worst = max(force, gap)
+        return self.worst <= self.tolerance
 
 
 def _power_of_two(value: float) -> float:

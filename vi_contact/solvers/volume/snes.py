@@ -11,7 +11,7 @@ from __future__ import annotations
 import weakref
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar
 
 import numpy as np
 from petsc4py import PETSc
@@ -26,12 +26,8 @@ from .scaled_step import ScaledStep
 # Line search: `bt` throttles changes of the active set, 16 to 50 iterations instead of 5 to 7.
 # Tolerances: ours decide (ScaledStep.verdict); one of these set by the user stops earlier, relative to |b|.
 NEWTON_OPTIONS: Options = {
-    "snes_linesearch_type": "none",
-    "snes_vi_zero_tolerance": 0.0,
-    "snes_rtol": 0.0,
-    "snes_atol": 0.0,
-    "snes_stol": 0.0,
-    "snes_max_it": 100,
+    "snes_linesearch_type": "none", "snes_vi_zero_tolerance": 0.0, "snes_max_it": 100,
+    "snes_rtol": 0.0, "snes_atol": 0.0, "snes_stol": 0.0,
 }
 MUMPS_OPTIONS: Options = {
     "ksp_type": "preonly",
@@ -40,24 +36,14 @@ MUMPS_OPTIONS: Options = {
 }
 
 
-class Jacobian(Protocol):
-    """Hold the matrix of F for SNES: ``rescale`` when the units of a step change, ``evaluate`` as the SNES callback."""
-
-    mat: Any
-
-    def rescale(self, ratio: float) -> None: ...
-    def evaluate(self, snes: Any, y: Any, J: Any, P: Any) -> None: ...
-    def destroy(self) -> None: ...
-
-
 class SnesDriver:
     """Run a SNES object bound to a scaled step; ``solver`` is the PETSc object."""
 
     reasons = PETSc.SNES.ConvergedReason
 
     def __init__(
-        self, scaled: ScaledStep, layers: OptionLayers, jacobian: Jacobian, *, snes_type: str,
-        check: Callable[[Any, OptionLayers], None],
+        self, scaled: ScaledStep, layers: OptionLayers, jacobian: AssembledJacobian | FrictionJacobian, *,
+        snes_type: str, check: Callable[[Any, OptionLayers], None],
     ) -> None:
         self._scaled, self._layers, self._jacobian = scaled, layers, jacobian
         self._y, self._F = jacobian.mat.createVecs()
@@ -65,11 +51,11 @@ class SnesDriver:
         self.solver = PETSc.SNES().create(scaled.system.comm)
         self.solver.setOptionsPrefix(layers.prefix)
         self.solver.setType(snes_type)  # before the convergence test, which it would overwrite
-        self._test = Test(scaled)
+        self._first = 0.0
         self.solver.setFunction(weakly(scaled.function), self._F)
         self.solver.setJacobian(weakly(jacobian.evaluate), jacobian.mat)
         self.solver.setVariableBounds(self._lower, self._upper)
-        self.solver.setConvergenceTest(weakly(self._test.reason))
+        self.solver.setConvergenceTest(weakly(self._test))
         layers.apply(self.solver, check)
 
     def run(self) -> tuple[Array, Array, int, int]:
@@ -83,21 +69,8 @@ class SnesDriver:
         y, F = np.array(self._y.array_r), np.array(self._F.array_r)
         return y, F, snes.getConvergedReason(), snes.getIterationNumber()
 
-    def destroy(self) -> None:
-        """Free the PETSc objects; collective."""
-        for item in (self.solver, self._jacobian, self._y, self._F, self._lower, self._upper):
-            item.destroy()
-
-
-class Test:
-    """Test the convergence of SNES: our verdict, or a tolerance that the user set, which then counts relative to |b|.
-    """
-
-    def __init__(self, scaled: ScaledStep) -> None:
-        self._scaled, self._first = scaled, 0.0
-
-    def reason(self, snes: Any, iteration: int, norms: tuple[float, float, float]) -> int:
-        """Return PETSc's reason to stop, 0 to go on."""
+    def _test(self, snes: Any, iteration: int, norms: tuple[float, float, float]) -> int:
+        """PETSc's reason to stop: our verdict, or the user's tolerance, which counts relative to |b|; 0 to go on."""
         reason = self._scaled.verdict(snes.getSolution().array_r, snes.getFunction()[0].array_r)
         if reason:
             return reason
@@ -105,10 +78,15 @@ class Test:
         if iteration == 0:
             self._first = norms[2]
         if norms[2] < atol:
-            return int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_ABS)
+            return int(self.reasons.CONVERGED_FNORM_ABS)
         if iteration and norms[2] < rtol * self._first:
-            return int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_RELATIVE)
+            return int(self.reasons.CONVERGED_FNORM_RELATIVE)
         return 0
+
+    def destroy(self) -> None:
+        """Free the PETSc objects; collective."""
+        for item in (self.solver, self._jacobian, self._y, self._F, self._lower, self._upper):
+            item.destroy()
 
 
 def weakly(method: Callable[..., Any]) -> Callable[..., Any]:
@@ -193,9 +171,8 @@ class ReducedNewton:
 
     def driver(self, scaled: ScaledStep, layers: OptionLayers) -> SnesDriver:
         """Return the SNES object."""
-        return SnesDriver(
-            scaled, layers, AssembledJacobian(scaled.system), snes_type="vinewtonrsls", check=check_reduced
-        )
+        jacobian = AssembledJacobian(scaled.system)
+        return SnesDriver(scaled, layers, jacobian, snes_type="vinewtonrsls", check=check_reduced)
 
     def friction_defaults(self) -> Options:
         """Return options before the user's: LU, the system with friction is not symmetric. Its zeros on the diagonal
@@ -225,6 +202,5 @@ class SemismoothNewton:
 
     def driver(self, scaled: ScaledStep, layers: OptionLayers) -> SnesDriver:
         """Return the SNES object."""
-        return SnesDriver(
-            scaled, layers, SemismoothJacobian(scaled.system), snes_type="vinewtonssls", check=check_semismooth
-        )
+        jacobian = SemismoothJacobian(scaled.system)
+        return SnesDriver(scaled, layers, jacobian, snes_type="vinewtonssls", check=check_semismooth)

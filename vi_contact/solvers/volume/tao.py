@@ -18,19 +18,6 @@ from .scaled_step import ScaledStep
 from .snes import AssembledJacobian, weakly, write_bounds
 
 
-def tao_options(ranks: int) -> Options:
-    """Give TRON's defaults; PETSc has no incomplete Cholesky for several ranks."""
-    return {
-        "tao_gatol": 0.0,
-        "tao_grtol": 0.0,
-        "tao_gttol": 0.0,
-        "tao_steptol": 0.0,
-        "tao_max_it": 200,
-        "pc_type": "icc" if ranks == 1 else "bjacobi",
-        "sub_pc_type": "icc",
-    }
-
-
 def check_tao(tao: Any, layers: OptionLayers) -> None:
     """Refuse other types and preconditioners that give wrong answers, also when they come from options
     (docs/reference/petsc.md: many types ignore bounds, and bqpip reports garbage as converged)."""
@@ -54,12 +41,11 @@ class TaoDriver:
         self.solver = PETSc.TAO().create(scaled.system.comm)
         self.solver.setOptionsPrefix(layers.prefix)
         self.solver.setType("tron")
-        self._test = Test(scaled)
         self.solver.setObjectiveGradient(weakly(scaled.objective), G)
         self.solver.setHessian(weakly(self._hessian.evaluate), self._hessian.mat)
         self.solver.setVariableBounds((self._vectors[2], self._vectors[3]))
         self.solver.setSolution(self._y)
-        self.solver.setConvergenceTest(weakly(self._test.reason))
+        self.solver.setConvergenceTest(weakly(self._test))
         layers.apply(self.solver, check_tao)
 
     def run(self) -> tuple[Array, Array, int, int]:
@@ -86,15 +72,8 @@ class TaoDriver:
         for item in (self.solver, self._hessian, *self._vectors):
             item.destroy()
 
-
-class Test:
-    """Test the convergence of TAO: PETSc's own, which only the user's tolerances switch on, then our verdict."""
-
-    def __init__(self, scaled: ScaledStep) -> None:
-        self._scaled = scaled
-
-    def reason(self, tao: Any) -> int | None:
-        """Return PETSc's reason to stop, None to go on."""
+    def _test(self, tao: Any) -> int | None:
+        """PETSc's reason to stop: its own, which only the user's tolerances bring, then our verdict; None to go on."""
         if tao.getConvergedReason():
             return None
         y = tao.getSolution().array_r
@@ -115,8 +94,11 @@ class TaoTron:
     carries_friction: ClassVar[bool] = False
 
     def defaults(self, ranks: int) -> Options:
-        """Return the options that come before the user's."""
-        return tao_options(ranks)
+        """Return the options that come before the user's; PETSc has no incomplete Cholesky for several ranks."""
+        return {
+            "tao_gatol": 0.0, "tao_grtol": 0.0, "tao_gttol": 0.0, "tao_steptol": 0.0, "tao_max_it": 200,
+            "pc_type": "icc" if ranks == 1 else "bjacobi", "sub_pc_type": "icc",
+        }
 
     def driver(self, scaled: ScaledStep, layers: OptionLayers) -> TaoDriver:
         """Return the TAO object."""
