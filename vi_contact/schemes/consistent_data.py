@@ -71,8 +71,7 @@ def _with_contact(problem: ContactProblem, state: State, force: Array, dt: float
         slip0=None if rate is None else -rate / dt, rate_factor=dt,
     )
     solver: PreparedSolver = problem.equations.cached(
-        "resting contacts",
-        lambda: solver_beside_steps(step.A, step.surface).prepare(step.A, step.surface, 1.0),
+        "resting contacts", lambda: solver_beside_steps(step.A, step.surface).prepare(step.A, step.surface, 1.0)
     )
     result = solver.solve(step)
     return result.x, springs + surface.reaction_load(result.r_n, len(force), result.r_t)

@@ -55,8 +55,7 @@ class AlphaStep(BalanceStep, ABC):
         return np.array([self.weights.alpha_m, self.weights.alpha_f, t])
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
-        """Return the state with massless nodes in equilibrium and its acceleration; once, not on restarts and changes
-        of dt."""
+        """Return the state with its acceleration and massless nodes in equilibrium; not on restarts, changes of dt."""
         if np.array_equal(state.memory.get("of", ()), self._mark(state.t)):
             return state
         return self._restarted(problem, equilibrated(problem, state), dt)
@@ -82,8 +81,7 @@ class AlphaStep(BalanceStep, ABC):
         return state.v + dt * ((1.0 - w.gamma) * a0 + w.gamma * a), a
 
     def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem:
-        """Return the step with b = f1 - C v1 - (M a_m - alpha_f (f0 - C v0 - K u0 - Bᵀr0))/(1 - alpha_f), all for u1 =
-        0."""
+        """Return the step with b = f1 - C v1 - (M a_m - alpha_f (f0 - C v0 - K u0 - Bᵀr0))/(1 - alpha_f) at u1 = 0."""
         system, w = problem.equations, self.weights
         v, a = self._known(state, dt)
         mean = ((1.0 - w.alpha_m) * a + w.alpha_m * state.memory["a"]) / (1.0 - w.alpha_f)
@@ -151,8 +149,7 @@ class GeneralisedAlpha(AlphaStep):
 
     @classmethod
     def spectral_radius(cls, rho_inf: float = 0.8) -> GeneralisedAlpha:
-        """Return the member of order 2 with this amplification at infinite frequency, 0 (all damped) to 1 (nothing
-        damped)."""
+        """Return the member of order 2 with this amplification at infinite frequency, 0 (all damped) to 1 (none)."""
         remedy = "give the amplification at infinite frequency, from 0 to 1 (no damping)"
         between("rho_inf", rho_inf, 0.0, 1.0, remedy)
         alpha_m, alpha_f = (2.0 * rho_inf - 1.0) / (1.0 + rho_inf), rho_inf / (1.0 + rho_inf)

@@ -65,10 +65,8 @@ class LinearMultistep(BalanceStep):
         defects = (a.sum(), a @ level - b.sum(), gamma.sum(), gamma @ level, gamma @ level**2 - 2.0 * self.mu * b.sum())
         scale = np.abs(a).sum() + np.abs(b).sum() + np.abs(gamma).sum()
         if not np.max(np.abs(defects)) <= 1e-12 * scale * (q + 1) ** 2:
-            raise InputError(
-                "LinearMultistep coefficients are inconsistent: "
-                "eq. 11a must be exact for u = 1, t and eq. 11b for u = 1, t, t²"
-            )
+            raise InputError("LinearMultistep coefficients are inconsistent: eq. 11a must be exact for u = 1, t and "
+                             "eq. 11b for u = 1, t, t²")
         if self.spectral_radius() > 1.0 + 1e-6:
             raise InputError(
                 f"LinearMultistep a={self.a}, b={self.b}, gamma={self.gamma} is not unconditionally stable: contact "
@@ -97,8 +95,7 @@ class LinearMultistep(BalanceStep):
         return self.a[0] / (dt * self.b[0]), self.gamma[0] / (self.mu * dt**2 * self.b[0])
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
-        """Return the state with a past, unless it brings one for this dt; massless nodes come into equilibrium, once.
-        """
+        """Return the state with a past, unless it has one for this dt; massless nodes come into equilibrium, once."""
         memory = state.memory
         if not np.array_equal(memory.get("t", ()), [state.t]):
             return self._restarted(problem, equilibrated(problem, state), dt)

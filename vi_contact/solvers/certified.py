@@ -37,8 +37,7 @@ class CertifiedSolver:
     ) -> None:
         for solver in solvers:
             solver.check(problem)
-        self._surface, self._A, self._scale = surface or problem.surface, A, scale
-        self._advice = advice
+        self._surface, self._A, self._scale, self._advice = surface or problem.surface, A, scale, advice
         self._solvers, self._tolerance = solvers, tolerance
         self._prepared: dict[int, PreparedSolver] = {}
         self._get(0)
@@ -51,8 +50,7 @@ class CertifiedSolver:
         return self._prepared[rank]
 
     def solve(self, step: StepProblem) -> tuple[StepResult, Certificate, bool]:
-        """Return (result, certificate, escalated) of the first method below tolerance; StepFailure when there is none.
-        """
+        """Return (result, certificate, escalated) of the first method below tolerance; StepFailure if there is none."""
         refuse_nan(step)
         tried = []
         for rank in range(len(self._solvers)):

@@ -50,8 +50,7 @@ class SmallMethod(Protocol):
 
 @dataclass(frozen=True)
 class Condensed:
-    """Condense onto the contact unknowns, with a method for the small problem; with or without friction, any number of
-    ranks.
+    """Condense onto the contact unknowns, with a method for the small problem; with or without friction, on any ranks.
 
     ``method`` solves it without friction: ActiveSet or Hildreth. ``friction_method`` solves it with friction:
     FrictionNewton, NSGS or FixedPoint, GivenForces or Uzawa; ``rates`` is the iteration around it for laws that depend
@@ -77,9 +76,8 @@ class Condensed:
         else:
             refuse_dense("Condensed()", surface.total)
         if problem.frictional and surface.tangents.shape[1] == 0:
-            raise InputError(
-                f"Condensed would ignore {problem.friction}: a body in one dimension cannot slide, use Frictionless()"
-            )
+            law = problem.friction
+            raise InputError(f"Condensed would ignore {law}: a body in one dimension cannot slide, use Frictionless()")
         on_all(surface.comm, "the friction law",
                lambda: problem.friction.limit(np.zeros(surface.count), surface.weights, 1.0))
 
@@ -95,7 +93,6 @@ class PreparedCondensed:
 
     def __init__(self, settings: Condensed, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> None:
         self._settings, self._A, self._surface, self._scale = settings, A, surface, scale
-        self._friction: CondensedFriction | None = None
         self._rigid = surface.everywhere(surface.compliance == 0.0)
         self._name = f"condensed {type(settings.method).__name__}" if surface.total else "linear"
         if surface.tangents.shape[1] == 0:
@@ -126,13 +123,11 @@ class PreparedCondensed:
         """Return D~ = G⁻¹: reactions of the contact points to unit normal displacements (eq. 49)."""
         return np.asarray(np.linalg.inv(self.delassus))
 
-    @property
+    @cached_property
     def friction(self) -> CondensedFriction:
         """Return the small problem with friction, made at the first step that has some."""
-        if self._friction is None:
-            method, rates = self._settings.friction_method, self._settings.rates
-            self._friction = CondensedFriction(method, self._condensed(frictional=True), self._surface, rates=rates)
-        return self._friction
+        method, rates = self._settings.friction_method, self._settings.rates
+        return CondensedFriction(method, self._condensed(frictional=True), self._surface, rates=rates)
 
     def solve(self, step: StepProblem) -> StepResult:
         """Return x, r_n and the active set of a step."""
@@ -148,8 +143,6 @@ class PreparedCondensed:
     def _with_friction(self, step: StepProblem) -> StepResult:
         """The step with tangential reactions."""
         x, small = self.friction.solve(step, self._rigid)
-        name, r = f"condensed {type(self._settings.friction_method).__name__}", small.r[self._surface.slots]
-        return StepResult(
-            x, r[:, 0].copy(), small.active[self._surface.slots], small.iterations, name, r_t=r[:, 1:].copy(),
-            history=small.history,
-        )
+        name, mine = f"condensed {type(self._settings.friction_method).__name__}", self._surface.slots
+        r_n, r_t = small.r[mine][:, 0].copy(), small.r[mine][:, 1:].copy()
+        return StepResult(x, r_n, small.active[mine], small.iterations, name, r_t=r_t, history=small.history)

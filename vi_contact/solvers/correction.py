@@ -53,8 +53,7 @@ class Share:
 
 
 def share_of(residual: float) -> float:
-    """Return the share of its reactions that an answer with this residual gives back, a power of two: it loses no
-    digit."""
+    """Return the share of reactions that an answer with this residual gives back, a power of two: it loses no digit."""
     return float(np.clip(np.exp2(np.ceil(np.log2(max(residual, LEAST) * MARGIN))), LEAST, 1.0))
 
 

@@ -50,8 +50,7 @@ class PreparedFixedPoint:
     """Solve for one G and many right-hand sides."""
 
     def __init__(self, method: FixedPoint, G: Array, bilateral: Mask) -> None:
-        self.method = method
-        self.delassus = ScaledDelassus(G, bilateral)
+        self.method, self.delassus = method, ScaledDelassus(G, bilateral)
         self._tresca = method.tresca.prepare(G, bilateral)
 
     def solve(self, q: Array, cohesion: Array, slope: Array, guess: Array | Mask | None = None) -> FrictionResult:

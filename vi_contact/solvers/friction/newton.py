@@ -36,8 +36,7 @@ Kept = dict[bytes, Factored]  # factors by the key of their states
 
 @dataclass(frozen=True)
 class FrictionNewton:
-    """Hold the settings. ``tolerance``: residual above which the answer is refused; ``max_iterations`` of Newton in a
-    row.
+    """Hold the settings. ``tolerance``: residual above which it refuses; ``max_iterations`` of Newton in a row.
 
     In the result ``iterations`` counts linear solves and fallback sweeps (0: no contact), ``history`` the residual
     after each linear solve.

@@ -84,11 +84,8 @@ class _Node:
         def pressure(r_t: Array) -> float:
             return float(-(q_n + self.coupling @ r_t) / self.normal)
 
-        r_t = on_disk(
-            self.condensed,
-            q_t - self.coupling * (q_n / self.normal),
-            lambda r_t: self.cohesion + self.slope * max(pressure(r_t), 0.0),
-        )
+        r_t = on_disk(self.condensed, q_t - self.coupling * (q_n / self.normal),
+                      lambda r_t: self.cohesion + self.slope * max(pressure(r_t), 0.0))
         r_n = pressure(r_t)
         return np.concatenate([[r_n if self.bilateral else max(r_n, 0.0)], r_t])
 

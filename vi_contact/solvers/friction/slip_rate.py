@@ -27,8 +27,7 @@ from .problem import FrictionResult
 
 @dataclass(frozen=True)
 class RateIteration:
-    """Hold the settings. ``tolerance``: change of the coefficients relative to the largest; ``extrapolation``: the next
-    guess.
+    """Hold the settings. ``tolerance``: change of coefficients over the largest; ``extrapolation``: the next guess.
 
     ``iterations`` of the result counts those of all inner problems, ``history`` is the change in each iteration.
     """
@@ -42,9 +41,7 @@ class RateIteration:
         accelerated("RateIteration", self.extrapolation)
 
     def solve(
-        self,
-        mu: Array,
-        solved: Callable[[Array, FrictionResult | None], FrictionResult],
+        self, mu: Array, solved: Callable[[Array, FrictionResult | None], FrictionResult],
         image: Callable[[FrictionResult], Array],
     ) -> FrictionResult:
         """Iterate from mu (m,), those at rest. ``solved``: the problem of given coefficients, starting from the last

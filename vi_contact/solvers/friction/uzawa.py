@@ -25,8 +25,7 @@ from .problem import Iterated, PreparedFriction, ScaledDelassus, ScaledProblem, 
 
 @dataclass(frozen=True)
 class Uzawa:
-    """Hold the settings. ``tolerance``: largest |F| of the natural map relative to r = 0; ``rho`` > 0, or None: see
-    above.
+    """Hold the settings. ``tolerance``: largest |F| of the natural map over that of r = 0; ``rho``: > 0, None above.
 
     In the result ``iterations`` counts projections and ``history`` the residual after each. InputError for rho <= 0.
     """
@@ -46,10 +45,7 @@ class Uzawa:
         rho = self.rho or best_step(delassus.matrix)
 
         def loop(step: ScaledProblem, r: Array) -> Iterated:
-            def project(r: Array, w: Array) -> Array:
-                return step.admissible(r - rho * w)
-
-            return iterated(step, r, project, self.tolerance, self.max_iterations)
+            return iterated(step, r, lambda r, w: step.admissible(r - rho * w), self.tolerance, self.max_iterations)
 
         return PreparedFriction(self, self.tolerance, delassus, loop)
 

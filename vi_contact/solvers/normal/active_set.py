@@ -29,8 +29,7 @@ PATIENCE = 10  # Júdice and Pires, Comput. Oper. Res. 21, 1994
 
 @dataclass(frozen=True)
 class ActiveSet:
-    """Hold the settings. ``max_iterations``: set changes allowed; ``tolerance``: residual above which the answer is
-    refused.
+    """Hold the settings. ``max_iterations``: set changes allowed; ``tolerance``: residual above which it refuses.
 
     In the result ``iterations`` is the number of changes of the set (0: the guess was right) and ``history`` the number
     of rows that changed sides in each.
@@ -75,8 +74,7 @@ class _Sets:
         raise failure(self.method, iterations=len(history), residual=residual, advice=advice)
 
     def _exchange(self, active: Mask, gap: Array, history: list[float]) -> tuple[Array, Array]:
-        """The r and w of the first set without wrong signs; adds to ``history`` how many rows changed sides in each
-        change."""
+        """The r and w of the first set without wrong signs; adds to ``history`` how many rows each change moved."""
         seen: set[bytes] = set()
         fewest, patience = gap.size + 1, PATIENCE
         while True:
@@ -154,6 +152,5 @@ class _Factor:
         r = np.zeros(gap.size)
         if self._lower is None:
             return r, gap.copy()
-        part, _ = lapack.dpotrs(self._lower, -gap[self._index], lower=1)
-        r[self._index] = part
+        r[self._index] = part = lapack.dpotrs(self._lower, -gap[self._index], lower=1)[0]
         return r, gap + part @ self._rows

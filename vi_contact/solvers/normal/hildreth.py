@@ -3,10 +3,9 @@
 Primal (eqs. 46, 49 there; D = G⁻¹):   v_i <- min(bound_i, v_i + (z - D v)_i / D_ii)
 Dual (eq. 42 there; Hildreth 1957):    r_i <- max(0, r_i - (q + G r)_i / G_ii)
 
-Both are projected Gauss–Seidel: every sweep lowers the objective. They converge
-for every SPD matrix, linearly, and slowly when contacts are strongly coupled. The primal is written in s = x_free - v
-= G r, the displacement that the reactions take back, because s carries no digits of the gap: min ½ sᵀD s over s >= -q,
-which is (49) up to the constant ½ x_freeᵀ D x_free.
+Both are projected Gauss–Seidel: every sweep lowers the objective. They converge for every SPD matrix, linearly, and
+slowly when contacts are strongly coupled. The primal is written in s = x_free - v = G r, the displacement that the
+reactions take back, because s carries no digits of the gap: min ½ sᵀD s over s >= -q, (49) but for a constant.
 """
 
 from __future__ import annotations
@@ -50,7 +49,6 @@ class _Sweeps:
     def __init__(self, method: Hildreth, scaled: ScaledLCP) -> None:
         self.method, self._scaled, bilateral = method, scaled, scaled.bilateral
         factor = cholesky(scaled.matrix)
-        self._H: Array
         self._H, self._unit = _inverse(factor) if method.primal else (scaled.matrix, np.ones(bilateral.size))
         fixed = bilateral & method.primal  # s = -q there; in the dual form r is free there
         self._rows = [(i, self._H[i]) for i in np.flatnonzero(~fixed).tolist()]
@@ -73,16 +71,11 @@ class _Sweeps:
             error = scaled.complementarity(r, gap + scaled.matrix @ r)
             if error <= max(method.tolerance * unit, self._rounding(x, r)):
                 return r, error / unit, sweeps, history
-        raise failure(
-            method,
-            iterations=method.max_sweeps,
-            residual=error / unit,
-            advice="contacts are strongly coupled; use ActiveSet, or the other form of Hildreth",
-        )
+        advice = "contacts are strongly coupled; use ActiveSet, or the other form of Hildreth"
+        raise failure(method, iterations=method.max_sweeps, residual=error / unit, advice=advice)
 
     def _lower(self, gap: Array) -> list[float]:
-        bilateral = self._scaled.bilateral
-        lower = -gap / self._unit if self.method.primal else np.where(bilateral, -np.inf, 0.0)
+        lower = -gap / self._unit if self.method.primal else np.where(self._scaled.bilateral, -np.inf, 0.0)
         return list(lower.tolist())
 
     def _start(self, gap: Array, lower: list[float], guess: Array | Mask | None) -> list[float]:
@@ -100,9 +93,8 @@ class _Sweeps:
         """Scaled r: x itself, or r = D s where s is at its bound (elsewhere r = 0 by complementarity)."""
         if not self.method.primal:
             return x
-        bilateral = self._scaled.bilateral
         r = gradient / self._unit
-        return np.where(bilateral, r, np.where(x == lower, np.maximum(r, 0.0), 0.0))
+        return np.where(self._scaled.bilateral, r, np.where(x == lower, np.maximum(r, 0.0), 0.0))
 
     def _objective(self, x: list[float], gap: Array) -> float:
         at = np.array(x)

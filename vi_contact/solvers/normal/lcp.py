@@ -83,8 +83,7 @@ class ScaledLCP:
 
 @dataclass(frozen=True)
 class PreparedLCP:
-    """Solve problem (1) for one G and many q. ``search``: (scaled gap, guess, unit of the residual) -> what was found.
-    """
+    """Solve problem (1) for one G and many q. ``search``: (scaled gap, guess, unit of the residual) -> Found."""
 
     method: object
     scaled: ScaledLCP
@@ -138,8 +137,7 @@ def energy_scale(G: Array) -> Array:
 
 
 def cholesky(G: Array) -> Array:
-    """Return the lower Cholesky factor (LAPACK dpotrf); InputError with the row at which G stops being positive
-    definite."""
+    """Return the lower Cholesky factor (LAPACK dpotrf); InputError with the row at which G is not positive definite."""
     if not G.size:  # LAPACK takes no empty matrix
         return G
     factor, info = lapack.dpotrf(G, lower=1, clean=0)

@@ -185,7 +185,11 @@ class PreparedVolume:
         y, F, reason, iterations = driver.run()
         if reason <= 0 and not self._scaled.accepts(y, F):
             raise stopped(self._name, driver.reasons, reason, iterations, self._scaled.worst)
+        return self._result(y, F, iterations)
+
+    def _result(self, y: Array, F: Array, iterations: int) -> StepResult:
+        """x, and r_n on the active set. Off it r_n is zero, so that what is left of F shows in the certificate."""
         system, scaled = self._system, self._scaled
         active = scaled.active(y, F)
-        r_n = np.where(active, system.reactions(F * scaled.r_ref), 0.0)  # what is left of F shows in the certificate
+        r_n = np.where(active, system.reactions(F * scaled.r_ref), 0.0)
         return StepResult(y[: system.rows] * scaled.x_ref, r_n, active, iterations, self._name)
