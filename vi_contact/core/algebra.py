@@ -105,8 +105,7 @@ class Algebra(Protocol):
         ...
 
     def local(self, rows: Indices, columns: Indices, values: Array, n: int) -> Matrix:
-        """Return the matrix of given entries between unknowns of the same rank, which owns n; entries given twice add
-        up."""
+        """Return the matrix of entries between the n unknowns of one rank; those given twice add up."""
         ...
 
     def with_identity_rows(self, A: Matrix, mask: Mask) -> Matrix:

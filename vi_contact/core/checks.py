@@ -73,15 +73,13 @@ def attributes(
 ) -> None:
     """Raise InputError naming the first attribute of ``owner`` that is not a finite number, or not > 0, or not >= 0, or
     no whole number of at least 1 (``counts``), or neither True nor False (``flags``)."""
+    what = type(owner).__name__
     for name in finite + positive + not_negative:
-        number(
-            type(owner).__name__, name, getattr(owner, name),
-            positive=name in positive, not_negative=name in not_negative,
-        )
+        number(what, name, getattr(owner, name), positive=name in positive, not_negative=name in not_negative)
     for name in counts:
-        whole(type(owner).__name__, name, getattr(owner, name), least=1)
+        whole(what, name, getattr(owner, name), least=1)
     for name in flags:
-        flag(type(owner).__name__, name, getattr(owner, name))
+        flag(what, name, getattr(owner, name))
 
 
 def flag(owner: str, meaning: str, value: Any) -> bool:

@@ -19,8 +19,7 @@ from .surfaces import ContactSurface
 
 
 def condense(A: EffectiveMatrix, surface: ContactSurface, *, frictional: bool = False) -> Last | _Twice:
-    """Factorise A and condense it onto the normal unknowns of the surface, with friction the tangential ones too.
-    Collective."""
+    """Factorise A and condense it onto the normal and, with friction, tangential contact unknowns. Collective."""
     mine, first = surface.owned[:, None], A.algebra.first(A.matrix.rows)
     if frictional:
         mine = np.hstack([mine, surface.tangents])

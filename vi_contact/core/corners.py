@@ -61,8 +61,7 @@ def with_open_faces(surface: ContactSurface, v: Array, target: Array) -> Array:
 
 
 def lumped_entries(surface: ContactSurface, nodal: Array) -> tuple[Indices, Indices, Array]:
-    """Return (rows, columns, values) of the lumped masses ``nodal`` of the owned unknowns: the diagonal, but m G⁻¹ at
-    oblique corners."""
+    """Return (rows, columns, values) of the lumped masses ``nodal``: the diagonal, but m G⁻¹ at oblique corners."""
     rows = [np.arange(len(nodal))]
     columns, values = [rows[0]], [nodal.copy()]
     for corner in oblique_corners(surface):

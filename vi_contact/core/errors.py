@@ -6,8 +6,7 @@ import signal
 
 
 class ViContactError(Exception):
-    """Name every error that this package raises on purpose; the command line prints its one sentence and exits with 1.
-    """
+    """Name every error raised on purpose; the command line prints its one sentence and exits with 1."""
 
 
 class InputError(ViContactError, ValueError):
@@ -15,8 +14,7 @@ class InputError(ViContactError, ValueError):
 
 
 class StepFailure(ViContactError, RuntimeError):
-    """Say that a time step stayed above the certificate tolerance with every method; nothing computed before it is
-    lost."""
+    """Say that a step stayed above the certificate tolerance with every method; nothing before it is lost."""
 
 
 class Interrupted(KeyboardInterrupt):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -36,7 +36,9 @@ class ContactProblem:
 
     def __post_init__(self) -> None:
         check_parts(self)
-        object.__setattr__(self, "friction", _on_this_rank(self.friction, self.surface))
+        total, slots = self.surface.total, self.surface.slots
+        own = with_values(self.friction, self.surface, lambda v: tuple(v[i] for i in slots) if len(v) == total else v)
+        object.__setattr__(self, "friction", own)
 
     @property
     def excitations(self) -> tuple[Excitation, ...]:
@@ -46,8 +48,7 @@ class ContactProblem:
     @cached_property
     @stage("mass")
     def equations(self) -> SemiDiscreteSystem:
-        """Return the system in the rotated basis, with the inertia loads -M r a_g(t) of the excitations; schemes see
-        this."""
+        """Return the system that schemes see: in the rotated basis, with the inertia loads -M r a_g(t)."""
         system = self.turned
         if self.mass is not None:
             system = self.mass.apply(system, self.surface, tangential=self.frictional)
@@ -80,8 +81,7 @@ class ContactProblem:
         return not isinstance(self.friction, Frictionless)
 
     def slip_origin(self, u: Array, start: float, end: float) -> Array | None:
-        """Return B_t u plus what the obstacle slides until then: where the slip of a step is zero; None without
-        friction."""
+        """Return B_t u plus what the obstacle slides: where the slip of a step is zero; None without friction."""
         if not self.frictional:
             return None
         origin, sliding = self.surface.tangential_values(u), self.surface.sliding(start, end)
@@ -98,16 +98,12 @@ class ContactProblem:
         return np.asarray(sum(parts, np.zeros(self.system.influence.shape[1])))
 
 
-def _on_this_rank(law: Any, surface: ContactSurface) -> Any:
-    """The law with those values of every tuple for all contact points, also in laws that it is made of, that belong to
-    this rank."""
+def with_values(law: Any, surface: ContactSurface, change: Callable[[tuple[Any, ...]], tuple[Any, ...]]) -> Any:
+    """Return the law with its tuples changed on several ranks, also in the laws that it is made of."""
     if surface.comm.size == 1 or not is_dataclass(law) or isinstance(law, type):
         return law
-    own = {}
-    for name in (one.name for one in fields(law) if one.init):
-        value = getattr(law, name)
-        if isinstance(value, tuple) and len(value) == surface.total:
-            own[name] = tuple(value[slot] for slot in surface.slots)
-        elif is_dataclass(value):
-            own[name] = _on_this_rank(value, surface)
-    return replace(law, **own) if own else law
+    found: dict[str, Any] = {}
+    for name, value in ((one.name, getattr(law, one.name)) for one in fields(law) if one.init):
+        new = change(value) if isinstance(value, tuple) else with_values(value, surface, change)
+        found |= {} if new is value else {name: new}
+    return replace(law, **found) if found else law

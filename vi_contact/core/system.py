@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
@@ -37,8 +37,7 @@ class Space(Protocol):
         ...
 
     def sample(self, u: Array, nodes: np.ndarray, t: float, derivative: int = 0) -> Array:
-        """Return the values (k, d) at the nodes, the same on every rank; derivative 0, 1, 2: of the prescribed motion.
-        """
+        """Return the values (k, d) at the nodes, on every rank; derivative 0, 1, 2: of the prescribed motion."""
         ...
 
 
@@ -87,17 +86,13 @@ class Load:
 
     def in_basis(self, T: Matrix) -> Load:
         """Return the same load on the unknowns û of u = T û: Tᵀ f."""
-        return Load(
-            T.transpose_apply(self.constant),
-            tuple((T.transpose_apply(vector), history) for vector, history in self.separable),
-            tuple(_turned(T, function) for function in self.general),
-            tuple(_turned(T, function) for function in self.viscous),
-            tuple(_turned(T, function) for function in self.inertial),
-        )
+        separable = tuple((T.transpose_apply(vector), history) for vector, history in self.separable)
+        moving = (_turned(T, functions) for functions in (self.general, self.viscous, self.inertial))
+        return Load(T.transpose_apply(self.constant), separable, *moving)
 
     def handed_over(self, P: Matrix) -> Load:
         """Return the load beside C* = PᵀCP: Pᵀ on its viscous parts."""
-        return replace(self, viscous=tuple(_turned(P, function) for function in self.viscous))
+        return replace(self, viscous=_turned(P, self.viscous))
 
 
 def _factor(history: Callable[[float], float], t: float) -> float:
@@ -111,8 +106,11 @@ def _factor(history: Callable[[float], float], t: float) -> float:
     return value
 
 
-def _turned(T: Matrix, function: Callable[[float], Array]) -> Callable[[float], Array]:
-    return lambda t: T.transpose_apply(function(t))
+def _turned(T: Matrix, functions: Sequence[Callable[[float], Array]]) -> tuple[Callable[[float], Array], ...]:
+    def turned(function: Callable[[float], Array]) -> Callable[[float], Array]:
+        return lambda t: T.transpose_apply(function(t))
+
+    return tuple(map(turned, functions))
 
 
 @dataclass(frozen=True)
@@ -240,12 +238,10 @@ class SemiDiscreteSystem:
 
     def with_load(self, *terms: tuple[Array, Callable[[float], float]]) -> SemiDiscreteSystem:
         """Return the same system with separable loads vector * history(t) added."""
-        load = replace(self.load, separable=self.load.separable + terms)
-        return self.changed(load=load)
+        return self.changed(load=replace(self.load, separable=self.load.separable + terms))
 
     def inertia(self, direction: Array) -> Array:
-        """Return M r: the force [N] that accelerates body and prescribed nodes together by one in this direction (d,).
-        """
+        """Return M r: the force [N] that accelerates body and prescribed nodes by one in this direction (d,)."""
         force = self.M @ (self.influence @ direction)
         return force if self.base_mass is None else force + self.base_mass @ direction
 

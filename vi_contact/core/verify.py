@@ -16,8 +16,7 @@ ROUNDED = 1e-5  # of |A||x|, and of what friction is compared with: see Certific
 
 
 def kkt_residual(step: StepProblem, result: StepResult) -> Certificate:
-    """Return the certificate of a step: how well (x, r_n) satisfies the inequality problem. Definitions:
-    ``Certificate``."""
+    """Return how well (x, r_n) satisfies the inequality problem of a step; definitions: ``Certificate``."""
     surface, x, r_n = step.surface, result.x, result.r_n
     Ax = step.A.image(x)
     residual = Ax - step.b
@@ -79,8 +78,7 @@ def _over(value: float, reference: float) -> float:
 
 @dataclass(frozen=True)
 class StepEnergy:
-    """Say where the energy of one step went [J]: change = input - damping - contact - friction - algorithmic + defect.
-    """
+    """Say where energy went [J]: change = input - damping - contact - friction - algorithmic + defect."""
 
     change: float
     input: float
@@ -97,8 +95,7 @@ class StepEnergy:
 
 @dataclass(frozen=True)
 class Energies:
-    """Hold M v, K u and the energies of a state [J]. A ledger carries them from step to step: each product is made
-    once."""
+    """Hold M v, K u and the energies of a state [J]; a ledger carries them on, so that none is made twice."""
 
     momentum: Array
     elastic: Array

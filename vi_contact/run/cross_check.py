@@ -125,10 +125,6 @@ class Disagreement:
     iterations: int = 0
     steps: int = 0
 
-    def add(self, name: str, off: float, size: float) -> None:
-        """Take the differences of one more step, and what they compare to."""
-        self.off[name], self.size[name] = max(self.off.get(name, 0.0), off), max(self.size.get(name, 0.0), size)
-
     @property
     def relative(self) -> dict[str, float]:
         """Return max |x - x'| / max |x| over all components and steps, by name; max |x - x'| where x is zero."""
@@ -216,7 +212,7 @@ class PreparedCrossCheck:
             pairs["r_t"] = (np.zeros_like(result.r_t) if other.r_t is None else other.r_t, result.r_t)
         sizes = np.array([[max_abs((its - own).ravel()), max_abs(own.ravel())] for its, own in pairs.values()])
         for name, (off, size) in zip(pairs, self.surface.comm.max(sizes).tolist(), strict=True):
-            found.add(name, off, size)
+            found.off[name], found.size[name] = max(found.off.get(name, 0.0), off), max(found.size.get(name, 0.0), size)
         found.method = other.method
         found.iterations += other.iterations
         found.steps += 1

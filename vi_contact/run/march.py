@@ -104,8 +104,7 @@ class March:
 
 
 def after_impact(problem: ContactProblem, scheme: Scheme, old: State, new: State, dt: float) -> State:
-    """Return the state with the impact law applied. Massless supports (springs) do not collide: their points are left
-    out."""
+    """Return the state with the impact law applied; points on massless supports (springs) do not collide."""
     law, surface = problem.impact, problem.surface
     if law is None:
         return new

@@ -32,8 +32,7 @@ def refuse_overflow(row: Row) -> None:
 
 
 class Steps:
-    """Record the columns that every run has: time, step, solver iterations, certificate, escalation and ground
-    acceleration."""
+    """Record the columns of every run: time, step, iterations, certificate, escalation and ground acceleration."""
 
     _axes = AXES  # those of the problem, once it is started
 
@@ -92,8 +91,7 @@ class Energy:
         return self._COLUMNS
 
     def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
-        """Return the energies of the initial state; works and losses are zero, or those of the run that is continued.
-        """
+        """Return the initial energies; works and losses are zero, or those of the run that is continued."""
         self._problem = problem
         self._now = energies(problem.equations, state.u, state.v)
         self._sums = {term: 0.0 if resumed is None else float(resumed[term]) for term in self._SUMS}

@@ -51,8 +51,7 @@ class RigidBodies:
         return worst
 
     def resultants(self, force: Array) -> Array:
-        """Return the part M w (w·force) of a force on the unknowns of ``problem.static_load``, which has its
-        resultants."""
+        """Return M w (w·force), the part of a force on the unknowns of ``static_load`` with its resultants."""
         own, part = self._own(force), np.zeros_like(force)
         for body in self._free:
             part[body.rows] += body.momenta @ self._comm.sum(body.motions.T @ own[body.rows])

@@ -153,8 +153,7 @@ class Session:
                 begin = time.perf_counter()
 
     def _stop_if_asked(self, writer: Writer, signals: StopSignals) -> None:
-        """Interrupted on all ranks, with a checkpoint, when a signal has reached one of them, or the time is nearly
-        over. Collective."""
+        """Interrupted on all ranks, with a checkpoint, by a signal to one, or by the end of the time. Collective."""
         number, late = signals.asked(self._comm, self.wall_time.over())
         if not (number or late):
             return

@@ -66,7 +66,9 @@ def simulate(
             is in the folder then, and summary.json says why the run ended.
     """
     _check_outputs(record, out, restart, checkpoint_every, (progress, changed), fields, cross_check)
-    end = _wall_time(wall_time, out)
+    if wall_time is not None and out is None:
+        raise InputError("wall_time needs out, the folder of the run to continue afterwards")
+    end = WallTime(wall_time)
     solvers = solver, escalation
     method = checked_method(
         "simulate", problem, scheme, solvers, dt, steps=steps, t_end=t_end, state=state, tolerance=tolerance
@@ -115,13 +117,6 @@ def _check_outputs(
         provides(owner, "fields", fields, ("open",), "give fem.XDMF(every=10), or None")
     if cross_check is not None:
         provides(owner, "cross_check", cross_check, ("report",), "give a CrossChecked solver, or None")
-
-
-def _wall_time(wall_time: str | None, out: Any) -> WallTime:
-    """The watch over a wall time, which needs a folder that keeps what a restart goes on from."""
-    if wall_time is not None and out is None:
-        raise InputError("wall_time needs out, the folder of the run to continue afterwards")
-    return WallTime(wall_time)
 
 
 def _source(restart: bool | str | Path, folder: Path | None) -> Path | None:

@@ -49,8 +49,7 @@ def energy_warning(facts: Mapping[str, Any]) -> str | None:
 
 
 def sampling_warning(excitations: Sequence[Excitation], dt: float) -> str | None:
-    """Return a sentence when a time step [s] is longer than that of a record, whose peaks then fall between the steps.
-    """
+    """Return a sentence when a time step [s] is longer than that of a record, whose peaks it then misses."""
     finest = min((one.record.dt for one in excitations if isinstance(one, GroundMotion)), default=dt)
     if dt <= finest * (1.0 + 1e-6):
         return None

@@ -66,8 +66,7 @@ class Equilibria:
             self._solve = lambda step: certified.solve(step)[0]
 
     def after(self, old: State, t: float) -> State:
-        """Return the equilibrium at time t, of a body that rubs and slides from where ``old`` left it; numbered as
-        ``old``."""
+        """Return the equilibrium at time t of a body that rubs and slides from where ``old`` was; its number too."""
         problem = self._problem
         step = StepProblem(
             A=self._K, b=problem.static_load.load.at_rest(t), bound=problem.surface.gap(t), surface=problem.surface,

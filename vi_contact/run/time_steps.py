@@ -76,8 +76,7 @@ def described(plan: TimeSteps) -> float | str:
 
 
 def pieces_of(plan: TimeSteps) -> tuple[tuple[float, float], ...]:
-    """Return the pieces (dt, until) of base steps that a plan has, endless for a constant dt [s]; InputError for no dt.
-    """
+    """Return the pieces (dt, until) of a plan, endless for a constant dt [s]; InputError for no dt."""
     dt = plan.dt if isinstance(plan, HalvedAtImpact) else plan
     return dt.pieces if isinstance(dt, Schedule) else ((_positive(dt), inf),)
 

@@ -223,8 +223,7 @@ def _unpacked(file: Path) -> tuple[dict[str, Any], Arrays]:
 
 
 def _check_sizes(problem: ContactProblem, about: dict[str, Any], arrays: Arrays) -> None:
-    """InputError or KeyError for missing, misshapen or senseless values. Unknowns and points come first: of another
-    problem nothing fits."""
+    """InputError or KeyError for missing, misshapen or senseless values; of another problem nothing need fit."""
     n, m, d = problem.system.space.unknowns, problem.surface.total, problem.surface.tangents.shape[1]
     about |= {name: number("it", name, about[name]) for name in ("t", "t_start")}
     about |= {name: whole("it", name, about[name], most=2**53) for name in ("k", "k_start", "base", "halved")}

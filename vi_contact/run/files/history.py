@@ -52,7 +52,7 @@ class HistoryFiles:
         write_atomically(folder / COLUMNS, (to_json(columns) + "\n").encode())
         if stored is None:
             self._csv = open(folder / HISTORY_CSV, "wb", buffering=0)  # noqa: SIM115
-            self._write(self._csv, (",".join(table.numbers) + "\n").encode())
+            _append((self._csv, (",".join(table.numbers) + "\n").encode()))
             self._tail = self._csv.tell()
             self._open_journal()
             self.append(table.first)
@@ -80,36 +80,19 @@ class HistoryFiles:
         """Write rows onto the disk; those that it has no room for are taken back, all of them."""
         lines, names = lines_of(self._table, rows), ("k", *self._table.arrays)
         records = records_of(self._table, {name: np.array([row[name] for row in rows]) for name in names})
-        if self._journal is not None:
-            start = self._journal.tell()
-            self._write(self._journal, b"".join(records))
-        try:
-            self._write(self._csv, b"".join(lines))
-        except OSError:
-            if self._journal is not None:
-                _take_back(self._journal, start)
-            raise
+        _append((self._journal, b"".join(records)), (self._csv, b"".join(lines)))
         for line, record in zip(lines, records, strict=True):
             self._hash.update(line + record)
         self._rows, self._last = self._rows + len(rows), int(rows[-1]["k"])
 
     def checksum(self, k: int) -> str:
-        """Return the checksum of the rows up to step k, for its checkpoint; later ones are of a base step that is not
-        at its end."""
+        """Return the checksum of the rows up to step k; later ones are of a base step that is not at its end."""
         if k == self._last:
             return self._hash.hexdigest()
         stored = StoredRows(self._folder, self._table, k)
         for _ in stored.blocks():
             pass
         return stored.hash.hexdigest()
-
-    def _write(self, file: Any, data: bytes) -> None:
-        start = file.tell()
-        try:
-            write_all(file, data)
-        except OSError as error:
-            _take_back(file, start)
-            raise OSError(error.errno, error.strerror, file.name) from error
 
     def sync(self) -> bool:
         """Push rows onto the medium unless that was done a moment ago, history.h5 when it has grown enough; say whether
@@ -151,7 +134,10 @@ class HistoryFiles:
         if kept:
             with open_hdf5(self._folder / HISTORY_H5) as old:
                 for name, dataset in found.items():
-                    _copy(old[name], dataset, kept)
+                    step = max(1, STRIDE * kept // dataset.nbytes)
+                    for i in range(0, kept, step):
+                        part = slice(i, min(i + step, kept))
+                        dataset[part] = old[name][part]
         for block in blocks:
             n = len(block["k"])
             for name, dataset in found.items():
@@ -172,16 +158,17 @@ class HistoryFiles:
         (self._folder / JOURNAL).unlink(missing_ok=True)
 
 
-def _take_back(file: Any, start: int) -> None:
-    """Cut off what was written last."""
-    with suppress(OSError):
-        file.truncate(start)
-        file.seek(start)
-
-
-def _copy(old: Any, new: Any, rows: int) -> None:
-    """The first rows, a part of at most STRIDE bytes at a time."""
-    step = max(1, STRIDE * rows // max(new.nbytes, 1))
-    for i in range(0, rows, step):
-        part = slice(i, min(i + step, rows))
-        new[part] = old[part]
+def _append(*pairs: tuple[Any, bytes]) -> None:
+    """Write these bytes to the files that there are; what one has no room for is cut off from all of them."""
+    begun: list[tuple[Any, int]] = []
+    try:
+        for file, data in pairs:
+            if file is not None:
+                begun.append((file, file.tell()))
+                write_all(file, data)
+    except OSError as error:
+        for one, start in begun:
+            with suppress(OSError):
+                one.truncate(start)
+                one.seek(start)
+        raise OSError(error.errno, error.strerror, file.name) from error

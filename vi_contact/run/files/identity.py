@@ -10,14 +10,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import fields, is_dataclass
+from functools import partial
 from math import isclose
 from typing import Any
 
 import numpy as np
 
 from ...core.algebra import Array, Indices, from_each
-from ...core.problem import ContactProblem
+from ...core.problem import ContactProblem, with_values
 from ...core.step import Scheme
 from ...core.surfaces import ContactSurface
 from ...core.system import SemiDiscreteSystem
@@ -56,7 +57,7 @@ def identity(problem: ContactProblem, scheme: Scheme, dt: TimeSteps, *, start: f
         "scheme": text_of(scheme),
         "mass": text_of(problem.mass),
         "impact law": text_of(problem.impact),
-        "friction law": text_of(_of_all_points(problem.friction, surface)),
+        "friction law": text_of(with_values(problem.friction, surface, partial(_of_all_points, surface))),
         "stiffness": [_dot(system, w, system.K @ w) for w in probes],
         "mass matrix": [_dot(system, w, system.M @ w) for w in probes],
         "damping": [] if system.C is None else [_dot(system, w, system.C @ w) for w in probes],
@@ -182,21 +183,13 @@ def _columns(surface: ContactSurface, arrays: Sequence[Array]) -> Numbers:
     return [(value, size) for *values, size in sums.tolist() for value in values]
 
 
-def _of_all_points(law: Any, surface: ContactSurface) -> Any:
-    """The law with the values of all contact points in place of this rank's, also in laws that it is made of."""
-    if surface.comm.size == 1 or not is_dataclass(law) or isinstance(law, type):
-        return law
-    whole = {}
-    for name in (one.name for one in fields(law) if one.init):
-        value = getattr(law, name)
-        if isinstance(value, tuple):
-            parts = from_each(surface.comm, (surface.slots.tolist(), value))
-            if all(len(slots) == len(values) for slots, values in parts):
-                numbered = [pair for slots, values in parts for pair in zip(slots, values, strict=True)]
-                whole[name] = tuple(value for _, value in sorted(numbered, key=lambda pair: pair[0]))
-        elif is_dataclass(value):
-            whole[name] = _of_all_points(value, surface)
-    return replace(law, **whole) if whole else law
+def _of_all_points(surface: ContactSurface, values: tuple[Any, ...]) -> tuple[Any, ...]:
+    """The values of all contact points in place of this rank's."""
+    parts = from_each(surface.comm, (surface.slots.tolist(), values))
+    if any(len(slots) != len(values) for slots, values in parts):
+        return values
+    numbered = [pair for slots, values in parts for pair in zip(slots, values, strict=True)]
+    return tuple(value for _, value in sorted(numbered, key=lambda pair: pair[0]))
 
 
 def _friction(problem: ContactProblem) -> Numbers:

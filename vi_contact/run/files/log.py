@@ -71,8 +71,7 @@ def versions(*needed: str) -> dict[str, str]:
 
 
 class Progress:
-    """Show the progress: a line of tqdm on a terminal; otherwise a line in the log every tenth of the run or every 30
-    s."""
+    """Show the progress: by tqdm on a terminal, and a line in the log every tenth of the run or every 30 s."""
 
     def __init__(self, total: int, *, shown: bool) -> None:
         self._total, self._done = total, 0

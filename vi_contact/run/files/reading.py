@@ -85,8 +85,7 @@ def _short(error: Exception) -> str:
 
 
 def read_object(path: Path) -> dict[str, Any]:
-    """Return the JSON object of a file of a run; ValueError for anything else, NaN, and texts that cannot be printed.
-    """
+    """Return the JSON object of a file; ValueError for anything else, NaN, and texts that cannot be printed."""
     if path.stat().st_size > BYTES:
         raise ValueError(f"{path.name} is larger than {BYTES:.0e} bytes")
     try:

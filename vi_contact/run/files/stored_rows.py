@@ -7,7 +7,7 @@ checksum over lines and arrays, which the checkpoint keeps.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from contextlib import closing, suppress
 from itertools import islice
 from pathlib import Path
@@ -73,8 +73,7 @@ class StoredRows:
 def read_blocks(
     csv: Any, table: Table, arrays: StoredArrays, *, first: int = 0, k: int | None = None
 ) -> Iterator[tuple[list[bytes], Block]]:
-    """Return (lines, rows) from where history.csv is open, row ``first``, to step k or its end. A line cut short is
-    none."""
+    """Return (lines, rows) from where history.csv is, row ``first``, to step k or its end; no line cut short."""
     done = first
     while True:
         lines = [line for line in islice(csv, table.block) if line.endswith(b"\n")]
@@ -173,7 +172,7 @@ class StoredArrays:
         }
 
 
-def times_of(folder: Path, steps: set[int]) -> dict[int, float]:
+def times_of(folder: Path, steps: Container[int]) -> dict[int, float]:
     """Step -> time of some rows of history.csv, whose first columns these are."""
     found: dict[int, float] = {}
     with open(folder / HISTORY_CSV, "rb") as file:

@@ -61,8 +61,7 @@ class Table:
         self.append(first)
 
     def check(self, row: Row) -> None:
-        """Raise InputError for a row whose recorder, one of your own, fills other columns than it announced, or not
-        with numbers."""
+        """Raise InputError for a row with other columns than its recorder has announced, or not of numbers."""
         if row.keys() == self.columns.keys() and self._types.issuperset(map(type, row.values())):
             return
         for name in sorted(row.keys() ^ self.columns.keys()):

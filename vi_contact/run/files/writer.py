@@ -34,8 +34,7 @@ class OpenFields(Protocol):
 
 
 class FieldWriter(Protocol):
-    """Write field output (fem.XDMF). ``open`` is collective; ``kept``: step -> time of the rows kept of an earlier run.
-    """
+    """Write field output (fem.XDMF). ``open`` is collective; ``kept``: step -> time of the frames that are there."""
 
     @property
     def every(self) -> int: ...
@@ -81,14 +80,10 @@ class Writer:
         geometry = {name: surface.on_first(getattr(surface, name)) for name in GEOMETRY}
         on_root(self._comm, partial(self._make, folder, geometry))
         if self._settings is not None:
-            kept = on_root(self._comm, lambda: self._frames_of(folder)) or {}
+            kept = on_root(self._comm, lambda: times_of(folder, frames_of(folder)) if self._continued else {}) or {}
             self._fields = self._settings.open(self._problem, folder, kept)
             if not self._continued:
                 self._fields.write(state, np.zeros_like(state.u))
-
-    def _frames_of(self, folder: Path) -> dict[int, float]:
-        """Step -> time of the frames that an earlier part of the run has left."""
-        return times_of(folder, set(frames_of(folder))) if self._continued else {}
 
     def _make(self, folder: Path, geometry: Mapping[str, Array]) -> None:
         remove_litter(folder)
@@ -150,8 +145,7 @@ class Writer:
         on_root(self._comm, lambda: self._close(facts))
 
     def rescue(self, facts: Mapping[str, Any]) -> None:
-        """Do the same after a failure: not collective, as other ranks might not come, and no error hides the first one.
-        """
+        """Do the same after a failure: not collective, as others might not come; no error hides the first."""
         with suppress(Exception):
             self._close(facts)
 
