@@ -287,8 +287,7 @@ def serial(matrix: Matrix) -> SerialMatrix:
 
 
 def upper_blocks(rows: sp.csr_matrix, width: int, first: int) -> tuple[Indices, Indices, Array]:
-    """Return (ends, columns, blocks) of the upper triangle of these rows, the first of which has the number ``first``,
-    in blocks of ``width``."""
+    """Return (ends, columns, blocks of ``width``) of the upper triangle of these rows, which begin at ``first``."""
     counts, columns, values = [np.zeros(1, dtype=np.int64)], [rows.indices[:0]], [np.zeros((0, width, width))]
     for start in range(0, rows.shape[0], AT_ONCE * width):
         blocks = rows[start : start + AT_ONCE * width].tobsr((width, width))

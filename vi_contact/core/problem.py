@@ -53,9 +53,8 @@ class ContactProblem:
         if self.mass is not None:
             system = self.mass.apply(system, self.surface, tangential=self.frictional)
         system = self._relative(system)
-        return system.with_load(
-            *((-system.inertia(np.asarray(one.direction, dtype=float)), one.acceleration) for one in self.excitations)
-        )
+        ways = ((np.asarray(one.direction, dtype=float), one.acceleration) for one in self.excitations)
+        return system.with_load(*((-system.inertia(direction), history) for direction, history in ways))
 
     @cached_property
     def static_load(self) -> SemiDiscreteSystem:

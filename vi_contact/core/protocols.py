@@ -49,8 +49,7 @@ class FrictionLaw(Protocol):
         Args:
             r_n: normal reactions (m,), ``scale`` times newtons; of either sign, tension counts as zero.
             weights: tributary lengths times thickness, or areas (m,) [m²]: what turns stresses into forces.
-            scale: of the step: 1 for forces, dt [s] for impulses. A limit that does not depend on r_n is multiplied
-                by it.
+            scale: of the step: 1 for forces, dt [s] for impulses. A limit that ignores r_n is multiplied by it.
         """
         ...
 

@@ -231,10 +231,8 @@ class SemiDiscreteSystem:
                 total += c * self.product("C", x)
             return total
 
-        matrix = self.algebra.combine(terms)
-        return EffectiveMatrix(
-            matrix, self.algebra, space=self.space, inertia=(m, self.M), image=image if shares else None
-        )
+        A, inertia = self.algebra.combine(terms), (m, self.M)
+        return EffectiveMatrix(A, self.algebra, space=self.space, inertia=inertia, image=image if shares else None)
 
     def with_load(self, *terms: tuple[Array, Callable[[float], float]]) -> SemiDiscreteSystem:
         """Return the same system with separable loads vector * history(t) added."""

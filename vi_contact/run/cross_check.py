@@ -138,8 +138,7 @@ class Disagreement:
 
 @dataclass
 class CrossChecked:
-    """Solve by one solver, ask others at every step too, and remember how far they are off; the first one's answer
-    counts.
+    """Solve by one solver, whose answer counts, ask others at every step too, and remember how far they are off.
 
     ``found`` does not count attempts that ``HalvedAtImpact`` threw away; ``differences``: what ``cross_check`` found
     about answers of other methods.
@@ -176,8 +175,7 @@ class CrossChecked:
 
     def report(self) -> Mapping[str, Mapping[str, float]]:
         """Return, by method, relative differences in u, r_n and, with friction, r_t, iterations per step: what
-        summary.json shows. A name that comes again gets a number. Opinions: impulse and mean displacement over the
-        whole run."""
+        summary.json shows. A name that comes again gets a number. Opinions: of the whole run."""
         names = [one.method for one in self.found]
         return {
             name if names.count(name) == 1 else f"{name} #{rank}":

@@ -34,10 +34,8 @@ def march(
     StepFailure with step, time, residuals and advice. ``state`` continues from a static stage or a checkpoint.
     InputError, at the call, for arguments of the wrong kind, and a state of another problem or inside the obstacle.
     """
-    solvers = solver, escalation
-    method = checked_method(
-        "march", problem, scheme, solvers, dt, steps=steps, t_end=t_end, state=state, tolerance=tolerance
-    )
+    method = checked_method("march", problem, scheme, (solver, escalation), dt, steps=steps, t_end=t_end, state=state,
+                            tolerance=tolerance)
     state = initial_state(method.problem) if state is None else state
     return iter(March(method, step_plan(dt, steps, t_end, state.t), state))
 
@@ -52,8 +50,7 @@ class March:
 
     def __init__(self, method: Method, step_plan: StepPlan, state: State, base: int = 0, halved: int = 0) -> None:
         self._method, self._step_plan, self._state = method, step_plan, state
-        self._matrices: dict[float, EffectiveMatrix] = {}
-        self._solvers: dict[float, CertifiedSolver] = {}
+        self._prepared: dict[float, tuple[EffectiveMatrix, CertifiedSolver]] = {}
         self.base, self.halved, self.ended, self.dt = base, halved, True, float("nan")
 
     def __iter__(self) -> Iterator[tuple[State, Report]]:
@@ -63,8 +60,7 @@ class March:
             self._method.bind()  # another run of the problem may be under way
             if not sizes or sizes[0] != dt:
                 sizes = [dt / 2**level for level in range(self._step_plan.halvings + 1)]
-                self._matrices = {size: self._matrices[size] for size in sizes if size in self._matrices}
-                self._solvers = {size: self._solvers[size] for size in sizes if size in self._solvers}
+                self._prepared = {size: self._prepared[size] for size in sizes if size in self._prepared}
             self._state, self.dt = self._restarted(dt), dt
             levels = [0]  # how often the parts of the base step that are left were halved
             while levels:
@@ -86,13 +82,13 @@ class March:
     def _attempt(self, dt: float, *, final: bool) -> Report | None:
         """A step of dt; None when it closes a point and is to be halved: nothing has happened then."""
         problem, scheme, state = self._method.problem, self._method.scheme, self._restarted(dt)
-        if dt not in self._matrices:
-            self._matrices[dt] = scheme.effective_matrix(problem, dt)
-        A = self._matrices[dt]
+        A, solver = self._prepared.get(dt, (None, None))
+        A = scheme.effective_matrix(problem, dt) if A is None else A
         step = scheme.step(problem, state, A, dt)
-        if dt not in self._solvers:
-            self._solvers[dt] = CertifiedSolver(problem, A, step.scale, self._method.solvers, self._method.tolerance)
-        result, certificate, escalated = self._solvers[dt].solve(step)
+        if solver is None:
+            solver = CertifiedSolver(problem, A, step.scale, self._method.solvers, self._method.tolerance)
+            self._prepared[dt] = A, solver
+        result, certificate, escalated = solver.solve(step)
         if not final and problem.surface.some(result.active & ~state.active):
             return None
         free = scheme.finish(problem, state, step, result, dt)

@@ -66,8 +66,7 @@ def with_defaults(problem: ContactProblem, scheme: Scheme | None) -> tuple[Conta
     """Return the problem with a mass matrix and the scheme to run it with.
 
     Without a scheme: the trapezoidal rule on redistributed mass; with an impact law, or with mass at the contact nodes
-    asked for, the Zienkiewicz-Wood-Taylor step at phi = ½, which never gains energy. Without a mass: the scheme's own
-    choice.
+    asked for, the Zienkiewicz-Wood-Taylor step at phi = ½, which never gains energy. Without a mass: the scheme's.
     """
     check_problem_given("march", problem)
     if scheme is None:

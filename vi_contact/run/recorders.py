@@ -69,8 +69,7 @@ class Energy:
 
     D_impact = ½ v⁻ᵀMv⁻ - ½ v⁺ᵀMv⁺ with its sign; W_input is the work of loads, inertia loads -M r a_g and
     prescribed motions. The defect is the work of the residual of the equation of motion, accumulated; its size relative
-    to the largest energy or work is in ``summary.json``. Costs three sparse products a step, one more with damping and
-    one more after an impact.
+    to the largest energy or work is in ``summary.json``. Three products a step; damping and impacts take one each.
     """
 
     _COLUMNS: ClassVar[Columns] = {

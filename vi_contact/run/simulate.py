@@ -69,10 +69,8 @@ def simulate(
     if wall_time is not None and out is None:
         raise InputError("wall_time needs out, the folder of the run to continue afterwards")
     end = WallTime(wall_time)
-    solvers = solver, escalation
-    method = checked_method(
-        "simulate", problem, scheme, solvers, dt, steps=steps, t_end=t_end, state=state, tolerance=tolerance
-    )
+    method = checked_method("simulate", problem, scheme, (solver, escalation), dt, steps=steps, t_end=t_end,
+                            state=state, tolerance=tolerance)
     problem, comm = method.problem, method.problem.system.algebra.comm
     source = _source(restart, folder := None if out is None else run_folder(comm, out))
     recorders: list[Recorder] = [Steps(), *((Energy(), Contact()) if record is None else record)]
@@ -84,10 +82,8 @@ def simulate(
         stored = None if source is None else StoredRows(source, table, place.state.k, checksum)
         if stored is not None:
             _started(problem, recorders, place.state, _restored(table, stored, comm))
-        session = Session(
-            method, recorders, table, plan, place, checkpoint_every, cross_check, progress, end,
-            resumed_from=None if stored is None else stored.k,
-        )
+        session = Session(method, recorders, table, plan, place, checkpoint_every, cross_check, progress, end,
+                          resumed_from=None if stored is None else stored.k)
         return session.go(Writer(problem, folder, fields, table, stored))
 
 

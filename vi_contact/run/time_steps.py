@@ -49,8 +49,7 @@ class Schedule:
 
 @dataclass(frozen=True)
 class HalvedAtImpact:
-    """Plan steps of ``dt`` [s], or of a Schedule; one that closes an open contact point is discarded and done as two
-    halves.
+    """Plan steps of ``dt`` [s], or of a Schedule; one that closes an open contact point is done anew as two halves.
 
     These may be halved again, down to dt/2**halvings, the resolution of the time of an impact. Every accepted part is a
     certified step like any other. At most one matrix is factorised for each of the halvings + 1 lengths of a piece.

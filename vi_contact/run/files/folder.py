@@ -90,8 +90,7 @@ def remove_litter(folder: Path) -> None:
 
 @contextmanager
 def locked(comm: Comm, folder: Path | None, name: str = LOCK) -> Iterator[None]:
-    """Refuse other runs that want the folder, or this part of it, while it lasts, with one sentence on all their ranks.
-    Collective.
+    """Refuse other runs that want the folder, or this part of it, while it lasts, on all their ranks. Collective.
 
     Rank 0 holds a lock (flock) on a file in the folder. What a killed run leaves of it holds nobody up. Within the same
     thread it may be taken again. On a file system that knows no locks there is none, which is logged.

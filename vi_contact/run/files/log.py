@@ -98,7 +98,5 @@ class Progress:
         if self._done >= self._next or now - self._told >= SECONDS:
             self._told, self._next = now, self._done + SHARE * self._total
             left = (now - self._begin) / self._done * (self._total - self._done)
-            log.info(
-                "step %d, t = %.6g s: %d of %d steps, %d iterations, worst certificate %.1e, %s left",
-                k, t, self._done, self._total, iterations, worst, timedelta(seconds=int(left)),
-            )
+            log.info("step %d, t = %.6g s: %d of %d steps, %d iterations, worst certificate %.1e, %s left",
+                     k, t, self._done, self._total, iterations, worst, timedelta(seconds=int(left)))

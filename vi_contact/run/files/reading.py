@@ -161,10 +161,8 @@ def _arrays(path: Path, rows: int) -> tuple[dict[str, Array], ContactGeometry | 
         points = np.shape(geometry.points)
         if shapes != {(count,)} or len(points) != 2 or points[0] != count or np.shape(geometry.normals) != points:
             raise ValueError(f"{HISTORY_H5}: the contact points do not fit each other")
-        arrays = {
-            name: _values(file, name) for name in file
-            if name != "contact" and file[name].ndim > 1 and file[name].shape[0] == rows
-        }
+        whole = [name for name in file if name != "contact" and file[name].ndim > 1 and file[name].shape[0] == rows]
+        arrays = {name: _values(file, name) for name in whole}
         if any(values.shape[1] != count for values in arrays.values()):
             raise ValueError(f"{HISTORY_H5}: arrays are not those of {count} contact points")
     return arrays, geometry if count else None

@@ -205,14 +205,12 @@ class Tally:
     def facts(self) -> dict[str, Any]:
         """Return the numbers for summary.json."""
         steps, most = self._rows - 1, self._most
+        mean = self._sums["iterations"] / steps if steps else 0.0
         facts: dict[str, Any] = {
             "steps": steps,
             "t_start": self._first["t"],
             "t_end": self._last["t"],
-            "iterations_per_step": {
-                "mean": self._sums["iterations"] / steps if steps else 0.0,
-                "max": int(most.get("iterations", 0)),
-            },
+            "iterations_per_step": {"mean": mean, "max": int(most.get("iterations", 0))},
             "escalated_steps": int(self._sums["escalated"]),
             "worst_certificate": most["certificate"],
         }
