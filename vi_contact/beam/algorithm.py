@@ -148,7 +148,13 @@ def run_beam(stepper: BeamStepper, start: Start, *, steps: int, every: int = 0) 
             values = np.zeros((4, len(x) + 1))
             values[:, 1:] = np.stack([y.reshape(2, -1), w.reshape(2, -1)], axis=1).reshape(4, -1)
             snapshots.append(Snapshot(row[0], values))
-    return BeamRun(np.insert(x, 0, 0.0), _history(rows), tuple(snapshots))
+    history = dict(zip(COLUMNS, np.array(rows, dtype=float).T, strict=True))
+    for name in ("work_input", "loss_damping", "loss_friction"):  # since the start
+        history[name] = np.cumsum(history[name])
+    energy = history["energy_kinetic"] + history["energy_strain"]
+    spent = history["work_input"] - history["loss_damping"] - history["loss_friction"]
+    history["energy_defect"] = energy - energy[0] - spent
+    return BeamRun(np.insert(x, 0, 0.0), history, tuple(snapshots))
 
 
 def _states(stepper: BeamStepper, y: Array, w: Array) -> Iterator[tuple[tuple[float, ...], Array, Array]]:
@@ -184,13 +190,3 @@ def _states(stepper: BeamStepper, y: Array, w: Array) -> Iterator[tuple[tuple[fl
                               "state at the start")
         yield ((k + 1) * dt, y[-1], w[-1], slip.force, slip.s, N, mu, slip.updates, kinetic, strain, work, viscous,
                slip.force * slip.s), y, w
-
-
-def _history(rows: list[tuple[float, ...]]) -> dict[str, Array]:
-    """Columns by name: works and losses since the start, and what the energy lacks."""
-    history = dict(zip(COLUMNS, np.array(rows, dtype=float).T, strict=True))
-    for name in ("work_input", "loss_damping", "loss_friction"):
-        history[name] = np.cumsum(history[name])
-    energy = history["energy_kinetic"] + history["energy_strain"]
-    spent = history["work_input"] - history["loss_damping"] - history["loss_friction"]
-    return history | {"energy_defect": energy - energy[0] - spent}

@@ -160,10 +160,8 @@ def rod_forces(
 
 @dataclass(frozen=True)
 class _Part:
-    """Matrices, loads, initial values and mass of the unknowns along the axis, or of those across.
-
-    C = viscosity K. ``inertia`` [kg]: the force when unknowns and clamped node are accelerated together by one.
-    """
+    """Matrices, loads, initial values and mass of the unknowns along the axis, or of those across; C = viscosity K.
+    ``inertia`` [kg]: the force when unknowns and clamped node are accelerated together by one."""
 
     M: Any
     K: Any

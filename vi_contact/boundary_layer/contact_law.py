@@ -91,19 +91,14 @@ class ContactLayer:
         layer, gamma = self.layer, self.mass
         squared, damper = layer.width**2, layer.c / layer.v / dt + 2.0 * gamma / dt**2
         bracket = squared * (layer.k - damper * np.log(rho / old) + 2.0 * gamma / dt * rate)
-        quotient, slope = self._quotient(rho, old)
-        return quotient * bracket, slope * bracket - quotient * squared * damper / rho
-
-    def _quotient(self, rho: Array, old: Array) -> tuple[Array, Array]:
-        """((Y_1 - Y_0)/(rho_1 - rho_0), its derivative with respect to rho_1)."""
-        step, middle = rho - old, 0.5 * (rho + old)
+        step, middle, cut = rho - old, 0.5 * (rho + old), layer.cut_off
         near = np.abs(step) < SHORT_STEP * middle
-        step = np.where(near, middle, step)
-        cut = self.layer.cut_off
+        step = np.where(near, middle, step)  # quotient: (Y_1 - Y_0)/(rho_1 - rho_0); slope: its derivative
         quotient = np.where(near, cut(middle) / middle, (self.potential(rho) - self.potential(old)) / step)
         h = 1e-4 * middle
         bend = 0.5 * (cut(middle + h) / (middle + h) - cut(middle - h) / (middle - h)) / (2.0 * h)
-        return quotient, np.where(near, bend, (cut(rho) / rho - quotient) / step)
+        slope = np.where(near, bend, (cut(rho) / rho - quotient) / step)
+        return quotient * bracket, slope * bracket - quotient * squared * damper / rho
 
     def rebound(self, mass: float, speed: float) -> float:
         """Return e of a rigid body that enters with this speed, by one equation in time. mass: of the body [kg/m²]; a

@@ -103,7 +103,14 @@ class ConstrainedSystem:
     def generalised_force(self, t: float, q: Array, v: Array) -> Array:
         """Return f - Γ(v, v), (n,)."""
         f = np.zeros_like(v) if self.force is None else np.asarray(self.force(t, q, v), dtype=float)
-        return f - _inertia(self.mass, q, v, self.difference(q)) if callable(self.mass) else f
+        if not callable(self.mass):
+            return f
+        h, slopes = self.difference(q), np.empty((len(q), len(v), len(v)))  # ∂M_IJ/∂q_K in [K, I, J], for v = q̇
+        for K in range(len(q)):
+            side = np.zeros_like(q)
+            side[K] = h
+            slopes[K] = (np.asarray(self.mass(q + side)) - np.asarray(self.mass(q - side))) / (2.0 * h)
+        return f - (np.einsum("kij,k,j->i", slopes, v, v) - 0.5 * np.einsum("ijk,j,k->i", slopes, v, v))
 
     def difference(self, q: Array) -> float:
         """Return the way over which to take a central difference at q."""
@@ -152,13 +159,3 @@ def check_positive(owner: str, meaning: str, matrix: Any, unit: str) -> None:
     M = array(owner, meaning, matrix, (None, None), unit=unit)
     if M.shape[0] != M.shape[1] or not np.allclose(M, M.T) or np.min(np.linalg.eigvalsh(M), initial=np.inf) <= 0.0:
         raise InputError(f"{owner}: {meaning} is not symmetric positive definite; check its entries")
-
-
-def _inertia(mass: Callable[[Array], Array], q: Array, v: Array, h: float) -> Array:
-    """Γ(v, v) by central differences of M, for v = q̇."""
-    slopes = np.empty((len(q), len(v), len(v)))  # ∂M_IJ/∂q_K in [K, I, J]
-    for K in range(len(q)):
-        side = np.zeros_like(q)
-        side[K] = h
-        slopes[K] = (np.asarray(mass(q + side)) - np.asarray(mass(q - side))) / (2.0 * h)
-    return np.einsum("kij,k,j->i", slopes, v, v) - 0.5 * np.einsum("ijk,j,k->i", slopes, v, v)

@@ -69,11 +69,10 @@ def _run(options: argparse.Namespace) -> str:
     case = open_case(path, short.settings(read_toml(path), options.settings), options.allow)
     name = case.tables.get("title") or path.stem
     restart = options.restart or options.changed
-    if isinstance(case, OwnCase) and restart:
-        raise InputError(f"{path}: this case keeps no checkpoint: leave --restart away, it takes seconds")
+    for option, given in (("--restart", restart), ("--wall-time", options.wall_time)):
+        if isinstance(case, OwnCase) and given:
+            raise InputError(f"{path}: this case keeps no checkpoint: leave {option} away, it takes seconds")
     out = options.out or (None if isinstance(case, OwnCase) else case.out) or Path("results") / path.stem
-    if isinstance(case, OwnCase) and options.wall_time:
-        raise InputError(f"{path}: this case keeps no checkpoint: leave --wall-time away, it takes seconds")
     if options.check:
         if not isinstance(case, OwnCase):
             case.check(comm)

@@ -115,19 +115,14 @@ def acceleration(text: str) -> float:
 def _read(options: argparse.Namespace, path: str) -> Record:
     """Return the record of a file after the processing asked for."""
     asked = {one.name: getattr(options, one.name) for one in fields(Processing)}
-    steps = Processing(**asked | {"psa": _psa(options.psa)})
-    return steps(read_record(path, options.units, dt=options.dt, channel=options.channel, resample_dt=options.even,
-                             largest=options.largest))
-
-
-def _psa(words: list[str] | None) -> tuple[float, float] | None:
-    """Return the two words after --psa as acceleration and period."""
-    if words is None:
-        return None
-    try:
-        return acceleration(words[0]), float(words[1])
-    except (argparse.ArgumentTypeError, ValueError):
-        raise InputError(f"--psa {' '.join(words)}: give an acceleration such as 0.5g, a period in seconds") from None
+    if (words := options.psa) is not None:
+        try:
+            asked["psa"] = acceleration(words[0]), float(words[1])
+        except (argparse.ArgumentTypeError, ValueError):
+            raise InputError(f"--psa {' '.join(words)}: give an acceleration such as 0.5g, a period in seconds"
+                             ) from None
+    return Processing(**asked)(read_record(path, options.units, dt=options.dt, channel=options.channel,
+                                           resample_dt=options.even, largest=options.largest))
 
 
 def _info(options: argparse.Namespace) -> str:

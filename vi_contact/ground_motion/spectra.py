@@ -58,9 +58,7 @@ class ResponseSpectrum:
 def _factors(time: Array | float, length: Array | float, omega: Array, zeta: float) -> Array:
     """Return (4, 2, m): what u, v, a0 and a1 add to displacement and velocity after `time`, for each omega.
 
-    From u and v under the line from a0 to a1 = its value after `length`: the exact solution, free vibration about the
-    particular -(a0 + s t)/omega² + 2 zeta s/omega³.
-    """
+    The acceleration goes from a0 to a1 in `length`; free vibration about -(a0 + s t)/omega² + 2 zeta s/omega³."""
     root = math.sqrt(1.0 - zeta**2)
     decay, angle = np.exp(-zeta * omega * time), root * omega * time
     sine, cosine = np.sin(angle), np.cos(angle)
@@ -84,10 +82,8 @@ def _moved(factors: Array, u: Array, v: Array, a0: Array | float, a1: Array | fl
 
 
 def _series(time: Array | float, omega: Array, zeta: float, first: int) -> Array:
-    """Return the motion at `time` under a = 1 (first = 2) or a = t (first = 3) from rest, a power series (2, m).
-
-    u = sum c_k t^k with c_first = -1/first! and k (k-1) c_k = -2 zeta omega (k-1) c_{k-1} - omega² c_{k-2}.
-    """
+    """Return the motion at `time` under a = 1 (first = 2) or a = t (first = 3) from rest, a power series (2, m):
+    u = sum c_k t^k with c_first = -1/first! and k (k-1) c_k = -2 zeta omega (k-1) c_{k-1} - omega² c_{k-2}."""
     term = -np.asarray(time, dtype=float) ** first / math.factorial(first) * np.ones_like(omega)
     before = np.zeros_like(term)
     total, rate = term, first * term / time

@@ -176,10 +176,8 @@ class Rocking:
 
     def _row(self, state: State) -> Row:
         left, right = self.model.problem.surface.everywhere(state.r_n)
-        return {
-            "theta": self.model.angle(state), "theta_rate": self.model.spin(state),
-            "r_left": float(left), "r_right": float(right),
-        }
+        return {"theta": self.model.angle(state), "theta_rate": self.model.spin(state), "r_left": float(left),
+                "r_right": float(right)}
 
 
 def build(block: RockingBlock, comm: Any) -> RockingModel:

@@ -149,7 +149,11 @@ def plot_interface(runs: Mapping[str, History], outline: Outline, path: str | Pa
             axis.pcolormesh(*edges, one.T, cmap=matplotlib.colormaps[colours], norm=norm, rasterized=True)
             for one, (colours, norm, _) in zip(values, drawn.values(), strict=True)
         ]
-        _mark_sides(axis, outline)
+        for corner in outline.corners():
+            axis.axhline(corner, color="black", lw=0.8)
+        for side, part in outline.along():
+            middle = 0.5 * float(outline.arc[part].min() + outline.arc[part].max())
+            axis.text(0.004, middle, side, rotation=90, fontsize=8, va="center", transform=axis.get_yaxis_transform())
         axis.set(xlim=(t[0], t[-1]), ylim=(arc.max(), arc.min()), ylabel="arc length [m]")
         axis.set_title(name, fontsize=10, loc="left")
     for image, (label, (*_, extend)) in zip(images, drawn.items(), strict=True):
@@ -164,15 +168,6 @@ def _reduced(run: History, parts: Any) -> tuple[Array, Array, Array]:
     gap = np.where(np.reshape(run["active"], (rows, -1))[:, parts] > 0.0, 0.0, gap)
     t, pressure = thinned(run["t"], pressure)
     return t, pressure, thinned(run["t"], gap)[1]
-
-
-def _mark_sides(axis: Any, outline: Outline) -> None:
-    """Corners as lines across a map, and the names of the sides."""
-    for corner in outline.corners():
-        axis.axhline(corner, color="black", lw=0.8)
-    for name, conditions in outline.along():
-        middle = 0.5 * float(outline.arc[conditions].min() + outline.arc[conditions].max())
-        axis.text(0.004, middle, name, rotation=90, fontsize=8, va="center", transform=axis.get_yaxis_transform())
 
 
 def plot_envelope(runs: Mapping[str, History], outline: Outline, path: str | Path, *, title: str) -> Path:

@@ -75,11 +75,8 @@ def _header(text: TextFile) -> tuple[float | None, float | None, int, int]:
             dt, last = text.number(index, step[1]), index
     if start is None:
         start = last + 1
-    return npts, dt if dt is not None else _prose_dt(text, start), npts_line, start
-
-
-def _prose_dt(text: TextFile, start: int) -> float | None:
-    """Return the time step of a sentence "1559 points at equal spacing of 0.02 sec", if there is exactly one."""
-    found = {text.number(index, match[1]) for index in range(start) for pattern in _PROSE_DT
-             for match in pattern.finditer(text.heads[index])}
-    return found.pop() if len(found) == 1 else None
+    if dt is None:  # of a sentence "1559 points at equal spacing of 0.02 sec", if there is exactly one
+        found = {text.number(index, match[1]) for index in range(start) for pattern in _PROSE_DT
+                 for match in pattern.finditer(text.heads[index])}
+        dt = found.pop() if len(found) == 1 else None
+    return npts, dt, npts_line, start

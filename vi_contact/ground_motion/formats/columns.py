@@ -44,10 +44,8 @@ def read(text: TextFile) -> Record:
 
 
 def _table(text: TextFile, *, series: bool) -> tuple[list[int], Array]:
-    """Return the line index of every row and the rows, shape (n, 1) or (n, 2), n >= 2.
-
-    series: rows of more than two values, the last perhaps shorter, are one column written in rows.
-    """
+    """Return the line index of every row and the rows, shape (n, 1) or (n, 2), n >= 2; series:
+    rows of more than two values, the last perhaps shorter, are one column written in rows."""
     lines = [index for index in text.filled(begin_data(text) or 0) if not text.lines[index].lstrip().startswith("#")]
     rows = list(text.rows(lines))
     if series and rows and len(rows[0]) > 2:

@@ -46,14 +46,6 @@ def read_record(path: str | os.PathLike[str], units: str | None = None, *, dt: f
         raise InputError(f"{text.path}: channel={channel} was passed but the file holds one record; leave channel out")
     number("read_record", "largest", largest, positive=True, unit="m/s²")
     record = reader.read(text)
-    _refuse_improbable(record, largest)
-    if resample_dt is not None and not math.isclose(record.dt, resample_dt, rel_tol=1e-9):
-        record = resampled(record, resample_dt)
-    return record
-
-
-def _refuse_improbable(record: Record, largest: float) -> None:
-    """Raise InputError for a peak or a time step that no ground motion has."""
     peak = float(np.max(np.abs(record.acceleration)))
     if peak > largest:
         raise InputError(f"{record.source}: the peak acceleration is {peak / STANDARD_GRAVITY:.4g} g = {peak:.4g} m/s2 "
@@ -62,3 +54,6 @@ def _refuse_improbable(record: Record, largest: float) -> None:
     if not STEPS[0] <= record.dt <= STEPS[1]:
         raise InputError(f"{record.source}: a time step of {record.dt:g} s is none of a ground motion; give seconds "
                          f"from {STEPS[0]:g} to {STEPS[1]:g}, or make a Record of the samples")
+    if resample_dt is not None and not math.isclose(record.dt, resample_dt, rel_tol=1e-9):
+        record = resampled(record, resample_dt)
+    return record

@@ -31,7 +31,13 @@ def recognises(text: TextFile) -> bool:
 
 def read(text: TextFile) -> Record:
     """Return the record of an SMC file; dt is needed only where the file leaves its sampling rate undefined."""
-    _refuse_other_kinds(text)
+    kind = text.heads[0].strip()
+    if kind.upper().startswith("1"):
+        raise InputError(f"{text.at(0)}: {kind!r} holds unequally spaced (time, acceleration) pairs before instrument "
+                         "correction; get the file of type '2 CORRECTED ACCELEROGRAM'")
+    if not kind.upper().startswith("2"):
+        raise InputError(f"{text.at(0)}: {kind!r} is not an acceleration; get the file of type "
+                         "'2 CORRECTED ACCELEROGRAM'")
     integers = _fields(text, TEXT_LINES, INTEGER_LINES, INTEGER_WIDTH, 8)
     reals = _fields(text, TEXT_LINES + INTEGER_LINES, REAL_LINES, REAL_WIDTH, 5)
     comments_start = TEXT_LINES + INTEGER_LINES + REAL_LINES
@@ -49,16 +55,6 @@ def read(text: TextFile) -> Record:
     title = "; ".join(" ".join(text.heads[index].split()) for index in (3, 5) if text.heads[index].strip(" *"))
     return text.record(_samples(text, start, integers[SAMPLES]), units="cm/s2", dt=stated, format="USGS SMC",
                        title=title, notes=tuple(notes), station=_station(text), component=direction)
-
-
-def _refuse_other_kinds(text: TextFile) -> None:
-    kind = text.heads[0].strip()
-    if kind.upper().startswith("1"):
-        raise InputError(f"{text.at(0)}: {kind!r} holds unequally spaced (time, acceleration) pairs before instrument "
-                         "correction; get the file of type '2 CORRECTED ACCELEROGRAM'")
-    if not kind.upper().startswith("2"):
-        raise InputError(f"{text.at(0)}: {kind!r} is not an acceleration; get the file of type "
-                         "'2 CORRECTED ACCELEROGRAM'")
 
 
 def _fields(text: TextFile, start: int, lines: int, width: int, per_line: int) -> list[float]:

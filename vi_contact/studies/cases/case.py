@@ -107,19 +107,15 @@ class Case:
         for table, node in self.nodes.items():
             if table not in ("title", "model", "mesh", "system", "contact", "gravity") and not needs_body(node):
                 self._made(table)
-        self._check_steps()
+        if not needs_body(self.nodes["run"]):
+            own = self._made("run")
+            steps = own.get("steps") if "steps" in own or "t_end" in own else 1  # else as long as the excitation
+            try:
+                step_plan(own["dt"], steps, own.get("t_end"))
+            except InputError as error:
+                raise InputError(f"{self.path}: [run] {error}") from None
         if comm is not None and "mesh" in self.nodes:
             self._mesh(comm)
-
-    def _check_steps(self) -> None:
-        if needs_body(self.nodes["run"]):
-            return
-        own = self._made("run")
-        steps = own.get("steps") if "steps" in own or "t_end" in own else 1  # else as long as the excitation
-        try:
-            step_plan(own["dt"], steps, own.get("t_end"))
-        except InputError as error:
-            raise InputError(f"{self.path}: [run] {error}") from None
 
     def problem(self, comm: Any) -> ContactProblem:
         """Return the contact problem; collective."""
@@ -263,18 +259,11 @@ def _node(name: str, tables: Mapping[str, Any], spot: Spot, known: Words) -> Nod
     if isinstance(asked, Callee):
         if not isinstance(value, dict):
             raise spot.wrong("is no table: give its keys below it")
-        if name == "system":
-            value = _with_materials(value, tables.get("material", {}))
+        materials = list(tables.get("material", {})) if name == "system" and "material" not in value else []
+        if materials:  # those that [system] does not name: one for the whole body, or each for its cell group
+            value = {"material": materials[0] if len(materials) == 1 else [[one, one] for one in materials]} | value
         return arguments(value, asked, spot, known)
     node = read(value, asked, spot, known)
     if name == "material" and isinstance(node, dict):
         known.named[LinearElastic] = node  # before the system names them
     return node
-
-
-def _with_materials(system: Mapping[str, Any], materials: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return [system] with the materials it does not name: one for the whole body, or each for its cell group."""
-    names = list(materials)
-    if "material" in system or not names:
-        return system
-    return {"material": names[0] if len(names) == 1 else [[name, name] for name in names]} | dict(system)

@@ -13,7 +13,7 @@ from ...core.files import on_root
 from ...run.files.folder import locked, run_folder
 from .library import base_folder, check_format, keep_copy
 from .parsing import Words, arguments
-from .table_calls import Callee, Spot, callee
+from .table_calls import Spot, callee
 from .toml_file import read_toml, with_settings
 
 if TYPE_CHECKING:
@@ -22,14 +22,6 @@ if TYPE_CHECKING:
     from .layer_study import LayerStudy
 
 STUDIES = ("beam", "layer")
-
-
-def _study(name: str) -> Callee:
-    """The call of a study; what it needs is imported late."""
-    from .beam_study import BeamStudy
-    from .layer_study import LayerStudy
-
-    return callee({"beam": BeamStudy, "layer": LayerStudy}[name])
 
 
 @dataclass(frozen=True)
@@ -67,6 +59,9 @@ def open_case(path: str | Path, settings: Sequence[str] = (), allow: Sequence[st
 
 def study_of(path: Path, tables: Mapping[str, Any]) -> BeamStudy | LayerStudy:
     """Return what the tables of a case of its own make; InputError for other tables and values out of range."""
+    from .beam_study import BeamStudy  # late: [mesh] and [model] need neither
+    from .layer_study import LayerStudy
+
     check_format(path, tables)
     name = next(one for one in tables if one in STUDIES)
     others = [one for one in tables if one not in ("format", "title", name)]
@@ -75,6 +70,7 @@ def study_of(path: Path, tables: Mapping[str, Any]) -> BeamStudy | LayerStudy:
     table = tables[name]
     if not isinstance(table, dict):
         raise InputError(f"{path}: [{name}] is no table: give its keys below it")
-    node = arguments(table, _study(name), Spot(str(path), "", name), Words(base_folder(path), {}, {}, (), {}))
+    call = callee(BeamStudy if name == "beam" else LayerStudy)
+    node = arguments(table, call, Spot(str(path), "", name), Words(base_folder(path), {}, {}, (), {}))
     study: BeamStudy | LayerStudy = node.build({})
     return study

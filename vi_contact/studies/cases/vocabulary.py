@@ -170,10 +170,8 @@ def _channel(
 
 
 def _model(shape: type, build: Callable[..., Parts], inner: str = "") -> Callee:
-    """Return the call of a model: its keys are the fields of its shape, and what ``build`` takes by keyword.
-
-    inner: a field of the shape whose own fields are keys, too.
-    """
+    """Return the call of a model: its keys are the fields of its shape, and what ``build`` takes by keyword;
+    inner: a field of the shape whose own fields are keys, too."""
     of_shape, target = callee(shape).hints, callee(build)
     of_inner = callee(of_shape[inner]).hints if inner else {}
     extra = {key: hint for key, hint in target.hints.items() if key != "shape"}

@@ -130,7 +130,8 @@ def run_ida(
         say(f"{len(every)} runs, {len(mine)} of them here, {len(mine) - len(left)} finished before")
         for number, row in enumerate(executed(left, jobs, launch, end), start=1):
             _tell(study, out)
-            say(f"[{number}/{len(left)}] {row['record']} x {_shown(row['scale'])}: {row['status']}"
+            scale = "?" if row["scale"] is None or math.isnan(row["scale"]) else f"{row['scale']:g}"
+            say(f"[{number}/{len(left)}] {row['record']} x {scale}: {row['status']}"
                 + (f": {row['reason']}" if row["reason"] else ""))
         return _tell(study, out, draw=True)
 
@@ -144,10 +145,6 @@ def _check_demands(study: IDA) -> None:
     for one in study.wanted:
         if one.column not in written:
             raise InputError(f"demand '{one.column}': the runs record no such column: {nearest(one.column, written)}")
-
-
-def _shown(value: float | None) -> str:
-    return "?" if value is None or math.isnan(value) else f"{value:g}"
 
 
 def _claim(study: IDA, out: Path) -> None:
@@ -188,11 +185,8 @@ def _tell(study: IDA, out: Path, *, draw: bool = False) -> list[Row]:
 
 
 def _tabulated(case: Case, out: Path, measure: Intensity, demands: Sequence[Demand]) -> tuple[list[Row], Units]:
-    """Return (rows by record and scale, column -> (unit, meaning)) of all runs in the folder that have ended.
-
-    What a run has not measured is None: its demands when it failed, its intensity when its record cannot be read.
-    InputError when a finished run has no such column.
-    """
+    """Return (rows by record and scale, column -> (unit, meaning)) of all runs in the folder that have ended,
+    None for what a run has not measured. InputError when a finished run has no such column."""
     found = [(path.parent, row) for path in out.glob(f"*/{ROW}") if (row := read_row(path)) is not None]
     found.sort(key=lambda one: (one[1]["record"], math.inf if one[1]["scale"] is None else one[1]["scale"]))
     units: Units = {
