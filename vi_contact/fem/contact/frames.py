@@ -114,10 +114,8 @@ class NodalFrames:
 
     def _refuse_prescribed(self, held: Mask) -> None:
         for slot in np.flatnonzero(np.any(held & (self.directions != 0.0), axis=1)):
-            raise InputError(
-                f"contact node {at(self.points[slot])} is also prescribed along its contact direction: "
-                "free that component or leave the node out of the contact surface"
-            )
+            raise InputError(f"contact node {at(self.points[slot])} is also prescribed along its contact direction: "
+                             "free that component or leave the node out of the contact surface")
 
     def _refuse_dependent(self, slots: Indices) -> None:
         directions = self.directions[slots]
@@ -125,16 +123,12 @@ class NodalFrames:
         where = f"contact node {at(self.points[slots[0]])}"
         cosines = (directions @ directions.T)[np.triu_indices(k, 1)]
         if np.any(cosines > 1.0 - PARALLEL):
-            raise InputError(
-                f"{where} is on several contact surfaces with one contact direction: list every boundary and every "
-                "pair once"
-            )
+            raise InputError(f"{where} is on several contact surfaces with one contact direction: list every boundary "
+                             "and every pair once")
         if k > d or np.linalg.svd(directions, compute_uv=False)[-1] < INDEPENDENT:
-            raise InputError(
-                f"{where} has {k} contact directions, {'more than' if k > d else 'not independent in'} its {d} "
-                "dimensions: take the corner for smooth (a larger feature_angle=), or leave the node out of some of "
-                "its surfaces (points=)"
-            )
+            raise InputError(f"{where} has {k} contact directions, {'more than' if k > d else 'not independent in'} "
+                             f"its {d} dimensions: take the corner for smooth (a larger feature_angle=), or leave the "
+                             "node out of some of its surfaces (points=)")
 
 
 def corner_of(directions: Array) -> tuple[list[int], Array]:
@@ -174,18 +168,10 @@ def surface_of(space: FemSpace, parts: Sequence[NodalConditions], **data: Any) -
     place, column, count = frames.place, frames.column, len(slots)
     tangents = np.take_along_axis(index[place], tangential_columns(column, d), axis=1)
     return FemSurface(
-        comm=comm,
-        points=frames.points,
-        normals=frames.directions,
-        owned=index[place, column],
-        slots=slots,
-        tangents=np.where(frames.rubs, tangents, -1),
-        basis=_turn(space, frames.turns, index),
-        dual=_turn(space, frames.blocks, index) if largest(comm, frames.oblique) else None,
-        nodes=frames.numbers[place],
-        coupling=_coupling(space, parts, frames, index),
-        space=space,
-        parts=tuple(parts),
+        comm=comm, points=frames.points, normals=frames.directions, owned=index[place, column], slots=slots,
+        tangents=np.where(frames.rubs, tangents, -1), basis=_turn(space, frames.turns, index),
+        dual=_turn(space, frames.blocks, index) if largest(comm, frames.oblique) else None, nodes=frames.numbers[place],
+        coupling=_coupling(space, parts, frames, index), space=space, parts=tuple(parts),
         **{"bilateral": np.zeros(count, dtype=bool), "compliance": np.zeros(count)} | data,
     )
 
@@ -265,7 +251,5 @@ def _refuse_chains(space: FemSpace, parts: Sequence[NodalConditions]) -> None:
         used[facing.P.indices] = 1.0
         both = np.flatnonzero(space.at_nodes(facing.nodes.numbers, first)[:, 0] * space.comm.max(used))
         if len(both):
-            raise InputError(
-                f"node {at(facing.nodes.points[both[0]])} is on side 1 of one contact pair and on side 2 of another: "
-                "exchange the sides of one of the pairs"
-            )
+            raise InputError(f"node {at(facing.nodes.points[both[0]])} is on side 1 of one contact pair and on side 2 "
+                             "of another: exchange the sides of one of the pairs")

@@ -71,17 +71,14 @@ class NodeToNode:
         partner = self._partners(one, two, size)
         missing = np.flatnonzero(partner < 0)
         if len(missing):
-            raise InputError(
-                f"{len(missing)} of {len(partner)} nodes of '{one.name}' have no node of '{two.name}' opposite, the "
-                f"first at {at(one.nodes.points[missing[0]])}: mesh both sides alike, make the smaller side the first, "
-                "or use matching=DualMortar()"
-            )
+            raise InputError(f"{len(missing)} of {len(partner)} nodes of '{one.name}' have no node of '{two.name}' "
+                             f"opposite, the first at {at(one.nodes.points[missing[0]])}: mesh both sides alike, make "
+                             "the smaller side the first, or use matching=DualMortar()")
         first, counts = np.unique(partner, return_counts=True)
         if counts.max() > 1:
-            raise InputError(
-                f"several nodes of '{one.name}' face the node of '{two.name}' at "
-                f"{at(two.nodes.points[first[counts.argmax()]])}: mesh both sides alike, or use matching=DualMortar()"
-            )
+            raise InputError(f"several nodes of '{one.name}' face the node of '{two.name}' at "
+                             f"{at(two.nodes.points[first[counts.argmax()]])}: mesh both sides alike, or use "
+                             "matching=DualMortar()")
         m = len(partner)
         P = sp.csr_matrix((np.ones(m), (np.arange(m), partner)), shape=(m, len(two.nodes.points)))
         return Matched(np.arange(m), P, one.nodes.weights, np.zeros(m))
@@ -120,10 +117,8 @@ def _opposite(one: Nodes, two: Nodes, places: Indices, reach: Array) -> tuple[In
 
 def refuse_same_way(one: str, two: str, point: Array) -> None:
     """Raise InputError for sides whose outward normals point the same way."""
-    raise InputError(
-        f"'{two}' does not face '{one}' at {at(point)}, the outward normals of both point the same way there: choose "
-        "the two boundaries between the bodies"
-    )
+    raise InputError(f"'{two}' does not face '{one}' at {at(point)}, the outward normals of both point the same way "
+                     "there: choose the two boundaries between the bodies")
 
 
 def _spacing(points: Array, size: float) -> Array:

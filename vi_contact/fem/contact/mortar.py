@@ -75,10 +75,8 @@ class DualMortar:
     def _refuse(self, one: Side, two: Side, normals1: Array, normals2: Array) -> None:
         if np.all(normals1 @ normals2.T > 0.0):
             refuse_same_way(one.name, two.name, one.nodes.points[0])
-        raise InputError(
-            f"no part of '{two.name}' lies opposite '{one.name}', along the normals of the latter: choose the two "
-            "boundaries between the bodies"
-        )
+        raise InputError(f"no part of '{two.name}' lies opposite '{one.name}', along the normals of the latter: choose "
+                         "the two boundaries between the bodies")
 
 
 def _normals(side: Side, ends: Array) -> Array:

@@ -41,13 +41,8 @@ log = logging.getLogger(__name__)
 
 @stage("contact")
 def contact_pair(
-    system: SemiDiscreteSystem,
-    facets1: Facets,
-    facets2: Facets,
-    *,
-    matching: Matching | None = None,
-    points: Sequence[Sequence[float]] | None = None,
-    feature_angle: float = FEATURE_ANGLE,
+    system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *, matching: Matching | None = None,
+    points: Sequence[Sequence[float]] | None = None, feature_angle: float = FEATURE_ANGLE,
 ) -> ContactSurface:
     """Make the contact conditions between two boundaries of deformable bodies, or two faces of a crack.
 
@@ -74,10 +69,8 @@ def contact_pair(
     one, two = side_of(space, facets1), side_of(space, facets2)
     shared = np.isin(one.nodes.numbers, two.nodes.numbers)
     if shared.all():
-        raise InputError(
-            f"'{one.name}' and '{two.name}' are the same nodes, so that nothing can part there: mesh the bodies one by "
-            "one, or cut the mesh open (meshes.cut.CutOpen)"
-        )
+        raise InputError(f"'{one.name}' and '{two.name}' are the same nodes, so that nothing can part there: mesh the "
+                         "bodies one by one, or cut the mesh open (meshes.cut.CutOpen)")
     around = boundary(space, facets1, beyond=angle)
     faces = _faces(space, one, boundary(space, facets1) if len(around.vertices) else around, angle)
     nodes, matched = _by_face(faces, two, NodeToNode() if matching is None else matching, space.size)
@@ -124,10 +117,8 @@ def _faces(space: FemSpace, one: Side, around: Boundary, angle: float) -> list[t
         own = nodes.pick(inside)
         if len(own.numbers) > len(used):
             again = own.points[1:][np.diff(own.numbers) == 0][0]
-            raise InputError(
-                f"'{one.name}' turns round and meets itself at {at(again)}: give it as two boundaries "
-                "(fem.joined_surfaces), or take the corner for smooth (a larger feature_angle=)"
-            )
+            raise InputError(f"'{one.name}' turns round and meets itself at {at(again)}: give it as two boundaries "
+                             "(fem.joined_surfaces), or take the corner for smooth (a larger feature_angle=)")
         found.append((Side(one.name, own, np.searchsorted(used, facets)), one.nodes.normals[used]))
     return found
 
@@ -178,10 +169,8 @@ def _unclamped(space: FemSpace, name: str, nodes: Nodes, two: Side, matched: Mat
     facing = np.asarray(matched.P.argmax(axis=1)).ravel()
     lost = np.flatnonzero(clamped & ~two.nodes.held[facing].all(axis=1))
     if len(lost):
-        raise InputError(
-            f"contact node {at(nodes.points[lost[0]])} of '{name}' is clamped but faces a free "
-            f"node of '{two.name}': make '{two.name}' the first side, or clamp less"
-        )
+        raise InputError(f"contact node {at(nodes.points[lost[0]])} of '{name}' is clamped but faces a free node of "
+                         f"'{two.name}': make '{two.name}' the first side, or clamp less")
     if clamped.all():
         raise InputError(
             f"no contact nodes: every node of '{name}' that faces '{two.name}' is also clamped; clamp less"
@@ -197,10 +186,9 @@ def _gap(space: FemSpace, name: str, two: Side, nodes: Nodes, directions: Array,
     behind = -gap - np.maximum(matched.overlap, 1e-12 * space.size)
     if behind.max() > 0.0:
         worst = int(np.argmax(behind))
-        raise InputError(
-            f"'{two.name}' lies {-gap[worst]:.3g} m behind '{name}' at {at(nodes.points[worst])}: the bodies overlap "
-            "there, or these are not the boundaries between them; move one body, or choose the sides that face"
-        )
+        raise InputError(f"'{two.name}' lies {-gap[worst]:.3g} m behind '{name}' at {at(nodes.points[worst])}: the "
+                         "bodies overlap there, or these are not the boundaries between them; move one body, or choose "
+                         "the sides that face")
     if gap.min() < -1e-12 * space.size and space.comm.rank == 0:
         log.warning("'%s' and '%s' overlap by up to %.3g m: taken as touching there", name, two.name, -gap.min())
     return np.maximum(gap, 0.0)

@@ -29,12 +29,8 @@ log = logging.getLogger(__name__)
 
 @stage("contact")
 def contact_surface(
-    system: SemiDiscreteSystem,
-    facets: Facets,
-    *,
-    obstacle: Obstacle | None = None,
-    points: Sequence[Sequence[float]] | None = None,
-    feature_angle: float = FEATURE_ANGLE,
+    system: SemiDiscreteSystem, facets: Facets, *, obstacle: Obstacle | None = None,
+    points: Sequence[Sequence[float]] | None = None, feature_angle: float = FEATURE_ANGLE,
 ) -> ContactSurface:
     """Make the contact conditions of a boundary part, or only of listed points of it, as in case a of the wall.
 
@@ -145,10 +141,8 @@ def nodes_on(space: FemSpace, facets: Facets) -> Nodes:
     if not largest(space.comm, len(blocks)):
         raise InputError(f"no contact nodes: boundary group '{facets.name}' is empty, choose a group that has facets")
     if largest(space.comm, not weights.all()):
-        raise InputError(
-            f"boundary group '{facets.name}' lies inside the body, where cells on both sides share its nodes: cut the "
-            "mesh open there (meshes.cut.CutOpen), or choose an outer boundary"
-        )
+        raise InputError(f"boundary group '{facets.name}' lies inside the body, where cells on both sides share its "
+                         "nodes: cut the mesh open there (meshes.cut.CutOpen), or choose an outer boundary")
     length = np.linalg.norm(sums, axis=1)[:, None]
     normals = in_symmetry_planes(sums / np.maximum(length, np.finfo(float).tiny), held)
     return Nodes(space.nodes[blocks], space.points[blocks], normals, weights, held, unknowns)
@@ -159,10 +153,8 @@ def free_nodes(space: FemSpace, nodes: Nodes, name: str) -> Nodes:
     clamped = nodes.held.all(axis=1)
     count = round(total(space.comm, clamped.sum()))
     if not largest(space.comm, (~clamped).any()):
-        raise InputError(
-            f"no contact nodes: every node of boundary group '{name}' is also clamped, "
-            "a point cannot be clamped and in contact; choose another boundary or clamp less"
-        )
+        raise InputError(f"no contact nodes: every node of boundary group '{name}' is also clamped, a point cannot be "
+                         "clamped and in contact; choose another boundary or clamp less")
     if count:
         log.info("%d clamped nodes of '%s' are left out of the contact surface", count, name)
     return nodes.pick(~clamped)
@@ -179,10 +171,8 @@ def listed(space: FemSpace, nodes: Nodes, points: Sequence[Sequence[float]], nam
         row = int(np.argmin(distance))
         where = ", ".join(f"{c:g}" for c in x)
         if distance[row] > 0.05 * space.size:
-            raise InputError(
-                f"contact point ({where}) is {distance[row]:.3g} m away from boundary group '{name}': "
-                "give a point on it"
-            )
+            raise InputError(f"contact point ({where}) is {distance[row]:.3g} m away from boundary group '{name}': "
+                             "give a point on it")
         if distance[row] > 1e-6 * space.size and space.comm.rank == 0:
             log.warning("contact point (%s) stands for the nearest node, %.3g m away", where, distance[row])
         if nodes.held[row].all():
@@ -200,10 +190,8 @@ def listed(space: FemSpace, nodes: Nodes, points: Sequence[Sequence[float]], nam
 def _refuse_tied(space: FemSpace, nodes: Nodes, slots: Indices, name: str) -> None:
     def refuse(points: Array, tied: Mask) -> tuple[()]:
         for point in points[tied]:
-            raise InputError(
-                f"contact node {at(point)} of '{name}' is tied to another: leave it out (points=), or tie boundaries "
-                "that end before the contact"
-            )
+            raise InputError(f"contact node {at(point)} of '{name}' is tied to another: leave it out (points=), or tie "
+                             "boundaries that end before the contact")
         return ()
 
     asked(space.comm, slots, refuse, nodes.points, np.isin(nodes.numbers, space.tied_nodes))

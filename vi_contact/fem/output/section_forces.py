@@ -131,10 +131,8 @@ def find_cut(space: FemSpace, name: str, ends: Array, group: Cells | None) -> Cu
     covered = space.comm.sum(np.array([span[owned & side].sum() for side in (left, right)]))
     use_left = covered[0] >= covered[1]
     if abs(max(covered) - length) > UNCOVERED * length:
-        raise InputError(
-            f"section '{name}': sides of elements cover {max(covered):.4g} m of its {length:.4g} m: lay it along lines "
-            "of the mesh, from one surface of the group of cells to the other"
-        )
+        raise InputError(f"section '{name}': sides of elements cover {max(covered):.4g} m of its {length:.4g} m: lay "
+                         "it along lines of the mesh, from one surface of the group of cells to the other")
     own = space.points - ends[0]
     nodes = (np.abs(own @ across) <= tol) & (own @ along >= -tol) & (own @ along <= length + tol)
     return Cut(nodes, left if use_left else right, bool(use_left), along, across, 0.5 * (ends[0] + ends[1]))
