@@ -114,7 +114,6 @@ class BoundaryContact:
             if self.conditions.nodes.max(initial=0) >= self.count:
                 raise InputError(f"{owner}: conditions name node {self.conditions.nodes.max()} of {self.count} contact "
                                  "nodes; make them with conditions_on for this compliance")
-
         self._refuse_corners()
 
     def _refuse_corners(self) -> None:

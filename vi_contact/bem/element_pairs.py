@@ -12,7 +12,6 @@ from .loops import distances, point_at
 
 NEAR_LENGTHS = 3.0  # pairs closer than this many element lengths get the finer rule
 CLOSE = 0.9  # pairs whose elements are this share of the longer one's length apart are integrated with their feet
-
 LEAST = 0.05  # of the longer element: nearer ones are refused, for nothing is known of the answers
 
 

@@ -45,4 +45,3 @@ def traction_forces(
         for nodes, shape in ((chosen, 1.0 - x), (mesh.after[chosen], x)):
             forces[k][:, nodes] += np.einsum("eqc,q->ce", loads, shape)
     return forces
-

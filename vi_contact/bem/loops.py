@@ -108,10 +108,6 @@ def ordered_loops(points: Array, segments: Indices, *, exterior: bool) -> tuple[
             point = int(segments[number].sum()) - point
             number = next((n for n in at_point[point] if n != number), number)
         loops.append(loop)
-    return _turned(points, loops, exterior)
-
-
-def _turned(points: Array, loops: list[list[tuple[int, int]]], exterior: bool) -> tuple[Indices, tuple[int, ...]]:
     chains = [np.array(loop, np.int64) for loop in loops]
     curves = [points[chain[:, 0]] for chain in chains]
     turned = []

@@ -136,10 +136,8 @@ def _flat(pairs: ElementPairs, chosen: Indices, owner: Indices, xi: Array, eta: 
 def _split(
     pairs: ElementPairs, chosen: Indices, fronts: Sequence[float], outer: Rule, inner: Rule, *, close: bool = False
 ) -> Iterator[PointSet]:
-    """Split the outer integral where fronts reach the second element's ends or graze it, the inner one at the fronts.
-
-    Where elements are close, both are split and stretched about the feet as well.
-    """
+    """Split the outer integral where fronts reach the second element's ends or graze it, the inner one at the fronts;
+    ``close``: both about the feet as well, and stretched there."""
     for start in range(0, len(chosen), 200):
         part = chosen[start : start + 200]
         owner, xi, weight = _outer(pairs, part, fronts, outer, close)
@@ -232,10 +230,8 @@ def _reached(distance: Array, fronts: Sequence[float]) -> tuple[Indices, Array, 
 def _at_corners(
     pairs: ElementPairs, chosen: Indices, fronts: Sequence[float], order: int, *, sharp: bool
 ) -> Iterator[PointSet]:
-    """Place points at (u, u w) and (u w, u) from the corner: r = u R(w), inner integral in u split at fronts/R(w).
-
-    sharp: R(w) falls to a small share of its greatest value at the foot of one end on the other element.
-    """
+    """Place points at (u, u w) and (u w, u) from the corner: r = u R(w), inner integral in u split at fronts/R(w);
+    sharp: R(w) falls to a small share of its greatest value at the foot of one end on the other element."""
     if not len(chosen):
         return
     at_end = pairs.shares_end[chosen]  # the corner is the end of the first element and the start of the second

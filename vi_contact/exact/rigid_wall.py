@@ -28,7 +28,6 @@ CATALAN = 0.915965594177219
 TERMS = 4000  # of the series of p: its tail is below 3e-5 of p
 THRUST = 14.0 * float(zeta(3)) / math.pi**3  # 0.54276
 MOMENT = 32.0 / math.pi**4 * (float(zeta(4, 0.25)) - float(zeta(4, 0.75))) / 256.0  # 0.32488
-
 TURNED = 8.0 * CATALAN / math.pi**2  # 0.74245
 
 

@@ -130,7 +130,9 @@ def node_numbers(mesh: Mesh) -> npt.NDArray[np.int64]:
 @stage("mesh")
 def _distribute(comm: MPI.Comm, produce: Callable[[], MeshArrays]) -> tuple[Mesh, Tags]:
     instance("mesh", "comm", comm, MPI.Comm, "give a communicator, such as MPI.COMM_WORLD")
-    arrays = _on_root(comm, produce)
+    arrays = on_root(MpiComm(comm), produce)  # what rank 0 raises, all ranks raise
+    groups = comm.bcast(arrays and replace(arrays, points=arrays.points[:0], cells=arrays.cells[:0]))
+    arrays = arrays or groups  # without points and cells on the others
     vertices = arrays.cells[:, TENSOR_ORDER.get(arrays.cell, slice(None))]
     where = destinations(arrays.points, arrays.cells, arrays.cell, comm.size) if comm.rank == 0 else _NOWHERE
     mesh = compat.create_mesh(comm, arrays.cell, vertices, arrays.points, where)
@@ -143,10 +145,3 @@ def _distribute(comm: MPI.Comm, produce: Callable[[], MeshArrays]) -> tuple[Mesh
     for name, numbers in zip(arrays.facet_groups, named, strict=True):
         tags[name] = Facets(name, np.flatnonzero(found_in(facets, numbers)).astype(np.int32), mesh)
     return mesh, tags
-
-
-def _on_root(comm: MPI.Comm, produce: Callable[[], MeshArrays]) -> MeshArrays:
-    """The arrays on rank 0; on the others the groups, without points and cells. What rank 0 raises, all ranks raise."""
-    arrays = on_root(MpiComm(comm), produce)
-    groups = comm.bcast(arrays and replace(arrays, points=arrays.points[:0], cells=arrays.cells[:0]))
-    return arrays or groups

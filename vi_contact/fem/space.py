@@ -96,7 +96,9 @@ class FemSpace:
         geometry_nodes = compat.dof_to_node(self.V)[:owned]
         self.nodes: Indices = node_numbers(mesh)[geometry_nodes]
         self.points: Array = mesh.geometry.x[geometry_nodes][:, : self.dimension]
-        self.size = self._size()
+        low = -self.comm.max(-np.min(self.points, axis=0, initial=np.inf))
+        high = self.comm.max(np.max(self.points, axis=0, initial=-np.inf))
+        self.size = float(np.linalg.norm(high - low))  # of the bounding box [m]: tolerances are relative to it
         self.prescribed = prescribed
         self._where_held: list[tuple[Indices, tuple[int, ...]]] = []
         self.held = np.zeros((owned, self.dimension), dtype=bool)
@@ -124,12 +126,6 @@ class FemSpace:
     def bytes(self) -> int:
         """Return the bytes of the mesh on this rank."""
         return compat.mesh_bytes(self.mesh)
-
-    def _size(self) -> float:
-        """Diagonal of the bounding box [m], the length that tolerances are relative to."""
-        low = -self.comm.max(-np.min(self.points, axis=0, initial=np.inf))
-        high = self.comm.max(np.max(self.points, axis=0, initial=-np.inf))
-        return float(np.linalg.norm(high - low))
 
     def facet_blocks(self, facets: Any) -> Indices:
         """Return the owned blocks (nodes) on the facets, wherever the facets are owned."""

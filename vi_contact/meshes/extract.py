@@ -142,9 +142,7 @@ def _elements(model: Any, dim: int, entities: Iterable[int]) -> _Elements:
         for kind, tag, node in zip(kinds, tags, nodes, strict=True):
             parts.setdefault(int(kind), []).append((np.asarray(node, dtype=np.int64).reshape(len(tag), -1), entity))
     return {
-        kind: (
-            np.concatenate([rows for rows, _ in found]), np.concatenate([np.full(len(rows), e) for rows, e in found])
-        )
+        kind: (np.concatenate([r for r, _ in found]), np.repeat([e for _, e in found], [len(r) for r, _ in found]))
         for kind, found in parts.items()
     }
 
