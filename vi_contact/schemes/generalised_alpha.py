@@ -55,7 +55,7 @@ class AlphaStep(BalanceStep, ABC):
         return np.array([self.weights.alpha_m, self.weights.alpha_f, t])
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
-        """Return the state with its acceleration and massless nodes in equilibrium; not on restarts, changes of dt."""
+        """Return the state with massless nodes in equilibrium and its acceleration; not on restarts or a new dt."""
         if np.array_equal(state.memory.get("of", ()), self._mark(state.t)):
             return state
         return self._restarted(problem, equilibrated(problem, state), dt)

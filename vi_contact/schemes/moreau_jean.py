@@ -106,8 +106,7 @@ class MoreauJean(SingleStep):
         return obstacle + np.where(surface.bilateral, 0.0, np.where(v_n < 0.0, returning, -self.e) * v_n)
 
     def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem:
-        """Return the step with b = M v0 + dt (f_θ - K (u0 + theta (1 - theta) dt v0) - (1 - theta) C v0), and the bound
-        on velocities."""
+        """Return the step with b = M v0 + dt (f_θ - K (u0 + theta (1 - theta) dt v0) - (1 - theta) C v0)."""
         system, surface, left = problem.equations, problem.surface, 1.0 - self.theta
         force = self._load(problem, state.t, dt) - system.product("K", state.u)
         force -= self.theta * left * dt * system.product("K", state.v)

@@ -25,7 +25,7 @@ from .problem import Iterated, PreparedFriction, ScaledDelassus, ScaledProblem, 
 
 @dataclass(frozen=True)
 class Uzawa:
-    """Hold the settings. ``tolerance``: largest |F| of the natural map over that of r = 0; ``rho``: > 0, None above.
+    """Hold the settings. ``tolerance``: largest |F| of the natural map over that of r = 0; ``rho`` > 0, or None: best.
 
     In the result ``iterations`` counts projections and ``history`` the residual after each. InputError for rho <= 0.
     """
