@@ -5,7 +5,8 @@ Dual (eq. 42 there; Hildreth 1957):    r_i <- max(0, r_i - (q + G r)_i / G_ii)
 
 Both are projected Gauss–Seidel: every sweep lowers the objective. They converge for every SPD matrix, linearly, and
 slowly when contacts are strongly coupled. The primal is written in s = x_free - v = G r, the displacement that the
-reactions take back, because s carries no digits of the gap: min ½ sᵀD s over s >= -q, (49) but for a constant.
+reactions take back, because s carries no digits of the gap: min ½ sᵀD s over s >= -q, which
+is (49) up to the constant ½ x_freeᵀ D x_free.
 """
 
 from __future__ import annotations
