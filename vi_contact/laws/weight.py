@@ -21,8 +21,8 @@ def with_weight(
     acceleration: g [m/s²]; direction: where it acts, of length one, (0, -1) or (0, 0, -1) by default, in one dimension
     (-1,). It is the load of ``BodyForce`` with the density of every material. InputError as for ``own_weight``.
     """
-    constant = system.load.constant + own_weight(system, acceleration, direction)
-    return system.changed(load=replace(system.load, constant=constant))
+    weight = own_weight(system, acceleration, direction)  # first: it checks what is given
+    return system.changed(load=replace(system.load, constant=system.load.constant + weight))
 
 
 def own_weight(
