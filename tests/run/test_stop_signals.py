@@ -127,7 +127,7 @@ def test_exit_status_of_the_command_line(
         def stop(*_: Any, error: BaseException = error, **__: Any) -> None:
             raise error
 
-        monkeypatch.setattr("vi_contact.cli.entry.parser", lambda stop=stop: Parser(stop))
+        monkeypatch.setattr("vi_contact.cli.entry.parser", lambda *_, stop=stop: Parser(stop))
         assert main(["anything"]) == status
         said = capsys.readouterr()
         assert said.out == "" and said.err.count("\n") == 1 and said.err.startswith("vi-contact: ")

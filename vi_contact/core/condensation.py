@@ -78,13 +78,11 @@ class _Twice:
         return self._comm.sum(whole)
 
     def free(self, b: Array) -> Array:
-        self._b, self._x = b, self._A.factor.solve(b)
+        self._x = self._A.factor.solve(b)
         return self._everywhere(self._x[self._owned])
 
     def answer(self, r: Array, held: Mask, values: Array) -> Array:
-        load, mine = self._b.copy(), held[self._places]
-        load[self._owned] -= r[self._places]
-        x = self._A.factor.solve(load) if r.any() else self._x
+        x, mine = self._x - self.response(r) if r.any() else self._x, held[self._places]
         x[self._owned[mine]] = values[self._places[mine]]
         return x
 
