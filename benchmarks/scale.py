@@ -286,10 +286,15 @@ def rows_of(size: float, steps: int) -> Iterator[dict[str, Any]]:
         for mu in (0.3, 0.8):
             yield dynamic(given.rubbing(mu), state, 10.0, vc.Iterative(), steps, 2) | {"peak_bytes": set_up}
         if size <= LARGE:
+            mesh = given.problem.system.space.mesh
             del given, state
+            MEMORY.forget(mesh.comm)  # which must be there until what lived on it is freed
             given = block(size, element, pushed=True)
             yield dynamic(given, None, FAR, vc.Iterative(), steps, 6)
             yield static(given, vc.Iterative(), 4)
+            mesh = given.problem.system.space.mesh
+            del given
+            MEMORY.forget(mesh.comm)
 
 
 def small_rows(steps: int) -> Iterator[dict[str, Any]]:
