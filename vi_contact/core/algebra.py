@@ -15,7 +15,6 @@ from typing import Any, Protocol, SupportsFloat
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.linalg.blas import idamax
 from scipy.sparse.linalg import splu
 
 AT_ONCE = 10_000  # nodes whose rows are stored in blocks: bounds the memory
@@ -25,10 +24,8 @@ Indices = NDArray[np.int64]
 
 
 def max_abs(x: Array) -> float:
-    """Return max |x| over the entries given, 0 for none; NaN stays NaN, which the search for the largest may miss."""
-    if x.ndim != 1:
-        return max(float(x.max()), -float(x.min())) if x.size else 0.0
-    return abs(float(x[idamax(x)])) if x.size and x.dot(x) >= 0.0 else 0.0 * float(x.sum())
+    """Return max |x| over the entries given, 0 for none; NaN stays NaN."""
+    return max(float(x.max()), -float(x.min())) if x.size else 0.0
 
 
 class Comm(Protocol):
