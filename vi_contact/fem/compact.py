@@ -14,7 +14,8 @@ import scipy.sparse as sp
 from petsc4py import PETSc
 
 from ..core.algebra import Array, Indices, Matrix, largest, total, upper_blocks
-from .petsc_algebra import PetscAlgebra, PetscMatrix, aij_of, as_petsc, give_back, rows_of, triple_product
+from .petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc, give_back, triple_product
+from .petsc_rows import aij_of, rows_of
 
 COMPACT = 20_000  # unknowns in space from which on it pays: those that are solved iteratively
 WASTE, SAMPLE = 1.8, 1000  # entries of blocks over those that are not zero, at so many nodes: with more, no blocks

@@ -11,6 +11,7 @@ import scipy.sparse as sp
 from ..core.algebra import Array, Indices, largest
 from ..core.compiled import library
 from ..core.contact_last import ContactLast
+from .petsc_rows import rows_of
 
 
 def contact_last(comm: Any, mat: Any, last: Indices) -> ContactLast | None:
@@ -19,9 +20,7 @@ def contact_last(comm: Any, mat: Any, last: Indices) -> ContactLast | None:
     functions = library(comm)
     if functions is None:
         return None
-    ends, columns, values = mat.getValuesCSR()
-    rows = sp.csr_matrix((values, columns, ends), shape=(len(ends) - 1, mat.getSize()[1]))
-    made = None
+    rows, made = rows_of(mat), None
     try:
         if comm.size == 1:
             made = ContactLast(functions, rows, last)

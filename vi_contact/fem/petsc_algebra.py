@@ -15,6 +15,7 @@ from ..core.contact_last import ContactLast
 from ..core.errors import InputError
 from ..core.stages import trim
 from .copied_factor import contact_last
+from .petsc_rows import aij_of, rows_of
 
 PREFIX = "vi_contact_factor_"
 OWN_FACTOR = {
@@ -278,22 +279,6 @@ class PetscAlgebra:
 
     def dot(self, x: Array, y: Array) -> float:
         return total(self.comm, x @ y)
-
-
-def rows_of(mat: Any) -> sp.csr_matrix:
-    """Return a copy of the owned rows of a PETSc AIJ matrix, columns numbered over all ranks."""
-    ends, columns, values = mat.getValuesCSR()
-    return sp.csr_matrix((values, columns, ends), shape=(mat.getLocalSize()[0], mat.getSize()[1]))
-
-
-def aij_of(rows: sp.spmatrix, comm: Any, columns: int | None = None) -> Any:
-    """Return the PETSc matrix with these rows of this rank, columns numbered over all ranks; ``columns``: how many this
-    rank owns, as many as rows unless given. Collective."""
-    entries, kind, n = sp.csr_matrix(rows), PETSc.IntType, rows.shape[0]
-    csr = (entries.indptr.astype(kind), entries.indices.astype(kind), entries.data)
-    mat = PETSc.Mat().createAIJ(((n, None), (n if columns is None else columns, None)), csr=csr, comm=comm)
-    mat.assemble()
-    return mat
 
 
 def triple_product(K: Any, P: Any) -> Any:

@@ -19,7 +19,8 @@ from . import compat
 from .groups import components_of
 from .loads import Prescribed, evaluate_here
 from .mesh import Facets, node_numbers
-from .petsc_algebra import MpiComm, PetscMatrix, aij_of, triple_product
+from .petsc_algebra import MpiComm, PetscMatrix, triple_product
+from .petsc_rows import aij_of
 from .ties import PLACE_TOLERANCE, Pairs, Tied, paired
 
 

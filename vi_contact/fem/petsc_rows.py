@@ -1,0 +1,24 @@
+"""Turn PETSc matrices into rows of scipy, each rank its own, and back."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import scipy.sparse as sp
+from petsc4py import PETSc
+
+
+def rows_of(mat: Any) -> sp.csr_matrix:
+    """Return a copy of the owned rows of a PETSc AIJ matrix, columns numbered over all ranks."""
+    ends, columns, values = mat.getValuesCSR()
+    return sp.csr_matrix((values, columns, ends), shape=(mat.getLocalSize()[0], mat.getSize()[1]))
+
+
+def aij_of(rows: sp.spmatrix, comm: Any, columns: int | None = None) -> Any:
+    """Return the PETSc matrix with these rows of this rank, columns numbered over all ranks; ``columns``: how many this
+    rank owns, as many as rows unless given. Collective."""
+    entries, kind, n = sp.csr_matrix(rows), PETSc.IntType, rows.shape[0]
+    csr = (entries.indptr.astype(kind), entries.indices.astype(kind), entries.data)
+    mat = PETSc.Mat().createAIJ(((n, None), (n if columns is None else columns, None)), csr=csr, comm=comm)
+    mat.assemble()
+    return mat
