@@ -23,7 +23,7 @@ from typing import Protocol
 import numpy as np
 import scipy.sparse as sp
 
-from ..core.algebra import Array, EffectiveMatrix, Indices, max_abs, total
+from ..core.algebra import Array, EffectiveMatrix, Indices, largest, max_abs, total
 from ..core.checks import between, function
 from ..core.condensation import condense
 from ..core.corners import with_open_faces
@@ -96,12 +96,13 @@ class ImpulseUpdate:
 def _prepared(system: SemiDiscreteSystem, surface: ContactSurface) -> tuple[Array, Callable[[Array], Array]]:
     """B M⁻¹Bᵀ, and what gives the owned rows of M⁻¹Bᵀ times impulses. Collective."""
     condensed = condense(EffectiveMatrix(system.M, system.algebra), surface)
-    columns = []
+    comm, columns, left = surface.comm, [], STORED * total(surface.comm, system.rows)
     for impulse in np.eye(surface.total):
         column = condensed.response(impulse)
-        column[np.abs(column) < BELOW * surface.comm.max(np.array([max_abs(column)]))] = 0.0
+        column[np.abs(column) < BELOW * largest(comm, max_abs(column))] = 0.0
         columns.append(sp.csr_matrix(column))
-        if total(surface.comm, sum(one.nnz for one in columns)) > STORED * total(surface.comm, system.rows):
+        left -= total(comm, columns[-1].nnz)
+        if left < 0:
             return condensed.flexibility, condensed.response
     stored = sp.csr_matrix(sp.vstack(columns).T) if columns else sp.csr_matrix((system.rows, 0))
     return condensed.flexibility, lambda impulse: np.asarray(stored @ impulse)
