@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 
 pytest.importorskip("dolfinx")
 
@@ -20,6 +21,7 @@ from vi_contact import fem
 from vi_contact.core.algebra import Matrix
 from vi_contact.fem import compact
 from vi_contact.fem.petsc_algebra import PetscMatrix
+from vi_contact.fem.petsc_rows import aij_of
 from vi_contact.run.files.identity import probe
 
 COMM = MPI.COMM_WORLD
@@ -113,3 +115,20 @@ def test_bodies_below_the_limit_stay_as_they_are() -> None:
     assert type(thrown_box(COMM).system.K) is PetscMatrix
     assert type(compact.algebra_for(COMM, 2, 10**6)) is not compact.CompactAlgebra
     assert type(compact.algebra_for(COMM, 3, compact.COMPACT)) is compact.CompactAlgebra
+
+
+def test_rows_of_a_node_may_have_entries_in_different_places() -> None:
+    """The blocks of a node are then met in any order: the first row of each rank's first node names
+    the last node of all, the others their own before."""
+    nodes, algebra = 2, compact.CompactAlgebra(COMM, 3)
+    n = 3 * nodes
+    first, dense = n * COMM.rank, np.eye(n * COMM.size)
+    for rank in range(COMM.size):
+        mine = slice(n * rank, n * rank + 3)
+        dense[mine, -3:] = dense[-3:, mine] = 1.0
+        dense[n * rank, mine] = dense[mine, n * rank] = 0.0  # the own block is met after the far one
+    rows = sp.csr_matrix(dense[first : first + n])
+    held = algebra.held(aij_of(rows, COMM))
+    assert isinstance(held, compact.Half)
+    x = np.sin(np.arange(n * COMM.size) + 1.0)
+    assert alike(held @ x[first : first + n], rows @ x)

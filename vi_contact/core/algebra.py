@@ -288,6 +288,7 @@ def upper_blocks(rows: sp.csr_matrix, width: int, first: int) -> tuple[Indices, 
     counts, columns, values = [np.zeros(1, dtype=np.int64)], [rows.indices[:0]], [np.zeros((0, width, width))]
     for start in range(0, rows.shape[0], AT_ONCE * width):
         blocks = rows[start : start + AT_ONCE * width].tobsr((width, width))
+        blocks.sort_indices()  # they come as the rows of a node name them; PETSc counts on their order on several ranks
         row = np.repeat(np.arange(len(blocks.indptr) - 1), np.diff(blocks.indptr))
         upper = blocks.indices >= (first + start) // width + row
         counts.append(np.bincount(row[upper], minlength=len(blocks.indptr) - 1))
