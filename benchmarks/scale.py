@@ -10,7 +10,8 @@ C = 100 and in statics, of a block at rest whose top is pushed down slowly. For 
 is solved too: same A, load, tolerance, preconditioner and guess, no contact. Times are processor time
 of the busiest rank, ``flops`` its operations in a step, as PETSc counts them: how ranks share the work, whatever else
 the machine does. A product is one with A as AIJ, timed in the same run. ``peak_bytes`` counts set-up,
-``bytes_per_unknown`` what there is while stepping (Linux), Python, mesh, M, K, and A included. Beside it, on small
+``bytes_per_unknown`` what there is while stepping (Linux), mesh, M, K, and A included, without what Python and its
+libraries take before the first mesh. Beside it, on small
 blocks, the condensed route.
 """
 
@@ -41,6 +42,7 @@ from petsc4py import PETSc  # noqa: E402
 import vi_contact as vc  # noqa: E402
 from vi_contact import fem  # noqa: E402
 from vi_contact.core.verify import kkt_residual  # noqa: E402
+from vi_contact.fem.petsc_algebra import give_back, kept  # noqa: E402
 
 COMM = MPI.COMM_WORLD
 NU, CONTRAST, WEIGHT = 0.3, 10.0, 0.02  # E and rho of the lower layer are 1
@@ -58,11 +60,15 @@ def busiest(seconds: float) -> float:
 
 
 class Memory:
-    """Largest resident memory of all ranks together since the last ``forget`` [bytes]; zero where it is not told."""
+    """Largest resident memory of all ranks together since the last ``forget`` [bytes]; zero where it is not told.
+    ``bare``: what Python and its libraries take before there is any mesh."""
 
-    def forget(self, comm: Any = COMM) -> None:
+    def __init__(self) -> None:
+        self.bare = self.peak()
+
+    def forget(self) -> None:
         gc.collect()
-        PETSc.garbage_cleanup(comm)  # what nobody holds any more here; PETSc frees it on all ranks together
+        give_back(kept(COMM))
         with suppress(OSError):
             Path("/proc/self/clear_refs").write_text("5")
 
@@ -226,7 +232,7 @@ def dynamic(given: Block, state: vc.State | None, courant: float, solver: Any, s
         closed.append(float(COMM.allreduce(int(report.new.active.sum()))))
         if len(closed) == warm:
             watched.rows.clear()
-            MEMORY.forget(given.problem.system.algebra.comm.mpi)  # the mesh has one of its own
+            MEMORY.forget()
     return row(given, watched, courant, worst, float(np.mean(closed[warm:])), report.step.A)
 
 
@@ -269,7 +275,7 @@ def row(
         "cpu_products": mean["seconds"] / product, "setup_products": busiest(watched.setup) / product,
         "seconds": mean["seconds"], "flops": mean["flops"], "product_seconds": product,
         "over_linear": None if not linear else mean["linear_iterations"] / linear,
-        "peak_bytes": resident, "bytes_per_unknown": resident / given.unknowns, "certificate": worst,
+        "peak_bytes": resident, "bytes_per_unknown": (resident - MEMORY.bare) / given.unknowns, "certificate": worst,
         "ranks": COMM.size,
     }
 
@@ -286,15 +292,12 @@ def rows_of(size: float, steps: int) -> Iterator[dict[str, Any]]:
         for mu in (0.3, 0.8):
             yield dynamic(given.rubbing(mu), state, 10.0, vc.Iterative(), steps, 2) | {"peak_bytes": set_up}
         if size <= LARGE:
-            mesh = given.problem.system.space.mesh
             del given, state
-            MEMORY.forget(mesh.comm)  # which must be there until what lived on it is freed
+            MEMORY.forget()
             given = block(size, element, pushed=True)
             yield dynamic(given, None, FAR, vc.Iterative(), steps, 6)
             yield static(given, vc.Iterative(), 4)
-            mesh = given.problem.system.space.mesh
             del given
-            MEMORY.forget(mesh.comm)
 
 
 def small_rows(steps: int) -> Iterator[dict[str, Any]]:

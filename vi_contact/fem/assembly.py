@@ -28,6 +28,7 @@ from .dashpots import DashpotMatrix, Dashpots, describe_boundaries
 from .loads import ActingLoad, BodyForce, Prescribed, Traction, as_tuple, evaluate
 from .mesh import Cells, Facets
 from .petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc, give_back
+from .petsc_rows import moved
 from .space import FemSpace
 from .ties import Tied
 
@@ -76,7 +77,7 @@ def assemble(
     check_initial(mesh, displacement=initial_displacement, velocity=initial_velocity)
     space = FemSpace(mesh, tuple(Prescribed(facets) for facets in held) + moved, as_tuple(tied))
     forms = ElasticForms(space, cell_materials(mesh, material), section, damping)
-    algebra = algebra_for(mesh.comm, space.dimension, space.unknowns)
+    algebra = algebra_for(space.comm.mpi, space.dimension, space.unknowns)
     absorbers = [DashpotMatrix(space, forms, one) for one in boundaries]
     acting = [one.dashpots.loads(one, forms) for one in absorbers]
     load = assemble_loads(space, section, as_tuple(loads))
@@ -117,7 +118,7 @@ def _reduced(
     pull = (_prescribed_load(space, derivative, full),) if moves else ()
     part = space.reduced(full)
     full.destroy()
-    return algebra.held(part), pull
+    return algebra.held(moved(part, algebra.comm.mpi)), pull
 
 
 class ElasticForms:
@@ -219,7 +220,7 @@ def _integrated(space: FemSpace, section: Section, load: ActingLoad) -> Callable
 
 def _prescribed_load(space: FemSpace, derivative: int, full: Any) -> Callable[[float], Array]:
     """A part of -Pᵀ(K U + C U' + M U''): that of a derivative and its matrix."""
-    matrix, held = PetscMatrix(space.held_columns(full)), space.held.ravel()
+    matrix, held = PetscMatrix(moved(space.held_columns(full), space.comm.mpi)), space.held.ravel()
     return lambda t: -space.pull(matrix @ space.prescribed_values(t, derivative)[held])
 
 

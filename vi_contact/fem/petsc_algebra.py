@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Any
+from weakref import WeakValueDictionary
 
 import numpy as np
 import scipy.sparse as sp
@@ -59,13 +60,42 @@ class MpiComm:
         return gathered
 
 
+def kept(comm: Any) -> Any:
+    """Return the communicator of the ranks of ``comm`` that lasts as long as the program. Collective the first time.
+
+    PETSc objects that Python drops wait on their communicator for ``give_back``. A mesh frees its own at its end: what
+    waits there would wait for ever.
+    """
+    alike = (MPI.IDENT, MPI.CONGRUENT)
+    found = next((one for one in _KEPT if MPI.Comm.Compare(one, comm) in alike), None)
+    if found is None:
+        found = comm.Dup()
+        _KEPT.append(found)
+    return found
+
+
+_KEPT: list[Any] = []
+
+
+def _vector(comm: Any, size: int, way: int) -> Any:
+    """A vector in room that all matrices share: a product needs it only for as long as it takes."""
+    room = _ROOM.get((size, way))
+    if room is None:
+        _ROOM[size, way] = room = np.zeros(size)
+    return PETSc.Vec().createWithArray(room, (size, None), comm=comm)
+
+
+_ROOM: WeakValueDictionary[tuple[int, int], Array] = WeakValueDictionary()
+
+
 class PetscMatrix:
     """Hold an AIJ matrix behind the ``Matrix`` protocol; ``stored`` is the PETSc object, ``mat`` too unless it is
     stored otherwise: then it is made anew (``fem.compact``)."""
 
     def __init__(self, mat: Any) -> None:
         self.stored = mat
-        self._x, self._y = mat.createVecs()
+        sizes = mat.getLocalSize()
+        self._x, self._y = (_vector(mat.comm, sizes[way], way) for way in (1, 0))
 
     @property
     def mat(self) -> Any:
@@ -292,7 +322,8 @@ def triple_product(K: Any, P: Any) -> Any:
 
 def give_back(comm: Any) -> None:
     """Free the PETSc objects that nobody holds any more: PETSc keeps them until all ranks ask it to. Collective."""
-    PETSc.garbage_cleanup(comm)
+    for _ in range(2):  # what one held may be free only after it
+        PETSc.garbage_cleanup(comm)
     trim()
 
 

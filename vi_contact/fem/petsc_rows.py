@@ -14,6 +14,13 @@ def rows_of(mat: Any) -> sp.csr_matrix:
     return sp.csr_matrix((values, columns, ends), shape=(mat.getLocalSize()[0], mat.getSize()[1]))
 
 
+def moved(mat: Any, comm: Any) -> Any:
+    """Return a copy of a PETSc AIJ matrix on another communicator of the same ranks; the matrix is destroyed."""
+    rows, columns = rows_of(mat), mat.getLocalSize()[1]
+    mat.destroy()
+    return aij_of(rows, comm, columns)
+
+
 def aij_of(rows: sp.spmatrix, comm: Any, columns: int | None = None) -> Any:
     """Return the PETSc matrix with these rows of this rank, columns numbered over all ranks; ``columns``: how many this
     rank owns, as many as rows unless given. Collective."""

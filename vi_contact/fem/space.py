@@ -19,7 +19,7 @@ from . import compat
 from .groups import components_of
 from .loads import Prescribed, evaluate_here
 from .mesh import Facets, node_numbers
-from .petsc_algebra import MpiComm, PetscMatrix, triple_product
+from .petsc_algebra import MpiComm, PetscMatrix, kept, triple_product
 from .petsc_rows import aij_of
 from .ties import PLACE_TOLERANCE, Pairs, Tied, paired
 
@@ -91,7 +91,7 @@ class FemSpace:
     def __init__(self, mesh: Any, prescribed: tuple[Prescribed, ...], tied: Sequence[Tied] = ()) -> None:
         self.mesh = mesh
         self.V = compat.vector_space(mesh)
-        self.comm = MpiComm(mesh.comm)
+        self.comm = MpiComm(kept(mesh.comm))
         self.dimension: int = mesh.geometry.dim
         owned = self.V.dofmap.index_map.size_local
         geometry_nodes = compat.dof_to_node(self.V)[:owned]
@@ -164,7 +164,7 @@ class FemSpace:
     def _selection(self, pairs: Sequence[Pairs]) -> Any:
         """P as a PETSc matrix: one 1 per free component, and one for each that follows another."""
         d, rows, columns = self.dimension, len(self.free), int(self.free.sum())
-        first = int(self.mesh.comm.exscan(columns) or 0)
+        first = int(self.comm.mpi.exscan(columns) or 0)
         column = np.where(self.free, first + self.free_index, -1)
         for pair in pairs:
             leaders = self.at_nodes(pair.first, column.reshape(-1, d).astype(float)).astype(np.int64)
@@ -175,7 +175,7 @@ class FemSpace:
                         column[d * row + c] = leader[c]
         kept = np.flatnonzero(column >= 0)
         ones = sp.csr_matrix((np.ones(len(kept)), (kept, column[kept])), shape=(rows, self.unknowns))
-        return aij_of(ones, self.mesh.comm, columns)
+        return aij_of(ones, self.comm.mpi, columns)
 
     @property
     def tied_unknowns(self) -> Mask | None:

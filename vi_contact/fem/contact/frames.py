@@ -188,7 +188,7 @@ def _turn(space: FemSpace, blocks: Array, index: Indices) -> PetscMatrix | None:
     plain = np.setdiff1d(np.arange(n), index)
     entries = np.concatenate([rows, plain]), np.concatenate([columns, plain])
     values = np.concatenate([blocks[used], np.ones(len(plain))])
-    return as_petsc(PetscAlgebra(space.mesh.comm).local(*entries, values, n))
+    return as_petsc(PetscAlgebra(space.comm.mpi).local(*entries, values, n))
 
 
 def _coupling(
@@ -201,7 +201,7 @@ def _coupling(
     if all(part.facing is None for part in parts):
         return None
     _refuse_chains(space, parts)
-    algebra, n = PetscAlgebra(space.mesh.comm), len(space.ids)
+    algebra, n = PetscAlgebra(space.comm.mpi), len(space.ids)
     first, total = algebra.first(n), space.unknowns
     own, entries, start = [np.zeros(0, dtype=np.int64)], [sp.csr_matrix((0, total))], 0
     relative = frames.own_vectors()

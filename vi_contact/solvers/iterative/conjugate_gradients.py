@@ -15,7 +15,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from ...core.algebra import Array
-from ..volume.snes import weakly
+from ..volume.snes import Lent, weakly
 from .operator import Operator
 from .preconditioners import Masked
 
@@ -31,7 +31,7 @@ class ConjugateGradients:
         shell = operator.shell()
         self._b, self._x = shell.createVecs()
         self._residual = self._b.duplicate()
-        self._operator = operator
+        self._operator, self._masked = operator, masked  # for as long as PETSc applies them
         self._watch: Watch = lambda its, residual, x: SOLVED
         self.ksp = PETSc.KSP().create(shell.comm)
         self.ksp.setOperators(shell)
@@ -40,7 +40,7 @@ class ConjugateGradients:
         self.ksp.setTolerances(max_it=np.iinfo(np.int32).max)
         self.ksp.setConvergenceTest(weakly(self._test))
         self.ksp.pc.setType("python")
-        self.ksp.pc.setPythonContext(masked)
+        self.ksp.pc.setPythonContext(Lent(masked))
 
     def solve(self, residual: Array, x: Array, watch: Watch) -> tuple[Array, Array, int]:
         """Return (x, residual, PETSc's reason) of where ``watch(iterations, residual, x)`` returned a reason; its x is

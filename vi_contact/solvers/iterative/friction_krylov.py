@@ -18,6 +18,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from ...core.algebra import Array, Comm, largest
+from ..volume.snes import Lent
 from .conjugate_gradients import SOLVED, STAGNATED
 from .contact import Contact
 from .friction_states import States, Tangents, dot
@@ -85,7 +86,8 @@ class Gmres:
     def __init__(self, comm: Comm, operator: Operator, contact: Contact, turned: Turned, patience: int) -> None:
         self._comm, self._operator, self._turned, self._contact = comm, operator, turned, contact
         self._linearised = Linearised(operator, contact)
-        shell = PETSc.Mat().createPython(operator.blocks.getSizes(), self._linearised, comm=operator.blocks.comm)
+        lent, blocks = Lent(self._linearised), operator.blocks
+        shell = PETSc.Mat().createPython(blocks.getSizes(), lent, comm=blocks.comm)
         shell.setUp()
         self._b, self._x = shell.createVecs()
         self._patience = patience
@@ -95,7 +97,7 @@ class Gmres:
             ksp.setType(kind)
             ksp.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
             ksp.pc.setType("python")
-            ksp.pc.setPythonContext(turned)
+            ksp.pc.setPythonContext(Lent(turned))
         self.gmres.setGMRESRestart(RESTART)
         self.gmres.setPCSide(PETSc.PC.Side.RIGHT)
 

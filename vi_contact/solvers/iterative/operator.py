@@ -8,6 +8,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from ...core.algebra import Array, Indices
+from ..volume.snes import Lent
 from .work import Work
 
 
@@ -40,8 +41,8 @@ class Operator:
         return np.array(self._y.array_r)
 
     def shell(self) -> Any:
-        """Return a PETSc matrix that applies this operator. Whoever asks holds it: here the two would hold each other,
-        and PETSc would free neither."""
-        mat = PETSc.Mat().createPython(self.blocks.getSizes(), self, comm=self.blocks.comm)
+        """Return a PETSc matrix that applies this operator, which must outlive it: to hold it is not PETSc's, whose
+        clean-up loses whatever only its contexts kept alive."""
+        mat = PETSc.Mat().createPython(self.blocks.getSizes(), Lent(self), comm=self.blocks.comm)
         mat.setUp()
         return mat

@@ -105,6 +105,16 @@ def weakly(method: Callable[..., Any]) -> Callable[..., Any]:
     return call
 
 
+class Lent:
+    """Lend an object to PETSc as context, as ``weakly`` lends a method; PETSc asks what is gone for nothing."""
+
+    def __init__(self, lent: Any) -> None:
+        self._lent = weakref.ref(lent)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._lent(), name)
+
+
 def write_bounds(scaled: ScaledStep, lower: Any, upper: Any) -> None:
     """Write the bounds of a step into PETSc's vectors; only PETSc's own infinities mean no bound."""
     lower.array[:] = np.maximum(scaled.lower, PETSc.NINFINITY)

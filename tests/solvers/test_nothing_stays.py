@@ -1,0 +1,47 @@
+"""What a problem took in PETSc is given back once Python has dropped it, its mesh too."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("dolfinx")
+pytestmark = pytest.mark.serial
+
+RUN = """
+from dataclasses import replace
+from mpi4py import MPI
+from fem_problems import thrown_box
+import vi_contact as vc
+from vi_contact.fem import compact
+from vi_contact.fem.petsc_algebra import give_back, kept
+
+compact.COMPACT = 0
+for mu in (0.0, 0.3):
+    for solver in (vc.Condensed(), vc.Iterative(), vc.Volume()):
+        problem = replace(thrown_box(MPI.COMM_WORLD), friction=vc.Coulomb(mu) if mu else vc.Frictionless())
+        for _ in vc.march(problem, solver=solver, dt=1e-3, steps=2):
+            pass
+del problem, solver, _
+give_back(kept(MPI.COMM_WORLD))
+"""
+
+
+def test_every_matrix_solver_and_vector_is_freed(tmp_path: Path) -> None:
+    """As many destructions as creations in PETSc's own account."""
+    account, support = tmp_path / "log", str(Path(__file__).parents[1] / "support")
+    paths = os.pathsep.join([support, str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH", "")])
+    environment = {**os.environ, "PYTHONPATH": paths, "PETSC_OPTIONS": f"-log_view :{account}"}
+    done = subprocess.run([sys.executable, "-c", RUN], env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    table = re.findall(r"^ *([A-Z][A-Za-z ]+?) +(\d+) +(\d+)$", account.read_text(), flags=re.MULTILINE)
+    kinds = {name: (int(made), int(freed)) for name, made, freed in table}
+    assert kinds["Matrix"][0] > 50
+    for name in ("Matrix", "Vector", "Krylov Solver", "Preconditioner", "Index Set"):
+        made, freed = kinds[name]
+        assert made == freed, f"{made - freed} of {made}: {name}"
