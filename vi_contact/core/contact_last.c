@@ -1,7 +1,8 @@
 /* Factorise A = L L' by CHOLMOD with given unknowns last, and substitute: compiled once for every user, see contact_last.py.
 
    CHOLMOD is linked as PETSc links it, and never copied into this package: its supernodal part is under the GPL. Matrices
-   come as the lower triangle in compressed columns with sorted rows. Functions that can fail return CHOLMOD's status. */
+   are symmetric and come whole, in compressed columns with sorted rows, of which CHOLMOD reads the lower triangle.
+   Functions that can fail return CHOLMOD's status. */
 #include <cholmod.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,7 +13,7 @@ typedef struct {
     cholmod_dense *X, *Y, *E;
 } Factor;
 
-static cholmod_sparse lower_triangle(int n, int *p, int *i, double *x) {
+static cholmod_sparse symmetric(int n, int *p, int *i, double *x) {
     cholmod_sparse A;
     memset(&A, 0, sizeof A);
     A.nrow = A.ncol = n;
@@ -32,18 +33,32 @@ static void start(cholmod_common *common) {
     common->try_catch = 1;
 }
 
-/* An order of little fill, in which the elimination tree is numbered child before parent. */
-int order(int n, int *p, int *i, int dissect, int *perm) {
+/* An order of little fill of the rows that have a number in `among`, in which the elimination tree is numbered child before
+   parent. `among`: -1 for the others, and else ascending from 0; perm holds such numbers. */
+int order(int n, const int *p, const int *i, const int *among, int dissect, int *perm) {
     cholmod_common common;
-    cholmod_sparse A = lower_triangle(n, p, i, NULL);
+    cholmod_factor *L = NULL;
+    int *starts = malloc((n + 1) * sizeof(int)), *rows = malloc((p[n] + 1L) * sizeof(int)), count = 0, found = 0;
     start(&common);
     common.method[0].ordering = dissect ? CHOLMOD_METIS : CHOLMOD_AMD;
     common.supernodal = CHOLMOD_SIMPLICIAL;
-    cholmod_factor *L = cholmod_analyze(&A, &common);
+    if (starts && rows) {
+        for (int j = 0; j < n; j++) {
+            if (among[j] < 0) continue;
+            starts[count++] = found;
+            for (int k = p[j]; k < p[j + 1]; k++)
+                if (i[k] >= j && among[i[k]] >= 0) rows[found++] = among[i[k]];
+        }
+        starts[count] = found;
+        cholmod_sparse A = symmetric(count, starts, rows, NULL);
+        L = cholmod_analyze(&A, &common);
+    } else common.status = CHOLMOD_OUT_OF_MEMORY;
     int status = L ? CHOLMOD_OK : common.status ? common.status : CHOLMOD_INVALID;
-    if (L) memcpy(perm, L->Perm, n * sizeof(int));
+    if (L) memcpy(perm, L->Perm, count * sizeof(int));
     cholmod_free_factor(&L, &common);
     cholmod_finish(&common);
+    free(starts);
+    free(rows);
     return status;
 }
 
@@ -58,7 +73,7 @@ void release(Factor *f) {
 
 /* Factorise in this order, which stays as it is: what is last in it is last in L. */
 int factorise(int n, int *p, int *i, double *x, int *perm, Factor **made) {
-    cholmod_sparse A = lower_triangle(n, p, i, x);
+    cholmod_sparse A = symmetric(n, p, i, x);
     Factor *f = calloc(1, sizeof(Factor));
     *made = NULL;
     if (!f) return CHOLMOD_OUT_OF_MEMORY;
