@@ -10,7 +10,8 @@ from petsc4py import PETSc
 
 from vi_contact.core.algebra import Array, SerialAlgebra, SerialMatrix
 from vi_contact.core.errors import InputError
-from vi_contact.fem.petsc_algebra import RIGHT_SIDES, MpiComm, PetscAlgebra, PetscMatrix
+from vi_contact.fem.communicators import MpiComm
+from vi_contact.fem.petsc_algebra import RIGHT_SIDES, PetscAlgebra, PetscMatrix
 
 COMM = MPI.COMM_WORLD
 N = 200

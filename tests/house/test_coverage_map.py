@@ -81,6 +81,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "schemes/test_trapezoidal.py": "schemes.base",
     "soil/test_free_field.py": "core.companion core.problem_checks soil.companion soil.upgoing_wave",
     "solvers/test_condensed_on_finite_elements.py": "core.condensation fem.copied_factor fem.petsc_rows",
+    "solvers/test_nothing_stays.py": "fem.communicators",
     "solvers/test_friction_condensed.py": "solvers.certified solvers.friction.newton",
     "solvers/test_friction_methods.py":
         "solvers.friction.fixed_point solvers.friction.given_forces solvers.friction.linear "

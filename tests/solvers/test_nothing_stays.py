@@ -19,7 +19,7 @@ from mpi4py import MPI
 from fem_problems import thrown_box
 import vi_contact as vc
 from vi_contact.fem import compact
-from vi_contact.fem.petsc_algebra import give_back, kept
+from vi_contact.fem.communicators import give_back, kept
 
 compact.COMPACT = 0
 for mu in (0.0, 0.3):

@@ -23,11 +23,12 @@ from ..core.system import Load, SemiDiscreteSystem
 from ..laws.materials import Damping, LinearElastic, Section
 from . import compat
 from .assembly_checks import check_body, check_boundaries, check_initial
+from .communicators import give_back
 from .compact import algebra_for
 from .dashpots import DashpotMatrix, Dashpots, describe_boundaries
 from .loads import ActingLoad, BodyForce, Prescribed, Traction, as_tuple, evaluate
 from .mesh import Cells, Facets
-from .petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc, give_back
+from .petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc
 from .petsc_rows import moved
 from .space import FemSpace
 from .ties import Tied

@@ -13,10 +13,10 @@ from dolfinx.mesh import Mesh
 from ..core.checks import flag, instance, provides, refuse, several
 from ..core.errors import InputError
 from ..laws.materials import Damping, LinearElastic, NoDamping, PlaneStrain, PlaneStress, Section, Solid
+from .communicators import MpiComm
 from .dashpots import Dashpots
 from .groups import cells_of, facets_of, field_given
 from .loads import BodyForce, Prescribed, Traction
-from .petsc_algebra import MpiComm
 from .ties import Tied
 
 log = logging.getLogger(__name__)

@@ -14,7 +14,8 @@ import scipy.sparse as sp
 from petsc4py import PETSc
 
 from ..core.algebra import Array, Indices, Matrix, largest, total, upper_blocks
-from .petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc, give_back, triple_product
+from .communicators import give_back
+from .petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc, triple_product
 from .petsc_rows import aij_of, rows_of
 
 COMPACT = 20_000  # unknowns in space from which on it pays: those that are solved iteratively

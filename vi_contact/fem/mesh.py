@@ -22,8 +22,8 @@ from vi_contact.core.errors import InputError
 from vi_contact.core.files import on_root
 from vi_contact.core.stages import stage
 from vi_contact.fem import compat
+from vi_contact.fem.communicators import MpiComm
 from vi_contact.fem.compat import Indices
-from vi_contact.fem.petsc_algebra import MpiComm
 from vi_contact.meshes.extract import MeshArrays, arrays_from_file, arrays_from_script
 from vi_contact.meshes.gmsh_session import MeshScript
 from vi_contact.meshes.partition import destinations

@@ -8,13 +8,12 @@ from weakref import WeakValueDictionary
 
 import numpy as np
 import scipy.sparse as sp
-from mpi4py import MPI
 from petsc4py import PETSc
 
 from ..core.algebra import Array, Factor, Indices, Mask, Matrix, identity_with, total
 from ..core.contact_last import ContactLast
 from ..core.errors import InputError
-from ..core.stages import trim
+from .communicators import MpiComm, give_back
 from .copied_factor import contact_last
 from .petsc_rows import aij_of, rows_of
 
@@ -29,52 +28,6 @@ FEW_ROWS = 10_000  # with full rows: beyond, MUMPS' dense blocks pay
 COPIED_ROWS = 300_000  # with sparse rows: a copy of the factor on every rank takes about 0.5 GB here
 _ENTRY = 8 + np.dtype(PETSc.IntType).itemsize  # bytes of an entry and its column
 RIGHT_SIDES = 64  # right-hand sides per block solve: bounds the memory of the dense blocks
-
-
-class MpiComm:
-    """Offer the collective operations on an MPI communicator."""
-
-    def __init__(self, comm: Any) -> None:
-        self.mpi = comm
-        self.rank: int = comm.rank
-        self.size: int = comm.size
-
-    def _reduce(self, x: Array, operation: Any) -> Array:
-        if self.size == 1:
-            return x
-        total = np.empty_like(x)
-        self.mpi.Allreduce(np.ascontiguousarray(x), total, op=operation)
-        return total
-
-    def sum(self, x: Array) -> Array:
-        return self._reduce(x, MPI.SUM)
-
-    def max(self, x: Array) -> Array:
-        return self._reduce(x, MPI.MAX)
-
-    def bcast(self, value: Any) -> Any:
-        return self.mpi.bcast(value, root=0)
-
-    def gather(self, value: Any) -> list[Any] | None:
-        gathered: list[Any] | None = self.mpi.gather(value, root=0)
-        return gathered
-
-
-def kept(comm: Any) -> Any:
-    """Return the communicator of the ranks of ``comm`` that lasts as long as the program. Collective the first time.
-
-    PETSc objects that Python drops wait on their communicator for ``give_back``. A mesh frees its own at its end: what
-    waits there would wait for ever.
-    """
-    alike = (MPI.IDENT, MPI.CONGRUENT)
-    found = next((one for one in _KEPT if MPI.Comm.Compare(one, comm) in alike), None)
-    if found is None:
-        found = comm.Dup()
-        _KEPT.append(found)
-    return found
-
-
-_KEPT: list[Any] = []
 
 
 def _vector(comm: Any, size: int, way: int) -> Any:
@@ -318,13 +271,6 @@ def triple_product(K: Any, P: Any) -> Any:
     made = product.duplicate(copy=True)
     product.destroy()
     return made
-
-
-def give_back(comm: Any) -> None:
-    """Free the PETSc objects that nobody holds any more: PETSc keeps them until all ranks ask it to. Collective."""
-    for _ in range(2):  # what one held may be free only after it
-        PETSc.garbage_cleanup(comm)
-    trim()
 
 
 def as_petsc(matrix: Matrix) -> PetscMatrix:

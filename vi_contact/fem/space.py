@@ -16,10 +16,11 @@ from ..core.checks import instance, refuse
 from ..core.errors import InputError
 from ..core.system import SemiDiscreteSystem
 from . import compat
+from .communicators import MpiComm, kept
 from .groups import components_of
 from .loads import Prescribed, evaluate_here
 from .mesh import Facets, node_numbers
-from .petsc_algebra import MpiComm, PetscMatrix, kept, triple_product
+from .petsc_algebra import PetscMatrix, triple_product
 from .petsc_rows import aij_of
 from .ties import PLACE_TOLERANCE, Pairs, Tied, paired
 

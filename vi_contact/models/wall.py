@@ -19,10 +19,10 @@ from ..core.system import SemiDiscreteSystem
 from ..core.units import STANDARD_GRAVITY
 from ..engineering.modal import lowest_frequency
 from ..fem.assembly import assemble
+from ..fem.communicators import MpiComm
 from ..fem.contact.surface import contact_surface
 from ..fem.loads import BodyForce
 from ..fem.mesh import build_mesh
-from ..fem.petsc_algebra import MpiComm
 from ..laws.excitation import Harmonic
 from ..laws.impact import Inelastic
 from ..laws.mass import ConsistentMass

@@ -106,7 +106,8 @@ def weakly(method: Callable[..., Any]) -> Callable[..., Any]:
 
 
 class Lent:
-    """Lend an object to PETSc as context, as ``weakly`` lends a method; PETSc asks what is gone for nothing."""
+    """Pass an object to PETSc as context without giving it away, as ``weakly`` does with a method; once it is gone,
+    PETSc finds nothing there."""
 
     def __init__(self, lent: Any) -> None:
         self._lent = weakref.ref(lent)
