@@ -2,33 +2,38 @@
 
 Condensing costs one factor of A, once per dt, and a step then one forward and one backward substitution; the iterative
 route costs some tens of products with A every step, and next to nothing before. In the plane factors stay sparse, in
-space they do not: the rule and what it was measured on are in docs/guide/solvers.md.
+space they do not; with friction the small dense problem grows faster still. What the rule was measured on is in
+docs/guide/solvers.md.
 """
 
 from __future__ import annotations
 
 import logging
 from dataclasses import dataclass, field
+from typing import Any
 
 from ..core.algebra import EffectiveMatrix, Matrix, SerialMatrix, total
 from ..core.checks import provides
+from ..core.compiled import library
 from ..core.problem import ContactProblem
-from ..core.step import PreparedSolver, Solver
+from ..core.step import PreparedSolver, Solver, StepProblem, StepResult
 from ..core.surfaces import ContactSurface
 from .condensed import Condensed
 
 log = logging.getLogger(__name__)
 IN_SPACE = 20_000  # unknowns in three dimensions from which on a few hundred steps are faster without a factor
-CONDITIONS = 5_000  # contact unknowns d m: their dense matrix takes 200 MB on every rank
+ALONE_IN_SPACE = 50_000  # the same on one rank, where CHOLMOD factorises
+DENSE = {3: 2_500, 2: 5_000, 1: 5_000}  # rows of the small problem, by dimension: 5000 take 200 MB on every rank
 
 
 @dataclass(frozen=True)
 class Automatic:
     """Solve by ``condensed`` or by ``iterative``, whichever the size of the problem makes the faster one.
 
-    The iterative route is taken in three dimensions from 20 000 unknowns on, and wherever d m contact unknowns are more
-    than 5000; elsewhere, and without finite elements, the condensed one. The log says which. ``iterative`` None is
-    Iterative(), which needs PETSc.
+    The iterative route is taken in three dimensions from 50 000 unknowns on (20 000 on several ranks, or without
+    CHOLMOD), and wherever the small problem has more rows, contact points or with friction contact unknowns, than 2500
+    in space and 5000 in the plane; elsewhere, and without finite elements, the condensed one. The log says which.
+    ``iterative`` None is Iterative(), which needs PETSc.
     """
 
     condensed: Solver = field(default_factory=Condensed)
@@ -41,25 +46,40 @@ class Automatic:
 
     def check(self, problem: ContactProblem) -> None:
         """Raise InputError for what the chosen route cannot treat. Collective."""
-        self.route(problem.system.K, problem.surface).check(problem)
+        self.route(problem.system.K, problem.surface, problem.frictional).check(problem)
 
     def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> PreparedSolver:
-        """Choose, and prepare what was chosen. Collective."""
-        route = self.route(A.matrix, surface)
-        if surface.comm.rank == 0:
-            log.info("Automatic: %s for %d contact points", type(route).__name__, surface.total)
-        return route.prepare(A, surface, scale)
+        """Return what chooses a route at the first step."""
+        return Chosen(self, A, surface, scale)
 
-    def route(self, matrix: Matrix, surface: ContactSurface) -> Solver:
+    def route(self, matrix: Matrix, surface: ContactSurface, frictional: bool) -> Solver:
         """Return the solver for a matrix of this size and this surface. Collective."""
         if isinstance(matrix, SerialMatrix):
             return self.condensed
-        dimension = surface.points.shape[1]
-        in_space = dimension == 3 and total(surface.comm, matrix.rows) >= IN_SPACE
-        if not in_space and dimension * surface.total <= CONDITIONS:
+        dimension, comm = surface.points.shape[1], surface.comm
+        alone = comm.size == 1 and library(comm) is not None
+        large = dimension == 3 and total(comm, matrix.rows) >= (ALONE_IN_SPACE if alone else IN_SPACE)
+        if not large and surface.total * (dimension if frictional else 1) <= DENSE[dimension]:
             return self.condensed
         if self.iterative is not None:
             return self.iterative
         from .iterative import Iterative  # needs petsc4py, which small problems do without
 
         return Iterative()
+
+
+class Chosen:
+    """Choose at the first step, which tells whether it rubs, and solve all by what was chosen."""
+
+    def __init__(self, rule: Automatic, *given: Any) -> None:
+        self._rule, self._given = rule, given
+        self._prepared: PreparedSolver | None = None
+
+    def solve(self, step: StepProblem) -> StepResult:
+        """Return the answer of the chosen route. Collective."""
+        if self._prepared is None:
+            route = self._rule.route(step.A.matrix, step.surface, step.slip0 is not None)
+            if step.surface.comm.rank == 0:
+                log.info("Automatic: %s for %d contact points", type(route).__name__, step.surface.total)
+            self._prepared = route.prepare(*self._given)
+        return self._prepared.solve(step)
