@@ -6,8 +6,6 @@ Everything else has a room: ``vi_contact.fem`` (meshes, assembly, contact surfac
 ``plots``.
 """
 
-from __future__ import annotations
-
 from . import schemes
 from .core.lazy import lazy
 

@@ -8,8 +8,6 @@ system, ``rigid_body`` an ellipsoid, ``bilateral`` equality constraints; ``metri
 0.5
 """
 
-from __future__ import annotations
-
 from ..core.lazy import lazy
 
 _CONTENTS = {

@@ -3,8 +3,6 @@
 Read ``step.py`` first: ``Scheme``, ``Solver``, ``Recorder`` and the values between them. A ``ContactProblem`` is a
 ``SemiDiscreteSystem`` (M, C, K, loads) with a ``ContactSurface``; ``verify.py`` judges. See docs/theory/routes.md."""
 
-from __future__ import annotations
-
 from .lazy import lazy
 
 _CONTENTS = {

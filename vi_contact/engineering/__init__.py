@@ -7,8 +7,6 @@
 array([0. , 1.5, 6. ])
 """
 
-from __future__ import annotations
-
 from ..core.lazy import lazy
 
 _CONTENTS = {

@@ -6,8 +6,6 @@ Each is a value of its data, with functions of time and place; its file has equa
 0.5 1.166667
 """
 
-from __future__ import annotations
-
 from ..core.lazy import lazy
 
 _CONTENTS = {

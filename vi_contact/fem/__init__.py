@@ -9,8 +9,6 @@ In this order: ``build_mesh`` or ``read_mesh``, ``assemble``, ``contact_surface`
 3
 """
 
-from __future__ import annotations
-
 from ..core.lazy import lazy
 
 _CONTENTS = {

@@ -6,8 +6,6 @@
 1.5
 """
 
-from __future__ import annotations
-
 from ..core.lazy import lazy
 
 _CONTENTS = {

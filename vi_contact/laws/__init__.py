@@ -6,8 +6,6 @@ Take a material first; what is not given is frictionless and undamped. Your own 
 2887
 """
 
-from __future__ import annotations
-
 from ..core.lazy import lazy
 
 _CONTENTS = {

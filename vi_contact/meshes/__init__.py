@@ -6,8 +6,6 @@ mesh without a file, `python3 meshes wall --help` (or `meshes/wall.py`) tells th
 angles in radians. Begin with ``wall.py``.
 """
 
-from __future__ import annotations
-
 from ..core.lazy import lazy
 
 _CONTENTS = {

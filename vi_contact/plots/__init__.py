@@ -3,8 +3,6 @@
 Begin with ``plot_report(run.read_run(folder), "report.pdf")``, the page about a run; ``draw_run`` draws its pictures.
 The ending of a file's name says its format: docs/guide/outputs.md."""
 
-from __future__ import annotations
-
 from ..core.lazy import lazy
 
 _CONTENTS = {

@@ -3,8 +3,6 @@
 Begin with ``simulate``, as README.md and, in short, the room ``models`` do. ``march`` is the bare loop below it,
 ``static_equilibrium`` the start under weight, ``read_run`` the way back from a folder: docs/reference/files.md."""
 
-from __future__ import annotations
-
 from ..core.lazy import lazy
 
 _CONTENTS = {

@@ -7,8 +7,6 @@ docs/guide/schemes.md. A scheme of your own: docs/guide/extend.md.
 GeneralisedAlpha(alpha_m=0.5, alpha_f=0.5, beta=0.25, gamma=0.5)
 """
 
-from __future__ import annotations
-
 from ..core.lazy import lazy
 
 _CONTENTS = {

@@ -7,8 +7,6 @@ Begin with docs/guide/soil.md, which tells ``base_motion`` (rock that moves) fro
 [0.16 0.  ]
 """
 
-from __future__ import annotations
-
 from ..core.lazy import lazy
 
 _CONTENTS = {

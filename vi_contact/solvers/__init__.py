@@ -8,8 +8,6 @@ friction (``normal/``) and with it (``friction/``): docs/guide/solvers.md.
 array([0.5, 0. ])
 """
 
-from __future__ import annotations
-
 from ..core.lazy import lazy
 from . import friction, iterative, normal, volume
 

@@ -8,8 +8,6 @@
 10
 """
 
-from __future__ import annotations
-
 from ..core.lazy import lazy
 
 _CONTENTS = {"cases.case": ("Case", "read_case"), "ida.ida": ("IDA", "run_ida")}

@@ -1,7 +1,5 @@
 """Solve for normal and tangential reactions on the contact points, Tresca or Coulomb."""
 
-from __future__ import annotations
-
 from ...core.lazy import lazy
 
 _CONTENTS = {

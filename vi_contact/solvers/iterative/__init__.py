@@ -1,7 +1,5 @@
 """Solve the step in the volume by conjugate gradients, without any factor: one row of a mask is a contact condition."""
 
-from __future__ import annotations
-
 from ...core.lazy import lazy
 
 _CONTENTS = {"route": ("Iterative",)}

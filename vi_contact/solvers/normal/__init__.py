@@ -1,7 +1,5 @@
 """Solve for normal reactions on the contact points: the linear complementarity problem."""
 
-from __future__ import annotations
-
 from ...core.lazy import lazy
 
 _CONTENTS = {

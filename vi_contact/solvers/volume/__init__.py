@@ -1,7 +1,5 @@
 """Solve the step in the volume, with PETSc's variational-inequality solvers: the whole u, no condensation."""
 
-from __future__ import annotations
-
 from ...core.lazy import lazy
 
 _CONTENTS = {
