@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 from small_steps import small
 
-from vi_contact.core.algebra import Array, Mask
+from vi_contact.core.algebra import Array, Mask, SerialComm
+from vi_contact.core.compiled import library
 from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.solvers.friction import linear as friction_linear
+from vi_contact.solvers.friction import newton as friction_newton
 from vi_contact.solvers.friction.extrapolation import Anderson, Plain
 from vi_contact.solvers.friction.fixed_point import FixedPoint, contraction
 from vi_contact.solvers.friction.given_forces import GivenForces
@@ -168,6 +170,23 @@ def test_newton_remembers_factors_not_answers(d: int) -> None:
     assert np.array_equal(again.r, fresh.r) and again.iterations == fresh.iterations
 
 
+@pytest.mark.parametrize("d", [2, 3])
+def test_newton_without_a_compiler_is_the_same(d: int, monkeypatch: Any) -> None:
+    """Compiled sweeps before Newton save linear solves, and change no more than round-off."""
+    spent, none, some = [], np.zeros(12), np.full(12, 0.1)
+    for seed in range(20):
+        (G, q, bilateral), results = small(500 + seed, 12, d), []
+        for found in (friction_newton.library, lambda comm: None):
+            with monkeypatch.context() as patch:
+                patch.setattr(friction_newton, "library", found)
+                prepared = FrictionNewton().prepare(G, bilateral)
+            results.append(prepared.solve(q, some if seed % 2 else none, np.full(12, 0.4)))
+        assert energy_norm(results[1].r - results[0].r, G) <= 1e-12 * energy_norm(results[0].r, G)
+        assert np.array_equal(results[0].stick, results[1].stick) and results[0].residual <= 1e-13
+        spent.append([result.iterations for result in results])
+    assert library(SerialComm()) is None or np.sum(spent, axis=0)[0] < np.sum(spent, axis=0)[1]
+
+
 @pytest.mark.parametrize("law", ["coulomb", "tresca", "both"])
 def test_bordered_problems_are_the_problems_themselves(law: str, monkeypatch: Any) -> None:
     """Newton with one factor a run, whatever the states differ by, and with one for every set: the same to rounding,
@@ -180,6 +199,7 @@ def test_bordered_problems_are_the_problems_themselves(law: str, monkeypatch: An
         return bordered[-1]
 
     monkeypatch.setattr(friction_linear.Bordered, "solve", counted)
+    monkeypatch.setattr(friction_newton, "library", lambda comm: None)  # whose sweeps leave nothing to do
     for seed in range(30):
         G, q, bilateral = small(300 + seed, 12, 2)
         slope = np.full(12, 0.4 if law != "tresca" else 0.0)

@@ -64,5 +64,5 @@ def compiled() -> Path:
 def _loaded(file: Path) -> Any:
     """The functions of a file; OSError where it cannot be loaded."""
     found = ctypes.CDLL(str(file))
-    found.columns.restype = ctypes.c_long
+    found.columns.restype, found.relax.restype = ctypes.c_long, ctypes.c_double
     return found

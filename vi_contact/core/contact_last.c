@@ -1,9 +1,11 @@
-/* Factorise A = L L' by CHOLMOD with given unknowns last, and substitute: compiled once for every user, see contact_last.py.
+/* Factorise A = L L' by CHOLMOD with given unknowns last, and substitute; sweep over small problems with friction: compiled
+   once for every user, see contact_last.py and friction/newton.py.
 
    CHOLMOD is linked as PETSc links it, and never copied into this package: its supernodal part is under the GPL. Matrices
    are symmetric and come whole, in compressed columns with sorted rows, of which CHOLMOD reads the lower triangle.
    Functions that can fail return CHOLMOD's status. */
 #include <cholmod.h>
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -150,4 +152,39 @@ int substitute(Factor *f, int system, double *y) {
         return f->common.status;
     memcpy(y, f->X->x, sizeof(double) * f->L->n);
     return CHOLMOD_OK;
+}
+
+/* `sweeps` of projected Gauss-Seidel for the small problem with friction: m nodes of d unknowns, G (m d, m d) symmetric,
+   disks of radius cohesion + slope max(r_n, 0); w = q + G r follows r. Returns the largest change of r in the last sweep. */
+double relax(int m, int d, const double *G, const double *cohesion, const double *slope, const char *bilateral,
+             int sweeps, double *restrict r, double *restrict w) {
+    const long n = (long) m * d;
+    double largest = 0.0;
+    for (int s = 0; s < sweeps; s++) {
+        largest = 0.0;
+        for (int i = 0; i < m; i++) {
+            const long first = (long) i * d;
+            double limit = 0.0, factor = 1.0;
+            for (int part = 0; part < 2; part++) { /* the normal, then the tangents, which know the normal's change */
+                const long from = first + part, to = part ? first + d : first + 1;
+                double stiffest = 0.0, size = 0.0, y[3];
+                for (long k = from; k < to; k++) stiffest = fmax(stiffest, G[k * n + k]);
+                for (long k = from; k < to; k++) {
+                    y[k - first] = r[k] - w[k] / stiffest;
+                    size += y[k - first] * y[k - first];
+                }
+                if (!part && !bilateral[i]) y[0] = fmax(y[0], 0.0);
+                if (!part) limit = cohesion[i] + slope[i] * fmax(y[0], 0.0);
+                factor = part && sqrt(size) > limit ? limit / sqrt(size) : 1.0;
+                for (long k = from; k < to; k++) {
+                    const double change = factor * y[k - first] - r[k], *row = G + k * n;
+                    if (change == 0.0) continue;
+                    r[k] += change;
+                    largest = fmax(largest, fabs(change));
+                    for (long j = 0; j < n; j++) w[j] += change * row[j];
+                }
+            }
+        }
+    }
+    return largest;
 }
