@@ -24,8 +24,13 @@ Indices = NDArray[np.int64]
 
 
 def max_abs(x: Array) -> float:
-    """Return max |x| over the entries given, 0 for none; NaN stays NaN."""
-    return max(float(x.max()), -float(x.min())) if x.size else 0.0
+    """Return max |x| over the entries given, 0 for none; NaN stays NaN. The places are found faster than the values."""
+    return float(max(x.item(x.argmax()), -x.item(x.argmin()))) if x.size else 0.0
+
+
+def lowest(x: Array) -> float:
+    """Return the size of the smallest negative entry, 0 for none; NaN stays NaN."""
+    return -min(x.item(x.argmin()), 0.0) if x.size else 0.0
 
 
 class Comm(Protocol):

@@ -6,7 +6,6 @@ object it is. What is handed out is shared, and read-only too.
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
 from typing import Any
 
@@ -23,20 +22,27 @@ class Remembered:
     """Hold the last few values of a function of a vector, or of a number."""
 
     def __init__(self, function: Callable[[Any], Array], kept: int) -> None:
-        self._function = function
-        self._kept: deque[tuple[Any, Array | Callable[[], Array]]] = deque(maxlen=kept)
+        self._function, self._kept = function, kept
+        self._known: dict[Any, tuple[Any, Array | Callable[[], Array]]] = {}  # with the vectors, so that ids are theirs
 
     def __call__(self, x: Any) -> Array:
         """Return the value at x."""
-        for known, value in self._kept:
-            if known is x or type(x) is float and x == known:
-                return value() if callable(value) else value
+        is_number = type(x) is float
+        known = self._known.get(x if is_number else id(x))
+        if known is not None:
+            value = known[1]
+            return value() if callable(value) else value
         value = self._function(x)
-        if type(x) is float or not x.flags.writeable:
-            self._kept.append((x, frozen(value)))
+        if is_number or not x.flags.writeable:
+            self._keep(x if is_number else id(x), x, frozen(value))
         return value
+
+    def _keep(self, key: Any, x: Any, value: Array | Callable[[], Array]) -> None:
+        if len(self._known) == self._kept:
+            del self._known[next(iter(self._known))]
+        self._known[key] = x, value
 
     def know(self, x: Array, value: Callable[[], Array]) -> Array:
         """Return x, frozen; ``value`` tells the value there when somebody asks for it."""
-        self._kept.append((frozen(x), value))
+        self._keep(id(x), frozen(x), value)
         return x

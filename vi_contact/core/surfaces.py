@@ -85,7 +85,7 @@ class ContactSurface:
 
     def some(self, found: Mask) -> bool:
         """Say whether the mask (m,) is True for a condition of any rank. Collective."""
-        return bool(largest(self.comm, found.any()))
+        return bool(largest(self.comm, np.count_nonzero(found) > 0))
 
     @cached_property
     def rigid(self) -> Mask:

@@ -71,8 +71,9 @@ class Load:
 
     def __call__(self, t: float) -> Array:
         total = self.at_rest(t)
-        for moving in self.viscous + self.inertial:
-            total += moving(t)
+        for parts in (self.viscous, self.inertial):
+            for moving in parts:
+                total += moving(t)
         return total
 
     def at_rest(self, t: float) -> Array:
@@ -200,7 +201,8 @@ class SemiDiscreteSystem:
         """Return f(t), read-only; made once for each of the last two times, unless something is marched beside it."""
         if self.companions:
             return self.load(t)
-        return self.cached("loads", lambda: Remembered(self.load, 2))(float(t))
+        found: Array = (self._cache.get("loads") or self.cached("loads", lambda: Remembered(self.load, 2)))(float(t))
+        return found
 
     def rates(self, u0: Array, u1: Array, v0: Array, v1: Array, dt: float) -> tuple[Array, Array]:
         """Return (u1 - u0)/dt and (v1 - v0)/dt; the products C and M of them are made of those with their ends."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .algebra import Array, max_abs
+from .algebra import Array, lowest, max_abs
 from .certificate import Certificate
 from .problem import ContactProblem
 from .step import Balance, State, StepProblem, StepResult
@@ -25,11 +25,11 @@ def kkt_residual(step: StepProblem, result: StepResult) -> Certificate:
     else:
         residual += surface.reaction_load(r_n, len(x), result.r_t)
     gap, closed = step.bound - surface.normal_values(x), result.active
-    lowest = gap, r_n
+    signed = gap, r_n
     if not surface.plain:
         gap += surface.compliance * r_n / step.scale
-        closed, lowest = closed | surface.bilateral, (gap[~surface.bilateral], r_n[~surface.bilateral])
-    maxima = _maxima(step, residual, step.b, Ax, x, step.guess, r_n, gap[closed], r_n[~closed], lowest=lowest)
+        closed, signed = closed | surface.bilateral, (gap[~surface.bilateral], r_n[~surface.bilateral])
+    maxima = _maxima(step, residual, step.b, Ax, x, step.guess, r_n, gap[closed], r_n[~closed], signed=signed)
     residual_max, b_max, Ax_max, x_max, guess_max, r_max, apart, open_force, behind, pull = maxima
     x_ref, r_ref = max(x_max, guess_max), max(b_max, r_max)
     cone, dissipation = _friction_residuals(step, result, x_ref, r_ref)
@@ -44,10 +44,10 @@ def kkt_residual(step: StepProblem, result: StepResult) -> Certificate:
     )
 
 
-def _maxima(step: StepProblem, *arrays: Array, lowest: tuple[Array, ...] = ()) -> list[float]:
-    """Largest sizes of the entries on all ranks, and of the negative ones of ``lowest``, by one reduction; infinite for
+def _maxima(step: StepProblem, *arrays: Array, signed: tuple[Array, ...] = ()) -> list[float]:
+    """Largest sizes of the entries on all ranks, and of the negative ones of ``signed``, by one reduction; infinite for
     NaN, which no reduction keeps."""
-    sizes = [*map(max_abs, arrays), *(-float(np.minimum.reduce(array, initial=0.0)) for array in lowest)]
+    sizes = [*map(max_abs, arrays), *map(lowest, signed)]
     sizes = [size if size >= 0.0 else np.inf for size in sizes]
     comm = step.surface.comm
     return sizes if comm.size == 1 else comm.max(np.array(sizes)).tolist()

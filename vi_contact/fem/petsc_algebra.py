@@ -30,12 +30,12 @@ _ENTRY = 8 + np.dtype(PETSc.IntType).itemsize  # bytes of an entry and its colum
 RIGHT_SIDES = 64  # right-hand sides per block solve: bounds the memory of the dense blocks
 
 
-def _vector(comm: Any, size: int, way: int) -> Any:
-    """A vector in room that all matrices share: a product needs it only for as long as it takes."""
+def _vector(comm: Any, size: int, way: int) -> tuple[Array, Any]:
+    """Room that all matrices share, as a product needs it only for as long as it takes, and a vector in it."""
     room = _ROOM.get((size, way))
     if room is None:
         _ROOM[size, way] = room = np.zeros(size)
-    return PETSc.Vec().createWithArray(room, (size, None), comm=comm)
+    return room, PETSc.Vec().createWithArray(room, (size, None), comm=comm)
 
 
 _ROOM: WeakValueDictionary[tuple[int, int], Array] = WeakValueDictionary()
@@ -48,7 +48,7 @@ class PetscMatrix:
     def __init__(self, mat: Any) -> None:
         self.stored = mat
         sizes = mat.getLocalSize()
-        self._x, self._y = (_vector(mat.comm, sizes[way], way) for way in (1, 0))
+        (self._in, self._x), (self._out, self._y) = (_vector(mat.comm, sizes[way], way) for way in (1, 0))
 
     @property
     def mat(self) -> Any:
@@ -64,14 +64,14 @@ class PetscMatrix:
         return _ENTRY * float(self.stored.getInfo(PETSc.Mat.InfoType.LOCAL)["nz_allocated"])
 
     def __matmul__(self, x: Array) -> Array:
-        self._x.array[:] = x
+        self._in[:] = x
         self.stored.mult(self._x, self._y)
-        return np.array(self._y.array_r)
+        return self._out.copy()
 
     def transpose_apply(self, x: Array) -> Array:
-        self._y.array[:] = x
+        self._out[:] = x
         self.stored.multTranspose(self._y, self._x)
-        return np.array(self._x.array_r)
+        return self._in.copy()
 
     def diagonal(self) -> Array:
         return np.array(self.stored.getDiagonal().array_r)

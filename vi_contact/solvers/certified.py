@@ -9,9 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import isfinite
 
-import numpy as np
-
-from ..core.algebra import EffectiveMatrix, largest
+from ..core.algebra import EffectiveMatrix, largest, max_abs
 from ..core.certificate import Certificate
 from ..core.errors import StepFailure
 from ..core.problem import ContactProblem
@@ -75,7 +73,7 @@ class CertifiedSolver:
 
 def refuse_nan(step: StepProblem) -> None:
     """Raise StepFailure for a NaN, which would spread silently; asked of all ranks, so that all stop."""
-    if largest(step.surface.comm, not isfinite(np.add.reduce(step.b))):
+    if largest(step.surface.comm, not isfinite(max_abs(step.b))):
         raise StepFailure(
             f"the load of step {step.k} at t = {step.t:.6g} s contains NaN or infinite values: "
             "check the excitation, the tractions and the initial data"
