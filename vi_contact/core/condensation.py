@@ -38,6 +38,7 @@ class Last:
 
     def __init__(self, factor: ContactLast, there: Mask) -> None:
         self._factor, self.there, corner = factor, there, factor.corner
+        self._free = slice(None) if there.all() else there
         inverse = lapack.dpotri(corner, lower=1)[0] if len(corner) else corner
         self.flexibility: Array = np.zeros((len(there), len(there)))
         self.flexibility[np.ix_(there, there)] = np.tril(inverse) + np.tril(inverse, -1).T
@@ -46,13 +47,13 @@ class Last:
         """Return x_c (k,) of A⁻¹b."""
         self._y = self._factor.forward(b)
         self._x = np.zeros(len(self.there))
-        self._x[self.there] = self._factor.free(self._y)
+        self._x[self._free] = self._factor.free(self._y)
         return self._x
 
     def answer(self, r: Array, held: Mask, values: Array) -> Array:
         """Return x = A⁻¹(b - r), owned rows, with ``held`` unknowns (k,) on these values: it removes round-off only."""
-        x, there = self._x[self.there], self.there
-        if r.any():
+        x, there = self._x[self._free], self._free
+        if np.count_nonzero(r):
             x = self._factor.free(self._y - self._factor.reduced(r[there]))
         return self._factor.backward(np.where(held[there], values[there], x))
 

@@ -62,7 +62,7 @@ class ContactLast:
 
     def forward(self, b: Array) -> Array:
         """Return y_c of the load b; y_i is kept for ``backward``. Collective."""
-        np.take(b if self._whole is None else self._whole(b), self._order, out=self._y, mode="clip")
+        (b if self._whole is None else self._whole(b)).take(self._order, out=self._y, mode="clip")
         if self._columns:
             self._library.forward(*self._arguments)
             return self.reduced(self._c)

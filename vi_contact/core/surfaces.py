@@ -106,8 +106,12 @@ class ContactSurface:
         whole[self.slots] = values
         return self.comm.sum(whole).astype(np.asarray(values).dtype)
 
+    def mine(self, whole: NDArray[Any]) -> NDArray[Any]:
+        """Return, of what is known of all conditions (total, …), the rows (m, …) of these."""
+        return whole if self.comm.size == 1 else whole[self.slots]
+
     def on_first(self, values: NDArray[Any]) -> Any:
-        """Return the same (total, …) on rank 0, and none, (0, …), on the others. Collective; for output."""
+        """Return the values (total, …) on rank 0, and none, (0, …), on the others. Collective; for output."""
         return on_first(self.comm, self.slots, values)
 
     @cached_property

@@ -133,12 +133,13 @@ class PreparedCondensed:
         """Return x, r_n and the active set of a step."""
         if step.slip0 is not None and self._surface.total:
             return self._with_friction(step)
-        surface, (condensed, small) = self._surface, self._normal
-        bound, guess = surface.everywhere(np.column_stack([step.bound, step.active])).T
-        found: LCPResult = small.solve(bound - condensed.free(step.b), guess > 0.0)
+        surface, (condensed, small), bound, guess = self._surface, self._normal, step.bound, step.active
+        if surface.comm.size > 1:
+            bound, guess = surface.everywhere(np.column_stack([bound, guess])).T
+            guess = guess > 0.0
+        found: LCPResult = small.solve(bound - condensed.free(step.b), guess)
         x = condensed.answer(found.r, (found.r != 0.0) & self._rigid, bound)
-        mine = surface.slots
-        return StepResult(x, found.r[mine], found.active[mine], found.iterations, self._name)
+        return StepResult(x, surface.mine(found.r), surface.mine(found.active), found.iterations, self._name)
 
     def _with_friction(self, step: StepProblem) -> StepResult:
         """The step with tangential reactions."""

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import lapack
 
-from ...core.algebra import Array, Mask
+from ...core.algebra import Array, Mask, lowest
 from ...core.checks import attributes
 from .lcp import Found, PreparedLCP, ScaledLCP, cholesky, failure, scaled_dense
 
@@ -80,7 +80,7 @@ class _Sets:
         while True:
             r, w = self._on_set(active, gap)
             wrong = self._wrong(active, r, w)
-            count = int(np.count_nonzero(wrong))
+            count = np.count_nonzero(wrong)
             if count == 0:
                 return self._cut(r, w, gap)
             fewest, patience = (count, PATIENCE) if count < fewest else (fewest, patience - 1)
@@ -128,7 +128,7 @@ class _Sets:
 
     def _cut(self, r: Array, w: Array, gap: Array) -> tuple[Array, Array]:
         """Cut reactions that are negative by rounding, so that r >= 0 holds exactly."""
-        if np.minimum.reduce(r, initial=0.0) >= 0.0:
+        if lowest(r) <= 0.0:
             return r, w
         cut = self._positive(r)
         return (cut, gap + self._scaled.matrix @ cut) if (cut != r).any() else (r, w)
@@ -139,7 +139,7 @@ class _Factor:
 
     def __init__(self, active: Mask, matrix: Array) -> None:
         self.key = active.tobytes()
-        self._index = np.flatnonzero(active)
+        self._index = active.nonzero()[0]
         self._rows = matrix[self._index]
         self._lower = cholesky(self._rows[:, self._index]) if self._index.size else None
 

@@ -23,7 +23,7 @@ from math import isfinite
 import numpy as np
 from scipy.linalg import lapack
 
-from ...core.algebra import Array, Mask, max_abs
+from ...core.algebra import Array, Mask, lowest, max_abs
 from ...core.errors import InputError, StepFailure
 
 EPS = float(np.finfo(float).eps)
@@ -75,6 +75,10 @@ class ScaledLCP:
         """Say whether no row is bilateral."""
         return not self.bilateral.any()
 
+    def violation(self, gap: Array) -> float:
+        """Return the complementarity of r = 0."""
+        return lowest(gap) if self.unilateral else self.complementarity(np.zeros(gap.size), gap)
+
     def complementarity(self, r: Array, w: Array) -> float:
         """Return max |min(r, w)| over unilateral rows, max |w| over bilateral ones."""
         least = np.minimum(r, w)
@@ -101,7 +105,7 @@ class PreparedLCP:
             raise InputError(f"The guess has shape {guess.shape} but there are {q.size} rows: pass a mask or all "
                              "reactions.")
         gap = q * scaled.scale
-        unit = scaled.complementarity(np.zeros(q.size), gap)
+        unit = scaled.violation(gap)
         r, residual, iterations, history = self.search(gap, guess, unit) if unit else (np.zeros(q.size), 0.0, 0, ())
         active = (r > 0.0) | scaled.bilateral
         return LCPResult(r * scaled.scale, active, iterations, residual, self.method, tuple(history))
@@ -161,7 +165,7 @@ def check_gap(q: Array, bilateral: Mask) -> None:
     """Raise InputError unless q has one entry a row, finite or (in unilateral rows) +inf."""
     if q.shape != bilateral.shape:
         raise InputError(f"q has shape {q.shape} but the Delassus operator has {bilateral.size} rows: they must match.")
-    if not isfinite(np.add.reduce(q)) and not np.where(bilateral, np.isfinite(q), q > -np.inf).all():
+    if not isfinite(max_abs(q)) and not np.where(bilateral, np.isfinite(q), q > -np.inf).all():
         raise InputError("q contains NaN, -inf, or +inf in a bilateral row: only +inf in unilateral rows is allowed.")
 
 
