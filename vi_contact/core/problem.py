@@ -40,7 +40,7 @@ class ContactProblem:
         own = with_values(self.friction, self.surface, lambda v: tuple(v[i] for i in slots) if len(v) == total else v)
         object.__setattr__(self, "friction", own)
 
-    @property
+    @cached_property
     def excitations(self) -> tuple[Excitation, ...]:
         """Return the excitations as a tuple."""
         return tuple(self.excitation) if isinstance(self.excitation, Sequence) else (self.excitation,)
@@ -93,8 +93,14 @@ class ContactProblem:
 
     def ground_acceleration(self, t: float) -> Array:
         """Return the vector a_g(t) [m/s²] summed over the excitations."""
-        parts = (one.acceleration(t) * np.asarray(one.direction, dtype=float) for one in self.excitations)
-        return np.asarray(sum(parts, np.zeros(self.system.influence.shape[1])))
+        found = np.zeros(self.system.influence.shape[1])
+        for one, direction in zip(self.excitations, self._directions, strict=True):
+            found += one.acceleration(t) * direction
+        return found
+
+    @cached_property
+    def _directions(self) -> tuple[Array, ...]:
+        return tuple(np.asarray(one.direction, dtype=float) for one in self.excitations)
 
 
 def with_values(law: Any, surface: ContactSurface, change: Callable[[tuple[Any, ...]], tuple[Any, ...]]) -> Any:

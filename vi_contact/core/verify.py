@@ -111,13 +111,14 @@ class Energies:
 def energies(system: SemiDiscreteSystem, u: Array, v: Array) -> Energies:
     """Return the energies of displacement u and velocity v: two products, unless they are known."""
     momentum, elastic = system.product("M", v), system.product("K", u)
-    kinetic, strain = 0.5 * _dots(system, (v, momentum), (u, elastic))
-    return Energies(momentum, elastic, float(kinetic), float(strain))
+    kinetic, strain = _dots(system, (v, momentum), (u, elastic))
+    return Energies(momentum, elastic, 0.5 * kinetic, 0.5 * strain)
 
 
-def _dots(system: SemiDiscreteSystem, *pairs: tuple[Array, Array], sums: tuple[float, ...] = ()) -> Array:
+def _dots(system: SemiDiscreteSystem, *pairs: tuple[Array, Array], sums: tuple[float, ...] = ()) -> list[float]:
     """Inner products, and sums over the ranks, with one reduction for all."""
-    return system.algebra.comm.sum(np.array([*(x.dot(y) for x, y in pairs), *sums]))
+    comm, found = system.algebra.comm, [*(float(x.dot(y)) for x, y in pairs), *sums]
+    return found if comm.size == 1 else comm.sum(np.array(found)).tolist()
 
 
 def energy_balance(
@@ -139,18 +140,17 @@ def energy_balance(
     after = after or energies(system, new.u, new.v)
     du = new.u - old.u
     pushed, dragged = _obstacle_work(problem, old.t, new.t, balance)
-    rubbing = 0.0 if balance.r_t is None else np.sum(balance.r_t * surface.tangential_values(du))
+    rubbing = 0.0 if balance.r_t is None else float(np.sum(balance.r_t * surface.tangential_values(du)))
     work, inertia, kinetic, stiffness, lost, *local = _dots(
         system, (du, balance.f), (du, system.product("M", balance.a)),
         (0.5 * (old.v + new.v), after.momentum - before.momentum),
         (balance.u - 0.5 * (old.u + new.u), after.elastic - before.elastic), (balance.r_n, surface.normal_values(du)),
-        sums=(rubbing, pushed, dragged, 0.0 if system.C is None else du.dot(system.product("C", balance.v))),
+        sums=(rubbing, pushed, dragged, 0.0 if system.C is None else float(du.dot(system.product("C", balance.v)))),
     )
     rubbing, pushed, dragged, damping = local
     return StepEnergy(
-        change=after.total - before.total, input=float(work + pushed + dragged), damping=float(damping),
-        contact=float(lost + pushed), friction=float(rubbing + dragged),
-        algorithmic=float(inertia - kinetic + stiffness),
+        change=after.total - before.total, input=work + pushed + dragged, damping=damping, contact=lost + pushed,
+        friction=rubbing + dragged, algorithmic=inertia - kinetic + stiffness,
     )
 
 

@@ -24,7 +24,7 @@ from ..core.verify import Energies, energies, energy_balance
 def refuse_overflow(row: Row) -> None:
     """Raise StepFailure for a number beyond those of the machine: infinite, or NaN in the energy ledger."""
     for name, value in row.items():
-        if not isinstance(value, float) or isfinite(value):
+        if type(value) is int or not isinstance(value, float) or isfinite(value):
             continue
         if np.isinf(value) or name.startswith(("energy_", "work_", "loss_")):
             raise StepFailure(f"step {row['k']} at t = {row['t']:.6g} s: {name} is {value}, beyond the numbers of the "
@@ -177,9 +177,10 @@ class Contact:
         surface, d, r_n = self._problem.surface, len(self._axes), state.r_n
         gap = surface.gap(state.t) - surface.normal_values(state.u) + surface.compliance * r_n
         pressure, rubbing = r_n / surface.weights, self._rubbing(state) if self._frictional else ()
-        sums = [surface.weights[state.active].sum(), state.active.sum(), r_n.sum()]
-        sums += [*(r_n @ surface.normals), *(r_n @ surface.points)]
-        closed, count, resultant, *vectors = surface.comm.sum(np.array(sums, dtype=float)).tolist()
+        sums = [float(surface.weights[state.active].sum()), float(np.count_nonzero(state.active)), float(r_n.sum()),
+                *(r_n @ surface.normals).tolist(), *(r_n @ surface.points).tolist()]
+        sums = sums if surface.comm.size == 1 else surface.comm.sum(np.array(sums)).tolist()
+        closed, count, resultant, *vectors = sums
         force, place = [0.0 - one for one in vectors[:d]], vectors[d:]  # not -one: no negative zeros
         depth, highest, *farthest = self._largest(gap, pressure, *rubbing[1:])
         values = [
@@ -204,9 +205,9 @@ class Contact:
         if not self._problem.surface.total:
             return [np.nan] * (2 + len(slip))
         some = len(gap) > 0
-        tops = [-gap.min(), pressure.max()] if some else [-np.inf] * 2
-        tops += [np.linalg.norm(one, axis=1).max() if some else -np.inf for one in slip]
-        return self._problem.surface.comm.max(np.array(tops)).tolist()
+        tops = [-gap.item(gap.argmin()), pressure.item(pressure.argmax())] if some else [-np.inf] * 2
+        tops += [float(np.linalg.norm(one, axis=1).max()) if some else -np.inf for one in slip]
+        return tops if self._problem.surface.comm.size == 1 else self._problem.surface.comm.max(np.array(tops)).tolist()
 
     def _rubbing(self, state: State) -> tuple[Array, Array]:
         """Tangential tractions and slips (m, d - 1)."""

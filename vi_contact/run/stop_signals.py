@@ -49,7 +49,7 @@ class StopSignals:
     def asked(self, comm: Comm, over: bool = False) -> tuple[int, bool]:
         """Return the number of a signal that some rank has got, 0 for none, and whether the time is over for one of
         them: the same on all ranks. Collective, one reduction."""
-        number, late = comm.max(np.array([self._found, over], dtype=float))
+        number, late = (self._found, over) if comm.size == 1 else comm.max(np.array([self._found, over], dtype=float))
         self._found = 0 if number else self._found
         return int(number), bool(late)
 
