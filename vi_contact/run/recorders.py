@@ -24,7 +24,7 @@ from ..core.verify import Energies, energies, energy_balance
 def refuse_overflow(row: Row) -> None:
     """Raise StepFailure for a number beyond those of the machine: infinite, or NaN in the energy ledger."""
     for name, value in row.items():
-        if type(value) is int or not isinstance(value, float) or isfinite(value):
+        if not isinstance(value, float) or isfinite(value):
             continue
         if np.isinf(value) or name.startswith(("energy_", "work_", "loss_")):
             raise StepFailure(f"step {row['k']} at t = {row['t']:.6g} s: {name} is {value}, beyond the numbers of the "

@@ -139,14 +139,13 @@ def _items(value: list[Any], kinds: tuple[Any, ...], fixed: bool, spot: Spot, wo
 
 
 def _table(value: dict[str, Any], members: list[Any], spot: Spot, words: Words) -> Node:
-    choices: dict[str, Callee] = {}
-    for member in members:
-        choices |= _choices(member, words)
-    if choices:
-        only = next(iter(choices)) if len(choices) == 1 else None
-        default = next((words.default[member] for member in members if member in words.default), only)
-        chosen = _chosen(value.get("type", default), choices, members, spot, words)
-        return arguments(value, chosen, spot, words)
+    found = [one for one in (_choices(member, words) for member in members) if one]
+    if found:
+        choices = found[0] if len(found) == 1 else {word: one[word] for one in found for word in one}
+        word = value.get("type", next((words.default[member] for member in members if member in words.default), None))
+        if word is None and len(choices) == 1:
+            word = next(iter(choices))
+        return arguments(value, _chosen(word, choices, members, spot, words), spot, words)
     for member in members:
         if get_origin(member) in (Mapping, dict):
             kind = get_args(member)[1]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from types import MappingProxyType, ModuleType
 from typing import Any, get_origin, get_type_hints
@@ -208,20 +208,49 @@ def names_of(kind: Any) -> tuple[str, ...]:
 @cache
 def _choices() -> Mapping[Any, Mapping[str, Callee]]:
     """Return kind -> word -> what it calls."""
-    found: dict[Any, dict[str, Callee]] = {
-        Parts: {"Wall": _model(wall.Wall, _wall), "Channel": _model(channel.Channel, _channel, inner="shape")}
-    }
-    for room, kinds in _KINDS.items():
-        for kind in kinds:
-            found.setdefault(kind, {}).update({one.name: one for one in _callees(room, kind)})
-    for kind, functions in _FUNCTIONS.items():
-        found.setdefault(kind, {}).update({name: callee(one, name=name) for name, one in functions.items()})
-    return MappingProxyType(found)
+    of_rooms = (kind for kinds in _KINDS.values() for kind in kinds)
+    return MappingProxyType({kind: _Listed(kind) for kind in (Parts, *of_rooms, *_FUNCTIONS)})
 
 
-def _callees(room: ModuleType, kind: Any) -> Iterator[Callee]:
-    """Yield the public classes of a room that are of this kind, and named constructors; none that needs functions."""
-    for cls in (getattr(room, name) for name in room.__all__):
+class _Listed(Mapping[str, Callee]):
+    """Find the words for a kind, each when it is asked for: most are of modules that a case does not need."""
+
+    def __init__(self, kind: Any) -> None:
+        self._kind, self._rooms = kind, [room for room, kinds in _KINDS.items() if kind in kinds]
+        self._functions = _FUNCTIONS.get(kind, {})
+
+    def _found(self, names: Sequence[str] | None = None) -> dict[str, Callee]:
+        """What words with these names before the dot call; None: all."""
+        found: dict[str, Callee] = {}
+        if self._kind is Parts:
+            found |= {"Wall": _model(wall.Wall, _wall), "Channel": _model(channel.Channel, _channel, inner="shape")}
+        for room in self._rooms:
+            own = room.__all__ if names is None else [name for name in names if name in room.__all__]
+            found |= {one.name: one for one in _callees(room, self._kind, own)}
+        functions = self._functions.items()
+        return found | {name: callee(one, name=name) for name, one in functions if names is None or name in names}
+
+    @cached_property
+    def _all(self) -> dict[str, Callee]:
+        return self._found()
+
+    def __getitem__(self, word: str) -> Callee:
+        return self._found([word.partition(".")[0]])[word]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._all)
+
+    def __len__(self) -> int:
+        return len(self._all)
+
+    def __bool__(self) -> bool:
+        return True  # without looking
+
+
+def _callees(room: ModuleType, kind: Any, names: Sequence[str]) -> Iterator[Callee]:
+    """Yield the public classes of these names that are of this kind, and named constructors; none that needs
+    functions."""
+    for cls in (getattr(room, name) for name in names):
         if isinstance(cls, type) and not is_protocol(cls) and not defect(cls, kind):
             made = [callee(one, name=one.__qualname__) for one in (cls, *_constructors(cls))]
             yield from (one for one in made
