@@ -6,7 +6,7 @@ from .algebra import Comm, total
 from .errors import InputError
 
 DENSE_ROWS = 10_000  # 0.8 GB a matrix, and its factor and a copy while it is made, on every rank
-OWN_UNKNOWNS = 50_000  # beyond it a factor of the mass matrix takes ten seconds, conjugate gradients a tenth of one
+OWN_UNKNOWNS = 50_000  # beyond it a factor of the mass matrix takes seconds, conjugate gradients a tenth of one
 OWN_CONDITIONS = 1_000  # as many back-substitutions, and a dense matrix
 
 
@@ -17,10 +17,10 @@ def refuse_dense(owner: str, rows: int, *, instead: str = "Iterative(), which st
                          f"{8e-9 * rows**2:.2g} GB: take {instead}, or at most {DENSE_ROWS}")
 
 
-def small(comm: Comm, unknowns: int, conditions: int) -> bool:
+def small(comm: Comm, unknowns: int, conditions: int, *, worth: int = 1) -> bool:
     """Say whether what the package solves beside the steps is small, by unknowns and contact conditions of this rank.
 
     Such problems are condensed with a factor of their own, whatever solves the steps; larger ones are solved by
-    conjugate gradients. Collective.
+    conjugate gradients. ``worth``: for problems that come again and again, so many times larger. Collective.
     """
-    return total(comm, unknowns) <= OWN_UNKNOWNS and total(comm, conditions) <= OWN_CONDITIONS
+    return total(comm, unknowns) <= worth * OWN_UNKNOWNS and total(comm, conditions) <= OWN_CONDITIONS
