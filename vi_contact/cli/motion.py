@@ -14,10 +14,10 @@ from ..core.errors import InputError
 from ..core.files import write_csv
 from ..ground_motion.chain import Processing
 from ..ground_motion.ec8 import EC8Spectrum
-from ..ground_motion.formats.reader import LARGEST_PEAK, read_record
+from ..ground_motion.formats.reader import read_record
 from ..ground_motion.formats.writer import write_at2, write_columns, write_path_series
 from ..ground_motion.intensity import pga, record_info
-from ..ground_motion.record import UNITS, Record, canonical_units
+from ..ground_motion.record import LARGEST_PEAK, UNITS, Record, canonical_units
 from ..ground_motion.spectra import response_spectrum
 from ..plots.records import plot_motion, plot_spectra
 from .options import add_actions, output_file, spaced

@@ -15,6 +15,9 @@ UNITS = {"m/s2": 1.0, "cm/s2": 0.01, "gal": 0.01, "g": STANDARD_GRAVITY, "g/10":
          "in/s2": 0.0254, "ft/s2": 0.3048}
 """Accepted units of acceleration and their size in m/s²."""
 
+LARGEST_PEAK = 10.0 * STANDARD_GRAVITY
+"""Peak acceleration [m/s²] beyond which units are doubted: the strongest ground motions on record reach half of it."""
+
 
 @dataclass(frozen=True, eq=False)
 class Record:

@@ -11,16 +11,12 @@ from ...core.checks import number
 from ...core.errors import InputError
 from ...core.units import STANDARD_GRAVITY
 from ..processing import resampled
-from ..record import Record
+from ..record import LARGEST_PEAK, Record
 from . import afad, at2, columns, cosmos, esm, knet, simcenter, smc
 from .text import load_text
 
 SEVERAL = (cosmos, afad, simcenter)
 """Formats whose files may hold several components."""
-
-
-LARGEST_PEAK = 10.0 * STANDARD_GRAVITY
-"""Peak acceleration [m/s²] beyond which units are doubted: the strongest ground motions on record reach half of it."""
 
 STEPS = 1e-6, 100.0
 """Shortest and longest time step [s] of a file; that of seismographs is 0.001 to 0.05."""

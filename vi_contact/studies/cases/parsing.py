@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import types
+from collections import ChainMap
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, is_dataclass
 from difflib import get_close_matches
@@ -139,9 +140,9 @@ def _items(value: list[Any], kinds: tuple[Any, ...], fixed: bool, spot: Spot, wo
 
 
 def _table(value: dict[str, Any], members: list[Any], spot: Spot, words: Words) -> Node:
-    found = [one for one in (_choices(member, words) for member in members) if one]
+    found: list[Any] = [one for one in (_choices(member, words) for member in members) if one]
     if found:
-        choices = found[0] if len(found) == 1 else {word: one[word] for one in found for word in one}
+        choices = ChainMap(*found[::-1])  # in which words come in the order of ``found``, and are looked up one by one
         word = value.get("type", next((words.default[member] for member in members if member in words.default), None))
         if word is None and len(choices) == 1:
             word = next(iter(choices))

@@ -22,9 +22,8 @@ from ...core.system import SemiDiscreteSystem
 from ...fem import BodyForce, Cells, CompliantBase, Dashpots, Facets, Prescribed, Traction
 from ...fem.contact.matching import Matching
 from ...ground_motion.chain import Processing
-from ...ground_motion.formats.reader import LARGEST_PEAK, read_record
 from ...ground_motion.kanai_tajimi import synthetic
-from ...ground_motion.record import Record
+from ...ground_motion.record import LARGEST_PEAK, Record
 from ...laws.impact import VelocityUpdate
 from ...laws.materials import Damping, LinearElastic, Section
 from ...meshes.gmsh_session import MeshScript
@@ -68,7 +67,7 @@ def record(
     channel: int | None = None, largest: float = LARGEST_PEAK, processing: Processing | None = None,
 ) -> Record:
     """Read a record, ``read_record``, then apply ``processing``."""
-    found = read_record(path, units, dt=dt, resample_dt=resample_dt, channel=channel, largest=largest)
+    found = ground_motion.read_record(path, units, dt=dt, resample_dt=resample_dt, channel=channel, largest=largest)
     return found if processing is None else processing(found)
 
 
