@@ -187,31 +187,27 @@ def test_newton_without_a_compiler_is_the_same(d: int, monkeypatch: Any) -> None
     assert library(SerialComm()) is None or np.sum(spent, axis=0)[0] < np.sum(spent, axis=0)[1]
 
 
-@pytest.mark.parametrize("law", ["coulomb", "tresca", "both"])
-def test_bordered_problems_are_the_problems_themselves(law: str, monkeypatch: Any) -> None:
-    """Newton with one factor a run, whatever the states differ by, and with one for every set: the same to rounding,
-    from a guess that is far off; some sets are solved both ways."""
-    bordered = []
-    solve = friction_linear.Bordered.solve
+@pytest.mark.parametrize(("d", "held"), [(2, 0.0), (2, 0.2), (2, 1e9), (3, 1e9)])
+def test_places_that_are_left_solve_the_problem_too(d: int, held: float, monkeypatch: Any) -> None:
+    """Where most places hold, the small matrix of the others gives the answer of the large one, to rounding."""
+    rests = []
+    rest = friction_linear.Factored._rest
 
     def counted(*arguments: Any) -> Any:
-        bordered.append(solve(*arguments))
-        return bordered[-1]
+        rests.append(rest(*arguments))
+        return rests[-1]
 
-    monkeypatch.setattr(friction_linear.Bordered, "solve", counted)
-    monkeypatch.setattr(friction_newton, "library", lambda comm: None)  # whose sweeps leave nothing to do
-    for seed in range(30):
-        G, q, bilateral = small(300 + seed, 12, 2)
-        slope = np.full(12, 0.4 if law != "tresca" else 0.0)
-        cohesion = G[1::2, 1::2].diagonal() ** -0.5 * (0.2 if law != "coulomb" else 0.0)
-        results = []
-        for share in (0.0, 10.0):
-            monkeypatch.setattr(friction_linear, "LARGE", 1)
-            monkeypatch.setattr(friction_linear, "SHARE", share)
-            results.append(FrictionNewton().prepare(G, bilateral).solve(q, cohesion, slope, seed % 3 < np.arange(12)))
+    monkeypatch.setattr(friction_linear.Factored, "_rest", counted)
+    monkeypatch.setattr(friction_newton, "library", lambda comm: None)
+    for seed in range(20):
+        (G, q, bilateral), results = small(700 + seed, 12, d), []
+        q[:, 0] = -np.abs(np.where(np.isinf(q[:, 0]), 1.0, q[:, 0]))
+        for large in (10**6, 1):
+            monkeypatch.setattr(friction_linear, "LARGE", large)
+            results.append(FrictionNewton().prepare(G, bilateral).solve(q, np.full(12, held), np.full(12, 0.6)))
         assert energy_norm(results[1].r - results[0].r, G) <= 1e-12 * energy_norm(results[0].r, G)
-        assert results[1].residual <= 1e-13
-    assert len(bordered) > 30
+        assert np.array_equal(results[0].stick, results[1].stick) and results[1].residual <= 1e-13
+    assert any(len(matrix) for matrix in rests)
 
 
 def test_newton_is_exact_in_few_steps_from_any_guess() -> None:

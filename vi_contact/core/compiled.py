@@ -55,7 +55,7 @@ def compiled() -> Path:
         folder.mkdir(parents=True, exist_ok=True)
         with TemporaryDirectory(dir=folder) as aside:
             made = Path(aside) / file.name
-            command += [str(SOURCE), "-o", str(made), "-lcholmod"]
+            command += [str(SOURCE), "-o", str(made), "-lcholmod", "-lm"]
             subprocess.run(command, check=True, capture_output=True, text=True)
             made.replace(file)
     return file

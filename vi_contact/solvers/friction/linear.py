@@ -1,16 +1,13 @@
-"""Solve the linear problems of semismooth Newton with friction, one with the factor of another.
+"""Solve the linear problems of semismooth Newton with friction, by whichever of two matrices is the smaller.
 
 With the rows R that must hold, r = fixed + P z and w = q + G fixed:
 
     K z = -R w,    K = R G P (+ the turns in 3D)                                                                   (1)
 
-A step begins far from its states and ends by small changes. With the factor K0 of an earlier iterate, P x the columns
-of places that were added and of slip reactions that grow otherwise, z of the places E that were dropped zero,
+Where most places are in R, the others S are fewer. With H = G⁻¹, made once, and C r = 0 what holds there, r_S zero or
+growing with its normal, K z = v is r = H (v + s) with s at S only:
 
-    K0 z0 + R0 G P x - E y = -R0 w,    R (w + G (P0 z0 + P x)) = 0 at added places,
-    Eᵀz0 = 0,                          x = z0 of its normal for slip that grows otherwise                          (2)
-
-which asks K0⁻¹ for one column per difference, once, and for the solution of a small dense problem.
+    (C H)_S s = -C H v                                                                                             (2)
 """
 
 from __future__ import annotations
@@ -21,11 +18,12 @@ import numpy as np
 from scipy.linalg import lapack
 
 from ...core.algebra import Array, Indices, Mask
-from .problem import ScaledProblem
+from .problem import ScaledDelassus, ScaledProblem
 
 KEPT = 8  # factors
 LARGE = 150  # unknowns from which (2) is faster, as measured
-SHARE = 0.125  # of them, differences up to which it is
+MOST = 0.55  # of all places, beyond which it is
+INVERTED = 3000  # unknowns up to which H is worth its memory
 
 
 class States:
@@ -58,31 +56,22 @@ class LinearProblems:
     """Solve the linear problems of one run of Newton's method. The way of solution depends on this run alone, not on
     ``kept``, the factors of the last sets of states of one G: they save time and change no digit of an answer."""
 
-    def __init__(self, G: Array, kept: dict[bytes, Factored]) -> None:
-        self._G, self._kept = G, kept
-        self._near: Bordered | None = None
-        self._bordered: set[bytes] = set()
+    def __init__(self, delassus: ScaledDelassus, kept: dict[bytes, Factored]) -> None:
+        self._delassus, self._kept = delassus, kept
         self._solved: set[bytes] = set()
 
     def solve(self, states: States, w: Array) -> Array | None:
-        """Return r; None when the problem is singular, or exact and solved before. What (2) has solved without success,
-        (1) solves once more."""
+        """Return r; None when the problem is singular, or exact and solved before."""
         if states.key in self._solved:
             return None
-        reduced, near = Reduced(states), self._near
-        z: Array | None = None
-        if near and states.exact and states.key not in self._bordered and near.serves(reduced):
-            self._bordered.add(states.key)
-            z = near.solve(reduced, w)
-        if z is None:
-            factored = self._kept.pop(states.key, None) or Factored(reduced, self._G)
-            z = factored.solve(-reduced.rows(w)) if factored.sound else None
-            if states.exact:
-                self._kept[states.key] = factored  # now the last one
-                if len(self._kept) > KEPT:
-                    del self._kept[next(iter(self._kept))]
-                self._solved.add(states.key)
-                self._near = Bordered(factored, self._G)
+        reduced = Reduced(states)
+        factored = self._kept.pop(states.key, None) or Factored(reduced, self._delassus)
+        if states.exact:
+            self._kept[states.key] = factored  # now the last one
+            if len(self._kept) > KEPT:
+                del self._kept[next(iter(self._kept))]
+            self._solved.add(states.key)
+        z = factored.solve(-reduced.rows(w)) if factored.sound else None
         return None if z is None or not np.isfinite(z).all() else np.asarray(states.fixed + reduced.columns(z))
 
 
@@ -117,13 +106,6 @@ class Reduced:
         flat[self._turned] += self._across * z[plain:, None]
         return r
 
-    def transposed(self, w: Array) -> Array:
-        """Return Pᵀ applied to rows (k, m d), where no node turns."""
-        by_node = w.reshape(len(w), *self._shape)
-        r = by_node.copy()
-        r[:, :, 0] += np.sum(by_node[:, :, 1:] * self.growth, axis=2)
-        return np.asarray(r.reshape(w.shape)[:, self.plain])
-
     def matrix(self, G: Array) -> Array:
         """Return K, made as its transpose: G is symmetric, and rows are near each other in memory."""
         places = np.concatenate([self.plain, self._turned.ravel()])
@@ -145,88 +127,44 @@ class Reduced:
 
 
 class Factored:
-    """Hold (1) of one set of states with its factor. ``sound``: K is regular."""
+    """Hold (1) of one set of states, or (2) where that is smaller, with its factor. ``sound``: it is regular."""
 
-    def __init__(self, reduced: Reduced, G: Array) -> None:
-        self.reduced = reduced
+    def __init__(self, reduced: Reduced, delassus: ScaledDelassus) -> None:
+        self.reduced, self._G, self._H = reduced, delassus.matrix, None
         self._lu: Any = None
         self.sound = True
-        if reduced.size:
-            lu, pivots, info = lapack.dgetrf(reduced.matrix(G), overwrite_a=1)
+        if LARGE <= reduced.size == len(reduced.plain) and MOST * len(self._G) < reduced.size < INVERTED:
+            self._H = delassus.inverse
+        matrix = reduced.matrix(self._G) if self._H is None else self._rest(self._H)
+        if matrix.size:
+            lu, pivots, info = lapack.dgetrf(matrix, overwrite_a=1)
             self._lu, self.sound = (lu, pivots), info == 0
 
+    def _rest(self, H: Array) -> Array:
+        """The matrix of (2)."""
+        d = 1 + self.reduced.growth.shape[1]
+        self._others = others = np.setdiff1d(np.arange(len(H)), self.reduced.plain)
+        self._normals, self._rows = others // d * d, H[others]
+        self._growth = np.insert(self.reduced.growth, 0, 0.0, axis=1).ravel()[others]
+        return np.asarray(self._rows[:, others] - self._growth[:, None] * _block(H, self._normals, others))
+
     def solve(self, right: Array) -> Array:
-        """Return K⁻¹ right, of one vector or of the columns of a matrix."""
-        return np.asarray(lapack.dgetrs(*self._lu, right)[0]) if self.reduced.size else right
+        """Return K⁻¹ right."""
+        if self._H is None:
+            return np.asarray(lapack.dgetrs(*self._lu, right)[0]) if self.reduced.size else right
+        r = self._whole(self._H, right)
+        r += self._whole(self._H, right - (self._G @ r)[self.reduced.plain])  # H is less exact than factors
+        return np.asarray(r[self.reduced.plain])
 
-
-class Bordered:
-    """Solve (2): problems near ``base``, in 2D or without slip; keeps what K0⁻¹ was applied to."""
-
-    def __init__(self, base: Factored, G: Array) -> None:
-        self._base, self._G, self.size = base, G, base.reduced.size
-        self._known: dict[int, Array] = {}  # by place, columns of E after columns of G
-        self._position = np.full(len(G), -1)
-        self._position[base.reduced.plain] = np.arange(self.size)
-
-    def _differences(self, new: Reduced) -> tuple[Indices, Indices, Indices]:
-        """Places added, nodes whose slip reaction grows otherwise, positions dropped."""
-        old = self._base.reduced
-        kept = np.zeros(len(self._G), dtype=bool)
-        kept[new.plain] = True
-        added = new.plain[self._position[new.plain] < 0]
-        other = np.flatnonzero(old.closed & new.closed & np.any(old.growth != new.growth, axis=1))
-        return added, other, np.flatnonzero(~kept[old.plain])
-
-    def serves(self, new: Reduced) -> bool:
-        """Say whether (2) is faster than a factor."""
-        limit = SHARE * self.size if self.size >= LARGE else 0.0
-        return self._base.sound and sum(len(part) for part in self._differences(new)) <= limit
-
-    def _applied(self, keys: Indices) -> Array:
-        """K0⁻¹ times columns of R0 G and, for keys beyond their number, of E."""
-        missing = [key for key in keys.tolist() if key not in self._known]
-        if missing:
-            count, plain = len(self._G), self._base.reduced.plain
-            right = np.zeros((self.size, len(missing)), order="F")
-            for i, key in enumerate(missing):
-                if key < count:
-                    right[:, i] = self._G[key, plain]
-                else:
-                    right[key - count, i] = 1.0
-            self._known.update(zip(missing, self._base.solve(right).T, strict=True))
-        return np.array([self._known[key] for key in keys.tolist()]).reshape(len(keys), self.size).T
-
-    def solve(self, new: Reduced, w: Array) -> Array | None:
-        """Return z of ``new``; None when it is singular."""
-        G, old, flat, d = self._G, self._base.reduced, w.ravel(), w.shape[1]
-        added, other, dropped = self._differences(new)
-        a, nodes = len(added), np.concatenate([added // d, other])
-        change = new.growth[nodes]
-        change[:a][added % d != 0] = 0.0
-        change[a:] -= old.growth[other]
-        grows, k = np.nonzero(change)
-        places = np.concatenate([added, nodes[grows] * d + 1 + k])
-        P = np.zeros((len(places), len(nodes)))
-        P[np.arange(a), np.arange(a)] = 1.0
-        P[a + np.arange(len(grows)), grows] = change[grows, k]
-        columns = np.hstack([self._applied(places) @ P, -self._applied(len(G) + dropped)])
-        border, corner = np.zeros((columns.shape[1], self.size)), np.zeros((columns.shape[1],) * 2)
-        border[:a] = old.transposed(G[added])
-        border[np.arange(a, len(nodes)), self._position[other * d]] = -1.0
-        border[np.arange(len(nodes), len(border)), dropped] = 1.0
-        corner[:a, : len(nodes)] = _block(G, added, places) @ P
-        corner[np.arange(a, len(nodes)), np.arange(a, len(nodes))] = 1.0
-        z = -self._base.solve(flat[old.plain])
-        right = -border @ z
-        right[:a] -= flat[added]
-        _, _, x, info = lapack.dgesv(corner - border @ columns, right)
-        if info:
-            return None
-        r = np.zeros(len(G))
-        r[old.plain] = z - columns @ x
-        r[added] = x[:a]
-        return r[new.plain]
+    def _whole(self, H: Array, v: Array) -> Array:
+        """r of (2)."""
+        full = np.zeros(len(H))
+        full[self.reduced.plain] = v
+        r = H @ full
+        if len(self._others):
+            r += lapack.dgetrs(*self._lu, self._growth * r[self._normals] - r[self._others])[0] @ self._rows
+            r[self._others] = self._growth * r[self._normals]
+        return np.asarray(r)
 
 
 def _block(G: Array, rows: Indices, columns: Indices) -> Array:

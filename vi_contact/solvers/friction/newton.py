@@ -65,17 +65,17 @@ class FrictionNewton:
 
     def _loop(self, compiled: Any, kept: Kept, step: ScaledProblem, r: Array) -> Iterated:
         history: list[float] = []
-        swept = 0
+        swept, w = 0, None
         if compiled and step.unit > 0.0:
             r, w = relaxed(compiled, step, r)
             history.append(step.residual(r, w) / step.unit)
             if step.delassus.dimension > 2 and history[0] * step.unit <= step.rounding(r):
                 return r, 1, history
         for attempt in range(ATTEMPTS if step.unit > 0.0 else 0):
-            r, done = self._newton(kept, step, r - step.w(r), history)
+            r, done = self._newton(kept, step, r - (step.w(r) if w is None else w), history)
             if done or attempt == ATTEMPTS - 1:
                 break
-            sweep, r = sweeper(step), step.admissible(r)
+            sweep, r, w = sweeper(step), step.admissible(r), None
             for _ in range(FIRST_SWEEPS * 2**attempt):
                 r, swept = sweep(r), swept + 1
         return r, len(history) + swept, history
@@ -83,7 +83,7 @@ class FrictionNewton:
     def _newton(self, kept: Kept, step: ScaledProblem, y: Array, history: list[float]) -> tuple[Array, bool]:
         """The best iterate r, and whether it solves the problem to rounding or to the tolerance."""
         best, smallest = np.zeros_like(y), step.unit
-        linear = LinearProblems(step.delassus.matrix, kept)
+        linear = LinearProblems(step.delassus, kept)
         states: States | None = None
         for _ in range(self.max_iterations):
             states = States(step, y, states)

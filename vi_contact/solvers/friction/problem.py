@@ -25,6 +25,7 @@ from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
+from scipy.linalg import lapack
 
 from ...core.algebra import Array, Mask, max_abs
 from ...core.checks import provides
@@ -169,6 +170,12 @@ class ScaledDelassus:
             scale[:, 1:] = np.mean(scale[:, 1:] ** -2.0, axis=1)[:, None] ** -0.5
         self.scale, self.bilateral, self.count, self.dimension = scale, bilateral.copy(), m, d
         self.matrix, self.norm = scaled_symmetric(G, scale.ravel())
+
+    @cached_property
+    def inverse(self) -> Array | None:
+        """Return the inverse of the matrix; None where it is not positive definite to rounding."""
+        inverse, info = lapack.dpotri(lapack.dpotrf(self.matrix, lower=1)[0], lower=1)
+        return None if info else np.tril(inverse) + np.tril(inverse, -1).T
 
     def problem(self, q: Array, cohesion: Array, slope: Array) -> ScaledProblem:
         """Return problem (1) in scaled numbers."""
