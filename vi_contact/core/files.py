@@ -143,6 +143,16 @@ def open_hdf5(path: Path) -> Any:
     return h5py.File(path, "r")
 
 
+def note(dataset: Any, **texts: str) -> None:
+    """Write texts as attributes of a new HDF5 dataset; the short way of h5py takes four times as long."""
+    from h5py import h5a, h5s, h5t, string_dtype
+
+    kind = string_dtype()
+    for name, text in texts.items():
+        made = h5a.create(dataset.id, name.encode(), h5t.py_create(kind, logical=True), h5s.create(h5s.SCALAR))
+        made.write(np.array(text, dtype=kind))
+
+
 def hdf5_atomically(path: Path, fill: Callable[[Any], None]) -> None:
     """Write an HDF5 file likewise, which need not fit the memory."""
     import h5py  # late: the package is imported without it

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from math import ceil, inf, isfinite
 from typing import Any
@@ -87,7 +88,7 @@ class StepPlan:
     parts: tuple[tuple[float, int], ...]
     halvings: int = 0
 
-    @property
+    @cached_property
     def steps(self) -> int:
         """Return the number of base steps."""
         return sum(steps for _, steps in self.parts)

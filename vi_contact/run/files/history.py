@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from ...core.algebra import Array
-from ...core.files import hdf5_atomically, open_hdf5, push, to_json, write_all, write_atomically
+from ...core.files import hdf5_atomically, note, open_hdf5, push, to_json, write_all, write_atomically
 from ...core.step import Row
 from .folder import COLUMNS, FORMAT, HISTORY_CSV, HISTORY_H5, JOURNAL
 from .stored_rows import StoredArrays, StoredRows, lines_of, read_blocks, records_of
@@ -128,7 +128,7 @@ class HistoryFiles:
         for name, (unit, meaning) in self._table.columns.items():
             sample = self._table.arrays.get(name, np.zeros(()))
             dataset = file.create_dataset(name, (self._rows, *sample.shape), sample.dtype)
-            dataset.attrs["unit"], dataset.attrs["meaning"] = unit, meaning
+            note(dataset, unit=unit, meaning=meaning)
             if sample.size:
                 found[name] = dataset
         if kept:
@@ -144,7 +144,7 @@ class HistoryFiles:
                 dataset[kept : kept + n] = block[name]
             kept += n
         for name, unit in GEOMETRY.items():
-            file.create_dataset(f"contact/{name}", data=self._geometry[name]).attrs["unit"] = unit
+            note(file.create_dataset(f"contact/{name}", data=self._geometry[name]), unit=unit)
 
     def close(self) -> None:
         """Write all rows into history.h5 and leave no journal; what cannot be written stays in the other files."""

@@ -216,7 +216,6 @@ class _Listed(Mapping[str, Callee]):
 
     def __init__(self, kind: Any) -> None:
         self._kind, self._rooms = kind, [room for room, kinds in _KINDS.items() if kind in kinds]
-        self._functions = _FUNCTIONS.get(kind, {})
 
     def _found(self, names: Sequence[str] | None = None) -> dict[str, Callee]:
         """What words with these names before the dot call; None: all."""
@@ -226,7 +225,7 @@ class _Listed(Mapping[str, Callee]):
         for room in self._rooms:
             own = room.__all__ if names is None else [name for name in names if name in room.__all__]
             found |= {one.name: one for one in _callees(room, self._kind, own)}
-        functions = self._functions.items()
+        functions = _FUNCTIONS.get(self._kind, {}).items()
         return found | {name: callee(one, name=name) for name, one in functions if names is None or name in names}
 
     @cached_property
@@ -247,8 +246,7 @@ class _Listed(Mapping[str, Callee]):
 
 
 def _callees(room: ModuleType, kind: Any, names: Sequence[str]) -> Iterator[Callee]:
-    """Yield the public classes of these names that are of this kind, and named constructors; none that needs
-    functions."""
+    """Yield the classes of these names that are of this kind, and named constructors; none that needs functions."""
     for cls in (getattr(room, name) for name in names):
         if isinstance(cls, type) and not is_protocol(cls) and not defect(cls, kind):
             made = [callee(one, name=one.__qualname__) for one in (cls, *_constructors(cls))]
