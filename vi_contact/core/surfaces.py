@@ -107,7 +107,7 @@ class ContactSurface:
         return self.comm.sum(whole).astype(np.asarray(values).dtype)
 
     def mine(self, whole: NDArray[Any]) -> NDArray[Any]:
-        """Return, of what is known of all conditions (total, …), the rows (m, …) of these."""
+        """Return the rows (m, …) of these conditions, of what is known of all (total, …)."""
         return whole if self.comm.size == 1 else whole[self.slots]
 
     def on_first(self, values: NDArray[Any]) -> Any:
