@@ -18,8 +18,6 @@ One back-substitution per step. Energy: E = ½ wᵀMw + ½ yᵀSy, and (6.5) hol
     E1 - E0 = f·(y1 - y0) - a2/dt (y1 - y0)·S (y1 - y0) - R s,      each loss >= 0 (Lemma 11)
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import count, islice

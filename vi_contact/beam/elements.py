@@ -13,8 +13,6 @@ a spring 2 E I/(17 h) on the rotation of its left node, so that h -> 0 clamps th
 theta_x(l) = 0. It is here to reproduce the source; theta_x(l) = 0 is natural and needs no special function.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -8,8 +8,6 @@ Only C dies within a few steps, as the text's negligible loss by friction and it
 for. eps is printed as 102/5, read as 10⁻²/5 = 0.002; minus signs of the initial data are lost: "moves downward".
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from ..core.checks import number

@@ -9,8 +9,6 @@ c > 0 [N/m] is the stiffness of the step, g [N] the force that would hold the ti
 eps [m] is a slip per *step*, not a speed: the rate that is rounded off is eps/dt.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Protocol

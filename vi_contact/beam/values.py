@@ -1,7 +1,5 @@
 """Describe Timoshenko beam and Kelvin-Voigt rod: coefficients and the state they start from (Ahn 2012, section 2)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

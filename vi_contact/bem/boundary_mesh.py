@@ -7,8 +7,6 @@ Displacements: continuous P1, values (2, n) (component, node). Tractions: discon
 element, end), so that a corner carries two tractions. Flattened in that order they are the unknowns of the matrices.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property

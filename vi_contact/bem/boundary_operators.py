@@ -13,8 +13,6 @@ is worse than a logarithm on a closed curve):
 in u/2 = V p - K u and p/2 = K' p - D u. For density rho: V/rho, K, rho D.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

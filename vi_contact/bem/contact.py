@@ -11,8 +11,6 @@ so that every method for the small problem and the certificate of a step serve h
 those of the body on its support, nodal forces [N/m] held during a step; traction = force / length.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property

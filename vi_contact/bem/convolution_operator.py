@@ -6,8 +6,6 @@ frequency, and a Fourier transform; nothing is marched. Answers are objects of t
 not see the difference: forces are means over steps, displacements are at the ends of steps.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -16,8 +16,6 @@ Only matrices at the frequencies s_i are formed, N/2 + 1 times two. For g held, 
 times the method's own sum of g times velocity: not negative for a passive body.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property

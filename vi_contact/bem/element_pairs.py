@@ -1,7 +1,5 @@
 """Pair boundary elements, each pair once, with the distances that decide how they are integrated."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..core.algebra import Array, Indices

@@ -13,8 +13,6 @@ F_k is the nodal force [N/m], the mean over step k. In the symmetric form the wo
 quadratic form of the history of u: the energy of the body, from boundary data alone.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

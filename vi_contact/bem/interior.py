@@ -1,7 +1,5 @@
 """Compute the displacement inside the body from the histories on its boundary: u(x) = V p - K u, in time."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

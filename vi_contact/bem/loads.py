@@ -1,7 +1,5 @@
 """Turn surface tractions into nodal forces, averaged over each time step."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Put closed loops of segments in order, turn them the right way round, check them for crossings."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..core.algebra import Array, Indices

@@ -4,8 +4,6 @@ S maps the history of boundary displacements to nodal forces. Symmetric form S =
 its space-time matrix is positive definite), unsymmetric form S = V⁻¹ (K + 1/2) (positivity not guaranteed).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol

@@ -12,8 +12,6 @@ over w about the foot of one end on the other element (rules.stretched).
 Every piece is mapped with w -> w²(3 - 2w), which makes square roots and logarithms at both ends harmless.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 

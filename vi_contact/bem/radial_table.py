@@ -10,8 +10,6 @@ and one sparse product. Panels are dyadic towards r = 0, where the functions are
 Phi_S'/r is integrated on its own), and of equal width further out, where they are like exp(-s r/c_S).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

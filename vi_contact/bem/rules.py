@@ -1,7 +1,5 @@
 """Make rules for one integral: Gauss points, substitutions that tame what happens at or close to the ends."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

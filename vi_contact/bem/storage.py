@@ -1,7 +1,5 @@
 """Keep boundary element blocks in a file (HDF5): they depend on geometry, wave speeds and time step only."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

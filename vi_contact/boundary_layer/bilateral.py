@@ -12,8 +12,6 @@ direction that the boundary's B of (20) has, so that m̄ is g_11 of the layer; (
 decide how an error in phi fades, not the motion. The bracket is the reaction along a^R [N], of either sign.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

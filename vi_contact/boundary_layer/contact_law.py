@@ -18,8 +18,6 @@ O(b) with gamma = O(b). However large the step, p̄ is unbounded as rho_1 -> 0: 
 ρ̇/rho from the velocities of the body would leave order 1.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cached_property
 

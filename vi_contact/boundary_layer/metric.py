@@ -12,8 +12,6 @@ What a point on its way through the layer is subject to can be read in two ways,
 ``Metric`` says which. All of them move M q̈ + ... = f + Aᵀ lambda, and momenta along the boundary are unchanged.
 """
 
-from __future__ import annotations
-
 from enum import Enum
 
 from .layer import Layer

@@ -15,8 +15,6 @@ e depends on s alone: e = 1 - 2/3 s + ... for small s, and tends to 1/s for larg
 the particle's own U changes s to c U/(a k V).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

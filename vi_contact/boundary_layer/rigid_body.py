@@ -11,8 +11,6 @@ The impact map, which the motion through a thin layer tends to: v⁺ = v⁻ - M�
 ½ g_11 (1 - e²) ρ̇⁻² and all momenta orthogonal to A unchanged.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -12,8 +12,6 @@ Order 2. Energy: r̄_n does the work of a potential, of the damper (never positi
 booked as contact work; what the layer holds at a time comes back when the gap opens.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary
 

@@ -1,7 +1,5 @@
 """Integrate in time from flight to layer and back, with an event at every crossing of the layer's edge rho = b."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -6,8 +6,6 @@ one, so it is the default; with ``relative`` the ground's is taken off again. In
 displacements no ground acceleration is recorded, and both are the same.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

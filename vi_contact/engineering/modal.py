@@ -1,7 +1,5 @@
 """Find the lowest natural frequency of a system, for choosing excitations and time steps."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..core.checks import instance, whole

@@ -1,7 +1,5 @@
 """List peak values of histories as a tidy table, and follow loops of a force over a deformation with their work."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass
 from pathlib import Path

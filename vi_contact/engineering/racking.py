@@ -1,7 +1,5 @@
 """Measure the racking of a frame: the shear of four corner points, which no rigid rotation changes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

@@ -11,8 +11,6 @@ force, T points to the right, and N acts at the distance e to the right of the c
 ``height`` the height of its line of action above the centre. Positions are those of the undeformed body.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol

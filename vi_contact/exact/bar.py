@@ -9,8 +9,6 @@ forces and energies per unit of section. Methods take arrays x in [0, length] an
 velocity, strain or pressure jumps they return one of the two values.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import ClassVar

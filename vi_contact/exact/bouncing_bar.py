@@ -13,8 +13,6 @@ quadratics, so that the solution is exact to round-off. A periodic motion costs 
 number multiplies with every bounce, a thousand or so after five.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import lru_cache

@@ -5,8 +5,6 @@ ignore each other but for the friction of the base. Tractions, impulses and ener
 Methods take arrays y and t >= 0 whose shapes broadcast.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

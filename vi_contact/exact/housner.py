@@ -9,8 +9,6 @@ When theta passes zero, angular momentum about the new edge is conserved: |theta
 e = 1 - (3/2) sin²(alpha). Angles [rad], times [s], accelerations [m/s²].
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

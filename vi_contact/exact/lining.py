@@ -14,8 +14,6 @@ with A = -G gamma/2, B = 0 in the soil. It tends to the usual formulas for thin 
 and supposes that soil and lining do not part: with full slip that needs a pressure beforehand.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

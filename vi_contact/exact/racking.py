@@ -8,8 +8,6 @@ E/(1-nu²) takes the place of E. R belongs to a frame in the full space without 
 by up to 15 % (verification S3.4).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ..core.checks import attributes

@@ -11,8 +11,6 @@ rock, p [Pa] the pressure of the layer on the wall for a body force rho a toward
 The two-dimensional theory of elasticity gives thrusts 2 to 6 % off (verification S3.3).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -5,8 +5,6 @@
 u [m] is the displacement of the block relative to the base, a [m/s²] the horizontal acceleration of the base.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

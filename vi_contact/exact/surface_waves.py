@@ -3,8 +3,6 @@
 The dashpots are those of Lysmer and Kuhlemeyer, sigma_n = -rho c_P v_n and tau = -rho c_S v_t.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

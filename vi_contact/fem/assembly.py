@@ -6,8 +6,6 @@ integrated over the mesh times the section's thickness. Prescribed displacements
 so M, C, K are Pᵀ(·)P and the load gets -Pᵀ(K U + C U' + M U'').
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Check what a body is assembled of: kinds of objects, groups of this mesh, conditions that do not contradict."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Iterator, Sequence
 from itertools import combinations

@@ -1,7 +1,5 @@
 """Offer collective operations, communicators that last, and what frees PETSc objects that wait on them."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -3,8 +3,6 @@
 Their numbers are local ones of one mesh. On another mesh, or taken for those of cells, they would name other places.
 """
 
-from __future__ import annotations
-
 from typing import Any, cast
 
 from dolfinx.mesh import Mesh

@@ -12,8 +12,6 @@ the finite element solution because x itself is a displacement of the space, ∫
 on level ground minus m g times the height h_c of its centre of mass, so that the energy changes by -½ m g h_c theta².
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -5,8 +5,6 @@ recognised on each rank by the vertices of their members, numbered as in the inp
 groups as it likes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path

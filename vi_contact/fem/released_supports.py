@@ -9,8 +9,6 @@ so that u_0, its stresses and its contact are an equilibrium of the new problem 
 (INTERFACE_SSI_STATIC) and Abaqus (*GEOSTATIC).
 """
 
-from __future__ import annotations
-
 import logging
 from dataclasses import replace
 

@@ -8,8 +8,6 @@ layered soil exactly and send every other wave through: what leaves on the right
 Source: Zienkiewicz, Bicanic and Shen (1988); compared with others by Kontoe et al. (2007).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Prepare records by the usual steps in the usual order, the last of which scales them to a measure."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Shake a body with a recorded ground motion."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ..core.checks import instance

@@ -1,7 +1,5 @@
 """Measure how strong a record is: peaks, Arias intensity, durations, what spectra say; and tell what it holds."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

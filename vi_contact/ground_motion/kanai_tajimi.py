@@ -1,7 +1,5 @@
 """Make stochastic motions: white noise filtered by the ground (Kanai-Tajimi), without long periods (Clough-Penzien)."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -3,8 +3,6 @@
 Every function returns a new value and notes what it did. Between samples the acceleration is a straight line.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from fractions import Fraction

@@ -7,8 +7,6 @@ the peak of a vibration is at most 1 - cos(pi/64) = 0.12 % low. After its last s
 vibration that follows counts.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

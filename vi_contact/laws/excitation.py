@@ -7,8 +7,6 @@ acceleration of the ground; in the frame that moves with the ground it loads the
 vertical motion together are a sequence of excitations.
 """
 
-from __future__ import annotations
-
 import math
 from bisect import bisect_right
 from collections.abc import Sequence

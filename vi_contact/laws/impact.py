@@ -14,8 +14,6 @@ impact loss are therefore to be read together: what the step took beyond the col
 here is a nodal law; on a fine mesh it has no macroscopic effect.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol

@@ -6,8 +6,6 @@ Renard 2008; Hager, Hüeber and Wohlmuth 2008), the semi-discrete problem has a 
 contact forces are those of the waves alone.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

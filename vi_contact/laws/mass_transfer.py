@@ -8,8 +8,6 @@ best, weighted with their entries w_J of the mass matrix:
 so that every rigid motion is kept exactly. In 1D it is the velocity of the neighbour.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

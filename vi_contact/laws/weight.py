@@ -1,7 +1,5 @@
 """Make the weight of a body a load on its unknowns."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

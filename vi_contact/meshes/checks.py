@@ -5,8 +5,6 @@ Which way round the vertices of a cell run does not matter (finite elements use 
 of a facet do.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from vi_contact.core.algebra import Array

@@ -4,8 +4,6 @@ Two bodies that may part need nodes of their own on either side. A mesh of one g
 conforming there, gets them by `CutOpen`; bodies meshed one by one have them already.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any

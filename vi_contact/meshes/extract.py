@@ -4,8 +4,6 @@ DOLFINx's own readers fail on node tags that do not start at 1, on facets in two
 nothing of them is used. Vertices stay in Gmsh's order here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path

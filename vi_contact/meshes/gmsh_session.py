@@ -1,7 +1,5 @@
 """Run a quiet, reproducible Gmsh for the length of a with-block, and in it build a mesh and write it."""
 
-from __future__ import annotations
-
 import ctypes
 import inspect
 import os

@@ -3,8 +3,6 @@
 A script that says which ``grids`` it is made of needs no Gmsh to become arrays, only to be written as a file.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import permutations

@@ -5,8 +5,6 @@ decides by the name of a file, else by the first word in it, and it runs FILE.op
 read only if its first bytes are those of Gmsh's own format, and from a copy called mesh.msh, alone in a new folder.
 """
 
-from __future__ import annotations
-
 import mmap
 import re
 import shutil

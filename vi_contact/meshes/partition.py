@@ -4,8 +4,6 @@ Graph partitioners give smaller interfaces but, in parallel, another answer on e
 that.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

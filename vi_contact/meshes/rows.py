@@ -1,7 +1,5 @@
 """Handle rows of vertices: the sides of cells, and which rows have the same members."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

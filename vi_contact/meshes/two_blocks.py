@@ -4,8 +4,6 @@ Physical groups of a body called "lower": cells "lower"; boundary "lower_left", 
 "lower_bottom", "lower_top" (y), "lower_back", "lower_front" (z).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any

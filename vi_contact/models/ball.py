@@ -4,8 +4,6 @@ It flies down along -y without gravity and strikes the plane with its lowest poi
 model are a quarter of the ball's: times ``QUARTERS`` they compare with those of ``vi_contact.exact.hertz``.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 from typing import Any

@@ -4,8 +4,6 @@ In 2D and 3D it is a strip or a column with nu = 0 and free sides, in which the 
 energies divided by ``section`` compare with those of ``vi_contact.exact``.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Take the boundary of a plane finite element mesh as a mesh of boundary elements, the same on all ranks."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

@@ -1,8 +1,6 @@
 """Set up four examples of Aimi, Di Credico and Gimperlein (2024) with boundary elements: numpy and scipy only, data of
 square, disk and embedded have for finite elements."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial

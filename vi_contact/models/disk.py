@@ -4,8 +4,6 @@ No weight and no other load: once released, the disk flies up with a constant ve
 stays horizontal and moves by s(t); the gap of a point of the disk is its height above the plane, y + u_y - s(t).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field

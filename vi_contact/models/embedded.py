@@ -5,8 +5,6 @@ which is clamped at its bottom: contact on floor and walls of the notch, without
 sub-meshes with nodes of their own, welded along their common sides (the transmission interfaces of the source).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any

@@ -10,8 +10,6 @@ where Housner's has phi = theta/alpha and p²: for b/h = 0.2, angles 1.3 % large
 The restitution e = 1 - (3/2) sin²(alpha) is Housner's: the mass matrix knows the true moments of inertia.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace

@@ -3,8 +3,6 @@
 The whole base is in possible contact and free to lift and slide; the run starts from the gravity stage.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any

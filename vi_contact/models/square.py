@@ -4,8 +4,6 @@ A uniform pressure acts on the top of [-a/2, a/2]², the bottom is in possible c
 at rest for t <= 0. In the source's units: c_P = 1, c_S = 1/2, rho = 1, side 1, pressure 0.1 from t = 0 on.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field

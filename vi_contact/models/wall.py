@@ -3,8 +3,6 @@
 What the source leaves open is marked CHOSEN and explained in the documentation (docs/start/first_wall.md).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any

@@ -3,8 +3,6 @@
 A run that writes fields (``fields=fem.XDMF(every=...)``) and records ``Contact()`` leaves all that is needed there.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -3,8 +3,6 @@
 matplotlib is imported late, and its state is left alone: neither the user's backend nor his settings change.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any

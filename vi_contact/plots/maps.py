@@ -1,7 +1,5 @@
 """Draw maps of contact quantities over position and time, for surfaces that are lines: straight, bent or U-shaped."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

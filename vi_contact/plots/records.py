@@ -1,7 +1,5 @@
 """Draw ground motions, response spectra and a target, transfer functions, loops of force and deformation."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Draw one page about a run, from the files in its folder: facts, input motion, histories, contact, energies, peaks."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path

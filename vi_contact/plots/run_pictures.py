@@ -1,8 +1,6 @@
 """Draw the pictures of a run beside its page, from its folder alone: ground motion, displacements, energy, certificate,
 contact; of the buried channel its interface and a film too."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

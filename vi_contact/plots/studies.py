@@ -1,8 +1,6 @@
 """Draw what the studies compute: rod and beam as Figs. 8.1 to 8.9 of Ahn (2012), the impact of a particle on a boundary
 layer as Fig. 1 of the paper on b-geometry (ENOC 2017), incremental dynamic analyses as intensity over demand."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Hold what schemes share: two families of them, the step in displacements, and what does not suit their contact."""
 
-from __future__ import annotations
-
 import logging
 
 from ..core.algebra import Array, EffectiveMatrix, Mask

@@ -18,8 +18,6 @@ from step to step for ever, so schemes put it right once, at the start; the ener
 mesh size, and the history starts after it.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

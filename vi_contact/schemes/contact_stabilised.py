@@ -22,8 +22,6 @@ Sources: Deuflhard, Krause and Ertel, Int. J. Numer. Meth. Engng 73 (2008) 1274-
 Comput. Methods Appl. Mech. Engng 180 (1999) 1-26.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

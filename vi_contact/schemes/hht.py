@@ -11,8 +11,6 @@ highest frequency of the mesh: docs/guide/schemes.md has numbers.
 Source: Hilber, Hughes and Taylor, Earthquake Eng. Struct. Dyn. 5 (1977) 283-292.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ..core.checks import between

@@ -16,8 +16,6 @@ Impulses: those over a contact with free flight before and after are the change 
 Source: Houbolt, J. Aeronaut. Sci. 17 (1950) 540-550; as a member of eqs. 11a,b: docs/reference/sources.md [1].
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 from .linear_multistep import LinearMultistep

@@ -13,8 +13,6 @@ since contact nodes need their mass here. Impulses: dt r̄_n is the change of mo
 Source: Kane, Repetto, Ortiz and Marsden, Comput. Methods Appl. Mech. Eng. 180 (1999) 1-26.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 from .zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor

@@ -25,8 +25,6 @@ Sources: Moreau in Nonsmooth Mechanics and Applications (Springer 1988), 1-82; J
 177 (1999) 235-257; the range of theta: Acary, ZAMM 96 (2016) 585-603. The bound of separating points is ours.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 

@@ -20,8 +20,6 @@ Source: Newmark, J. Eng. Mech. Div. ASCE 85 (1959) 67-94; Krenk, Comput. Methods
 (2006) 6110-6124.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ..core.problem import ContactProblem

@@ -10,8 +10,6 @@ order 2 at theta1 = ½. Energy: as the midpoint rule at theta1 = theta2 = ½; di
 Source: Zienkiewicz, Wood and Taylor, in the form with two weights: docs/reference/sources.md [2].
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -14,8 +14,6 @@ not ring. On consistent mass this is Newmark(¼, ½), which gains energy in ever
 warning. Source: Khenous, Laborde and Renard, Eur. J. Mech. A 27 (2008) 918-932.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 
 from ..core.algebra import Array, EffectiveMatrix

@@ -13,8 +13,6 @@ loads, damping and contact, and contact with gap >= 0 at the end of the step nev
 midpoint rule, SS22(½, ½) and Newmark(¼, ½) in (u, v). No accelerations are stored, so nothing restarts after an impact.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ..core.algebra import Array, EffectiveMatrix

@@ -5,8 +5,6 @@ between the steps, as in the schemes' own averages of them, so that a load made 
 motion with the same weights as the run's own u and v.
 """
 
-from __future__ import annotations
-
 from bisect import bisect_right
 from collections.abc import Callable, Iterator
 from dataclasses import replace

@@ -10,8 +10,6 @@ marched with the run's scheme. Waves that a structure sends out leave through th
 held: for a gravity stage put the sides on rollers, then ``release`` them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any

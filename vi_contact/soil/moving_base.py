@@ -12,8 +12,6 @@ So do MoreauJean and ContactStabilisedNewmark, whose contact looks at velocities
 Source: seismic practice, prescribed base; a base moved by (u, v, a) integrated otherwise drifts against its inertia.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import ClassVar

@@ -8,8 +8,6 @@ and with damping C = alpha M + beta K the stresses get beta times those of the v
 elements does whose sides move together, to the last digit: linear elements of such a strip have no other motion.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

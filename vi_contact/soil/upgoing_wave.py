@@ -5,8 +5,6 @@ profile holds what came back down and is of no use here without deconvolution. W
 expects the *within* motion, a compliant base the *upgoing* one (Mejia and Dawson 2006).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..core.algebra import Array

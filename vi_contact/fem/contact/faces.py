@@ -5,8 +5,6 @@ smooth node has one face, a node at an edge two, at a corner in space three. Nor
 those of the facets of this face. Facets are gathered on every rank only round nodes where they may turn so far.
 """
 
-from __future__ import annotations
-
 import logging
 from dataclasses import dataclass, replace
 from typing import Any

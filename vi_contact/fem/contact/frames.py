@@ -6,8 +6,6 @@ are Q f̂ then, and u = T û with T = Q⁻ᵀ: Q itself, unless directions of th
 directions has the unit vector along its edge as the third. A rank holds the conditions of its own nodes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import permutations

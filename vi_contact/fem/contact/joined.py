@@ -1,7 +1,5 @@
 """Join several contact surfaces of one system: more than one pair of bodies, pairs and obstacles, corners."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any

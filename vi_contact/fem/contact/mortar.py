@@ -15,8 +15,6 @@ Then every linear field is matched exactly (P x_2 = x_1 on fitting sides) and a 
 Engrg. 194 (2005); dual functions of partly covered segments: Cichosz and Bischoff, ibid. 200 (2011).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar

@@ -10,8 +10,6 @@ and the work of a reaction on ǔ is that of the pair of forces r on side 1 and -
 n is the outward normal of side 1, from side 1 to side 2. Displacements are small: nobody's partner changes.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Make contact conditions of facets of a mesh: nodal normals, weights, gaps and the rotated basis."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace

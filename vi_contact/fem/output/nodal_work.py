@@ -5,8 +5,6 @@ the absolute acceleration and f their loads. For a nodal field r, rᵀq is a num
 (K r)ᵀu + (C r)ᵀv + (M r)ᵀa - rᵀf: three sparse products a step, however many cells there are.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable, Sequence
 from functools import partial

@@ -1,7 +1,5 @@
 """Record reactions of prescribed boundaries: base shear and overturning moment."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

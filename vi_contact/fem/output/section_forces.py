@@ -1,7 +1,5 @@
 """Record section forces N, V, M of straight cuts through the elements of walls and slabs, along lines of the mesh."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

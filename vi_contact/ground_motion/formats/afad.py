@@ -1,7 +1,5 @@
 """Read text files of AFAD (Türkiye): "KEY : value" lines, then three columns N-S, E-W, U-D in gal."""
 
-from __future__ import annotations
-
 from ...core.errors import InputError
 from ..record import Record
 from .text import TextFile

@@ -6,8 +6,6 @@ line `*** Begin data ***`, the time step standing only in a sentence. Any number
 short and lack its line end.
 """
 
-from __future__ import annotations
-
 import re
 from itertools import pairwise
 

@@ -6,8 +6,6 @@ Lines starting with "#" and empty lines are skipped; columns are separated by bl
 that ends in `*** Begin data ***` is skipped too. The units are never guessed.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -7,8 +7,6 @@ real number 34 of its header. Without a stated format it is (8F10.3). Samples ar
 Velocities and displacements are skipped.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass

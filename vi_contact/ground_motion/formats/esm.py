@@ -3,8 +3,6 @@
 One value a line. Read DATA_LICENSE and DATA_CITATION, kept in the notes, before passing a record on.
 """
 
-from __future__ import annotations
-
 import re
 from itertools import takewhile
 

@@ -4,8 +4,6 @@ Acceleration = count x "Scale Factor", written as 3920(gal)/6182761. The counts 
 is removed, as the agency does before it prints "Max. Acc.". NIED forbids passing these files on.
 """
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Read a record file of any known format; the format is recognised by content, never by the file's name."""
 
-from __future__ import annotations
-
 import math
 import os
 

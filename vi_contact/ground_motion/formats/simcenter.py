@@ -5,8 +5,6 @@
 missing. The unit of acceleration is not stated in such files.
 """
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

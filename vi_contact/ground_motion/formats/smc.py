@@ -5,8 +5,6 @@ starting with "|"; the samples, 8 a line in columns of 10 that touch, so they ar
 first integer and the first real are the marks of an undefined value (-32768 and 1.7E38).
 """
 
-from __future__ import annotations
-
 import re
 
 from ...core.errors import InputError

@@ -5,8 +5,6 @@ comma, or with two commas in one word, commas separate. With semicolons between 
 Europe write them, they are decimal. Nobody can tell in any other case.
 """
 
-from __future__ import annotations
-
 import hashlib
 import math
 import os

@@ -1,7 +1,5 @@
 """Record files for other programs: two columns, PEER AT2, OpenSees path series."""
 
-from __future__ import annotations
-
 import os
 
 from ...core.errors import InputError

@@ -4,8 +4,6 @@ The figures' data are not in the text: what is assumed is marked CHOSEN. Between
 base and right wall; the two bottom corners touch with both their sides.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Describe what stands at the two ends and at the bottom of the soil layer around a channel."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Protocol

@@ -6,8 +6,6 @@ reaction there. To look at the signs costs no product, and to go on from a known
 solves for the correction.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -5,8 +5,6 @@ stiffness k = scale / compliance, leaves its unknown free and adds k to the diag
 reaction is k (x - bound). An infinite bound is never closed. Arrays have one entry for each condition of this rank.
 """
 
-from __future__ import annotations
-
 import zlib
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Say in one sentence why a step has no answer: how far it came, what stopped it, and what helps."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from ...core.errors import StepFailure

@@ -6,8 +6,6 @@ that the step predicts: A x - b at a predicted x is no contact force. In the end
 reactions are put on their cone, and tangents that stick where they were.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...core.algebra import Array, Comm, Mask, largest, max_abs

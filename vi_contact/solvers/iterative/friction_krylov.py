@@ -10,8 +10,6 @@ which gives M⁻¹ the diagonal of (A + kappa)⁻¹ across the slip, where 1/g i
 point that cannot turn. About half of the diagonal of A is what its neighbours leave a node of stiffness.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

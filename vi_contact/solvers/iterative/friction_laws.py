@@ -9,8 +9,6 @@ of the r_n found last: Tresca problems, which are convex (Nečas, Jarušek and H
 1980). A law that weakens steeply goes back to the coefficients of rest, and climbs for more rounds than before.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...core.algebra import Array

@@ -5,8 +5,6 @@ all of it (SBAIJ): it takes a third of the time. Prescribed components are no un
 others would break the blocks: it gets them back here as unknowns that are always held at zero.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any

@@ -1,7 +1,5 @@
 """Measure an iterate as the certificate of the step will (``core.verify``), with reductions of a few numbers."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

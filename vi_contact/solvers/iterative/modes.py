@@ -1,7 +1,5 @@
 """Make rigid body modes in the unknowns of the equations: turned into the nodal frames, relative at two bodies."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Apply A, and the springs of closed points, to what PETSc hands over."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

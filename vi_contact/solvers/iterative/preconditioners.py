@@ -10,8 +10,6 @@ contact open; its interpolation is kept, and only the Galerkin products are rene
 contact set has moved since.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -9,8 +9,6 @@ times (tetrahedra) the Courant number c_p dt / h of the trapezoidal rule, infini
 neither cells nor materials.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...core.algebra import EffectiveMatrix

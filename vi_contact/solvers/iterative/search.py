@@ -10,8 +10,6 @@ not come right, and the set changes there and then. In the end F is formed afres
 last digit that the certificate sees.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

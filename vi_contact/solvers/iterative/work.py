@@ -1,7 +1,5 @@
 """Count what an iterative solver has done: products with A, their processor time, renewals of the preconditioner."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -13,8 +13,6 @@ at every set it completes. No such set can return: it ends, in practice after ab
 (Murty's single exchanges, the other finite fallback, took up to 1000 changes where this one took 150.)
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -9,8 +9,6 @@ reactions take back, because s carries no digits of the gap: min ½ sᵀD s over
 is (49) up to the constant ½ x_freeᵀ D x_free.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -13,8 +13,6 @@ number. The unit is the violation of r = 0: the largest -q_i d_i (|q_i| d_i in b
 resolve. Gaps that are far from closing do not enter it: a wide gap does not blunt the certificate of a narrow one.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -11,8 +11,6 @@ r_n / scale of the spring is a further unknown, and the bound is on w,
 The spring unknowns of a rank follow its body unknowns. Contact arrays (m,) are of the conditions that this rank owns.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

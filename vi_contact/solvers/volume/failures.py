@@ -3,8 +3,6 @@
 PETSc 3.25 has other names for some reasons and other words for some errors; both are settled here.
 """
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

@@ -9,8 +9,6 @@ friction, every other starts from the solution before, its sliding points on the
 one factorisation. A law that depends on the slip rate makes this a sequence of such sequences: ``friction.slip_rate``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any

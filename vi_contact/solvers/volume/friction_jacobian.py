@@ -1,7 +1,5 @@
 """Build the Jacobian of a step with friction: H = A x_ref/r_ref, B_t, and in 3D what lambda and gamma make of it."""
 
-from __future__ import annotations
-
 import weakref
 from typing import Any
 

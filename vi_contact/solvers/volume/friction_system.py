@@ -22,8 +22,6 @@ end by luck. So SNES sees, with the diagonal c of A and E the residual of the bo
 whose signs after a projection say how far the unknown had gone beyond: the rule of the primal-dual active set method.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

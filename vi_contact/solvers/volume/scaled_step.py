@@ -5,8 +5,6 @@ handed z / x_ref and (A z - b) / r_ref instead, with powers of two for x_ref and
 any system of units and scaling loses no digit: a bound stays exactly a bound.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

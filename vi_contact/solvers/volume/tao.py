@@ -4,8 +4,6 @@ TAO's tolerances and trust regions are absolute, which the scaled step makes har
 are replaced by ``ScaledStep.verdict``.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
