@@ -82,7 +82,7 @@ class Reduced:
     """
 
     def __init__(self, states: States) -> None:
-        m, d = self._shape = states.fixed.shape
+        m, d = self.shape = states.fixed.shape
         places = np.arange(m * d).reshape(m, d)
         self.closed, self._turning = states.closed, states.turning
         self.plain = np.concatenate([places[states.closed, 0], places[states.stick, 1:].ravel()])
@@ -99,7 +99,7 @@ class Reduced:
 
     def columns(self, z: Array) -> Array:
         """Return P z (m, d)."""
-        r = np.zeros(self._shape)
+        r = np.zeros(self.shape)
         flat, plain = r.ravel(), len(self.plain)
         flat[self.plain] = z[:plain]
         r[:, 1:] += self.growth * r[:, :1]
@@ -112,8 +112,8 @@ class Reduced:
         part = _block(G, self.plain, places)
         growth = self.growth[self.closed]  # of the first rows of part
         grows = np.flatnonzero(growth.any(axis=1))
-        for k in range(self._shape[1] - 1):
-            tied = np.flatnonzero(self.closed)[grows] * self._shape[1] + 1 + k
+        for k in range(self.shape[1] - 1):
+            tied = np.flatnonzero(self.closed)[grows] * self.shape[1] + 1 + k
             part[grows] += growth[grows, k, None] * _block(G, tied, places)
         if not len(self._turned):
             return part.T
@@ -142,10 +142,11 @@ class Factored:
 
     def _rest(self, H: Array) -> Array:
         """The matrix of (2)."""
-        d = 1 + self.reduced.growth.shape[1]
-        self._others = others = np.setdiff1d(np.arange(len(H)), self.reduced.plain)
-        self._normals, self._rows = others // d * d, H[others]
-        self._growth = np.insert(self.reduced.growth, 0, 0.0, axis=1).ravel()[others]
+        growth, left = np.zeros(self.reduced.shape), np.ones(len(H), dtype=bool)
+        growth[:, 1:], left[self.reduced.plain] = self.reduced.growth, False
+        self._others = others = np.flatnonzero(left)
+        self._normals, self._rows = others // growth.shape[1] * growth.shape[1], H[others]
+        self._growth = growth.ravel()[others]
         return np.asarray(self._rows[:, others] - self._growth[:, None] * _block(H, self._normals, others))
 
     def solve(self, right: Array) -> Array:

@@ -102,7 +102,7 @@ class FrictionNewton:
 
 
 def relaxed(compiled: Any, step: ScaledProblem, r: Array) -> tuple[Array, Array]:
-    """Return r and w = q + G r after compiled sweeps."""
+    """Return r and w = q + G r after compiled sweeps; in 2D, where both are a start only, w as the sweeps left it."""
     r, w = np.array(r, order="C"), np.array(step.w(r), order="C")
     of, arrays = step.delassus, (step.delassus.matrix, step.cohesion, step.slope, step.delassus.bilateral)
     at = [ctypes.c_void_p(array.ctypes.data) for array in (*arrays, r, w)]
@@ -112,4 +112,4 @@ def relaxed(compiled: Any, step: ScaledProblem, r: Array) -> tuple[Array, Array]
         if of.dimension > 2 and not EPS * max_abs(r) < change <= FALL * before:
             break
         before = change
-    return r, step.w(r)
+    return r, w if of.dimension == 2 else step.w(r)
