@@ -120,7 +120,7 @@ class Cholmod:
     def solve(self, b: np.ndarray) -> np.ndarray:
         """A⁻¹ b."""
         x = b.copy()
-        self.factor._library.substitute(self.factor._factor, 0, contact_last._at(x))  # CHOLMOD_A
+        self.factor._library.substitute(self.factor._factor, 0, 1, contact_last.at(x))  # CHOLMOD_A
         return x
 
 

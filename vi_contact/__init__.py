@@ -36,6 +36,7 @@ _CONTENTS = {
     "run.simulate": ("simulate",),
     "run.solution": ("Solution",),
     "run.march": ("march",),
+    "run.march_many": ("march_many",),
     "run.static": ("quasi_static", "static_equilibrium"),
     "run.time_steps": ("HalvedAtImpact", "Schedule"),
     "run.recorders": ("Contact", "Energy", "Probe"),

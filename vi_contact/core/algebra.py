@@ -164,6 +164,12 @@ class EffectiveMatrix:
                 self.__dict__.setdefault("factor", self._last[1])
         return self._last[1]
 
+    def factorised_as(self, other: EffectiveMatrix) -> EffectiveMatrix:
+        """Return this matrix with the factors of another, whose entries are the same."""
+        self._last = other._last
+        self.__dict__ |= {"factor": other.factor} if other.factorised else {}
+        return self
+
     @cached_property
     def factor(self) -> Factor:
         """Return the one factorisation of A."""

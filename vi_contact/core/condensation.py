@@ -44,18 +44,18 @@ class Last:
         self.flexibility[np.ix_(there, there)] = np.tril(inverse) + np.tril(inverse, -1).T
 
     def free(self, b: Array) -> Array:
-        """Return x_c (k,) of A⁻¹b."""
+        """Return x_c (k,) of A⁻¹b; of several loads, a row for each."""
         self._y = self._factor.forward(b)
-        self._x = np.zeros(len(self.there))
-        self._x[self._free] = self._factor.free(self._y)
+        self._x = np.zeros((*b.shape[:-1], len(self.there)))
+        self._x.T[self._free] = self._factor.free(self._y).T
         return self._x
 
     def answer(self, r: Array, held: Mask, values: Array) -> Array:
         """Return x = A⁻¹(b - r), owned rows, with ``held`` unknowns (k,) on these values: it removes round-off only."""
-        x, there = self._x[self._free], self._free
+        x, there = self._x.T[self._free].T, self._free
         if np.count_nonzero(r):
-            x = self._factor.free(self._y - self._factor.reduced(r[there]))
-        return self._factor.backward(np.where(held[there], values[there], x))
+            x = self._factor.free(self._y - self._factor.reduced(r.T[there].T))
+        return self._factor.backward(np.where(held.T[there].T, values.T[there].T, x))
 
     def response(self, r: Array) -> Array:
         """Return A⁻¹ r, owned rows, of forces r (k,)."""

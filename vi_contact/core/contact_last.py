@@ -5,6 +5,8 @@
 
 L_cc L_ccᵀ is A condensed onto c (the Schur complement), so its inverse is the block c of A⁻¹, and any x_c that contact
 asks for may be put in between the two substitutions: with it the rest is in equilibrium.
+
+Loads, answers and contact values may also be of several runs, a row for each: L is then read once for eight of them.
 """
 
 from __future__ import annotations
@@ -23,6 +25,7 @@ from .algebra import Array, Indices
 
 FORWARD, BACKWARD = 4, 5  # CHOLMOD_L and CHOLMOD_Lt of cholmod.h
 FEW_ROWS = 5_000  # below, minimum degree fills as little as METIS, in a quarter of the time
+AT_ONCE = 8  # loads that are substituted together
 SHORT_COLUMNS = 120.0  # entries of L a column: 2D has fewer, and is substituted column by column, 3D by supernodes
 
 
@@ -43,25 +46,27 @@ class ContactLast:
         self._inner = inner = self.rows - len(last)
         self._order = _order(library, A, np.asarray(last))
         factor = _factorise(library, A, self._order)
-        self._y = np.zeros(self.rows)
+        self._y, self._many = np.zeros(self.rows), np.zeros(0)
         self._c = self._y[inner:]
         self.corner: Array = np.zeros((len(last), len(last)), order="F")
         entries = library.columns(factor, inner, None, None, None, None)
         self._columns: tuple[NDArray[Any], ...] = ()
         if entries <= SHORT_COLUMNS * max(inner, 1):
             starts, rows, values = np.empty(inner + 1, np.int64), np.empty(entries, np.int32), np.empty(entries)
-            library.columns(factor, inner, _at(starts), _at(rows), _at(values), _at(self.corner))
+            library.columns(factor, inner, at(starts), at(rows), at(values), at(self.corner))
             library.release(factor)
             self._columns = starts, rows, values
-            self._arguments = (inner, _at(starts), _at(rows), _at(values), _at(self._y))
+            self._arguments = (inner, at(starts), at(rows), at(values), at(self._y))
         else:
-            library.columns(factor, inner, None, None, None, _at(self.corner))
+            library.columns(factor, inner, None, None, None, at(self.corner))
             self._factor = factor
             weakref.finalize(self, library.release, factor)
         self.bytes = 12.0 * entries + 8.0 * self.corner.size
 
     def forward(self, b: Array) -> Array:
         """Return y_c of the load b; y_i is kept for ``backward``. Collective."""
+        if b.ndim == 2:
+            return self._forward_many(b)
         (b if self._whole is None else self._whole(b)).take(self._order, out=self._y, mode="clip")
         if self._columns:
             self._library.forward(*self._arguments)
@@ -72,6 +77,8 @@ class ContactLast:
     def backward(self, x_c: Array) -> Array:
         """Return x, the owned entries, whose contact unknowns are exactly x_c and the others in equilibrium with them
         under the load of the last ``forward``."""
+        if x_c.ndim == 2:
+            return self._backward_many(x_c)
         if self._columns:
             self._c[:] = x_c
             self._library.backward(*self._arguments)
@@ -89,19 +96,54 @@ class ContactLast:
 
     def free(self, y_c: Array) -> Array:
         """Return x_c = L_cc⁻ᵀ y_c."""
+        if y_c.ndim == 2:
+            return _by_corner(blas.dtrsm, self.corner, y_c, trans=1)
         return np.asarray(blas.dtrsv(self.corner, y_c, lower=1, trans=1)) if len(y_c) else y_c
 
     def reduced(self, r_c: Array) -> Array:
         """Return L_cc⁻¹ r_c, by which a force on the contact unknowns changes y_c."""
+        if r_c.ndim == 2:
+            return _by_corner(blas.dtrsm, self.corner, r_c)
         return np.asarray(blas.dtrsv(self.corner, r_c, lower=1)) if len(r_c) else r_c.copy()
 
     def solve(self, b: Array) -> Array:
         """Return A⁻¹ b. Collective."""
         return self.backward(self.free(self.forward(b)))
 
-    def _substitute(self, system: int) -> None:
-        if self._library.substitute(self._factor, system, _at(self._y)):
+    def _substitute(self, system: int, y: Array | None = None) -> None:
+        y = self._y if y is None else y
+        if self._library.substitute(self._factor, system, y.size // self.rows, at(y)):
             raise MemoryError("CHOLMOD has no memory left for a substitution")
+
+    def _forward_many(self, b: Array) -> Array:
+        """y_c (k, m) of loads (k, rows), on one rank."""
+        if not self._columns:
+            self._many = np.take(b, self._order, axis=1)
+            self._substitute(FORWARD, self._many)
+            return self._many[:, self._inner :].copy()
+        room = self.rows * AT_ONCE * (1 + len(b) // AT_ONCE)
+        if self._many.size != room:
+            self._many = np.empty(room)
+            self._constant = (self.rows, *self._arguments[:-1], at(self._order))
+        y_c, b = np.empty((len(b), len(self._c))), np.ascontiguousarray(b)
+        self._library.forward_many(len(b), *self._constant, at(b), at(self._many), at(y_c))
+        return self.reduced(y_c)
+
+    def _backward_many(self, x_c: Array) -> Array:
+        x, x_c = np.empty((len(x_c), self.rows)), np.ascontiguousarray(x_c)
+        if self._columns:
+            self._library.backward_many(len(x), *self._constant, at(x_c), at(self._many), at(x))
+            return x
+        self._many[:, self._inner :] = _by_corner(blas.dtrmm, self.corner, x_c, trans=1)
+        self._substitute(BACKWARD, self._many)
+        self._many[:, self._inner :] = x_c
+        x[:, self._order] = self._many
+        return x
+
+
+def _by_corner(routine: Any, corner: Array, rows: Array, trans: int = 0) -> Array:
+    """What a routine of BLAS makes of the triangle and of every row."""
+    return np.asarray(routine(1.0, corner, rows.T, lower=1, trans_a=trans).T) if rows.size else rows.copy()
 
 
 def _order(library: Any, A: sp.csr_matrix, last: Indices) -> NDArray[np.int32]:
@@ -112,14 +154,14 @@ def _order(library: Any, A: sp.csr_matrix, last: Indices) -> NDArray[np.int32]:
     among, found = np.full(len(inner), -1, dtype=np.int32), np.empty(len(rows), dtype=np.int32)
     among[rows] = np.arange(len(rows))
     for way in (dissect, False):  # a CHOLMOD without METIS has minimum degree
-        if not library.order(len(inner), _at(A.indptr), _at(A.indices), _at(among), way, _at(found)):
+        if not library.order(len(inner), at(A.indptr), at(A.indices), at(among), way, at(found)):
             return np.concatenate([rows[found], last]).astype(np.int32)
     raise ArithmeticError("CHOLMOD cannot order the matrix")
 
 
 def _factorise(library: Any, A: sp.csr_matrix, order: NDArray[np.int32]) -> Any:
     made = ctypes.c_void_p()
-    arrays = (_at(one) for one in (A.indptr, A.indices, A.data, order))
+    arrays = (at(one) for one in (A.indptr, A.indices, A.data, order))
     if not np.isfinite(A.data).all() or library.factorise(len(order), *arrays, ctypes.byref(made)):
         raise ArithmeticError("CHOLMOD cannot factorise the matrix")
     return made
@@ -134,6 +176,6 @@ def _readable(A: sp.csr_matrix) -> sp.csr_matrix:
     return made if made.has_sorted_indices else made.sorted_indices()
 
 
-def _at(array: NDArray[Any]) -> ctypes.c_void_p:
-    """Where an array lies in memory."""
+def at(array: NDArray[Any]) -> ctypes.c_void_p:
+    """Return where an array lies in memory."""
     return ctypes.c_void_p(array.ctypes.data)

@@ -47,14 +47,32 @@ class ContactProblem:
 
     @cached_property
     @stage("mass")
-    def equations(self) -> SemiDiscreteSystem:
-        """Return the system that schemes see: in the rotated basis, with the inertia loads -M r a_g(t)."""
+    def unshaken(self) -> SemiDiscreteSystem:
+        """Return the system in the rotated basis, with the mass law in it, without excitation."""
         system = self.turned
         if self.mass is not None:
             system = self.mass.apply(system, self.surface, tangential=self.frictional)
-        system = self._relative(system)
+        return self._relative(system)
+
+    @cached_property
+    def equations(self) -> SemiDiscreteSystem:
+        """Return the system that schemes see: in the rotated basis, with the inertia loads -M r a_g(t)."""
+        system = self.unshaken
         ways = ((np.asarray(one.direction, dtype=float), one.acceleration) for one in self.excitations)
-        return system.with_load(*((-system.inertia(direction), history) for direction, history in ways))
+        shaken = system.with_load(*((-system.inertia(direction), history) for direction, history in ways))
+        return system.loaded(shaken.load)
+
+    def beside(self, other: ContactProblem) -> ContactProblem | None:
+        """Return the same problem with the matrices of another one, and the factors made of them; None where these are
+        not its own: for another system, surface, mass or impact law, or friction where the other has none."""
+        ours, theirs = ((one.system, one.surface, one.frictional) for one in (self, other))
+        if any(a is not b for a, b in zip(ours, theirs, strict=True)):
+            return None
+        if (self.mass, self.impact) != (other.mass, other.impact):
+            return None
+        made = replace(self)
+        made.__dict__["unshaken"] = other.unshaken
+        return made
 
     @cached_property
     def static_load(self) -> SemiDiscreteSystem:

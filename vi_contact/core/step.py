@@ -83,8 +83,8 @@ class StepProblem:
     rate_factor: float = 0.0
 
     def __post_init__(self) -> None:
-        rows, conditions = len(self.guess), self.surface.count
-        if (len(self.b), len(self.bound), len(self.active)) != (rows, conditions, conditions):
+        rows, conditions = self.guess.shape[-1], self.surface.count
+        if (self.b.shape[-1], len(self.bound), self.active.shape[-1]) != (rows, conditions, conditions):
             raise InputError(f"StepProblem has {len(self.b)} loads for {rows} unknowns, {len(self.bound)} bounds and a "
                              f"contact set of {len(self.active)} for {conditions} conditions: give one of each")
 
@@ -137,7 +137,8 @@ class Scheme(Protocol):
 
     One whose contact condition is on velocities says ``penetrates = True``: states of its own runs may lie inside the
     obstacle, and it goes on from them. A scheme is a value without state of its own: what it carries from step to step
-    is in ``State.memory``, so that a checkpoint holds all of it.
+    is in ``State.memory``, so that a checkpoint holds all of it. One that says ``by_rows = True`` steps several runs at
+    once: ``step`` and ``finish`` then also get vectors as rows, (k, n) and (k, m), and return them.
     """
 
     @property
@@ -196,7 +197,8 @@ class Scheme(Protocol):
 
 
 class PreparedSolver(Protocol):
-    """Solve steps with one effective matrix and one surface; what ``Solver.prepare`` returns."""
+    """Solve steps with one effective matrix and one surface; what ``Solver.prepare`` returns. One with ``solve_many``
+    answers several at once (``solvers.condensed``)."""
 
     def solve(self, step: StepProblem) -> StepResult:
         """Return x, reactions and closed conditions of ``step``, whose A, surface and scale are those it was made for.

@@ -143,12 +143,12 @@ class ContactSurface:
         return replace(self, comm=SerialComm(), slots=np.arange(self.total), **arrays)
 
     def normal_values(self, x: Array) -> Array:
-        """Return B_n x, shape (m,)."""
-        return np.asarray(x[self.owned])
+        """Return B_n x, shape (m,); rows (k, m) of rows (k, n), as in all these products with B."""
+        return np.asarray(x[self.owned] if x.ndim == 1 else x.take(self.owned, -1))
 
     def tangential_values(self, x: Array) -> Array:
         """Return B_t x, shape (m, d - 1), zero where the tangent is prescribed."""
-        return np.where(self.tangents >= 0, x[self.tangents], 0.0)
+        return np.where(self.tangents >= 0, x.take(self.tangents, -1), 0.0)
 
     def slip(self, u: Array, t: float) -> Array:
         """Return the tangential displacements on the obstacle (m, d - 1) [m], those of open points too."""
@@ -157,11 +157,11 @@ class ContactSurface:
 
     def reaction_load(self, r_n: Array, rows: int, r_t: Array | None = None) -> Array:
         """Return B_nᵀ r_n + B_tᵀ r_t: the owned part of the contact reaction on the unknowns [N]."""
-        load = np.zeros(rows)
-        load[self.owned] = r_n
+        load = np.zeros((*r_n.shape[:-1], rows))
+        load.T[self.owned] = r_n.T
         if r_t is not None:
             free = self.tangents >= 0
-            load[self.tangents[free]] = r_t[free]
+            load.T[self.tangents[free]] = r_t[..., free].T
         return load
 
     def gap(self, t: float) -> Array:

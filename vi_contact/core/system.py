@@ -41,7 +41,7 @@ class Space(Protocol):
         ...
 
 
-KEPT = {"M": 5, "C": 4, "K": 2}  # products with each: what a step and the next one may ask for again
+KEPT = {"M": 5, "C": 4, "K": 2, "load": 2}  # products with each: what a step and the next one may ask for again
 PAIR = "give pairs of a vector [N] and a function of the time"
 
 
@@ -154,6 +154,7 @@ class SemiDiscreteSystem:
     absolute: bool = False
     companions: tuple[Companion, ...] = ()
     _cache: dict[str, Any] = field(init=False, default_factory=dict, compare=False, repr=False)
+    _products: dict[str, Remembered] = field(init=False, default_factory=dict, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         for name in ("M", "K") if self.C is None else ("M", "K", "C"):
@@ -189,20 +190,17 @@ class SemiDiscreteSystem:
 
     def product(self, name: str, x: Array) -> Array:
         """Return M x, C x or K x, read-only; made once for each of the last frozen vectors (core.products)."""
-        found: Array = (self._cache.get(name) or self._remembered(name))(x)
-        return found
+        return (self._products.get(name) or self._remembered(name))(x)
 
     def _remembered(self, name: str) -> Remembered:
-        matrix = getattr(self, name)
-        found: Remembered = self.cached(name, lambda: Remembered(matrix.__matmul__, KEPT[name]))
-        return found
+        function = self.load if name == "load" else getattr(self, name).__matmul__
+        return self._products.setdefault(name, Remembered(function, KEPT[name]))
 
     def load_at(self, t: float) -> Array:
         """Return f(t), read-only; made once for each of the last two times, unless something is marched beside it."""
         if self.companions:
             return self.load(t)
-        found: Array = (self._cache.get("loads") or self.cached("loads", lambda: Remembered(self.load, 2)))(float(t))
-        return found
+        return (self._products.get("load") or self._remembered("load"))(float(t))
 
     def rates(self, u0: Array, u1: Array, v0: Array, v1: Array, dt: float) -> tuple[Array, Array]:
         """Return (u1 - u0)/dt and (v1 - v0)/dt; the products C and M of them are made of those with their ends."""
@@ -239,6 +237,12 @@ class SemiDiscreteSystem:
     def with_load(self, *terms: tuple[Array, Callable[[float], float]]) -> SemiDiscreteSystem:
         """Return the same system with separable loads vector * history(t) added."""
         return self.changed(load=replace(self.load, separable=self.load.separable + terms))
+
+    def loaded(self, load: Load) -> SemiDiscreteSystem:
+        """Return the same system under another load in its basis, with the factors of this one."""
+        other = self.changed(load=load)
+        object.__setattr__(other, "_cache", self._cache)
+        return other
 
     def inertia(self, direction: Array) -> Array:
         """Return M r: the force [N] that accelerates body and prescribed nodes by one in this direction (d,)."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +31,29 @@ def kkt_residual(step: StepProblem, result: StepResult) -> Certificate:
         gap += surface.compliance * r_n / step.scale
         closed, signed = closed | surface.bilateral, (gap[~surface.bilateral], r_n[~surface.bilateral])
     maxima = _maxima(step, residual, step.b, Ax, x, step.guess, r_n, gap[closed], r_n[~closed], signed=signed)
+    return _judged(step, result, maxima)
+
+
+def kkt_residuals(
+    many: StepProblem, result: StepResult, steps: Sequence[StepProblem], results: Sequence[StepResult]
+) -> list[Certificate]:
+    """Return the certificate of each of several steps on one rank: ``many`` and ``result`` hold their rows."""
+    surface, x, r_n = many.surface, result.x, result.r_n
+    Ax = many.A.image(x)
+    residual = Ax - many.b + surface.reaction_load(r_n, x.shape[-1], result.r_t)
+    gap, held, closed = many.bound - surface.normal_values(x), surface.bilateral, result.active
+    if not surface.plain:
+        gap += surface.compliance * r_n / many.scale
+        closed = closed | held
+    lowest = [np.where(held, 0.0, np.minimum(one, 0.0)) for one in (gap, r_n)]
+    small = np.abs([r_n, np.where(closed, gap, 0.0), np.where(closed, 0.0, r_n), *lowest]).max(-1, initial=0.0)
+    large = [np.maximum(one.max(-1), -one.min(-1)) for one in (residual, many.b, Ax, x, many.guess)]
+    rows = np.concatenate([large, small]).T.tolist()
+    return [_judged(*row) for row in zip(steps, results, rows, strict=True)]
+
+
+def _judged(step: StepProblem, result: StepResult, maxima: list[float]) -> Certificate:
+    """The certificate, of the largest sizes in its definitions."""
     residual_max, b_max, Ax_max, x_max, guess_max, r_max, apart, open_force, behind, pull = maxima
     x_ref, r_ref = max(x_max, guess_max), max(b_max, r_max)
     cone, dissipation = _friction_residuals(step, result, x_ref, r_ref)

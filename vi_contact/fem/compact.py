@@ -66,6 +66,8 @@ class Replaced(PetscMatrix):
         return aij_of(both[order], self.stored.comm)
 
     def __matmul__(self, x: Array) -> Array:
+        if x.ndim == 2:
+            return self._rows_by(x)
         y = self._base @ x
         y[self._rows] = super().__matmul__(x)
         return y

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
 from typing import Any
 from weakref import WeakValueDictionary
 
@@ -14,7 +15,7 @@ from ..core.algebra import Array, Factor, Indices, Mask, Matrix, identity_with, 
 from ..core.contact_last import ContactLast
 from ..core.errors import InputError
 from .communicators import MpiComm, give_back
-from .copied_factor import contact_last
+from .copied_factor import contact_last, product_of_rows
 from .petsc_rows import aij_of, rows_of
 
 PREFIX = "vi_contact_factor_"
@@ -64,9 +65,15 @@ class PetscMatrix:
         return _ENTRY * float(self.stored.getInfo(PETSc.Mat.InfoType.LOCAL)["nz_allocated"])
 
     def __matmul__(self, x: Array) -> Array:
+        if x.ndim == 2:
+            return self._rows_by(x)
         self._in[:] = x
         self.stored.mult(self._x, self._y)
         return self._out.copy()
+
+    @cached_property
+    def _rows_by(self) -> Callable[[Array], Array]:
+        return product_of_rows(self)
 
     def transpose_apply(self, x: Array) -> Array:
         self._out[:] = x

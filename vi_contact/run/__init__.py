@@ -9,6 +9,7 @@ _CONTENTS = {
     "cross_check": ("CrossChecked", "cross_check"),
     "files.reading": ("RunFolder", "read_run"),
     "march": ("march",),
+    "march_many": ("march_many",),
     "method": ("with_defaults",),
     "recorders": ("Contact", "Energy", "Probe"),
     "simulate": ("simulate",),

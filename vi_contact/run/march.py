@@ -48,9 +48,12 @@ class March:
         dt: the length of this step [s]. halved: attempts that were thrown away.
     """
 
-    def __init__(self, method: Method, step_plan: StepPlan, state: State, base: int = 0, halved: int = 0) -> None:
+    def __init__(
+        self, method: Method, step_plan: StepPlan, state: State, base: int = 0, halved: int = 0,
+        prepared: dict[float, tuple[EffectiveMatrix, CertifiedSolver]] | None = None,
+    ) -> None:
         self._method, self._step_plan, self._state = method, step_plan, state
-        self._prepared: dict[float, tuple[EffectiveMatrix, CertifiedSolver]] = {}
+        self._prepared = prepared or {}
         self.base, self.halved, self.ended, self.dt = base, halved, True, float("nan")
 
     def __iter__(self) -> Iterator[tuple[State, Report]]:

@@ -28,6 +28,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -45,6 +46,8 @@ SLACK = 1e-12  # round-off in the conditions of stability
 class AlphaStep(BalanceStep, ABC):
     """Step by the module's equations, with the weights of a member. Its memory is "a" (the acceleration),
     "reaction" (Bᵀr at the same end) and "of" (alpha_m, alpha_f and t they belong to)."""
+
+    by_rows: ClassVar[bool] = True
 
     @property
     @abstractmethod
@@ -100,7 +103,7 @@ class AlphaStep(BalanceStep, ABC):
         v, a = self._known(state, dt)
         v += w.gamma / (w.beta * dt) * result.x
         a += result.x / (w.beta * dt**2)
-        reaction = problem.surface.reaction_load(result.r_n, len(v), result.r_t)
+        reaction = problem.surface.reaction_load(result.r_n, v.shape[-1], result.r_t)
         memory = {"a": massless_take(problem, 0.0, a), "reaction": reaction, "of": self._mark(step.t)}
         v = massless_take(problem, (result.x - state.u) / dt, v)
         return State(step.t, step.k, result.x, v, result.r_n, result.active, memory, result.r_t)

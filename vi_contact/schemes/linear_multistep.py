@@ -21,6 +21,7 @@ Impulses: those over a contact with free flight before and after are the change 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -43,6 +44,8 @@ class LinearMultistep(BalanceStep):
 
     InputError for unequal lengths, b[0] = 0, or inconsistent operators (they must be exact for u = 1, t and t²).
     """
+
+    by_rows: ClassVar[bool] = True
 
     a: tuple[float, ...]
     b: tuple[float, ...]
@@ -157,7 +160,7 @@ class LinearMultistep(BalanceStep):
         (v_known, a_known), (by_v, by_a) = self._known(levels, dt), self._factors(dt)
         v = massless_take(problem, (result.x - state.u) / dt, v_known + by_v * result.x)
         a = massless_take(problem, 0.0, a_known + by_a * result.x)
-        reaction = problem.surface.reaction_load(result.r_n, len(v), result.r_t)
+        reaction = problem.surface.reaction_load(result.r_n, v.shape[-1], result.r_t)
         newest = {"a_0": a, "reaction_0": reaction, "dt": state.memory["dt"], "t": np.array([step.t])}
         return State(step.t, step.k, result.x, v, result.r_n, result.active, levels | newest, result.r_t)
 

@@ -11,6 +11,7 @@ Source: Zienkiewicz, Wood and Taylor, in the form with two weights: docs/referen
 """
 
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -25,6 +26,8 @@ from .base import SingleStep, means, position_step, stepped
 @dataclass(frozen=True)
 class SS22(SingleStep):
     """Step by the module's equations. InputError unless theta2 >= theta1 >= ½ (else only conditionally stable)."""
+
+    by_rows: ClassVar[bool] = True
 
     theta1: float = 0.5
     theta2: float = 0.5

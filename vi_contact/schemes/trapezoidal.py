@@ -15,6 +15,7 @@ warning. Source: Khenous, Laborde and Renard, Eur. J. Mech. A 27 (2008) 918-932.
 """
 
 from dataclasses import dataclass, field, replace
+from typing import ClassVar
 
 from ..core.algebra import Array, EffectiveMatrix
 from ..core.checks import provides
@@ -29,6 +30,8 @@ from .consistent_data import equilibrated, massless_take
 @dataclass(frozen=True)
 class Trapezoidal:
     """Step by the module's equations. ``mass``: the mass matrix for problems that do not name one."""
+
+    by_rows: ClassVar[bool] = True
 
     mass: MassLaw = field(default_factory=Redistributed)
 

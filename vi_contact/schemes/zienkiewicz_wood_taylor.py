@@ -14,6 +14,7 @@ midpoint rule, SS22(½, ½) and Newmark(¼, ½) in (u, v). No accelerations are 
 """
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from ..core.algebra import Array, EffectiveMatrix
 from ..core.checks import between
@@ -25,6 +26,8 @@ from .base import SingleStep, means, position_step, stepped
 @dataclass(frozen=True)
 class ZienkiewiczWoodTaylor(SingleStep):
     """Step by the module's equations. ``phi`` in [½, 1]: InputError below ½, where the step is unstable."""
+
+    by_rows: ClassVar[bool] = True
 
     phi: float = 0.5
 

@@ -9,6 +9,7 @@ docs/guide/solvers.md.
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -77,9 +78,17 @@ class Chosen:
 
     def solve(self, step: StepProblem) -> StepResult:
         """Return the answer of the chosen route. Collective."""
+        return self._chosen(step).solve(step)
+
+    def solve_many(self, many: StepProblem, steps: Sequence[StepProblem]) -> Any:
+        """Return the answers of the chosen route to several runs; None where it has none."""
+        together = getattr(self._chosen(many), "solve_many", None)
+        return None if together is None else together(many, steps)
+
+    def _chosen(self, step: StepProblem) -> PreparedSolver:
         if self._prepared is None:
             route = self._rule.route(step.A.matrix, step.surface, step.slip0 is not None)
             if step.surface.comm.rank == 0:
                 log.info("Automatic: %s for %d contact points", type(route).__name__, step.surface.total)
             self._prepared = route.prepare(*self._given)
-        return self._prepared.solve(step)
+        return self._prepared

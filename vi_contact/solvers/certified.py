@@ -40,6 +40,11 @@ class CertifiedSolver:
         self._prepared: dict[int, PreparedSolver] = {}
         self._get(0)
 
+    @property
+    def first(self) -> PreparedSolver:
+        """Return the solver that is tried first."""
+        return self._get(0)
+
     def _get(self, rank: int) -> PreparedSolver:
         """The solver of that rank of escalation, prepared when first needed."""
         if rank not in self._prepared:

@@ -13,10 +13,14 @@ Tangential unknowns that are prescribed carry no reaction: their rows are replac
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 
 from ...core.algebra import Array, Mask
 from ...core.condensation import Condensation
+from ...core.errors import ViContactError
 from ...core.step import StepProblem
 from ...core.surfaces import ContactSurface
 from .problem import FrictionMethod, FrictionResult
@@ -29,15 +33,20 @@ class CondensedFriction:
     def __init__(
         self, method: FrictionMethod, condensed: Condensation, surface: ContactSurface, *, rates: RateIteration
     ) -> None:
-        self._surface, self._rates, self._condensed = surface, rates, condensed
+        self._surface, self._rates, self.condensed = surface, rates, condensed
         self.delassus, d = condensed.flexibility, 1 + surface.tangents.shape[1]
         fixed = np.flatnonzero(~condensed.there)
         self.delassus[fixed, fixed] = self.delassus.diagonal()[fixed // d * d]
         self._small = method.prepare(self.delassus, surface.everywhere(surface.bilateral))
 
     def solve(self, step: StepProblem, rigid: Mask) -> tuple[Array, FrictionResult]:
-        """Return x and the reactions of a step; points on a rigid support that are closed are put on their bound, those
-        that stick where they were, which removes round-off only."""
+        """Return x and the reactions of a step."""
+        found, held, places = self.reactions(step, self.condensed.free(step.b), rigid)
+        return self.condensed.answer(found.r.ravel(), held, places), found
+
+    def reactions(self, step: StepProblem, free: Array, rigid: Mask) -> tuple[FrictionResult, Mask, Array]:
+        """Return the reactions for contact unknowns that would be ``free``, and where they are put: closed points on
+        a rigid support on their bound, those that stick where they were, which removes round-off only."""
         surface, law = self._surface, step.friction
         assert step.slip0 is not None
         none = np.zeros(surface.count)
@@ -45,12 +54,26 @@ class CondensedFriction:
         cohesion, slope = rest.limit(none, surface.weights, step.scale), rest.slope(surface.weights)
         given = surface.everywhere(np.column_stack([step.bound, step.slip0, cohesion, slope, step.active]))
         places, (cohesion, slope, closed) = given[:, :-3], given[:, -3:].T
-        q = places - self._condensed.free(step.b).reshape(places.shape)
+        q = places - free.reshape(places.shape)
         found = self._reactions(step, q, cohesion, slope, closed > 0.0, fixed=rest is law)
         held = np.repeat(found.stick[:, None], places.shape[1], axis=1)
         held[:, 0] = (found.r[:, 0] != 0.0) & rigid
         held &= found.r.any()
-        return self._condensed.answer(found.r.ravel(), held.ravel(), places.ravel()), found
+        return found, held.ravel(), places.ravel()
+
+    def solve_many(self, many: StepProblem, steps: Sequence[StepProblem], rigid: Mask) -> tuple[Array, list[Any]]:
+        """Return the same of several steps, x by rows; what one raises takes the place of its reactions."""
+        free = self.condensed.free(many.b)
+        nothing, found = np.zeros(len(self.condensed.there)), list[Any]()
+        rows = [(nothing, nothing > 0.0, nothing)] * len(steps)
+        for row, step in enumerate(steps):
+            try:
+                small, held, places = self.reactions(step, free[row], rigid)
+                rows[row] = small.r.ravel(), held, places
+                found.append(small)
+            except ViContactError as error:
+                found.append(error)
+        return self.condensed.answer(*map(np.stack, zip(*rows, strict=True))), found
 
     def _reactions(
         self, step: StepProblem, q: Array, cohesion: Array, slope: Array, active: Mask, *, fixed: bool

@@ -14,14 +14,18 @@ at every set it completes. No such set can return: it ends, in practice after ab
 """
 
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 from scipy.linalg import lapack
 
 from ...core.algebra import Array, Mask, lowest
 from ...core.checks import attributes
-from .lcp import Found, PreparedLCP, ScaledLCP, cholesky, failure, scaled_dense
+from ...core.errors import ViContactError
+from .lcp import EPS, Found, LCPResult, PreparedLCP, ScaledLCP, cholesky, failure, scaled_dense
 
+EXCHANGES = 4  # of several runs together, before each goes on alone
+KEPT = 256  # factors of sets that they share
 PATIENCE = 10  # Júdice and Pires, Comput. Oper. Res. 21, 1994
 
 
@@ -132,6 +136,62 @@ class _Sets:
         return (cut, gap + self._scaled.matrix @ cut) if (cut != r).any() else (r, w)
 
 
+class ManySets:
+    """Solve the problems of several gaps with one G: rows on the same set are solved together, and the first exchanges
+    are those of ``ActiveSet``, which goes on with the others one by one."""
+
+    def __init__(self, prepared: PreparedLCP) -> None:
+        self._prepared, self._method = prepared, cast(ActiveSet, prepared.method)
+        self._kept: dict[bytes, _Factor] = {}
+
+    def solve(self, q: Array, guess: Mask) -> list[LCPResult | ViContactError]:
+        """Return the answers to the rows of q with these guesses (k, m), or what they raise."""
+        scaled, limit = self._prepared.scaled, 4.0 * EPS * self._prepared.scaled.norm
+        gap, held, free = q * scaled.scale, scaled.bilateral, scaled.unilateral
+        unit = np.abs(np.minimum(gap, 0.0) if free else np.where(held, gap, np.minimum(gap, 0.0))).max(1, initial=0.0)
+        r, changes, left = np.zeros_like(gap), [0] * len(q), np.flatnonzero(unit != 0.0)
+        active, gap = (guess[left] & (gap[left] < np.inf)) | held, gap[left]
+        for change in range(EXCHANGES):
+            if not len(left):
+                break
+            r_i, w_i = self._on_sets(active, gap)
+            signs, least = np.where(active, r_i, w_i), np.minimum(r_i, w_i)
+            if not free:
+                signs[:, held], least[:, held] = 0.0, w_i[:, held]
+            wrong = signs < -limit * np.abs(r_i).max(1)[:, None]
+            again = wrong.any(1)
+            good = ~again & (np.where(active, signs, 0.0).min(1) >= 0.0)
+            good &= np.abs(least).max(1) <= self._method.tolerance * unit[left]
+            for row, found, other in zip(left.tolist(), good.tolist(), again.tolist(), strict=True):
+                changes[row] = change if found else change + 1 if other else -1
+            r[left[good]] = r_i[good]
+            left, active, gap = left[again], active[again] ^ wrong[again], gap[again]
+        for row in left.tolist():
+            changes[row] = -1
+        closed, r = (r > 0.0) | held, r * scaled.scale
+        return [LCPResult(r[row], closed[row], count, 0.0, self._method) if count >= 0
+                else self._searched(q[row], guess[row]) for row, count in enumerate(changes)]
+
+    def _on_sets(self, active: Mask, gap: Array) -> tuple[Array, Array]:
+        alike: dict[bytes, list[int]] = {}
+        for row, key in enumerate(map(bytes, active)):
+            alike.setdefault(key, []).append(row)
+        r, w = np.empty_like(gap), np.empty_like(gap)
+        for key, rows in alike.items():
+            if key not in self._kept:
+                if len(self._kept) >= KEPT:
+                    self._kept.clear()
+                self._kept[key] = _Factor(active[rows[0]], self._prepared.scaled.matrix)
+            r[rows], w[rows] = self._kept[key].solve(gap[rows])
+        return r, w
+
+    def _searched(self, q: Array, guess: Mask) -> LCPResult | ViContactError:
+        try:
+            return self._prepared.solve(q, guess)
+        except ViContactError as error:
+            return error
+
+
 class _Factor:
     """Cholesky factor of G_aa of one set, and the rows of G that carry its reactions to all gaps."""
 
@@ -142,13 +202,13 @@ class _Factor:
         self._lower = cholesky(self._rows[:, self._index]) if self._index.size else None
 
     def solve(self, gap: Array) -> tuple[Array, Array]:
-        """r (m,) with r = 0 off the set, and w = gap + G r.
+        """r (m,) with r = 0 off the set, and w = gap + G r; rows of both for rows of gaps.
 
         No iterative refinement: the residual of Cholesky is at rounding level already (measured gain below a factor 2
         for conditions up to 1e10).
         """
-        r = np.zeros(gap.size)
+        r = np.zeros(gap.shape)
         if self._lower is None:
             return r, gap.copy()
-        r[self._index] = part = lapack.dpotrs(self._lower, -gap[self._index], lower=1)[0]
-        return r, gap + part @ self._rows
+        r.T[self._index] = part = lapack.dpotrs(self._lower, -gap.T[self._index], lower=1)[0]
+        return r, gap + part.T @ self._rows

@@ -1,0 +1,116 @@
+#!/usr/bin/env python3
+"""What a step costs when several runs are marched together, as a multiple of the step of a run alone.
+
+    python3 benchmarks/many_runs.py [--sizes 2e3] [--rounds 5] [--json FILE]
+
+The wall of step_cost.py, all of its right side in possible contact, under harmonic motions of different amplitude and
+frequency: ``march_many`` of k runs beside k times ``march``, in turn. ``cost_ratio``: processor time per run and step
+over that of single runs; set-up is in neither. ``worst_difference``: of a step from the single step that begins with
+the same state, in u and v over their largest entries.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ[name] = "1"
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+import numpy as np  # noqa: E402
+from mpi4py import MPI  # noqa: E402
+
+import vi_contact as vc  # noqa: E402
+from vi_contact.models.wall import Wall, build  # noqa: E402
+
+SCHEME = vc.ZienkiewiczWoodTaylor(phi=0.5)
+WALLS = {216: (8, 12), 2e3: (26, 39), 2e4: (82, 123)}
+STEPS = {216: 200, 2e3: 120, 2e4: 24}
+RUNS = (1, 2, 4, 8, 16)
+CHECKED = 8  # steps that are made once more, alone, of two runs
+
+
+def problems(size: float, count: int) -> tuple[list[vc.ContactProblem], float]:
+    """Runs of one wall, and their time step."""
+    model = build(Wall(divisions=WALLS[size]), MPI.COMM_SELF, base_inertia="catalogue")
+    one = model.problem("face")
+    motions = (replace(one.excitation, amplitude=0.5 + 0.1 * k, frequency=one.excitation.frequency * (1.0 + 0.05 * k))
+               for k in range(count))
+    return [replace(one, excitation=motion) for motion in motions], model.time_step()
+
+
+def seconds_per_step(loop: Iterator[Any], count: int) -> float:
+    """Processor time of a step, after the first of each run, in which everything is set up."""
+    for _ in range(count):
+        next(loop)
+    begin, steps = time.thread_time(), 0
+    for _ in loop:
+        steps += 1
+    return (time.thread_time() - begin) / steps
+
+
+def measured(size: float, rounds: int) -> list[dict[str, Any]]:
+    """The rows of one size."""
+    every, dt = problems(size, max(RUNS))
+    steps = STEPS[size]
+    rows = []
+    for count in RUNS:
+        chosen = every[:count]
+        ways: dict[str, Callable[[], list[Iterator[Any]]]] = {
+            "alone": lambda chosen=chosen: [vc.march(one, scheme=SCHEME, dt=dt, steps=steps) for one in chosen[:4]],
+            "together": lambda chosen=chosen: [vc.march_many(chosen, scheme=SCHEME, dt=dt, steps=steps)],
+        }
+        found: dict[str, list[float]] = {name: [] for name in ways}
+        for _ in range(rounds):
+            for name, made in ways.items():
+                each = 1 if name == "alone" else count
+                found[name].append(float(np.mean([seconds_per_step(loop, each) for loop in made()])))
+        alone, together = (min(found[name]) for name in ways)
+        rows.append({
+            "unknowns": len(every[0].equations.u0), "runs": count, "cost_ratio": together / alone,
+            "worst_difference": difference(chosen, dt, steps), "seconds_per_step": together,
+            "seconds_per_single_step": alone,
+        })
+        print(line(rows[-1]), flush=True)
+    return rows
+
+
+def difference(chosen: list[vc.ContactProblem], dt: float, steps: int) -> float:
+    """Largest difference of steps from the single steps that begin with the same states."""
+    worst, every = 0.0, max(steps // CHECKED, 1)
+    for number, report in vc.march_many(chosen, scheme=SCHEME, dt=dt, steps=steps):
+        if report.new.k % every == 0 and number < 2:
+            alone, _ = next(vc.march(chosen[number], scheme=SCHEME, dt=dt, steps=1, state=report.old))
+            for ours, theirs in ((report.new.u, alone.u), (report.new.v, alone.v)):
+                worst = max(worst, float(np.abs(ours - theirs).max() / np.abs(theirs).max()))
+    return worst
+
+
+def line(row: dict[str, Any]) -> str:
+    """A row of the table."""
+    return (f"{row['unknowns']:>8} {row['runs']:>5} {1e6 * row['seconds_per_step']:>14.0f} "
+            f"{1e6 * row['seconds_per_single_step']:>10.0f} {row['cost_ratio']:>6.2f} {row['worst_difference']:>11.1e}")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--sizes", type=float, nargs="+", default=list(WALLS), choices=list(WALLS))
+    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--json", type=Path, help="write the rows into this file")
+    options = parser.parse_args()
+    print(f"{'unknowns':>8} {'runs':>5} {'us/run + step':>14} {'alone us':>10} {'ratio':>6} {'difference':>11}")
+    rows = [row for size in options.sizes for row in measured(size, options.rounds)]
+    if options.json:
+        options.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

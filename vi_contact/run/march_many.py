@@ -1,0 +1,76 @@
+"""March many: several runs of one body at once, which differ in what shakes it, how it rubs and where it starts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from ..core.checks import several
+from ..core.errors import InputError, ViContactError
+from ..core.problem import ContactProblem
+from ..core.state_checks import initial_state
+from ..core.step import Report, Scheme, Solver, State
+from ..solvers.certified import TOLERANCE
+from .method import checked_method, with_defaults
+from .time_steps import TimeSteps, step_plan
+from .together import Together, grouped
+
+
+def march_many(
+    problems: Sequence[ContactProblem], *, scheme: Scheme | None = None, solver: Solver | None = None, dt: TimeSteps,
+    steps: int | Sequence[int] | None = None, t_end: float | Sequence[float] | None = None,
+    states: Sequence[State | None] | None = None, escalation: Sequence[Solver] = (), tolerance: float = TOLERANCE,
+) -> Iterator[tuple[int, Report | ViContactError]]:
+    """Yield (number of the run, report) after every certified step, a step of each run in turn.
+
+    A run that fails yields its error, last; the others go on. ``steps`` or ``t_end``: one for all, or one for each run,
+    as ``states``, None for that of the system; everything else as of ``march``, of which each run takes the steps.
+
+    Runs step together, which reads every matrix once for eight of them, when their problems have the same system and
+    surface objects, and equal mass and impact laws: ``dataclasses.replace(problem, excitation=…)``; when all of them
+    have friction or none; and are at the same time. One whose record ends, or whose step needs the escalation, leaves
+    the others and goes on alone. Alone from the beginning go runs on several MPI ranks, with HalvedAtImpact, with
+    motions that are marched beside (``soil``), with schemes that do not say ``by_rows`` (ContactStabilisedNewmark,
+    MoreauJean), with other solvers than Condensed() of ActiveSet(), or of any method for friction, and without CHOLMOD.
+    """
+    given = several("march_many", "problems", problems, "give a list of ContactProblems")
+    every = [list(_each(name, value, len(given))) for name, value in
+             (("steps", steps), ("t_end", t_end), ("states", states))]
+    runs: list[Together] = []
+    for problem, count, end, state in zip(given, *every, strict=True):
+        problem, scheme = with_defaults(problem, scheme)
+        shared = next((one for run in runs if (one := problem.beside(run.method.problem)) is not None), problem)
+        method = checked_method("march_many", shared, scheme, (solver, escalation), dt, steps=count, t_end=end,
+                                state=state, tolerance=tolerance)
+        state = initial_state(method.problem) if state is None else state
+        plan = step_plan(dt, count, end, state.t)
+        runs.append(Together(method, plan, scheme.start(method.problem, state, plan.dt(0))))
+    grouped(runs)
+    return _in_turn(runs)
+
+
+def _each(name: str, value: Any, count: int) -> Sequence[Any]:
+    """One value for each run."""
+    if not isinstance(value, Sequence):
+        return [value] * count
+    if len(value) != count:
+        raise InputError(f"march_many got {len(value)} {name} for {count} problems: give one for each")
+    return value
+
+
+def _in_turn(runs: Sequence[Together]) -> Iterator[tuple[int, Report | ViContactError]]:
+    """A step of every run in turn, until all have ended."""
+    going = {number: iter(run) for number, run in enumerate(runs)}
+    while going:
+        for number, loop in list(going.items()):
+            try:
+                _, report = next(loop)
+            except StopIteration:
+                del going[number]
+                continue
+            except ViContactError as error:
+                del going[number]
+                runs[number].leave()
+                yield number, error
+                continue
+            yield number, report
