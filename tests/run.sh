@@ -11,6 +11,7 @@ tests=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 vi_setup
 cd "$vi_root" || exit 1
 
+unset PYTHONDONTWRITEBYTECODE  # or every process of every test compiles the package anew
 export PETSC_OPTIONS="-no_signal_handler ${PETSC_OPTIONS:-}"  # a crash is then told by Python, with the line it came from
 [ -t 1 ] && colour=auto || colour=no  # mpirun gives its processes a terminal, even when its own output is a file
 seconds=${VI_CONTACT_TIMEOUT:-} passed=0 failed=0 skipped=0 status=0 child=
