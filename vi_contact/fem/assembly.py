@@ -18,6 +18,7 @@ from ..core.algebra import Array, Mask, largest
 from ..core.errors import InputError
 from ..core.stages import stage
 from ..core.system import Load, SemiDiscreteSystem
+from ..laws.mass_transfer import rigid_motions
 from ..laws.materials import Damping, LinearElastic, Section
 from . import compat
 from .assembly_checks import check_body, check_boundaries, check_initial
@@ -260,13 +261,7 @@ def _floats(space: FemSpace, body: Mask) -> bool:
     own = body[::d]
     middle = space.comm.sum(np.append(space.points[own].sum(axis=0), own.sum()))
     x = (space.points - middle[:d] / middle[d]) / space.size
-    modes = [np.tile(np.eye(d)[i], (len(x), 1)) for i in range(d)]
-    for i in range(d):
-        for j in range(i + 1, d):
-            turn = np.zeros_like(x)
-            turn[:, i], turn[:, j] = -x[:, j], x[:, i]
-            modes.append(turn)
-    rows = np.column_stack([mode.ravel()[space.held.ravel() & body] for mode in modes])
+    rows = rigid_motions(np.tile(np.eye(d), (len(x), 1)), np.repeat(x, d, axis=0))[space.held.ravel() & body]
     gram = space.comm.sum(rows.T @ rows)
     values = np.linalg.eigvalsh(gram)
     return bool(values[0] <= 1e-10 * max(values[-1], np.finfo(float).tiny))

@@ -4,8 +4,9 @@ from typing import Any
 
 import numpy as np
 
-from ...core.algebra import Array, EffectiveMatrix
+from ...core.algebra import EffectiveMatrix
 from ...core.surfaces import ContactSurface
+from ...laws.mass_transfer import rigid_motions
 from .layout import Layout
 
 
@@ -17,19 +18,12 @@ def rigid_modes(A: EffectiveMatrix, surface: ContactSurface, layout: Layout, tem
     low = -comm.max(-np.min(points, axis=0, initial=np.inf))
     high = comm.max(np.max(points, axis=0, initial=-np.inf))
     x = (points - 0.5 * (low + high)) / np.linalg.norm(high - low)
-    modes = [(component == i).astype(float) for i in range(d)]
-    for i in range(d):
-        modes += [np.where(component == j, x[:, i], np.where(component == i, -x[:, j], 0.0)) for j in range(i + 1, d)]
+    modes = rigid_motions(np.eye(d)[component], x).T
     vectors = [template.duplicate() for _ in modes]
     for vector, mode in zip(vectors, modes, strict=True):
-        vector.array[:] = layout.padded(_unknowns(surface, mode))
+        turned = surface.in_frames(mode)  # T⁻¹ u, and of relative unknowns R⁻¹ = 2 - R
+        vector.array[:] = layout.padded(turned if surface.coupling is None else 2.0 * turned - surface.coupling @ turned)
     return orthonormal(vectors)
-
-
-def _unknowns(surface: ContactSurface, u: Array) -> Array:
-    """The unknowns of the equations of displacements along the axes: T⁻¹ u, then R⁻¹ = 2 - R."""
-    turned = surface.in_frames(u)
-    return turned if surface.coupling is None else 2.0 * turned - surface.coupling @ turned
 
 
 def orthonormal(vectors: list[Any]) -> list[Any]:
