@@ -21,8 +21,10 @@ def rigid_modes(A: EffectiveMatrix, surface: ContactSurface, layout: Layout, tem
     modes = rigid_motions(np.eye(d)[component], x).T
     vectors = [template.duplicate() for _ in modes]
     for vector, mode in zip(vectors, modes, strict=True):
-        turned = surface.in_frames(mode)  # T⁻¹ u, and of relative unknowns R⁻¹ = 2 - R
-        vector.array[:] = layout.padded(turned if surface.coupling is None else 2.0 * turned - surface.coupling @ turned)
+        unknowns = surface.in_frames(mode)  # T⁻¹ u
+        if surface.coupling is not None:
+            unknowns = 2.0 * unknowns - surface.coupling @ unknowns  # R⁻¹ = 2 - R
+        vector.array[:] = layout.padded(unknowns)
     return orthonormal(vectors)
 
 
