@@ -13,7 +13,8 @@ import numpy as np
 import scipy.sparse as sp
 from petsc4py import PETSc
 
-from ...core.algebra import Array, EffectiveMatrix, Indices, SerialMatrix, largest, upper_blocks
+from ...core.algebra import Array, EffectiveMatrix, Indices, largest, upper_blocks
+from ..volume.bounded_system import assembled
 
 
 @dataclass(frozen=True)
@@ -58,16 +59,6 @@ def layout_of(A: EffectiveMatrix) -> Layout:
     places = d * (np.cumsum(first) - 1) + component
     size = d * int(first.sum())
     return Layout(d, places, size, complete=not largest(A.algebra.comm, size != n))
-
-
-def assembled(A: EffectiveMatrix) -> Any:
-    """Return A as PETSc's AIJ matrix, its own where it has one."""
-    matrix = A.matrix
-    if not isinstance(matrix, SerialMatrix):
-        return matrix.mat  # type: ignore[attr-defined]
-    csr, kind = matrix.csr, PETSc.IntType
-    arrays = (csr.indptr.astype(kind), csr.indices.astype(kind), csr.data)
-    return PETSc.Mat().createAIJ(csr.shape, csr=arrays, comm=PETSc.COMM_SELF)
 
 
 class Nodewise:

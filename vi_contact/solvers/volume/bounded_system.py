@@ -98,15 +98,11 @@ class BoundedSystem:
         return largest + 2.0 * float(self.max(np.max(self.spring, initial=0.0))[0])
 
     def assembled(self) -> Any:
-        """Return A as an AIJ matrix: the given one when it is a PETSc matrix on a rigid support, else a new one."""
-        matrix = self.A.matrix
-        if isinstance(matrix, SerialMatrix):
-            indptr, columns, values = matrix.csr.indptr, matrix.csr.indices, matrix.csr.data
-        else:
-            mat = matrix.mat  # type: ignore[attr-defined]
-            if not self.surface.some(self.surface.compliance > 0.0):
-                return mat
-            indptr, columns, values = mat.getValuesCSR()
+        """Return A with its springs as an AIJ matrix: the given one when it is a PETSc matrix without springs."""
+        mat = assembled(self.A)
+        if not self.surface.some(self.soft):
+            return mat
+        indptr, columns, values = mat.getValuesCSR()
         first, columns, total = renumbered(self.surface.comm, self.rows, self.size, columns)
         body = sp.csr_matrix((values, columns, indptr), shape=(self.rows, total)).tocoo()
         feet, tips = self.feet, np.arange(self.rows, self.size)
@@ -118,6 +114,16 @@ class BoundedSystem:
         arrays = (csr.indptr.astype(PETSc.IntType), csr.indices.astype(PETSc.IntType), csr.data)
         size = (self.size, total)
         return PETSc.Mat().createAIJ((size, size), csr=arrays, comm=self.comm)
+
+
+def assembled(A: EffectiveMatrix) -> Any:
+    """Return A as PETSc's AIJ matrix, its own where it has one."""
+    matrix = A.matrix
+    if not isinstance(matrix, SerialMatrix):
+        return matrix.mat  # type: ignore[attr-defined]
+    csr, kind = matrix.csr, PETSc.IntType
+    arrays = (csr.indptr.astype(kind), csr.indices.astype(kind), csr.data)
+    return PETSc.Mat().createAIJ(csr.shape, csr=arrays, comm=PETSc.COMM_SELF)
 
 
 def renumbered(comm: Comm, old_size: int, new_size: int, columns: Any) -> tuple[int, Indices, int]:
