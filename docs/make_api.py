@@ -74,6 +74,10 @@ class Module:
         given[0] = given[0][node.col_offset :]
         return re.sub(r"\s+", " ", b"".join(given).decode()).replace("( ", "(").replace(", )", ")")
 
+    def annotation(self, node: ast.expr) -> str:
+        """Return an annotation as it is written, without the quotes around names that come later."""
+        return self.source(node).strip('"')
+
 
 def file_of(path: str) -> Path:
     """Return the file of a dotted module path below the package."""
@@ -150,7 +154,7 @@ def parameters(where: Module, given: ast.arguments, skip: int) -> list[str]:
     """Return the parameters of a function as they are written, without the first ``skip``."""
 
     def written(arg: ast.arg, default: ast.expr | None = None, stars: str = "") -> str:
-        kind = f": {where.source(arg.annotation)}" if arg.annotation else ""
+        kind = f": {where.annotation(arg.annotation)}" if arg.annotation else ""
         equals = " = " if kind else "="
         return stars + arg.arg + kind + (f"{equals}{where.source(default)}" if default else "")
 
@@ -166,7 +170,7 @@ def parameters(where: Module, given: ast.arguments, skip: int) -> list[str]:
 def function(where: Module, node: ast.FunctionDef, skip: int = 0) -> str:
     """Return ``name(parameters) -> result``; a property has no parentheses and a colon."""
     decorators = [where.source(one) for one in node.decorator_list]
-    result = where.source(node.returns) if node.returns else ""
+    result = where.annotation(node.returns) if node.returns else ""
     if skip and any(one in ("property", "cached_property") for one in decorators):
         return f"{node.name}: {result}"
     given = ", ".join(parameters(where, node.args, 0 if "staticmethod" in decorators else skip))
@@ -193,7 +197,7 @@ def fields(where: Module, node: ast.ClassDef) -> dict[str, str]:
                 found.update(fields(there, above))
     for one in node.body:
         if isinstance(one, ast.AnnAssign) and isinstance(one.target, ast.Name) and not one.target.id.startswith("_"):
-            kind, given = where.source(one.annotation), default(where, one.value)
+            kind, given = where.annotation(one.annotation), default(where, one.value)
             if given == "" or kind.startswith("ClassVar"):
                 found.pop(one.target.id, None)
             else:

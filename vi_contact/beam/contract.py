@@ -15,8 +15,6 @@ rotations. The forces of ``Midpoint`` ring with the mass of the tip while it tou
 their mean; those of ``MoreauJean`` and ``ContactStabilisedNewmark`` do not.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -172,7 +170,7 @@ class _Part:
     inertia: Array
 
     @classmethod
-    def of_rod(cls, rod: Rod, elements: Elements, start: Start) -> _Part:
+    def of_rod(cls, rod: Rod, elements: Elements, start: Start) -> "_Part":
         x = elements.nodes(rod.length)
         M, K, uniform = rod_matrices(rod, elements.count)
         tip = np.zeros_like(x)
@@ -182,7 +180,7 @@ class _Part:
         return cls(M, K, rod.viscosity, loads, start.at("u", x), start.at("v", x), rod.rho * rod.area * uniform)
 
     @classmethod
-    def of_beam(cls, beam: TimoshenkoBeam, elements: Elements, start: Start, load: History | None) -> _Part:
+    def of_beam(cls, beam: TimoshenkoBeam, elements: Elements, start: Start, load: History | None) -> "_Part":
         x, (M, S, uniform) = elements.nodes(beam.length), beam_matrices(beam, elements)
         y = np.concatenate([start.at("theta", x), start.at("u", x)])
         w = np.concatenate([start.at("omega", x), start.at("v", x)])

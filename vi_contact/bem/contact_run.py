@@ -1,7 +1,5 @@
 """March through contact on a condensed boundary; answer with histories, resultants, works."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -21,7 +19,7 @@ from .poincare_steklov import BoundaryMotion, work
 
 def march_contact(
     contact: BoundaryContact, *, solver: Condensed | None = None, tolerance: float = TOLERANCE
-) -> ContactRun:
+) -> "ContactRun":
     """March through all steps of the compliance; ``solver``: Condensed with any of its methods.
 
     Raises StepFailure when a step's certificate exceeds ``tolerance``, with step, time and residuals.

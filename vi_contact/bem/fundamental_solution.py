@@ -13,8 +13,6 @@ Ahead of its front (r >= c t) every function is zero. Derivation: docs/theory/be
 Propagation in Elastic Solids, section 3.10.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from numbers import Number
 from typing import NamedTuple
@@ -76,7 +74,7 @@ class LaplaceKernels:
         return KernelSet((g1, g2), double, (*double, s**2 * k0_p / TWO_PI, s**2 * phi))
 
 
-def _check_speeds(kernels: LaplaceKernels | TimeKernels) -> None:
+def _check_speeds(kernels: "LaplaceKernels | TimeKernels") -> None:
     attributes(kernels, positive=("c_p", "c_s"))
     if kernels.c_p <= kernels.c_s:
         raise InputError(f"{type(kernels).__name__}: c_p is {kernels.c_p:g} and c_s is {kernels.c_s:g} m/s; pressure "

@@ -9,8 +9,6 @@ the condensed motion of one body on a rigid support. Welded nodes have w = 0 in 
 step; their forces are eliminated, and what is left is a CondensedCompliance of the contact nodes alone.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -58,7 +56,7 @@ class TwoBodies:
         return replace(one, W=one.W + two.W[:, unknowns][:, :, unknowns], u_free=one.u_free - two.u_free[:, unknowns])
 
     @cached_property
-    def _weld(self) -> Weld:
+    def _weld(self) -> "Weld":
         relative, interface = self.relative, np.asarray(self.one.contact, bool)
         elements = np.zeros(len(interface), bool) if self.welded is None else np.asarray(self.welded, bool)
         if (elements & ~interface).any():

@@ -10,8 +10,6 @@ of all steps is not normal, so that changes grow before they shrink, the more th
 errors win: long runs are cut into windows, one after the other, the past of which is known.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -66,7 +64,7 @@ class SpaceTimeUzawa:
             counts.append(len(changes))
         return problem.run(r, np.array(counts), tuple(history))
 
-    def _window(self, problem: _SpaceTime, r: Array) -> tuple[Array, list[float]]:
+    def _window(self, problem: "_SpaceTime", r: Array) -> tuple[Array, list[float]]:
         """Return the multipliers (steps, 2, c) of the window that was entered, and the relative changes on the way."""
         rho, unit = self.rho or problem.default_rho, float(np.linalg.norm(problem.violation(r)))
         changes: list[float] = []

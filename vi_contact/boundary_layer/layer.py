@@ -7,8 +7,6 @@ x > 0 is admissible, x = 0 is the obstacle; a positive f̂_1 pushes away from it
 is complete up to a and fades out smoothly between a and b.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -66,7 +64,7 @@ class Layer:
             raise InputError("the layer's speed V is not given: give speed, or enter the layer first")
         return self.speed
 
-    def at(self, speed: float) -> Layer:
+    def at(self, speed: float) -> "Layer":
         """Return the layer as a body that enters with this speed [m/s] meets it."""
         return self if self.speed is not None else replace(self, speed=speed)
 

@@ -1,7 +1,5 @@
 """``vi-contact run CASE`` and ``vi-contact cases``: options and what the commands do."""
 
-from __future__ import annotations
-
 import argparse
 from contextlib import suppress
 from dataclasses import fields

@@ -1,7 +1,5 @@
 """The command line ``vi-contact``: parses and prints, nothing else."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 import traceback

@@ -1,7 +1,5 @@
 """Tell errors in one sentence, those of the machine and of libraries too, and end a command on all its ranks."""
 
-from __future__ import annotations
-
 import argparse
 import errno
 import sys

@@ -1,7 +1,5 @@
 """``vi-contact ida CASE.toml``: options and what the command does."""
 
-from __future__ import annotations
-
 import argparse
 import shlex
 import signal

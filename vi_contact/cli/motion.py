@@ -1,7 +1,5 @@
 """``vi-contact motion info|convert|plot|spectrum``: options and what each action does."""
 
-from __future__ import annotations
-
 import argparse
 import re
 from dataclasses import fields

@@ -1,7 +1,5 @@
 """Options that several commands share, and checks of the files they write."""
 
-from __future__ import annotations
-
 import argparse
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """``vi-contact report`` and ``vi-contact post peaks|spectrum|transfer|loop``: options and what each does."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Sequence
 from pathlib import Path
@@ -81,7 +79,7 @@ def _report(options: argparse.Namespace) -> str:
     return f"report: {page}\ntable: {table}\n{_listed(drawn)}"
 
 
-def _run(options: argparse.Namespace) -> RunFolder:
+def _run(options: argparse.Namespace) -> "RunFolder":
     from ..run.files.reading import read_run  # late: h5py, which records do not need
 
     return read_run(options.folder)

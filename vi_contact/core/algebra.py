@@ -6,8 +6,6 @@ asks how many ranks there are. ``SerialAlgebra`` (scipy) serves one process and 
 returned by ``dot`` and by ``Comm`` are the same number on every rank.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any, Protocol, SupportsFloat
@@ -164,7 +162,7 @@ class EffectiveMatrix:
                 self.__dict__.setdefault("factor", self._last[1])
         return self._last[1]
 
-    def factorised_as(self, other: EffectiveMatrix) -> EffectiveMatrix:
+    def factorised_as(self, other: "EffectiveMatrix") -> "EffectiveMatrix":
         """Return this matrix with the factors of another, whose entries are the same."""
         self._last = other._last
         self.__dict__ |= {"factor": other.factor} if other.factorised else {}

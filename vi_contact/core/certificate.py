@@ -1,7 +1,5 @@
 """Judge one step: how far an answer is from solving its inequality problem. ``core.verify`` computes it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

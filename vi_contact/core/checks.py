@@ -4,8 +4,6 @@ Every constructor and every entry point of the package asks here, before any wor
 the type that the caller goes on with, so that one line reads and checks an argument.
 """
 
-from __future__ import annotations
-
 import math
 import re
 import traceback

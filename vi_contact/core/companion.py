@@ -1,7 +1,5 @@
 """Name what is marched beside a run: systems and surfaces hold such companions and import this."""
 
-from __future__ import annotations
-
 from typing import Any, Protocol
 
 

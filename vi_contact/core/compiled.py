@@ -1,8 +1,6 @@
 """Compile ``contact_last.c`` against CHOLMOD when it is first needed, and keep it in the user's cache, as DOLFINx keeps
 forms: $XDG_CACHE_HOME or ~/.cache, folder vi_contact. Compiling against its header is what makes any CHOLMOD do."""
 
-from __future__ import annotations
-
 import ctypes
 import logging
 import os

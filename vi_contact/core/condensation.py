@@ -8,8 +8,6 @@ contact unknown. Contact values here are those of all ranks, on every rank: the 
 conditions or, with friction, (r_n, r_t) node by node. What cannot move (a prescribed tangent) stays at zero.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.linalg import lapack
 
@@ -18,7 +16,7 @@ from .contact_last import ContactLast
 from .surfaces import ContactSurface
 
 
-def condense(A: EffectiveMatrix, surface: ContactSurface, *, frictional: bool = False) -> Last | _Twice:
+def condense(A: EffectiveMatrix, surface: ContactSurface, *, frictional: bool = False) -> "Last | _Twice":
     """Factorise A and condense it onto the normal and, with friction, tangential contact unknowns. Collective."""
     mine, first = surface.owned[:, None], A.algebra.first(A.matrix.rows)
     if frictional:

@@ -9,8 +9,6 @@ asks for may be put in between the two substitutions: with it the rest is in equ
 Loads, answers and contact values may also be of several runs, a row for each: L is then read once for eight of them.
 """
 
-from __future__ import annotations
-
 import ctypes
 import weakref
 from collections.abc import Callable

@@ -5,8 +5,6 @@ are oblique, with the cosines G_ij = n_i·n_j, a change of velocity along one no
 and a lumped mass m is m G⁻¹.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from .algebra import Array, Indices, from_each

@@ -1,7 +1,5 @@
 """Name the ways a run stops early: wrong input, a step that no method could certify, or somebody asked it to."""
 
-from __future__ import annotations
-
 import signal
 
 

@@ -1,7 +1,5 @@
 """Check values that shake a body, and turn their scalar accelerations into vectors."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Write files that a crash cannot spoil, on rank 0 alone, with failures told to all ranks."""
 
-from __future__ import annotations
-
 import csv
 import errno
 import io

@@ -1,7 +1,5 @@
 """Solve with a well-conditioned matrix, as mass matrices are, without a factor: conjugate gradients to round-off."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from .algebra import Algebra, Array, Mask, Matrix

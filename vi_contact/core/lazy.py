@@ -1,7 +1,5 @@
 """Give a package its public names, each imported when it is first used: what nobody asks for need not be installed."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module

@@ -1,7 +1,5 @@
 """Say where a rigid obstacle lies: contact directions and initial gaps, and what is asked of them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol

@@ -1,7 +1,5 @@
 """State the problem that is marched: a semi-discrete system, its contact surface, and the laws of both."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import cached_property
@@ -62,7 +60,7 @@ class ContactProblem:
         shaken = system.with_load(*((-system.inertia(direction), history) for direction, history in ways))
         return system.loaded(shaken.load)
 
-    def beside(self, other: ContactProblem) -> ContactProblem | None:
+    def beside(self, other: "ContactProblem") -> "ContactProblem | None":
         """Return the same problem with the matrices of another one, and the factors made of them; None where these are
         not its own: for another system, surface, mass or impact law, or friction where the other has none."""
         ours, theirs = ((one.system, one.surface, one.frictional) for one in (self, other))

@@ -4,8 +4,6 @@ Identity counts: a surface that ``fem`` made carries the space it was made on, a
 Sizes are compared on all ranks together, so that all of them raise the same sentence.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

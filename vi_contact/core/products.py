@@ -4,8 +4,6 @@ Remembered are vectors that nobody can write to any more (``frozen``), such as t
 object it is. What is handed out is shared, and read-only too.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

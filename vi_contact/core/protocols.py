@@ -1,7 +1,5 @@
 """Describe what a problem asks of its laws and of what shakes it: the protocols that users' own classes satisfy."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -57,7 +55,7 @@ class FrictionLaw(Protocol):
         """Return d limit / d r_n >= 0 of each condition under pressure, (m,); ``weights`` as in ``limit``."""
         ...
 
-    def at(self, speed: Array) -> FrictionLaw:
+    def at(self, speed: Array) -> "FrictionLaw":
         """Return the law at slip rates ``speed`` = |v_t| (m,) [m/s], >= 0, with limit and slope of its own.
 
         ``limit`` and ``slope`` of the law itself are those at rest. A law that does not know rates returns itself,
@@ -78,7 +76,7 @@ class Frictionless:
         """Return zeros, shape (m,)."""
         return np.zeros(len(weights))
 
-    def at(self, speed: Array) -> Frictionless:
+    def at(self, speed: Array) -> "Frictionless":
         """Return itself: the law does not know the slip rate."""
         return self
 

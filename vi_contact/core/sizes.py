@@ -1,7 +1,5 @@
 """Say which problems are small: those that a dense matrix on every rank, or a factor made in passing, suits."""
 
-from __future__ import annotations
-
 from .algebra import Comm, total
 from .errors import InputError
 

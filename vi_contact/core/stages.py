@@ -1,7 +1,5 @@
 """Tell how long the stages of setting up take: to the log, and to the terminal of a command."""
 
-from __future__ import annotations
-
 import ctypes
 import logging
 import sys

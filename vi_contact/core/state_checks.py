@@ -1,7 +1,5 @@
 """Make the state a run begins with; check that a state belongs to a problem: its time, its arrays on every rank."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

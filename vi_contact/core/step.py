@@ -20,8 +20,6 @@ contact conditions, d the dimensions. ``problem.equations`` is the system to mar
 and excitations in it; ``problem.surface`` are its contact conditions. Arrays that come in are read, never written to.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -56,7 +54,7 @@ class State:
     memory: Mapping[str, Array] = field(default_factory=dict)
     r_t: Array | None = None
 
-    def with_velocity(self, v: Array) -> State:
+    def with_velocity(self, v: Array) -> "State":
         """Return the state with another velocity."""
         return State(self.t, self.k, self.u, v, self.r_n, self.active, self.memory, self.r_t)
 

@@ -7,8 +7,6 @@ another's: what is asked of all of them (``some``, ``everywhere``) is asked on a
 Sign: the direction n points from the body to the obstacle, u_n = u·n, gap = gap0 - u_n >= 0, reaction r_n >= 0.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -135,7 +133,7 @@ class ContactSurface:
         turn = self.basis if self.dual is None else self.dual
         return load if turn is None else turn @ load
 
-    def whole(self) -> ContactSurface:
+    def whole(self) -> "ContactSurface":
         """Return the conditions of all ranks, by their numbers, on every rank as if it were alone: where they are and
         how large, for output. Collective."""
         names = ("points", "normals", "weights", "gap0", "bilateral", "compliance")
@@ -176,7 +174,7 @@ class ContactSurface:
         """Return what the obstacle moves along the tangents between two times, (m, d-1) [m]; None for one at rest."""
         return None if self.slide is None else self.slide(end) - self.slide(start)
 
-    def moving(self, towards: Motion | None = None, along: Motion | None = None) -> ContactSurface:
+    def moving(self, towards: Motion | None = None, along: Motion | None = None) -> "ContactSurface":
         """Return the surface on an obstacle that moves: ``towards`` the body and ``along`` the tangents, t [s] -> [m],
         one value for all points or arrays of shape (m,) and (m, d-1), in the order of ``points``. A moving obstacle is
         not turned; its points face the same nodes."""
@@ -190,11 +188,11 @@ class ContactSurface:
             slide=None if along is None else spread("along", along, (self.count, self.tangents.shape[1])),
         )
 
-    def bilateral_everywhere(self) -> ContactSurface:
+    def bilateral_everywhere(self) -> "ContactSurface":
         """Return the bilateral comparison case: every point stays on the obstacle."""
         return replace(self, bilateral=np.ones(self.count, dtype=bool))
 
-    def with_frictionless_corners(self) -> ContactSurface:
+    def with_frictionless_corners(self) -> "ContactSurface":
         """Let nodes, beside friction, with several conditions slide freely over their faces; else they are refused.
 
         What such a node could rub on one face is a force across the other, which the conditions, each a bound on one
@@ -206,7 +204,7 @@ class ContactSurface:
             log.info("%d contact nodes with several directions slide freely over their faces", corners)
         return replace(self, frictionless_corners=True)
 
-    def on_springs(self, stiffness: float) -> ContactSurface:
+    def on_springs(self, stiffness: float) -> "ContactSurface":
         """Return the surface on a linearly deformable support of foundation modulus ``stiffness`` [Pa/m].
 
         Each point presses a fictitious spring k = stiffness * weight, whose far end obeys the unilateral law.

@@ -1,7 +1,5 @@
 """Hold the semi-discrete equations of motion M u'' + C u' + K u = f(t) and the loads on their right-hand side."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
@@ -85,13 +83,13 @@ class Load:
             total += part(t)
         return total
 
-    def in_basis(self, T: Matrix) -> Load:
+    def in_basis(self, T: Matrix) -> "Load":
         """Return the same load on the unknowns û of u = T û: Tᵀ f."""
         separable = tuple((T.transpose_apply(vector), history) for vector, history in self.separable)
         moving = (_turned(T, functions) for functions in (self.general, self.viscous, self.inertial))
         return Load(T.transpose_apply(self.constant), separable, *moving)
 
-    def handed_over(self, P: Matrix) -> Load:
+    def handed_over(self, P: Matrix) -> "Load":
         """Return the load beside C* = PᵀCP: Pᵀ on its viscous parts."""
         return replace(self, viscous=_turned(P, self.viscous))
 
@@ -211,7 +209,7 @@ class SemiDiscreteSystem:
 
         return (u1 - u0) / dt if self.C is None else change("C", u0, u1), change("M", v0, v1)
 
-    def changed(self, **values: Any) -> SemiDiscreteSystem:
+    def changed(self, **values: Any) -> "SemiDiscreteSystem":
         """Return the same system with other values of the attributes that are named, and no factor of the old one."""
         return replace(self, **values)
 
@@ -234,11 +232,11 @@ class SemiDiscreteSystem:
         A, inertia = self.algebra.combine(terms), (m, self.M)
         return EffectiveMatrix(A, self.algebra, space=self.space, inertia=inertia, image=image if shares else None)
 
-    def with_load(self, *terms: tuple[Array, Callable[[float], float]]) -> SemiDiscreteSystem:
+    def with_load(self, *terms: tuple[Array, Callable[[float], float]]) -> "SemiDiscreteSystem":
         """Return the same system with separable loads vector * history(t) added."""
         return self.changed(load=replace(self.load, separable=self.load.separable + terms))
 
-    def loaded(self, load: Load) -> SemiDiscreteSystem:
+    def loaded(self, load: Load) -> "SemiDiscreteSystem":
         """Return the same system under another load in its basis, with the factors of this one."""
         other = self.changed(load=load)
         object.__setattr__(other, "_cache", self._cache)
@@ -249,21 +247,21 @@ class SemiDiscreteSystem:
         force = self.M @ (self.influence @ direction)
         return force if self.base_mass is None else force + self.base_mass @ direction
 
-    def in_basis(self, T: Matrix, dual: Matrix | None = None) -> SemiDiscreteSystem:
+    def in_basis(self, T: Matrix, dual: Matrix | None = None) -> "SemiDiscreteSystem":
         """Return the same system in the unknowns û of u = T û: TᵀMT, TᵀCT, TᵀKT, Tᵀf.
 
         Initial values and influence vectors turn with T⁻¹: ``dual`` is T⁻ᵀ, T itself where it is orthogonal (None).
         """
         return self._in_unknowns(T, (T if dual is None else dual).transpose_apply)
 
-    def in_relative(self, R: Matrix) -> SemiDiscreteSystem:
+    def in_relative(self, R: Matrix) -> "SemiDiscreteSystem":
         """Return the same system in the unknowns ǔ of û = R ǔ, in which contact points move relative to the other body.
 
         R = 1 + N with N N = 0 (nobody's partner is somebody's partner), so that R⁻¹ = 2 - R.
         """
         return self._in_unknowns(R, lambda x: 2.0 * x - R @ x)
 
-    def _in_unknowns(self, T: Matrix, inverse: Callable[[Array], Array]) -> SemiDiscreteSystem:
+    def _in_unknowns(self, T: Matrix, inverse: Callable[[Array], Array]) -> "SemiDiscreteSystem":
         turn = self.algebra.congruence
         return self.changed(
             M=turn(T, self.M), C=None if self.C is None else turn(T, self.C), K=turn(T, self.K),

@@ -1,7 +1,5 @@
 """Verify a step: its certificate, and its energy balance. These checks ship with the package."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

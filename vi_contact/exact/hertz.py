@@ -9,8 +9,6 @@ Pressures are positive in compression; under a punch they are infinite at the ed
 of the distance. Lengths [m], pressures and moduli [Pa], forces [N], or any consistent units.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
@@ -94,7 +92,7 @@ class HertzPoint(Pressed):
     """
 
     @classmethod
-    def from_approach(cls, approach: float, *, modulus: float, radius: float) -> HertzPoint:
+    def from_approach(cls, approach: float, *, modulus: float, radius: float) -> "HertzPoint":
         """Return the contact of spheres whose distant points have come nearer by `approach` [m]."""
         if not approach > 0.0:
             raise InputError(f"HertzPoint: the approach is {approach!r}; give a number above zero")

@@ -5,8 +5,6 @@ of M, whose components are not coupled along the axes, only what is not zero is 
 identity but for the contact nodes changes few rows: the others are shared with the matrix it was made from.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

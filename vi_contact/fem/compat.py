@@ -6,8 +6,6 @@ elements and function spaces take tuples (0.7), `create_mesh` swapped two argume
 per cell type (0.11).
 """
 
-from __future__ import annotations
-
 from contextlib import suppress
 from itertools import product
 from typing import Any

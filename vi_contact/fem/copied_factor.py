@@ -1,7 +1,5 @@
 """Factorise PETSc matrices with contact unknowns last: by CHOLMOD, a whole copy of the factor on every rank."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

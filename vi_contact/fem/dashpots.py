@@ -13,8 +13,6 @@ A compliant base adds the traction of an upgoing wave v_up, whatever its directi
 The wave that comes back down passes through the dashpots: the record of the base is not the input, but up + down.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -70,7 +68,7 @@ class Dashpots:
             instance(owner, "material", self.material, LinearElastic, "give a LinearElastic, or None")
         attributes(self, not_negative=("normal", "tangential"))
 
-    def loads(self, matrix: DashpotMatrix, forms: Any) -> BoundaryLoads:
+    def loads(self, matrix: "DashpotMatrix", forms: Any) -> BoundaryLoads:
         """Return what acts on the body here besides the dashpots: nothing. ``forms``: ``ElasticForms``. Collective."""
         return BoundaryLoads()
 
@@ -91,7 +89,7 @@ class CompliantBase(Dashpots):
         super().__post_init__()
         function("CompliantBase", "motion", self.motion, "give upgoing(record), or a function of the time [s]")
 
-    def loads(self, matrix: DashpotMatrix, forms: Any) -> BoundaryLoads:
+    def loads(self, matrix: "DashpotMatrix", forms: Any) -> BoundaryLoads:
         """Return the load of the upgoing wave, 2 Pᵀ D v_up."""
         return BoundaryLoads(viscous=(matrix.moved_by(self.motion, 2.0),))
 

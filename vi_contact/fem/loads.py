@@ -4,8 +4,6 @@ Fields are given at points: a callable takes points (k, d) [m] and the time [s] 
 interpolated at the nodes and then integrated exactly, so a load costs one sparse product a step.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -93,7 +91,7 @@ class Prescribed:
         owners = {id(owner): owner for owner in (getattr(value, "__self__", None) for value in self.motions)}
         return tuple(one for owner in owners.values() for one in getattr(owner, "companions", ()))
 
-    def same_motion(self, other: Prescribed) -> bool:
+    def same_motion(self, other: "Prescribed") -> bool:
         """Return whether both say the same of the components that both prescribe."""
         mine, theirs = self.components, other.components
         apart = mine is not None and theirs is not None and not set(mine) & set(theirs)

@@ -1,7 +1,5 @@
 """Implement the algebra protocol on PETSc matrices, on any number of ranks; MUMPS factorises, vectors are of numpy."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import Any

@@ -1,7 +1,5 @@
 """Turn PETSc matrices into rows of scipy, each rank its own, and back."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import scipy.sparse as sp

@@ -1,7 +1,5 @@
 """Say what the unknowns of a finite element system mean: nodes, bodies, free and prescribed parts, points, output."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Sequence
 from functools import cached_property
@@ -56,7 +54,7 @@ def _smallest(first: Any, second: Any, numbers: Indices) -> Indices:
 log = logging.getLogger(__name__)
 
 
-def space_of(owner: str, system: Any) -> FemSpace:
+def space_of(owner: str, system: Any) -> "FemSpace":
     """Return the space of a system that fem.assemble made; InputError for anything else."""
     instance(owner, "system", system, SemiDiscreteSystem, "give a system, such as fem.assemble returns")
     if not isinstance(system.space, FemSpace) or system.space.forms is None:

@@ -1,7 +1,5 @@
 """Give the elastic response spectra of Eurocode 8, EN 1998-1:2004, 3.2.2.2 (horizontal) and 3.2.2.3 (vertical)."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
@@ -48,14 +46,14 @@ class EC8Spectrum:
             raise InputError(f"EC8Spectrum: damping is {self.damping!r}; give a ratio from 0 to below 1, 0.05 for 5 %")
 
     @classmethod
-    def on_ground(cls, ground: str, *, ag: float, kind: int = 1, damping: float = 0.05) -> EC8Spectrum:
+    def on_ground(cls, ground: str, *, ag: float, kind: int = 1, damping: float = 0.05) -> "EC8Spectrum":
         """Return the horizontal spectrum of type `kind` (1, or 2 for weak near earthquakes) on ground "A" to "E"."""
         if kind not in GROUNDS or ground not in GROUNDS[kind]:
             raise InputError(f"EC8Spectrum: ground {ground!r}, type {kind!r}; give A, B, C, D or E and type 1 or 2")
         return cls(ag, *GROUNDS[kind][ground], damping=damping)
 
     @classmethod
-    def vertical(cls, *, ag: float, kind: int = 1, damping: float = 0.05) -> EC8Spectrum:
+    def vertical(cls, *, ag: float, kind: int = 1, damping: float = 0.05) -> "EC8Spectrum":
         """Return the vertical spectrum S_ve(T), eqs. 3.8 to 3.11, for every ground; ag is the horizontal one."""
         if kind not in VERTICAL:
             raise InputError(f"EC8Spectrum: type {kind!r}; give 1 or 2")

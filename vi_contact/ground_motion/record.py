@@ -1,7 +1,5 @@
 """Hold one component of a recorded ground motion, and name the units its file may be written in."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -51,7 +49,7 @@ class Record:
         samples.flags.writeable = False
         object.__setattr__(self, "acceleration", samples)
 
-    def changed(self, acceleration: Array, note: str, *, dt: float | None = None) -> Record:
+    def changed(self, acceleration: Array, note: str, *, dt: float | None = None) -> "Record":
         """Return a record with these samples, and a note of what was done."""
         return replace(self, acceleration=acceleration, dt=dt or self.dt, notes=(*self.notes, note))
 

@@ -9,8 +9,6 @@ and differs only in `limit`, which is affine in the pressure: limit = cohesion +
 between the two, so that a stress times a nodal weight becomes either. The slope may depend on the slip rate: `at`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -45,7 +43,7 @@ class Tresca:
         """Return zeros, shape (n,)."""
         return np.zeros(len(weights))
 
-    def at(self, speed: Array) -> Tresca:
+    def at(self, speed: Array) -> "Tresca":
         """Return itself: the law does not know the slip rate."""
         return self
 
@@ -72,7 +70,7 @@ class Coulomb:
         """Return mu, shape (n,)."""
         return _nodal("Coulomb", "mu", self.mu, len(weights)) * np.ones(len(weights))
 
-    def at(self, speed: Array) -> Coulomb:
+    def at(self, speed: Array) -> "Coulomb":
         """Return itself: the law does not know the slip rate."""
         return self
 
@@ -89,7 +87,7 @@ class SlipRateCoulomb:
     mu(0) is the static coefficient.
     """
 
-    mu: ExponentialDecay | StaticKinetic | Callable[[Array], Any]
+    mu: "ExponentialDecay | StaticKinetic | Callable[[Array], Any]"
 
     def __post_init__(self) -> None:
         function("SlipRateCoulomb", "mu", self.mu, "give a function of the slip rate, or use Coulomb()")

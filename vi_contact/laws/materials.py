@@ -3,8 +3,6 @@
 Everything here is a frozen value checked when it is built; SI units throughout; no finite element is needed.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
@@ -39,7 +37,7 @@ class LinearElastic:
                              "both excluded (nearly incompressible materials need a mixed method)")
 
     @classmethod
-    def from_wave_speeds(cls, c_p: float, c_s: float, rho: float) -> LinearElastic:
+    def from_wave_speeds(cls, c_p: float, c_s: float, rho: float) -> "LinearElastic":
         """Return the material whose pressure and shear waves travel at c_p and c_s [m/s].
 
         nu = (c_p² - 2 c_s²) / (2 (c_p² - c_s²)), shear_modulus = rho c_s², E = 2 shear_modulus (1 + nu).
@@ -175,7 +173,7 @@ class Rayleigh:
         number("Rayleigh", "the stiffness coefficient beta [s]", self.beta, not_negative=True)
 
     @classmethod
-    def from_frequencies(cls, f1: float, f2: float, *, xi1: float, xi2: float) -> Rayleigh:
+    def from_frequencies(cls, f1: float, f2: float, *, xi1: float, xi2: float) -> "Rayleigh":
         """Make the damping that has ratio xi1 at f1 and xi2 at f2 [Hz]: solve alpha / (2 w_i) + beta w_i / 2 = xi_i
         with w_i = 2 pi f_i.
 

@@ -1,7 +1,5 @@
 """Write a mesh of this room to a file: ``python3 meshes wall --height 9 --size 0.5 -o wall.msh``."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Sequence

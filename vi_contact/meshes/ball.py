@@ -6,8 +6,6 @@ symmetry: the quarter has x >= 0 and z >= 0, the eighth also y <= R. Physical gr
 eighth, "cut" (y = R).
 """
 
-from __future__ import annotations
-
 import math
 import sys
 from dataclasses import dataclass

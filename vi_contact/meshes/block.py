@@ -4,8 +4,6 @@ Physical groups: cells "block"; boundary "left", "right" (x lowest, highest), "b
 front towards the viewer). A bar has the first two, a rectangle four, a box six.
 """
 
-from __future__ import annotations
-
 import math
 import sys
 from collections.abc import Callable, Sequence

@@ -7,8 +7,6 @@ walls). The channel is open at the surface, with which its walls end. Of two nod
 first.
 """
 
-from __future__ import annotations
-
 import math
 import sys
 from collections.abc import Sequence

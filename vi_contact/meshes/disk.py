@@ -4,8 +4,6 @@ The disk touches the line y = 0 at the origin, its centre is (0, R). Physical gr
 arc within an angle of the lowest point: the contact side) and "rest". Symmetric loads leave it exactly symmetric.
 """
 
-from __future__ import annotations
-
 import math
 import sys
 from dataclasses import dataclass

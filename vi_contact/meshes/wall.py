@@ -4,8 +4,6 @@ Physical groups: cells "wall"; boundary "base" (y = 0), "face" (x = width: the c
 defaults are the mesh of the published example: 8 x 12 cells, 40 boundary nodes 0.75 m apart.
 """
 
-from __future__ import annotations
-
 import sys
 from dataclasses import dataclass
 from pathlib import Path

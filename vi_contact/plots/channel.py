@@ -1,7 +1,5 @@
 """Draw the buried channel from recorded histories: as Figs. 7 to 9 of the boundary method, and along its outline."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,7 +32,7 @@ class Outline:
     sides: Mapping[str, Mask]
 
     @classmethod
-    def of(cls, points: Array, normals: Array) -> Outline:
+    def of(cls, points: Array, normals: Array) -> "Outline":
         """Make the outline from contact ``points`` (m, 2) [m] with outward ``normals`` (m, 2)."""
         low, high = points.min(axis=0), points.max(axis=0)
         left, right = normals[:, 0] < -0.5, normals[:, 0] > 0.5

@@ -1,7 +1,5 @@
 """Draw the buried channel's mesh: Fig. 6 of the boundary method, the deformed bodies with their contact, a film."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -65,7 +63,7 @@ class Colours:
     norm: Any
 
     @classmethod
-    def of(cls, pressures: Array) -> Colours:
+    def of(cls, pressures: Array) -> "Colours":
         """Make the colours for all pressures [Pa] that are drawn."""
         from matplotlib.colors import PowerNorm
 

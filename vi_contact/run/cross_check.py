@@ -6,8 +6,6 @@ another method, boundary elements for example, have steps and points of their ow
 displacement of its contact boundary towards the support.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field
@@ -168,7 +166,7 @@ class CrossChecked:
         for solver in (self.primary, *self.others):
             solver.check(problem)
 
-    def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> PreparedCrossCheck:
+    def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> "PreparedCrossCheck":
         """Return all solvers prepared on the same matrix."""
         solvers = [solver.prepare(A, surface, scale) for solver in (self.primary, *self.others)]
         return PreparedCrossCheck(self, solvers, surface)

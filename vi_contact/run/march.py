@@ -1,7 +1,5 @@
 """March: the one time loop, a generator over certified steps."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from functools import partial
 

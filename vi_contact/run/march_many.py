@@ -1,7 +1,5 @@
 """March many: several runs of one body at once, which differ in what shakes it, how it rubs and where it starts."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Say what a run takes of the memory: the peak of every rank, and the bytes of matrices, factor and mesh."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from resource import RUSAGE_SELF, getrusage
 from typing import Any

@@ -1,7 +1,5 @@
 """Choose and check how a problem is marched: scheme, solvers, tolerance, time steps, the state it starts from."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any

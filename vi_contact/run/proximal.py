@@ -14,8 +14,6 @@ Rigid motions that no load drives stay where they start: along them P-weighted m
 mass of a block free to slide on level ground does not move). On a conservative problem all else is unique.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -4,8 +4,6 @@ Rows hold numbers (one column of ``history.csv`` each), equal on every rank, or 
 Displacements and velocities are those of the equations: relative to the ground when an excitation shakes the body.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite

@@ -4,8 +4,6 @@ Every body is asked by itself, in its own unknowns (``problem.turned``): with w 
 static stage asks for w·(f - B_nᵀ r_n - B_tᵀ r_t) = 0, the sums of forces and moments. No stiffness enters it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Run the loop over certified steps, with everything that has to happen when it ends, well or badly."""
 
-from __future__ import annotations
-
 import logging
 import time
 from collections import deque

@@ -1,7 +1,5 @@
 """Simulate: march, listen with recorders, and keep everything in a folder that a crash cannot spoil."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Hold what a run leaves behind: histories, the final state and a summary in figures."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from textwrap import shorten, wrap

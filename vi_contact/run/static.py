@@ -10,8 +10,6 @@ obstacles that move. Without friction every stage is the equilibrium of its own 
 so a law that asks for one is refused: its value at rest would be wrong for points in motion wherever it jumps there.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 

@@ -4,8 +4,6 @@ Ctrl-C (SIGINT), a scheduler's or container's end of time (SIGTERM), a closed te
 its own for some of them, which print pages and stop; those of the run come after them and win.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import threading
@@ -30,7 +28,7 @@ class StopSignals:
         self._found = 0
         self._before: dict[int, Any] = {}
 
-    def __enter__(self) -> StopSignals:
+    def __enter__(self) -> "StopSignals":
         if threading.current_thread() is threading.main_thread():
             for number in SIGNALS:
                 before = signal.getsignal(number)

@@ -5,8 +5,6 @@ from u and v (``Scheme.start``). ``steps``, ``t_end``, ``checkpoint_every`` and 
 of the plan, whether they were halved or not.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property

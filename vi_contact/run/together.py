@@ -5,8 +5,6 @@ from run to run, small problems, judgement, impacts and reports, stays a run's o
 with a certificate far below the tolerance is solved alone; who then has to escalate, or fails, goes on alone.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """End a run before its time is over: read a wall time as Slurm does, and say when what is left of it gets short."""
 
-from __future__ import annotations
-
 import math
 import os
 import re

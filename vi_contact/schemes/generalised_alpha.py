@@ -24,8 +24,6 @@ is not, unless the member is Newmark.
 Source: Chung and Hulbert, J. Appl. Mech. 60 (1993) 371-375.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from typing import ClassVar
@@ -51,7 +49,7 @@ class AlphaStep(BalanceStep, ABC):
 
     @property
     @abstractmethod
-    def weights(self) -> GeneralisedAlpha:
+    def weights(self) -> "GeneralisedAlpha":
         """Return the member of generalised-alpha that it is, with alpha_m, alpha_f, beta and gamma."""
 
     def _mark(self, t: float) -> Array:
@@ -146,12 +144,12 @@ class GeneralisedAlpha(AlphaStep):
             )
 
     @property
-    def weights(self) -> GeneralisedAlpha:
+    def weights(self) -> "GeneralisedAlpha":
         """Return itself."""
         return self
 
     @classmethod
-    def spectral_radius(cls, rho_inf: float = 0.8) -> GeneralisedAlpha:
+    def spectral_radius(cls, rho_inf: float = 0.8) -> "GeneralisedAlpha":
         """Return the member of order 2 with this amplification at infinite frequency, 0 (all damped) to 1 (none)."""
         remedy = "give the amplification at infinite frequency, from 0 to 1 (no damping)"
         between("rho_inf", rho_inf, 0.0, 1.0, remedy)

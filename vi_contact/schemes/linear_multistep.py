@@ -18,8 +18,6 @@ balance at t_p can *gain* energy on consistent mass, booked as algorithmic or co
 Impulses: those over a contact with free flight before and after are the change of momentum.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -84,7 +82,7 @@ class LinearMultistep(BalanceStep):
         return max(float(np.max(np.abs(np.roots(polynomial)), initial=0.0)) for polynomial in polynomials)
 
     @classmethod
-    def newmark(cls, beta: float = 0.25, gamma: float = 0.5) -> LinearMultistep:
+    def newmark(cls, beta: float = 0.25, gamma: float = 0.5) -> "LinearMultistep":
         """Return Newmark(beta, gamma) as the q = 2 member."""
         for name, value in (("beta", beta), ("gamma", gamma)):
             number("LinearMultistep.newmark", name, value)

@@ -6,8 +6,6 @@ space they do not; with friction the small dense problem grows faster still. Wha
 docs/guide/solvers.md.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Choose what solves the contact problems that schemes pose beside the steps: at the start, of a predictor."""
 
-from __future__ import annotations
-
 from importlib.util import find_spec
 
 from ..core.algebra import EffectiveMatrix

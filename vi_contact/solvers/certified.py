@@ -4,8 +4,6 @@ An answer whose certificate comes near the tolerance, as round-off makes it wher
 stiffness, is corrected by what it leaves over (``correction``) before it is judged.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import isfinite
 

@@ -12,8 +12,6 @@ A step costs one forward and one backward substitution and the small problem, wh
 ``core.condensation``. With friction the tangential unknowns of the contact points are kept too: ``friction.condensed``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -83,7 +81,7 @@ class Condensed:
         on_all(surface.comm, "the friction law",
                lambda: problem.friction.limit(np.zeros(surface.count), surface.weights, 1.0))
 
-    def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> PreparedCondensed:
+    def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> "PreparedCondensed":
         """Return what condenses A, once per time step size, at the first step: that tells whether it rubs. InputError
         for more contact conditions than a dense matrix suits."""
         refuse_dense("Condensed()", surface.total)

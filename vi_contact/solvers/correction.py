@@ -11,8 +11,6 @@ leaves r_n >= (1 - s) r0_n. But a solver passes through numbers as large as A⁻
 what it was. Where a stiff body rests on a soft one, or on nothing but contact, A⁻¹Bᵀr is millions of times x.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 

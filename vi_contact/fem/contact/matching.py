@@ -3,8 +3,6 @@
 The rows of P sum to one, so that a common translation of both bodies opens and closes nothing.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -41,7 +39,7 @@ class Matched:
     weights: Array
     overlap: Array
 
-    def pick(self, rows: Any) -> Matched:
+    def pick(self, rows: Any) -> "Matched":
         """Return the matched nodes of these rows."""
         return Matched(self.rows[rows], self.P[rows], self.weights[rows], self.overlap[rows])
 

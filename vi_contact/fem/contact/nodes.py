@@ -6,8 +6,6 @@ nodes stays with their owners, but for the two sides of a pair of bodies, which 
 120 bytes a node in space with its share of facets, 25 MB for two sides of 10⁵ nodes (``pairs.side_of``).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
@@ -29,7 +27,7 @@ class Nodes:
     held: Mask
     unknowns: Indices
 
-    def pick(self, rows: Any) -> Nodes:
+    def pick(self, rows: Any) -> "Nodes":
         """Return the nodes of these rows."""
         return Nodes(*(getattr(self, one.name)[rows] for one in fields(self)))
 

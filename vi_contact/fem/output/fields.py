@@ -7,8 +7,6 @@ moment, also while the run goes on or after it was killed. Nothing in the files 
 What a frame holds: docs/reference/files.md. In the first one a is zero, and with friction all closed nodes stick.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -78,7 +76,7 @@ class XDMF:
     def __post_init__(self) -> None:
         attributes(self, counts=("every", "frames_per_file"))
 
-    def open(self, problem: ContactProblem, folder: Path, kept: Mapping[int, float]) -> FrameWriter:
+    def open(self, problem: ContactProblem, folder: Path, kept: Mapping[int, float]) -> "FrameWriter":
         """Write the mesh; go on after the frames of ``kept`` (step -> time) that are in the folder. Collective."""
         space_of("XDMF", problem.system)
         known_matrices("XDMF, von_mises", problem.system, "K")

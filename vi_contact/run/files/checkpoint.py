@@ -7,8 +7,6 @@ never from inside a halved one, so that a restart takes the steps of the straigh
 after a crash it is the last complete one.
 """
 
-from __future__ import annotations
-
 import hashlib
 import io
 import json
@@ -53,7 +51,7 @@ class RestartPoint:
     halved: int = 0
 
     @classmethod
-    def first(cls, state: State) -> RestartPoint:
+    def first(cls, state: State) -> "RestartPoint":
         """Return the beginning of a run."""
         return cls(state, state.t, state.k)
 

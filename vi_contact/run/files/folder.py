@@ -4,8 +4,6 @@ Only rank 0 touches the disk. Whatever it does there goes through ``on_root``: a
 then raise the same sentence together. Files that must be whole are written beside their name and renamed.
 """
 
-from __future__ import annotations
-
 import fcntl
 import json
 import logging

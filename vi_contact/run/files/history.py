@@ -7,8 +7,6 @@
 ``history.journal``  the array columns of the steps since then (float64: k, then the arrays of the row).
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 import shutil

@@ -6,8 +6,6 @@ kept as numbers, with their sizes, and compared relative to these. Laws and sche
 which are compared likewise.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass

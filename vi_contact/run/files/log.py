@@ -1,7 +1,5 @@
 """Tell what a run does while it works: ``run.log`` through the logging module, and progress with the time left."""
 
-from __future__ import annotations
-
 import logging
 import platform
 import sys

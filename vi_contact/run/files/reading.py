@@ -1,7 +1,5 @@
 """Read what a run left in its folder: histories, units, facts and the geometry of the contact points."""
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Mapping

@@ -4,8 +4,6 @@ Numbers are in history.csv, arrays in history.h5 and, of later steps, in history
 checksum over lines and arrays, which the checkpoint keeps.
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Container, Iterator, Sequence
 from contextlib import closing, suppress
@@ -71,7 +69,7 @@ class StoredRows:
 
 
 def read_blocks(
-    csv: Any, table: Table, arrays: StoredArrays, *, first: int = 0, k: int | None = None
+    csv: Any, table: Table, arrays: "StoredArrays", *, first: int = 0, k: int | None = None
 ) -> Iterator[tuple[list[bytes], Block]]:
     """Return (lines, rows) from where history.csv is, row ``first``, to step k or its end; no line cut short."""
     done = first

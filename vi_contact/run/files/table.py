@@ -1,7 +1,5 @@
 """Hold the histories of a run in memory: compact columns, of a run with a folder only so much of them; tally them."""
 
-from __future__ import annotations
-
 import copy
 import os
 from collections.abc import Iterator, Mapping

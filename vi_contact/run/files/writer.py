@@ -1,7 +1,5 @@
 """Write everything a run writes while it works, in one place: histories, fields, checkpoints, log and summary."""
 
-from __future__ import annotations
-
 import logging
 import time
 from collections.abc import Callable, Mapping

@@ -11,8 +11,6 @@ A law that depends on the slip rate makes this a sequence of such problems: ``sl
 Tangential unknowns that are prescribed carry no reaction: their rows are replaced by those of a free spring.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -10,8 +10,6 @@ Where a plain step lets f grow along itself, f·f_old >= |f_old|², g expands an
 plain again, and what was tried before is forgotten.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol

@@ -5,8 +5,6 @@ Every problem with the threshold s given is convex and has one solution; the map
 Analysis IV, 1996). Its observed factor is in the result. ``extrapolation`` may shorten the sequence.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import ClassVar
 
@@ -41,7 +39,7 @@ class FixedPoint:
         inner_method("FixedPoint", "tresca", self.tresca)
         accelerated("FixedPoint", self.extrapolation)
 
-    def prepare(self, G: Array, bilateral: Mask) -> PreparedFixedPoint:
+    def prepare(self, G: Array, bilateral: Mask) -> "PreparedFixedPoint":
         """Check and scale G (m d, m d)."""
         return PreparedFixedPoint(self, G, bilateral)
 

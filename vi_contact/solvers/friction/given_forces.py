@@ -11,8 +11,6 @@ Block Gauss-Seidel: under Tresca's law the exact minimum over one block after th
 under Coulomb's when coupling and friction are moderate, linearly. ``extrapolation`` acts on r_t.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, ClassVar

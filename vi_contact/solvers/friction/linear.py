@@ -10,8 +10,6 @@ growing with its normal, K z = v is r = H (v + s) with s at S only:
     (C H)_S s = -C H v                                                                                             (2)
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -34,7 +32,7 @@ class States:
     of nodes that turn. ``exact``: none does, and the linear problem depends on ``key`` only.
     """
 
-    def __init__(self, step: ScaledProblem, y: Array, before: States | None) -> None:
+    def __init__(self, step: ScaledProblem, y: Array, before: "States | None") -> None:
         m, d = y.shape
         limit = step.limit(y[:, 0])
         size = np.linalg.norm(y[:, 1:], axis=1)
@@ -56,7 +54,7 @@ class LinearProblems:
     """Solve the linear problems of one run of Newton's method. The way of solution depends on this run alone, not on
     ``kept``, the factors of the last sets of states of one G: they save time and change no digit of an answer."""
 
-    def __init__(self, delassus: ScaledDelassus, kept: dict[bytes, Factored]) -> None:
+    def __init__(self, delassus: ScaledDelassus, kept: "dict[bytes, Factored]") -> None:
         self._delassus, self._kept = delassus, kept
         self._solved: set[bytes] = set()
 

@@ -18,8 +18,6 @@ Slip that turned back within one iteration overshot: such a node sticks in the n
 slip to and fro. Where Newton cycles all the same, Gauss-Seidel sweeps (nsgs.py) lead to a better start.
 """
 
-from __future__ import annotations
-
 import ctypes
 from dataclasses import dataclass
 from functools import partial

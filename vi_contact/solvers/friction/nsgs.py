@@ -11,8 +11,6 @@ Appl. Mech. Eng. 177, 1999) and Jean (same volume). Under Tresca's law it is coo
 converges for every G; under Coulomb's it converges in practice, linearly, for friction that is not large.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar

@@ -17,8 +17,6 @@ Scaling. Normal rows are multiplied by G_nn^(-1/2), tangential ones by one numbe
 the mean of G_tt to the same power: reactions and displacements are then both in sqrt(J), as in ``normal.lcp``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -78,7 +76,7 @@ def inner_method(owner: str, meaning: str, value: Any) -> None:
 class ScaledProblem:
     """Pose (1) in scaled numbers: q (m, d), cohesion and slope (m,)."""
 
-    delassus: ScaledDelassus
+    delassus: "ScaledDelassus"
     q: Array
     cohesion: Array
     slope: Array

@@ -11,8 +11,6 @@ has one solution, but plain iterations need c mu' < 1; beyond that Anderson's me
 point.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 

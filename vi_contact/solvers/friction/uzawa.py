@@ -11,8 +11,6 @@ the condition number k of G, is reached at rho = 2/(lambda_min + lambda_max), wh
 that of the scaled numbers of ``problem``, in which rho is dimensionless. Slow by nature: errors shrink by 1 - 2/k.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 

@@ -14,8 +14,6 @@ in which kappa, the friction limit over the slip, is the curvature of the disk; 
 that depend on the slip rate add their derivative times n n·s. Arrays have one row for each condition of this rank.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,7 +57,7 @@ class Limits:
     cohesion: Array
     slope: Array
     rise: Array
-    rest: Limits | None = None
+    rest: "Limits | None" = None
 
     def __call__(self, r_n: Array) -> Array:
         """Return the limit (m,): tension rubs on nothing."""
@@ -83,7 +81,7 @@ class States:
 
     def __init__(
         self, tangents: Tangents, limits: Limits, y: tuple[Array, Array], slip: Array, *,
-        before: States | None = None, stuck: Mask | None = None,
+        before: "States | None" = None, stuck: Mask | None = None,
     ) -> None:
         self._tangents = tangents
         y_n, y_t = y

@@ -13,8 +13,6 @@ bounds are searched; then they are taken from the answer, and a search along the
 small as can be, keeps this Newton iteration from cycling.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...core.algebra import Array, Mask, largest, total
@@ -76,7 +74,7 @@ class Projected:
         of.contact.closed[self._one_sided] = closed
         return x, reason
 
-    def _descend(self, face: Face) -> int:
+    def _descend(self, face: "Face") -> int:
         """Advance until the projected gradient is as small as the measures of the step ask for."""
         of, mark, since, count = self.of, np.inf, 0, 0
         while True:

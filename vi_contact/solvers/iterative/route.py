@@ -7,8 +7,6 @@ projected gradients, which decrease the energy in every step and so cannot cycle
 friction take semismooth Newton and GMRES instead (``friction``).
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -84,7 +82,7 @@ class Iterative:
             raise InputError(f"Iterative() would ignore {problem.friction}: a body in one dimension cannot slide, use "
                              "Frictionless()")
 
-    def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> PreparedIterative:
+    def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> "PreparedIterative":
         """Choose and make the preconditioner; collective. InputError for options that cannot work."""
         return PreparedIterative(self, A, surface, scale)
 

@@ -5,8 +5,6 @@ PETSC_OPTIONS). SNES VI reads its options again whenever the active set changes,
 as long as a solve runs and are taken out afterwards: two solvers with one prefix do not meet.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
@@ -27,7 +25,7 @@ class OptionLayers:
         self.prefix = prefix
         self._defaults, self._own = defaults, {key.lstrip("-"): value for key, value in own.items()}
 
-    def apply(self, solver: Any, check: Callable[[Any, OptionLayers], None]) -> None:
+    def apply(self, solver: Any, check: "Callable[[Any, OptionLayers], None]") -> None:
         """Set up a SNES or TAO object from the options; InputError when PETSc or ``check`` does not take them."""
         with self.in_force():
             try:

@@ -7,8 +7,6 @@ friction the tangential reactions become bounded unknowns too (``friction``); th
 and only SNES can do it. Reference: PETSc manual, chapters SNES (variational inequalities) and TAO.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol, cast
@@ -106,7 +104,7 @@ class Volume:
             raise InputError(f"Volume would ignore {law}: a body in one dimension cannot slide, use Frictionless()")
         on_all(surface.comm, "the friction law", lambda: law.limit(np.zeros(surface.count), surface.weights, 1.0))
 
-    def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> PreparedVolume:
+    def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> "PreparedVolume":
         """Return the solver for one effective matrix; collective. InputError for options that cannot work."""
         return PreparedVolume(self, A, surface, scale)
 

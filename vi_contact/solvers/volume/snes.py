@@ -6,8 +6,6 @@ VINEWTONSSLS on the Fischer-Burmeister function. Both factorise in every iterati
 route but A and b.
 """
 
-from __future__ import annotations
-
 import weakref
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -42,7 +40,7 @@ class SnesDriver:
     reasons = PETSc.SNES.ConvergedReason
 
     def __init__(
-        self, scaled: ScaledStep, layers: OptionLayers, jacobian: AssembledJacobian | FrictionJacobian, *,
+        self, scaled: ScaledStep, layers: OptionLayers, jacobian: "AssembledJacobian | FrictionJacobian", *,
         snes_type: str, check: Callable[[Any, OptionLayers], None],
     ) -> None:
         self._scaled, self._layers, self._jacobian = scaled, layers, jacobian

@@ -1,7 +1,5 @@
 """Run the Timoshenko beam that rubs with its tip on a wall, from the values of a case file's table [beam]."""
 
-from __future__ import annotations
-
 import io
 from dataclasses import dataclass, fields
 from functools import cached_property

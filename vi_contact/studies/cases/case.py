@@ -7,8 +7,6 @@
     [friction] [impact] [mass] [[excitation]]              [model]    instead of mesh, material, system, contact
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace

@@ -1,7 +1,5 @@
 """Let a particle hit a wall through a boundary layer, from the values of a case file's table [layer]."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Find the case files that ship with the package, and keep in a run folder the copy of the case that made it."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path

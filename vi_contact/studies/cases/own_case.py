@@ -1,7 +1,5 @@
 """Read and run case files whose table has a runner of its own: [beam], [layer]; [mesh] and [model] are in ``case``."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -31,7 +29,7 @@ class OwnCase:
     path: Path
     tables: Mapping[str, Any]
     settings: Sequence[str]
-    study: BeamStudy | LayerStudy = field(repr=False)
+    study: "BeamStudy | LayerStudy" = field(repr=False)
 
     def run(self, comm: Comm, out: str | Path) -> str:
         """Run it on rank 0, whatever the number of ranks; return what it found, as text. Collective."""
@@ -46,7 +44,7 @@ class OwnCase:
         return on_root(comm, alone) or ""
 
 
-def open_case(path: str | Path, settings: Sequence[str] = (), allow: Sequence[str] = ()) -> Case | OwnCase:
+def open_case(path: str | Path, settings: Sequence[str] = (), allow: Sequence[str] = ()) -> "Case | OwnCase":
     """Return the case of a file, whatever its tables; arguments and InputError as of ``read_case``."""
     path = Path(path)
     tables = with_settings(read_toml(path), settings)
@@ -57,7 +55,7 @@ def open_case(path: str | Path, settings: Sequence[str] = (), allow: Sequence[st
     return read_case(path, settings, allow=allow)
 
 
-def study_of(path: Path, tables: Mapping[str, Any]) -> BeamStudy | LayerStudy:
+def study_of(path: Path, tables: Mapping[str, Any]) -> "BeamStudy | LayerStudy":
     """Return what the tables of a case of its own make; InputError for other tables and values out of range."""
     from .beam_study import BeamStudy  # late: [mesh] and [model] need neither
     from .layer_study import LayerStudy

@@ -8,8 +8,6 @@ pack.tools uses ``subprocess``. And it has all methods of the protocol that the 
 path without the folder of the case file, whose author could have put a module of a trusted name there.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace

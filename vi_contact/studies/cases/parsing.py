@@ -1,7 +1,5 @@
 """Read values of a TOML file into nodes of calls, by type hints; see ``table_calls``."""
 
-from __future__ import annotations
-
 import os
 import types
 from collections import ChainMap

@@ -1,7 +1,5 @@
 """Turn the short options of ``vi-contact run`` into settings KEY=VALUE of a case; refuse those it has no use for."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from itertools import chain

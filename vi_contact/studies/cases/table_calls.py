@@ -10,8 +10,6 @@ file holds: communicator, mesh, its groups, system; excitations, time step and s
 of the file is ever evaluated as code.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, is_dataclass
 from inspect import Parameter, signature
@@ -35,11 +33,11 @@ class Spot:
     def __str__(self) -> str:
         return f"[{self.table}] {self.key}".strip() if self.table else f"[{self.key}]"
 
-    def at(self, key: str) -> Spot:
+    def at(self, key: str) -> "Spot":
         """Return the spot of a key of the table that is here."""
         return Spot(self.file, self._here(), key)
 
-    def entry(self, number: int) -> Spot:
+    def entry(self, number: int) -> "Spot":
         """Return the spot of an entry of the list that is here, counted from 1."""
         return Spot(self.file, self.table, f"{self.key}[{number}]")
 

@@ -1,7 +1,5 @@
 """Read TOML files, and set single values of what was read; every mistake is one sentence with the file."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

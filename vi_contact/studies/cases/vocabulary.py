@@ -5,8 +5,6 @@ for, and so are its named constructors ("GeneralisedAlpha.spectral_radius"). Wha
 of a function here that takes none.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
@@ -142,7 +140,7 @@ class Parts:
     tags: Any
     weighted: bool = False
     recorders: tuple[Recorder, ...] | None = None
-    firm: Parts | None = None
+    firm: "Parts | None" = None
     moved: bool = False
 
 

@@ -5,8 +5,6 @@ Vamvatsikos and Cornell, Earthquake Engng Struct. Dyn. 31 (2002). In the folder 
 ``runs/NAME_xSCALE``, the folder of every run, with its row.
 """
 
-from __future__ import annotations
-
 import hashlib
 import math
 from collections.abc import Callable, Sequence

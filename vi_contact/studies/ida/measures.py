@@ -1,7 +1,5 @@
 """What an incremental dynamic analysis plots: intensity measures of motions, demands on the structure."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial

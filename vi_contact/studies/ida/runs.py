@@ -1,7 +1,5 @@
 """The runs of an incremental dynamic analysis: one case, its motions replaced and scaled, a process for every run."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess
