@@ -24,7 +24,8 @@ def parser() -> argparse.ArgumentParser:
         mesh = getattr(meshes, name)
         one = commands.add_parser(shape, description=mesh.__doc__, argument_default=argparse.SUPPRESS)
         for field in fields(mesh):
-            option, kind = f"--{field.name.replace('_', '-')}", str(field.type)  # annotations are texts
+            option = f"--{field.name.replace('_', '-')}"
+            kind = field.type.__name__ if isinstance(field.type, type) else str(field.type)
             if kind == "bool":
                 one.add_argument(option, action="store_true")
             elif kind.startswith(("float", "tuple")):
