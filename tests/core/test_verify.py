@@ -11,7 +11,9 @@ from bar import before_impact, bouncing, period_three, run, thrown
 from chain import chain_problem
 from shaken import changes, shaken
 
-from vi_contact.core.algebra import EffectiveMatrix, SerialMatrix
+from vi_contact.core import verify
+from vi_contact.core.algebra import EffectiveMatrix, SerialComm, SerialMatrix
+from vi_contact.core.compiled import library
 from vi_contact.core.state_checks import initial_state
 from vi_contact.core.step import Report, StepProblem, StepResult
 from vi_contact.core.verify import energies, energy_balance, kkt_residual
@@ -241,3 +243,27 @@ def test_ledger_finds_a_wrong_step():
     lighter = replace(report.balance, f=report.balance.f + 1.0)
     defect = energy_balance(problem, report.old, before_impact(report), lighter).defect
     assert defect == pytest.approx(-du.sum(), rel=1e-9)
+
+
+def test_compiled_sizes_are_those_of_numpy(monkeypatch):
+    """Digit by digit: of one step and of several, with springs, held conditions, friction, and NaN."""
+    library(SerialComm())
+    step, result = pressed()
+    A = EffectiveMatrix(step.A.matrix, step.A.algebra, image=lambda x: np.ascontiguousarray((step.A.matrix @ x.T).T))
+    step = replace(step, A=A)
+    rng, m, n = np.random.default_rng(3), 2, len(result.x)
+    odd = replace(step.surface, bilateral=np.array([True, False]), compliance=np.array([0.0, 1e-3]))
+    for surface in (step.surface, odd, replace(odd, tangents=np.array([[3], [-1]]))):
+        x, r_n, r_t = rng.normal(size=(4, n)), rng.normal(size=(4, m)), rng.normal(size=(4, m, 1))
+        rows = replace(result, x=x, r_n=r_n, active=rng.random((4, m)) < 0.5, r_t=r_t)
+        rows = rows if surface.tangents.size else replace(rows, r_t=None)
+        rows.x[3, 1] = np.nan
+        many = replace(step, surface=surface, b=rng.normal(size=(4, n)), guess=-0.5 * x, active=rows.active)
+        single = replace(many, b=many.b[1], guess=many.guess[1], active=rows.active[1])
+        own = replace(rows, x=x[1], r_n=r_n[1], active=rows.active[1], r_t=None if rows.r_t is None else r_t[1])
+        compiled = verify._sizes(many, rows), verify._sizes(single, own)
+        monkeypatch.setattr(verify, "already", lambda: None)
+        assert compiled == (verify._sizes(many, rows), verify._sizes(single, own))
+        monkeypatch.undo()
+        assert verify.already() is not None and compiled[1] == compiled[0][1:2] and np.inf in compiled[0][3]
+        assert np.isfinite(compiled[0][:3]).all() and min(compiled[0][0][:6]) > 0.0

@@ -134,12 +134,12 @@ class Fails:
                 raise vc.StepFailure("refused")
             return solve(step)
 
-        def failing_many(many, steps):
-            found = solve_many(many, steps)
-            if found is None:
-                return None
-            return found[0], [vc.StepFailure("refused") if refused(step) else one
-                              for step, one in zip(steps, found[1], strict=True)]
+        def failing_many(many, own):
+            found = solve_many(many, own)
+            if found is not None:
+                rows = [row for row in range(len(many.b)) if refused(own(row))]
+                found.failed.update(dict.fromkeys(rows, vc.StepFailure("refused")))
+            return found
 
         made.solve, made.solve_many = failing, failing_many
         return made

@@ -6,11 +6,19 @@ import numpy as np
 import pytest
 from reference_lcp import KINDS, LCP, degenerate, enumerate_lcp, generic, problems, solve, spd
 
-from vi_contact.core.errors import StepFailure
+from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.solvers.normal import active_set
 from vi_contact.solvers.normal.active_set import ActiveSet
 
 pytestmark = pytest.mark.serial
+
+
+@pytest.fixture(params=["compiled", "numpy"], autouse=True)
+def route(request, monkeypatch):
+    """Solve by compiled exchanges, where there is a compiler, and without."""
+    if request.param == "numpy":
+        monkeypatch.setattr(active_set, "library", lambda comm: None)
+    return request.param
 
 
 def full_exchange(G: np.ndarray, q: np.ndarray, active: np.ndarray, steps: int) -> list[tuple[bool, ...]]:
@@ -101,6 +109,7 @@ def test_iterations_count_changes_of_the_set_and_history_the_rows():
 
 def test_the_same_set_is_not_factored_twice(monkeypatch):
     """Prepared once, marching with an unchanged set: triangular solves only."""
+    monkeypatch.setattr(active_set, "library", lambda comm: None)
     calls, original = [], active_set.cholesky
     monkeypatch.setattr(active_set, "cholesky", lambda G: calls.append(G.shape[0]) or original(G))
     rng = np.random.default_rng(9)
@@ -141,3 +150,34 @@ def test_failure_tells_what_happened_and_what_to_do():
     G = 1.0 / (1.0 + np.add.outer(np.arange(8.0), np.arange(8.0)))
     with pytest.raises(StepFailure, match="ill-conditioned"):
         solve(ActiveSet(tolerance=1e-18), LCP(G, -np.linspace(1.0, 2.0, 8), np.zeros(8, dtype=bool)))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_several_problems_at_once_have_the_answers_of_each(kind, route):
+    """From right and wrong guesses, after other problems, and with one among them that is refused."""
+    rng = np.random.default_rng(12)
+    made = kind(rng, 9)
+    prepared, alone = (ActiveSet().prepare(made.G, made.bilateral) for _ in range(2))
+    for _ in range(3):
+        q = made.q + np.where(np.isfinite(made.q), rng.normal(size=(6, len(made.q))), 0.0)
+        guess = rng.random(q.shape) < 0.5
+        q[4, 0] = np.nan
+        r, active, counts, failed = prepared.solve_many(q, guess)
+        assert list(failed) == [4] and isinstance(failed[4], InputError)
+        for row in (0, 1, 2, 3, 5):
+            one = alone.solve(q[row], guess[row])
+            assert (counts[row], active[row].tolist()) == (one.iterations, one.active.tolist())
+            assert np.abs(r[row] - one.r).max() <= 1e-12 * np.abs(one.r).max()
+
+
+def test_both_routes_make_the_same_exchanges(monkeypatch):
+    """The history, the answer to round-off, and reactions that are not negative."""
+    rng = np.random.default_rng(13)
+    for problem in [generic(rng, m) for m in (1, 3, 8, 30)] + [degenerate(rng, 12)]:
+        monkeypatch.undo()
+        compiled = ActiveSet().prepare(problem.G, problem.bilateral).solve(problem.q)
+        monkeypatch.setattr(active_set, "library", lambda comm: None)
+        other = ActiveSet().prepare(problem.G, problem.bilateral).solve(problem.q)
+        assert compiled.history == other.history and compiled.iterations == other.iterations
+        assert np.abs(compiled.r - other.r).max() <= 1e-13 * np.abs(other.r).max()
+        assert compiled.r.min() >= 0.0 and np.array_equal(compiled.active, other.active)

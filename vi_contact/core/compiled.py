@@ -40,6 +40,11 @@ def _library() -> Any:
         return None
 
 
+def already() -> Any:
+    """Return the functions where somebody has asked for them before, else None."""
+    return _library() if _library.cache_info().currsize else None
+
+
 def compiled() -> Path:
     """Return the file of the compiled functions, made unless one that can be loaded is there. Safe in any number of
     processes: each compiles aside, and the last one to end replaces the file as a whole."""

@@ -6,6 +6,7 @@
    Functions that can fail return CHOLMOD's status. */
 #include <cholmod.h>
 #include <math.h>
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -293,4 +294,163 @@ double relax(int m, int d, const double *G, const double *cohesion, const double
         }
     }
     return largest;
+}
+
+/* The largest sizes in the definitions of the certificate, ten for each of k steps, a row of n unknowns and m conditions
+   each: of A x - b + B'r, b, A x, x and the guess; of r_n, of the gaps of closed conditions and the r_n of the others; and of
+   negative gaps and r_n. As whole numbers doubles are in the order of their sizes, and NaN is above infinity: it becomes
+   that. `compliance` and `held` are NULL where all is rigid and unilateral, r_t without friction; room: n numbers. */
+#define UP(top, value) { const double of = value; int64_t size; memcpy(&size, &of, 8); size &= INT64_MAX; top = size > top ? size : top; }
+#define BELOW(value) ((value) >= 0.0 ? 0.0 : (value))
+
+FASTEST void largest(int k, int n, int m, int along, const double *Ax, const double *b, const double *x, const double *guess,
+                     const double *bound, const double *r_n, const double *r_t, const char *active, double scale,
+                     const int64_t *owned, const int64_t *tangents, const double *compliance, const char *held,
+                     double *restrict room, double *out) {
+    const double infinity = HUGE_VAL;
+    for (; k > 0; k--, Ax += n, b += n, x += n, guess += n, r_n += m, active += m, out += 10) {
+        int64_t top[10] = {0}, first = 0, second = 0, third = 0, fourth = 0;
+        for (int j = 0; j < n; j++) {
+            room[j] = Ax[j] - b[j];
+            UP(first, b[j]) UP(second, Ax[j]) UP(third, x[j]) UP(fourth, guess[j])
+        }
+        top[1] = first; top[2] = second; top[3] = third; top[4] = fourth;
+        for (int j = 0; j < m; j++) {
+            const int fixed = held && held[j], closed = active[j] || fixed;
+            double gap = bound[j] - x[owned[j]];
+            if (compliance) gap += compliance[j] * r_n[j] / scale;
+            room[owned[j]] += r_n[j];
+            UP(top[5], r_n[j])
+            if (closed) UP(top[6], gap) else UP(top[7], r_n[j])
+            if (!fixed) { UP(top[8], BELOW(gap)) UP(top[9], BELOW(r_n[j])) }
+        }
+        if (r_t) {
+            for (int j = 0; j < m * along; j++)
+                if (tangents[j] >= 0) room[tangents[j]] += r_t[j];
+            r_t += m * along;
+        }
+        first = 0;
+        for (int j = 0; j < n; j++) UP(first, room[j])
+        top[0] = first;
+        for (int c = 0; c < 10; c++) {
+            memcpy(out + c, top + c, 8);
+            out[c] = out[c] <= infinity ? out[c] : infinity;
+        }
+    }
+}
+
+/* The first exchanges of the active-set method for k small problems 0 <= r, q + G r >= 0 with one G of m rows: see
+   active_set.py, which has the same for one of them, and goes on where changes[] says -1. `limit` times |r|_max is the
+   rounding of q + G r. `sets` and `factors` (k, m, m) are kept from call to call: the last set of every row, 2 in its first
+   place where there is none, and its factor; moved (k, most): rows that changed sides in each exchange; room: 3 m
+   numbers. */
+static inline __attribute__((always_inline)) int decompose(const int n, double *restrict L) { /* column by column, lower */
+    for (int j = 0; j < n; j++) {
+        double *mine = L + (long) j * n;
+        if (!(mine[j] > 0.0)) return 0;
+        const double pivot = sqrt(mine[j]);
+        for (int i = j; i < n; i++) mine[i] /= pivot;
+        for (int c = j + 1; c < n; c++) {
+            double *other = L + (long) c * n;
+            const double t = mine[c];
+            for (int i = c; i < n; i++) other[i] -= t * mine[i];
+        }
+    }
+    return 1;
+}
+
+static inline __attribute__((always_inline)) void substituted(const int n, const double *L, double *restrict y) {
+    for (int j = 0; j < n; j++) {
+        const double *mine = L + (long) j * n, t = y[j] /= mine[j];
+        for (int i = j + 1; i < n; i++) y[i] -= t * mine[i];
+    }
+    for (int j = n - 1; j >= 0; j--) {
+        const double *mine = L + (long) j * n;
+        double s[4] = {0.0, 0.0, 0.0, 0.0};
+        int i = j + 1;
+        for (; i + 3 < n; i += 4)
+            for (int c = 0; c < 4; c++) s[c] += mine[i + c] * y[i + c];
+        for (; i < n; i++) s[0] += mine[i] * y[i];
+        y[j] = (y[j] - ((s[0] + s[1]) + (s[2] + s[3]))) / mine[j];
+    }
+}
+
+/* w = gap + G r for the r of the places in `at`. */
+static inline __attribute__((always_inline)) void
+pushed(const int m, const int n, const int *at, const double *G, const double *gap, const double *r, double *restrict w) {
+    memcpy(w, gap, m * sizeof(double));
+    for (int a = 0; a < n; a++) {
+        const double *row = G + (long) at[a] * m, t = r[at[a]];
+        for (int j = 0; j < m; j++) w[j] += t * row[j];
+    }
+}
+
+FASTEST void exchanges(int k, int m, int most, double limit, double tolerance, const double *G, const double *scale,
+                       const char *held, const double *q, const char *guess, char *sets, double *factors, double *room,
+                       int *places, double *r, char *closed, double *residual, int *changes, int *moved) {
+    for (; k > 0; k--, q += m, guess += m, sets += m, factors += (long) m * m, r += m, closed += m, residual++,
+                  changes++, moved += most) {
+        double *gap = room, *w = room + m, *part = room + 2 * m, unit = 0.0;
+        int sound = 1;
+        for (int j = 0; j < m; j++) {
+            gap[j] = q[j] * scale[j];
+            const double off = held[j] ? fabs(gap[j]) : BELOW(gap[j]);
+            sound &= fabs(off) < HUGE_VAL;
+            unit = fmax(unit, fabs(off));
+            closed[j] = held[j] || (guess[j] && gap[j] < HUGE_VAL);
+            r[j] = 0.0;
+        }
+        *residual = 0.0;
+        *changes = sound && unit == 0.0 ? 0 : -1;
+        for (int change = 0; sound && unit > 0.0 && change <= most; change++) {
+            if (memcmp(closed, sets, m)) {
+                int n = 0;
+                for (int j = 0; j < m; j++)
+                    if (closed[j]) places[n++] = j;
+                for (int a = 0; a < n; a++)
+                    for (int c = a; c < n; c++) factors[(long) a * n + c] = G[(long) places[a] * m + places[c]];
+                memcpy(sets, closed, m);
+                if (!decompose(n, factors)) { sets[0] = 2; break; }
+            }
+            int n = 0, wrong = 0;
+            for (int j = 0; j < m; j++) {
+                r[j] = 0.0;
+                if (closed[j]) { part[n] = -gap[j]; places[n++] = j; }
+            }
+            substituted(n, factors, part);
+            double top = 0.0, least = 0.0, off = 0.0;
+            for (int a = 0; a < n; a++) { r[places[a]] = part[a]; top = fmax(top, fabs(part[a])); }
+            pushed(m, n, places, G, gap, r, w);
+            for (int j = 0; j < m; j++) {
+                if (held[j]) continue;
+                const int other = (closed[j] ? r[j] : w[j]) < -limit * top;
+                wrong += other;
+                least = fmin(least, r[j]);
+                part[j] = other;
+            }
+            if (wrong) {
+                if (change == most) break;
+                moved[change] = wrong;
+                for (int j = 0; j < m; j++)
+                    if (!held[j] && part[j] != 0.0) closed[j] = !closed[j];
+                continue;
+            }
+            if (least < 0.0) { /* by rounding: r >= 0 holds exactly */
+                for (int j = 0; j < m; j++)
+                    if (!held[j]) r[j] = fmax(r[j], 0.0);
+                pushed(m, n, places, G, gap, r, w);
+            }
+            for (int j = 0; j < m; j++) {
+                const double one = fabs(held[j] ? w[j] : fmin(r[j], w[j]));
+                off = one <= off ? off : one;
+            }
+            *residual = off / unit;
+            if (*residual <= tolerance) *changes = change;
+            break;
+        }
+        for (int j = 0; j < m; j++) {
+            closed[j] = held[j] || r[j] > 0.0;
+            r[j] *= scale[j];
+        }
+    }
 }

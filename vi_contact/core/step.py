@@ -20,7 +20,7 @@ contact conditions, d the dimensions. ``problem.equations`` is the system to mar
 and excitations in it; ``problem.surface`` are its contact conditions. Arrays that come in are read, never written to.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Protocol
@@ -30,7 +30,7 @@ import numpy as np
 from .algebra import Array, EffectiveMatrix, Mask
 from .certificate import Certificate
 from .checks import on_all
-from .errors import InputError
+from .errors import InputError, ViContactError
 from .problem import ContactProblem
 from .protocols import FrictionLaw, Frictionless, MassLaw
 from .surfaces import ContactSurface
@@ -111,6 +111,23 @@ class StepResult:
     r_t: Array | None = None
     history: tuple[float, ...] = ()
     aim: float = 0.0
+
+
+@dataclass(frozen=True)
+class Answers:
+    """Answer a step of several runs: ``rows`` holds x (k, n), r_n, active (k, m) and r_t (k, m, d - 1). Of each run
+    ``iterations`` and, with friction, ``histories``; ``failed``: what those raise that have no answer."""
+
+    rows: StepResult
+    iterations: Sequence[int]
+    failed: dict[int, ViContactError]
+    histories: Sequence[tuple[float, ...]] = ()
+
+    def own(self, row: int) -> StepResult:
+        """Return the answer of one run."""
+        rows, history = self.rows, self.histories[row] if self.histories else ()
+        r_t, count = None if rows.r_t is None else rows.r_t[row], self.iterations[row]
+        return StepResult(rows.x[row], rows.r_n[row], rows.active[row], count, rows.method, r_t, history)
 
 
 @dataclass(frozen=True)

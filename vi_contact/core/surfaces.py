@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from .algebra import Array, Comm, Indices, Mask, Matrix, SerialComm, largest, on_first, total
 from .checks import function, number, shown
 from .companion import Companion
+from .contact_last import at
 from .errors import InputError
 
 log = logging.getLogger(__name__)
@@ -94,6 +95,14 @@ class ContactSurface:
     def plain(self) -> bool:
         """Say whether all conditions of this rank are rigid and unilateral."""
         return bool(self.rigid.all() and not self.bilateral.any())
+
+    @cached_property
+    def readable(self) -> tuple[tuple[int, ...], list[Any], tuple[Any, ...]]:
+        """Return (m, d - 1), where compiled functions find the unknowns and, unless all is plain, compliance and
+        bilateral conditions, and what lies there."""
+        kept = (np.ascontiguousarray(self.owned, np.int64), np.ascontiguousarray(self.tangents, np.int64),
+                *((None, None) if self.plain else (self.compliance + 0.0, self.bilateral.copy())))
+        return self.tangents.shape, [None if one is None else at(one) for one in kept], kept
 
     def everywhere(self, values: NDArray[Any]) -> Any:
         """Return (total, …) the values (m, …) of all conditions, by their numbers and the same on every rank, of one

@@ -1,12 +1,17 @@
 """Verify a step: its certificate, and its energy balance. These checks ship with the package."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable
+from ctypes import c_double
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from .algebra import Array, lowest, max_abs
+from .algebra import Array, max_abs
 from .certificate import Certificate
+from .compiled import already
+from .contact_last import at
 from .problem import ContactProblem
 from .step import Balance, State, StepProblem, StepResult
 from .system import SemiDiscreteSystem
@@ -16,38 +21,48 @@ ROUNDED = 1e-5  # of |A||x|, and of what friction is compared with: see Certific
 
 def kkt_residual(step: StepProblem, result: StepResult) -> Certificate:
     """Return how well (x, r_n) satisfies the inequality problem of a step; definitions: ``Certificate``."""
-    surface, x, r_n = step.surface, result.x, result.r_n
-    Ax = step.A.image(x)
-    residual = Ax - step.b
-    if result.r_t is None:
-        residual[surface.owned] += r_n
-    else:
-        residual += surface.reaction_load(r_n, len(x), result.r_t)
-    gap, closed = step.bound - surface.normal_values(x), result.active
-    signed = gap, r_n
-    if not surface.plain:
-        gap += surface.compliance * r_n / step.scale
-        closed, signed = closed | surface.bilateral, (gap[~surface.bilateral], r_n[~surface.bilateral])
-    maxima = _maxima(step, residual, step.b, Ax, x, step.guess, r_n, gap[closed], r_n[~closed], signed=signed)
-    return _judged(step, result, maxima)
+    return _judged(step, result, _sizes(step, result)[0])
 
 
 def kkt_residuals(
-    many: StepProblem, result: StepResult, steps: Sequence[StepProblem], results: Sequence[StepResult]
+    many: StepProblem, result: StepResult, own: Callable[[int], tuple[StepProblem, StepResult]]
 ) -> list[Certificate]:
-    """Return the certificate of each of several steps on one rank: ``many`` and ``result`` hold their rows."""
-    surface, x, r_n = many.surface, result.x, result.r_n
-    Ax = many.A.image(x)
-    residual = Ax - many.b + surface.reaction_load(r_n, x.shape[-1], result.r_t)
-    gap, held, closed = many.bound - surface.normal_values(x), surface.bilateral, result.active
-    if not surface.plain:
-        gap += surface.compliance * r_n / many.scale
-        closed = closed | held
-    lowest = [np.where(held, 0.0, np.minimum(one, 0.0)) for one in (gap, r_n)]
-    small = np.abs([r_n, np.where(closed, gap, 0.0), np.where(closed, 0.0, r_n), *lowest]).max(-1, initial=0.0)
-    large = [np.maximum(one.max(-1), -one.min(-1)) for one in (residual, many.b, Ax, x, many.guess)]
-    rows = np.concatenate([large, small]).T.tolist()
-    return [_judged(*row) for row in zip(steps, results, rows, strict=True)]
+    """Return the certificate of each of several steps on one rank: ``many`` and ``result`` hold their rows, ``own``
+    makes one of each."""
+    rubs, rows = many.slip0 is not None, enumerate(_sizes(many, result))
+    return [_judged(*(own(row) if rubs else (many, result)), sizes) for row, sizes in rows]
+
+
+def _sizes(step: StepProblem, result: StepResult) -> list[list[float]]:
+    """The largest sizes in the definitions, over all ranks, of each of the steps that are rows of this one; infinite
+    for NaN, which no reduction keeps."""
+    comm, functions = step.surface.comm, already()
+    Ax = step.A.image(result.x)
+    found = _sizes_in_numpy(step, result, Ax) if functions is None else _sizes_compiled(step, result, Ax, functions)
+    return (found if comm.size == 1 else comm.max(found)).tolist()
+
+
+def _sizes_compiled(step: StepProblem, result: StepResult, Ax: Array, functions: Any) -> Array:
+    n, arrays = Ax.shape[-1], [Ax, step.b, result.x, step.guess, step.bound, result.r_n, result.r_t, result.active]
+    found, room, (counts, fixed, _) = np.empty((math.prod(Ax.shape[:-1]), 10)), np.empty(n), step.surface.readable
+    kept = [None if one is None else np.ascontiguousarray(one) for one in arrays]
+    places = [None if one is None else at(one) for one in kept]
+    functions.largest(len(found), n, *counts, *places, c_double(step.scale), *fixed, at(room), at(found))
+    return found
+
+
+def _sizes_in_numpy(step: StepProblem, result: StepResult, Ax: Array) -> Array:
+    surface, x, r_n, residual = step.surface, result.x, result.r_n, Ax - step.b
+    if result.r_t is None:
+        residual.T[surface.owned] += r_n.T
+    else:
+        residual += surface.reaction_load(r_n, x.shape[-1], result.r_t)
+    gap, held, closed = step.bound - surface.normal_values(x), surface.bilateral, result.active | surface.bilateral
+    gap += surface.compliance * r_n / step.scale
+    signed = [np.where(held, 0.0, np.minimum(one, 0.0)) for one in (gap, r_n)]
+    arrays = (residual, step.b, Ax, x, step.guess, r_n, np.where(closed, gap, 0.0), np.where(closed, 0.0, r_n), *signed)
+    sizes = [np.maximum(one.max(-1, initial=0.0), -one.min(-1, initial=0.0)) for one in arrays]
+    return np.nan_to_num(np.atleast_2d(np.array(sizes).T), nan=np.inf, posinf=np.inf)
 
 
 def _judged(step: StepProblem, result: StepResult, maxima: list[float]) -> Certificate:
@@ -66,11 +81,9 @@ def _judged(step: StepProblem, result: StepResult, maxima: list[float]) -> Certi
     )
 
 
-def _maxima(step: StepProblem, *arrays: Array, signed: tuple[Array, ...] = ()) -> list[float]:
-    """Largest sizes of the entries on all ranks, and of the negative ones of ``signed``, by one reduction; infinite for
-    NaN, which no reduction keeps."""
-    sizes = [*map(max_abs, arrays), *map(lowest, signed)]
-    sizes = [size if size >= 0.0 else np.inf for size in sizes]
+def _maxima(step: StepProblem, *arrays: Array) -> list[float]:
+    """Largest sizes of the entries on all ranks, by one reduction; infinite for NaN, which no reduction keeps."""
+    sizes = [size if size >= 0.0 else np.inf for size in map(max_abs, arrays)]
     comm = step.surface.comm
     return sizes if comm.size == 1 else comm.max(np.array(sizes)).tolist()
 

@@ -19,7 +19,7 @@ from ..core.certificate import Certificate
 from ..core.errors import ViContactError
 from ..core.problem import ContactProblem
 from ..core.products import frozen
-from ..core.step import Report, State, StepProblem, StepResult
+from ..core.step import Answers, Report, State, StepProblem, StepResult
 from ..core.system import Load, SemiDiscreteSystem
 from ..core.verify import kkt_residuals
 from ..solvers.certified import NEAR, CertifiedSolver
@@ -158,23 +158,24 @@ class Group:
             method = runs[0].method
             self._solver = CertifiedSolver(problem, self._A, many.scale, method.solvers, self._tolerance)
         together = getattr(self._solver.first, "solve_many", None)
-        answers = None if together is None else together(many, steps)
+        answers = None if together is None else together(many, steps.__getitem__)
         if answers is None:
             return list(runs)
         for run in runs:
             run.prepared = {dt: (self._A, self._solver)}
-        result, found, leaving = self._judged(many, steps, *answers)
+        result, found, leaving = self._judged(many, steps, answers)
         if not leaving:
             self._finish(many, steps, result, found, dt)
         return [runs[row] for row in leaving]
 
     def _judged(
-        self, many: StepProblem, steps: Sequence[StepProblem], result: StepResult, results: list[Any]
+        self, many: StepProblem, steps: Sequence[StepProblem], answers: Answers
     ) -> tuple[StepResult, list[tuple[StepResult, Certificate]], list[int]]:
         """The answers with their certificates; those that are not good at once are found alone. The rows of runs that
         have to escalate, or fail, last."""
-        leaving = [row for row, one in enumerate(results) if isinstance(one, ViContactError)]
-        certificates = [] if leaving else kkt_residuals(many, result, steps, results)
+        result, leaving = answers.rows, list(answers.failed)
+        results = [answers.own(row) for row in range(len(steps))]
+        certificates = [] if leaving else kkt_residuals(many, result, lambda row: (steps[row], results[row]))
         doubtful = [row for row, one in enumerate(certificates) if not one.worst <= NEAR * self._tolerance]
         for row in doubtful:
             escalated = True

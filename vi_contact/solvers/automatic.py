@@ -7,7 +7,7 @@ docs/guide/solvers.md.
 """
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -78,10 +78,10 @@ class Chosen:
         """Return the answer of the chosen route. Collective."""
         return self._chosen(step).solve(step)
 
-    def solve_many(self, many: StepProblem, steps: Sequence[StepProblem]) -> Any:
+    def solve_many(self, many: StepProblem, own: Callable[[int], StepProblem]) -> Any:
         """Return the answers of the chosen route to several runs; None where it has none."""
         together = getattr(self._chosen(many), "solve_many", None)
-        return None if together is None else together(many, steps)
+        return None if together is None else together(many, own)
 
     def _chosen(self, step: StepProblem) -> PreparedSolver:
         if self._prepared is None:

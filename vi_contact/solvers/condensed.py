@@ -12,7 +12,7 @@ A step costs one forward and one backward substitution and the small problem, wh
 ``core.condensation``. With friction the tangential unknowns of the contact points are kept too: ``friction.condensed``.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Protocol
@@ -22,18 +22,18 @@ import numpy as np
 from ..core.algebra import Array, EffectiveMatrix, Mask
 from ..core.checks import instance, on_all, provides
 from ..core.condensation import Condensation, Last, condense
-from ..core.errors import InputError, ViContactError
+from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.products import frozen
 from ..core.sizes import refuse_dense
 from ..core.stages import stage
-from ..core.step import StepProblem, StepResult
+from ..core.step import Answers, StepProblem, StepResult
 from ..core.surfaces import ContactSurface
 from .friction.condensed import CondensedFriction
 from .friction.newton import FrictionNewton
 from .friction.problem import FrictionMethod, inner_method
 from .friction.slip_rate import RateIteration
-from .normal.active_set import ActiveSet, ManySets
+from .normal.active_set import ActiveSet, PreparedSets
 from .normal.lcp import LCPResult
 
 
@@ -141,38 +141,24 @@ class PreparedCondensed:
         x = condensed.answer(found.r, (found.r != 0.0) & self._rigid, bound)
         return StepResult(x, surface.mine(found.r), surface.mine(found.active), found.iterations, self._name)
 
-    def solve_many(
-        self, many: StepProblem, steps: Sequence[StepProblem]
-    ) -> tuple[StepResult, list[StepResult | ViContactError]] | None:
-        """Return the answers to the steps of several runs, as rows and one by one, or what they raise; ``many`` holds
-        the rows of b, guess and active set. None where this cannot be: on several ranks, without contact unknowns last
-        in the factor, and with other methods than ActiveSet."""
+    def solve_many(self, many: StepProblem, own: Callable[[int], StepProblem]) -> Answers | None:
+        """Return the answers to the steps of several runs: ``many`` holds the rows of b, guess and active set, ``own``
+        makes the step of one. None where this cannot be: on several ranks, without contact unknowns last in the factor,
+        and with other methods than ActiveSet."""
         surface, rubs = self._surface, many.slip0 is not None and self._surface.total > 0
-        condensed = self.friction.condensed if rubs else self._normal[0]
+        condensed, small = (self.friction.condensed, None) if rubs else self._normal
         if surface.comm.size > 1 or not isinstance(condensed, Last):
             return None
-        if not (rubs or isinstance(self._settings.method, ActiveSet)):
-            return None
-        found: list[Any]
         if rubs:
-            x, found = self.friction.solve_many(many, steps, self._rigid)
-            method, d = self._settings.friction_method, 1 + surface.tangents.shape[1]
-        else:
-            found, method, d = self._sets.solve(many.bound - condensed.free(many.b), many.active), None, 1
-        none, name = np.zeros((surface.total, d)), f"condensed {type(method).__name__}" if rubs else self._name
-        r, active = (np.stack(part) for part in zip(*(
-            (none, none[:, 0] > 0.0) if isinstance(one, ViContactError) else (one.r.reshape(none.shape), one.active)
-            for one in found), strict=True))
-        r_n, r_t = r[..., 0].copy(), r[..., 1:].copy() if rubs else None
-        x = frozen(x if rubs else condensed.answer(r_n, (r_n != 0.0) & self._rigid, many.bound))
-        return StepResult(x, r_n, active, 0, name, r_t=r_t), [
-            one if isinstance(one, ViContactError) else StepResult(
-                x[row], r_n[row], active[row], one.iterations, name, None if r_t is None else r_t[row],
-                one.history if rubs else ()) for row, one in enumerate(found)]
-
-    @cached_property
-    def _sets(self) -> ManySets:
-        return ManySets(self._normal[1])
+            x, r, active, counts, failed, histories = self.friction.solve_many(many, own, self._rigid)
+            name = f"condensed {type(self._settings.friction_method).__name__}"
+            rows = StepResult(frozen(x), r[..., 0].copy(), active, 0, name, r_t=r[..., 1:].copy())
+            return Answers(rows, counts, failed, histories)
+        if not isinstance(small, PreparedSets):
+            return None
+        r, active, counts, failed = small.solve_many(many.bound - condensed.free(many.b), many.active)
+        x = frozen(condensed.answer(r, (r != 0.0) & self._rigid, many.bound))
+        return Answers(StepResult(x, r, active, 0, self._name), counts, failed)
 
     def _with_friction(self, step: StepProblem) -> StepResult:
         """The step with tangential reactions."""

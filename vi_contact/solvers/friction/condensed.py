@@ -11,8 +11,7 @@ A law that depends on the slip rate makes this a sequence of such problems: ``sl
 Tangential unknowns that are prescribed carry no reaction: their rows are replaced by those of a free spring.
 """
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 
@@ -59,19 +58,23 @@ class CondensedFriction:
         held &= found.r.any()
         return found, held.ravel(), places.ravel()
 
-    def solve_many(self, many: StepProblem, steps: Sequence[StepProblem], rigid: Mask) -> tuple[Array, list[Any]]:
-        """Return the same of several steps, x by rows; what one raises takes the place of its reactions."""
-        free = self.condensed.free(many.b)
-        nothing, found = np.zeros(len(self.condensed.there)), list[Any]()
-        rows = [(nothing, nothing > 0.0, nothing)] * len(steps)
-        for row, step in enumerate(steps):
+    def solve_many(
+        self, many: StepProblem, own: Callable[[int], StepProblem], rigid: Mask
+    ) -> tuple[Array, Array, Mask, list[int], dict[int, ViContactError], list[tuple[float, ...]]]:
+        """Return the same of several steps, which ``own`` makes, by rows: x, r, active, iterations, what those raise
+        that have no answer, and histories."""
+        free, (m, d) = self.condensed.free(many.b), (len(many.bound), 1 + self._surface.tangents.shape[1])
+        r, places, held = np.zeros((len(free), m, d)), np.zeros(free.shape), np.zeros(free.shape, dtype=bool)
+        active, counts, failed = held[:, :m].copy(), [0] * len(free), dict[int, ViContactError]()
+        histories: list[tuple[float, ...]] = [()] * len(free)
+        for row in range(len(free)):
             try:
-                small, held, places = self.reactions(step, free[row], rigid)
-                rows[row] = small.r.ravel(), held, places
-                found.append(small)
+                found, held[row], places[row] = self.reactions(own(row), free[row], rigid)
+                r[row], active[row] = found.r, found.active
+                counts[row], histories[row] = found.iterations, found.history
             except ViContactError as error:
-                found.append(error)
-        return self.condensed.answer(*map(np.stack, zip(*rows, strict=True))), found
+                failed[row] = error
+        return self.condensed.answer(r.reshape(free.shape), held, places), r, active, counts, failed, histories
 
     def _reactions(
         self, step: StepProblem, q: Array, cohesion: Array, slope: Array, active: Mask, *, fixed: bool

@@ -13,19 +13,23 @@ at every set it completes. No such set can return: it ends, in practice after ab
 (Murty's single exchanges, the other finite fallback, took up to 1000 changes where this one took 150.)
 """
 
+from ctypes import c_double
 from dataclasses import dataclass
-from typing import cast
+from functools import cached_property
+from typing import Any, cast
 
 import numpy as np
 from scipy.linalg import lapack
 
-from ...core.algebra import Array, Mask, lowest
+from ...core.algebra import Array, Indices, Mask, SerialComm, lowest
 from ...core.checks import attributes
+from ...core.compiled import library
+from ...core.contact_last import at
 from ...core.errors import ViContactError
 from .lcp import EPS, Found, LCPResult, PreparedLCP, ScaledLCP, cholesky, failure, scaled_dense
 
-EXCHANGES = 4  # of several runs together, before each goes on alone
-KEPT = 256  # factors of sets that they share
+FEW = 160  # rows up to which compiled exchanges are as fast as those of LAPACK
+KEPT = 16  # factors of sets
 PATIENCE = 10  # Júdice and Pires, Comput. Oper. Res. 21, 1994
 
 
@@ -46,19 +50,83 @@ class ActiveSet:
     def prepare(self, G: Array, bilateral: Mask) -> PreparedLCP:
         """Check and factor G (m, m) once for many right-hand sides. InputError when it is not SPD.
 
-        The factor of the last set is remembered: a step on the same set costs triangular solves only.
+        The factors of the last sets are remembered: a step on the same set costs triangular solves only.
         """
         scaled = scaled_dense(G, bilateral)
         cholesky(scaled.matrix)  # if the whole is positive definite, so is every part
-        return PreparedLCP(self, scaled, _Sets(self, scaled).search)
+        return PreparedSets(self, scaled, _Sets(self, scaled).search)
+
+
+class PreparedSets(PreparedLCP):
+    """Solve problem (1) of one G, or several at once, by compiled exchanges first where rows are few."""
+
+    @cached_property
+    def _compiled(self) -> "Exchanges | None":
+        functions = library(SerialComm())
+        return None if functions is None or self.scaled.bilateral.size > FEW else Exchanges(functions, self)
+
+    def solve(self, q: Array, guess: Array | Mask | None = None) -> LCPResult:
+        """Solve the problem of q (m,), as ``PreparedLCP`` says."""
+        known = q.shape == self.scaled.bilateral.shape and (guess is None or guess.shape == q.shape)
+        if known and self._compiled is not None:
+            r, active, residual, changes, moved = self._compiled(q, q < 0.0 if guess is None else guess > 0)
+            if (count := int(changes[0])) >= 0:
+                history = tuple(moved[0, :count].tolist())
+                return LCPResult(r[0], active[0], count, float(residual[0]), self.method, history)
+        return super().solve(q, guess)
+
+    def solve_many(self, q: Array, guess: Mask) -> tuple[Array, Mask, list[int], dict[int, ViContactError]]:
+        """Return r and active of several q, all (k, m), the iterations, and what those raise that have no answer."""
+        if self._compiled is None:
+            r, active, changes = np.zeros(q.shape), np.zeros(q.shape, dtype=bool), np.full(len(q), -1)
+        else:
+            r, active, _, changes, _ = self._compiled(q, guess)
+        counts, failed = changes.tolist(), dict[int, ViContactError]()
+        for row in np.flatnonzero(changes < 0).tolist():
+            try:
+                found = super().solve(q[row], guess[row])
+                r[row], active[row], counts[row] = found.r, found.active, found.iterations
+            except ViContactError as error:
+                failed[row] = error
+        return r, active, counts, failed
+
+
+class Exchanges:
+    """Make the first exchanges of several problems of one G, compiled: those of ``_Sets``, which has the others."""
+
+    def __init__(self, library: Any, prepared: PreparedLCP) -> None:
+        self._library, self._scaled, self._method = library, prepared.scaled, cast(ActiveSet, prepared.method)
+        self._rows = 0
+
+    def _made(self, k: int) -> None:
+        """Make room for k problems."""
+        scaled, m, most = self._scaled, self._scaled.bilateral.size, min(PATIENCE, self._method.max_iterations)
+        self._rows, self._q, self._guess = k, np.empty((k, m)), np.empty((k, m), dtype=bool)
+        sets = np.full((k, m), 2, np.uint8), np.empty((k, m, m)), np.empty(3 * m), np.empty(m, np.int32)
+        self._found: Any = (np.empty((k, m)), np.empty((k, m), dtype=bool), np.empty(k), np.empty(k, np.int32),
+                       np.empty((k, most), np.int32))
+        self._kept = scaled.matrix, scaled.scale, scaled.bilateral, self._q, self._guess, *sets, *self._found
+        numbers = m, most, c_double(4.0 * EPS * scaled.norm), c_double(self._method.tolerance)
+        self._arguments = *numbers, *map(at, self._kept)
+
+    def __call__(self, q: Array, guess: Mask) -> tuple[Array, Mask, Array, Indices, Indices]:
+        """Return r, active, residual, iterations (-1: not solved) and the rows that each of them moved, of q and a
+        guessed set (k, m), or (m,) for one."""
+        k = len(q) if q.ndim == 2 else 1
+        if k > self._rows:
+            self._made(k)
+        self._q[:k], self._guess[:k] = q, guess
+        self._library.exchanges(k, *self._arguments)
+        r, active, *others = (one[:k] for one in self._found)
+        return r.copy(), active.copy(), *others
 
 
 class _Sets:
-    """The sets of one G, with the factor of the last one."""
+    """The sets of one G, with the factors of the last ones."""
 
     def __init__(self, method: ActiveSet, scaled: ScaledLCP) -> None:
         self.method, self._scaled, self._bilateral = method, scaled, scaled.bilateral
-        self._factor = _Factor(np.zeros(scaled.bilateral.size, dtype=bool), scaled.matrix)
+        self._kept: dict[bytes, _Factor] = {}
 
     def search(self, gap: Array, guess: Array | Mask | None, unit: float) -> Found:
         """Start from the guess, or the signs of guessed reactions; without one, from gap < 0."""
@@ -116,9 +184,12 @@ class _Sets:
             active = active ^ change
 
     def _on_set(self, active: Mask, gap: Array) -> tuple[Array, Array]:
-        if self._factor.key != active.tobytes():
-            self._factor = _Factor(active, self._scaled.matrix)
-        return self._factor.solve(gap)
+        key = active.tobytes()
+        factor = self._kept.pop(key) if key in self._kept else _Factor(active, self._scaled.matrix)
+        self._kept[key] = factor  # now the last
+        if len(self._kept) > KEPT:
+            del self._kept[next(iter(self._kept))]
+        return factor.solve(gap)
 
     def _wrong(self, active: Mask, r: Array, w: Array) -> Mask:
         """Rows whose sign is wrong by more than rounding: grazing rows (r = w = 0) fit either side."""
@@ -136,79 +207,23 @@ class _Sets:
         return (cut, gap + self._scaled.matrix @ cut) if (cut != r).any() else (r, w)
 
 
-class ManySets:
-    """Solve the problems of several gaps with one G: rows on the same set are solved together, and the first exchanges
-    are those of ``ActiveSet``, which goes on with the others one by one."""
-
-    def __init__(self, prepared: PreparedLCP) -> None:
-        self._prepared, self._method = prepared, cast(ActiveSet, prepared.method)
-        self._kept: dict[bytes, _Factor] = {}
-
-    def solve(self, q: Array, guess: Mask) -> list[LCPResult | ViContactError]:
-        """Return the answers to the rows of q with these guesses (k, m), or what they raise."""
-        scaled, limit = self._prepared.scaled, 4.0 * EPS * self._prepared.scaled.norm
-        gap, held, free = q * scaled.scale, scaled.bilateral, scaled.unilateral
-        unit = np.abs(np.minimum(gap, 0.0) if free else np.where(held, gap, np.minimum(gap, 0.0))).max(1, initial=0.0)
-        r, changes, left = np.zeros_like(gap), [0] * len(q), np.flatnonzero(unit != 0.0)
-        active, gap = (guess[left] & (gap[left] < np.inf)) | held, gap[left]
-        for change in range(EXCHANGES):
-            if not len(left):
-                break
-            r_i, w_i = self._on_sets(active, gap)
-            signs, least = np.where(active, r_i, w_i), np.minimum(r_i, w_i)
-            if not free:
-                signs[:, held], least[:, held] = 0.0, w_i[:, held]
-            wrong = signs < -limit * np.abs(r_i).max(1)[:, None]
-            again = wrong.any(1)
-            good = ~again & (np.where(active, signs, 0.0).min(1) >= 0.0)
-            good &= np.abs(least).max(1) <= self._method.tolerance * unit[left]
-            for row, found, other in zip(left.tolist(), good.tolist(), again.tolist(), strict=True):
-                changes[row] = change if found else change + 1 if other else -1
-            r[left[good]] = r_i[good]
-            left, active, gap = left[again], active[again] ^ wrong[again], gap[again]
-        for row in left.tolist():
-            changes[row] = -1
-        closed, r = (r > 0.0) | held, r * scaled.scale
-        return [LCPResult(r[row], closed[row], count, 0.0, self._method) if count >= 0
-                else self._searched(q[row], guess[row]) for row, count in enumerate(changes)]
-
-    def _on_sets(self, active: Mask, gap: Array) -> tuple[Array, Array]:
-        alike: dict[bytes, list[int]] = {}
-        for row, key in enumerate(map(bytes, active)):
-            alike.setdefault(key, []).append(row)
-        r, w = np.empty_like(gap), np.empty_like(gap)
-        for key, rows in alike.items():
-            if key not in self._kept:
-                if len(self._kept) >= KEPT:
-                    self._kept.clear()
-                self._kept[key] = _Factor(active[rows[0]], self._prepared.scaled.matrix)
-            r[rows], w[rows] = self._kept[key].solve(gap[rows])
-        return r, w
-
-    def _searched(self, q: Array, guess: Mask) -> LCPResult | ViContactError:
-        try:
-            return self._prepared.solve(q, guess)
-        except ViContactError as error:
-            return error
-
-
 class _Factor:
     """Cholesky factor of G_aa of one set, and the rows of G that carry its reactions to all gaps."""
 
     def __init__(self, active: Mask, matrix: Array) -> None:
-        self.key = active.tobytes()
         self._index = active.nonzero()[0]
         self._rows = matrix[self._index]
         self._lower = cholesky(self._rows[:, self._index]) if self._index.size else None
 
     def solve(self, gap: Array) -> tuple[Array, Array]:
-        """r (m,) with r = 0 off the set, and w = gap + G r; rows of both for rows of gaps.
+        """r (m,) with r = 0 off the set, and w = gap + G r.
 
         No iterative refinement: the residual of Cholesky is at rounding level already (measured gain below a factor 2
         for conditions up to 1e10).
         """
-        r = np.zeros(gap.shape)
+        r = np.zeros(gap.size)
         if self._lower is None:
             return r, gap.copy()
-        r.T[self._index] = part = lapack.dpotrs(self._lower, -gap.T[self._index], lower=1)[0]
-        return r, gap + part.T @ self._rows
+        part = lapack.dpotrs(self._lower, -gap[self._index], lower=1)[0]
+        r[self._index] = part
+        return r, gap + part @ self._rows
