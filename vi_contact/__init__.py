@@ -37,6 +37,7 @@ _CONTENTS = {
     "run.solution": ("Solution",),
     "run.march": ("march",),
     "run.march_many": ("march_many",),
+    "run.simulate_many": ("simulate_many",),
     "run.static": ("quasi_static", "static_equilibrium"),
     "run.time_steps": ("HalvedAtImpact", "Schedule"),
     "run.recorders": ("Contact", "Energy", "Probe"),

@@ -107,7 +107,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "studies/test_case.py":
         "cli.case studies.cases.parsing studies.cases.toml_file studies.cases.vocabulary",
     "studies/test_case_inputs.py": "studies.cases.table_calls",
-    "studies/test_ida.py": "cli.ida studies.ida.measures studies.ida.runs",
+    "studies/test_ida.py": "cli.batch cli.ida studies.ida.measures studies.ida.processes studies.ida.runs",
     "validation/test_boundary_element_examples.py": "models.boundary_elements",
     "validation/test_hertz_impact.py": "models.ball",
     "validation/test_impact_bars.py": "models.bar",

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 import tomllib
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
@@ -33,7 +34,8 @@ from vi_contact.studies.cases.library import located
 from vi_contact.studies.cases.own_case import open_case
 from vi_contact.studies.cases.toml_file import toml_value
 from vi_contact.studies.ida.measures import demand, fractiles, intensity
-from vi_contact.studies.ida.runs import OneRun, Shaking, executed
+from vi_contact.studies.ida.processes import command, executed
+from vi_contact.studies.ida.runs import OneRun, Shaking
 
 pytestmark = pytest.mark.serial
 ROOT = Path(__file__).resolve().parents[2]
@@ -135,7 +137,7 @@ def test_an_interrupted_run_goes_on_and_failures_are_rows(study: Path, tmp_path:
     """A run with a checkpoint at half its way and no row continues there; a record that is none has a row that says so,
     and the others go on. The row of a failed run is tried again."""
     folder = study / "runs" / "motion_1_x1.0"
-    expected = (folder / "history.csv").read_bytes()
+    expected = np.genfromtxt(folder / "history.csv", delimiter=",", names=True)
     for path in folder.iterdir():
         path.unlink() if path.is_file() else shutil.rmtree(path)
     settings = Shaking("motion_1", (Path("motion_1.at2").resolve(),)).settings(read_case("wall.toml"))
@@ -150,7 +152,9 @@ def test_an_interrupted_run_goes_on_and_failures_are_rows(study: Path, tmp_path:
     assert "bad.txt, line 2: 'x' is not a number" in bad["reason"]
     assert any(line.endswith("] motion_1 x 1: finished") for line in said)
     assert json.loads((folder / "summary.json").read_text(encoding="utf-8"))["restarted_from_step"] == 200
-    assert (folder / "history.csv").read_bytes() == expected
+    found = np.genfromtxt(folder / "history.csv", delimiter=",", names=True)
+    for name in ("t", "u_x_top", "contact_resultant", "contact_uplift", "energy_strain", "loss_friction"):
+        assert found[name] == pytest.approx(expected[name], abs=1e-10 * np.abs(expected[name]).max()), name
     assert table(study)[0]["reason"] == bad["reason"] and table(study)[0]["u_x_top_min"] == ""
     assert again(study, motions=(tmp_path / "bad.txt",), scales=(1.0,))[1][0].endswith("0 finished before")
 
@@ -172,7 +176,7 @@ def test_parts_levels_and_runs_that_die(study: Path) -> None:
 
 def test_stopping_stops_the_runs(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Ctrl-C between two rows: processes that go on are stopped, also where SIGINT is ignored, and leave no row."""
-    monkeypatch.setattr("vi_contact.studies.ida.runs.PATIENCE", 1.0)
+    monkeypatch.setattr("vi_contact.studies.ida.processes.PATIENCE", 1.0)
     case, shaking = read_case("wall.toml"), Shaking("motion_1", (Path("motion_1.at2"),))
     wrong = OneRun(case, shaking, 1.0, study / "runs" / "wrong", "it cannot")
     long = OneRun(case, shaking, 1.0, study / "runs" / "long")
@@ -184,11 +188,34 @@ def test_stopping_stops_the_runs(study: Path, monkeypatch: pytest.MonkeyPatch) -
     assert time.monotonic() - start < 600.0 and not (long.folder / "row.json").exists()
 
 
+def test_what_a_process_that_died_has_left_runs_alone(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first process ends one of three runs and dies; each of the others gets its own, and one of these dies too."""
+    case = read_case("wall.toml")
+    runs = [OneRun(case, Shaking(f"m{k}", (Path("motion_1.at2"),)), 1.0, study / "runs" / f"m{k}") for k in range(3)]
+    made: list[list[str]] = []
+
+    def started(asked: Sequence[OneRun], *_: object) -> subprocess.Popen[str]:
+        made.append([one.shaking.name for one in asked])
+        asked[0].folder.mkdir(exist_ok=True)
+        (asked[0].folder / "summary.json").write_text('{"status": "finished"}')
+        ended = 'echo \'{"share": 0.5}\'; echo \'{"ended": 0, "status": 0, "said": ""}\''
+        words = "echo no memory; exit 3" if made[-1] == ["m1"] else ended
+        end = "; kill -9 $$" if len(made) == 1 else ""
+        return subprocess.Popen(["sh", "-c", words + end], stdout=subprocess.PIPE, text=True)
+
+    monkeypatch.setattr("vi_contact.studies.ida.processes.started", started)
+    found = list(executed(runs, 1, (), WallTime()))
+    rows = {row["record"]: row for row in found if not isinstance(row, float)}
+    assert made == [["m0", "m1", "m2"], ["m1"], ["m2"]] and found[0] == 1.5
+    assert [rows[name]["status"] for name in ("m0", "m1", "m2")] == ["finished", "failed", "finished"]
+    assert rows["m1"]["reason"] == "no memory"
+
+
 def test_a_wall_time_ends_a_study(study: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
     """Every run gets what is left; one that ends with status 75 leaves no row, and without time left none is begun."""
     monkeypatch.setattr("vi_contact.run.wall_time.age", lambda: 100.0)
     run = OneRun(read_case("wall.toml"), Shaking("motion_1", (Path("motion_1.at2"),)), 1.0, study / "runs" / "long")
-    assert run.command((), WallTime("5"))[-2:] == ["--wall-time", "3:15"]
+    assert json.loads(command([run], (), WallTime("5"))[-1])["wall_time"] == "3:15"
     with pytest.raises(OutOfTime, match="200 s left of the wall time 5 ended the study: give the same command again"):
         list(executed([run], 1, ("sh", "-c", "exit 75"), WallTime("5")))
     assert not (run.folder / "row.json").exists()

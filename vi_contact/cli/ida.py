@@ -27,7 +27,7 @@ def add_ida_commands(commands: Any) -> None:
     one.add_argument("--edp", nargs="+", required=True, metavar="COLUMN[:WAY]",
                      help="columns of history.csv; WAY: absmax (default), max, min, last")
     one.add_argument("--out", required=True, metavar="DIR", help="folder of the study; the same again to go on")
-    one.add_argument("--jobs", type=int, default=1, metavar="N", help="runs at the same time (default 1)")
+    one.add_argument("--jobs", type=int, default=1, metavar="N", help="processes, of up to 8 runs each (default 1)")
     one.add_argument("--part", type=_part, default=(1, 1), metavar="I/N", help="only every N-th run, for job arrays")
     one.add_argument("--launch", default="", metavar="WORDS", help="in front of every run, such as 'mpirun -n 4'")
     one.add_argument("--wall-time", metavar="TIME", help=f"{WALL_TIME}; every run gets what is left")

@@ -13,6 +13,7 @@ _CONTENTS = {
     "method": ("with_defaults",),
     "recorders": ("Contact", "Energy", "Probe"),
     "simulate": ("simulate",),
+    "simulate_many": ("simulate_many",),
     "solution": ("Solution",),
     "static": ("quasi_static", "static_equilibrium"),
     "time_steps": ("HalvedAtImpact", "Schedule"),

@@ -36,9 +36,8 @@ def march_many(
              (("steps", steps), ("t_end", t_end), ("states", states))]
     runs: list[Together] = []
     for problem, count, end, state in zip(given, *every, strict=True):
-        problem, scheme = with_defaults(problem, scheme)
-        shared = next((one for run in runs if (one := problem.beside(run.method.problem)) is not None), problem)
-        method = checked_method("march_many", shared, scheme, (solver, escalation), dt, steps=count, t_end=end,
+        problem, scheme = with_defaults(problem, scheme, [run.method.problem for run in runs])
+        method = checked_method("march_many", problem, scheme, (solver, escalation), dt, steps=count, t_end=end,
                                 state=state, tolerance=tolerance)
         state = initial_state(method.problem) if state is None else state
         plan = step_plan(dt, count, end, state.t)

@@ -60,18 +60,22 @@ def checked_method(
     return method
 
 
-def with_defaults(problem: ContactProblem, scheme: Scheme | None) -> tuple[ContactProblem, Scheme]:
+def with_defaults(
+    problem: ContactProblem, scheme: Scheme | None, others: Sequence[ContactProblem] = ()
+) -> tuple[ContactProblem, Scheme]:
     """Return the problem with a mass matrix and the scheme to run it with.
 
     Without a scheme: the trapezoidal rule on redistributed mass; with an impact law, or with mass at the contact nodes
     asked for, the Zienkiewicz-Wood-Taylor step at phi = ½, which never gains energy. Without a mass: the scheme's.
+    ``others``: the first that has its matrices lends them.
     """
     check_problem_given("march", problem)
     if scheme is None:
         massive = problem.mass is not None and isinstance(problem.mass, ConsistentMass)
         scheme = Trapezoidal() if problem.impact is None and not massive else ZienkiewiczWoodTaylor()
     provides("march", "scheme", scheme, SCHEME, "give a time scheme, such as Trapezoidal(), or None")
-    return (problem if problem.mass is not None else replace(problem, mass=scheme.mass)), scheme
+    problem = problem if problem.mass is not None else replace(problem, mass=scheme.mass)
+    return next((one for other in others if (one := problem.beside(other)) is not None), problem), scheme
 
 
 def check_solver(owner: str, value: Any, meaning: str = "solver") -> None:

@@ -3,7 +3,7 @@
 import logging
 import time
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -28,6 +28,7 @@ from .recorders import refuse_overflow
 from .solution import Solution, energy_warning, sampling_warning
 from .stop_signals import StopSignals
 from .time_steps import StepPlan, described, pieces_of
+from .together import Together
 from .wall_time import WallTime
 
 log = logging.getLogger(__name__)
@@ -48,7 +49,8 @@ class Session:
     Attributes:
         recorders: the user's, after those of every run. wall_time: when the process has to have ended.
         table: the rows so far. step_plan: the base steps. place: the end of the last base step.
-        resumed_from: the step of the checkpoint that it continues, None for a new run.
+        loop: its steps, where others have them too. resumed_from: the step of the checkpoint that it continues, None
+            for a new run.
     """
 
     method: Method
@@ -60,6 +62,7 @@ class Session:
     cross_check: Comparison | None
     progress: bool
     wall_time: WallTime
+    loop: March | Together | None = None
     resumed_from: int | None = None
     last: Report | None = None
     dt: float = float("nan")
@@ -100,20 +103,27 @@ class Session:
     def go(self, writer: Writer) -> Solution:
         """Make the remaining steps, and write everything before, during and after them."""
         with StopSignals() as signals:
-            return self._go(writer, signals)
+            steps = self.steps(writer, signals)
+            while True:
+                try:
+                    next(steps)
+                except StopIteration as end:
+                    solution: Solution = end.value
+                    return solution
 
-    def _go(self, writer: Writer, signals: StopSignals) -> Solution:
+    def steps(self, writer: Writer, signals: StopSignals) -> Generator[None, None, Solution]:
+        """Do the same, and stop to yield after every base step."""
         begin = time.perf_counter()
         self.halved = self.place.halved
         try:
             writer.open(self.place.state)
             self._tell_start()
-            self._march(writer, signals)
+            yield from self._march(writer, signals)
             self._checkpoint(writer)
             self._measure()
             linear = self._seconds_per_linear_step()
         except BaseException as error:
-            interrupted = isinstance(error, KeyboardInterrupt)
+            interrupted = isinstance(error, KeyboardInterrupt | GeneratorExit)
             reason = str(error) or ("interrupted by the user" if interrupted else type(error).__name__)
             self._rescue(writer, "interrupted" if interrupted else "failed", reason, time.perf_counter() - begin)
             if isinstance(error, Interrupted):  # on all ranks: none ends before the first has written
@@ -126,9 +136,9 @@ class Session:
         writer.close(facts)
         return Solution(self.table.history(), self.table.columns, self.place.state, facts)
 
-    def _march(self, writer: Writer, signals: StopSignals) -> None:
+    def _march(self, writer: Writer, signals: StopSignals) -> Iterator[None]:
         place = self.place
-        loop = March(self.method, self.step_plan, place.state, place.base, place.halved)
+        loop = self.loop or March(self.method, self.step_plan, place.state, place.base, place.halved)
         worst, begin = 0.0, time.perf_counter()
         self.wall_time.begin()
         with closing(Progress(self.left, shown=self.progress and self.root)) as progress:
@@ -148,6 +158,8 @@ class Session:
                     self._measure()
                 if loop.ended and self.left:
                     self._stop_if_asked(writer, signals)
+                if loop.ended:
+                    yield
                 begin = time.perf_counter()
 
     def _stop_if_asked(self, writer: Writer, signals: StopSignals) -> None:

@@ -1,6 +1,7 @@
 """Simulate: march, listen with recorders, and keep everything in a folder that a crash cannot spoil."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ from .files.folder import HISTORY_H5, locked, run_folder
 from .files.stored_rows import StoredRows
 from .files.table import Block, Table
 from .files.writer import FieldWriter, Writer
-from .method import Method, checked_method
+from .method import Method, checked_method, with_defaults
 from .recorders import Contact, Energy, Steps
 from .session import Comparison, Session
 from .solution import Solution
@@ -63,13 +64,30 @@ def simulate(
         StepFailure: a step no solver could certify; ViContactError: the disk refused something. All that was computed
             is in the folder then, and summary.json says why the run ended.
     """
+    with opened(**locals()) as (session, writer):
+        return session.go(writer)
+
+
+@contextmanager
+def opened(
+    problem: ContactProblem, scheme: Scheme | None, solver: Solver | None, dt: TimeSteps, t_end: float | None,
+    steps: int | None, record: Sequence[Recorder] | None, out: str | Path | None, state: State | None,
+    escalation: Sequence[Solver], tolerance: float, checkpoint_every: int, restart: bool | str | Path, changed: bool,
+    progress: bool, fields: FieldWriter | None, cross_check: Comparison | None, wall_time: str | None,
+    others: Sequence[ContactProblem] = (), runs: int = 1,
+) -> Iterator[tuple[Session, Writer]]:
+    """Check the arguments of ``simulate`` and set a run up, with the lock of its folder. Collective.
+
+    ``others``: problems whose matrices and factors serve it too, if they are its own. ``runs``: that take turns.
+    """
     _check_outputs(record, out, restart, checkpoint_every, (progress, changed), fields, cross_check)
     if wall_time is not None and out is None:
         raise InputError("wall_time needs out, the folder of the run to continue afterwards")
-    end = WallTime(wall_time)
+    end = WallTime(wall_time, runs)
+    problem, scheme = with_defaults(problem, scheme, others)
     method = checked_method("simulate", problem, scheme, (solver, escalation), dt, steps=steps, t_end=t_end,
                             state=state, tolerance=tolerance)
-    problem, comm = method.problem, method.problem.system.algebra.comm
+    comm = problem.system.algebra.comm
     source = _source(restart, folder := None if out is None else run_folder(comm, out))
     recorders: list[Recorder] = [Steps(), *((Energy(), Contact()) if record is None else record)]
     with locked(comm, folder):
@@ -82,7 +100,7 @@ def simulate(
             _started(problem, recorders, place.state, _restored(table, stored, comm))
         session = Session(method, recorders, table, plan, place, checkpoint_every, cross_check, progress, end,
                           resumed_from=None if stored is None else stored.k)
-        return session.go(Writer(problem, folder, fields, table, stored))
+        yield session, Writer(problem, folder, fields, table, stored)
 
 
 def _place(method: Method, source: Path | None, state: State | None, changed: bool) -> tuple[RestartPoint, str]:

@@ -22,10 +22,11 @@ class StopSignals:
 
     A signal that was ignored stays so (nohup, jobs in the background), and so do handlers that the caller wrote. A
     second Ctrl-C ends the process at once. What nobody has acted on in the end is sent again, to the old handlers.
+    ``lasting``: for several runs, all of which are told once one has been.
     """
 
-    def __init__(self) -> None:
-        self._found = 0
+    def __init__(self, *, lasting: bool = False) -> None:
+        self._found, self._lasting, self._late = 0, lasting, False
         self._before: dict[int, Any] = {}
 
     def __enter__(self) -> "StopSignals":
@@ -47,8 +48,12 @@ class StopSignals:
     def asked(self, comm: Comm, over: bool = False) -> tuple[int, bool]:
         """Return the number of a signal that some rank has got, 0 for none, and whether the time is over for one of
         them: the same on all ranks. Collective, one reduction."""
+        over = over or self._late
         number, late = (self._found, over) if comm.size == 1 else comm.max(np.array([self._found, over], dtype=float))
-        self._found = 0 if number else self._found
+        if self._lasting:
+            self._late = bool(late)
+        elif number:
+            self._found = 0
         return int(number), bool(late)
 
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:

@@ -74,7 +74,7 @@ def grouped(runs: Sequence[Together]) -> None:
             continue
         for group in groups:
             first, found = group[0], problem.beside(group[0].method.problem)
-            if found is not None and (first.state.t, first.state.k, first.base) == (run.state.t, run.state.k, run.base):
+            if found is not None and _place(first) == _place(run) and _way(first.method) == _way(run.method):
                 run.method = replace(run.method, problem=found)
                 group.append(run)
                 break
@@ -82,6 +82,14 @@ def grouped(runs: Sequence[Together]) -> None:
             groups.append([run])
     for group in groups:
         Group(group)
+
+
+def _place(run: Together) -> tuple[float, int, int]:
+    return run.state.t, run.state.k, run.base
+
+
+def _way(method: Method) -> tuple[Any, ...]:
+    return method.scheme, *method.solvers, method.tolerance
 
 
 @dataclass(frozen=True)

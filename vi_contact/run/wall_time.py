@@ -48,10 +48,13 @@ def _born() -> float:
 
 
 class WallTime:
-    """Keep what base steps and checkpoints take, against the wall time of the process; None: there is no end."""
+    """Keep what base steps and checkpoints take, against the wall time of the process; None: there is no end.
 
-    def __init__(self, wall_time: str | None = None) -> None:
-        self.text = wall_time
+    ``runs``: so many take turns, and each has a checkpoint to write in the end.
+    """
+
+    def __init__(self, wall_time: str | None = None, runs: int = 1) -> None:
+        self.text, self._runs = wall_time, runs
         self._end = math.inf if wall_time is None else seconds_of(wall_time)
         self._last, self._step, self._saving = 0.0, 0.0, math.nan
 
@@ -87,4 +90,4 @@ class WallTime:
             return False
         now = age()
         self._step, self._last = max(self._step, now - self._last), now
-        return bool(self._end - now <= SAFETY * (self._step + 2.0 * self._saving))
+        return bool(self._end - now <= SAFETY * (self._step + 2.0 * self._runs * self._saving))

@@ -4,11 +4,12 @@ import logging
 import platform
 import sys
 import time
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from datetime import timedelta
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from ...core.version import __version__
 
@@ -30,17 +31,27 @@ class _LogFile(logging.FileHandler):
 class RunLog:
     """Send everything logged under ``vi_contact`` to a file while it is open, and warnings to the terminal: on rank 0.
 
-    The root logger is left out: form compilers make it print every line.
+    Runs that take turns set ``turn``, each to its own value, before they open their logs and whenever it is theirs:
+    a line goes to the logs that were opened in this turn. The root logger is left out: form compilers make it print
+    every line.
     """
 
+    turn: ClassVar[object] = None
+    _open: ClassVar[int] = 0
+    _before: ClassVar[tuple[int, bool]] = (logging.NOTSET, True)
+
     def __init__(self, path: Path, *, append: bool) -> None:
-        self._before = LOGGER.level, LOGGER.propagate
+        if not RunLog._open:
+            RunLog._before = LOGGER.level, LOGGER.propagate
+        own = RunLog.turn
         self._file = _LogFile(path, mode="a" if append else "w", encoding="utf-8")
         self._terminal = logging.StreamHandler()
         self._terminal.setLevel(logging.WARNING)
         self._file.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
-        LOGGER.addHandler(self._file)
-        LOGGER.addHandler(self._terminal)
+        for handler in (self._file, self._terminal):
+            handler.addFilter(lambda record: RunLog.turn is own)
+            LOGGER.addHandler(handler)
+        RunLog._open += 1
         LOGGER.setLevel(logging.INFO)
         LOGGER.propagate = False
 
@@ -53,10 +64,22 @@ class RunLog:
         """Give the logger back as it was."""
         LOGGER.removeHandler(self._file)
         LOGGER.removeHandler(self._terminal)
-        LOGGER.setLevel(self._before[0])
-        LOGGER.propagate = self._before[1]
+        RunLog._open -= 1
+        if not RunLog._open:
+            LOGGER.setLevel(RunLog._before[0])
+            LOGGER.propagate = RunLog._before[1]
         with suppress(OSError):  # the disk is full: check() or the histories have told
             self._file.close()
+
+
+@contextmanager
+def turn_of(run: object) -> Iterator[None]:
+    """Give one of several runs its turn with the logs."""
+    RunLog.turn = run
+    try:
+        yield
+    finally:
+        RunLog.turn = None
 
 
 def versions(*needed: str) -> dict[str, str]:

@@ -8,7 +8,8 @@
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -117,11 +118,11 @@ class Case:
 
     def problem(self, comm: Any) -> ContactProblem:
         """Return the contact problem; collective."""
-        return self._problem(self._parts(comm))
+        return self._problem(self.parts(comm))
 
     def columns(self, comm: Any) -> frozenset[str]:
         """Return the columns that a run writes into history.csv; assembles, and computes no step. Collective."""
-        parts = self._parts(comm)
+        parts = self.parts(comm)
         problem = self._problem(parts)
         own = self._recorders(parts)
         recorders = [Steps(), *((Energy(), Contact()) if own is None else own)]
@@ -145,24 +146,33 @@ class Case:
         equilibrium. The folder gets a copy of the case, ``case.toml``. Raises as ``simulate``.
         """
         self.check()
-        folder = self.out if out is None else Path(out)
-        parts = self._parts(comm)
+        with self.call(self.parts(comm), self.out if out is None else Path(out), changed=changed) as call:
+            return simulate(**call, restart=restart, progress=progress, wall_time=wall_time)
+
+    @contextmanager
+    def call(
+        self, parts: Parts, folder: Path | None, state: State | None = None, *, changed: bool = False
+    ) -> Iterator[dict[str, Any]]:
+        """Hold the run folder, with a copy of the case, and what the run gives to ``simulate``; collective.
+
+        parts: as of ``parts``, of this case or of one with the same body; state: at rest, when it is known.
+        """
         problem = self._problem(parts)
         own = {name: value for name, value in self._made("run", system=parts.system).items() if name != "out"}
         own |= {"changed": True} if changed else {}
         if "steps" not in own and "t_end" not in own:
             own["t_end"] = self._duration(parts)
         solver = self._made("solver")
-        problem, state = self._at_rest(parts, problem, solver)
+        problem, state = self._at_rest(parts, problem, solver) if state is None else (problem, state)
         ranks = problem.system.algebra.comm
         with locked(ranks, None if folder is None else run_folder(ranks, folder)):
             if folder is not None:
                 keep_copy(self.path, self.settings, folder, ranks)
-            return simulate(problem, scheme=self._made("scheme"), solver=solver, state=state, out=folder,
-                            restart=restart, record=self._recorders(parts), escalation=self._several("escalation"),
-                            fields=self._made("fields"), progress=progress,
-                            cross_check=solver if isinstance(solver, CrossChecked) else None, wall_time=wall_time,
-                            **own)
+            yield own | {
+                "problem": problem, "scheme": self._made("scheme"), "solver": solver, "state": state, "out": folder,
+                "record": self._recorders(parts), "escalation": self._several("escalation"),
+                "fields": self._made("fields"), "cross_check": solver if isinstance(solver, CrossChecked) else None,
+            }
 
     def _made(self, table: str, **context: Any) -> Any:
         """Return what a table makes; None where there is none."""
@@ -173,7 +183,8 @@ class Case:
         made = self._made(table, **context)
         return made if isinstance(made, tuple) else () if made is None else (made,)
 
-    def _parts(self, comm: Any) -> Parts:
+    def parts(self, comm: Any) -> Parts:
+        """Return what the problem is made of; collective."""
         if "model" in self.nodes:
             parts: Parts = self._made("model", comm=comm, run_dt=self._plain("dt"), **self._shaking())
             return parts

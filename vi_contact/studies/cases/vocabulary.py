@@ -143,6 +143,12 @@ class Parts:
     firm: "Parts | None" = None
     moved: bool = False
 
+    @property
+    def steady(self) -> bool:
+        """Say whether they serve other excitations too: nothing in them moves with these."""
+        companions = self.system.companions or self.surface.companions
+        return not (companions or self.moved or self.firm)
+
 
 def _wall(shape: wall.Wall, comm: Any, *, case: str = "b", weight: bool = False, base_inertia: str = "whole") -> Parts:
     model = wall.build(shape, comm, weight=weight, base_inertia=base_inertia)

@@ -7,12 +7,13 @@ Vamvatsikos and Cornell, Earthquake Engng Struct. Dyn. 31 (2002). In the folder 
 
 import hashlib
 import math
+import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from datetime import timedelta
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -28,10 +29,11 @@ from ...run.wall_time import WallTime
 from ..cases.case import Case
 from ..cases.parsing import nearest
 from .measures import Demand, Intensity, demand, fractiles, intensity
-from .runs import ROW, OneRun, Shaking, executed, read_json, read_row, refuse_mpirun, shakings
+from .processes import executed, refuse_mpirun
+from .runs import ROW, OneRun, Row, Shaking, read_json, read_row, shakings
 
-Row = dict[str, Any]
 Units = dict[str, tuple[str, str]]
+SECONDS = 30.0  # between two lines about the time left
 SHARES = (0.16, 0.50, 0.84)
 TABLE, COLUMNS, FIGURE, STUDY, RUNS = "ida.csv", "columns.json", "ida.png", "ida.json", "runs"
 
@@ -99,15 +101,16 @@ def run_ida(
 ) -> list[Row]:
     """Make the runs that have not finished yet, and the table and figure of all that are in ``out``; returns its rows.
 
-    Each run is a process of its own; what it cannot do is told in its row, and the others go on. Called again it keeps
+    Eight runs share a process and, where the body serves all excitations, its assembly and every pass over its
+    matrices (``simulate_many``). What a run cannot do is told in its row, and the others go on. Called again it keeps
     finished runs, continues interrupted ones from their checkpoints, and tries failed ones again. The table is
     made anew after every run, in one piece, the figure at the end.
 
     Args:
-        jobs: runs at the same time.
+        jobs: processes at the same time.
         part: (i, n): only every n-th run from the i-th on, for job arrays that share the folder.
-        launch: words in front of the command of a run, ("mpirun", "-n", "4").
-        say: takes a line about each run.
+        launch: words in front of the command of a run, ("mpirun", "-n", "4"); each has a process of its own then.
+        say: takes a line about each run, and every half a minute one about the time left.
         wall_time: as of ``simulate``: every run gets what is left of it, and ends with a checkpoint before it is over.
     Raises:
         InputError: a folder of another study, or in which the same part runs, a part or number of jobs that makes no
@@ -126,11 +129,21 @@ def run_ida(
         if left:
             _check_demands(study)
         say(f"{len(every)} runs, {len(mine)} of them here, {len(mine) - len(left)} finished before")
-        for number, row in enumerate(executed(left, jobs, launch, end), start=1):
+        number, begin = 0, time.monotonic()
+        told = begin
+        for found in executed(left, jobs, launch, end):
+            now = time.monotonic()
+            if isinstance(found, float):
+                if now > told + SECONDS and found > 0.0:
+                    told = now
+                    seconds = int((now - begin) / found * (len(left) - found))
+                    say(f"{100.0 * found / len(left):.0f} % of the steps are done, {timedelta(seconds=seconds)} left")
+                continue
+            number, told = number + 1, now
             _tell(study, out)
-            scale = "?" if row["scale"] is None or math.isnan(row["scale"]) else f"{row['scale']:g}"
-            say(f"[{number}/{len(left)}] {row['record']} x {scale}: {row['status']}"
-                + (f": {row['reason']}" if row["reason"] else ""))
+            scale = "?" if found["scale"] is None or math.isnan(found["scale"]) else f"{found['scale']:g}"
+            say(f"[{number}/{len(left)}] {found['record']} x {scale}: {found['status']}"
+                + (f": {found['reason']}" if found["reason"] else ""))
         return _tell(study, out, draw=True)
 
 

@@ -1,37 +1,25 @@
-"""The runs of an incremental dynamic analysis: one case, its motions replaced and scaled, a process for every run."""
+"""The runs of an incremental dynamic analysis: one case, its motions replaced and scaled."""
 
-import os
 import signal
-import subprocess
-import sys
-import threading
-import time
-from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
-from contextlib import suppress
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from ...core.errors import InputError, OutOfTime
+from ...core.errors import InputError
 from ...core.files import to_json, write_atomically
 from ...ground_motion.excitation import GroundMotion
 from ...ground_motion.processing import scaled
 from ...ground_motion.record import Record
-from ...run.files.folder import CHECKPOINT, SUMMARY
+from ...run.files.folder import SUMMARY
 from ...run.files.reading import read_object
-from ...run.wall_time import WallTime
 from ..cases.case import Case, read_case
 from ..cases.toml_file import toml_value
 
+Row = dict[str, Any]
 ROW = "row.json"
 SAID = "failure.txt"
-ATTEMPTS = 5  # of a run that ends without a word: Gmsh 4.8, asked before it is initialised, does that now and then
-PATIENCE = 20.0  # seconds for a run to save its state
-ASIDE = 5.0  # seconds of a wall time for the beginning and the end of a process
-AGAIN = "ended the study: give the same command again to go on"
-_MPI = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_RANK")  # in the environment of what mpirun has started
 
 
 @dataclass(frozen=True)
@@ -107,27 +95,19 @@ class OneRun:
     folder: Path
     wrong: str = ""
 
-    def done(self) -> dict[str, Any] | None:
+    def done(self) -> Row | None:
         """Return the row of a run that has finished, or None."""
         row = read_row(self.folder / ROW)
         if row is None and (read_json(self.folder / SUMMARY) or {}).get("status") == "finished":
             row = self.keep("", 0)  # it outlived the process that had started it
         return row if row is not None and row["status"] == "finished" else None
 
-    def command(self, launch: Sequence[str], end: WallTime) -> list[str]:
-        """Return the command that runs it, from its checkpoint where there is one; OutOfTime when nothing of the wall
-        time is left for it."""
-        own = [sys.executable, "-m", "vi_contact", "run", str(self.case.path), "--out", str(self.folder), "--quiet"]
-        settings = (*self.case.settings, *self.shaking.settings(self.case, self.factor))
-        made = [word for setting in settings for word in ("--set", setting)]
-        made += [word for package in self.case.allowed for word in ("--allow", package)]
-        if end.text is not None:
-            if (left := int(end.left - ASIDE)) < 1:
-                raise OutOfTime(f"{end.words} {AGAIN}")
-            made += ["--wall-time", f"{left // 60}:{left % 60:02d}"]
-        return [*launch, *own, *made, *(["--restart"] if (self.folder / CHECKPOINT).is_file() else [])]
+    @property
+    def settings(self) -> tuple[str, ...]:
+        """Return all KEY=VALUE that make the run of the case file."""
+        return (*self.case.settings, *self.shaking.settings(self.case, self.factor))
 
-    def keep(self, said: str, code: int) -> dict[str, Any]:
+    def keep(self, said: str, code: int) -> Row:
         """Write the row of a run that ended with this status, having said this; failed ones leave that in a file."""
         facts = read_json(self.folder / SUMMARY) or {}
         finished = code == 0 and facts.get("status") == "finished"
@@ -142,84 +122,6 @@ class OneRun:
             write_atomically(self.folder / SAID, said.encode())
         write_atomically(self.folder / ROW, to_json(row).encode())
         return row
-
-    def start(self, launch: Sequence[str], end: WallTime) -> subprocess.Popen[str]:
-        """Start it, in the environment without what MPI of this process may have put there."""
-        package = str(Path(__file__).resolve().parents[2])
-        way = os.pathsep.join([package, *filter(None, [os.environ.get("PYTHONPATH")])])
-        environment = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"} | dict(os.environ) | {"PYTHONPATH": way}
-        command = self.command(launch, end)
-        (self.folder / ROW).unlink(missing_ok=True)
-        (self.folder / SUMMARY).unlink(missing_ok=True)
-        try:
-            return subprocess.Popen(command, env=environment, text=True, encoding="utf-8", errors="replace",
-                                    stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                                    start_new_session=True)
-        except OSError as error:
-            raise InputError(f"'{error.filename}' cannot be started ({error.strerror}): give another launch") from None
-
-
-def executed(runs: Sequence[OneRun], jobs: int, launch: Sequence[str], end: WallTime) -> Iterator[dict[str, Any]]:
-    """Run them, so many at a time, and yield the row of each when it ends. Left early, it stops those that go on;
-    OutOfTime when one of them has ended with its status."""
-    stopped, lock = threading.Event(), threading.Lock()
-    going: set[subprocess.Popen[str]] = set()
-
-    def attempt(run: OneRun) -> tuple[str, int]:
-        with lock:
-            if stopped.is_set():
-                raise KeyboardInterrupt
-            process = run.start(launch, end)
-            going.add(process)
-        said = process.communicate()[0]
-        with lock:
-            going.discard(process)
-            if stopped.is_set():
-                raise KeyboardInterrupt
-        return said, process.returncode
-
-    def one(run: OneRun) -> dict[str, Any]:
-        if run.wrong:
-            return run.keep(f"vi-contact: {run.wrong}", 1)
-        for _ in range(ATTEMPTS):
-            said, code = attempt(run)
-            if code == os.EX_TEMPFAIL:
-                raise OutOfTime(f"{end.words} {AGAIN}")
-            if code <= 0 or said.strip():
-                break
-        return run.keep(said, code)
-
-    with ThreadPoolExecutor(jobs) as pool:
-        futures = [pool.submit(one, run) for run in runs]
-        try:
-            for future in as_completed(futures):
-                yield future.result()
-        finally:
-            with lock:
-                stopped.set()
-                left = list(going)
-            _stop(left)
-            for future in futures:
-                future.cancel()
-
-
-def _stop(processes: Sequence[subprocess.Popen[str]]) -> None:
-    """Ends them with all they have started: as by Ctrl-C, on which a run saves its state; else by SIGTERM."""
-    for signum in (signal.SIGINT, signal.SIGTERM):
-        for process in processes:
-            with suppress(ProcessLookupError):
-                os.killpg(process.pid, signum)
-        deadline = time.monotonic() + PATIENCE
-        for process in processes:
-            with suppress(subprocess.TimeoutExpired):
-                process.wait(max(deadline - time.monotonic(), 0.0))
-
-
-def refuse_mpirun() -> None:
-    """Raise InputError in a process that mpirun has started: those it starts would take themselves for it."""
-    if any(name in os.environ for name in _MPI):
-        raise InputError("ida starts processes and must not be one of MPI's: start it without mpirun, and give the "
-                         "runs their ranks with --launch 'mpirun -n N'")
 
 
 def read_json(path: Path) -> dict[str, Any] | None:

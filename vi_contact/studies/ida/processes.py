@@ -1,0 +1,187 @@
+"""The processes of an incremental dynamic analysis: a few runs in each, so many at a time, until told to stop."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from pathlib import Path
+from queue import SimpleQueue
+from typing import Any
+
+from ...core.errors import InputError, OutOfTime
+from ...run.files.folder import CHECKPOINT, SUMMARY
+from ...run.wall_time import WallTime
+from .runs import ROW, OneRun, Row
+
+TOGETHER = 8  # runs in a process: so many share every pass over a matrix
+ATTEMPTS = 5  # of runs that end without a word: Gmsh 4.8, asked before it is initialised, does that now and then
+PATIENCE = 20.0  # seconds for a run to save its state
+ASIDE = 5.0  # seconds of a wall time for the beginning and the end of a process
+AGAIN = "ended the study: give the same command again to go on"
+_MPI = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_RANK")  # in the environment of what mpirun has started
+
+
+def command(runs: Sequence[OneRun], launch: Sequence[str], end: WallTime) -> list[str]:
+    """Return the command that makes these runs, each from its checkpoint where there is one; OutOfTime when nothing of
+    the wall time is left for them."""
+    asked = {
+        "case": str(runs[0].case.path), "allow": runs[0].case.allowed, "settings": [one.settings for one in runs],
+        "folders": [str(one.folder) for one in runs],
+        "restart": [(one.folder / CHECKPOINT).is_file() for one in runs], "wall_time": None,
+    }
+    if end.text is not None:
+        if (left := int(end.left - ASIDE)) < 1:
+            raise OutOfTime(f"{end.words} {AGAIN}")
+        asked["wall_time"] = f"{left // 60}:{left % 60:02d}"
+    return [*launch, sys.executable, "-m", "vi_contact.cli.batch", json.dumps(asked)]
+
+
+def started(runs: Sequence[OneRun], launch: Sequence[str], end: WallTime) -> subprocess.Popen[str]:
+    """Start them, in the environment without what MPI of this process may have put there."""
+    package = str(Path(__file__).resolve().parents[2])
+    way = os.pathsep.join([package, *filter(None, [os.environ.get("PYTHONPATH")])])
+    environment = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"} | dict(os.environ) | {"PYTHONPATH": way}
+    words = command(runs, launch, end)
+    for name in (ROW, SUMMARY):
+        for one in runs:
+            (one.folder / name).unlink(missing_ok=True)
+    try:
+        return subprocess.Popen(words, env=environment, text=True, encoding="utf-8", errors="replace",
+                                stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                                start_new_session=True)
+    except OSError as error:
+        raise InputError(f"'{error.filename}' cannot be started ({error.strerror}): give another launch") from None
+
+
+class Processes:
+    """Keep the processes that go on, until they are all told to stop. ``done``: runs, and parts of runs."""
+
+    def __init__(self, launch: Sequence[str], end: WallTime) -> None:
+        self._launch, self._end = launch, end
+        self._stopped, self._lock = threading.Event(), threading.Lock()
+        self._going: set[subprocess.Popen[str]] = set()
+        self._shares: dict[subprocess.Popen[str], float] = {}
+
+    @property
+    def done(self) -> float:
+        """Return how many runs have been made, with parts of those that go on."""
+        return sum(list(self._shares.values()))
+
+    def rows(self, runs: Sequence[OneRun]) -> Iterator[Row | None]:
+        """Yield the row of each run as it ends, None when more is done. What a process that died has left is run again,
+        each by itself."""
+        for _ in range(ATTEMPTS):
+            left, said = list(runs), []
+            process = self._started(runs)
+            for line in process.stdout or ():
+                found = _read(line)
+                if "ended" in found:
+                    one = runs[found["ended"]]
+                    left.remove(one)
+                    yield one.keep(found["said"], found["status"])
+                elif "share" in found:
+                    self._shares[process] = found["share"] * len(runs)
+                    yield None
+                else:
+                    said.append(line)
+            self._ended(process)
+            self._shares[process] = len(runs) - len(left)
+            if process.returncode == os.EX_TEMPFAIL:
+                raise OutOfTime(f"{self._end.words} {AGAIN}")
+            runs = left
+            if not left or process.returncode <= 0 or said:
+                break
+        if len(runs) > 1:
+            for one in runs:
+                yield from self.rows([one])
+        elif runs:
+            yield runs[0].keep("".join(said), process.returncode)
+
+    def _started(self, runs: Sequence[OneRun]) -> subprocess.Popen[str]:
+        with self._lock:
+            if self._stopped.is_set():
+                raise KeyboardInterrupt
+            process = started(runs, self._launch, self._end)
+            self._going.add(process)
+        return process
+
+    def _ended(self, process: subprocess.Popen[str]) -> None:
+        process.wait()
+        with self._lock:
+            self._going.discard(process)
+            if self._stopped.is_set():
+                raise KeyboardInterrupt
+
+    def stop(self) -> None:
+        """Stop those that go on; none begins any more."""
+        with self._lock:
+            self._stopped.set()
+            left = list(self._going)
+        _stop(left)
+
+
+def executed(runs: Sequence[OneRun], jobs: int, launch: Sequence[str], end: WallTime) -> Iterator[Row | float]:
+    """Run them, in so many processes at a time, and yield the row of each when it ends, and between rows how many have
+    been made, with parts of runs. Left early, it stops those that go on; OutOfTime when one has ended with its status.
+    """
+    processes, told = Processes(launch, end), SimpleQueue[Row | BaseException | None]()
+
+    def make(batch: Sequence[OneRun]) -> None:
+        try:
+            for row in processes.rows(batch):
+                told.put(row)
+        except BaseException as error:
+            told.put(error)
+
+    wrong = [run for run in runs if run.wrong]
+    for run in wrong:
+        yield run.keep(f"vi-contact: {run.wrong}", 1)
+    right = [run for run in runs if not run.wrong]
+    size = 1 if launch else max(min(TOGETHER, -(-len(right) // jobs)), 1)
+    with ThreadPoolExecutor(jobs) as pool:
+        futures = [pool.submit(make, right[first : first + size]) for first in range(0, len(right), size)]
+        try:
+            ended = 0
+            while ended < len(right):
+                found = told.get()
+                if isinstance(found, BaseException):
+                    raise found
+                ended += found is not None
+                yield len(wrong) + processes.done if found is None else found
+        finally:
+            processes.stop()
+            for future in futures:
+                future.cancel()
+
+
+def _read(line: str) -> dict[str, Any]:
+    """What the process of ``command`` tells in a line of JSON; empty for other lines."""
+    with suppress(ValueError):
+        found = json.loads(line)
+        return found if isinstance(found, dict) else {}
+    return {}
+
+
+def _stop(processes: Sequence[subprocess.Popen[str]]) -> None:
+    """Ends them with all they have started: as by Ctrl-C, on which a run saves its state; else by SIGTERM."""
+    for signum in (signal.SIGINT, signal.SIGTERM):
+        for process in processes:
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signum)
+        deadline = time.monotonic() + PATIENCE
+        for process in processes:
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(max(deadline - time.monotonic(), 0.0))
+
+
+def refuse_mpirun() -> None:
+    """Raise InputError in a process that mpirun has started: those it starts would take themselves for it."""
+    if any(name in os.environ for name in _MPI):
+        raise InputError("ida starts processes and must not be one of MPI's: start it without mpirun, and give the "
+                         "runs their ranks with --launch 'mpirun -n N'")
