@@ -11,7 +11,6 @@ held: for a gravity stage put the sides on rollers, then ``release`` them.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -22,6 +21,7 @@ from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.problem_checks import EXCITATION
 from ..core.protocols import Excitation
+from ..core.values import dataclass, field
 from ..fem import compat
 from ..fem.dashpots import BoundaryLoads, CompliantBase, DashpotMatrix, Dashpots, impedances
 from ..fem.petsc_algebra import PetscMatrix

@@ -8,7 +8,6 @@ docs/guide/solvers.md.
 
 import logging
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from typing import Any
 
 from ..core.algebra import EffectiveMatrix, Matrix, SerialMatrix, total
@@ -17,6 +16,7 @@ from ..core.compiled import library
 from ..core.problem import ContactProblem
 from ..core.step import PreparedSolver, Solver, StepProblem, StepResult
 from ..core.surfaces import ContactSurface
+from ..core.values import dataclass, field
 from .condensed import Condensed
 
 log = logging.getLogger(__name__)
