@@ -1,6 +1,7 @@
 """State the problem that is marched: a semi-discrete system, its contact surface, and the laws of both."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -12,7 +13,6 @@ from .protocols import Excitation, FrictionLaw, Frictionless, ImpactLaw, MassLaw
 from .stages import stage
 from .surfaces import ContactSurface
 from .system import SemiDiscreteSystem
-from .values import dataclass, field, fields, is_dataclass, replace
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """Describe what a problem asks of its laws and of what shakes it: the protocols that users' own classes satisfy."""
 
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -7,7 +8,6 @@ import numpy as np
 from .algebra import Array, Mask
 from .surfaces import ContactSurface
 from .system import SemiDiscreteSystem
-from .values import dataclass
 
 
 class Excitation(Protocol):

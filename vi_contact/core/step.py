@@ -21,6 +21,7 @@ and excitations in it; ``problem.surface`` are its contact conditions. Arrays th
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -33,7 +34,6 @@ from .errors import InputError, ViContactError
 from .problem import ContactProblem
 from .protocols import FrictionLaw, Frictionless, MassLaw
 from .surfaces import ContactSurface
-from .values import dataclass, field
 
 
 @dataclass(frozen=True)

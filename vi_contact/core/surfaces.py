@@ -9,6 +9,7 @@ Sign: the direction n points from the body to the obstacle, u_n = u·n, gap = ga
 
 import logging
 from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -20,7 +21,6 @@ from .checks import function, number, shown
 from .companion import Companion
 from .contact_last import at
 from .errors import InputError
-from .values import dataclass, field, replace
 
 log = logging.getLogger(__name__)
 Motion = Callable[[float], float | Array]

@@ -1,6 +1,7 @@
 """Hold the semi-discrete equations of motion M u'' + C u' + K u = f(t) and the loads on their right-hand side."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -10,7 +11,6 @@ from .checks import array, function, instance, provides, several, shown
 from .companion import Companion
 from .errors import InputError
 from .products import Remembered
-from .values import dataclass, field, replace
 
 
 class Space(Protocol):

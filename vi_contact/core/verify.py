@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from ctypes import c_double
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,6 @@ from .contact_last import at
 from .problem import ContactProblem
 from .step import Balance, State, StepProblem, StepResult
 from .system import SemiDiscreteSystem
-from .values import dataclass
 
 ROUNDED = 1e-5  # of |A||x|, and of what friction is compared with: see Certificate
 

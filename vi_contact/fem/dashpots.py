@@ -15,6 +15,7 @@ The wave that comes back down passes through the dashpots: the record of the bas
 
 import logging
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
@@ -23,7 +24,6 @@ import ufl
 from ..core.algebra import Array
 from ..core.checks import attributes, function, instance
 from ..core.errors import InputError
-from ..core.values import dataclass, field
 from ..laws.materials import LinearElastic, Section
 from . import compat
 from .groups import components_of, facets_of

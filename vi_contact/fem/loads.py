@@ -5,6 +5,7 @@ interpolated at the nodes and then integrated exactly, so a load costs one spars
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,6 @@ from dolfinx.mesh import Mesh
 
 from ..core.algebra import Array, Comm
 from ..core.checks import ended, function, refuse, shown
-from ..core.values import dataclass
 from . import compat
 from .groups import components_given, facets_of, field_given
 from .mesh import Facets

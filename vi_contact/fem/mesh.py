@@ -6,6 +6,7 @@ groups as it likes.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -25,8 +26,6 @@ from vi_contact.meshes.extract import MeshArrays, arrays_from_file, arrays_from_
 from vi_contact.meshes.gmsh_session import MeshScript
 from vi_contact.meshes.partition import destinations
 from vi_contact.meshes.rows import found_in, number_alike
-
-from ..core.values import dataclass, field, replace
 
 TENSOR_ORDER = {"quadrilateral": [0, 1, 3, 2], "hexahedron": [0, 1, 3, 2, 4, 5, 7, 6]}
 """DOLFINx's vertices in Gmsh's numbering, where the two differ; also in VTK's."""

@@ -9,12 +9,12 @@ Source: Zienkiewicz, Bicanic and Shen (1988); compared with others by Kontoe et 
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..core.algebra import Array, Indices
 from ..core.errors import InputError
-from ..core.values import dataclass
 from .groups import components_given, components_of, facets_of
 from .mesh import Facets
 

@@ -1,10 +1,10 @@
 """Prepare records by the usual steps in the usual order, the last of which scales them to a measure."""
 
 import math
+from dataclasses import dataclass
 
 from ..core.checks import number
 from ..core.errors import InputError
-from ..core.values import dataclass
 from .intensity import arias, pga, psa
 from .processing import baseline_corrected, filtered, padded, resampled, scaled, tapered, trimmed, without_mean
 from .record import Record

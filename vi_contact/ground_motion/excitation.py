@@ -1,9 +1,9 @@
 """Shake a body with a recorded ground motion."""
 
+from dataclasses import dataclass
 
 from ..core.checks import instance
 from ..core.excitation_values import check_excitation, vector
-from ..core.values import dataclass
 from .record import Record
 
 

@@ -1,13 +1,13 @@
 """Make stochastic motions: white noise filtered by the ground (Kanai-Tajimi), without long periods (Clough-Penzien)."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..core.algebra import Array
 from ..core.checks import attributes, counted
 from ..core.errors import InputError
-from ..core.values import dataclass
 from .record import Record
 
 

@@ -1,5 +1,6 @@
 """Hold one component of a recorded ground motion, and name the units its file may be written in."""
 
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -7,7 +8,6 @@ from ..core.algebra import Array
 from ..core.checks import array, number
 from ..core.errors import InputError
 from ..core.units import STANDARD_GRAVITY
-from ..core.values import dataclass, replace
 
 UNITS = {"m/s2": 1.0, "cm/s2": 0.01, "gal": 0.01, "g": STANDARD_GRAVITY, "g/10": 0.1 * STANDARD_GRAVITY, "mm/s2": 0.001,
          "in/s2": 0.0254, "ft/s2": 0.3048}

@@ -8,13 +8,13 @@ vibration that follows counts.
 """
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..core.algebra import Array
 from ..core.checks import counted
 from ..core.errors import InputError
-from ..core.values import dataclass
 from .record import Record
 
 PER_PERIOD, PER_STEP = 64, 4

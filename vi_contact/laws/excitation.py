@@ -10,13 +10,13 @@ vertical motion together are a sequence of excitations.
 import math
 from bisect import bisect_right
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import ClassVar
 
 from ..core.checks import number
 from ..core.errors import InputError
 from ..core.excitation_values import check_excitation, finite_tuple, vector
-from ..core.values import dataclass
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ between the two, so that a stress times a nodal weight becomes either. The slope
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,6 @@ import numpy as np
 from ..core.algebra import Array
 from ..core.checks import function, real, shown
 from ..core.errors import InputError
-from ..core.values import dataclass
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ here is a nodal law; on a fine mesh it has no macroscopic effect.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -29,7 +30,6 @@ from ..core.protocols import Impact
 from ..core.sizes import small
 from ..core.surfaces import ContactSurface
 from ..core.system import SemiDiscreteSystem
-from ..core.values import dataclass, field
 
 BELOW = 1e-17  # of the largest entry of a column of M⁻¹Bᵀ: what is left out
 STORED = 20  # entries a row of M⁻¹Bᵀ: half a substitution reads more in two dimensions

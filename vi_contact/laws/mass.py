@@ -7,6 +7,7 @@ contact forces are those of the waves alone.
 """
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,7 +17,6 @@ from ..core.corners import lumped_entries
 from ..core.errors import InputError
 from ..core.surfaces import ContactSurface
 from ..core.system import SemiDiscreteSystem
-from ..core.values import dataclass
 from .mass_transfer import from_neighbours, named, rigid_motions
 
 LIGHT = 1e-9  # of the diagonal entry of M: a row sum that is no mass

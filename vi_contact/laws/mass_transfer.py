@@ -9,6 +9,7 @@ so that every rigid motion is kept exactly. In 1D it is the velocity of the neig
 """
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
@@ -16,7 +17,6 @@ import scipy.sparse as sp
 from ..core.algebra import Array, Indices, Mask, Matrix, from_each, largest
 from ..core.errors import InputError
 from ..core.system import SemiDiscreteSystem
-from ..core.values import dataclass
 
 BATCH = 4096  # rows that are fitted at a time: bounds the memory
 KEPT = 1e-10  # of a rigid motion, in the units of the neighbourhood

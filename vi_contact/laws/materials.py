@@ -4,11 +4,11 @@ Everything here is a frozen value checked when it is built; SI units throughout;
 """
 
 import math
+from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
 from ..core.checks import number
 from ..core.errors import InputError
-from ..core.values import dataclass
 
 EXTREME = 1e100  # beyond it, and below its inverse, squares are no numbers any more
 

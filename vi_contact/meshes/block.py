@@ -7,6 +7,7 @@ front towards the viewer). A bar has the first two, a rectangle four, a box six.
 import math
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +19,6 @@ if not __package__:  # run as a file of the source tree, maybe not installed
 from vi_contact.core.checks import MOST_CELLS, counted
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.grid import Array, Grid, add_grids, lattice
-
-from ..core.values import dataclass
 
 SIDES = (("left", "right"), ("bottom", "top"), ("back", "front"))
 

@@ -10,6 +10,7 @@ first.
 import math
 import sys
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -24,8 +25,6 @@ from vi_contact.core.errors import InputError
 from vi_contact.meshes.extract import MeshArrays, add_arrays
 from vi_contact.meshes.grid import Array, add_outline
 from vi_contact.meshes.rows import Mask, Rows
-
-from ..core.values import dataclass
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,6 +5,7 @@ nothing of them is used. Vertices stay in Gmsh's order here.
 """
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -17,8 +18,6 @@ from vi_contact.meshes.gmsh_session import MeshScript, session
 from vi_contact.meshes.grid import Grid
 from vi_contact.meshes.mesh_file import safe_copy
 from vi_contact.meshes.rows import GMSH_NUMBERS, Mask, Rows, number_alike
-
-from ..core.values import dataclass
 
 Source = MeshScript | str | Path
 _Elements = dict[int, tuple[Rows, Rows]]

@@ -4,6 +4,7 @@ A script that says which ``grids`` it is made of needs no Gmsh to become arrays,
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import permutations
 from typing import Any
 
@@ -11,8 +12,6 @@ import numpy as np
 import numpy.typing as npt
 
 from vi_contact.core.algebra import Array
-
-from ..core.values import dataclass
 
 _SIMPLEX_TYPE = (15, 1, 2, 4)  # Gmsh's numbers of point, line, triangle, tetrahedron
 _BOX_TYPE = (15, 1, 3, 5)  # point, line, quadrangle, hexahedron

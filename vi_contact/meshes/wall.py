@@ -5,6 +5,7 @@ defaults are the mesh of the published example: 8 x 12 cells, 40 boundary nodes 
 """
 
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +16,6 @@ from vi_contact.core.checks import MOST_CELLS, counted
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.block import check_box
 from vi_contact.meshes.grid import Grid, add_grids, add_outline, lattice
-
-from ..core.values import dataclass
 
 _PUBLISHED = (8, 12)
 

@@ -8,6 +8,7 @@ displacement of its contact boundary towards the support.
 
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -18,7 +19,6 @@ from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.step import PreparedSolver, Report, Scheme, Solver, State, StepProblem, StepResult
 from ..core.surfaces import ContactSurface
-from ..core.values import dataclass, field
 from .march import march
 from .method import check_solver
 from .time_steps import TimeSteps

@@ -1,6 +1,7 @@
 """Choose and check how a problem is marched: scheme, solvers, tolerance, time steps, the state it starts from."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,6 @@ from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.state_checks import check_problem_given, check_sizes, start_time
 from ..core.step import Scheme, Solver, State
-from ..core.values import dataclass, replace
 from ..laws.mass import ConsistentMass
 from ..schemes.trapezoidal import Trapezoidal
 from ..schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor

@@ -14,6 +14,7 @@ Rigid motions that no load drives stay where they start: along them P-weighted m
 mass of a block free to slide on level ground does not move). On a conservative problem all else is unique.
 """
 
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,7 +23,6 @@ from ..core.certificate import Certificate
 from ..core.errors import InputError, StepFailure
 from ..core.problem import ContactProblem
 from ..core.step import Solver, StepProblem, StepResult
-from ..core.values import dataclass, replace
 from ..core.verify import kkt_residual
 from ..solvers.correction import MARGIN, added, kept, left_over, share_of
 from .rigid_bodies import RigidBodies, body_springs

@@ -5,6 +5,7 @@ Displacements and velocities are those of the equations: relative to the ground 
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from math import isfinite
 from typing import Any, ClassVar
 
@@ -15,7 +16,6 @@ from ..core.checks import array, attributes, column_name, instance
 from ..core.errors import InputError, StepFailure
 from ..core.problem import ContactProblem
 from ..core.step import AXES, Columns, Report, Row, State
-from ..core.values import dataclass
 from ..core.verify import Energies, energies, energy_balance
 
 

@@ -5,13 +5,13 @@ static stage asks for w·(f - B_nᵀ r_n - B_tᵀ r_t) = 0, the sums of forces a
 """
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..core.algebra import Array, Comm, Indices, Matrix, largest, total
 from ..core.problem import ContactProblem
 from ..core.system import SemiDiscreteSystem
-from ..core.values import dataclass
 from ..laws.mass_transfer import rigid_motions
 
 FREE = 1e-10  # wᵀKw over the body's largest K_ii, for motions w of size one, that is round-off

@@ -5,6 +5,7 @@ import time
 from collections import deque
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import closing, suppress
+from dataclasses import dataclass, field
 from functools import cached_property
 from signal import Signals
 from typing import Any, Protocol
@@ -15,7 +16,6 @@ from ..core.algebra import Comm
 from ..core.errors import Interrupted, OutOfTime
 from ..core.stages import done
 from ..core.step import Recorder, Report, State, StepResult
-from ..core.values import dataclass, field
 from .files.checkpoint import RestartPoint
 from .files.identity import identity
 from .files.log import Progress, versions

@@ -1,6 +1,7 @@
 """Hold what a run leaves behind: histories, the final state and a summary in figures."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from textwrap import shorten, wrap
 from typing import Any
 
@@ -9,7 +10,6 @@ import numpy as np
 from ..core.algebra import Array
 from ..core.protocols import Excitation
 from ..core.step import Columns, State
-from ..core.values import dataclass
 from ..ground_motion.excitation import GroundMotion
 from .files.table import LEDGER
 

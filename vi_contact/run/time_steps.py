@@ -6,6 +6,7 @@ of the plan, whether they were halved or not.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from math import ceil, inf, isfinite
@@ -13,7 +14,6 @@ from typing import Any
 
 from ..core.checks import number, shown, whole
 from ..core.errors import InputError
-from ..core.values import dataclass
 
 HALVINGS = 20  # at most: a millionth of the base step
 SLACK = 1e-6  # of a step: round-off of the times t + dt + … of a run does not add a step to a piece

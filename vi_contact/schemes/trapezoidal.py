@@ -14,6 +14,7 @@ not ring. On consistent mass this is Newmark(¼, ½), which gains energy in ever
 warning. Source: Khenous, Laborde and Renard, Eur. J. Mech. A 27 (2008) 918-932.
 """
 
+from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 from ..core.algebra import Array, EffectiveMatrix
@@ -21,7 +22,6 @@ from ..core.checks import provides
 from ..core.problem import ContactProblem
 from ..core.protocols import MassLaw
 from ..core.step import Balance, State, StepProblem, StepResult
-from ..core.values import dataclass, field, replace
 from ..laws.mass import Redistributed
 from .base import check_balance, means, position_step, stepped
 from .consistent_data import equilibrated, massless_take

@@ -13,13 +13,13 @@ loads, damping and contact, and contact with gap >= 0 at the end of the step nev
 midpoint rule, SS22(½, ½) and Newmark(¼, ½) in (u, v). No accelerations are stored, so nothing restarts after an impact.
 """
 
+from dataclasses import dataclass
 from typing import ClassVar
 
 from ..core.algebra import Array, EffectiveMatrix
 from ..core.checks import between
 from ..core.problem import ContactProblem
 from ..core.step import Balance, State, StepProblem, StepResult
-from ..core.values import dataclass
 from .base import SingleStep, means, position_step, stepped
 
 

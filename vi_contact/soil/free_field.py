@@ -11,6 +11,7 @@ held: for a gravity stage put the sides on rollers, then ``release`` them.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,6 @@ from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.problem_checks import EXCITATION
 from ..core.protocols import Excitation
-from ..core.values import dataclass, field
 from ..fem import compat
 from ..fem.dashpots import BoundaryLoads, CompliantBase, DashpotMatrix, Dashpots, impedances
 from ..fem.petsc_algebra import PetscMatrix

@@ -13,6 +13,7 @@ Source: seismic practice, prescribed base; a base moved by (u, v, a) integrated 
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 import numpy as np
@@ -25,7 +26,6 @@ from ..core.problem_checks import EXCITATION
 from ..core.protocols import Excitation
 from ..core.surfaces import ContactSurface
 from ..core.system import Load, SemiDiscreteSystem
-from ..core.values import dataclass, field, replace
 from .companion import CompanionRun, linear_problem
 
 

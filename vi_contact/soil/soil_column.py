@@ -9,6 +9,7 @@ elements does whose sides move together, to the last digit: linear elements of s
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
@@ -18,7 +19,6 @@ from ..core.checks import array, shown
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.system import Load
-from ..core.values import dataclass
 from .companion import linear_problem
 
 

@@ -8,6 +8,7 @@ docs/guide/solvers.md.
 
 import logging
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Any
 
 from ..core.algebra import EffectiveMatrix, Matrix, SerialMatrix, total
@@ -16,7 +17,6 @@ from ..core.compiled import library
 from ..core.problem import ContactProblem
 from ..core.step import PreparedSolver, Solver, StepProblem, StepResult
 from ..core.surfaces import ContactSurface
-from ..core.values import dataclass, field
 from .condensed import Condensed
 
 log = logging.getLogger(__name__)

@@ -13,6 +13,7 @@ A step costs one forward and one backward substitution and the small problem, wh
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -28,7 +29,6 @@ from ..core.sizes import refuse_dense
 from ..core.stages import stage
 from ..core.step import Answers, StepProblem, StepResult
 from ..core.surfaces import ContactSurface
-from ..core.values import dataclass, field
 from .friction.condensed import CondensedFriction
 from .friction.newton import FrictionNewton
 from .friction.problem import FrictionMethod, inner_method

@@ -12,6 +12,7 @@ what it was. Where a stiff body rests on a soft one, or on nothing but contact, 
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,7 +22,6 @@ from ..core.errors import StepFailure
 from ..core.products import frozen
 from ..core.protocols import FrictionLaw
 from ..core.step import StepProblem, StepResult
-from ..core.values import dataclass, replace
 from ..core.verify import kkt_residual
 
 MARGIN = 2.0**10  # share over residual: reactions may be that much more wrong than the residual tells

@@ -6,6 +6,7 @@ those of the facets of this face. Facets are gathered on every rank only round n
 """
 
 import logging
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,6 @@ import ufl
 from ...core.algebra import Array, Indices, Mask, from_each
 from ...core.checks import number
 from ...core.errors import InputError
-from ...core.values import dataclass, replace
 from ...meshes.rows import number_alike
 from .. import compat
 from ..mesh import Facets, node_numbers

@@ -7,6 +7,7 @@ directions has the unit vector along its edge as the third. A rank holds the con
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from itertools import permutations
 from typing import Any
 
@@ -17,7 +18,6 @@ from ...core.algebra import Array, Indices, Mask, largest
 from ...core.corners import PARALLEL, at_right_angles
 from ...core.errors import InputError
 from ...core.surfaces import ContactSurface, nodal_blocks, nodal_frames, tangential_columns
-from ...core.values import dataclass, field
 from ..petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc
 from ..space import FemSpace
 from .nodes import Nodes, asked, at, joined_nodes

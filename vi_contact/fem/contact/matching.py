@@ -3,6 +3,7 @@
 The rows of P sum to one, so that a common translation of both bodies opens and closes nothing.
 """
 
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -11,7 +12,6 @@ import scipy.sparse as sp
 from ...core.algebra import Array, Indices, Mask
 from ...core.checks import attributes
 from ...core.errors import InputError
-from ...core.values import dataclass
 from .nodes import Nodes, at
 
 NEARBY = 8  # nodes of side 2 that are looked at first

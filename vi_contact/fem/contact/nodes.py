@@ -7,12 +7,12 @@ nodes stays with their owners, but for the two sides of a pair of bodies, which 
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 
 from ...core.algebra import Array, Comm, Indices, Mask, from_each, largest
-from ...core.values import dataclass, fields
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,6 +5,7 @@ base and right wall; the two bottom corners touch with both their sides.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -17,7 +18,6 @@ from ...core.protocols import Excitation, FrictionLaw, Frictionless, ImpactLaw, 
 from ...core.step import Columns, Recorder, Report, Row, State
 from ...core.surfaces import ContactSurface
 from ...core.system import SemiDiscreteSystem
-from ...core.values import dataclass, field, replace
 from ...fem.assembly import assemble
 from ...fem.contact.frames import FemSurface
 from ...fem.contact.joined import joined_surfaces

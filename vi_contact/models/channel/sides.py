@@ -1,6 +1,7 @@
 """Describe what stands at the two ends and at the bottom of the soil layer around a channel."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
@@ -9,7 +10,6 @@ from ...core.algebra import Array
 from ...core.checks import check_word
 from ...core.errors import InputError
 from ...core.protocols import Excitation
-from ...core.values import dataclass, field
 from ...fem.dashpots import CompliantBase, Dashpots
 from ...fem.loads import Prescribed
 from ...fem.ties import Tied

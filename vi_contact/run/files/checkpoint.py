@@ -13,6 +13,7 @@ import json
 import logging
 import zipfile
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,6 @@ from ...core.errors import InputError
 from ...core.files import on_root, write_atomically
 from ...core.problem import ContactProblem
 from ...core.step import Scheme, State
-from ...core.values import dataclass, replace
 from ..time_steps import TimeSteps
 from .folder import CHECKPOINT, FORMAT, check_format
 from .identity import FIXED, difference, identity

@@ -11,13 +11,13 @@ plain again, and what was tried before is forgotten.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
 
 from ...core.algebra import Array
 from ...core.checks import provides, whole
-from ...core.values import dataclass
 
 Next = Callable[[Array, Array], Array]  # x (n,) and its image g(x) -> the point to try after x
 

@@ -19,6 +19,7 @@ slip to and fro. Where Newton cycles all the same, Gauss-Seidel sweeps (nsgs.py)
 """
 
 import ctypes
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, ClassVar
 
@@ -27,7 +28,6 @@ import numpy as np
 from ...core.algebra import Array, Mask, SerialComm, max_abs
 from ...core.checks import attributes
 from ...core.compiled import library
-from ...core.values import dataclass
 from ..normal.lcp import EPS
 from .linear import Factored, LinearProblems, States
 from .nsgs import sweeper

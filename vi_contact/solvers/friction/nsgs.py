@@ -12,13 +12,13 @@ converges for every G; under Coulomb's it converges in practice, linearly, for f
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
 from ...core.algebra import Array, Mask
 from ...core.checks import attributes
-from ...core.values import dataclass
 from .problem import Iterated, PreparedFriction, ScaledDelassus, ScaledProblem, iterated
 
 

@@ -18,6 +18,7 @@ the mean of G_tt to the same power: reactions and displacements are then both in
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -27,7 +28,6 @@ from scipy.linalg import lapack
 from ...core.algebra import Array, Mask, max_abs
 from ...core.checks import provides
 from ...core.errors import InputError, StepFailure
-from ...core.values import dataclass
 from ...laws.friction import project
 from ..normal.lcp import EPS, check_gap, energy_scale, scaled_symmetric
 

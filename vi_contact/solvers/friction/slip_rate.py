@@ -12,13 +12,13 @@ point.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ...core.algebra import Array, max_abs
 from ...core.checks import attributes
 from ...core.errors import StepFailure
-from ...core.values import dataclass, field, replace
 from .extrapolation import Anderson, Extrapolation, accelerated
 from .problem import FrictionResult
 

@@ -14,6 +14,7 @@ at every set it completes. No such set can return: it ends, in practice after ab
 """
 
 from ctypes import c_double
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, cast
 
@@ -25,7 +26,6 @@ from ...core.checks import attributes
 from ...core.compiled import library
 from ...core.contact_last import at
 from ...core.errors import ViContactError
-from ...core.values import dataclass
 from .lcp import EPS, Found, LCPResult, PreparedLCP, ScaledLCP, cholesky, failure, scaled_dense
 
 FEW = 160  # rows up to which compiled exchanges are as fast as those of LAPACK

@@ -14,6 +14,7 @@ resolve. Gaps that are far from closing do not enter it: a wide gap does not blu
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from math import isfinite
 
@@ -22,7 +23,6 @@ from scipy.linalg import lapack
 
 from ...core.algebra import Array, Mask, lowest, max_abs
 from ...core.errors import InputError, StepFailure
-from ...core.values import dataclass
 
 EPS = float(np.finfo(float).eps)
 Found = tuple[Array, float, int, Sequence[float]]  # scaled r, residual over the unit, iterations, history

@@ -10,6 +10,7 @@ one factorisation. A law that depends on the slip rate makes this a sequence of 
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,6 @@ import numpy as np
 from ...core.algebra import Array, Mask, max_abs
 from ...core.errors import StepFailure
 from ...core.step import StepProblem, StepResult
-from ...core.values import dataclass
 from ...laws.friction import project
 from ..friction.extrapolation import Anderson
 from ..friction.slip_rate import RateIteration

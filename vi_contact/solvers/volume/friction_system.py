@@ -22,13 +22,13 @@ end by luck. So SNES sees, with the diagonal c of A and E the residual of the bo
 whose signs after a projection say how far the unknown had gone beyond: the rule of the primal-dual active set method.
 """
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ...core.algebra import Array, Mask, max_abs
 from ...core.step import StepProblem
-from ...core.values import dataclass
 from ...laws.friction import project
 from .bounded_system import BoundedSystem
 from .scaled_step import ScaledStep, fraction

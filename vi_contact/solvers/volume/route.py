@@ -8,6 +8,7 @@ and only SNES can do it. Reference: PETSc manual, chapters SNES (variational ine
 """
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any, Protocol, cast
 
 import numpy as np
@@ -19,7 +20,6 @@ from ...core.errors import InputError, StepFailure
 from ...core.problem import ContactProblem
 from ...core.step import StepProblem, StepResult
 from ...core.surfaces import ContactSurface
-from ...core.values import dataclass, field
 from .bounded_system import BoundedSystem
 from .failures import raised, stopped
 from .friction import VolumeFriction

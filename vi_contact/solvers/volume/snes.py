@@ -8,13 +8,13 @@ route but A and b.
 
 import weakref
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 from petsc4py import PETSc
 
 from ...core.algebra import Array
-from ...core.values import dataclass
 from .bounded_system import BoundedSystem
 from .friction_jacobian import FrictionJacobian
 from .friction_system import ScaledFrictionStep

@@ -4,13 +4,13 @@ TAO's tolerances and trust regions are absolute, which the scaled step makes har
 are replaced by ``ScaledStep.verdict``.
 """
 
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 from petsc4py import PETSc
 
 from ...core.algebra import Array
-from ...core.values import dataclass
 from .options import REDUCED_PC, OptionLayers, Options, refuse
 from .scaled_step import ScaledStep
 from .snes import AssembledJacobian, weakly, write_bounds

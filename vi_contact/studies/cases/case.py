@@ -10,6 +10,7 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,6 @@ from ...core.protocols import Excitation, FrictionLaw, Frictionless, ImpactLaw, 
 from ...core.state_checks import initial_state
 from ...core.step import Recorder, Scheme, Solver, State
 from ...core.surfaces import ContactSurface, empty_surface
-from ...core.values import dataclass, field, replace
 from ...fem.assembly import assemble
 from ...fem.contact.joined import joined_surfaces
 from ...fem.mesh import Tags, build_mesh, read_mesh

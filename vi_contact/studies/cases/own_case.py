@@ -1,13 +1,13 @@
 """Read and run case files whose table has a runner of its own: [beam], [layer]; [mesh] and [model] are in ``case``."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...core.algebra import Comm, SerialComm
 from ...core.errors import InputError
 from ...core.files import on_root
-from ...core.values import dataclass, field
 from ...run.files.folder import locked, run_folder
 from .library import base_folder, check_format, keep_copy
 from .parsing import Words, arguments

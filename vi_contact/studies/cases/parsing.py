@@ -4,13 +4,13 @@ import os
 import types
 from collections import ChainMap
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, is_dataclass
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Union, get_args, get_origin
 
 from ...core.checks import SHOWN, shown
 from ...core.errors import InputError
-from ...core.values import dataclass, field, is_dataclass
 from .own_classes import own_class
 from .table_calls import GROUP, Call, Callee, Group, Node, Spot, callee
 

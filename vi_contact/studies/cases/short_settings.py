@@ -1,13 +1,13 @@
 """Turn the short options of ``vi-contact run`` into settings KEY=VALUE of a case; refuse those it has no use for."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
 from itertools import chain
 from pathlib import Path
 from typing import Any
 
 from ...core.checks import shown
 from ...core.errors import InputError
-from ...core.values import dataclass, fields
 from .parsing import nearest
 from .toml_file import toml_value, with_settings
 

@@ -11,11 +11,11 @@ of the file is ever evaluated as code.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, is_dataclass
 from inspect import Parameter, signature
 from typing import Any, get_type_hints
 
 from ...core.errors import InputError
-from ...core.values import dataclass, field, is_dataclass
 
 Context = Mapping[str, Any]
 Node = Any  # what has been read: a Group or Call, a tuple or dict of nodes; all else stands for itself

@@ -6,6 +6,7 @@ of a function here that takes none.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from pathlib import Path
 from types import MappingProxyType, ModuleType
@@ -16,7 +17,6 @@ from ...core import ContactSurface, Excitation, FrictionLaw, ImpactLaw, MassLaw,
 from ...core.checks import number
 from ...core.corners import FEATURE_ANGLE
 from ...core.system import SemiDiscreteSystem
-from ...core.values import dataclass, replace
 from ...fem import BodyForce, Cells, CompliantBase, Dashpots, Facets, Prescribed, Traction
 from ...fem.contact.matching import Matching
 from ...ground_motion.chain import Processing
