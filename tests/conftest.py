@@ -47,8 +47,8 @@ def _patience(seconds: float) -> float:
 
 
 def _meet(config: pytest.Config, mine: str, *, where: str, seconds: float, dull: bool = False) -> list[str]:
-    """The texts of all ranks, in rank order; none where `mine` is `dull` on all of them: nearly always, so that one small
-    reduction is all that a meeting takes. Aborts the run if some rank does not come within `seconds`."""
+    """Return the texts of all ranks, in rank order; none where `mine` is `dull` on all of them: nearly always, so that a
+    meeting takes one small reduction. Aborts the run if some rank does not come within `seconds`."""
     comm, some = _comm(), array("i", [0])
     request = comm.Iallreduce(array("i", [not dull]), some)
     deadline, pause = time.monotonic() + seconds, 1e-5
@@ -77,6 +77,8 @@ def pytest_ignore_collect(collection_path: Path) -> bool | None:
     """Files that are left out as a whole are not even imported: that takes longer than many of their tests."""
     if SIZE == 1 or collection_path.suffix != ".py":
         return None
+    if SIZE > 2 and collection_path.parent.name == "validation":  # exact answers do not know ranks: two have shown it
+        return True
     text = collection_path.read_text()
     return True if any(f"\npytestmark = pytest.mark.{marker}" in text for marker in LEFT_OUT) else None
 
@@ -86,12 +88,36 @@ def _left_out(item: pytest.Item) -> bool:
     return any(item.get_closest_marker(marker) for marker in LEFT_OUT)
 
 
+def _covering(items: list[pytest.Item]) -> set[pytest.Item]:
+    """Tests without parameters, and of every other function so many that each value of each parameter occurs: all of
+    their combinations run on one rank, where a law, a scheme or a shape takes the path that it takes on several."""
+    kept: set[pytest.Item] = set()
+    functions: dict[str, list[pytest.Item]] = {}
+    for item in items if SIZE % 2 == 0 else reversed(items):  # other combinations on three ranks than on two
+        functions.setdefault(item.nodeid.split("[")[0], []).append(item)
+    for ones in functions.values():
+        seen: set[tuple[str, int]] = set()
+        for new in (all, any):  # those of new values only, then those of some new value
+            for item in ones:
+                values = {(name, id(value)) for name, value in _parameters(item).items()}
+                if item not in kept and (not values or new(value not in seen for value in values)):
+                    kept.add(item)
+                    seen |= values
+    return kept
+
+
+def _parameters(item: pytest.Item) -> dict[str, Any]:
+    return item.callspec.params if hasattr(item, "callspec") else {}
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    if SIZE == 1:
-        items.sort(key=lambda item: "validation" not in item.path.parts)  # its files are long: not last on one core
+    if SIZE == 1:  # files of validation and those with many slow tests are long: not last on one core
+        slow = Counter(item.path for item in items if item.get_closest_marker("slow"))
+        items.sort(key=lambda item: -slow[item.path] - 10 * ("validation" in item.path.parts))
         return
-    if left_out := [item for item in items if _left_out(item)]:
-        items[:] = [item for item in items if not _left_out(item)]
+    kept = _covering([item for item in items if not _left_out(item)])
+    if left_out := [item for item in items if item not in kept]:
+        items[:] = [item for item in items if item in kept]
         config.hook.pytest_deselected(items=left_out)
 
 

@@ -21,10 +21,12 @@ MINIMUM = {
 }
 
 
+@pytest.mark.serial
 def test_interpreter_is_recent_enough() -> None:
     assert sys.version_info >= (3, 11)
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("name", MINIMUM)
 def test_stack_is_recent_enough(name: str) -> None:
     version = import_module(name).__version__
