@@ -47,8 +47,8 @@ def _patience(seconds: float) -> float:
 
 
 def _meet(config: pytest.Config, mine: str, *, where: str, seconds: float, dull: bool = False) -> list[str]:
-    """Return the texts of all ranks, in rank order; none where `mine` is `dull` on all of them: nearly always, so that a
-    meeting takes one small reduction. Aborts the run if some rank does not come within `seconds`."""
+    """Return the texts of all ranks, in rank order; none where `mine` is `dull` on all of them: nearly always, so that
+    a meeting takes one small reduction. Aborts the run if some rank does not come within `seconds`."""
     comm, some = _comm(), array("i", [0])
     request = comm.Iallreduce(array("i", [not dull]), some)
     deadline, pause = time.monotonic() + seconds, 1e-5

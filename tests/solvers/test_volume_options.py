@@ -267,7 +267,6 @@ def test_a_body_that_flies_away_is_a_failure(method: Any) -> None:
 @pytest.mark.parametrize("method", METHODS)
 def test_solvers_are_freed(pushed: Case, method: Any, closed: bool) -> None:
     """Only PETSc objects outlive the last reference, so that their late destruction finds nothing else to free."""
-    gc.collect()
     gc.disable()
     try:
         prepared = prepare(pushed, Volume(method=method))
