@@ -27,7 +27,7 @@ import numpy as np
 
 from ..core import checks
 from ..core.algebra import Array, SerialFactor, SerialMatrix
-from ..core.checks import counted, function, instance, number, provides, whole
+from ..core.checks import counted, function, instance, number, optional, provides, whole
 from ..core.errors import StepFailure
 from ..core.files import write_csv
 from .elements import Elements, beam_matrices
@@ -115,8 +115,7 @@ class BeamStepper:
         function(owner, "mu", self.mu, "give a function of (t, slip rate)")
         provides(owner, "friction", self.friction, ("solve",), "give ExactFriction() or RegularisedFriction(eps)",
                  lacks=("limit",))
-        if self.load is not None:
-            function(owner, "load", self.load, "give a function of t in N/m, or None")
+        optional(function, owner, "load", self.load, "give a function of t in N/m, or None")
 
     def given(self, t: float, rate: float) -> tuple[float, float, float]:
         """Return (|r_N|, mu, load) at a time and slip rate, checked."""

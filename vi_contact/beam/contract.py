@@ -24,7 +24,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..core.algebra import Array, Indices, SerialAlgebra, SerialComm, SerialMatrix
-from ..core.checks import array, function, instance, number, provides, whole
+from ..core.checks import array, function, instance, number, optional, provides, whole
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.protocols import FrictionLaw, Frictionless
@@ -201,8 +201,7 @@ def _check(
     instance(owner, "elements", elements, Elements, "give Elements(count)")
     for start in starts:
         instance(owner, "start", start, (Start, type(None)), "give Start(...), or None")
-    if load is not None:
-        function(owner, "load", load, "give a function of t in N/m, or None")
+    optional(function, owner, "load", load, "give a function of t in N/m, or None")
     for name, kind in (("rod", Rod), ("beam", TimoshenkoBeam)):
         if name in given:
             instance(owner, name, given[name], kind, f"give a {kind.__name__}")

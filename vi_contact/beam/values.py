@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core.algebra import Array
-from ..core.checks import array, attributes, function, shape_of
+from ..core.checks import array, attributes, function, optional, shape_of
 
 Profile = Callable[[Array], Array]
 
@@ -68,8 +68,7 @@ class Rod:
     def __post_init__(self) -> None:
         attributes(self, positive=("length", "rho", "area", "E"), not_negative=("viscosity", "gap"))
         for name in ("body_force", "end_force"):
-            if getattr(self, name) is not None:
-                function("Rod", name, getattr(self, name), "give a function of the time, or None")
+            optional(function, "Rod", name, getattr(self, name), "give a function of the time, or None")
 
 
 @dataclass(frozen=True)

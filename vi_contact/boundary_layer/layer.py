@@ -14,7 +14,7 @@ import numpy as np
 from scipy.special import expit
 
 from ..core.algebra import Array
-from ..core.checks import number
+from ..core.checks import number, optional
 from ..core.errors import InputError
 
 LARGEST, LARGEST_FORCE = 1e60, 1e150  # of lengths, speeds and masses; of k and c: products of their squares are finite
@@ -47,8 +47,7 @@ class Layer:
                 sized("Layer", f"the layer parameter {name}", getattr(self, name), unit, most=LARGEST_FORCE)
         if self.k == 0.0 and self.c == 0.0:
             raise InputError("layer parameters k and c are both zero: nothing would push the body back, give k > 0")
-        if self.speed is not None:
-            sized("Layer", "the layer speed V", self.speed, "m/s")
+        optional(sized, "Layer", "the layer speed V", self.speed, "m/s")
         if self.start is not None and sized("Layer", "the layer start a", self.start, "m") > self.width:
             raise InputError(f"Layer: the layer start a is {self.start}; give a length up to the width {self.width} m")
 

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from ..core.algebra import Array
-from ..core.checks import array, instance, number, whole
+from ..core.checks import array, instance, number, optional, whole
 from ..core.errors import InputError, StepFailure
 from .layer import Layer
 from .metric import Metric
@@ -69,8 +69,7 @@ def layer_motion(
     q, v = array(owner, "q0", q0, (None,)), array(owner, "v0", v0, (None,))
     system.check(q, v)
     number(owner, "t_end", t_end, positive=True, unit="s")
-    if contacts is not None:
-        whole(owner, "contacts", contacts, least=1)
+    optional(whole, owner, "contacts", contacts, least=1)
     check_tolerance(owner, rtol)
     whole(owner, "refine", refine, least=1, most=10_000)
     rho = float(system.rho(q))

@@ -145,6 +145,12 @@ def array(owner: str, meaning: str, value: Any, shape: tuple[int | None, ...], *
     return found
 
 
+def optional(check: Callable[..., Any], owner: str, meaning: str, value: Any, *more: Any, **options: Any) -> None:
+    """Check a value that may be left out: ``check(owner, meaning, value, …)`` unless it is None."""
+    if value is not None:
+        check(owner, meaning, value, *more, **options)
+
+
 def shape_of(value: Any) -> tuple[int, ...]:
     """Return the shape of numbers in lists or arrays; (-1,) for lists of different lengths, which have none."""
     try:
@@ -178,6 +184,11 @@ def path(owner: str, meaning: str, value: Any) -> Path:
     if not isinstance(value, str | Path) or not str(value).strip() or "\0" in str(value):
         raise InputError(f"{owner}: {meaning} is {shown(value)}; give the path of a file")
     return Path(value)
+
+
+def at(point: Array) -> str:
+    """Return a point as words for a sentence."""
+    return f"({', '.join(f'{x:g}' for x in point)})"
 
 
 def shown(value: Any) -> str:

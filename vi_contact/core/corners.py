@@ -8,6 +8,7 @@ and a lumped mass m is m G⁻¹.
 import numpy as np
 
 from .algebra import Array, Indices, from_each
+from .checks import at
 from .errors import InputError
 from .surfaces import ContactSurface
 
@@ -34,8 +35,8 @@ def refuse_rubbing(surface: ContactSurface) -> None:
     first = [(surface.slots[corner[0]], surface.points[corner[0]]) for corner in surface.corners]
     every = [one for part in from_each(surface.comm, first) for one in part]
     if every:
-        where = ", ".join(f"{x:g}" for x in min(every, key=lambda one: one[0])[1])
-        raise InputError(f"{len(every)} contact nodes, the first at ({where}), have several contact directions, and "
+        where = at(min(every, key=lambda one: one[0])[1])
+        raise InputError(f"{len(every)} contact nodes, the first at {where}, have several contact directions, and "
                          "how they rub on two faces at once is not modelled: let them slide freely "
                          "(surface.with_frictionless_corners()), or take the corner for smooth (a larger "
                          "feature_angle=)")

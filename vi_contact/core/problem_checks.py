@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from .checks import array, instance, provides, refuse
+from .checks import array, instance, optional, provides, refuse
 from .corners import refuse_rubbing
 from .errors import InputError
 from .surfaces import ContactSurface
@@ -24,8 +24,7 @@ def check_parts(problem: Any) -> None:
     instance(owner, "system", system, SemiDiscreteSystem, "give a system, such as fem.assemble returns")
     instance(owner, "surface", surface, ContactSurface, "give a contact surface, such as fem.contact_surface returns")
     provides(owner, "friction", problem.friction, ("limit", "slope", "at"), "give Coulomb(mu) or another friction law")
-    if problem.impact is not None:
-        provides(owner, "impact", problem.impact, ("target", "apply"), "give Inelastic() or another law, or None")
+    optional(provides, owner, "impact", problem.impact, ("target", "apply"), "give Inelastic() or another law, or None")
     if problem.mass is not None:
         remedy = "give Redistributed() or ConsistentMass(), or None"
         provides(owner, "mass", problem.mass, ("apply",), remedy, lacks=("target",))

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core.algebra import Array
-from ..core.checks import array, counted, flag, instance, number
+from ..core.checks import array, counted, flag, instance, number, optional
 from ..core.errors import InputError
 from ..ground_motion.record import Record
 from ..ground_motion.spectra import ResponseSpectrum, response_spectrum
@@ -93,8 +93,7 @@ def transfer_function(
     InputError for a base without motion.
     """
     number("transfer_function", "floor", floor, positive=True)
-    if bandwidth is not None:
-        number("transfer_function", "bandwidth", bandwidth, positive=True)
+    optional(number, "transfer_function", "bandwidth", bandwidth, positive=True)
     top, below = recorded_motion(history, surface), recorded_motion(history, base)
     raw = np.fft.rfftfreq(len(top.acceleration), top.dt)[1:]
     spectra = [np.abs(np.fft.rfft(one.acceleration))[1:] for one in (top, below)]

@@ -18,7 +18,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..core.algebra import Array, Mask
-from ..core.checks import array, column_name, function, instance, mask, provides
+from ..core.checks import array, column_name, function, instance, mask, optional, provides
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.step import AXES, Columns, Report, Row, State
@@ -41,10 +41,8 @@ class Geometry(Protocol):
 def check_part(name: str, centre: Any, where: Any, normal: Any) -> None:
     """Raise InputError unless centre and direction are numbers and the mask is a function."""
     array(f"part '{name}'", "the centre", centre, (None,), unit="metres")
-    if where is not None:
-        function(f"part '{name}'", "where", where, "give a function of points and normals, or None")
-    if normal is not None:
-        array(f"part '{name}'", "normal", normal, (None,))
+    optional(function, f"part '{name}'", "where", where, "give a function of points and normals, or None")
+    optional(array, f"part '{name}'", "normal", normal, (None,))
 
 
 class Part:

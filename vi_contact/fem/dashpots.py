@@ -22,7 +22,7 @@ import numpy as np
 import ufl
 
 from ..core.algebra import Array
-from ..core.checks import attributes, function, instance
+from ..core.checks import attributes, function, instance, optional
 from ..core.errors import InputError
 from ..laws.materials import LinearElastic, Section
 from . import compat
@@ -64,8 +64,7 @@ class Dashpots:
     def __post_init__(self) -> None:
         owner = type(self).__name__
         facets_of(owner, "facets", self.facets)
-        if self.material is not None:
-            instance(owner, "material", self.material, LinearElastic, "give a LinearElastic, or None")
+        optional(instance, owner, "material", self.material, LinearElastic, "give a LinearElastic, or None")
         attributes(self, not_negative=("normal", "tangential"))
 
     def loads(self, matrix: "DashpotMatrix", forms: Any) -> BoundaryLoads:

@@ -13,7 +13,7 @@ import ufl
 from dolfinx.mesh import Mesh
 
 from ..core.algebra import Array, Comm
-from ..core.checks import ended, function, refuse, shown
+from ..core.checks import ended, function, optional, refuse, shown
 from . import compat
 from .groups import components_given, facets_of, field_given
 from .mesh import Facets
@@ -118,8 +118,7 @@ class ActingLoad:
     def __post_init__(self) -> None:
         owner = type(self).__name__
         field_given(owner, "value", self.value)
-        if self.history is not None:
-            function(owner, "history", self.history, "give a function of the time [s], or None")
+        optional(function, owner, "history", self.history, "give a function of the time [s], or None")
 
     @property
     def is_constant(self) -> bool:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core.algebra import Array, Indices
+from ..core.checks import at
 from ..core.errors import InputError
 from .groups import components_given, components_of, facets_of
 from .mesh import Facets
@@ -68,7 +69,6 @@ def _pairs(tie: Tied, dimension: int, near: float, nodes: NodesOf) -> Pairs:
     partner = distance.argmin(axis=1)
     worst = int(distance.min(axis=1).argmax())
     if distance[worst, partner[worst]] > near or len(set(partner)) < len(partner):
-        where = ", ".join(f"{x:g}" for x in first[1][worst])
-        raise InputError(f"node ({where}) of tied boundaries {names} has no partner at the same height on the other: "
-                         "mesh both sides alike")
+        raise InputError(f"node {at(first[1][worst])} of tied boundaries {names} has no partner at the same height on "
+                         "the other: mesh both sides alike")
     return Pairs(first[0], second[0][partner], components_of("tied", tie.components, dimension))

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import ClassVar
 
-from ..core.checks import number
+from ..core.checks import number, optional
 from ..core.errors import InputError
 from ..core.excitation_values import check_excitation, finite_tuple, vector
 
@@ -59,8 +59,7 @@ class Ricker:
 
     def __post_init__(self) -> None:
         check_excitation(self, finite=("amplitude",), positive=("frequency",))
-        if self.delay is not None:
-            number("Ricker", "delay", self.delay, not_negative=True, unit="seconds")
+        optional(number, "Ricker", "delay", self.delay, not_negative=True, unit="seconds")
 
     @property
     def peak_time(self) -> float:

@@ -13,6 +13,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from vi_contact.core.algebra import Array
+from vi_contact.core.checks import at
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.extract import MeshArrays, Source, add_arrays, arrays_of
 from vi_contact.meshes.rows import Mask, Rows, cell_sides, number_alike
@@ -100,8 +101,8 @@ def welded(arrays: MeshArrays, first: str, second: str) -> MeshArrays:
 
     distance, nearest = cKDTree(arrays.points[one]).query(arrays.points[two])
     if distance.max(initial=0.0) > 1e-9 * size:
-        where = ", ".join(f"{x:g}" for x in arrays.points[two[np.argmax(distance)]])
-        raise InputError(f"group '{second}' has a node at ({where}), {distance.max():.3g} m away from every node of "
+        where = at(arrays.points[two[np.argmax(distance)]])
+        raise InputError(f"group '{second}' has a node at {where}, {distance.max():.3g} m away from every node of "
                          f"'{first}': weld only sides that are divided alike")
     target = np.arange(len(arrays.points))
     target[two] = one[nearest]

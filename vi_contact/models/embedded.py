@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..core.checks import instance
+from ..core.checks import instance, optional
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.protocols import FrictionLaw, Frictionless, MassLaw
@@ -47,8 +47,7 @@ class Embedded:
 
     def __post_init__(self) -> None:
         instance("Embedded", "box", self.box, Square, "give a Square, for example concrete(cells=10)")
-        if self.block is not None:
-            instance("Embedded", "block", self.block, LinearElastic, "give a LinearElastic, or None")
+        optional(instance, "Embedded", "block", self.block, LinearElastic, "give a LinearElastic, or None")
         if self.box.cells % 2:
             raise InputError(f"Embedded: box of {self.box.cells} cells per side: give an even number, half are in it")
         if self.box.confined:

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..core.checks import attributes, function, instance
+from ..core.checks import attributes, function, instance, optional
 from ..core.problem import ContactProblem
 from ..core.protocols import FrictionLaw, Frictionless, MassLaw
 from ..core.system import SemiDiscreteSystem
@@ -38,8 +38,7 @@ class Square:
     def __post_init__(self) -> None:
         attributes(self, positive=("side",), finite=("pressure",), counts=("cells",), flags=("confined",))
         instance("Square", "material", self.material, LinearElastic, "give a LinearElastic")
-        if self.history is not None:
-            function("Square", "history", self.history, "give a function of the time, or None")
+        optional(function, "Square", "history", self.history, "give a function of the time, or None")
 
     @property
     def time_step(self) -> float:

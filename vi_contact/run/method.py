@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..core.algebra import from_each, max_abs
-from ..core.checks import provides, real, several, shown
+from ..core.checks import at, provides, real, several, shown
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.state_checks import check_problem_given, check_sizes, start_time
@@ -107,6 +107,5 @@ def check_state(owner: str, problem: ContactProblem, state: State, *, dt: float,
     inside, *sizes = surface.comm.max(np.array([np.max(-gap, initial=-np.inf), *moved]))
     if inside > SLACK * tolerance * max(sizes):
         worst = np.concatenate(from_each(surface.comm, surface.points[gap == -inside]))[0]
-        where = ", ".join(f"{x:g}" for x in worst)
-        raise InputError(f"{owner}: the state lies {inside:.3g} m inside the obstacle at ({where}): start from one "
+        raise InputError(f"{owner}: the state lies {inside:.3g} m inside the obstacle at {at(worst)}: start from one "
                          "with every gap >= 0")

@@ -14,13 +14,13 @@ import scipy.sparse as sp
 import ufl
 
 from ...core.algebra import Array, Indices, Mask, from_each
-from ...core.checks import number
+from ...core.checks import at, number
 from ...core.errors import InputError
 from ...meshes.rows import number_alike
 from .. import compat
 from ..mesh import Facets, node_numbers
 from ..space import FemSpace
-from .nodes import Nodes, at
+from .nodes import Nodes
 
 log = logging.getLogger(__name__)
 LEANING = 0.9  # cosine of the angle (26°) up to which a normal counts as lying in a symmetry plane

@@ -15,12 +15,13 @@ import numpy as np
 import scipy.sparse as sp
 
 from ...core.algebra import Array, Indices, Mask, largest
+from ...core.checks import at
 from ...core.corners import PARALLEL, at_right_angles
 from ...core.errors import InputError
 from ...core.surfaces import ContactSurface, nodal_blocks, nodal_frames, tangential_columns
 from ..petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc
 from ..space import FemSpace
-from .nodes import Nodes, asked, at, joined_nodes
+from .nodes import Nodes, asked, joined_nodes
 
 INDEPENDENT = 0.01  # least singular value of a node's directions: two that turn by 0.8° (CHOSEN; T has 1 over it)
 

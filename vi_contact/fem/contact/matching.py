@@ -10,9 +10,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from ...core.algebra import Array, Indices, Mask
-from ...core.checks import attributes
+from ...core.checks import at, attributes
 from ...core.errors import InputError
-from .nodes import Nodes, at
+from .nodes import Nodes
 
 NEARBY = 8  # nodes of side 2 that are looked at first
 DISTANCES = 2**20  # in a table, where all nodes of side 2 are looked at

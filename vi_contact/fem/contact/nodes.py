@@ -66,8 +66,3 @@ def asked(comm: Comm, slots: Indices, ask: Callable[..., tuple[Any, ...]], *valu
     order = np.argsort(np.concatenate([part[0] for part in parts]))
     whole = ask(*(np.concatenate([part[i] for part in parts])[order] for i in range(1, 1 + len(values))))
     return tuple(one[slots] for one in whole)
-
-
-def at(point: Array) -> str:
-    """Return a point as words for a sentence."""
-    return f"({', '.join(f'{x:g}' for x in point)})"

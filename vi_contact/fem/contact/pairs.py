@@ -19,7 +19,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ...core.algebra import Array, Mask, largest
-from ...core.checks import provides
+from ...core.checks import at, optional, provides
 from ...core.corners import FEATURE_ANGLE
 from ...core.errors import InputError
 from ...core.stages import stage
@@ -31,7 +31,7 @@ from ..space import FemSpace
 from .faces import Boundary, boundary, checked_angle, split, tell_corners
 from .frames import Facing, NodalConditions, NodalFrames, given, surface_of
 from .matching import Matched, Matching, NodeToNode, Side
-from .nodes import Nodes, at, everywhere, joined_nodes
+from .nodes import Nodes, everywhere, joined_nodes
 from .surface import contact_space, listed, nodes_on, snapped
 
 log = logging.getLogger(__name__)
@@ -61,8 +61,7 @@ def contact_pair(
             boundary, contact directions that are partly prescribed, clamped nodes that face free ones.
     """
     space = contact_space("contact_pair", system, {"facets1": facets1, "facets2": facets2}, points)
-    if matching is not None:
-        provides("contact_pair", "matching", matching, ("match",), "give NodeToNode() or DualMortar(), or None")
+    optional(provides, "contact_pair", "matching", matching, ("match",), "give NodeToNode() or DualMortar(), or None")
     angle = checked_angle("contact_pair", feature_angle)
     one, two = side_of(space, facets1), side_of(space, facets2)
     shared = np.isin(one.nodes.numbers, two.nodes.numbers)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...core.algebra import Array, Indices, Mask, largest, total
-from ...core.checks import array, provides, several
+from ...core.checks import array, at, optional, provides, several
 from ...core.corners import FEATURE_ANGLE, PARALLEL
 from ...core.errors import InputError
 from ...core.obstacles import Obstacle, Touching, admissible_gap, facing
@@ -20,7 +20,7 @@ from ..mesh import Facets
 from ..space import FemSpace, space_of
 from .faces import boundary, checked_angle, in_symmetry_planes, integrals, split, tell_corners
 from .frames import NodalConditions, surface_of
-from .nodes import Nodes, asked, at, everywhere, slots_of
+from .nodes import Nodes, asked, everywhere, slots_of
 
 log = logging.getLogger(__name__)
 
@@ -49,8 +49,7 @@ def contact_surface(
             partly prescribed, initial penetration, a node with more faces than the body has dimensions.
     """
     space = contact_space("contact_surface", system, {"facets": facets}, points)
-    if obstacle is not None:
-        provides("contact_surface", "obstacle", obstacle, ("directions", "gap"), "give HalfSpace(…) or another")
+    optional(provides, "contact_surface", "obstacle", obstacle, ("directions", "gap"), "give HalfSpace(…) or another")
     angle = checked_angle("contact_surface", feature_angle)
     comm, whole = space.comm, nodes_on(space, facets)
     chosen = None if points is None else listed(space, everywhere(comm, whole), points, facets.name)
@@ -167,17 +166,16 @@ def listed(space: FemSpace, nodes: Nodes, points: Sequence[Sequence[float]], nam
             raise InputError(f"contact point {tuple(point)}: give {space.dimension} coordinates")
         distance = np.linalg.norm(nodes.points - x, axis=1)
         row = int(np.argmin(distance))
-        where = ", ".join(f"{c:g}" for c in x)
         if distance[row] > 0.05 * space.size:
-            raise InputError(f"contact point ({where}) is {distance[row]:.3g} m away from boundary group '{name}': "
+            raise InputError(f"contact point {at(x)} is {distance[row]:.3g} m away from boundary group '{name}': "
                              "give a point on it")
         if distance[row] > 1e-6 * space.size and space.comm.rank == 0:
-            log.warning("contact point (%s) stands for the nearest node, %.3g m away", where, distance[row])
+            log.warning("contact point %s stands for the nearest node, %.3g m away", at(x), distance[row])
         if nodes.held[row].all():
-            raise InputError(f"contact point ({where}) is also clamped: leave it out, or clamp less")
+            raise InputError(f"contact point {at(x)} is also clamped: leave it out, or clamp less")
         if row in rows:
             raise InputError(
-                f"contact point ({where}) is listed twice (nearest node {nodes.numbers[row]}): list each once"
+                f"contact point {at(x)} is listed twice (nearest node {nodes.numbers[row]}): list each once"
             )
         rows.append(row)
     if not rows:

@@ -15,7 +15,7 @@ import scipy.sparse as sp
 import ufl
 
 from ...core.algebra import Array, Mask
-from ...core.checks import array, instance
+from ...core.checks import array, instance, optional
 from ...core.errors import InputError
 from ...core.problem import ContactProblem
 from ...core.step import Report, State
@@ -33,8 +33,7 @@ def check_actions(owner: str, loads: Any, gravity: Any) -> None:
     """Raise InputError unless these are loads, as for ``fem.assemble``, and an acceleration."""
     for load in as_tuple(loads):
         instance(owner, "loads", load, (Traction, BodyForce), "give the loads of fem.assemble")
-    if gravity is not None:
-        array(owner, "gravity", gravity, (None,), unit="m/s²")
+    optional(array, owner, "gravity", gravity, (None,), unit="m/s²")
 
 
 class NodalWork:
