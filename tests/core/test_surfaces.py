@@ -8,7 +8,7 @@ from chain import chain_surface
 
 from vi_contact.core.algebra import SerialComm
 from vi_contact.core.errors import InputError
-from vi_contact.core.obstacles import AnalyticGap, HalfSpace, Touching, admissible_gap
+from vi_contact.core.obstacles import AnalyticGap, HalfSpace, Touching, admissible_gap, facing
 from vi_contact.core.surfaces import empty_surface, nodal_frames
 
 pytestmark = pytest.mark.serial
@@ -33,7 +33,7 @@ def test_half_space_oblique():
 
 def test_half_space_takes_sides_at_right_angles_but_for_rounding():
     side = np.tile([1.0, 1e-16], (3, 1))
-    assert HalfSpace((0.0, 0.0), (0.0, 1.0)).gap(POINTS, side).shape == (3,)
+    assert facing(HalfSpace((0.0, 0.0), (0.0, 1.0)), POINTS, side)[1].shape == (3,)
 
 
 @pytest.mark.parametrize(
@@ -42,9 +42,9 @@ def test_half_space_takes_sides_at_right_angles_but_for_rounding():
         (lambda: HalfSpace((0.0, 0.0), (0.0, 0.0)), "nonzero normal"),
         (lambda: HalfSpace((0.0, 0.0), (0.0, np.nan)), "give finite numbers"),
         (lambda: HalfSpace((0.0, 0.0, 0.0), (0.0, 1.0)), "same number"),
-        (lambda: HalfSpace((0.0, 0.0), (0.0, -1.0)).gap(POINTS, DOWN), "turn its sign"),
-        (lambda: HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)).directions(POINTS, DOWN), "one per dimension"),
-        (lambda: AnalyticGap(lambda x: 0.5).gap(POINTS, DOWN), "one gap per point"),
+        (lambda: facing(HalfSpace((0.0, 0.0), (0.0, -1.0)), POINTS, DOWN), "turn its sign"),
+        (lambda: facing(HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)), POINTS, DOWN), "numbers of shape"),
+        (lambda: facing(AnalyticGap(lambda x: 0.5), POINTS, DOWN), "one real gap per point"),
     ],
 )
 def test_wrong_obstacles_are_refused(obstacle, word):

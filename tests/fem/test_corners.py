@@ -383,7 +383,7 @@ def test_one_direction_is_one_condition():
     leaning_sides, names = body("trapezoid")  # seen from the corner, its side looks away from the ground
     below = fem.contact_surface(leaning_sides, group(names, "left", "bottom"), obstacle=ground, points=[(0.0, 0.0)])
     assert seen(below).count == 1 and seen(below).normals[0] == pytest.approx([0.0, -1.0])
-    with pytest.raises(InputError, match="points away from the body"):
+    with pytest.raises(InputError, match="points into the body"):
         fem.contact_surface(leaning_sides, group(names, "left", "bottom"), obstacle=ground)
 
 

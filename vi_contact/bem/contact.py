@@ -19,10 +19,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core.algebra import Array, EffectiveMatrix, Indices, Mask, SerialAlgebra, SerialComm, SerialMatrix
-from ..core.checks import array, flag, function, instance, integers, provides
+from ..core.checks import array, at, flag, function, instance, integers, optional, provides
 from ..core.corners import FEATURE_ANGLE
 from ..core.errors import InputError
-from ..core.obstacles import Obstacle, Touching, admissible_gap
+from ..core.obstacles import Obstacle, Touching, admissible_gap, facing
 from ..core.protocols import FrictionLaw, Frictionless
 from ..core.step import StepProblem
 from ..core.surfaces import ContactSurface, nodal_frames
@@ -104,8 +104,7 @@ class BoundaryContact:
         provides(owner, "obstacle", self.obstacle, ("gap", "directions"), "give an obstacle, for example Touching()")
         provides(owner, "friction", self.friction, ("limit", "slope"), "give a friction law, for example Coulomb(mu)")
         for name in ("towards", "along"):
-            if getattr(self, name) is not None:
-                function(owner, name, getattr(self, name), "give a function of the time, or None")
+            optional(function, owner, name, getattr(self, name), "give a function of the time, or None")
         flag(owner, "bilateral", self.bilateral)
         if self.conditions is not None:
             instance(owner, "conditions", self.conditions, Conditions, "give those of conditions_on(...), or None")
@@ -122,10 +121,9 @@ class BoundaryContact:
         corner, normals = int(np.argmax(turns)), self.compliance.normals
         directions = np.asarray(self.obstacle.directions(points, normals))
         if np.max(np.abs(directions - normals)) <= 1e-9:  # the obstacle follows the boundary; a plane has one direction
-            where = ", ".join(f"{x:g}" for x in points[corner])
             raise InputError(f"BoundaryContact: the contact boundary turns by {np.degrees(turns[corner]):.3g} degrees "
-                             f"at ({where}): give conditions=conditions_on(mesh, compliance, one side, other side), a "
-                             "condition on each")
+                             f"at {at(points[corner])}: give conditions=conditions_on(mesh, compliance, one side, "
+                             "other side), a condition on each")
 
     @property
     def count(self) -> int:
@@ -144,9 +142,10 @@ class BoundaryContact:
         return Conditions(np.arange(self.count), self.compliance.normals, self.compliance.lengths)
 
     @cached_property
-    def _directions(self) -> Array:
+    def _facing(self) -> tuple[Array, Array]:
+        """Return contact directions (c, 2) and gaps (c,)."""
         rows = self._rows
-        return self.obstacle.directions(self.compliance.points[rows.nodes], rows.normals)
+        return facing(self.obstacle, self.compliance.points[rows.nodes], rows.normals)
 
     @cached_property
     def _second(self) -> Mask:
@@ -158,10 +157,10 @@ class BoundaryContact:
     @cached_property
     def frames(self) -> Array:
         """Return N (2m, 2m): v = N u, first the contact directions of all nodes, then tangents or second directions."""
-        m, rows, second = self.count, self._rows, self._second
+        m, rows, second, directions = self.count, self._rows, self._second, self._facing[0]
         frames = np.tile(np.eye(2), (m, 1, 1))
-        frames[rows.nodes[~second]] = nodal_frames(self._directions[~second]).swapaxes(1, 2)
-        frames[rows.nodes[second], 1] = self._directions[second]
+        frames[rows.nodes[~second]] = nodal_frames(directions[~second]).swapaxes(1, 2)
+        frames[rows.nodes[second], 1] = directions[second]
         N = np.zeros((2, m, 2, m))
         N[:, np.arange(m), :, np.arange(m)] = frames
         return N.reshape(2 * m, 2 * m)
@@ -194,10 +193,9 @@ class BoundaryContact:
                              "out of the contact boundary, or free that direction")
         tangents = np.where(np.isin(rows.nodes, rows.nodes[second]), -1, number[rows.nodes + self.count])
         size = float(np.ptp(points, axis=0).max())
-        gap = self.obstacle.gap(points[rows.nodes], rows.normals)
-        count = len(rows.nodes)
+        (directions, gap), count = self._facing, len(rows.nodes)
         surface = ContactSurface(
-            SerialComm(), points[rows.nodes], self._directions, rows.lengths,
+            SerialComm(), points[rows.nodes], directions, rows.lengths,
             admissible_gap(gap, points[rows.nodes], size), np.full(count, self.bilateral), np.zeros(count),
             owned, np.arange(count), tangents[:, None],
         )

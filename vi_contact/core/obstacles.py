@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from .algebra import Array, Indices
-from .checks import array, function
+from .checks import array, at, function
 from .errors import InputError
 
 
@@ -63,21 +63,10 @@ class HalfSpace:
         normal = np.asarray(self.normal, dtype=float)
         return np.asarray(normal / np.linalg.norm(normal))
 
-    def _check(self, points: Array, normals: Array) -> None:
-        if points.shape[1] != len(self.normal):
-            raise InputError(f"HalfSpace has {len(self.normal)} components but the body has {points.shape[1]}: give "
-                             "one per dimension")
-        away = normals @ self.unit_normal > 1e-9  # a side at right angles may touch with its edge
-        if np.any(away) and np.any(away & ~np.isin(alike(points), alike(points)[~away])):  # a corner has several
-            raise InputError(f"HalfSpace normal {self.normal} points away from the body: turn its sign, it must point "
-                             "out of the obstacle towards the contact boundary")
-
     def directions(self, points: Array, normals: Array) -> Array:
-        self._check(points, normals)
         return np.tile(-self.unit_normal, (len(points), 1))
 
     def gap(self, points: Array, normals: Array) -> Array:
-        self._check(points, normals)
         return np.asarray((points - np.asarray(self.point, dtype=float)) @ self.unit_normal)
 
 
@@ -95,11 +84,7 @@ class AnalyticGap:
         return normals
 
     def gap(self, points: Array, normals: Array) -> Array:
-        gap = np.asarray(self.function(points))
-        if gap.shape != (len(points),) or gap.dtype.kind not in "iuf":
-            raise InputError(f"AnalyticGap returned shape {gap.shape} of {gap.dtype} for {len(points)} points: return "
-                             "one gap per point, a real number")
-        return gap.astype(float)
+        return self.function(points)
 
 
 def alike(points: Array) -> Indices:
@@ -119,9 +104,9 @@ def facing(obstacle: Obstacle, points: Array, normals: Array) -> tuple[Array, Ar
     towards, places = np.sum(directions * normals, axis=1) >= -1e-9 * length, alike(points)
     wrong = np.flatnonzero(~np.isin(places, places[towards]) | (length == 0.0))
     if len(wrong):
-        where = ", ".join(f"{x:g}" for x in points[wrong[0]])
-        raise InputError(f"{owner}: the contact direction at ({where}) points into the body or has no length; give "
-                         "unit vectors from the body to the obstacle")
+        raise InputError(f"{owner}: the contact direction at {at(points[wrong[0]])} points into the body or has no "
+                         "length; give unit vectors from the body to the obstacle (the normal of a HalfSpace points "
+                         "towards the body: turn its sign)")
     gap = np.asarray(obstacle.gap(points, normals))
     if gap.shape != (m,) or gap.dtype.kind not in "iuf":
         raise InputError(f"{owner}: gap returned {gap.dtype} of shape {gap.shape} for {m} points; return one real gap "
@@ -135,7 +120,6 @@ def admissible_gap(gap: Array, points: Array, size: float) -> Array:
         raise InputError("the initial gap contains NaN or infinite values: check the obstacle's gap function")
     if len(gap) and gap.min() < -1e-12 * size:
         worst = int(np.argmin(gap))
-        where = ", ".join(f"{x:g}" for x in points[worst])
-        raise InputError(f"the body penetrates its obstacle by {-gap[worst]:.3g} m at ({where}) before the first step: "
-                         "move the obstacle or the mesh so that every initial gap is >= 0")
+        raise InputError(f"the body penetrates its obstacle by {-gap[worst]:.3g} m at {at(points[worst])} before the "
+                         "first step: move the obstacle or the mesh so that every initial gap is >= 0")
     return np.maximum(gap, 0.0)
