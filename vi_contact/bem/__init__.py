@@ -7,27 +7,24 @@ In this order: a ``BoundaryMesh``, ``energetic_blocks``, ``PoincareSteklov``, ``
 3.137
 """
 
-from .boundary_mesh import BoundaryMesh, circle, from_segments, polygon
-from .boundary_operators import Galerkin, OperatorMatrices
-from .contact import BoundaryContact, Conditions, conditions_on
-from .contact_run import ContactLedger, ContactRun, ledger, march_contact
-from .convolution_operator import ConvolutionOperator, convolution_operator
-from .convolution_quadrature import Frequencies
-from .energetic import EnergeticBlocks, energetic_blocks
-from .fundamental_solution import LaplaceKernels, TimeKernels
-from .interior import interior_displacement
-from .loads import traction_forces
-from .poincare_steklov import BoundaryMotion, BoundaryProblem, CondensedCompliance, PoincareSteklov
-from .quadrature import Orders
-from .radial_table import RadialTable
-from .storage import stored_blocks
-from .two_bodies import TwoBodies
-from .uzawa_space_time import SpaceTimeUzawa
+from ..core.lazy import lazy
 
-__all__ = [
-    "BoundaryContact", "BoundaryMesh", "BoundaryMotion", "BoundaryProblem", "CondensedCompliance", "Conditions",
-    "ContactLedger", "ContactRun", "ConvolutionOperator", "EnergeticBlocks", "Frequencies", "Galerkin",
-    "LaplaceKernels", "OperatorMatrices", "Orders", "PoincareSteklov", "RadialTable", "SpaceTimeUzawa", "TimeKernels",
-    "TwoBodies", "circle", "conditions_on", "convolution_operator", "energetic_blocks", "from_segments",
-    "interior_displacement", "ledger", "march_contact", "polygon", "stored_blocks", "traction_forces",
-]
+_CONTENTS = {
+    "boundary_mesh": ("BoundaryMesh", "circle", "from_segments", "polygon"),
+    "boundary_operators": ("Galerkin", "OperatorMatrices"),
+    "contact": ("BoundaryContact", "Conditions", "conditions_on"),
+    "contact_run": ("ContactLedger", "ContactRun", "ledger", "march_contact"),
+    "convolution_operator": ("ConvolutionOperator", "convolution_operator"),
+    "convolution_quadrature": ("Frequencies",),
+    "energetic": ("EnergeticBlocks", "energetic_blocks"),
+    "fundamental_solution": ("LaplaceKernels", "TimeKernels"),
+    "interior": ("interior_displacement",),
+    "loads": ("traction_forces",),
+    "poincare_steklov": ("BoundaryMotion", "BoundaryProblem", "CondensedCompliance", "PoincareSteklov"),
+    "quadrature": ("Orders",),
+    "radial_table": ("RadialTable",),
+    "storage": ("stored_blocks",),
+    "two_bodies": ("TwoBodies",),
+    "uzawa_space_time": ("SpaceTimeUzawa",),
+}
+__all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)

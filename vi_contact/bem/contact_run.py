@@ -7,7 +7,7 @@ import numpy as np
 
 from ..core.algebra import Array, Mask
 from ..core.certificate import Certificate
-from ..core.checks import array, instance, mask, number
+from ..core.checks import array, instance, mask, number, optional
 from ..core.errors import InputError, StepFailure
 from ..core.step import StepProblem, StepResult
 from ..core.verify import kkt_residual
@@ -146,8 +146,7 @@ def ledger(run: ContactRun, motion: BoundaryMotion, loads: Array, *, supported: 
     if len(run.times) != len(motion.times):
         raise InputError(f"ledger: the run has {len(run.times)} steps and the motion {len(motion.times)}; give the "
                          "motion of this run, BoundaryProblem.solve(run.forces)")
-    if supported is not None:
-        mask("ledger", "supported", supported, motion.displacement.shape[1:])
+    optional(mask, "ledger", "supported", supported, motion.displacement.shape[1:])
     held = np.zeros(loads.shape[1:], bool) if supported is None else supported
     support = work(np.where(held, motion.forces, 0.0), motion.displacement)
     load = work(np.where(held, 0.0, loads), motion.displacement)

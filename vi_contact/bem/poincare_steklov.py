@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core.algebra import Array, Indices, Mask
-from ..core.checks import array, flag, instance, integers, mask, number, provides, shape_of
+from ..core.checks import array, flag, instance, integers, mask, number, optional, provides, shape_of
 from ..core.errors import InputError
 from .boundary_mesh import BoundaryMesh
 from .energetic import EnergeticBlocks, marched, summed
@@ -170,10 +170,8 @@ class BoundaryProblem:
         n, wanted = len(self.operator.mesh), self.operator.load_shape(len(shape_of(self.forces)))
         object.__setattr__(self, "forces", array(owner, "forces", self.forces, wanted, unit="N/m"))
         for name, shape in (("fixed", (2, n)), ("contact", (n,))):
-            if getattr(self, name) is not None:
-                mask(owner, name, getattr(self, name), shape)
-        if self.prescribed is not None:
-            array(owner, "prescribed", self.prescribed, (len(self.forces), 2, n), unit="m")
+            optional(mask, owner, name, getattr(self, name), shape)
+        optional(array, owner, "prescribed", self.prescribed, (len(self.forces), 2, n), unit="m")
 
     @property
     def times(self) -> Array:

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from ..core.algebra import Array, Indices, Mask
-from ..core.checks import array, mask, provides
+from ..core.checks import array, mask, optional, provides
 from ..core.errors import InputError
 from .contact import SUPPORTED
 from .energetic import summed
@@ -41,8 +41,7 @@ class TwoBodies:
         for name in ("one", "two"):
             provides("TwoBodies", name, getattr(self, name), ("operator", "contact", "condensed", "solve"),
                      "give a BoundaryProblem")
-        if self.welded is not None:
-            mask("TwoBodies", "welded", self.welded, (len(self.one.operator.mesh),))
+        optional(mask, "TwoBodies", "welded", self.welded, (len(self.one.operator.mesh),))
 
     @cached_property
     def relative(self) -> CondensedCompliance:

@@ -110,7 +110,7 @@ class Volume:
 
 
 class PreparedVolume:
-    """Run a PETSc solver bound to A; ``snes`` or ``tao`` is the PETSc object. ``close`` frees it.
+    """Run a PETSc solver bound to A. ``close`` frees it.
 
     Without ``close`` it is freed at the first ``prepare`` after its last reference: destruction is collective, and
     Python's is not, so petsc4py only puts it aside.
@@ -139,19 +139,10 @@ class PreparedVolume:
         return self._friction
 
     @property
-    def snes(self) -> Any:
-        """Return the SNES object; None when the method is TAO's or the solver is closed."""
-        return self._petsc("SNES")
-
-    @property
-    def tao(self) -> Any:
-        """Return the TAO object; None when the method is SNES's or the solver is closed."""
-        return self._petsc("TAO")
-
-    def _petsc(self, kind: str) -> Any:
+    def petsc(self) -> Any:
+        """Return PETSc's object, SNES or TAO; None when the solver is closed."""
         driver = self._driver if self._friction is None else self._friction.driver
-        solver = None if driver is None else driver.solver
-        return solver if isinstance(solver, getattr(PETSc, kind)) else None
+        return driver and driver.solver
 
     def close(self) -> None:
         """Free the PETSc objects; collective."""
