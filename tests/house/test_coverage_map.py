@@ -74,7 +74,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "run/test_folder.py": "core.files run.files.history run.files.stored_rows run.files.table",
     "run/test_fuzz_folders.py": "run.files.writer run.session run.solution",
     "run/test_march.py": "core.state_checks",
-    "run/test_march_many.py": "run.together",
+    "run/test_march_many.py": "run.rows run.together",
     "run/test_proximal.py": "run.rigid_bodies",
     "run/test_restart_refused.py": "run.files.identity",
     "run/test_simulate.py": "core.version run.files.log",

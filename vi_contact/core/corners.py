@@ -48,6 +48,8 @@ def with_open_faces(surface: ContactSurface, v: Array, target: Array) -> Array:
     corners = oblique_corners(surface)
     if not corners:
         return target
+    if v.ndim == 2:
+        return np.stack([with_open_faces(surface, *each) for each in zip(v, target, strict=True)])
     v_n, target = surface.normal_values(v), target.copy()
     for corner in corners:
         closed = ~np.isnan(target[corner])

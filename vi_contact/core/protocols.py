@@ -98,7 +98,8 @@ class Impact:
 
 
 class ImpactLaw(Protocol):
-    """Change velocities after a step in which conditions are closed: a law of ``laws.impact``, or your own."""
+    """Change velocities after a step in which conditions are closed: a law of ``laws.impact``, or your own. One that
+    says ``by_rows = True`` also gets those of several runs, (k, m) and (k, n), and returns them."""
 
     def target(self, impact: Impact) -> Array:
         """Return the normal velocities (m,) [m/s] after ``impact``; NaN where the law leaves the velocity alone.

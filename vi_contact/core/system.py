@@ -78,7 +78,7 @@ class Load:
         """Return the load of a static stage at time t: what moves in a given way stands still where it then is."""
         total = self.constant.copy()
         for vector, history in self.separable:
-            total += _factor(history, t) * vector
+            total += history_value(history, t) * vector
         for part in self.general:
             total += part(t)
         return total
@@ -94,8 +94,8 @@ class Load:
         return replace(self, viscous=_turned(P, self.viscous))
 
 
-def _factor(history: Callable[[float], float], t: float) -> float:
-    """The value of a history; NaN and infinity are told of the load as a whole."""
+def history_value(history: Callable[[float], float], t: float) -> float:
+    """Return the value of a history; NaN and infinity are told of the load as a whole."""
     value = history(t)
     if isinstance(value, float):
         return value

@@ -16,7 +16,7 @@ here is a nodal law; on a fine mesh it has no macroscopic effect.
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -53,11 +53,11 @@ class ComponentReset:
     these, and with it the normal components on its other faces, as at any other node.
     """
 
+    by_rows: ClassVar[bool] = True
+
     def __call__(self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array) -> Array:
-        target = with_open_faces(surface, v, target)
-        chosen = ~np.isnan(target)
-        after = v.copy()
-        after[surface.owned[chosen]] = target[chosen]
+        target, after = with_open_faces(surface, v, target), v.copy()
+        after.T[surface.owned] = np.where(np.isnan(target), surface.normal_values(v), target).T
         return after
 
 
@@ -109,8 +109,22 @@ def _prepared(system: SemiDiscreteSystem, surface: ContactSurface) -> tuple[Arra
     return condensed.flexibility, lambda impulse: np.asarray(stored @ impulse)
 
 
+class ByUpdate:
+    """Share what laws have in common that leave it to an update to change velocities."""
+
+    update: VelocityUpdate
+
+    @property
+    def by_rows(self) -> bool:
+        """Say whether velocities and impacts may be rows, those of several runs."""
+        return getattr(self.update, "by_rows", False)
+
+    def apply(self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array) -> Array:
+        return self.update(system, surface, v, target)
+
+
 @dataclass(frozen=True)
-class Inelastic:
+class Inelastic(ByUpdate):
     """Stop every closed point, v_n⁺ = 0: the perfectly plastic collision of the boundary method."""
 
     update: VelocityUpdate = field(default_factory=ComponentReset)
@@ -121,12 +135,9 @@ class Inelastic:
     def target(self, impact: Impact) -> Array:
         return np.where(impact.active, 0.0, np.nan)
 
-    def apply(self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array) -> Array:
-        return self.update(system, surface, v, target)
-
 
 @dataclass(frozen=True)
-class Newton:
+class Newton(ByUpdate):
     """Apply Newton's law v_n⁺ = -e v_n⁻ on points that have just closed; points that stay closed are left to the step.
 
     v_n⁻ is the velocity of approach before the step: a single mass rebounds with e times its speed at every dt.
@@ -141,9 +152,6 @@ class Newton:
 
     def target(self, impact: Impact) -> Array:
         return np.where(impact.closing, -self.e * np.maximum(impact.before, 0.0), np.nan)
-
-    def apply(self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array) -> Array:
-        return self.update(system, surface, v, target)
 
 
 def Elastic(update: VelocityUpdate | None = None) -> Newton:

@@ -57,11 +57,11 @@ def _each(name: str, value: Any, count: int) -> Sequence[Any]:
 
 def _in_turn(runs: Sequence[Together]) -> Iterator[tuple[int, Report | ViContactError]]:
     """A step of every run in turn, until all have ended."""
-    going = {number: iter(run) for number, run in enumerate(runs)}
+    going = {number: run.reports() for number, run in enumerate(runs)}
     while going:
         for number, loop in list(going.items()):
             try:
-                _, report = next(loop)
+                report = next(loop)
             except StopIteration:
                 del going[number]
                 continue

@@ -1,30 +1,28 @@
 """Step several runs with one effective matrix together: vectors are rows (k, n), and matrices are read once for all.
 
-The scheme steps the rows as it steps one state, and the solver answers them together (``solve_many``); what differs
-from run to run, small problems, judgement, impacts and reports, stays a run's own. A step that is not answered at once
-with a certificate far below the tolerance is solved alone; who then has to escalate, or fails, goes on alone.
+The scheme steps the rows as it steps one state, and the solver answers them together (``solve_many``); certificates,
+impacts and reports are a run's own. A step that is not answered at once with a certificate far below the tolerance is
+solved alone; who then has to escalate, or fails, goes on alone.
 """
 
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from ..core.algebra import Array, EffectiveMatrix
-from ..core.certificate import Certificate
+from ..core.algebra import EffectiveMatrix
 from ..core.errors import ViContactError
-from ..core.problem import ContactProblem
 from ..core.products import frozen
 from ..core.step import Answers, Report, State, StepProblem, StepResult
-from ..core.system import Load, SemiDiscreteSystem
 from ..core.verify import kkt_residuals
 from ..solvers.certified import NEAR, CertifiedSolver
 from .march import March, after_impact
 from .method import Method
+from .rows import Each, RowReport, joined, loads_of, own_state, own_step
 from .time_steps import StepPlan
 
 
@@ -42,6 +40,11 @@ class Together:
         self.waiting: deque[tuple[float, Report]] = deque()  # made, and not handed out yet
 
     def __iter__(self) -> Iterator[tuple[State, Report]]:
+        for report in self.reports():
+            yield report.new, report
+
+    def reports(self) -> Iterator[Report]:
+        """Yield the report of every step: what nobody reads in it is not made."""
         steps = self.step_plan.steps
         while self.base < steps:
             if not self.waiting and self.group is not None:
@@ -50,12 +53,12 @@ class Together:
                 break
             self.dt, report = self.waiting.popleft()
             self.base += 1
-            yield report.new, report
+            yield report
         if self.base < steps:
             loop = March(self.method, self.step_plan, self.state, self.base, self.halved, self.prepared)
-            for state, report in loop:
+            for _, report in loop:
                 self.base, self.halved, self.ended, self.dt = loop.base, loop.halved, loop.ended, loop.dt
-                yield state, report
+                yield report
 
     def leave(self) -> None:
         """Let the others go on without it."""
@@ -92,16 +95,6 @@ def _way(method: Method) -> tuple[Any, ...]:
     return method.scheme, *method.solvers, method.tolerance
 
 
-@dataclass(frozen=True)
-class _Loads(Load):
-    """The loads of several runs, a row for each."""
-
-    runs: tuple[SemiDiscreteSystem, ...] = ()
-
-    def __call__(self, t: float) -> Array:
-        return np.stack([one.load_at(t) for one in self.runs])
-
-
 class Group:
     """Hold runs of one system, surface, scheme and tolerance that are at the same step."""
 
@@ -115,22 +108,24 @@ class Group:
 
     def _chosen(self, runs: list[Together], states: list[State]) -> None:
         """Go on with these runs, one alone not together."""
-        self._runs, self._states = runs, states
+        self._runs = runs if len(runs) > 1 else []
         for run, state in zip(runs, states, strict=True):
-            run.group, run.state = (self if len(runs) > 1 else None), state
-        if len(runs) < 2:
-            self._runs = []
-            return
-        first, systems = runs[0].method.problem, tuple(run.method.problem.equations for run in runs)
-        self._problem = replace(first)
-        self._problem.__dict__["equations"] = first.unshaken.loaded(_Loads(systems[0].load.constant, runs=systems))
-        self._many = _rows(states)
+            run.group, run.state = (self if self._runs else None), state
+        if self._runs:
+            self._problems = [run.method.problem for run in runs]
+            self._problem = replace(first := self._problems[0])
+            self._problem.__dict__["equations"] = first.unshaken.loaded(loads_of(self._problems))
+            self._at(joined(states), states)
+
+    def _at(self, many: State, states: Iterable[State] = ()) -> None:
+        """Hold these states as rows, and one by one."""
+        self._many, self._states = many, Each(partial(own_state, many), states)
 
     def without(self, leaving: Sequence[Together]) -> None:
         """Let these runs go on alone from where they are."""
-        for run, state in zip(self._runs, self._states, strict=True):
+        for row, run in enumerate(self._runs):
             if run in leaving:
-                run.group, run.state = None, state
+                run.group, run.state = None, self._states[row]
         left = [row for row, run in enumerate(self._runs) if run not in leaving]
         self._chosen([self._runs[row] for row in left], [self._states[row] for row in left])
         if self._runs and self._dt == self._dt:
@@ -153,37 +148,35 @@ class Group:
         """Make a step and hand out its reports; the runs that cannot make it, and then none is made."""
         runs, scheme, problem = self._runs, self._scheme, self._problem
         if dt != self._dt:
-            self._states = [scheme.start(run.method.problem, state, dt)
-                            for run, state in zip(runs, self._states, strict=True)]
-            self._many, self._dt = _rows(self._states), dt
-            self._A, self._solver = scheme.effective_matrix(problem, dt), None
+            states = [scheme.start(one, self._states[row], dt) for row, one in enumerate(self._problems)]
+            self._at(joined(states), states)
+            self._dt, self._A, self._solver = dt, scheme.effective_matrix(problem, dt), None
         many = scheme.step(problem, self._many, self._A, dt)
-        wrong = np.flatnonzero(~np.isfinite(many.b.sum(axis=-1)))
-        if len(wrong):
+        if not np.isfinite(many.b.sum()) and len(wrong := np.flatnonzero(~np.isfinite(many.b).all(axis=-1))):
             return [runs[row] for row in wrong]
-        steps = [_own(run.method.problem, many, row) for row, run in enumerate(runs)]
         if self._solver is None:
             method = runs[0].method
             self._solver = CertifiedSolver(problem, self._A, many.scale, method.solvers, self._tolerance)
-        together = getattr(self._solver.first, "solve_many", None)
-        answers = None if together is None else together(many, steps.__getitem__)
+        problems = self._problems
+        steps, together = Each(lambda row: own_step(problems[row], many, row)), self._solver.first
+        answers = together.solve_many(many, steps.__getitem__) if hasattr(together, "solve_many") else None
         if answers is None:
             return list(runs)
-        for run in runs:
+        for run in () if dt in runs[0].prepared else runs:
             run.prepared = {dt: (self._A, self._solver)}
-        result, found, leaving = self._judged(many, steps, answers)
+        leaving = list(answers.failed)
         if not leaving:
-            self._finish(many, steps, result, found, dt)
+            parts = {"step": steps, "result": Each(answers.own)}
+            result, leaving = self._judged(many, answers, parts)
+        if not leaving:
+            self._finish(many, result, parts)
         return [runs[row] for row in leaving]
 
-    def _judged(
-        self, many: StepProblem, steps: Sequence[StepProblem], answers: Answers
-    ) -> tuple[StepResult, list[tuple[StepResult, Certificate]], list[int]]:
-        """The answers with their certificates; those that are not good at once are found alone. The rows of runs that
-        have to escalate, or fail, last."""
-        result, leaving = answers.rows, list(answers.failed)
-        results = [answers.own(row) for row in range(len(steps))]
-        certificates = [] if leaving else kkt_residuals(many, result, lambda row: (steps[row], results[row]))
+    def _judged(self, many: StepProblem, answers: Answers, parts: dict[str, Any]) -> tuple[StepResult, list[int]]:
+        """The answers as rows, those that are not good at once found alone; the rows of runs that have to escalate, or
+        fail."""
+        steps, results, rows, leaving = parts["step"], parts["result"], answers.rows, []
+        certificates = kkt_residuals(many, rows, lambda row: (steps[row], results[row]))
         doubtful = [row for row, one in enumerate(certificates) if not one.worst <= NEAR * self._tolerance]
         for row in doubtful:
             escalated = True
@@ -191,54 +184,36 @@ class Group:
                 results[row], certificates[row], escalated = self._solver.solve(steps[row])
             leaving += [row] if escalated else []
         if doubtful and not leaving:
-            names = ("x", "r_n", "active") if result.r_t is None else ("x", "r_n", "active", "r_t")
-            result = replace(result, **{name: np.stack([getattr(one, name) for one in results]) for name in names})
-        return result, list(zip(results, certificates, strict=bool(certificates))), leaving
+            names = ("x", "r_n", "active") if rows.r_t is None else ("x", "r_n", "active", "r_t")
+            each = [results[row] for row in range(len(certificates))]
+            rows = replace(rows, **{name: np.stack([getattr(one, name) for one in each]) for name in names})
+        parts["certificate"] = certificates
+        return rows, leaving
 
-    def _finish(
-        self, many: StepProblem, steps: Sequence[StepProblem], result: StepResult,
-        found: Sequence[tuple[StepResult, Certificate]], dt: float,
-    ) -> None:
+    def _finish(self, many: StepProblem, result: StepResult, parts: dict[str, Any]) -> None:
         """States, impacts and reports at the end of a step."""
-        runs, scheme, problem, old = self._runs, self._scheme, self._problem, self._states
-        free = scheme.finish(problem, self._many, many, result, dt)
-        for vector in (free.u, free.v, *free.memory.values()):
+        problems, scheme, dt, old = self._problems, self._scheme, self._dt, self._states
+        rows = scheme.finish(self._problem, self._many, many, result, dt)
+        for vector in (rows.u, rows.v, *rows.memory.values()):
             frozen(vector)  # what is known of them stays true
-        before = list(_split(free))
-        after = list(before)
-        closed = free.active & problem.surface.rigid if problem.impact is not None else free.active[:, :0]
-        for row in np.flatnonzero(closed.any(axis=1)):
-            after[row] = after_impact(runs[row].method.problem, scheme, old[row], before[row], dt)
-        if any(one is not other for one, other in zip(before, after, strict=True)):
-            free = replace(_rows(after), u=free.u)
-        for row, run in enumerate(runs):
-            own = run.method.problem
-            averages = partial(scheme.balance, own, old[row], before[row], dt)
-            report = Report(own, old[row], after[row], before[row].v, steps[row], *found[row], averages, False)
-            run.waiting.append((dt, report))
-        self._many, self._states = free, after
+        free = Each(partial(own_state, rows))
+        self._many, self._states = self._struck(rows, free)
+        averages = Each(lambda row: partial(scheme.balance, problems[row], old[row], free[row], dt))
+        parts |= {"problem": problems, "old": old, "new": self._states, "v_minus": Each(lambda row: free[row].v),
+                  "averages": averages, "escalated": Each(lambda row: False)}
+        for row, run in enumerate(self._runs):
+            run.waiting.append((dt, RowReport(parts=parts, row=row)))
 
-
-def _own(problem: ContactProblem, many: StepProblem, row: int) -> StepProblem:
-    """The step of one run."""
-    slip0 = None if many.slip0 is None else many.slip0[row]
-    return StepProblem(many.A, many.b[row], many.bound, many.surface, many.scale, many.guess[row], many.active[row],
-                       many.t, many.k, problem.friction, slip0, many.rate_factor)
-
-
-def _rows(states: Sequence[State]) -> State:
-    """The state of all runs, read-only; of a memory's arrays the vectors differ from run to run, the others do not."""
-    first, rubs = states[0], next((0.0 * one.r_t for one in states if one.r_t is not None), None)
-    u, v, r_n, active = (np.stack([getattr(one, name) for one in states]) for name in ("u", "v", "r_n", "active"))
-    memory = {name: frozen(np.stack([one.memory[name] for one in states])) if value.shape == first.u.shape else value
-              for name, value in first.memory.items()}
-    r_t = None if rubs is None else np.stack([rubs if one.r_t is None else one.r_t for one in states])
-    return State(first.t, first.k, frozen(u), frozen(v), r_n, active, memory, r_t)
-
-
-def _split(many: State) -> Iterator[State]:
-    """The states of the runs."""
-    memory, r_t = many.memory, [None] * len(many.u) if many.r_t is None else many.r_t
-    for row, vectors in enumerate(zip(many.u, many.v, many.r_n, many.active, strict=True)):
-        own = {name: value[row] if value.ndim == 2 else value for name, value in memory.items()}
-        yield State(many.t, many.k, *vectors, own, r_t[row])
+    def _struck(self, rows: State, free: Each) -> tuple[State, Each]:
+        """The states after the impact law, as rows and one by one: as they are where nothing was struck."""
+        problem, scheme, old, dt = self._problem, self._scheme, self._states, self._dt
+        closed = rows.active & problem.surface.rigid
+        if problem.impact is None or not closed.any():
+            return rows, free
+        if getattr(problem.impact, "by_rows", False) and not rows.memory:
+            new = after_impact(problem, scheme, self._many, rows, dt)
+            struck = (frozen(new.v) != rows.v).any(axis=1)
+            return new, Each(lambda row: own_state(new, row) if struck[row] else free[row])
+        own = [after_impact(one, scheme, old[row], free[row], dt) if closed[row].any() else free[row]
+               for row, one in enumerate(self._problems)]
+        return replace(joined(own), u=rows.u), Each(own.__getitem__)
