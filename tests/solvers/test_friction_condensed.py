@@ -115,11 +115,11 @@ def test_no_coefficient_no_friction() -> None:
 
 
 def test_newton_that_wanders_is_led_back() -> None:
-    """Friction far beyond real values (mu = 3): Newton cycles in some problems, and ends well after sweeps."""
+    """Friction far beyond real values (mu = 3): two iterations do not solve some problems, sweeps and more do."""
     rescued = 0
     for seed in range(60):
         G, q, bilateral = small(seed, 10, 3)
-        result = FrictionNewton(max_iterations=6).prepare(G, bilateral).solve(q, np.zeros(10), np.full(10, 3.0))
+        result = FrictionNewton(max_iterations=2).prepare(G, bilateral).solve(q, np.zeros(10), np.full(10, 3.0))
         assert result.residual <= TOLERANCE
         rescued += result.iterations > len(result.history)
     assert rescued > 0

@@ -128,12 +128,12 @@ class Factored:
     """Hold (1) of one set of states, or (2) where that is smaller, with its factor. ``sound``: it is regular."""
 
     def __init__(self, reduced: Reduced, delassus: ScaledDelassus) -> None:
-        self.reduced, self._G, self._H = reduced, delassus.matrix, None
+        self.reduced, self._delassus, self._H = reduced, delassus, None
         self._lu: Any = None
         self.sound = True
-        if LARGE <= reduced.size == len(reduced.plain) and MOST * len(self._G) < reduced.size < INVERTED:
+        if LARGE <= reduced.size == len(reduced.plain) and MOST * len(delassus.matrix) < reduced.size < INVERTED:
             self._H = delassus.inverse
-        matrix = reduced.matrix(self._G) if self._H is None else self._rest(self._H)
+        matrix = reduced.matrix(delassus.matrix) if self._H is None else self._rest(self._H)
         if matrix.size:
             lu, pivots, info = lapack.dgetrf(matrix, overwrite_a=1)
             self._lu, self.sound = (lu, pivots), info == 0
@@ -152,7 +152,7 @@ class Factored:
         if self._H is None:
             return np.asarray(lapack.dgetrs(*self._lu, right)[0]) if self.reduced.size else right
         r = self._whole(self._H, right)
-        r += self._whole(self._H, right - (self._G @ r)[self.reduced.plain])  # H is less exact than factors
+        r += self._whole(self._H, right - self._delassus.product(r)[self.reduced.plain])  # H is less exact than factors
         return np.asarray(r[self.reduced.plain])
 
     def _whole(self, H: Array, v: Array) -> Array:

@@ -11,8 +11,9 @@ Wohlmuth, SIAM J. Sci. Comput. 30, 2008):
 eta is the turn of the slip direction, t perpendicular to n: in 2D there is none, the problem is piecewise linear, and
 the iterate of the right states is exact. friction_linear.py solves these problems.
 
-Compiled Gauss-Seidel sweeps go before, as many as help: of a tenth of the cost of one linear solve each, they find most
-states, and of well-conditioned problems, as those of bodies in space, the answer. Without a compiler Newton does all.
+Compiled Gauss-Seidel sweeps go before, in single precision. In 2D they alternate between G, whose sweeps damp the long
+waves of r, and its inverse H, whose sweeps damp the short ones: some fifteen find all states, up to one or two. In 3D
+those with G alone find the answer, w made anew in double precision between them. Without a compiler Newton does all.
 
 Slip that turned back within one iteration overshot: such a node sticks in the next, which ends the usual cycles of
 slip to and fro. Where Newton cycles all the same, Gauss-Seidel sweeps (nsgs.py) lead to a better start.
@@ -25,19 +26,18 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ...core.algebra import Array, Mask, SerialComm, max_abs
+from ...core.algebra import Array, Mask, SerialComm
 from ...core.checks import attributes
 from ...core.compiled import library
-from ..normal.lcp import EPS
 from .linear import Factored, LinearProblems, States
 from .nsgs import sweeper
 from .problem import Iterated, PreparedFriction, ScaledDelassus, ScaledProblem
 
 ATTEMPTS = 10  # of Newton, with twice the sweeps before each
 FIRST_SWEEPS = 2
-BLOCK = 8  # compiled sweeps in a row
-BLOCKS = {2: 2, 3: 16}  # by dimension: in 2D the first linear solve of the right states is exact
-FALL = 0.1  # of the change of r in a block in 3D: where it falls less Newton is faster
+SWEEPS = {2: 25, 3: 8}  # compiled sweeps in a row, by dimension: in 2D fewer when states settle
+STAGES = {2: 1, 3: 16}  # of sweeps, each with a new w
+FALL = 0.1  # of the residual in a stage: where it falls less Newton is faster
 Kept = dict[bytes, Factored]  # factors by the key of their states
 
 
@@ -65,9 +65,9 @@ class FrictionNewton:
         history: list[float] = []
         swept, w = 0, None
         if compiled and step.unit > 0.0:
-            r, w = relaxed(compiled, step, r)
-            history.append(step.residual(r, w) / step.unit)
-            if step.delassus.dimension > 2 and history[0] * step.unit <= step.rounding(r):
+            r, w, left = relaxed(compiled, step, r)
+            history.append(left / step.unit)
+            if step.delassus.dimension > 2 and left <= step.rounding(r):
                 return r, 1, history
         for attempt in range(ATTEMPTS if step.unit > 0.0 else 0):
             r, done = self._newton(kept, step, r - (step.w(r) if w is None else w), history)
@@ -99,15 +99,20 @@ class FrictionNewton:
         return best, smallest <= self.tolerance * step.unit
 
 
-def relaxed(compiled: Any, step: ScaledProblem, r: Array) -> tuple[Array, Array]:
-    """Return r and w = q + G r after compiled sweeps; in 2D, where both are a start only, w as the sweeps left it."""
-    r, w = np.array(r, order="C"), np.array(step.w(r), order="C")
-    of, arrays = step.delassus, (step.delassus.matrix, step.cohesion, step.slope, step.delassus.bilateral)
-    at = [ctypes.c_void_p(array.ctypes.data) for array in (*arrays, r, w)]
-    before = np.inf
-    for _ in range(BLOCKS[of.dimension]):
-        change = compiled.relax(of.count, of.dimension, *at[:4], BLOCK, *at[4:])
-        if of.dimension > 2 and not EPS * max_abs(r) < change <= FALL * before:
+def relaxed(compiled: Any, step: ScaledProblem, r: Array) -> tuple[Array, Array, float]:
+    """Return r, w = q + G r and the residual after compiled sweeps; in 2D, where they are a start only, w as the sweeps
+    left it."""
+    of, r, w = step.delassus, np.array(r, order="C"), np.array(step.w(r), order="C")
+    room = np.empty(r.size + len(r), dtype=np.float32)
+    given = (*of.short, step.cohesion, step.slope, of.bilateral, r, w, room)
+    at = [None if array is None else ctypes.c_void_p(array.ctypes.data) for array in given]
+    left, before = np.inf, np.inf
+    for _ in range(STAGES[of.dimension]):
+        least = 0.5 * step.rounding(r) if of.dimension > 2 else 0.0
+        compiled.relax(of.count, of.dimension, *at[:-3], SWEEPS[of.dimension], ctypes.c_double(least), *at[-3:])
+        if of.dimension > 2:
+            w[:] = step.w(r)
+        left, before = step.residual(r, w), left
+        if left <= step.rounding(r) or not left <= FALL * before:
             break
-        before = change
-    return r, w if of.dimension == 2 else step.w(r)
+    return r, w, left

@@ -18,12 +18,12 @@ the mean of G_tt to the same power: reactions and displacements are then both in
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
-from scipy.linalg import lapack
+from scipy.linalg import blas, lapack
 
 from ...core.algebra import Array, Mask, max_abs
 from ...core.checks import provides
@@ -80,6 +80,7 @@ class ScaledProblem:
     q: Array
     cohesion: Array
     slope: Array
+    _last: list[Array] = field(default_factory=list, init=False, repr=False)  # r and G r
 
     @property
     def count(self) -> int:
@@ -87,11 +88,10 @@ class ScaledProblem:
         return len(self.cohesion)
 
     def moved(self, r: Array) -> Array:
-        """Return G r (m, d), from the rows that carry something when they are few."""
-        carried = np.flatnonzero(r)
-        matrix = self.delassus.matrix
-        product = matrix @ r.ravel() if len(carried) > 0.25 * r.size else r.ravel()[carried] @ matrix[carried]
-        return np.asarray(product.reshape(r.shape))
+        """Return G r (m, d), from the rows that carry something when they are few; of the last r it is known."""
+        if not (self._last and np.array_equal(self._last[0], r)):
+            self._last[:] = r.copy(), self.delassus.product(r.ravel()).reshape(r.shape)
+        return self._last[1]
 
     def w(self, r: Array) -> Array:
         """Return q + G r (m, d)."""
@@ -133,7 +133,10 @@ class ScaledProblem:
         r = self.admissible(np.where(held[:, None], -self.q, 0.0))
         carried = r != 0.0
         if carried.any():
-            r *= -(self.q[carried] @ r[carried]) / np.vdot(self.moved(r), r)
+            moved = self.moved(r)
+            best = -(self.q[carried] @ r[carried]) / np.vdot(moved, r)
+            r *= best
+            self._last[:] = r.copy(), best * moved
         return r
 
     def result(self, method: object, tolerance: float, found: Iterated) -> FrictionResult:
@@ -168,6 +171,26 @@ class ScaledDelassus:
             scale[:, 1:] = np.mean(scale[:, 1:] ** -2.0, axis=1)[:, None] ** -0.5
         self.scale, self.bilateral, self.count, self.dimension = scale, bilateral.copy(), m, d
         self.matrix, self.norm = scaled_symmetric(G, scale.ravel())
+
+    def product(self, r: Array) -> Array:
+        """Return G r, (m d,)."""
+        carried = np.flatnonzero(r)
+        if len(carried) <= 0.25 * len(r):
+            return np.asarray(r[carried] @ self.matrix[carried])
+        return np.asarray(blas.dsymv(1.0, self.matrix.T, r))  # reads half of it
+
+    @cached_property
+    def short(self) -> tuple[Any, ...]:
+        """Return G and, in 2D, its inverse H and the inverse of each node's block of H, in single precision, for the
+        compiled sweeps; None for what is missing, or is not positive definite to that precision."""
+        G, d = self.matrix.astype(np.float32), self.dimension
+        triangle, info = lapack.spotrf(G, lower=1) if d == 2 else (G, 1)
+        if info:
+            return G, None, None
+        H = lapack.spotri(triangle, lower=1)[0]
+        H = np.ascontiguousarray(np.tril(H) + np.tril(H, -1).T)
+        places = np.arange(len(H)).reshape(-1, d)
+        return G, H, np.ascontiguousarray(np.linalg.inv(H[places[:, :, None], places[:, None, :]]))
 
     @cached_property
     def inverse(self) -> Array | None:
