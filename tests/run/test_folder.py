@@ -396,7 +396,7 @@ def test_hdf5_on_a_full_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
 
 @pytest.mark.serial
 def test_folders_of_another_format(tmp_path: Path) -> None:
-    """Folder and checkpoint carry a number; an unknown one is refused, none is that of the first version."""
+    """Folder and checkpoint carry a number; an unknown one is refused, a folder without one is read."""
     run(tmp_path, 10)
     about = tmp_path / "format.json"
     assert json.loads(about.read_text())["format"] == 1

@@ -69,8 +69,6 @@ class BoundaryLayer(Midpoint):
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
         """Return the state as it is; InputError where the layer would have to begin behind the obstacle."""
         surface = problem.surface
-        if RATE in state.memory and len(state.memory[RATE]) != len(state.u):
-            raise InputError(f"the state's {RATE} is of an earlier version of the layer: start a new run")
         gap = surface.everywhere(surface.gap(state.t) - surface.normal_values(state.u))
         if len(gap) and not gap.min() > 0.0:
             where = int(np.argmin(gap))

@@ -127,14 +127,12 @@ def read_checkpoint(
     arrays: Arrays = {"r_t": None} | _own(problem, about["vectors"], whole and whole[1])
     memory = {name.removeprefix(MEMORY): array for name, array in arrays.items() if name.startswith(MEMORY)}
     state = State(about["t"], about["k"], memory=memory, **{name: arrays[name] for name in ("u", "v", *CONTACT)})
-    if "format" not in about and memory:
-        _check_memory(file, problem, scheme, state, about)
     if other:  # what the scheme keeps in mind was made of the old problem's matrices and loads
         state = replace(state, memory={})
     place = RestartPoint(state, about["t_start"], about["k_start"], about["base"], about["halved"])
     if "dt" in other:
         place = replace(place, t_start=state.t, k_start=place.number, base=0)
-    return place, about.get("rows", "")
+    return place, about["rows"]
 
 
 def _own(problem: ContactProblem, vectors: list[str], whole: Arrays | None) -> Arrays:
@@ -153,7 +151,7 @@ def _compare(
     file: Path, problem: ContactProblem, scheme: Scheme, dt: TimeSteps, about: Mapping[str, Any], changed: bool
 ) -> list[str]:
     """The names of what is another problem's; InputError unless that was allowed, or can be. Collective."""
-    start, end = about.get("span", (about["t_start"], about["t"]))
+    start, end = about["span"]
     ours, theirs = identity(problem, scheme, dt, start=start, end=end), dict(about["run"])
     names: list[str] = []
     while found := difference(ours, theirs):
@@ -166,18 +164,6 @@ def _compare(
     if names and problem.system.algebra.comm.rank == 0:
         log.warning("the checkpoint '%s' is continued as another problem: %s", file, ", ".join(names))
     return names
-
-
-def _check_memory(file: Path, problem: ContactProblem, scheme: Scheme, state: State, about: Mapping[str, Any]) -> None:
-    """InputError when a checkpoint without checksum lacks what the scheme keeps in mind. Collective."""
-    dt = about["run"].get("dt")
-    if about["run"].get("scheme") != repr(scheme):
-        return
-    wanted = scheme.start(problem, replace(state, memory={}), dt if isinstance(dt, float) else 1.0).memory
-    shapes = {name: np.shape(state.memory.get(name, ())) for name in sorted(wanted)}
-    wrong = [name not in state.memory or shape != np.shape(wanted[name]) for name, shape in shapes.items()]
-    if np.any(problem.system.algebra.comm.max(np.array(wrong, dtype=float))):
-        raise _damaged(file, f"{', '.join(shapes)} of the scheme is missing or of another shape")
 
 
 def _damaged(file: Path, why: Any) -> InputError:
@@ -193,7 +179,7 @@ def _read(file: Path, problem: ContactProblem) -> tuple[dict[str, Any], Arrays]:
         about, arrays = _unpacked(file)
     except Exception as error:  # whatever a damaged archive makes the readers of numpy and zip do
         raise _damaged(file, error or type(error).__name__) from error
-    check_format(file, about.get("format", FORMAT))
+    check_format(file, about.get("format"))
     try:
         _check_sizes(problem, about, arrays)
     except (InputError, KeyError, TypeError) as error:
@@ -214,7 +200,7 @@ def _unpacked(file: Path) -> tuple[dict[str, Any], Arrays]:
     about = json.loads(str(arrays["about"]))
     if not isinstance(about, dict) or not isinstance(about.get("run"), dict):
         raise ValueError("no description of the run")
-    if "format" in about and str(wanted) != checksum(arrays):
+    if str(wanted) != checksum(arrays):
         raise ValueError("its checksum is another one")
     del arrays["about"]
     return about, arrays
@@ -225,9 +211,8 @@ def _check_sizes(problem: ContactProblem, about: dict[str, Any], arrays: Arrays)
     n, m, d = problem.system.space.unknowns, problem.surface.total, problem.surface.tangents.shape[1]
     about |= {name: number("it", name, about[name]) for name in ("t", "t_start")}
     about |= {name: whole("it", name, about[name], most=2**53) for name in ("k", "k_start", "base", "halved")}
-    if "span" in about:
-        array("it", "span", about["span"], (2,))
-    if not isinstance(about.get("rows", ""), str) or not {"u", "v"} <= set(about["vectors"]):
+    array("it", "span", about["span"], (2,))
+    if not isinstance(about["rows"], str) or not {"u", "v"} <= set(about["vectors"]):
         raise InputError("its description is of nothing")
     theirs = about["run"]
     if theirs.get("unknowns") != n or theirs.get("contact points") != m:

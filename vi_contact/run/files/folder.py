@@ -21,7 +21,7 @@ from ...core.errors import InputError
 from ...core.files import FIELDS, FIELDS_INDEX, on_root, write_atomically
 
 log = logging.getLogger(__name__)
-FORMAT = 1  # of run folders and checkpoints; what was written before there were numbers counts as it
+FORMAT = 1  # of run folders and checkpoints
 
 ABOUT = "format.json"
 CHECKPOINT = "checkpoint.npz"
@@ -62,7 +62,7 @@ def check_format(file: Path, found: Any) -> None:
 
 
 def check_folder_format(folder: Path) -> None:
-    """Raise InputError likewise for a run folder; those of the first version have no number, which is well."""
+    """Raise InputError likewise for a run folder; one without a number, of which files were copied, is not asked."""
     try:
         found = json.loads((folder / ABOUT).read_text(encoding="utf-8"))["format"]
     except FileNotFoundError:

@@ -81,7 +81,7 @@ def difference(ours: Identity, theirs: Mapping[str, Any]) -> tuple[str, str] | N
     """Return (name, how) of the first fact of theirs that is another one in ours."""
     for name, own in ours.items():
         if name not in theirs:
-            continue  # checkpoints of the first version do not have all
+            continue  # it differs, and that was allowed
         other = theirs[name]
         if isinstance(own, list):
             if not _same_numbers(own, other):
