@@ -16,6 +16,7 @@ from .problem import ContactProblem
 from .step import Balance, State, StepProblem, StepResult
 from .system import SemiDiscreteSystem
 
+COPIED = 5_000  # numbers
 ROUNDED = 1e-5  # of |A||x|, and of what friction is compared with: see Certificate
 
 
@@ -43,12 +44,30 @@ def _sizes(step: StepProblem, result: StepResult) -> list[list[float]]:
 
 
 def _sizes_compiled(step: StepProblem, result: StepResult, Ax: Array, functions: Any) -> Array:
-    n, arrays = Ax.shape[-1], [Ax, step.b, result.x, step.guess, step.bound, result.r_n, result.r_t, result.active]
-    found, room, (counts, fixed, _) = np.empty((math.prod(Ax.shape[:-1]), 10)), np.empty(n), step.surface.readable
-    kept = [None if one is None else np.ascontiguousarray(one) for one in arrays]
-    places = [None if one is None else at(one) for one in kept]
-    functions.largest(len(found), n, *counts, *places, c_double(step.scale), *fixed, at(room), at(found))
-    return found
+    arrays = step.b, result.x, step.guess, step.bound, result.r_n, result.r_t, result.active
+    (*places, room, found), kept = _places(step.A.desk, Ax, *arrays)
+    counts, fixed, _ = step.surface.readable
+    functions.largest(len(kept[-1]), Ax.shape[-1], *counts, *places, c_double(step.scale), *fixed, room, found)
+    return np.asarray(kept[-1])
+
+
+def _places(desk: dict[Any, tuple[list[Any], list[Any]]], Ax: Array, *others: Any) -> tuple[list[Any], list[Any]]:
+    """Where compiled functions find the arrays, room and sizes, and what lies there: copies on the desk where they are
+    small, as numpy takes longer to tell where an array lies than to copy it."""
+    arrays = Ax, *others
+    shapes = tuple([None if one is None else one.shape for one in arrays])
+    if shapes in desk:
+        for copy, one in zip(desk[shapes][1], arrays, strict=False):
+            if one is not None:
+                copy[...] = one
+        return desk[shapes]
+    small, n = Ax.size <= COPIED, Ax.shape[-1]
+    kept = [None if one is None else np.array(one) if small else np.ascontiguousarray(one) for one in arrays]
+    kept += [np.empty(n), np.empty((math.prod(Ax.shape[:-1]), 10))]
+    made = [None if one is None else at(one) for one in kept], kept
+    if small:
+        desk[shapes] = made
+    return made
 
 
 def _sizes_in_numpy(step: StepProblem, result: StepResult, Ax: Array) -> Array:
