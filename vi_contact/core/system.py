@@ -39,7 +39,7 @@ class Space(Protocol):
         ...
 
 
-KEPT = {"M": 5, "C": 4, "K": 2, "load": 2}  # products with each: what a step and the next one may ask for again
+KEPT = {"M": 6, "C": 4, "K": 2, "load": 2}  # products with each: what a step and the next one may ask for again
 PAIR = "give pairs of a vector [N] and a function of the time"
 
 
@@ -193,6 +193,15 @@ class SemiDiscreteSystem:
     def _remembered(self, name: str) -> Remembered:
         function = self.load if name == "load" else getattr(self, name).__matmul__
         return self._products.setdefault(name, Remembered(function, KEPT[name]))
+
+    def know_rows(self, many: "SemiDiscreteSystem", row: int, *known: tuple[str, Array, Array]) -> None:
+        """Take (name, x, rows): the product with x is a row of that with the rows, when somebody asks for it."""
+
+        def value(name: str, rows: Array) -> Callable[[], Array]:
+            return lambda: np.asarray(many.product(name, rows)[row])
+
+        for name, x, rows in known:
+            self._remembered(name).know(x, value(name, rows))
 
     def load_at(self, t: float) -> Array:
         """Return f(t), read-only; made once for each of the last two times, unless something is marched beside it."""

@@ -54,11 +54,18 @@ def joined(states: Sequence[State]) -> State:
     return State(first.t, first.k, frozen(u), frozen(v), r_n, active, memory, r_t)
 
 
-def own_state(many: State, row: int) -> State:
-    """Return the state of one run."""
-    memory = {name: value[row] if value.ndim == 2 else value for name, value in many.memory.items()}
-    r_t = None if many.r_t is None else many.r_t[row]
-    return State(many.t, many.k, many.u[row], many.v[row], many.r_n[row], many.active[row], memory, r_t)
+def own_states(problem: ContactProblem, problems: Sequence[ContactProblem], many: State) -> Each:
+    """Return the states of runs whose rows are those of ``problem``, and let theirs know the products of the rows."""
+    viscous = () if problem.equations.C is None else ("C",)
+
+    def made(row: int) -> State:
+        memory = {name: value[row] if value.ndim == 2 else value for name, value in many.memory.items()}
+        r_t, u, v = None if many.r_t is None else many.r_t[row], many.u[row], many.v[row]
+        pairs = ("M", v, many.v), ("K", u, many.u), *((name, u, many.u) for name in viscous)
+        problems[row].equations.know_rows(problem.equations, row, *pairs)
+        return State(many.t, many.k, u, v, many.r_n[row], many.active[row], memory, r_t)
+
+    return Each(made)
 
 
 def own_step(problem: ContactProblem, many: StepProblem, row: int) -> StepProblem:

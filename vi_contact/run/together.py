@@ -6,7 +6,7 @@ solved alone; who then has to escalate, or fails, goes on alone.
 """
 
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -22,7 +22,7 @@ from ..core.verify import kkt_residuals
 from ..solvers.certified import NEAR, CertifiedSolver
 from .march import March, after_impact
 from .method import Method
-from .rows import Each, RowReport, joined, loads_of, own_state, own_step
+from .rows import Each, RowReport, joined, loads_of, own_states, own_step
 from .time_steps import StepPlan
 
 
@@ -117,9 +117,9 @@ class Group:
             self._problem.__dict__["equations"] = first.unshaken.loaded(loads_of(self._problems))
             self._at(joined(states), states)
 
-    def _at(self, many: State, states: Iterable[State] = ()) -> None:
+    def _at(self, many: State, states: list[State]) -> None:
         """Hold these states as rows, and one by one."""
-        self._many, self._states = many, Each(partial(own_state, many), states)
+        self._many, self._states = many, Each(states.__getitem__)
 
     def without(self, leaving: Sequence[Together]) -> None:
         """Let these runs go on alone from where they are."""
@@ -196,7 +196,7 @@ class Group:
         rows = scheme.finish(self._problem, self._many, many, result, dt)
         for vector in (rows.u, rows.v, *rows.memory.values()):
             frozen(vector)  # what is known of them stays true
-        free = Each(partial(own_state, rows))
+        free = own_states(self._problem, problems, rows)
         self._many, self._states = self._struck(rows, free)
         averages = Each(lambda row: partial(scheme.balance, problems[row], old[row], free[row], dt))
         parts |= {"problem": problems, "old": old, "new": self._states, "v_minus": Each(lambda row: free[row].v),
@@ -213,7 +213,8 @@ class Group:
         if getattr(problem.impact, "by_rows", False) and not rows.memory:
             new = after_impact(problem, scheme, self._many, rows, dt)
             struck = (frozen(new.v) != rows.v).any(axis=1)
-            return new, Each(lambda row: own_state(new, row) if struck[row] else free[row])
+            moved = own_states(problem, self._problems, new)
+            return new, Each(lambda row: moved[row] if struck[row] else free[row])
         own = [after_impact(one, scheme, old[row], free[row], dt) if closed[row].any() else free[row]
                for row, one in enumerate(self._problems)]
         return replace(joined(own), u=rows.u), Each(own.__getitem__)
