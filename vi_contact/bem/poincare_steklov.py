@@ -29,16 +29,13 @@ class BodyOperator(Protocol):
 
     def load_shape(self, dimensions: int) -> tuple[int | None, ...]:
         """Return the shape of nodal forces given in so many dimensions."""
-        ...
 
     def motion(self, forces: Array, fixed: Mask, prescribed: Array | None) -> tuple[Array, Array, Array]:
         """Return displacements (steps, 2n), tractions (steps, 4n) and nodal forces (steps, 2n), reactions included,
         under forces (steps, pieces of a step, 2n) and prescribed displacements (steps, 2n) of fixed unknowns (2n,)."""
-        ...
 
     def condense(self, forces: Array, fixed: Mask, prescribed: Array | None, unknowns: Indices) -> tuple[Array, Array]:
         """Return W and u_free of CondensedCompliance for these unknowns."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)

@@ -76,7 +76,6 @@ class Matrix(Protocol):
     @property
     def rows(self) -> int:
         """Return how many rows this rank owns."""
-        ...
 
     def __matmul__(self, x: Array) -> Array: ...
     def transpose_apply(self, x: Array) -> Array: ...
@@ -91,7 +90,6 @@ class Factor(Protocol):
     def solve_units(self, owned: Indices, slots: Indices, m: int, rows: Indices | None = None) -> Array:
         """Return the columns A^-1 e_j for m unit vectors: e_{slots[k]} has its one in row ``owned[k]`` of the owning
         rank. Returns the owned rows, shape (rows, m), or only those of them that are named: the whole may not fit."""
-        ...
 
 
 class Algebra(Protocol):
@@ -102,37 +100,29 @@ class Algebra(Protocol):
     def combine(self, terms: Sequence[tuple[float, Matrix]]) -> Matrix: ...
     def congruence(self, T: Matrix, K: Matrix) -> Matrix:
         """Return Tᵀ K T."""
-        ...
 
     def local(self, rows: Indices, columns: Indices, values: Array, n: int) -> Matrix:
         """Return the matrix of entries between the n unknowns of one rank; those given twice add up."""
-        ...
 
     def with_identity_rows(self, A: Matrix, mask: Mask) -> Matrix:
         """Return A with the rows and columns of the masked unknowns replaced by those of the identity."""
-        ...
 
     def block(self, A: Matrix, mask: Mask) -> Matrix:
         """Return the rows and columns of A of the masked unknowns, which their ranks own."""
-        ...
 
     def first(self, n: int) -> int:
         """Return the number, among those of all ranks, of the first of the n unknowns that this rank owns."""
-        ...
 
     def entries(self, A: Matrix, rows: Indices) -> sp.csr_matrix:
         """Return these owned rows of A, ascending, their columns numbered over all ranks. Collective."""
-        ...
 
     def replaced_rows(self, n: int, rows: Indices, entries: sp.csr_matrix) -> Matrix:
         """Return the identity of n owned rows with some of them replaced, columns numbered over all ranks."""
-        ...
 
     def factor(self, A: Matrix) -> Factor: ...
     def contact_last(self, A: Matrix, last: Indices) -> Any:
         """Return a factor with these unknowns last, a ``core.contact_last.ContactLast``; they are numbered over all
         ranks and the same on every rank. None where ``factor`` serves better or there is none. Collective."""
-        ...
 
     def dot(self, x: Array, y: Array) -> float: ...
 

@@ -13,4 +13,3 @@ class Companion(Protocol):
         other steps begin the motion anew, from rest at t = 0. ``dt`` is a number or a plan of ``run.time_steps``.
         InputError for a plan that the motion cannot follow.
         """
-        ...

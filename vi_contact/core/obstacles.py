@@ -20,14 +20,12 @@ class Obstacle(Protocol):
         ``points``: (k, d) positions of contact nodes [m], each rank its own; ``normals``: (k, d) unit outward normals
         of the body there. Asked before ``gap``, with the same arrays; InputError when body and support do not fit.
         """
-        ...
 
     def gap(self, points: Array, normals: Array) -> Array:
         """Return the initial gaps (k,) [m] along these directions, >= 0 but for round-off.
 
         ``points`` and ``normals`` as in ``directions``. gap - u·direction is what is left when the point moves by u.
         """
-        ...
 
 
 @dataclass(frozen=True)

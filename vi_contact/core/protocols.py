@@ -16,23 +16,19 @@ class Excitation(Protocol):
     @property
     def direction(self) -> tuple[float, ...]:
         """Return the components of the direction, (d,), not all zero; its length is a factor on the acceleration."""
-        ...
 
     @property
     def duration(self) -> float:
         """Return the time [s] after which the acceleration stays zero or negligible; infinite if it never does."""
-        ...
 
     def acceleration(self, t: float) -> float:
         """Return the acceleration [m/s²] at time ``t`` [s], positive along the direction.
 
         Asked for at any time >= 0, also twice and between the steps; the same on every rank, a finite number.
         """
-        ...
 
     def __call__(self, t: float) -> Array:
         """Return the vector acceleration(t) · direction [m/s²] at time ``t`` [s], shape (d,)."""
-        ...
 
 
 class FrictionLaw(Protocol):
@@ -49,11 +45,9 @@ class FrictionLaw(Protocol):
             weights: tributary lengths times thickness, or areas (m,) [m²]: what turns stresses into forces.
             scale: of the step: 1 for forces, dt [s] for impulses. A limit that ignores r_n is multiplied by it.
         """
-        ...
 
     def slope(self, weights: Array) -> Array:
         """Return d limit / d r_n >= 0 of each condition under pressure, (m,); ``weights`` as in ``limit``."""
-        ...
 
     def at(self, speed: Array) -> "FrictionLaw":
         """Return the law at slip rates ``speed`` = |v_t| (m,) [m/s], >= 0, with limit and slope of its own.
@@ -61,7 +55,6 @@ class FrictionLaw(Protocol):
         ``limit`` and ``slope`` of the law itself are those at rest. A law that does not know rates returns itself,
         the same object: that spares the iteration over rates.
         """
-        ...
 
 
 @dataclass(frozen=True)
@@ -106,7 +99,6 @@ class ImpactLaw(Protocol):
 
         > 0 is towards the obstacle, so a rebound is negative. Called only when some condition is active.
         """
-        ...
 
     def apply(self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array) -> Array:
         """Return the velocity vector (n,) [m/s] that has the normal velocities ``target`` (m,), where they are not NaN.
@@ -116,7 +108,6 @@ class ImpactLaw(Protocol):
             surface: its contact conditions, ``surface.normal_values(v)`` are the velocities to change.
             v: the velocity (n,) [m/s] that the step left; not to be written to. Collective.
         """
-        ...
 
 
 class MassLaw(Protocol):
@@ -132,4 +123,3 @@ class MassLaw(Protocol):
 
         Total mass and centre of mass should stay as they are; C and the load follow when inertia is moved. Collective.
         """
-        ...

@@ -159,11 +159,9 @@ class Scheme(Protocol):
     @property
     def mass(self) -> MassLaw:
         """Return the mass matrix that it takes when the problem does not say which."""
-        ...
 
     def check(self, problem: ContactProblem) -> None:
         """Raise InputError unless ``problem`` suits the scheme. Called before anything is computed, on all ranks."""
-        ...
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
         """Return ``state`` with the memory that steps of ``dt`` [s] need: accelerations or earlier levels, for example.
@@ -171,21 +169,18 @@ class Scheme(Protocol):
         Called with the first state of a run of ``problem``, on a restart, and whenever dt changes; what is in
         ``state.memory`` already was put there by this scheme, or by none. It may bring initial data into equilibrium.
         """
-        ...
 
     def jump(self, problem: ContactProblem, state: State, v: Array, dt: float) -> State:
         """Return ``state`` with the velocity ``v`` (n,) [m/s] that the impact law of ``problem`` gave, same u and t.
 
         What the scheme remembers of accelerations has to fit the new velocity before the next step of ``dt`` [s].
         """
-        ...
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
         """Return A (n rows) of ``problem`` for all steps of ``dt`` [s], as a rule ``problem.equations.effective(…)``.
 
         A is symmetric positive definite; nothing in it depends on time or state. It is made once for every dt.
         """
-        ...
 
     def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem:
         """Return the problem of the step of ``problem`` from ``state`` to state.t + dt, whose matrix ``A`` is.
@@ -193,7 +188,6 @@ class Scheme(Protocol):
         ``dt`` [s] is that of A. The meaning of x is the scheme's own (u1 or v1, say); ``bound`` and ``scale`` fit it,
         and ``scale`` is the same in all steps of one dt.
         """
-        ...
 
     def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
         """Return the state of ``problem`` at the end of a step of ``dt`` [s], before the impact law.
@@ -201,14 +195,12 @@ class Scheme(Protocol):
         ``state`` is the one the step began with, ``step`` what ``step()`` returned for it and ``result`` its certified
         answer: reactions in it are ``scale`` times newtons, those of the new state are newtons.
         """
-        ...
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
         """Return the equation of motion that the step of ``dt`` [s] from ``old`` to ``new`` satisfied, for the ledger.
 
         ``new`` is what ``finish`` returned: before the impact law of ``problem``. Called when a recorder asks.
         """
-        ...
 
 
 class PreparedSolver(Protocol):
@@ -221,7 +213,6 @@ class PreparedSolver(Protocol):
         The answer is judged by its certificate, so the method may stop where it finds best. StepFailure, on all ranks,
         when there is none. Collective.
         """
-        ...
 
 
 class Solver(Protocol):
@@ -229,14 +220,12 @@ class Solver(Protocol):
 
     def check(self, problem: ContactProblem) -> None:
         """Raise InputError unless the solver can treat ``problem``: its friction law, supports and matrices."""
-        ...
 
     def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> PreparedSolver:
         """Return a solver of steps with the matrix ``A`` on ``surface`` whose reactions are ``scale`` times newtons.
 
         Called once for every dt; factors and whatever else depends on A alone belong here. Collective.
         """
-        ...
 
 
 @dataclass(frozen=True)
@@ -271,7 +260,6 @@ class Recorder(Protocol):
 
         Names are made of letters, digits and underscores; no two recorders of a run have one in common.
         """
-        ...
 
     def start(
         self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
@@ -280,14 +268,12 @@ class Recorder(Protocol):
 
         ``resumed``: the last row of the run that a restart continues, from which sums over time go on; else None.
         """
-        ...
 
     def row(self, report: Report) -> Mapping[str, Any]:
         """Return the row of the step that ``report`` tells of: numbers, or arrays of one shape (to HDF5 only).
 
         Called once a step, in order, on all ranks: collective operations are allowed here.
         """
-        ...
 
 
 Columns = Mapping[str, tuple[str, str]]

@@ -32,11 +32,9 @@ class Space(Protocol):
 
     def find_nodes(self, points: Array) -> np.ndarray:
         """Return the node numbers nearest to the points (k, d); InputError for a point outside the body."""
-        ...
 
     def sample(self, u: Array, nodes: np.ndarray, t: float, derivative: int = 0) -> Array:
         """Return the values (k, d) at the nodes, on every rank; derivative 0, 1, 2: of the prescribed motion."""
-        ...
 
 
 KEPT = {"M": 6, "C": 4, "K": 2, "load": 2}  # products with each: what a step and the next one may ask for again

@@ -42,7 +42,6 @@ class VelocityUpdate(Protocol):
 
     def __call__(self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array) -> Array:
         """Return v (n,) [m/s] changed so that its normal velocities are ``target`` (m,), where they are not NaN."""
-        ...
 
 
 @dataclass(frozen=True)

@@ -82,7 +82,6 @@ class Section(Protocol):
 
     def elastic_constants(self, material: LinearElastic) -> tuple[float, float]:
         """Return (lambda_eff, shear_modulus) [Pa] of sigma = lambda_eff tr(eps) I + 2 shear_modulus eps, in plane."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -131,7 +130,6 @@ class Damping(Protocol):
 
     def coefficients(self, material: LinearElastic) -> tuple[float, float]:
         """Return (alpha [1/s], beta [s]) of C = alpha M + beta K on the part of the body made of `material`."""
-        ...
 
 
 @dataclass(frozen=True)

@@ -34,17 +34,14 @@ class Reference(Protocol):
     @property
     def times(self) -> Array:
         """Return (k,) [s], increasing."""
-        ...
 
     @property
     def impulse(self) -> Array:
         """Return (k, d) of the contact forces of the support on the body up to each time [N s]."""
-        ...
 
     @property
     def mean_towards(self) -> Array:
         """Return (k,) displacement towards the support at each time, mean over the contact boundary [m]."""
-        ...
 
 
 @dataclass(frozen=True)

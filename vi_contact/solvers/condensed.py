@@ -45,7 +45,6 @@ class SmallMethod(Protocol):
 
         What it returns has ``solve(q, guess) -> LCPResult``, q (m,) the gaps without reactions and ``guess`` (m,).
         """
-        ...
 
 
 @dataclass(frozen=True)

@@ -49,7 +49,6 @@ class Matching(Protocol):
 
     def match(self, one: Side, two: Side, size: float) -> Matched:
         """Return what the nodes of side ``one`` face on side ``two``; ``size``: of the mesh [m]."""
-        ...
 
 
 @dataclass(frozen=True)

@@ -74,7 +74,6 @@ class Sides(Protocol):
         ``motion``: displacement, velocity and acceleration of the bedrock as `Prescribed` takes them; empty in the
         frame of the bedrock.
         """
-        ...
 
 
 @dataclass(frozen=True)

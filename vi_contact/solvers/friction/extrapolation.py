@@ -27,7 +27,6 @@ class Extrapolation(Protocol):
 
     def start(self) -> Next:
         """Return what chooses the points of one iteration, which it remembers."""
-        ...
 
 
 def accelerated(owner: str, value: Any) -> None:

@@ -58,12 +58,10 @@ class FrictionMethod(Protocol):
     @property
     def carries_friction(self) -> bool:
         """Say True: that tells such a method from those for the problem without friction."""
-        ...
 
     def prepare(self, G: Array, bilateral: Mask) -> Any:
         """Return ``PreparedFriction`` or its like: check G (m d, m d) and scale it, once for many right-hand sides;
         ``bilateral`` (m,)."""
-        ...
 
 
 def inner_method(owner: str, meaning: str, value: Any) -> None:

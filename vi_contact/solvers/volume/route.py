@@ -40,7 +40,6 @@ class Driver(Protocol):
 
     def run(self) -> tuple[Array, Array, int, int]:
         """Return (y, F(y), PETSc's reason, iterations) of the scaled step."""
-        ...
 
     def destroy(self) -> None: ...
 
