@@ -96,18 +96,19 @@ def _covering(items: list[pytest.Item]) -> set[pytest.Item]:
     for item in items if SIZE % 2 == 0 else reversed(items):  # other combinations on three ranks than on two
         functions.setdefault(item.nodeid.split("[")[0], []).append(item)
     for ones in functions.values():
+        alike = set.intersection(*map(_parameters, ones)) if len(ones) > 1 else set()
         seen: set[tuple[str, int]] = set()
         for new in (all, any):  # those of new values only, then those of some new value
             for item in ones:
-                values = {(name, id(value)) for name, value in _parameters(item).items()}
+                values = _parameters(item) - alike
                 if item not in kept and (not values or new(value not in seen for value in values)):
                     kept.add(item)
                     seen |= values
     return kept
 
 
-def _parameters(item: pytest.Item) -> dict[str, Any]:
-    return item.callspec.params if hasattr(item, "callspec") else {}
+def _parameters(item: pytest.Item) -> set[tuple[str, int]]:
+    return {(name, id(value)) for name, value in item.callspec.params.items()} if hasattr(item, "callspec") else set()
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

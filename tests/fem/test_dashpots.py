@@ -81,6 +81,7 @@ def test_the_loss_is_in_the_ledger(comm, scheme):
 CASES = [("P", 60, 2.2), pytest.param("S", 60, 1.5, marks=pytest.mark.serial)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wave, angle, length", CASES)
 def test_oblique_waves(comm, wave, angle, length):
     """V8.1: a packet on a periodic strip, 10 cells per wavelength: within 20 % of the table, and of its own mean."""

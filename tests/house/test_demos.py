@@ -167,6 +167,7 @@ def test_bad_input_is_one_sentence(
 
 
 @pytest.mark.slow
+@pytest.mark.serial
 def test_the_bouncing_bar_demo(comm: Any, shared_tmp: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """V1.3, one bounce: every scheme certified, its ledger closed; energy stays, but for Newmark on consistent mass."""
     numbers = demo("bouncing_bar").main(quick=True, out=shared_tmp, progress=False)

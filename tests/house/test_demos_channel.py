@@ -17,6 +17,7 @@ FIGURES = (
 
 
 @pytest.mark.slow
+@pytest.mark.serial
 def test_the_channel_demo(comm: Any, shared_tmp: Path) -> None:
     """V4.2: openings alternate, the corners rock, unilateral exceeds bilateral; both routes agree; all files."""
     module = demo("channel")

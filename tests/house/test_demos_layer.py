@@ -46,6 +46,7 @@ def test_the_rigid_body_demo(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@serial
 def test_the_contact_layer_demo(comm: Any, shared_tmp: Path) -> None:
     """V1.1 in layers of 1 and ½ m: errors halve; the stiff block rebounds with ½ within 1 %."""
     numbers = demo("contact_layer").main(quick=True, out=shared_tmp, progress=False)

@@ -96,6 +96,7 @@ def test_impacts_of_a_history():
 
 
 @pytest.mark.slow
+@pytest.mark.serial
 def test_demo(shared_tmp, comm):
     """The quick demo: key numbers of V3.1, run folders and figures."""
     numbers = demo("rocking_block").main(quick=True, out=shared_tmp, progress=False)

@@ -53,9 +53,15 @@ RUBBING = [replace(one, friction=vc.Coulomb(mu)) for one, mu in zip(SHAKEN, (0.2
 LIGHT = [replace(one, impact=None, mass=vc.Redistributed()) for one in SHAKEN]
 
 
+def alone(problems, scheme):
+    """Return parameters for one rank: one by one, on several, all schemes go alike."""
+    return pytest.param(problems, scheme, marks=pytest.mark.serial)
+
+
 @pytest.mark.parametrize(("problems", "scheme"), [
-    (SHAKEN, None), (SHAKEN, vc.Newmark()), (SHAKEN, vc.HHT()), (SHAKEN, vc.SS22()), (SHAKEN, vc.Houbolt()),
-    (RUBBING, None), (LIGHT, None), ([replace(one, friction=vc.Coulomb(0.3)) for one in LIGHT], None),
+    (SHAKEN, None), alone(SHAKEN, vc.Newmark()), alone(SHAKEN, vc.HHT()), alone(SHAKEN, vc.SS22()),
+    alone(SHAKEN, vc.Houbolt()), (RUBBING, None), alone(LIGHT, None),
+    alone([replace(one, friction=vc.Coulomb(0.3)) for one in LIGHT], None),
 ])
 def test_each_step_is_the_step_alone_from_the_same_state(problems, scheme, steps_together):
     reports, errors = run(problems, scheme=scheme)
