@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import itertools
 from collections import defaultdict
 from dataclasses import dataclass, field, replace
 
@@ -10,6 +12,9 @@ import pytest
 from mpi4py import MPI
 
 import vi_contact as vc
+from vi_contact import fem
+from vi_contact.core import contact_last
+from vi_contact.meshes.block import BlockMesh
 from vi_contact.models.wall import Wall, build
 from vi_contact.run.together import Group
 
@@ -77,6 +82,48 @@ def test_each_step_is_the_step_alone_from_the_same_state(problems, scheme, steps
     assert not errors and MPI.COMM_WORLD.allreduce(closed) > 10
     if MPI.COMM_WORLD.size == 1:
         assert steps_together == [3] * STEPS
+
+
+@pytest.mark.parametrize("friction", [None, vc.Coulomb(0.3)])
+@pytest.mark.parametrize("by_supernodes", [True, False])
+def test_bodies_in_space(monkeypatch, steps_together, by_supernodes, friction):
+    """A cube over the ground that it touches: substitutions by supernodes, as where bodies in space are large."""
+    monkeypatch.setattr(contact_last, "SHORT_COLUMNS", 1.0 if by_supernodes else 1e3)
+    mesh, tags = fem.build_mesh(BlockMesh(lengths=(1.0, 1.0, 1.0), divisions=(3, 3, 3)), MPI.COMM_WORLD)
+    system = fem.assemble(mesh, vc.LinearElastic(E=3e10, nu=0.2, rho=2400.0), clamped=tags["top"])
+    ground = vc.HalfSpace(point=(0.0, 0.0, 0.0), normal=(0.0, 1.0, 0.0))
+    surface, dt = fem.contact_surface(system, tags["bottom"], obstacle=ground), 6e-5
+    laws = {} if friction is None else {"friction": friction}
+    problems = [vc.ContactProblem(
+        system, surface, mass=vc.ConsistentMass(), impact=vc.Inelastic(), **laws,
+        excitation=vc.Harmonic(amplitude, 400.0, direction=(0.3, 1.0, 0.1))) for amplitude in (1.0, -0.4, 2.0)]
+    settings = {"scheme": vc.ZienkiewiczWoodTaylor(), "dt": dt, "solver": vc.Condensed()}
+    reports, errors = run(problems, steps=24, **settings)
+    closed = 0.0
+    for number, problem in enumerate(problems):
+        for report in reports[number][5::6]:
+            alone, _ = next(vc.march(problem, steps=1, state=report.old, **settings))
+            assert apart(report.new, alone) < 1e-12 and report.certificate.worst < 1e-9
+        closed += sum(report.new.active.any() for report in reports[number])
+    assert not errors and MPI.COMM_WORLD.allreduce(closed) > 10
+    assert steps_together == ([3] * 24 if MPI.COMM_WORLD.size == 1 else [])
+
+
+def test_reports_hold_what_reports_of_march_hold(steps_together):
+    """Read late, in any order; and a changed copy."""
+    reports, _ = run(SHAKEN, steps=12)
+    fields = [one.name for one in dataclasses.fields(vc.Report)]
+    for report in reports[1]:
+        changed = replace(report, escalated=True)
+        assert changed.escalated and not report.escalated and changed.new is report.new
+        alone, other = next(vc.march(SHAKEN[1], dt=DT, steps=1, state=report.old))
+        for name in reversed(fields):
+            assert type(getattr(report, name)) is type(getattr(other, name))
+        assert np.abs(report.step.b - other.step.b).max(initial=0.0) <= 1e-12 * np.abs(other.step.b).max(initial=0.0)
+        assert (report.step.t, report.result.iterations) == (alone.t, other.result.iterations)
+        assert not hasattr(report, "another")
+    for before, after in itertools.pairwise(reports[1]):
+        assert after.old is before.new
 
 
 def test_the_order_of_the_runs_does_not_matter():
