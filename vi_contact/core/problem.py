@@ -109,14 +109,11 @@ class ContactProblem:
 
     def ground_acceleration(self, t: float) -> Array:
         """Return the vector a_g(t) [m/s²] summed over the excitations."""
-        found = np.zeros(self.system.influence.shape[1])
-        for one, direction in zip(self.excitations, self._directions, strict=True):
-            found += one.acceleration(t) * direction
-        return found
-
-    @cached_property
-    def _directions(self) -> tuple[Array, ...]:
-        return tuple(np.asarray(one.direction, dtype=float) for one in self.excitations)
+        found = [0.0] * self.system.influence.shape[1]
+        for one in self.excitations:
+            a = float(one.acceleration(t))
+            found = [so_far + a * way for so_far, way in zip(found, one.direction, strict=True)]
+        return np.array(found)
 
 
 def with_values(law: Any, surface: ContactSurface, change: Callable[[tuple[Any, ...]], tuple[Any, ...]]) -> Any:

@@ -171,7 +171,7 @@ def energies(system: SemiDiscreteSystem, u: Array, v: Array) -> Energies:
 
 def _dots(system: SemiDiscreteSystem, *pairs: tuple[Array, Array], sums: tuple[float, ...] = ()) -> list[float]:
     """Inner products, and sums over the ranks, with one reduction for all."""
-    comm, found = system.algebra.comm, [*(float(x.dot(y)) for x, y in pairs), *sums]
+    comm, found = system.algebra.comm, [*[float(x.dot(y)) for x, y in pairs], *sums]
     return found if comm.size == 1 else comm.sum(np.array(found)).tolist()
 
 

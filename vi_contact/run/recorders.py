@@ -5,6 +5,7 @@ Displacements and velocities are those of the equations: relative to the ground 
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from math import isfinite
 from typing import Any, ClassVar
@@ -45,8 +46,8 @@ class Steps:
         } | {f"a_g_{axis}": ("m/s²", f"ground acceleration along {axis} at time t") for axis in self._axes}
 
     def _row(self, state: State, iterations: int = 0, certificate: float = 0.0, escalated: bool = False) -> Row:
-        ground = self._problem.ground_acceleration(state.t)
-        values = (state.t, state.k, int(iterations), certificate, int(escalated), *ground.tolist())
+        ground = self._problem.ground_acceleration(state.t).tolist()
+        values = (state.t, state.k, int(iterations), certificate, int(escalated), *ground)
         return dict(zip(self._names, values, strict=True))
 
     def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
@@ -97,12 +98,13 @@ class Energy:
     def _row(self) -> Row:
         return {"energy_kinetic": self._now.kinetic, "energy_strain": self._now.strain, **self._sums}
 
-    @np.errstate(over="ignore", invalid="ignore")  # what overflows is told by refuse_overflow
     def row(self, report: Report) -> Row:
         system, new = self._problem.equations, report.new
         free = energies(system, new.u, report.v_minus)
-        before_impact = new if new.v is report.v_minus else new.with_velocity(report.v_minus)
-        step = energy_balance(self._problem, report.old, before_impact, report.balance, before=self._now, after=free)
+        end = new if new.v is report.v_minus else new.with_velocity(report.v_minus)
+        known = isfinite(free.kinetic + free.strain + self._now.kinetic + self._now.strain)  # so are u, v, M v and K u
+        with nullcontext() if known else np.errstate(over="ignore", invalid="ignore"):  # refuse_overflow tells of it
+            step = energy_balance(self._problem, report.old, end, report.balance, before=self._now, after=free)
         self._now = free
         if new.v is not report.v_minus:  # the impact law changed it; displacements do not jump
             momentum = system.product("M", new.v)
@@ -173,9 +175,10 @@ class Contact:
 
     def _row(self, state: State) -> Row:
         surface, d, r_n = self._problem.surface, len(self._axes), state.r_n
-        gap = surface.gap(state.t) - surface.normal_values(state.u) + surface.compliance * r_n
+        gap, added = surface.gap(state.t) - surface.normal_values(state.u), np.add.reduce
+        gap = gap if surface.plain else gap + surface.compliance * r_n
         pressure, rubbing = r_n / surface.weights, self._rubbing(state) if self._frictional else ()
-        sums = [float(surface.weights[state.active].sum()), float(np.count_nonzero(state.active)), float(r_n.sum()),
+        sums = [float(added(surface.weights[state.active])), float(np.count_nonzero(state.active)), float(added(r_n)),
                 *(r_n @ surface.normals).tolist(), *(r_n @ surface.points).tolist()]
         sums = sums if surface.comm.size == 1 else surface.comm.sum(np.array(sums)).tolist()
         closed, count, resultant, *vectors = sums
@@ -183,20 +186,21 @@ class Contact:
         depth, highest, *farthest = self._largest(gap, pressure, *rubbing[1:])
         values = [
             1.0 - closed / self._weight if self._weight else 1.0, int(count), resultant, *force,
-            *(one / resultant if resultant else np.nan for one in place), -depth, highest,
+            *[one / resultant if resultant else np.nan for one in place], -depth, highest,
         ]
         values += [*self._friction_force(state), *farthest] if self._frictional else []
-        row = dict(zip(self._numbers, values, strict=True))
-        return row | (self._whole(pressure, gap, state.active, *rubbing) if self.arrays else {})
+        row: dict[str, Any] = dict(zip(self._numbers, values, strict=True))
+        if self.arrays:
+            row.update(zip(self._ARRAYS, self._whole(pressure, gap, state.active, *rubbing), strict=False))
+        return row
 
-    def _whole(self, *each: Any) -> dict[str, Any]:
+    def _whole(self, *each: Any) -> Sequence[Any]:
         """The arrays of all conditions on rank 0, by one message of each rank."""
         if self._problem.surface.comm.size == 1:
-            return dict(zip(self._ARRAYS, each, strict=False))
+            return each
         found = self._problem.surface.on_first(np.column_stack(each))
         rubbing = np.hsplit(found[:, 3:], 2) if self._frictional else ()
-        parts = found[:, 0], found[:, 1], found[:, 2] > 0.0, *rubbing
-        return {name: part.copy() for name, part in zip(self._ARRAYS, parts, strict=False)}
+        return [part.copy() for part in (found[:, 0], found[:, 1], found[:, 2] > 0.0, *rubbing)]
 
     def _largest(self, gap: Array, pressure: Array, *slip: Array) -> list[float]:
         """The largest depth, pressure and slip of all conditions; nan without any."""

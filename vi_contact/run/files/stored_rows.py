@@ -95,14 +95,16 @@ def read_blocks(
 
 def numbers_of(path: str, lines: list[bytes], width: int, before: int) -> Array:
     """Return the numbers of lines (rows, width); InputError names the first line that holds something else."""
-    values = np.empty((len(lines), width))
+    values: list[list[float]] = []
     for i, line in enumerate(lines):
+        texts = line.replace(b"_", b"?").split(b",")  # float() would read 1_0 as ten
         try:
-            texts = line.replace(b"_", b"?").decode("ascii").split(",")  # float() would read 1_0 as ten
-            values[i] = np.reshape([float(text) for text in texts], width)  # one number alone would fill the row
-        except (ValueError, UnicodeDecodeError) as error:
+            if len(texts) != width:
+                raise ValueError(line)
+            values.append([float(text) for text in texts])
+        except ValueError as error:
             raise InputError(f"line {before + i + 2} of '{path}' is damaged: restore it or start a new run") from error
-    return values
+    return np.array(values).reshape(-1, width)
 
 
 class StoredArrays:
