@@ -8,7 +8,7 @@ missing. The unit of acceleration is not stated in such files.
 import json
 from typing import Any
 
-from ...core.checks import shown
+from ...core.checks import real, shown
 from ...core.errors import InputError
 from ..record import Record
 from .text import HEAD, TextFile
@@ -34,10 +34,10 @@ def read(text: TextFile) -> Record:
         raise InputError(f"{text.path}: time series {name!r} has a factor {shown(chosen['factor'])}, whose meaning "
                          "differs between tools; put it into the data")
     data = chosen.get("data")
-    if not isinstance(data, list) or len(data) < 2 or not all(_is_number(value) for value in data):
+    if not isinstance(data, list) or len(data) < 2 or not all(abs(real(value)) < 1e300 for value in data):
         raise InputError(f"{text.path}: \"data\" of time series {name!r} is no list of two or more numbers; correct it")
     step = chosen.get("dT", event.get("dT"))
-    if step is not None and not _is_number(step):
+    if step is not None and not abs(real(step)) < 1e300:
         raise InputError(f"{text.path}: \"dT\" of time series {name!r} is {shown(step)}; give a number of seconds")
     title = _text(event.get("description")) or _text(event.get("name"))
     return text.record(data, units=None, dt=step, title=title, format="SimCenter", component=name)
@@ -57,12 +57,6 @@ def _series(text: TextFile) -> tuple[dict[str, Any], list[dict[str, Any]]]:
         if isinstance(series, list) and series and all(isinstance(one, dict) for one in series):
             return event, series
     raise InputError(f"{text.path}: no event holds \"timeSeries\" with data; give the event file, not the workflow's")
-
-
-def _is_number(value: Any) -> bool:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return False
-    return abs(value) < 1e300
 
 
 def _text(value: Any) -> str:
