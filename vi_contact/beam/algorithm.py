@@ -155,8 +155,7 @@ def run_beam(stepper: BeamStepper, start: Start, *, steps: int, every: int = 0) 
 
 
 def _states(stepper: BeamStepper, y: Array, w: Array) -> Iterator[tuple[tuple[float, ...], Array, Array]]:
-    """Yield (values by COLUMNS, works and losses of the step alone; y, w) at the start and after every step, without
-    end."""
+    """Yield (values by COLUMNS, works and losses of the step alone; y, w) at the start and after every step."""
     dt, viscosity = stepper.dt, stepper.beam.viscosity
     M, S, uniform = beam_matrices(stepper.beam, stepper.elements)
 

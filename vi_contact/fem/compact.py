@@ -38,8 +38,7 @@ class Half(PetscMatrix):
 
 
 class Replaced(PetscMatrix):
-    """Hold a symmetric matrix that is another one but for ``part``, some of its owned rows; ``alike``: with entries in
-    the same places."""
+    """Hold a symmetric matrix that is another but for ``part``, some owned rows; ``alike``: same places."""
 
     def __init__(self, base: PetscMatrix, rows: Indices, part: Any, alike: bool) -> None:
         super().__init__(part)

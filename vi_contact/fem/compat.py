@@ -24,8 +24,7 @@ Indices = npt.NDArray[np.int32]
 fem: Any = dolfinx.fem  # untyped on purpose: names missing from the installed version are not errors here
 _mesh: Any = dolfinx.mesh
 
-VERSION: tuple[int, ...] = tuple(int(part) for part in dolfinx.__version__.split(".")[:2])
-"""DOLFINx's (major, minor)."""
+VERSION: tuple[int, ...] = tuple(int(part) for part in dolfinx.__version__.split(".")[:2])  # DOLFINx's (major, minor)
 
 _BASIX_ELEMENTS = VERSION >= (0, 7)
 _DOFMAP_PER_CELL_TYPE = VERSION >= (0, 11)

@@ -23,8 +23,7 @@ Value = tuple[float, ...] | Field
 
 
 def evaluate(name: str, value: Value, points: Array, t: float, comm: Comm) -> Array:
-    """Evaluate the value at this rank's points, (k, d); collective. InputError, on all ranks, for NaN or another
-    shape."""
+    """Evaluate the value at this rank's points, (k, d). InputError on all ranks for NaN, other shapes. Collective."""
     result, defect = evaluate_here(name, value, points, t)
     refuse([defect], comm)
     return result

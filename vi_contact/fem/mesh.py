@@ -30,8 +30,7 @@ from vi_contact.meshes.rows import found_in, number_alike
 TENSOR_ORDER = {"quadrilateral": [0, 1, 3, 2], "hexahedron": [0, 1, 3, 2, 4, 5, 7, 6]}
 """DOLFINx's vertices in Gmsh's numbering, where the two differ; also in VTK's."""
 
-_NOWHERE = (np.zeros(0, dtype=np.int32), np.zeros(1, dtype=np.int32))
-"""Destinations of no cells."""
+_NOWHERE = (np.zeros(0, dtype=np.int32), np.zeros(1, dtype=np.int32))  # destinations of no cells
 
 
 @dataclass(frozen=True, eq=False)

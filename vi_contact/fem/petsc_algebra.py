@@ -130,8 +130,7 @@ class PetscFactor:
 
     @property
     def bytes(self) -> float:
-        """Return the bytes of the entries, an equal share on each rank; 0 for factors that tell nothing, such as copies
-        on every rank."""
+        """Return the bytes of the entries, an equal share on each rank; 0 for factors that tell nothing, as copies."""
         try:
             count = self._pc.getFactorMatrix().getInfo()["nz_used"]  # MUMPS counts many in millions, below zero
         except PETSc.Error:

@@ -24,8 +24,7 @@ from .ties import PLACE_TOLERANCE, Pairs, Tied, paired
 
 
 def body_numbers(mesh: Any) -> Indices:
-    """Return the body (0, 1, ..., in the order of their smallest node number) of each local geometry node. Collective.
-    """
+    """Return the body (0, 1, ..., in the order of their least node number) of each local geometry node. Collective."""
     cells, numbers = compat.geometry_dofmap(mesh), node_numbers(mesh)
     count = mesh.topology.index_map(mesh.topology.dim).size_local
     first = np.repeat(cells[:, :1], cells.shape[1] - 1, axis=1)

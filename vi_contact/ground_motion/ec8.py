@@ -9,13 +9,12 @@ from ..core.algebra import Array
 from ..core.checks import attributes, real
 from ..core.errors import InputError
 
-GROUNDS = {
+GROUNDS = {  # S, T_B, T_C, T_D [s] by spectrum type and ground type: tables 3.2 and 3.3, the recommended values
     1: {"A": (1.0, 0.15, 0.4, 2.0), "B": (1.2, 0.15, 0.5, 2.0), "C": (1.15, 0.20, 0.6, 2.0),
         "D": (1.35, 0.20, 0.8, 2.0), "E": (1.4, 0.15, 0.5, 2.0)},
     2: {"A": (1.0, 0.05, 0.25, 1.2), "B": (1.35, 0.05, 0.25, 1.2), "C": (1.5, 0.10, 0.25, 1.2),
         "D": (1.8, 0.10, 0.30, 1.2), "E": (1.6, 0.05, 0.25, 1.2)},
 }
-"""S, T_B, T_C, T_D [s] by spectrum type and ground type: tables 3.2 and 3.3, the recommended values."""
 
 VERTICAL = {1: (0.90, 0.05, 0.15, 1.0), 2: (0.45, 0.05, 0.15, 1.0)}
 """a_vg / a_g, T_B, T_C, T_D [s] by spectrum type: table 3.4."""

@@ -76,11 +76,8 @@ def rms(record: Record) -> float:
     return math.sqrt(2.0 * STANDARD_GRAVITY / math.pi * arias(record) / record.duration)
 
 
-HOUSNER_PERIODS = np.linspace(0.1, 2.5, 241)
-"""Periods [s] of the trapezoidal rule in `housner_intensity`."""
-
-PREDOMINANT_PERIODS = np.geomspace(0.02, 10.0, 400)
-"""Periods [s] among which `predominant_period` looks, 1.6 % apart."""
+HOUSNER_PERIODS = np.linspace(0.1, 2.5, 241)  # periods [s] of the trapezoidal rule in `housner_intensity`
+PREDOMINANT_PERIODS = np.geomspace(0.02, 10.0, 400)  # periods [s] among which `predominant_period` looks, 1.6 % apart
 
 
 def psa(record: Record, period: float, *, damping: float = 0.05) -> float:

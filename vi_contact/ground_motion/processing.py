@@ -14,11 +14,8 @@ from ..core.checks import counted, number
 from ..core.errors import InputError
 from .record import Record
 
-LARGEST_RATIO = 1000
-"""Numerator and denominator of old dt / new dt may not exceed this; the filter grows with them."""
-
-HIGHEST = 6
-"""Highest degree of a baseline: beyond it a polynomial follows the shaking itself."""
+LARGEST_RATIO = 1000  # numerator and denominator of old dt / new dt may not exceed this; the filter grows with them
+HIGHEST = 6  # highest degree of a baseline: beyond it a polynomial follows the shaking itself
 
 
 def scaled(record: Record, *, factor: float) -> Record:

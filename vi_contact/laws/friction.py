@@ -62,8 +62,7 @@ class Coulomb:
         object.__setattr__(self, "mu", _checked("Coulomb", "the friction coefficient mu", self.mu))
 
     def limit(self, r_n: Array, weights: Array, scale: float) -> Array:
-        """Return mu · max(r_n, 0), shape (n,): the tension of a held point, or of an unconverged iterate, rubs on
-        nothing."""
+        """Return mu · max(r_n, 0), shape (n,): tension, of a held point or on the way to an answer, rubs on nothing."""
         return _nodal("Coulomb", "mu", self.mu, len(r_n)) * np.maximum(r_n, 0.0)
 
     def slope(self, weights: Array) -> Array:

@@ -138,8 +138,7 @@ class _Neighbours:
 
 
 def _neighbours(system: SemiDiscreteSystem, donors: Mask, columns: Indices) -> _Neighbours:
-    """What this rank needs to know of the donor nodes in these columns; those that other ranks own are told to all.
-    Collective."""
+    """What this rank needs of the donor nodes in these columns; what other ranks own is told to all. Collective."""
     d, first = system.influence.shape[1], system.algebra.first(system.rows)
     node, every = np.asarray(system.space.ids) // d, system.space.coordinates
 

@@ -63,8 +63,7 @@ class LinearElastic:
 
     @property
     def c_p(self) -> float:
-        """Return the pressure wave speed sqrt((lame_lambda + 2 shear_modulus) / rho) [m/s] in a solid or in plane
-        strain."""
+        """Return the pressure wave speed sqrt((lame_lambda + 2 shear_modulus) / rho) [m/s], also in plane strain."""
         return math.sqrt((self.lame_lambda + 2.0 * self.shear_modulus) / self.rho)
 
     @property
@@ -74,8 +73,7 @@ class LinearElastic:
 
 
 class Section(Protocol):
-    """Say how the body is cut out of space: integrals over the mesh are multiplied by `thickness` [m] (1 for a solid).
-    """
+    """Say how the body is cut out of space: integrals over the mesh are multiplied by `thickness` [m] (solids: 1)."""
 
     @property
     def thickness(self) -> float: ...
@@ -86,8 +84,7 @@ class Section(Protocol):
 
 @dataclass(frozen=True)
 class PlaneStress:
-    """Cut a thin panel of the given thickness [m], free of stress across it: lambda_eff = 2 lambda mu / (lambda + 2
-    mu)."""
+    """Cut a panel of this thickness [m], free of stress across it: lambda_eff = 2 lambda mu / (lambda + 2 mu)."""
 
     thickness: float = 1.0
 

@@ -6,10 +6,9 @@ import numpy.typing as npt
 Rows = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
 
-GMSH_NUMBERS = {
+GMSH_NUMBERS = {  # Gmsh's numbers of a cell, called by UFL's name, and of its side
     "interval": (1, 15), "triangle": (2, 1), "quadrilateral": (3, 1), "tetrahedron": (4, 2), "hexahedron": (5, 3),
 }
-"""Gmsh's numbers of a cell, called by UFL's name, and of its side."""
 
 _SIDES: dict[str, list[tuple[int, ...]]] = {
     "interval": [(0,), (1,)],

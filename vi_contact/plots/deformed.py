@@ -36,8 +36,7 @@ class Tractions:
 
 @dataclass(frozen=True)
 class StoredFrames:
-    """Hold the fields of a run: ``points`` (n, 2) [m], ``cells`` (c, corners), times ``t`` (f,) [s], their files with
-    the groups in them."""
+    """Hold fields of a run: ``points`` (n, 2) [m], ``cells`` (c, corners), times ``t`` (f,) [s], (file, group) each."""
 
     points: Array
     cells: Indices

@@ -17,8 +17,7 @@ from ..ground_motion.record import UNITS, Record
 from ..ground_motion.spectra import ResponseSpectrum
 from .histories import canvas, length_unit, panels, plain, plain_numbers, save, scaled
 
-SAMPLES_A_PERIOD = 10
-"""A spectrum is drawn pale at periods with fewer samples of the record than this."""
+SAMPLES_A_PERIOD = 10  # a spectrum is drawn pale at periods with fewer samples of the record than this
 
 
 def plot_motion(record: Record, path: str | Path, *, title: str | None = None, units: str = "m/s2") -> Path:

@@ -72,8 +72,7 @@ class SoilColumn:
         return linear_problem(M[2:, 2:], C[2:, 2:], K[2:, 2:], Load(np.zeros(len(inertia)), general=(load,)), 2)
 
     def on_dashpots(self, shear: float, normal: float, upgoing: Callable[[float], Array]) -> ContactProblem:
-        """Return the system of all nodes, node 0 on dashpots of these impedances [Pa s/m], with the upgoing wave (2,)
-        [m/s]."""
+        """Return the system of all nodes, node 0 on dashpots of these impedances [Pa s/m]; ``upgoing``: (2,) [m/s]."""
         M, C, K = self.matrices()
         impedance = np.array([shear, normal])
         foot = sp.csr_matrix((impedance, ([0, 1], [0, 1])), shape=C.shape)

@@ -28,8 +28,7 @@ INDEPENDENT = 0.01  # least singular value of a node's directions: two that turn
 
 @dataclass(frozen=True, eq=False)
 class Facing:
-    """Hold what contact nodes face: opposite node s the other body moves by sum_j P_sj u_j of these nodes, which are
-    those of all ranks."""
+    """Hold what contact nodes face: opposite node s the other body moves by sum_j P_sj u_j, nodes of all ranks."""
 
     nodes: Nodes
     P: sp.csr_matrix
@@ -150,8 +149,7 @@ def corner_of(directions: Array) -> tuple[list[int], Array]:
 
 
 def given(parts: Sequence[NodalConditions]) -> tuple[Indices, Array, Array, Mask]:
-    """Return what makes the frames of these conditions: numbers and points of their nodes, directions, held components.
-    """
+    """Return what makes the frames of conditions: numbers and points of their nodes, directions, held components."""
     nodes = joined_nodes([part.nodes for part in parts])
     return nodes.numbers, nodes.points, np.concatenate([part.directions for part in parts]), nodes.held
 
@@ -176,8 +174,7 @@ def surface_of(space: FemSpace, parts: Sequence[NodalConditions], **data: Any) -
 
 
 def _turn(space: FemSpace, blocks: Array, index: Indices) -> PetscMatrix | None:
-    """The identity but for the blocks of the contact nodes (T, or T⁻ᵀ); None when all are the identity too. Collective.
-    """
+    """The identity but for the blocks of contact nodes (T, or T⁻ᵀ); None when all are the identity too. Collective."""
     n = len(space.ids)
     if not largest(space.comm, np.any(blocks != np.eye(space.dimension))):
         return None
@@ -219,8 +216,7 @@ def _coupling(
 
 
 def _turns(space: FemSpace, frames: NodalFrames, numbers: Indices) -> Array:
-    """T (k, d, d) of nodes that are faced, whichever rank owns them; the axes where they are in contact with nothing
-    else. Collective."""
+    """T (k, d, d) of nodes that are faced, of all ranks; the axes where nothing else touches them. Collective."""
     d = space.dimension
     known = np.zeros((len(space.nodes), 1 + d * d))
     own = space.blocks_of(frames.numbers)

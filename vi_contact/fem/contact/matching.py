@@ -20,8 +20,7 @@ DISTANCES = 2**20  # in a table, where all nodes of side 2 are looked at
 
 @dataclass(frozen=True, eq=False)
 class Side:
-    """Hold a boundary that may touch another, the same on every rank: name, nodes, facets as rows of places among
-    them."""
+    """Hold a boundary that may touch another, the same on every rank: name, nodes, facets as rows of their places."""
 
     name: str
     nodes: Nodes

@@ -44,8 +44,7 @@ def everywhere(comm: Comm, nodes: Nodes) -> Nodes:
 
 
 def slots_of(comm: Comm, keys: Indices) -> Indices:
-    """Return the places (m,) of this rank's ascending keys among those of all ranks; equal ones are of one rank.
-    Collective."""
+    """Return the places (m,) of this rank's ascending keys among all; equal ones are of one rank. Collective."""
     every = np.sort(np.concatenate(from_each(comm, keys)))
     return np.asarray(np.searchsorted(every, keys) + np.arange(len(keys)) - np.searchsorted(keys, keys))
 

@@ -101,8 +101,7 @@ def side_of(space: FemSpace, facets: Facets) -> Side:
 
 
 def _faces(space: FemSpace, one: Side, around: Boundary, angle: float) -> list[tuple[Side, Array]]:
-    """Return the smooth faces of side 1 with their own normals and weights, and the nodes' normals over the whole
-    side."""
+    """Return the smooth faces of side 1, with normals and weights of their own, and the nodes' over the whole side."""
     nodes, facet = split(space, around, one.nodes, angle)
     if len(nodes.numbers) == len(one.nodes.numbers):
         return [(one, one.nodes.normals)]
@@ -192,8 +191,7 @@ def _gap(space: FemSpace, name: str, two: Side, nodes: Nodes, directions: Array,
 
 
 def _prescribed_motion(space: FemSpace, conditions: NodalConditions) -> dict[str, Callable[[float], Array]]:
-    """``motion`` and ``slide`` of this rank's conditions where side 2 has prescribed nodes that move: none when none
-    does. Collective."""
+    """``motion`` and ``slide`` of this rank's conditions where nodes of side 2 are moved, if any are. Collective."""
     facing, held = conditions.facing, conditions.nodes.held
     moves = any(condition.moves for condition in space.prescribed)
     if facing is None or not moves or not largest(space.comm, facing.nodes.held[facing.P.indices].any()):

@@ -13,8 +13,7 @@ from ...core.errors import InputError
 from ..record import Record
 from .text import NUMBER, TextFile
 
-HEADER_LINES = 8
-"""NPTS and DT are looked for in this many first lines."""
+HEADER_LINES = 8  # NPTS and DT are looked for in this many first lines
 
 _NPTS = re.compile(r"\bNPTS\s*+[=:]\s*+(\d++)", re.IGNORECASE)
 _DT = re.compile(rf"\bDT\s*+[=:]\s*+({NUMBER})", re.IGNORECASE)

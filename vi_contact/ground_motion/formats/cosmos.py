@@ -15,8 +15,7 @@ from ...core.errors import InputError
 from ..record import Record
 from .text import NUMBER, TextFile
 
-STEP = 33
-"""Place of the time step among the real header values of COSMOS, from 0."""
+STEP = 33  # place of the time step among the real header values of COSMOS, from 0
 
 _FIRST = re.compile(r"^\s*+(?:un)?corrected accelerogram|\(\s*+format\s++v[\d.]++ with \d++ text lines", re.IGNORECASE)
 _COUNT = re.compile(r"^\s*+(\d++)\s")

@@ -13,8 +13,7 @@ from ..record import Record, canonical_units
 from .text import NUMBER, TextFile
 
 KEYS = ("Origin Time", "Station Code", "Dir.", "Record Time", "Sampling Freq(Hz)", "Duration Time(s)", "Scale Factor",
-        "Max. Acc. (gal)", "Memo.")
-"""Header entries used here; the last one ends the header."""
+        "Max. Acc. (gal)", "Memo.")  # header entries used here; the last one ends the header
 
 _SCALE = re.compile(rf"({NUMBER})\s*+\(([^()]*+)\)\s*+/\s*+({NUMBER})\s*+$")
 _FREQUENCY = re.compile(rf"({NUMBER})\s*+(?:Hz)?\s*+$", re.IGNORECASE)

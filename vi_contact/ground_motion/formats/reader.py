@@ -13,11 +13,8 @@ from ..record import LARGEST_PEAK, Record
 from . import afad, at2, columns, cosmos, esm, knet, simcenter, smc
 from .text import load_text
 
-SEVERAL = (cosmos, afad, simcenter)
-"""Formats whose files may hold several components."""
-
-STEPS = 1e-6, 100.0
-"""Shortest and longest time step [s] of a file; that of seismographs is 0.001 to 0.05."""
+SEVERAL = (cosmos, afad, simcenter)  # formats whose files may hold several components
+STEPS = 1e-6, 100.0  # shortest and longest time step [s] of a file; that of seismographs is 0.001 to 0.05
 
 
 def read_record(path: str | os.PathLike[str], units: str | None = None, *, dt: float | None = None,

@@ -34,8 +34,7 @@ _BETWEEN = re.compile(r"[\s,;]+")
 _BETWEEN_DECIMALS = re.compile(r"[\s;]+")
 _COMMA_INSIDE = re.compile(r"(?<=\d),(?=\d)")
 
-Entries = Mapping[str, tuple[int, str]]
-"""Key of a header -> index of its line, and value."""
+Entries = Mapping[str, tuple[int, str]]  # key of a header -> index of its line, and value
 
 
 @dataclass(frozen=True, kw_only=True)

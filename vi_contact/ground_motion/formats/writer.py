@@ -5,8 +5,7 @@ import os
 from ...core.errors import InputError
 from ..record import UNITS, Record, canonical_units
 
-DIGITS = 9
-"""Significant digits of a written sample; what is read back differs by half a unit in the last of them."""
+DIGITS = 9  # significant digits of a written sample; what is read back differs by half a unit in the last of them
 
 
 def write_columns(record: Record, path: str | os.PathLike[str], units: str) -> None:

@@ -155,8 +155,7 @@ class SoilProbe(Probe):
 
 @dataclass(frozen=True)
 class Openings:
-    """Record the largest gap of each side of the contact: columns opening_<side> [m]. ``sides``: name -> mask (total,).
-    """
+    """Record the largest gap of each side of the contact: columns opening_<side> [m]. ``sides``: name -> (total,)."""
 
     sides: Mapping[str, Mask]
 

@@ -104,8 +104,7 @@ def weakly(method: Callable[..., Any]) -> Callable[..., Any]:
 
 
 class Lent:
-    """Pass an object to PETSc as context without giving it away, as ``weakly`` does with a method; once it is gone,
-    PETSc finds nothing there."""
+    """Pass an object to PETSc as context without giving it away, as ``weakly`` does with a method."""
 
     def __init__(self, lent: Any) -> None:
         self._lent = weakref.ref(lent)

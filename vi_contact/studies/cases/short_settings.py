@@ -132,8 +132,7 @@ def _tables(value: Any) -> list[dict[str, Any]]:
 
 
 def _named(kind: str, name: str, methods: Mapping[str, Sequence[str]]) -> str:
-    """Return the table of one of the keys, or of the one that a method belongs to, as TOML; a class of others has a
-    colon."""
+    """Return the table of one of the keys, or of a method's own, as TOML; a class of others has a colon."""
     for owner, names in methods.items():
         if name in names:
             return toml_value({"type": owner, "method": {"type": name}})
