@@ -93,7 +93,8 @@ int factorise(int n, int *p, int *i, double *x, int *perm, Factor **made) {
 }
 
 /* The entries of the first `inner` columns, counted when p is NULL; zeros that supernodes store are left out. Each column
-   begins with its diagonal entry, inverted. `corner`: the other columns, dense (m, m), column by column. */
+   begins with its diagonal entry, inverted; in the place of its row stands whether the next column has the same rows below
+   its own diagonal. `corner`: the other columns, dense (m, m), column by column. */
 long columns(const Factor *f, int inner, long *p, int *i, double *x, double *corner) {
     const cholmod_factor *L = f->L;
     const int *first = L->super, *from = L->pi, *at = L->px, *rows = L->s;
@@ -115,35 +116,21 @@ long columns(const Factor *f, int inner, long *p, int *i, double *x, double *cor
             }
         }
     }
-    if (p) p[inner] = count;
+    if (!p) return count;
+    p[inner] = count;
+    for (int j = 0; j < inner; j++) {
+        const long high = p[j + 1] - p[j] - 1;
+        i[p[j]] = j + 1 < inner && high > 0 && p[j + 2] - p[j + 1] == high && i[p[j] + 1] == j + 1
+                  && !memcmp(i + p[j] + 2, i + p[j + 1] + 1, (high - 1) * sizeof(int));
+    }
     return count;
 }
 
-/* y <- L^-1 y on the first `inner` columns. */
-void forward(int inner, const long *p, const int *i, const double *x, double *restrict y) {
-    for (int j = 0; j < inner; j++) {
-        const double t = y[j] *= x[p[j]];
-        for (long k = p[j] + 1; k < p[j + 1]; k++) y[i[k]] -= x[k] * t;
-    }
-}
-
-/* y <- L^-T y on the first `inner` columns. Memory is read downwards, within columns too: one stream for the processor. */
-void backward(int inner, const long *p, const int *i, const double *x, double *restrict y) {
-    for (int j = inner - 1; j >= 0; j--) {
-        double s = 0.0, t = 0.0, u = 0.0, w = 0.0;
-        long k = p[j + 1] - 1;
-        for (; k - 3 > p[j]; k -= 4) {
-            s += x[k] * y[i[k]]; t += x[k - 1] * y[i[k - 1]];
-            u += x[k - 2] * y[i[k - 2]]; w += x[k - 3] * y[i[k - 3]];
-        }
-        for (; k > p[j]; k--) s += x[k] * y[i[k]];
-        y[j] = (y[j] - ((s + t) + (u + w))) * x[p[j]];
-    }
-}
-
-/* The same for k loads at once: L and A are read once for up to 8 of them, whose numbers lie side by side in y. Loads and
-   answers are the rows of b and out. A width that the compiler knows keeps them in registers. Sums go in the order of
-   the functions above, products in that of PETSc for nodes, so that rounding is the same too. */
+/* y <- L^-1 y and y <- L^-T y on the first `inner` columns, for one load or for k: L and A are read once for up to 8 of
+   them, whose numbers lie side by side in y. Loads and answers are the rows of b and out. A width that the compiler knows
+   keeps them in registers. Two columns with the same rows go together where that was measured faster: with many loads it
+   halves the ways to y, with one the processor waits for L, which comes faster as one stream. Sums go in one order for any
+   width, products in that of PETSc for nodes, so that rounding is the same too. */
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && defined(__GLIBC__)
 #define FASTEST __attribute__((target_clones("avx2", "default")))
 #else
@@ -168,29 +155,51 @@ scatter(const int w, int k, long n, const int *order, const double *y, double *r
 static inline __attribute__((always_inline)) void
 forward_of(const int w, int inner, const long *p, const int *i, const double *x, double *restrict y) {
     for (int j = 0; j < inner; j++) {
-        double t[8];
-        EACH t[c] = y[(long) j * w + c] *= x[p[j]];
-        for (long k = p[j] + 1; k < p[j + 1]; k++) {
-            double *to = y + (long) i[k] * w;
-            EACH to[c] -= x[k] * t[c];
-        }
+        double t[8], u[8], *mine = y + (long) j * w;
+        const double *one = x + p[j], *other = x + p[j + 1];
+        const long high = p[j + 1] - p[j];
+        const int *row = i + p[j], two = w > 2 && row[0];
+        EACH t[c] = mine[c] *= one[0];
+        if (two) {
+            EACH u[c] = mine[w + c] = (mine[w + c] - one[1] * t[c]) * other[0];
+            for (long k = 2; k < high; k++) {
+                double *to = y + (long) row[k] * w;
+                EACH to[c] = (to[c] - one[k] * t[c]) - other[k - 1] * u[c];
+            }
+            j++;
+        } else
+            for (long k = 1; k < high; k++) {
+                double *to = y + (long) row[k] * w;
+                EACH to[c] -= one[k] * t[c];
+            }
     }
 }
 
+/* Memory is read downwards, within columns too: one stream for the processor. Of two columns with the same rows the first
+   has one row more, that of the second, which is known when the others have been summed up. */
 static inline __attribute__((always_inline)) void
 backward_of(const int w, int inner, const long *p, const int *i, const double *x, double *restrict y) {
     for (int j = inner - 1; j >= 0; j--) {
-        double s[8], t[8], u[8], v[8], *mine = y + (long) j * w;
-        EACH s[c] = t[c] = u[c] = v[c] = 0.0;
-        long k = p[j + 1] - 1;
-        for (; k - 3 > p[j]; k -= 4) {
-            EACH s[c] += x[k] * y[(long) i[k] * w + c];
-            EACH t[c] += x[k - 1] * y[(long) i[k - 1] * w + c];
-            EACH u[c] += x[k - 2] * y[(long) i[k - 2] * w + c];
-            EACH v[c] += x[k - 3] * y[(long) i[k - 3] * w + c];
-        }
-        for (; k > p[j]; k--) EACH s[c] += x[k] * y[(long) i[k] * w + c];
-        EACH mine[c] = (mine[c] - ((s[c] + t[c]) + (u[c] + v[c]))) * x[p[j]];
+        const int two = w > 4 && j > 0 && i[p[j - 1]];
+        const double *one = x + p[j], *other = two ? x + p[j - 1] + 1 : one;
+        const int *row = i + p[j];
+        double s[4][8], t[4][8], *mine = y + (long) j * w;
+        for (int q = 0; q < 4; q++) EACH s[q][c] = t[q][c] = 0.0;
+        long k = p[j + 1] - p[j] - 1, left;
+        for (; k > 3; k -= 4)
+            for (int q = 0; q < 4; q++) {
+                const double *from = y + (long) row[k - q] * w;
+                EACH s[q][c] += one[k - q] * from[c];
+                if (two) EACH t[q][c] += other[k - q] * from[c];
+            }
+        for (left = k; left > 0; left--) EACH s[0][c] += one[left] * y[(long) row[left] * w + c];
+        EACH mine[c] = (mine[c] - ((s[0][c] + s[1][c]) + (s[2][c] + s[3][c]))) * one[0];
+        if (!two) continue;
+        const int rest[4] = {j, k > 0 ? row[1] : 0, k > 1 ? row[2] : 0, k > 2 ? row[3] : 0};
+        for (int q = 0; k == 3 && q < 4; q++) EACH t[q][c] += other[3 - q] * y[(long) rest[3 - q] * w + c];
+        for (; k < 3 && k >= 0; k--) EACH t[0][c] += other[k] * y[(long) rest[k] * w + c];
+        EACH mine[c - w] = (mine[c - w] - ((t[0][c] + t[1][c]) + (t[2][c] + t[3][c]))) * x[p[j - 1]];
+        j--;
     }
 }
 
@@ -206,6 +215,9 @@ product_of(const int w, int k, long n, const int *p, const int *i, const double 
         for (int c = 0; c < k; c++) out[c * n + j] = s[c];
     }
 }
+
+FASTEST void forward(int inner, const long *p, const int *i, const double *x, double *y) { forward_of(1, inner, p, i, x, y); }
+FASTEST void backward(int inner, const long *p, const int *i, const double *x, double *y) { backward_of(1, inner, p, i, x, y); }
 
 #define BY_WIDTH(call) switch (w) { case 8: call(8); break; case 4: call(4); break; case 2: call(2); break; default: call(1); }
 
