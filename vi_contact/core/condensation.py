@@ -8,7 +8,10 @@ contact unknown. Contact values here are those of all ranks, on every rank: the 
 conditions or, with friction, (r_n, r_t) node by node. What cannot move (a prescribed tangent) stays at zero.
 """
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import lapack
 
 from .algebra import Array, EffectiveMatrix, Indices, Mask
@@ -36,7 +39,7 @@ class Last:
 
     def __init__(self, factor: ContactLast, there: Mask) -> None:
         self._factor, self.there, corner = factor, there, factor.corner
-        self._free = slice(None) if there.all() else there
+        self._all = bool(there.all())
         inverse = lapack.dpotri(corner, lower=1)[0] if len(corner) else corner
         self.flexibility: Array = np.zeros((len(there), len(there)))
         self.flexibility[np.ix_(there, there)] = np.tril(inverse) + np.tril(inverse, -1).T
@@ -44,16 +47,22 @@ class Last:
     def free(self, b: Array) -> Array:
         """Return x_c (k,) of A⁻¹b; of several loads, a row for each."""
         self._y = self._factor.forward(b)
-        self._x = np.zeros((*b.shape[:-1], len(self.there)))
-        self._x.T[self._free] = self._factor.free(self._y).T
+        self._x = x = self._factor.free(self._y)
+        if not self._all:
+            self._x = np.zeros((*b.shape[:-1], len(self.there)))
+            self._x.T[self.there] = x.T
         return self._x
+
+    def _moving(self, x: NDArray[Any]) -> NDArray[Any]:
+        return x if self._all else x.T[self.there].T
 
     def answer(self, r: Array, held: Mask, values: Array) -> Array:
         """Return x = A⁻¹(b - r), owned rows, with ``held`` unknowns (k,) on these values: it removes round-off only."""
-        x, there = self._x.T[self._free].T, self._free
         if np.count_nonzero(r):
-            x = self._factor.free(self._y - self._factor.reduced(r.T[there].T))
-        return self._factor.backward(np.where(held.T[there].T, values.T[there].T, x))
+            x = self._factor.free(self._y - self._factor.reduced(self._moving(r)))
+        else:
+            x = self._moving(self._x)
+        return self._factor.backward(np.where(self._moving(held), self._moving(values), x))
 
     def response(self, r: Array) -> Array:
         """Return A⁻¹ r, owned rows, of forces r (k,)."""

@@ -107,11 +107,15 @@ class HistoryFiles:
         return True
 
     def save(self) -> None:
-        """Write history.h5 with all rows; the journal starts anew."""
-        with open(self._folder / HISTORY_CSV, "rb") as csv, closing(StoredArrays(self._folder, self._table)) as arrays:
-            csv.seek(self._tail)
-            since = read_blocks(csv, self._table, arrays, first=self._saved)
-            self._replace((block for _, block in since), self._saved)
+        """Write history.h5 with all rows, from the memory if they are there; the journal starts anew."""
+        if self._rows == self._table.count and (known := self._table.remembered()) is not None:
+            self._replace(iter([{name: values[self._saved :] for name, values in known.items()}]), self._saved)
+        else:
+            path, stored = self._folder / HISTORY_CSV, StoredArrays(self._folder, self._table)
+            with open(path, "rb") as csv, closing(stored) as arrays:
+                csv.seek(self._tail)
+                since = read_blocks(csv, self._table, arrays, first=self._saved)
+                self._replace((block for _, block in since), self._saved)
         self._tail = self._csv.tell()
         self._open_journal()
 

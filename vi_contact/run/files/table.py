@@ -101,6 +101,12 @@ class Table:
         if self._kept:
             self._blocks.append(block)
 
+    def remembered(self) -> Block | None:
+        """Return all rows, column -> values, arrays on rank 0 only; None when the memory has let some go."""
+        self._gather()
+        names = [*self.numbers, *self.arrays] if self._kept else []
+        return {name: np.concatenate([block[name] for block in self._blocks]) for name in names} or None
+
     def facts(self) -> dict[str, Any]:
         """Return what the rows say about the run, for its summary."""
         tally = copy.deepcopy(self._tally)
@@ -111,9 +117,7 @@ class Table:
     def history(self) -> Mapping[str, Array]:
         """Return column -> values of all rows: (rows,) float64, or (rows, *shape of the arrays); of too many rows for
         the memory, or points for every rank, as they are in the file. Collective."""
-        self._gather()
-        names = [*self.numbers, *self.arrays] if self._kept else []
-        kept = {name: np.concatenate([block[name] for block in self._blocks]) for name in names}
+        kept = self.remembered() or {}
         shared = [name for name in self.arrays if name in kept and self.arrays[name].shape[:1] <= (SHARED,)]
         pieces = self._comm.bcast({name: 1 + kept[name].nbytes // BYTES for name in shared})
         for name, count in pieces.items() if self._comm.size > 1 else ():  # messages of MPI hold 2 GB at most
