@@ -189,6 +189,15 @@ def test_petsc_options_are_told_from_ours():
     assert split_petsc(["run", "--out", "x"]) == (["run", "--out", "x"], [])
 
 
+@pytest.mark.parametrize("old", ["wall", "channel --size 0.25", "beam --t-end 0.5 --exact", "layer --k 1 2"])
+def test_old_commands_name_the_new_ones(old, capsys):
+    """One sentence, and where their options went; nothing is computed."""
+    assert main(old.split()) == 1
+    said = capsys.readouterr().err
+    assert f"give vi-contact run {old.split()[0]}, and" in said and "CHANGELOG.md" in said
+    assert said.startswith("vi-contact: '") and said.count("\n") == 1
+
+
 def test_cases_are_listed(capsys):
     assert main(["cases"]) == 0
     *lines, folder = capsys.readouterr().out.splitlines()

@@ -5,7 +5,7 @@ import sys
 import traceback
 from collections.abc import Callable, Sequence
 
-from ..core.errors import Interrupted, OutOfTime, ViContactError
+from ..core.errors import InputError, Interrupted, OutOfTime, ViContactError
 from ..core.version import __version__
 from .case import add_case_commands
 from .errors import Parser, check_words, fail_together, printable, told, world
@@ -43,12 +43,21 @@ def split_petsc(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
     return own, petsc
 
 
+def refuse_retired(arguments: Sequence[str]) -> None:
+    """Raise InputError for a command of before that is a case now, with the command in its place."""
+    if arguments and arguments[0] in ("wall", "channel", "beam", "layer"):
+        old = arguments[0]
+        raise InputError(f"'{old}' is a case now: give vi-contact run {old}, and for its pictures vi-contact report "
+                         f"DIR; vi-contact run --help and the table of options in CHANGELOG.md tell the rest")
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command and print its text, or one sentence on standard error and return 1; 128 + n after signal n, 75 when
     the wall time was nearly over."""
     own, petsc = split_petsc(sys.argv[1:] if arguments is None else arguments)
 
     def command() -> None:
+        refuse_retired(own)
         options = parser(own[0] if own else "").parse_args(own)
         if petsc:
             import petsc4py
