@@ -23,10 +23,8 @@ class SingleStep:
     def check(self, problem: ContactProblem) -> None:
         """Raise InputError for massless contact nodes: their forces would swing for ever."""
         if problem.equations.massless is not None:
-            raise InputError(
-                f"{type(self).__name__} needs mass at the contact nodes, whose forces would swing for ever: give the "
-                "problem mass=ConsistentMass(), or use the default scheme Trapezoidal()"
-            )
+            raise InputError(f"{type(self).__name__} needs mass at the contact nodes, whose forces would swing for "
+                             "ever: give the problem mass=ConsistentMass(), or use the default scheme Trapezoidal()")
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
         """Return the state: there is nothing to prepare."""
@@ -84,17 +82,12 @@ def check_balance(name: str, problem: ContactProblem) -> None:
     """
     massless, surface = problem.equations.massless is not None, problem.surface
     if massless and problem.impact is not None:
-        raise InputError(
-            f"the impact law {problem.impact} acts on the mass of contact nodes and this problem has none there: leave "
-            "the law out, or give the problem mass=ConsistentMass()"
-        )
+        raise InputError(f"the impact law {problem.impact} acts on the mass of contact nodes and this problem has none "
+                         "there: leave the law out, or give the problem mass=ConsistentMass()")
     if massless or not surface.some(~surface.bilateral & (surface.compliance == 0.0)):
         return
     told = problem.equations.cached(f"told of {name}", list)
     if not told and surface.comm.rank == 0:
-        log.warning(
-            "%s with consistent mass can gain energy whenever a contact opens: leave out mass=ConsistentMass(), or "
-            "take ContactStabilisedNewmark() or Midpoint()",
-            name,
-        )
+        log.warning("%s with consistent mass can gain energy whenever a contact opens: leave out "
+                    "mass=ConsistentMass(), or take ContactStabilisedNewmark() or Midpoint()", name)
     told.append(True)

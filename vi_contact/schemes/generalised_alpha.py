@@ -138,10 +138,8 @@ class GeneralisedAlpha(AlphaStep):
         stable = alpha_m <= alpha_f + SLACK and alpha_f <= 0.5 + SLACK and gamma >= least - SLACK
         if not (stable and np.inf > beta >= 0.5 * gamma - SLACK and np.isfinite(least + gamma)):
             told = ", ".join(f"{name}={shown(getattr(self, name))}" for name in self.__dataclass_fields__)
-            raise InputError(
-                f"{told} are not unconditionally stable, and contact has no highest frequency to choose dt by: give "
-                "alpha_m <= alpha_f <= 1/2, gamma >= 1/2 - alpha_m + alpha_f, beta >= gamma/2"
-            )
+            raise InputError(f"{told} are not unconditionally stable, and contact has no highest frequency to choose "
+                             "dt by: give alpha_m <= alpha_f <= 1/2, gamma >= 1/2 - alpha_m + alpha_f, beta >= gamma/2")
 
     @property
     def weights(self) -> "GeneralisedAlpha":

@@ -58,9 +58,8 @@ class LinearMultistep(BalanceStep):
         if q < 1 or len(self.b) != q + 1 or len(self.gamma) != q + 1:
             raise InputError("LinearMultistep a, b and gamma must have the same length q + 1 >= 2 (levels p, ..., p-q)")
         if self.b[0] == 0.0 or self.mu == 0.0 or self.gamma[0] == 0.0:
-            raise InputError(
-                "LinearMultistep needs b[0], gamma[0] and mu other than zero: only implicit members can hold contact"
-            )
+            raise InputError("LinearMultistep needs b[0], gamma[0] and mu other than zero: only implicit members can "
+                             "hold contact")
         level = -np.arange(q + 1.0)
         a, b, gamma = (np.asarray(c, dtype=float) for c in (self.a, self.b, self.gamma))
         defects = (a.sum(), a @ level - b.sum(), gamma.sum(), gamma @ level, gamma @ level**2 - 2.0 * self.mu * b.sum())
@@ -69,10 +68,9 @@ class LinearMultistep(BalanceStep):
             raise InputError("LinearMultistep coefficients are inconsistent: eq. 11a must be exact for u = 1, t and "
                              "eq. 11b for u = 1, t, t²")
         if self.spectral_radius() > 1.0 + 1e-6:
-            raise InputError(
-                f"LinearMultistep a={self.a}, b={self.b}, gamma={self.gamma} is not unconditionally stable: contact "
-                "has no highest frequency to choose dt by; take other coefficients, for Newmark beta >= gamma/2 >= 1/4"
-            )
+            raise InputError(f"LinearMultistep a={self.a}, b={self.b}, gamma={self.gamma} is not unconditionally "
+                             "stable: contact has no highest frequency to choose dt by; take other coefficients, for "
+                             "Newmark beta >= gamma/2 >= 1/4")
 
     def spectral_radius(self) -> float:
         """Return the largest |z| of the solutions u(p) = z^p of u'' + 2 xi w u' + w² u = 0 over FREQUENCIES w dt and

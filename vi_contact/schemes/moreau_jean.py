@@ -62,30 +62,22 @@ class MoreauJean(SingleStep):
         between("MoreauJean theta", self.theta, 0.5, 1.0, "give a weight from 0.5 to 1, less is unstable")
         largest = 1.0 / (1.0 + self.e)
         if self.theta > largest + 1e-12 and not self.allow_energy_gain:
-            raise InputError(
-                f"MoreauJean theta={self.theta} with e={self.e} creates energy in impacts: give theta from 0.5 to "
-                f"1/(1 + e) = {largest:g}, or allow_energy_gain=True"
-            )
+            raise InputError(f"MoreauJean theta={self.theta} with e={self.e} creates energy in impacts: give theta "
+                             f"from 0.5 to 1/(1 + e) = {largest:g}, or allow_energy_gain=True")
 
     def check(self, problem: ContactProblem) -> None:
         """Raise InputError for massless contact nodes, springs, an impact law, or a bilateral point with a gap."""
         super().check(problem)
         surface = problem.surface
         if surface.some(surface.compliance > 0.0):
-            raise InputError(
-                "MoreauJean stops velocities and springs do not: use ContactStabilisedNewmark() or Midpoint() on "
-                "elastic supports"
-            )
+            raise InputError("MoreauJean stops velocities and springs do not: use ContactStabilisedNewmark() or "
+                             "Midpoint() on elastic supports")
         if problem.impact is not None:
-            raise InputError(
-                f"MoreauJean has its own restitution coefficient and {problem.impact} would act on top of it: leave "
-                "the impact law out, and give MoreauJean(e=…)"
-            )
+            raise InputError(f"MoreauJean has its own restitution coefficient and {problem.impact} would act on top of "
+                             "it: leave the impact law out, and give MoreauJean(e=…)")
         if surface.some(surface.bilateral & (surface.gap0 > 0.0)):
-            raise InputError(
-                "MoreauJean holds the velocity of bilateral points and would never close their initial gap: let them "
-                "start on the obstacle, or use another scheme"
-            )
+            raise InputError("MoreauJean holds the velocity of bilateral points and would never close their initial "
+                             "gap: let them start on the obstacle, or use another scheme")
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
         """Return A = M + theta dt C + theta² dt² K."""

@@ -34,10 +34,8 @@ class SS22(SingleStep):
 
     def __post_init__(self) -> None:
         if not np.inf > real(self.theta2) >= real(self.theta1) >= 0.5:
-            raise InputError(
-                f"SS22 weights theta1={shown(self.theta1)}, theta2={shown(self.theta2)}: give theta2 >= theta1 >= 0.5, "
-                "the unconditionally stable range"
-            )
+            raise InputError(f"SS22 weights theta1={shown(self.theta1)}, theta2={shown(self.theta2)}: give theta2 >= "
+                             "theta1 >= 0.5, the unconditionally stable range")
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
         """Return A = 2/(theta2 dt²) M + 2 theta1/(theta2 dt) C + K."""

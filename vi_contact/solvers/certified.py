@@ -68,16 +68,12 @@ class CertifiedSolver:
             if certificate.worst <= self._tolerance:
                 return result, certificate, rank > 0
             tried.append(f"{result.method}: {certificate}")
-        raise StepFailure(
-            f"step {step.k} at t = {step.t:.6g} s stayed above the certificate tolerance {self._tolerance:g} "
-            f"({'; '.join(tried)}): {self._advice}"
-        )
+        raise StepFailure(f"step {step.k} at t = {step.t:.6g} s stayed above the certificate tolerance "
+                          f"{self._tolerance:g} ({'; '.join(tried)}): {self._advice}")
 
 
 def refuse_nan(step: StepProblem) -> None:
     """Raise StepFailure for a NaN, which would spread silently; asked of all ranks, so that all stop."""
     if largest(step.surface.comm, not isfinite(max_abs(step.b))):
-        raise StepFailure(
-            f"the load of step {step.k} at t = {step.t:.6g} s contains NaN or infinite values: "
-            "check the excitation, the tractions and the initial data"
-        )
+        raise StepFailure(f"the load of step {step.k} at t = {step.t:.6g} s contains NaN or infinite values: check the "
+                          "excitation, the tractions and the initial data")

@@ -145,10 +145,9 @@ class ScaledProblem:
         residual, unit = self.residual(r, w), self.unit or 1.0
         rounding = self.rounding(r)
         if not residual <= max(tolerance * unit, rounding):
-            raise StepFailure(
-                f"{method} stopped after {iterations} iterations with residual {residual / unit:.1e}: try another "
-                "friction method (FrictionNewton, NSGS, FixedPoint), or a smaller step of time or load"
-            )
+            raise StepFailure(f"{method} stopped after {iterations} iterations with residual {residual / unit:.1e}: "
+                              "try another friction method (FrictionNewton, NSGS, FixedPoint), or a smaller step of "
+                              "time or load")
         still = np.linalg.norm(w[:, 1:], axis=1) <= 4.0 * max(residual, rounding)
         active = (r[:, 0] > 0.0) | self.delassus.bilateral
         stick = still & (self.limit(r[:, 0]) > 0.0)

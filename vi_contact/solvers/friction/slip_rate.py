@@ -56,7 +56,5 @@ class RateIteration:
             if history[-1] <= self.tolerance:
                 return replace(found, iterations=spent, history=tuple(history))
             mu = np.maximum(following(mu, new), 0.0)
-        raise StepFailure(
-            f"{self} stopped with a change of {history[-1] if history else np.inf:.1e} of the friction coefficients: "
-            "take a smaller time step, or let mu(v) vary less with the slip rate"
-        )
+        raise StepFailure(f"{self} stopped with a change of {history[-1] if history else np.inf:.1e} of the friction "
+                          "coefficients: take a smaller time step, or let mu(v) vary less with the slip rate")

@@ -144,10 +144,8 @@ def cholesky(G: Array) -> Array:
         return G
     factor, info = lapack.dpotrf(G, lower=1, clean=0)
     if info > 0:
-        raise InputError(
-            f"The Delassus operator is not positive definite at contact row {info - 1}: "
-            "remove constraints that act on the same motion twice."
-        )
+        raise InputError(f"The Delassus operator is not positive definite at contact row {info - 1}: remove "
+                         "constraints that act on the same motion twice.")
     return factor
 
 
