@@ -182,8 +182,8 @@ def project(r_t: Array, limit: Array) -> Array:
     if r_t.ndim != 2 or limit.shape != r_t.shape[:1]:
         raise InputError(f"project: r_t has shape {r_t.shape} and limit {limit.shape}; "
                          "give one row of tangential components and one limit per node")
-    size = np.linalg.norm(r_t, axis=1)
-    factor = np.ones_like(size)
+    size = np.abs(r_t[:, 0]) if r_t.shape[1] == 1 else np.linalg.norm(r_t, axis=1)
+    factor = np.ones(len(size))
     np.divide(limit, size, out=factor, where=size > limit)
     return r_t * factor[:, np.newaxis]
 

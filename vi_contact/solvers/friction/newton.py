@@ -105,7 +105,7 @@ def relaxed(compiled: Any, step: ScaledProblem, r: Array) -> tuple[Array, Array,
     of, r, w = step.delassus, np.array(r, order="C"), np.array(step.w(r), order="C")
     room = np.empty(r.size + len(r), dtype=np.float32)
     given = (*of.short, step.cohesion, step.slope, of.bilateral, r, w, room)
-    at = [None if array is None else ctypes.c_void_p(array.ctypes.data) for array in given]
+    at = [None if array is None else ctypes.c_void_p(array.__array_interface__["data"][0]) for array in given]
     left, before = np.inf, np.inf
     for _ in range(STAGES[of.dimension]):
         least = 0.5 * step.rounding(r) if of.dimension > 2 else 0.0
