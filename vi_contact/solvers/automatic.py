@@ -22,7 +22,7 @@ from .condensed import Condensed
 log = logging.getLogger(__name__)
 IN_SPACE = 20_000  # unknowns in three dimensions from which on a few hundred steps are faster without a factor
 ALONE_IN_SPACE = 50_000  # the same on one rank, where CHOLMOD factorises
-DENSE = {3: 2_500, 2: 5_000, 1: 5_000}  # rows of the small problem, by dimension: 5000 take 200 MB on every rank
+DENSE = {3: 4_000, 2: 5_000, 1: 5_000}  # rows of the small problem, by dimension: 5000 take 200 MB on every rank
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Automatic:
     """Solve by ``condensed`` or by ``iterative``, whichever the size of the problem makes the faster one.
 
     The iterative route is taken in three dimensions from 50 000 unknowns on (20 000 on several ranks, or without
-    CHOLMOD), and wherever the small problem has more rows, contact points or with friction contact unknowns, than 2500
+    CHOLMOD), and wherever the small problem has more rows, contact points or with friction contact unknowns, than 4000
     in space and 5000 in the plane; elsewhere, and without finite elements, the condensed one. The log says which.
     ``iterative`` None is Iterative(), which needs PETSc.
     """
