@@ -35,7 +35,6 @@ from ...run.files.writer import FieldWriter
 from ...run.method import with_defaults
 from ...run.recorders import Contact, Energy, Steps
 from ...run.simulate import Solution, simulate
-from ...run.static import static_equilibrium
 from ...run.time_steps import step_plan
 from ...solvers.automatic import Automatic
 from .library import base_folder, check_format, keep_copy
@@ -224,6 +223,8 @@ class Case:
         own = (solver.primary if isinstance(solver, CrossChecked) else solver) or Automatic()
         if not parts.weighted:
             return problem, None
+        from ...run.static import static_equilibrium  # late: other runs need none of it
+
         if parts.firm is None:
             return problem, static_equilibrium(problem, solver=own)
         static = replace(self._problem(parts.firm), excitation=())

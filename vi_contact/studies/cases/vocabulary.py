@@ -269,6 +269,6 @@ def words(folder: Path, allowed: Sequence[str] = ()) -> Words:
     """Return the words of a case file in this folder, where its relative paths begin; ``allowed``: others' packages."""
     default = {
         LinearElastic: "LinearElastic", Record: "read_record", ContactSurface: "contact_surface", Traction: "Traction",
-        Dashpots: "Dashpots",
+        Dashpots: "Dashpots", FieldWriter: "XDMF",
     }
     return Words(folder, _choices(), default, (Facets, Cells), short={Record: "path"}, allowed=allowed)
