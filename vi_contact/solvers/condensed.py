@@ -131,7 +131,7 @@ class PreparedCondensed:
     def solve(self, step: StepProblem) -> StepResult:
         """Return x, r_n and the active set of a step."""
         if step.slip0 is not None and self._surface.total:
-            return self._with_friction(step)
+            return self.friction.solve(step, self._rigid)
         surface, (condensed, small), bound, guess = self._surface, self._normal, step.bound, step.active
         if surface.comm.size > 1:
             bound, guess = surface.everywhere(np.column_stack([bound, guess])).T
@@ -149,19 +149,9 @@ class PreparedCondensed:
         if surface.comm.size > 1 or not isinstance(condensed, Last):
             return None
         if rubs:
-            x, r, active, counts, failed, histories = self.friction.solve_many(many, own, self._rigid)
-            name = f"condensed {type(self._settings.friction_method).__name__}"
-            rows = StepResult(frozen(x), r[..., 0].copy(), active, 0, name, r_t=r[..., 1:].copy())
-            return Answers(rows, counts, failed, histories)
+            return self.friction.solve_many(many, own, self._rigid)
         if not isinstance(small, PreparedSets):
             return None
         r, active, counts, failed = small.solve_many(many.bound - condensed.free(many.b), many.active)
         x = frozen(condensed.answer(r, (r != 0.0) & self._rigid, many.bound))
         return Answers(StepResult(x, r, active, 0, self._name), counts, failed)
-
-    def _with_friction(self, step: StepProblem) -> StepResult:
-        """The step with tangential reactions."""
-        x, small = self.friction.solve(step, self._rigid)
-        name, mine = f"condensed {type(self._settings.friction_method).__name__}", self._surface.slots
-        r_n, r_t = small.r[mine][:, 0].copy(), small.r[mine][:, 1:].copy()
-        return StepResult(x, r_n, small.active[mine], small.iterations, name, r_t=r_t, history=small.history)

@@ -18,7 +18,8 @@ import numpy as np
 from ...core.algebra import Array, Mask
 from ...core.condensation import Condensation
 from ...core.errors import ViContactError
-from ...core.step import StepProblem
+from ...core.products import frozen
+from ...core.step import Answers, StepProblem, StepResult
 from ...core.surfaces import ContactSurface
 from .problem import FrictionMethod, FrictionResult
 from .slip_rate import RateIteration
@@ -31,15 +32,18 @@ class CondensedFriction:
         self, method: FrictionMethod, condensed: Condensation, surface: ContactSurface, *, rates: RateIteration
     ) -> None:
         self._surface, self._rates, self.condensed = surface, rates, condensed
+        self._name = f"condensed {type(method).__name__}"
         self.delassus, d = condensed.flexibility, 1 + surface.tangents.shape[1]
         fixed = np.flatnonzero(~condensed.there)
         self.delassus[fixed, fixed] = self.delassus.diagonal()[fixed // d * d]
         self._small = method.prepare(self.delassus, surface.everywhere(surface.bilateral))
 
-    def solve(self, step: StepProblem, rigid: Mask) -> tuple[Array, FrictionResult]:
-        """Return x and the reactions of a step."""
+    def solve(self, step: StepProblem, rigid: Mask) -> StepResult:
+        """Return the answer to a step."""
         found, held, places = self.reactions(step, self.condensed.free(step.b), rigid)
-        return self.condensed.answer(found.r.ravel(), held, places), found
+        x, mine = self.condensed.answer(found.r.ravel(), held, places), self._surface.slots
+        r_n, r_t = found.r[mine][:, 0].copy(), found.r[mine][:, 1:].copy()
+        return StepResult(x, r_n, found.active[mine], found.iterations, self._name, r_t=r_t, history=found.history)
 
     def reactions(self, step: StepProblem, free: Array, rigid: Mask) -> tuple[FrictionResult, Mask, Array]:
         """Return the reactions for contact unknowns that would be ``free``, and where they are put: closed points on
@@ -58,11 +62,8 @@ class CondensedFriction:
         held &= found.r.any()
         return found, held.ravel(), places.ravel()
 
-    def solve_many(
-        self, many: StepProblem, own: Callable[[int], StepProblem], rigid: Mask
-    ) -> tuple[Array, Array, Mask, list[int], dict[int, ViContactError], list[tuple[float, ...]]]:
-        """Return the same of several steps, which ``own`` makes, by rows: x, r, active, iterations, what those raise
-        that have no answer, and histories."""
+    def solve_many(self, many: StepProblem, own: Callable[[int], StepProblem], rigid: Mask) -> Answers:
+        """Return the answers to several steps: ``many`` holds their rows, ``own`` makes one of them."""
         free, (m, d) = self.condensed.free(many.b), (len(many.bound), 1 + self._surface.tangents.shape[1])
         r, places, held = np.zeros((len(free), m, d)), np.zeros(free.shape), np.zeros(free.shape, dtype=bool)
         active, counts, failed = held[:, :m].copy(), [0] * len(free), dict[int, ViContactError]()
@@ -74,7 +75,9 @@ class CondensedFriction:
                 counts[row], histories[row] = found.iterations, found.history
             except ViContactError as error:
                 failed[row] = error
-        return self.condensed.answer(r.reshape(free.shape), held, places), r, active, counts, failed, histories
+        x = frozen(self.condensed.answer(r.reshape(free.shape), held, places))
+        rows = StepResult(x, r[..., 0].copy(), active, 0, self._name, r_t=r[..., 1:].copy())
+        return Answers(rows, counts, failed, histories)
 
     def _reactions(
         self, step: StepProblem, q: Array, cohesion: Array, slope: Array, active: Mask, *, fixed: bool

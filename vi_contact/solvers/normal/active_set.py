@@ -29,7 +29,7 @@ from ...core.errors import ViContactError
 from .lcp import EPS, Found, LCPResult, PreparedLCP, ScaledLCP, cholesky, failure, scaled_dense
 
 FEW = 160  # rows up to which compiled exchanges are as fast as those of LAPACK
-KEPT = 16  # factors of sets
+KEPT = 2**22  # numbers in the factors of sets, of 16 sets at most
 PATIENCE = 10  # Júdice and Pires, Comput. Oper. Res. 21, 1994
 
 
@@ -62,8 +62,8 @@ class PreparedSets(PreparedLCP):
 
     @cached_property
     def _compiled(self) -> "Exchanges | None":
-        functions = library(SerialComm())
-        return None if functions is None or self.scaled.bilateral.size > FEW else Exchanges(functions, self)
+        functions = library(SerialComm()) if self.scaled.bilateral.size <= FEW else None
+        return None if functions is None else Exchanges(functions, self)
 
     def solve(self, q: Array, guess: Array | Mask | None = None) -> LCPResult:
         """Solve the problem of q (m,), as ``PreparedLCP`` says."""
@@ -77,10 +77,8 @@ class PreparedSets(PreparedLCP):
 
     def solve_many(self, q: Array, guess: Mask) -> tuple[Array, Mask, list[int], dict[int, ViContactError]]:
         """Return r and active of several q, all (k, m), the iterations, and what those raise that have no answer."""
-        if self._compiled is None:
-            r, active, changes = np.zeros(q.shape), np.zeros(q.shape, dtype=bool), np.full(len(q), -1)
-        else:
-            r, active, _, changes, _ = self._compiled(q, guess)
+        none = np.zeros(q.shape), np.zeros(q.shape, dtype=bool), None, np.full(len(q), -1), None
+        r, active, _, changes, _ = none if self._compiled is None else self._compiled(q, guess)
         counts, failed = changes.tolist(), dict[int, ViContactError]()
         for row in np.flatnonzero(changes < 0).tolist():
             try:
@@ -95,19 +93,18 @@ class Exchanges:
     """Make the first exchanges of several problems of one G, compiled: those of ``_Sets``, which has the others."""
 
     def __init__(self, library: Any, prepared: PreparedLCP) -> None:
-        self._library, self._scaled, self._method = library, prepared.scaled, cast(ActiveSet, prepared.method)
-        self._rows = 0
+        self._library, self._prepared, self._rows = library, prepared, 0
 
     def _made(self, k: int) -> None:
         """Make room for k problems."""
-        scaled, m, most = self._scaled, self._scaled.bilateral.size, min(PATIENCE, self._method.max_iterations)
+        scaled, method = self._prepared.scaled, cast(ActiveSet, self._prepared.method)
+        m, most = scaled.bilateral.size, min(PATIENCE, method.max_iterations)
         self._rows, self._q, self._guess = k, np.empty((k, m)), np.empty((k, m), dtype=bool)
         sets = np.full((k, m), 2, np.uint8), np.empty((k, m, m)), np.empty(3 * m), np.empty(m, np.int32)
         self._found: Any = (np.empty((k, m)), np.empty((k, m), dtype=bool), np.empty(k), np.empty(k, np.int32),
                        np.empty((k, most), np.int32))
         self._kept = scaled.matrix, scaled.scale, scaled.bilateral, self._q, self._guess, *sets, *self._found
-        numbers = m, most, c_double(4.0 * EPS * scaled.norm), c_double(self._method.tolerance)
-        self._arguments = *numbers, *map(at, self._kept)
+        self._arguments = (m, most, c_double(4.0 * EPS * scaled.norm), c_double(method.tolerance), *map(at, self._kept))
 
     def __call__(self, q: Array, guess: Mask) -> tuple[Array, Mask, Array, Indices, Indices]:
         """Return r, active, residual, iterations (-1: not solved) and the rows that each of them moved, of q and a
@@ -187,7 +184,7 @@ class _Sets:
         key = active.tobytes()
         factor = self._kept.pop(key) if key in self._kept else _Factor(active, self._scaled.matrix)
         self._kept[key] = factor  # now the last
-        if len(self._kept) > KEPT:
+        if len(self._kept) > min(max(KEPT // (1 + active.size**2), 1), 16):
             del self._kept[next(iter(self._kept))]
         return factor.solve(gap)
 
