@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from ...core.algebra import Array
-from ...core.files import hdf5_atomically, make_dataset, open_hdf5, push, to_json, write_all, write_atomically
+from ...core.files import hdf5_atomically, make_dataset, open_hdf5, push, put_rows, to_json, write_all, write_atomically
 from ...core.step import Row
 from .folder import COLUMNS, FORMAT, HISTORY_CSV, HISTORY_H5, JOURNAL
 from .stored_rows import StoredArrays, StoredRows, lines_of, read_blocks, records_of
@@ -136,15 +136,14 @@ class HistoryFiles:
                 for name, (dataset, size) in found.items():
                     step = max(1, STRIDE // max(size, 1))
                     for i in range(0, kept, step):
-                        end = min(i + step, kept)
-                        dataset[i:end] = old[name][i:end]
+                        put_rows(dataset, i, old[name][i : min(i + step, kept)])
         for block in blocks:
-            first, kept = kept, kept + len(block["k"])
             for name, (dataset, _) in found.items():
-                dataset[first:kept] = block[name]
+                put_rows(dataset, kept, block[name])
+            kept += len(block["k"])
         for name, unit in GEOMETRY.items():
             values = self._geometry[name]
-            make_dataset(file, f"contact/{name}", values.shape, values.dtype, unit=unit)[...] = values
+            put_rows(make_dataset(file, f"contact/{name}", values.shape, values.dtype, unit=unit), 0, values)
 
     def close(self) -> None:
         """Write all rows into history.h5 and leave no journal; what cannot be written stays in the other files."""
