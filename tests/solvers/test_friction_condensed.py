@@ -10,6 +10,8 @@ import pytest
 from column import column
 from small_steps import small
 
+from vi_contact.core.algebra import SerialComm
+from vi_contact.core.compiled import library
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.protocols import Frictionless
 from vi_contact.core.step import Report
@@ -21,6 +23,7 @@ from vi_contact.schemes.trapezoidal import Trapezoidal
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.certified import TOLERANCE, CertifiedSolver
 from vi_contact.solvers.condensed import Condensed
+from vi_contact.solvers.friction import newton
 from vi_contact.solvers.friction.newton import FrictionNewton
 
 pytestmark = pytest.mark.serial
@@ -123,3 +126,31 @@ def test_newton_that_wanders_is_led_back() -> None:
         assert result.residual <= TOLERANCE
         rescued += result.iterations > len(result.history)
     assert rescued > 0
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_sweeps_leave_little_to_newton(monkeypatch: pytest.MonkeyPatch, d: int) -> None:
+    """Compiled sweeps find the states in the plane, and in space the answer, of more nodes than a group of theirs has;
+    the answer is that of Newton's method alone."""
+    if library(SerialComm()) is None:
+        pytest.skip("nothing is compiled here")
+    for seed in range(4):
+        G, q, bilateral = small(seed, 100, d)
+        given = q, np.zeros(100), np.full(100, 0.4), np.ones(100, dtype=bool)
+        found = FrictionNewton().prepare(G, bilateral).solve(*given)
+        assert found.iterations <= (2 if d == 2 else 1)
+        with monkeypatch.context() as patched:
+            patched.setattr(newton, "library", lambda comm: None)
+            alone = FrictionNewton().prepare(G, bilateral).solve(*given)
+        np.testing.assert_allclose(found.r, alone.r, rtol=0.0, atol=1e-9 * np.abs(alone.r).max())
+        assert np.array_equal(found.active, alone.active) and np.array_equal(found.stick, alone.stick)
+
+
+def test_without_an_inverse_in_single_precision_sweeps_go_on() -> None:
+    """A matrix that is positive definite in double precision only: sweeps do without its inverse."""
+    vectors = np.linalg.qr(np.random.default_rng(0).normal(size=(40, 40)))[0]
+    G = vectors @ np.diag(np.logspace(0.0, -9.0, 40)) @ vectors.T
+    prepared = FrictionNewton().prepare(0.5 * (G + G.T), np.zeros(20, dtype=bool))
+    assert prepared.delassus.short[1] is None
+    q = np.random.default_rng(1).normal(size=(20, 2))
+    assert prepared.solve(q, np.full(20, 0.5), np.zeros(20)).residual <= TOLERANCE
