@@ -146,8 +146,7 @@ def rod_forces(
     """Return |r_N| of every step of the rod [N], for Algorithm 10. ``scheme``: Midpoint(), the source's, when None.
 
     The force r_N^k of (5.1) acts in the step from t_k to t_k+1, and (7.1) of the same step rubs with it. The rod does
-    not feel the beam, so that rod first, beam second is no approximation: with ``ExactFriction`` it gives
-    ``rubbing_problem``.
+    not feel the beam: rod first, beam second is no approximation, with ``ExactFriction`` it is ``rubbing_problem``.
     """
     dt = number("rod_forces", "dt", dt, positive=True, unit="s")
     steps = whole("rod_forces", "steps", steps, least=1)

@@ -88,8 +88,7 @@ def convolution_operator(
 ) -> ConvolutionOperator:
     """Assemble S for `steps` time steps of dt [s] by Radau IIA: 192 steps n² bytes.
 
-    Raises InputError for a time step too small (c_P dt/h < 0.05) or too large (> 8) for the mesh, or for less than one
-    step.
+    Raises InputError for a time step too small (c_P dt/h < 0.05) or too large (> 8) for the mesh, or for no step.
     """
     check_body(mesh, material, orders)
     flag("convolution_operator", "symmetric", symmetric)

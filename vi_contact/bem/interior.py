@@ -24,8 +24,7 @@ def interior_displacement(
 ) -> Array:
     """Return (len(steps), m, 2) displacement [m] at the times motion.times[steps] (None: all) of inner points (m, 2).
 
-    Without quadrature in time, with the elements split at the wave fronts. Raises InputError for points on the boundary
-    or outside the body.
+    Without quadrature in time, with the elements split at the wave fronts. InputError for points that are not inside.
     """
     owner = "interior_displacement"
     instance(owner, "operator", operator, PoincareSteklov, "give PoincareSteklov(blocks, rho)")

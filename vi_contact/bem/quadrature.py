@@ -33,8 +33,7 @@ CHUNK = 40_000  # points evaluated at once: keeps the arrays in the cache
 class Orders:
     """Hold counts of Gauss points.
 
-    Far and near pairs (each way); pieces of split pairs, outer and inner; touching pairs; pieces of
-    pairs that are close (each way)."""
+    Far and near pairs (each way); pieces of split pairs, outer and inner; touching pairs; pieces of close pairs."""
 
     far: int = 4
     near: int = 8

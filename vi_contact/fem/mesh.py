@@ -1,8 +1,7 @@
 """Distribute meshes with named groups, read from a file or built in memory by a Gmsh script.
 
 Rank 0 reads and checks (vi_contact.meshes.extract), all ranks get the mesh or the same InputError. Groups are
-recognised on each rank by the vertices of their members, numbered as in the input, so a facet may be in as many
-groups as it likes.
+recognised on each rank by the vertices of their members, numbered as in the input: a facet may be in several.
 """
 
 from collections.abc import Callable
@@ -102,9 +101,8 @@ def alone() -> MPI.Comm:
 def read_mesh(path: str | Path, comm: MPI.Comm) -> tuple[Mesh, Tags]:
     """Read a first-order mesh of intervals, triangles, quadrilaterals, tetrahedra or hexahedra and its physical groups.
 
-    Coordinates in metres; a file in Gmsh's own format, MSH 2 to 4, text or binary. Raises InputError, the same on every
-    rank, if the file is missing, a script, or holds no usable mesh
-    (all reasons: `vi_contact.meshes.extract.extract`). Collective.
+    Coordinates in metres; a file in Gmsh's own format, MSH 2 to 4, text or binary. InputError, the same on every rank,
+    if the file is missing, a script, or no usable mesh (reasons: `vi_contact.meshes.extract.extract`). Collective.
     """
     instance("read_mesh", "path", path, (str, Path), "give the path of a mesh file")
     return _distribute(comm, lambda: arrays_from_file(path))

@@ -114,8 +114,7 @@ def without_mean(record: Record, *, until: float | None = None) -> Record:
 def tapered(record: Record, *, fraction: float = 0.05) -> Record:
     """Bring both ends to zero by half a cosine over `fraction` of the record's duration.
 
-    w(t) = (1 - cos(pi t / (fraction T))) / 2 at the start, mirrored at the end; 1 between.
-    Raises InputError unless 0 < fraction <= 0.5.
+    w(t) = (1 - cos(pi t / (fraction T))) / 2 at the start, mirrored at the end; InputError unless 0 < fraction <= 0.5.
     """
     if not 0.0 < fraction <= 0.5:
         raise InputError(f"tapered: fraction is {fraction!r}; give more than 0 and at most 0.5 of the duration")

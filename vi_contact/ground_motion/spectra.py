@@ -3,8 +3,7 @@
 Nigam and Jennings (1969): between samples the acceleration is a straight line, so the oscillator
 u'' + 2 zeta omega u' + omega² u = -a(t) has a closed solution from one sample to the next, exact for any period and
 step. Peaks between samples are found too: the same solution is read at 64 instants a period or more, and 4 a step, so
-the peak of a vibration is at most 1 - cos(pi/64) = 0.12 % low. After its last sample the record is zero; the free
-vibration that follows counts.
+the peak of a vibration is at most 1 - cos(pi/64) = 0.12 % low. The free vibration after the last sample counts.
 """
 
 import math

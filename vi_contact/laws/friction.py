@@ -23,8 +23,7 @@ from ..core.errors import InputError
 
 @dataclass(frozen=True)
 class Tresca:
-    """Bound friction by a given threshold [Pa] >= 0, acting whether or not the node touches: limit = threshold · weight
-    · scale.
+    """Bound friction by a threshold [Pa] >= 0, whether or not the node touches: limit = threshold · weight · scale.
 
     ``threshold``: a number, or one per contact point (then kept as a tuple). Raises InputError when one is negative or
     not a finite number, and, when used, for a wrong count.

@@ -1,7 +1,6 @@
 """Change velocities after an impact: inelastic collision, velocity reversal, Newton's restitution.
 
-After each step a law says which normal velocity every contact condition shall have, and an update says how the
-velocity vector v is given it:
+After each step a law says which normal velocity every contact condition shall have, and an update gives it to v:
 
 * ``ComponentReset`` sets the components, as the boundary method does. With a consistent mass this is not an impulse:
   its energy change ½ v⁻ᵀMv⁻ - ½ v⁺ᵀMv⁺ may have either sign and the ledger books it with its sign.

@@ -33,8 +33,7 @@ class ConsistentMass:
 
 @dataclass(frozen=True)
 class Redistributed:
-    """Take the mass from the normal unknowns of all contact nodes; with friction (``tangential``) massless tangential
-    ones too.
+    """Take the mass from the normal unknowns of all contact nodes; with friction also from ``tangential`` ones.
 
     M* = Pᵀ M_l P + D with M_l = (1 - lumping) M + lumping diag(row sums of M). P gives every contact node the velocity
     of the rigid motion that fits its neighbours behind the surface best: it hands the node's mass to them, keeps every
@@ -42,8 +41,7 @@ class Redistributed:
     coordinates times those of M and of the order of (mesh size / body size)², restore what the lumping changed: the
     mass matrix of rigid motions (total mass, centre of mass, all moments and products of inertia) of every body; in 1D
     also what the shift by one element changed, centre and second moment. Damping sees the same velocities, C* = PᵀCP:
-    a force on massless unknowns that depends on their rate would ring. Bodies with tied sides cannot turn: of them the
-    total mass is kept.
+    a force on massless unknowns that depends on their rate would ring. Bodies with tied sides keep the mass alone.
 
     ``lumping`` 0.4 balances the dispersion of mesh and time step: consistent mass sends high frequencies ahead of
     the wave, lumped mass leaves them behind (table in docs/guide/schemes.md). InputError for lumping outside [0, 1], a

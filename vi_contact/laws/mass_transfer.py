@@ -24,8 +24,7 @@ NOTHING = 1e-10  # of a node's own mass: neighbours with less cannot carry it
 
 
 def from_neighbours(system: SemiDiscreteSystem, massless: Mask, contact: Mask, nodal: Array) -> list[Matrix]:
-    """Return the matrices P_k of v = P_0 P_1 … v that replace massless unknowns; contact: all unknowns of contact
-    nodes.
+    """Return the matrices P_k of v = P_0 P_1 … v that replace massless unknowns; contact: all those of contact nodes.
 
     Contact nodes with neighbours behind the surface come last in the product, those with contact nodes around them
     only, in corners, follow these. Tied nodes carry nothing: they are in two places. InputError when some contact

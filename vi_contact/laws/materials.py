@@ -169,8 +169,7 @@ class Rayleigh:
 
     @classmethod
     def from_frequencies(cls, f1: float, f2: float, *, xi1: float, xi2: float) -> "Rayleigh":
-        """Make the damping that has ratio xi1 at f1 and xi2 at f2 [Hz]: solve alpha / (2 w_i) + beta w_i / 2 = xi_i
-        with w_i = 2 pi f_i.
+        """Make the damping of ratio xi1 at f1, xi2 at f2 [Hz]: alpha / (2 w_i) + beta w_i / 2 = xi_i, w_i = 2 pi f_i.
 
         alpha = 2 w1 w2 (w2 xi1 - w1 xi2) / (w2² - w1²), beta = 2 (w2 xi2 - w1 xi1) / (w2² - w1²); for equal ratios xi
         alpha = 2 xi w1 w2 / (w1 + w2) and beta = 2 xi / (w1 + w2). 5 % at 1 and 10 Hz: 0.5712 1/s and 1.4469e-3 s.

@@ -1,9 +1,8 @@
 """Mesh a quarter or an eighth of a ball by tetrahedra, finest at its lowest point, which lies on or strikes a plane.
 
 The ball touches the plane y = 0 at the origin, its centre is (0, R, 0), and the planes x = 0 and z = 0 are planes of
-symmetry: the quarter has x >= 0 and z >= 0, the eighth also y <= R. Physical groups: cells "ball"; boundary "surface"
-(the sphere), "foot" (its part near the origin: the contact side), "side_x" (x = 0), "side_z" (z = 0) and, of the
-eighth, "cut" (y = R).
+symmetry: the quarter has x, z >= 0, the eighth also y <= R. Physical groups: cells "ball"; boundary "surface" (the
+sphere), "foot" (its part near the origin: the contact side), "side_x" (x = 0), "side_z" (z = 0), "cut" (y = R).
 """
 
 import math
@@ -32,8 +31,7 @@ class BallMesh:
 
     Cells have about `size` [m] within the distance `foot` [m] of the origin, from there on `size` + `growth` times the
     distance from the foot, but no more than `coarsest` (a quarter of the radius unless given). The sphere becomes a
-    polyhedron inside it: volume and mass are too small by about 0.35 (coarsest/radius)². Raises InputError for sizes
-    that make no ball.
+    polyhedron inside it: volume and mass are too small by about 0.35 (coarsest/radius)². InputError if it is no ball.
     """
 
     radius: float

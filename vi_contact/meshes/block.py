@@ -23,8 +23,7 @@ class BlockMesh:
     """Describe a mesh of a d-dimensional box, d = len(lengths) = 1, 2 or 3.
 
     A node starts at corner + (i lengths_x/n_x, ...), is moved by `deform`, then turned by `angle` [rad] about the
-    origin (the z axis for a box). `deform` takes and returns points (n, d) [m]. Raises InputError for sizes that make
-    no box.
+    origin (the z axis for a box). `deform` takes and returns points (n, d) [m]. InputError for sizes that make no box.
     """
 
     lengths: tuple[float, ...] = (1.0, 1.0)

@@ -2,9 +2,8 @@
 
 Physical groups: cells "channel", "soil"; boundary "bedrock" (y = 0), "left_side", "right_side" (x = 0, width),
 "surface" (y = depth); the interface from both sides, "channel_left", "channel_base", "channel_right" and "soil_left",
-"soil_base", "soil_right", divided alike; "channel_inside" (what the water wets) and "channel_top" (the tops of the
-walls). The channel is open at the surface, with which its walls end. Of two nodes at one place the channel's comes
-first.
+"soil_base", "soil_right", divided alike; "channel_inside" (what the water wets) and "channel_top" (the tops of its
+walls, which end at the surface). Of two nodes at one place the channel's comes first.
 """
 
 import math
@@ -93,8 +92,7 @@ class ChannelMesh:
 def channel_grid(x: Sequence[float], y: Sequence[float], size: float, *, triangles: bool = False) -> MeshArrays:
     """Divide channel and soil between the lines x (6,) and y (4,) of `ChannelMesh` into cells of about `size` [m].
 
-    Diagonals of triangles run upwards to the middle of the channel on both sides of it: a symmetric layer has a
-    symmetric mesh.
+    Diagonals of triangles run upwards to the middle of the channel on both sides of it: symmetric layers stay so.
     """
     xs, ys = _divided(x, size), _divided(y, size)
     middle_x, middle_y = (0.5 * (line[1:] + line[:-1]) for line in (xs, ys))

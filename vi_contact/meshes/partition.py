@@ -1,7 +1,6 @@
 """Assign cells to ranks by repeated halving across the longest side, the same every time.
 
-Graph partitioners give smaller interfaces but, in parallel, another answer on every run: results must not depend on
-that.
+Graph partitioners give smaller interfaces but, in parallel, another answer, and so other results, on every run.
 """
 
 import numpy as np

@@ -30,7 +30,7 @@ class Each(dict[int, Any]):
 
 
 class RowReport(Report):
-    """Tell of the step of one run; ``parts`` have those of every run, by the names of a report's."""
+    """Report the step of one run; ``parts`` have those of every run, by the names of a report's."""
 
     def __init__(self, **values: Any) -> None:
         self.__dict__.update(values)

@@ -18,8 +18,7 @@ from ..ground_motion.record import Record
 class UpgoingVelocity:
     """Give v_up(t) [m/s], (d,): a share of the velocity of an excitation that is at rest before t = 0.
 
-    Exact where the acceleration is a straight line between multiples of dt, with k dt + s between them:
-    v = v_k + a_k s + (a_{k+1} - a_k) s²/(2 dt).
+    Exact where a is a straight line between multiples of dt: v(k dt + s) = v_k + a_k s + (a_{k+1} - a_k) s²/(2 dt).
     """
 
     def __init__(self, excitation: Excitation, dt: float, share: float) -> None:

@@ -1,5 +1,4 @@
-"""Write fields for ParaView: ``fields.xdmf`` and HDF5 files of one frame or several, in the node and cell order of the
-input mesh.
+"""Write fields for ParaView: ``fields.xdmf`` and HDF5 files of one frame or several, in the order of the input mesh.
 
 Every file is replaced as a whole and the index names only frames that are complete, so that ParaView can open it at any
 moment, also while the run goes on or after it was killed. Nothing in the files depends on the number of ranks.
@@ -66,8 +65,7 @@ _RUBBING = ("contact_traction_t", "slip")
 class XDMF:
     """Write a frame every so many steps, and one of the initial state. InputError unless both numbers are >= 1.
 
-    ``frames_per_file``: each time so many frames have files of their own they are put into one, for file systems that
-    do not like many.
+    ``frames_per_file``: each time so many frames have files of their own they are put into one: some systems like few.
     """
 
     every: int = 10

@@ -60,8 +60,7 @@ class Channel:
     def point(self, number: int) -> tuple[float, float]:
         """Return the boundary points 1..19 of the channel, CHOSEN so that 1 and 7 are its bottom corners.
 
-        1-7 base from left to right, 8-13 right wall upwards (13 at the surface), 14-19 left wall upwards (19 at the
-        surface), evenly spaced.
+        Evenly spaced: 1-7 base from left to right, 8-13 right wall and 14-19 left wall, upwards to the surface.
         """
         if not 1 <= number <= POINTS:
             raise InputError(f"the channel has boundary points 1 to {POINTS}, there is no point {number}")
@@ -103,8 +102,7 @@ class ChannelModel:
         excitation: Excitation | Sequence[Excitation] | None = None,
         impact: ImpactLaw | None = Inelastic(ImpulseUpdate()), mass: MassLaw | None = None,
     ) -> ContactProblem:
-        """Set up channel and soil under the harmonic motion, sliding freely; with the inelastic impact rule, as an
-        impulse, on consistent mass.
+        """Set up both under the harmonic motion, sliding freely; inelastic impacts, as impulses, on consistent mass.
 
         Args:
             friction: Coulomb(mu) for instance.

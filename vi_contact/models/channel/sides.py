@@ -46,8 +46,7 @@ def bedrock(
     base: "relative", that load, in the frame of the bedrock; "prescribed", a moved bedrock: the same contact forces,
     and both expect the motion under the layer; "compliant", with ``rock`` (the soil's own material when None): takes
     the motion as that of an outcrop, and half its velocity comes up. dt: step of the run [s]; what is no record is
-    integrated with a tenth of it.
-    InputError for another word, and for rock without a compliant base.
+    integrated with a tenth of it. InputError for another word, and for rock without a compliant base.
     """
     check_word("base", base, BASES)
     if rock is not None and base != "compliant":
@@ -71,8 +70,7 @@ class Sides(Protocol):
     def conditions(self, tags: Any, motion: Mapping[str, Any]) -> dict[str, Any]:
         """Return the arguments of fem.assemble, for the groups of a ChannelMesh.
 
-        ``motion``: displacement, velocity and acceleration of the bedrock as `Prescribed` takes them; empty in the
-        frame of the bedrock.
+        ``motion``: displacement, velocity, acceleration of the bedrock as `Prescribed` takes them; empty in its frame.
         """
 
 

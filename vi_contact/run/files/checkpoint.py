@@ -117,8 +117,7 @@ def read_checkpoint(
     """Return (where a run was left, with the state on the ranks of this one; checksum of its histories). Collective.
 
     InputError when the checkpoint is missing, damaged, of an unknown format, or of another problem, dt (or plan of
-    them) or scheme; unless ``changed`` allows the latter. After another dt the steps are counted anew from here;
-    the scheme begins without memory.
+    them) or scheme; unless ``changed`` allows the latter: another dt counts steps anew, schemes begin without memory.
     """
     file, comm = folder / CHECKPOINT, problem.system.algebra.comm
     whole = on_root(comm, lambda: _read(file, problem))

@@ -2,8 +2,7 @@
 
 Matrices and loads are seen through vectors w made of the numbers of the unknowns: wᵀMw, wᵀKw, wᵀCw, w·f(t). Such
 numbers depend neither on the ranks nor on their order, and round-off changes them in the last digits only; they are
-kept as numbers, with their sizes, and compared relative to these. Laws and schemes are their texts, the numbers in
-which are compared likewise.
+kept with their sizes and compared relative to these. Laws and schemes are texts, with numbers compared likewise.
 """
 
 import re

@@ -1,5 +1,4 @@
-"""Solve a step by projected conjugate gradients on all unknowns (MPRGP): what a search that goes in circles falls back
-on.
+"""Solve a step by projected conjugate gradients on all unknowns (MPRGP), after a search that went in circles.
 
 min ½ rᵀG r + qᵀr over r >= lower (Z. Dostál, Optimal Quadratic Programming Algorithms, Springer 2009, algorithm 5.8).
 With g = q + G r, the free gradient is phi = g where r is off its bound, and the chopped gradient beta = min(g, 0) where

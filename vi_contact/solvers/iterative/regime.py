@@ -5,8 +5,7 @@ With A = m M + c C + k K the number
     C² = sum (A_ii - m M_ii) / sum m M_ii
 
 compares stiffness and inertia of the diagonal over all unknowns. On uniform meshes it is 0.7 (hexahedra) to 1.0
-times (tetrahedra) the Courant number c_p dt / h of the trapezoidal rule, infinite in statics; it has no unit and asks
-neither cells nor materials.
+times (tetrahedra) the Courant number c_p dt / h of the trapezoidal rule, infinite in statics, and needs no cells.
 """
 
 import numpy as np

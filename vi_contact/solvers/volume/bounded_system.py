@@ -24,8 +24,7 @@ from ...core.surfaces import ContactSurface
 
 
 class BoundedSystem:
-    """Hold A, the contact surface and its springs as one system of ``size`` owned unknowns, ``bounded`` of them with
-    bounds.
+    """Hold A, the contact surface and its springs as one system of ``size`` unknowns here, ``bounded`` of them bounded.
 
     Attributes:
         soft: (m,) True where the support is a spring.

@@ -95,8 +95,7 @@ class ScaledStep:
         return (fraction(force_max, max(self._b_max, Ax_max)), fraction(gap_max, y_max), fraction(force_max, size))
 
     def verdict(self, y: Array, F: Array) -> int:
-        """Return a SNES convergence reason: 0 to go on, 2 solved to round-off, 4 below the tolerance and no longer
-        improving.
+        """Return SNES's reason: 0 to go on, 2 solved to round-off, 4 below the tolerance and no longer improving.
 
         PETSc's own tests are relative to the first residual, which a good prediction makes unreachable.
         """

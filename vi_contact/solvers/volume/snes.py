@@ -2,8 +2,7 @@
 
 ``ReducedNewton`` is VINEWTONRSLS, which without a line search is the primal-dual active set method: solve with the
 active points held, project, read the next active set off the signs of the residual. ``SemismoothNewton`` is
-VINEWTONSSLS on the Fischer-Burmeister function. Both factorise in every iteration and share nothing with the condensed
-route but A and b.
+VINEWTONSSLS on the Fischer-Burmeister function. Both factorise in every iteration; of ``Condensed`` they share A, b.
 """
 
 import weakref
@@ -164,8 +163,7 @@ class SemismoothJacobian(AssembledJacobian):
 
 @dataclass(frozen=True)
 class ReducedNewton:
-    """Solve by SNES VINEWTONRSLS, Cholesky by MUMPS on each reduced matrix: the reference. Iterations are
-    factorisations.
+    """Solve by SNES VINEWTONRSLS, Cholesky by MUMPS on each reduced matrix, in every iteration: the reference.
 
     Other linear solvers by ``petsc_options``, e.g. {"ksp_type": "cg", "pc_type": "hypre"}; gamg, mg and fieldsplit are
     refused, they do not survive the reduction. With friction LU in the place of Cholesky.
@@ -184,8 +182,7 @@ class ReducedNewton:
 
     def friction_defaults(self) -> Options:
         """Return options before the user's: LU, the system with friction is not symmetric. Its zeros on the diagonal
-        delay pivots, for which MUMPS on several ranks needs room: it stops with INFOG(1) = -9 when it has only the
-        usual."""
+        delay pivots, for which MUMPS on several ranks needs more room than usual, or stops with INFOG(1) = -9."""
         return {**NEWTON_OPTIONS, **MUMPS_OPTIONS, "pc_type": "lu", "mat_mumps_icntl_14": 200}
 
     def friction_driver(self, scaled: ScaledFrictionStep, layers: OptionLayers) -> SnesDriver:
@@ -196,8 +193,7 @@ class ReducedNewton:
 
 @dataclass(frozen=True)
 class SemismoothNewton:
-    """Solve by SNES VINEWTONSSLS, LU by MUMPS: a diagnostic. Its iterates may penetrate by about 1e-13 of the
-    displacement.
+    """Solve by SNES VINEWTONSSLS, LU by MUMPS: a diagnostic. Iterates may penetrate by 1e-13 of the displacement.
 
     With springs 1e6 times stiffer or softer than the body its line search fails or not, as rounding will have it.
     """

@@ -83,8 +83,7 @@ class TaoDriver:
 
 @dataclass(frozen=True)
 class TaoTron:
-    """Solve by TAO TRON: trust region Newton with projected searches; conjugate gradients with incomplete Cholesky
-    inside.
+    """Solve by TAO TRON: trust region Newton with projected searches, conjugate gradients and incomplete Cholesky.
 
     Slow, or a StepFailure, with springs more than about 1e3 times stiffer than the body: they shrink its trust region.
     """

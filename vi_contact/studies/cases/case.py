@@ -243,8 +243,7 @@ def read_case(path: str | Path, settings: Sequence[str] = (), *, allow: Sequence
     ``allow``: packages whose classes it may name as "package.module:Name", which runs them: those you trust.
 
     Raises InputError, one sentence with file, table, key and remedy: no TOML (with the line), a table, type or key that
-    nobody knows (with the nearest known), a missing key, a value of the wrong kind. Groups of the mesh are looked up
-    when the case runs.
+    nobody knows (with the nearest known), a missing key, a value of the wrong kind. Groups are looked up by ``run``.
     """
     path = Path(path)
     tables = with_settings(read_toml(path), settings)
