@@ -235,6 +235,7 @@ def test_v2_4_unloading_and_reloading():
         assert len(found[i].slips(back)) > 0 and len(found[i].slips(-back)) == 0
 
 
+@pytest.mark.serial
 def test_v2_4_one_body():
     """On a rigid parabola, any number of ranks: c to h, Q and P to 1e-9; q within 4 % of mu p0 and p within 3 % of p0
     at |x| < a - 1.5 h. In one step or four: nodal forces to 1e-9 P, the tolerance of the certificate."""
@@ -248,6 +249,7 @@ def test_v2_4_one_body():
     assert np.abs(once.r_t - found[-1].r_t).max() < CERTIFIED
 
 
+@pytest.mark.serial
 def test_v2_4_one_body_reversed():
     """Turned from Q* to -Q* nothing is left of the first way: the mirror image, to 1e-9 P. Back at Q* the loop closes.
     """

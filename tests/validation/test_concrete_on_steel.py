@@ -81,6 +81,7 @@ def test_space_time_boundary_elements(law, top, tolerance):
     assert -history["u_y_top"][-1] == pytest.approx(top, rel=tolerance)
 
 
+@pytest.mark.serial
 def test_the_concrete_demo(comm: Any, shared_tmp: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """V7.2 with steps of 0.25 ms: certified, ledgers closed, static at the end to 1 %; figures drawn."""
     numbers = demo("concrete_on_steel").main(quick=True, out=shared_tmp, progress=False)

@@ -100,10 +100,10 @@ def test_period_three(body: str, courant: float) -> None:
 
 
 @pytest.mark.serial
-@pytest.mark.parametrize("courant, periods, floor", [(1.0, 10, 0.88), (0.5, 3, 0.998), (0.1, 0.5, 0.9999)])
+@pytest.mark.parametrize("courant, periods, floor", [(1.0, 4, 0.988), (0.5, 3, 0.998), (0.1, 0.5, 0.9999)])
 @pytest.mark.parametrize("body", ["strip"])
 def test_bouncing_strip(body: str, courant: float, periods: float, floor: float) -> None:
-    """V1.2: energy after so many periods, impulse of the first contact 800/3 within 0.5 %."""
+    """V1.2: energy after so many periods (ten of the bar: below), impulse of the first contact 800/3 within 0.5 %."""
     bar = Bar(BouncingBar(), **BODIES[body])  # type: ignore[arg-type]
     found = follow(bar, courant, periods * 16.0 / 3.0)
     above = found.energy + bar.case.energy  # zero is the bar standing on the wall
@@ -123,7 +123,7 @@ def test_bouncing_bar_for_ten_periods(courant: float, periods: int, floor: float
         t = report.new.t
         if t < 2.5:
             impulse += dt * float(report.balance.r_n.sum())
-        if t < exact.period:
+        if t < exact.period and report.new.k % round(1.0 / courant) == 0:
             error.append(-problem.surface.normal_values(report.new.u)[0] - float(exact.displacement(0.0, t)))
         if report.new.k % 100 == 0:
             total = energy(problem, report.new) / 500.0 + 1.0
@@ -196,6 +196,7 @@ def test_dissipative_schemes_never_gain_on_a_strip(case: Any, courant: float) ->
     assert found.energy[-1] >= 0.97 * case.energy
 
 
+@pytest.mark.serial
 def test_newmark_on_consistent_mass_blows_up_on_a_strip() -> None:
     """Negative test: V1.3 on a strip of triangles, Courant number ½, where not all nodes of the foot act as one."""
     found = follow(Bar(PeriodicBar(), dimension=2, triangles=True), 0.5, 12.0, scheme=Newmark(), mass=ConsistentMass())

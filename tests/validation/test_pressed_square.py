@@ -23,7 +23,7 @@ LAWS = {
     "none": vc.Frictionless(), "tresca": vc.Tresca(0.05), "coulomb": vc.Coulomb(0.5),
     "weak tresca": vc.Tresca(0.005),
 }
-one_rank = pytest.mark.serial  # whole marches, slow on several ranks: these have the reference runs and the demo
+one_rank = pytest.mark.serial  # whole marches, slow on several ranks: these have the reference runs
 RUBBING = ("none", "tresca", "coulomb")
 SCHEMES: dict[str, Any] = {"midpoint": vc.Midpoint(), "default": None}
 
@@ -157,6 +157,7 @@ def test_a_square_needs_cells():
         Square(cells=0)
 
 
+@one_rank
 def test_the_square_demo(comm: Any, shared_tmp: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """V7.1 on 10 cells: all runs certified with closed ledgers, figures drawn, table printed."""
     numbers = demo("square").main(quick=True, out=shared_tmp, progress=False)

@@ -23,7 +23,7 @@ pytestmark = pytest.mark.slow
 
 LAWS = {"none": vc.Frictionless(), "coulomb": vc.Coulomb(2.0), "tresca": vc.Tresca(2.0)}
 SCHEMES: dict[str, Any] = {"midpoint": vc.Midpoint(), "default": None}
-one_rank = pytest.mark.serial  # whole marches, slow on several ranks: these have two of the runs and the demo
+one_rank = pytest.mark.serial  # whole marches, slow on several ranks: these have two of the runs
 SEVERAL = {("midpoint", "coulomb"), ("default", "none")}
 every_run = pytest.mark.parametrize(
     ("scheme", "law"),
@@ -169,6 +169,7 @@ def test_bad_input_is_refused():
         Push(rise=0.0)
 
 
+@one_rank
 def test_the_tennis_ball_demo(comm: Any, shared_tmp: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """V7.3 with cells of 0.1: certified, ledgers closed, no change of energy in flight; figures drawn."""
     numbers = demo("tennis_ball").main(quick=True, out=shared_tmp, progress=False)
