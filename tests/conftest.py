@@ -18,6 +18,7 @@ import time
 from array import array
 from collections import Counter
 from collections.abc import Generator, Iterator
+from math import inf
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -27,10 +28,12 @@ RANK = int(os.environ.get("OMPI_COMM_WORLD_RANK", os.environ.get("PMI_RANK", "0"
 SIZE = int(os.environ.get("OMPI_COMM_WORLD_SIZE", os.environ.get("PMI_SIZE", "1")))
 LEFT_OUT = ("serial", "slow") if SIZE > 2 else ("serial",) if SIZE > 1 else ()
 TEST_SECONDS = 600  # a test that takes longer on an idle machine is taken to be stuck
+WATCH_SECONDS = 30  # how long one watch over the tests stands: a new one for each would wait for a thread to end
 MEETING_SECONDS = 30  # patience of a rank that has failed: the others are probably waiting for it in a collective call
 SLOWEST_FILES = 10  # told at the end of a run
 
 _stderr = pytest.StashKey[TextIO]()
+_watched = pytest.StashKey[float]()
 _collection_errors: list[str] = []
 
 
@@ -139,13 +142,23 @@ def pytest_collection_finish(session: pytest.Session) -> None:
 
 @pytest.hookimpl(hookwrapper=True)
 def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> Generator[None, Any, None]:
-    faulthandler.dump_traceback_later(_patience(TEST_SECONDS), exit=True, file=item.config.stash[_stderr])
+    _watch(item.config)
     if SIZE > 1:  # what all ranks own is freed by all at one place: one that frees alone lets the others wait
         gc.disable()
     yield
     if SIZE > 1 and (nextitem is None or nextitem.path != item.path):
         gc.collect()
-    faulthandler.cancel_dump_traceback_later()
+    if nextitem is None:
+        faulthandler.cancel_dump_traceback_later()
+
+
+def _watch(config: pytest.Config) -> None:
+    """End the process with a traceback if the test that starts now does not end."""
+    now = time.monotonic()
+    if now - config.stash.get(_watched, -inf) > WATCH_SECONDS:
+        config.stash[_watched] = now
+        seconds = _patience(TEST_SECONDS) + WATCH_SECONDS
+        faulthandler.dump_traceback_later(seconds, exit=True, file=config.stash[_stderr])
 
 
 @pytest.hookimpl(hookwrapper=True, tryfirst=True)
