@@ -254,6 +254,7 @@ def test_a_stiff_block_of_finite_elements(comm):
     assert momentum == pytest.approx(0.5 * 10.0 * 0.3 * model.bar.section, rel=1e-2)
 
 
+@pytest.mark.slow
 def test_wall_tends_to_the_exact_inequality(comm):
     """The wall of seed 000, case b, in the layer: contact points within O(b) of the midpoint rule with gap >= 0."""
     from vi_contact.models.wall import Wall, build
@@ -279,6 +280,7 @@ def test_wall_tends_to_the_exact_inequality(comm):
     assert errors[1] < 0.65 * errors[0]
 
 
+@pytest.mark.slow
 def test_two_stiff_blocks(comm):
     """A layer between two bodies: with the reduced mass they part with e, and keep their momentum."""
     from two_bodies import blocks, momenta, two_blocks

@@ -105,6 +105,7 @@ def test_a_start_inside_the_obstacle() -> None:
     vc.march(sprung, dt=1e-2, steps=1, state=metre, scheme=vc.Midpoint())
 
 
+@pytest.mark.slow
 def test_motions_beside_a_run_are_marched_with_its_scheme_and_steps() -> None:
     """base_motion, as prescribed motion and as an obstacle that goes along, and FreeField, also behind other loads: two
     runs of one problem with other schemes or steps, at once, are those of two problems, to the last bit."""

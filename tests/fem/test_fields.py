@@ -336,6 +336,7 @@ def test_restart_goes_on_after_the_frames_it_keeps(comm: Any, shared_tmp: Path) 
     assert len(list((shared_tmp / "fields").glob("frame_*.h5"))) == 2
 
 
+@pytest.mark.slow
 def test_several_frames_in_a_file(comm: Any, shared_tmp: Path) -> None:
     """What a reader finds is the same as with a file for each, also after a restart that drops some of a file."""
     problem, folders = shaken_wall(comm, angle=0.3, gap=1e-7), (shared_tmp / "each", shared_tmp / "packed")
@@ -353,6 +354,7 @@ def test_several_frames_in_a_file(comm: Any, shared_tmp: Path) -> None:
     assert np.array_equal(stored.at(12 * DT)[1], frames(folders[0])[6]["u"][:, :2])
 
 
+@pytest.mark.slow
 def test_restart_drops_late_frames_of_a_file(comm: Any, shared_tmp: Path) -> None:
     """A run killed behind its checkpoint has later frames in a file with earlier ones: only those are kept."""
     problem, checkpoint, kept = shaken_wall(comm), shared_tmp / "checkpoint.npz", b""

@@ -35,7 +35,7 @@ def stages(comm: Any, *, motion: Any = None, friction: Any = None, **other: Any)
     return static, state, dynamic, [(0.0, 4.0), (3.0, 4.0), (6.0, 2.0)]
 
 
-@pytest.mark.parametrize("friction", [None, vc.Coulomb(0.3)])
+@pytest.mark.parametrize("friction", [None, pytest.param(vc.Coulomb(0.3), marks=pytest.mark.slow)])
 def test_nothing_moves_after_the_release(comm, friction):
     """One second without motion: still to 1e-12 of the static displacement, contact forces too."""
     static, state, dynamic, points = stages(comm, friction=friction)

@@ -151,6 +151,7 @@ def histories(comm: Any, moving: bool) -> dict[str, Array]:
     return dict(solution.history)
 
 
+@pytest.mark.slow
 def test_frames_give_the_same_forces(comm: Any) -> None:
     """The relative frame with its inertia load and the foot moved by hand: reactions, N, V, M, racking to 1e-8."""
     one, two = histories(comm, False), histories(comm, True)

@@ -104,6 +104,7 @@ def relative_frame(mesh, tags, excitation=()) -> ContactProblem:
     return linear(assemble(mesh, SOFT, clamped=tags["bottom"], loads=inertia), excitation=excitation)
 
 
+@pytest.mark.slow
 def test_moving_base_and_relative_frame_converge_to_one_motion():
     """Base displaced (absolute frame) or inertia -rho U'' per volume (relative frame): they differ by the time error of
     the sampled motion alone, which is of second order."""

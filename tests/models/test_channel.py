@@ -142,6 +142,7 @@ def test_weight_rests_on_the_base(sides):
     assert push["left"] == pytest.approx(push["right"], rel=1e-8) and push["left"] > 0.0
 
 
+@pytest.mark.slow
 def test_who_weighs():
     """The load is the weight of the bodies asked for; a body that does not exist is refused."""
     up = {}

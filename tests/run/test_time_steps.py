@@ -506,7 +506,7 @@ def test_another_plan_is_refused(tmp_path: Path):
 # any number of ranks
 
 
-@pytest.mark.parametrize("solver", ["condensed", "volume"])
+@pytest.mark.parametrize("solver", ["condensed", pytest.param("volume", marks=pytest.mark.slow)])
 def test_halved_wall_on_any_number_of_ranks(comm: Any, shared_tmp: Path, solver: str):
     """All ranks halve the same steps; the restart is the straight run, with factors of four dts."""
     pytest.importorskip("dolfinx")

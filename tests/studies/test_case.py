@@ -139,6 +139,7 @@ dt = 0.005
 """
 
 
+@pytest.mark.slow
 def test_a_pair_with_weight_and_record_to_the_last_bit(shared_tmp: Path) -> None:
     """Two materials, static stage, Coulomb, a processed record beside the file: the run lasts as long as the record."""
     write(shared_tmp, "".join(f"{0.01 * k} {np.sin(30.0 * 0.01 * k)}\n" for k in range(11)), "motion.txt")
@@ -257,6 +258,7 @@ frequency = 4.0
 """
 
 
+@pytest.mark.slow
 def test_soil_boundaries(shared_tmp: Path) -> None:
     """A compliant base and free-field sides; on a rigid base they take
     its excitations."""
