@@ -118,8 +118,7 @@ def instance(owner: str, meaning: str, value: Any, kinds: type | tuple[type, ...
 def provides(
     owner: str, meaning: str, value: Any, names: tuple[str, ...], remedy: str, *, lacks: tuple[str, ...] = ()
 ) -> Any:
-    """Return an object that has these attributes (a protocol's) and lacks those, which mark other kinds of objects;
-    InputError for a class, and for anything else."""
+    """Return an object with these attributes (a protocol's) and without those of other kinds; else InputError."""
     fits = all(hasattr(value, name) for name in names) and not any(hasattr(value, name) for name in lacks)
     if fits and not isinstance(value, type):
         return value
@@ -234,8 +233,7 @@ def ended(name: str, error: Exception) -> str:
 
 
 def on_all(comm: Comm, name: str, call: Callable[[], T]) -> T:
-    """Return what the call returns, which asks a user's function for what one rank has. Collective; InputError on all
-    ranks where it raises on one."""
+    """Return what a call of a user's function returns; InputError on all ranks where it raises on one. Collective."""
     found, defect = [], ""
     try:
         found.append(call())

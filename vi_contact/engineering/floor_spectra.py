@@ -86,11 +86,10 @@ def transfer_function(
 ) -> TransferFunction:
     """Return |A_surface(f)| / |A_base(f)| of absolute accelerations, from the Fourier amplitudes of two columns.
 
-    Amplitudes are smoothed with Konno and Ohmachi's window (1998), both alike, before they are divided; it widens
-    peaks, ``bandwidth=None`` takes the raw ones. The motion has to die away before the run ends (or be a periodic one),
-    else its cut end leaks into all frequencies. ``frequencies`` None: 200 of them, from four periods in the run to four
-    samples in a period; raw all of the transform. nan where the base has less than ``floor`` of its largest amplitude.
-    InputError for a base without motion.
+    Amplitudes are smoothed alike with Konno and Ohmachi's window (1998), which widens peaks, before they are divided;
+    ``bandwidth=None`` takes the raw ones. The motion has to die away before the run ends, or be periodic, else its end
+    leaks into all frequencies. ``frequencies`` None: 200, from four periods in the run to four samples in a period; raw
+    all of the transform. nan where the base has below ``floor`` of its peak. InputError for a base without motion.
     """
     number("transfer_function", "floor", floor, positive=True)
     optional(number, "transfer_function", "bandwidth", bandwidth, positive=True)

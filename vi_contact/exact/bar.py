@@ -117,9 +117,8 @@ class ThrownBar(UprightBar):
 class PeriodicBar:
     """Describe a bar of length = E = rho = 1, top clamped, foot released at the wall from u = (1 - x)/2; no gravity.
 
-    The motion has period 3: released, in contact (p = 1/2), expanding, one unit of time each. With s = t mod 1, u is
-    linear in x and s in the four zones that the lines s = x and s = 1 - x divide a phase into (Dabaghi, Petrov, Pousin,
-    Renard; Chouly, Hild, Renard).
+    Period 3: released, in contact (p = 1/2), expanding, one unit of time each. With s = t mod 1, u is linear in x and s
+    in the four zones between s = x and s = 1 - x (Dabaghi, Petrov, Pousin, Renard; Chouly, Hild, Renard).
     """
 
     length: ClassVar[float] = 1.0

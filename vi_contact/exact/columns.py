@@ -45,8 +45,7 @@ class ObliqueImpact:
 
     It stays for 2 height/c_P under p = rho c_P speed_n. If mu c_P speed_n < c_S speed_t the base slips throughout with
     v_b = speed_t - mu (c_P/c_S) speed_n under the traction mu p, else it sticks under rho c_S speed_t: the shear wave
-    returns only after the contact, as c_S < c_P. height [m]; speeds [m/s]; mu >= 0. Raises InputError for values out
-    of range.
+    returns only after the contact, as c_S < c_P. height [m]; speeds [m/s]; mu >= 0. InputError for other values.
     """
 
     height: float

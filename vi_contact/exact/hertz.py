@@ -62,8 +62,7 @@ class HertzLine(Pressed):
 
         a = sqrt(4 P R/(pi E*)),   p0 = 2 P/(pi a) = sqrt(P E*/(pi R)),   p = p0 sqrt(1 - x²/a²)
 
-    The approach of half-planes is not defined (logarithmic). force [N/m], modulus E* [Pa], radius R [m]. Raises
-    InputError unless all are finite and positive.
+    The approach is not defined. force [N/m], modulus E* [Pa], radius R [m]: InputError unless finite and positive.
     """
 
     @property

@@ -26,9 +26,8 @@ REST = 1e-30  # phi below which the rest of the motion lasts less than round-off
 class HousnerBlock:
     """Describe a block of width 2b and height 2h [m] (the full lengths) under gravity [m/s²].
 
-    "Slender" is said of what uses the linearised equation. theta0 is always the angle, in (0, alpha), from which the
-    block is released at rest. Raises InputError unless all are finite and positive, and for a block so wide that it
-    does not rock on after an impact (e <= 0).
+    "Slender" is said of what uses the linearised equation; theta0 is the angle of release at rest, in (0, alpha).
+    Raises InputError unless all are finite and positive, and for blocks that do not rock on after an impact (e <= 0).
     """
 
     width: float

@@ -3,9 +3,8 @@
     F = G W/(S H),     R = gamma_frame/gamma_soil = 4 (1-nu) F/(3 - 4 nu + F)
 
 G [Pa] and nu are those of the soil, W [m] the width and H [m] the height of the frame, S [N/m per m] the force at its
-roof for a unit racking displacement. Frames are of thin members with bending stiffness E I [N m²/m]; in plane strain
-E/(1-nu²) takes the place of E. R belongs to a frame in the full space without slip at its faces; finite elements differ
-by up to 15 % (verification S3.4).
+roof for a unit racking displacement. Frames are of thin members with bending stiffness E I [N m²/m], in plane strain
+E/(1-nu²) for E. R is of a frame in the full space without slip at its faces; finite elements are up to 15 % off.
 """
 
 from dataclasses import dataclass

@@ -8,7 +8,7 @@ and the horizontal displacements of all modes sin((2n-1) pi y/2H) decay from the
 
 with psi_s² = 2/(1-nu) and psi_e² = (2-nu)/(1-nu), or psi_e = psi_s in the simpler form. y [m] is the height above the
 rock, p [Pa] the pressure of the layer on the wall for a body force rho a towards it, Q [N/m], M [N] per metre of wall.
-The two-dimensional theory of elasticity gives thrusts 2 to 6 % off (verification S3.3).
+The two-dimensional theory of elasticity gives thrusts 2 to 6 % off.
 """
 
 import math

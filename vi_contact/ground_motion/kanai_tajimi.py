@@ -69,10 +69,9 @@ def synthetic(spectrum: KanaiTajimi, duration: float, dt: float, *, seed: int,
     """Make a motion of this density: a = sum sqrt(4 S(w_k) dw) cos(w_k t + phi_k), phi_k uniform from `seed`.
 
     Spectral representation (Shinozuka and Deodatis, 1991) with w_k = k dw, dw = 2 pi / period; the period, the next
-    power of two of steps from twice the duration, keeps the motion from repeating itself. Without an envelope it is
-    stationary over all seeds, of mean 0 and variance 2 sum S(w_k) dw. The same seed gives the same motion, on every
-    number of ranks. Scale with `scaled_to_pga`; correct the baseline where displacements are prescribed.
-    Raises InputError unless 0 < dt < duration.
+    power of two of steps from twice the duration, keeps the motion from repeating. Without an envelope it is stationary
+    over all seeds, of mean 0 and variance 2 sum S(w_k) dw. One seed gives one motion on all ranks. Scale with
+    `scaled_to_pga`; correct the baseline where displacements are prescribed. InputError unless 0 < dt < duration.
     """
     if not 0.0 < dt < duration < math.inf:
         raise InputError(f"synthetic: duration={duration!r}, dt={dt!r} s; give 0 < dt < duration")

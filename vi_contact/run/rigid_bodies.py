@@ -20,8 +20,7 @@ WEAK, STRONG = 4e-6, 1e-4  # of a stiffness: see body_springs
 
 @dataclass(frozen=True)
 class FreeMotions:
-    """Hold the free motions of one body: its owned unknowns, the motions w (rows, k) of size one, and the same
-    orthonormal in its mass, with M w."""
+    """Hold a body's owned unknowns, its free motions w (rows, k) of size one, and orthonormal in its mass, with M w."""
 
     rows: Indices
     unit: Array
@@ -92,8 +91,7 @@ def _kernel(form: Array, zero: float) -> Array:
 
 
 def _orthonormal(form: Array) -> Array:
-    """Columns c with cᵀ form c = 1, by Gram and Schmidt, but for motions of which nothing is left: those along a
-    component that is held everywhere."""
+    """Columns c with cᵀ form c = 1, by Gram and Schmidt; none of motions along a component that is held everywhere."""
     columns: list[Array] = []
     for column in np.eye(len(form)):
         for c in columns:

@@ -112,8 +112,7 @@ class AlphaStep(BalanceStep, ABC):
 
 
 def weighted(problem: ContactProblem, old: State, new: State, m: float, f: float, level: str = "") -> Balance:
-    """Return (1 - m) and m of the accelerations, (1 - f) and f of everything else at the ends of a step. ``level``: of
-    the memory's names."""
+    """Return 1 - m of the new and m of the old acceleration, 1 - f and f of all else; ``level``: of names in memory."""
     load, surface, r0 = problem.equations.load_at, problem.surface, old.memory[f"reaction{level}"]
     return Balance(
         u=(1.0 - f) * new.u + f * old.u, v=(1.0 - f) * new.v + f * old.v,

@@ -7,8 +7,7 @@
 
 The member a = (11/6, -3, 3/2, -1/3), b = (1, 0, 0, 0), gamma = (2, -5, 4, -1), mu = 1 of eqs. 11a,b of the boundary
 method: see linear_multistep for A, start and restart. Order 2, unconditionally stable. What is much faster than dt dies
-out in a few steps, but slow vibrations lose too, as with generalised-alpha at rho_inf = 0: 6 % of their amplitude a
-period with 20 steps a period, 0.6 % with 50.
+out in a few steps; slow vibrations lose 6 % a period at 20 steps a period, 0.6 % at 50 (as with rho_inf = 0).
 
 Energy: the ledger closes with the means of both ends; the damping is its algorithmic part. Contact stands in the
 balance of forces, but what it creates at high frequencies is damped away at once: docs/guide/schemes.md has numbers.

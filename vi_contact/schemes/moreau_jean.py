@@ -17,9 +17,8 @@ the bound -(1 - theta)/theta B_n v0, that is B_n v_θ <= 0: such a point ends th
 approaching one in the next. Normal contact then never creates energy; at theta = 1/(1 + e) there is no difference.
 Friction has the law at the end of the step but the work of its mean: P_t·B_t v_θ may be negative where sliding turns.
 
-Penetration: the condition is on velocities, so a gap closes late, by less than dt times the speed of approach, and
-what it has passed by then stays while the contact lasts (e = 0): a property of the scheme that shrinks with dt. The
-recorder's ``contact_min_gap`` shows it as a negative gap.
+Penetration: the condition is on velocities, so a gap closes late, by less than dt times the speed of approach, and what
+it has passed by then stays while contact lasts (e = 0): a negative ``contact_min_gap`` that shrinks with dt.
 
 Sources: Moreau in Nonsmooth Mechanics and Applications (Springer 1988), 1-82; Jean, Comput. Methods Appl. Mech. Engng
 177 (1999) 235-257; the range of theta: Acary, ZAMM 96 (2016) 585-603. The bound of separating points is ours.

@@ -5,8 +5,7 @@
     0 <= r1_n  ⊥  gap0 - B_n u1 >= 0,    |r1_t| <= limit(r1_n) along B_t (u1 - u0)
 
 In x = u1:  A = 4/dt² M + 2/dt C + K,  b = 4/dt² M (u0 + dt v0) + 2/dt C u0 - K u0 + f0 + f1 - Bᵀr0,  scale = 1, r the
-reaction at the end of the step. M is without inertia at the contact nodes (mass.Redistributed): their rows are in
-equilibrium at both ends of the step.
+reaction at the end. M has no inertia at contact nodes (mass.Redistributed): they are in equilibrium at both ends.
 
 Order 2 while nothing opens or closes; unconditionally stable. Energy: changes by work of loads and damping and
 by the contact work ½ (r1 g0 - r0 g1), of either sign and of order dt per event: quasi-conservative, contact forces do

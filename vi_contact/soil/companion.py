@@ -1,8 +1,7 @@
 """March a small linear system beside a run: the ground, or a free-field column, with the run's own scheme and steps.
 
-What it does is needed at the times at which the run's loads are evaluated. Displacement and velocity are straight lines
-between the steps, as in the schemes' own averages of them, so that a load made of them enters the run's equation of
-motion with the same weights as the run's own u and v.
+Loads of the run ask for its motion. Displacement and velocity are straight lines between the steps, as in the schemes'
+averages, so that such a load enters the equation of motion with the same weights as the run's own u and v.
 """
 
 from bisect import bisect_right
@@ -28,9 +27,8 @@ from ..run.time_steps import LARGEST, HalvedAtImpact, Schedule, TimeSteps
 class CompanionRun:
     """March a serial system without contact from rest at t = 0, as far as somebody asks for its u(t) and v(t).
 
-    ``name`` is for messages; ``problem`` makes the system when it is first needed. A run *binds* it: it hands over its
-    scheme and its plan of time steps, and the motion is then the one that this scheme integrates with these steps.
-    Mass is consistent. Each rank marches its own copy.
+    ``name`` is for messages; ``problem`` makes the system, with consistent mass, when it is first needed. A run *binds*
+    it to its scheme and time steps, with which the motion is then integrated. Each rank marches its own copy.
     """
 
     def __init__(self, name: str, problem: Callable[[], ContactProblem]) -> None:
