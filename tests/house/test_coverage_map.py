@@ -66,7 +66,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "meshes/test_partition.py": "meshes.rows",
     "meshes/test_two_body_meshes.py": "meshes.block meshes.cut meshes.two_blocks",
     "models/test_channel.py":
-        "models.channel.model models.channel.sides "
+        "models.channel.ends models.channel.model models.channel.sides "
         "studies.cases.short_settings",
     "models/test_wall.py": "core.units",
     "plots/test_plots_channel.py": "plots.channel plots.channel_mesh",

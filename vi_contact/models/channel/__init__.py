@@ -4,10 +4,11 @@
 its gravity stage, too, where sides or base hold no static load: ``fem.release`` goes from the one to the other.
 """
 
-from .model import Channel, ChannelModel, Openings, SoilProbe, build, staged, weighted
-from .sides import DashpotSides, Fixed, FreeFieldSides, RockBelow, Rollers, Sides, TiedSides, bedrock
+from ...core.lazy import lazy
 
-__all__ = [
-    "Channel", "ChannelModel", "DashpotSides", "Fixed", "FreeFieldSides", "Openings", "RockBelow", "Rollers",
-    "Sides", "SoilProbe", "TiedSides", "bedrock", "build", "staged", "weighted",
-]
+_CONTENTS = {
+    "ends": ("Sides",),
+    "model": ("Channel", "ChannelModel", "Openings", "SoilProbe", "build", "staged", "weighted"),
+    "sides": ("DashpotSides", "Fixed", "FreeFieldSides", "RockBelow", "Rollers", "TiedSides", "bedrock"),
+}
+__all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)

@@ -34,7 +34,8 @@ from ...run.recorders import Contact, Energy, Probe
 from ...soil.moving_base import BaseMotion
 from ...solvers.volume.route import Volume
 from ...solvers.volume.snes import ReducedNewton
-from .sides import RockBelow, Rollers, Sides
+from .ends import Sides
+from .sides import RockBelow, Rollers
 
 REFERENCE = Volume(method=ReducedNewton(), petsc_options={"snes_linesearch_type": "l2"})
 """The volume route to compare with and to fall back on. Without a line search its active set runs in circles in some

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -58,20 +58,6 @@ def bedrock(
     step = None if dt is None else 0.1 * dt
     waves = [upgoing(one, dt=getattr(getattr(one, "record", None), "dt", step)) for one in excitations]
     return RockBelow(lambda t: np.asarray(sum(wave(t) for wave in waves)), rock)
-
-
-class Sides(Protocol):
-    """Give the conditions at the ends of the layer. ``firm``: whether they hold static loads; others need a gravity
-    stage on firm ones (``staged``)."""
-
-    @property
-    def firm(self) -> bool: ...
-
-    def conditions(self, tags: Any, motion: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the arguments of fem.assemble, for the groups of a ChannelMesh.
-
-        ``motion``: displacement, velocity, acceleration of the bedrock as `Prescribed` takes them; empty in its frame.
-        """
 
 
 @dataclass(frozen=True)

@@ -12,24 +12,21 @@ from pathlib import Path
 from types import MappingProxyType, ModuleType
 from typing import Any, get_origin, get_type_hints
 
-from ... import core, engineering, fem, ground_motion, laws, meshes, run, schemes, solvers
+from ... import core, engineering, fem, ground_motion, laws, meshes, run, schemes, soil, solvers
 from ...core import ContactSurface, Excitation, FrictionLaw, ImpactLaw, MassLaw, Obstacle, Recorder, Scheme, Solver
 from ...core.checks import number
 from ...core.corners import FEATURE_ANGLE
 from ...core.system import SemiDiscreteSystem
 from ...fem import BodyForce, Cells, CompliantBase, Dashpots, Facets, Prescribed, Traction
 from ...fem.contact.matching import Matching
-from ...ground_motion.chain import Processing
-from ...ground_motion.kanai_tajimi import synthetic
 from ...ground_motion.record import LARGEST_PEAK, Record
 from ...laws.impact import VelocityUpdate
 from ...laws.materials import Damping, LinearElastic, Section
 from ...meshes.gmsh_session import MeshScript
 from ...models import channel, wall
-from ...models.channel import bedrock
 from ...run import HalvedAtImpact, Schedule
 from ...run.files.writer import FieldWriter
-from ...soil import FreeField, UpgoingVelocity, upgoing
+from ...soil import UpgoingVelocity
 from ...solvers import friction, normal, volume
 from ...solvers.condensed import SmallMethod
 from ...solvers.friction.extrapolation import Extrapolation
@@ -62,7 +59,7 @@ class MeshFile:
 
 def record(
     path: Path, units: str | None = None, *, dt: float | None = None, resample_dt: float | None = None,
-    channel: int | None = None, largest: float = LARGEST_PEAK, processing: Processing | None = None,
+    channel: int | None = None, largest: float = LARGEST_PEAK, processing: "ground_motion.Processing | None" = None,
 ) -> Record:
     """Read a record, ``read_record``, then apply ``processing``."""
     found = ground_motion.read_record(path, units, dt=dt, resample_dt=resample_dt, channel=channel, largest=largest)
@@ -105,7 +102,7 @@ def first_mode_period(system: SemiDiscreteSystem, *, parts: float) -> float:
     return 1.0 / (number("the period", "parts", parts, positive=True) * engineering.lowest_frequency(system))
 
 
-def free_field_sides() -> channel.FreeFieldSides:
+def free_field_sides() -> "channel.FreeFieldSides":
     """Return free-field ends of the channel's layer, on the base that the model has."""
     return channel.FreeFieldSides(base=())
 
@@ -120,10 +117,10 @@ def compliant_base(
 def free_field(
     excitations: Any, facets: Facets, *, base: CompliantBase | None = None,
     material: LinearElastic | None = None, normal: float = 1.0, tangential: float = 1.0,
-) -> FreeField:
+) -> "soil.FreeField":
     """Make a free-field side on the base of the run's excitations, or a compliant one."""
     foot = excitations if base is None else base
-    return FreeField(facets, material, normal, tangential, base=foot)
+    return soil.FreeField(facets, material, normal, tangential, base=foot)
 
 
 @dataclass(frozen=True)
@@ -157,14 +154,14 @@ def _wall(shape: wall.Wall, comm: Any, *, case: str = "b", weight: bool = False,
 
 
 def _channel(
-    shape: channel.Channel, comm: Any, *, excitations: tuple[Excitation, ...], run_dt: float | None,
+    shape: "channel.Channel", comm: Any, *, excitations: tuple[Excitation, ...], run_dt: float | None,
     sides: channel.Sides | None = None, weighing: Sequence[str] = ("channel",), held: bool = False,
     base: str = "relative", rock: LinearElastic | None = None,
 ) -> Parts:
-    bottom = bedrock(base, excitations, dt=run_dt, rock=rock)
+    bottom = channel.bedrock(base, excitations, dt=run_dt, rock=rock)
     ends = replace(sides, base=bottom or excitations) if isinstance(sides, channel.FreeFieldSides) else sides
 
-    def parts(model: channel.ChannelModel, firm: Parts | None = None) -> Parts:
+    def parts(model: "channel.ChannelModel", firm: Parts | None = None) -> Parts:
         surface = model.surface.bilateral_everywhere() if held else model.surface
         return Parts(model.system, surface, model.tags, bool(weighing), model.recorders(), firm, bottom is not None)
 
@@ -189,17 +186,17 @@ def _model(shape: type, build: Callable[..., Parts], inner: str = "") -> Callee:
     return Callee(shape.__name__, made, {**of_inner, **of_shape, **extra}, given=target.given)
 
 
-_FUNCTIONS: Mapping[Any, Mapping[str, Callable[..., Any]]] = {  # kind -> word -> what it calls
-    MeshFile: {"read_mesh": MeshFile},
-    Dashpots: {"CompliantBase": compliant_base, "FreeField": free_field},
-    CompliantBase: {"CompliantBase": compliant_base},
-    UpgoingVelocity: {"upgoing": upgoing},
-    ContactSurface: {"contact_surface": surface, "contact_pair": pair},
-    channel.Sides: {"FreeFieldSides": free_field_sides},
-    ImpactLaw: {"Elastic": laws.Elastic},
-    Record: {"read_record": record, "synthetic": synthetic},
-    Excitation: {"FirstModeHarmonic": first_mode_harmonic},
-    Schedule: {"FirstModePeriod": first_mode_period},
+_FUNCTIONS: Mapping[Any, Mapping[str, Callable[[], Any]]] = {  # kind -> word -> what it calls, when asked
+    MeshFile: {"read_mesh": lambda: MeshFile},
+    Dashpots: {"CompliantBase": lambda: compliant_base, "FreeField": lambda: free_field},
+    CompliantBase: {"CompliantBase": lambda: compliant_base},
+    UpgoingVelocity: {"upgoing": lambda: soil.upgoing},
+    ContactSurface: {"contact_surface": lambda: surface, "contact_pair": lambda: pair},
+    channel.Sides: {"FreeFieldSides": lambda: free_field_sides},
+    ImpactLaw: {"Elastic": lambda: laws.Elastic},
+    Record: {"read_record": lambda: record, "synthetic": lambda: ground_motion.synthetic},
+    Excitation: {"FirstModeHarmonic": lambda: first_mode_harmonic},
+    Schedule: {"FirstModePeriod": lambda: first_mode_period},
 }
 
 
@@ -225,12 +222,14 @@ class _Listed(Mapping[str, Callee]):
         """What words with these names before the dot call; None: all."""
         found: dict[str, Callee] = {}
         if self._kind is Parts:
-            found |= {"Wall": _model(wall.Wall, _wall), "Channel": _model(channel.Channel, _channel, inner="shape")}
+            models = {"Wall": lambda: _model(wall.Wall, _wall),
+                      "Channel": lambda: _model(channel.Channel, _channel, inner="shape")}
+            found |= {name: model() for name, model in models.items() if names is None or name in names}
         for room in self._rooms:
             own = room.__all__ if names is None else [name for name in names if name in room.__all__]
             found |= {one.name: one for one in _callees(room, self._kind, own)}
         functions = _FUNCTIONS.get(self._kind, {}).items()
-        return found | {name: callee(one, name=name) for name, one in functions if names is None or name in names}
+        return found | {name: callee(one(), name=name) for name, one in functions if names is None or name in names}
 
     @cached_property
     def _all(self) -> dict[str, Callee]:
