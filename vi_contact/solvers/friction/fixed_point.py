@@ -6,19 +6,17 @@ Analysis IV, 1996). Its observed factor is in the result. ``extrapolation`` may 
 """
 
 from dataclasses import dataclass, field
-from typing import ClassVar
 
 import numpy as np
 
 from ...core.algebra import Array, Mask, max_abs
-from ...core.checks import attributes
 from .extrapolation import Extrapolation, Plain, accelerated
 from .newton import FrictionNewton
-from .problem import FrictionMethod, FrictionResult, ScaledDelassus, inner_method
+from .problem import FrictionMethod, FrictionResult, ScaledDelassus, Settings, inner_method
 
 
 @dataclass(frozen=True)
-class FixedPoint:
+class FixedPoint(Settings):
     """Hold the settings. ``tolerance``: change of the thresholds relative to the largest, or rounding where that is
     more; ``tresca``: method for each problem; ``extrapolation``: Plain() or Anderson(), how the next
     thresholds follow. What the thresholds still change by shifts points that stick, and fine meshes amplify that: on
@@ -28,14 +26,12 @@ class FixedPoint:
     ``contraction(result)`` is the mean factor between them: with Plain() that of the map itself.
     """
 
-    carries_friction: ClassVar[bool] = True
-    tolerance: float = 1e-12
     max_iterations: int = 200
     tresca: FrictionMethod = field(default_factory=FrictionNewton)
     extrapolation: Extrapolation = field(default_factory=Plain)
 
     def __post_init__(self) -> None:
-        attributes(self, positive=("tolerance",), counts=("max_iterations",))
+        super().__post_init__()
         inner_method("FixedPoint", "tresca", self.tresca)
         accelerated("FixedPoint", self.extrapolation)
 

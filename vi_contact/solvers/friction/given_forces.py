@@ -13,34 +13,31 @@ under Coulomb's when coupling and friction are moderate, linearly. ``extrapolati
 
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
 from ...core.algebra import Array, Mask, max_abs
-from ...core.checks import attributes
 from ..normal.active_set import ActiveSet
 from .extrapolation import Extrapolation, Plain, accelerated
 from .newton import FrictionNewton
-from .problem import FrictionMethod, Iterated, PreparedFriction, ScaledDelassus, ScaledProblem, inner_method
+from .problem import FrictionMethod, Iterated, PreparedFriction, ScaledDelassus, ScaledProblem, Settings, inner_method
 
 
 @dataclass(frozen=True)
-class GivenForces:
+class GivenForces(Settings):
     """Hold the settings. ``tolerance``: change of the tangential reactions relative to the largest; ``tangential``:
     method for the tangential problems.
 
     In the result ``iterations`` counts pairs of problems and ``history`` the relative change in each.
     """
 
-    carries_friction: ClassVar[bool] = True
     tolerance: float = 1e-11
-    max_iterations: int = 1000
     tangential: FrictionMethod = field(default_factory=FrictionNewton)
     extrapolation: Extrapolation = field(default_factory=Plain)
 
     def __post_init__(self) -> None:
-        attributes(self, positive=("tolerance",), counts=("max_iterations",))
+        super().__post_init__()
         inner_method("GivenForces", "tangential", self.tangential)
         accelerated("GivenForces", self.extrapolation)
 

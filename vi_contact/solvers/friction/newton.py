@@ -22,16 +22,15 @@ slip to and fro. Where Newton cycles all the same, Gauss-Seidel sweeps (nsgs.py)
 import ctypes
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
 from ...core.algebra import Array, Mask, SerialComm
-from ...core.checks import attributes
 from ...core.compiled import library
 from .linear import Factored, LinearProblems, States
 from .nsgs import sweeper
-from .problem import Iterated, PreparedFriction, ScaledDelassus, ScaledProblem
+from .problem import Iterated, PreparedFriction, ScaledDelassus, ScaledProblem, Settings
 
 ATTEMPTS = 10  # of Newton, with twice the sweeps before each
 FIRST_SWEEPS = 2
@@ -42,19 +41,15 @@ Kept = dict[bytes, Factored]  # factors by the key of their states
 
 
 @dataclass(frozen=True)
-class FrictionNewton:
+class FrictionNewton(Settings):
     """Hold the settings. ``tolerance``: residual above which it refuses; ``max_iterations`` of Newton in a row.
 
     In the result ``iterations`` counts linear solves, fallback sweeps and, as one, the sweeps before (0: no contact),
     ``history`` the residual after those and after each linear solve.
     """
 
-    carries_friction: ClassVar[bool] = True
     tolerance: float = 1e-11
     max_iterations: int = 30
-
-    def __post_init__(self) -> None:
-        attributes(self, positive=("tolerance",), counts=("max_iterations",))
 
     def prepare(self, G: Array, bilateral: Mask) -> PreparedFriction:
         """Check and scale G (m d, m d). Answers depend on their right-hand side alone, not on steps before."""

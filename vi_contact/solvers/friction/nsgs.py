@@ -13,28 +13,21 @@ converges for every G; under Coulomb's it converges in practice, linearly, for f
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
 from ...core.algebra import Array, Mask
-from ...core.checks import attributes
-from .problem import Iterated, PreparedFriction, ScaledDelassus, ScaledProblem, iterated
+from .problem import Iterated, PreparedFriction, ScaledDelassus, ScaledProblem, Settings, iterated
 
 
 @dataclass(frozen=True)
-class NSGS:
+class NSGS(Settings):
     """Hold the settings. ``tolerance``: largest |F| of the natural map relative to r = 0.
 
     In the result ``iterations`` counts sweeps and ``history`` the residual after each.
     """
 
-    carries_friction: ClassVar[bool] = True
-    tolerance: float = 1e-12
     max_iterations: int = 5000
-
-    def __post_init__(self) -> None:
-        attributes(self, positive=("tolerance",), counts=("max_iterations",))
 
     def prepare(self, G: Array, bilateral: Mask) -> PreparedFriction:
         """Check and scale G (m d, m d)."""

@@ -20,13 +20,13 @@ the mean of G_tt to the same power: reactions and displacements are then both in
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from scipy.linalg import blas, lapack
 
 from ...core.algebra import Array, Mask, max_abs
-from ...core.checks import provides
+from ...core.checks import attributes, provides
 from ...core.errors import InputError, StepFailure
 from ...laws.friction import project
 from ..normal.lcp import EPS, check_gap, energy_scale, scaled_symmetric
@@ -62,6 +62,18 @@ class FrictionMethod(Protocol):
     def prepare(self, G: Array, bilateral: Mask) -> Any:
         """Return ``PreparedFriction`` or its like: check G (m d, m d) and scale it, once for many right-hand sides;
         ``bilateral`` (m,)."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Hold what all methods here let one choose: ``tolerance``, and ``max_iterations`` that they may take."""
+
+    carries_friction: ClassVar[bool] = True
+    tolerance: float = 1e-12
+    max_iterations: int = 1000
+
+    def __post_init__(self) -> None:
+        attributes(self, positive=("tolerance",), counts=("max_iterations",))
 
 
 def inner_method(owner: str, meaning: str, value: Any) -> None:

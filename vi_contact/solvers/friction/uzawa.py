@@ -12,30 +12,27 @@ that of the scaled numbers of ``problem``, in which rho is dimensionless. Slow b
 """
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
 from ...core.algebra import Array, Mask
-from ...core.checks import attributes
-from .problem import Iterated, PreparedFriction, ScaledDelassus, ScaledProblem, iterated
+from ...core.checks import number, optional
+from .problem import Iterated, PreparedFriction, ScaledDelassus, ScaledProblem, Settings, iterated
 
 
 @dataclass(frozen=True)
-class Uzawa:
+class Uzawa(Settings):
     """Hold the settings. ``tolerance``: largest |F| of the natural map over that of r = 0; ``rho`` > 0, or None: best.
 
     In the result ``iterations`` counts projections and ``history`` the residual after each. InputError for rho <= 0.
     """
 
-    carries_friction: ClassVar[bool] = True
-    tolerance: float = 1e-12
     max_iterations: int = 100_000
     rho: float | None = None
 
     def __post_init__(self) -> None:
-        positive = ("tolerance",) if self.rho is None else ("tolerance", "rho")
-        attributes(self, positive=positive, counts=("max_iterations",))
+        super().__post_init__()
+        optional(number, "Uzawa", "rho", self.rho, positive=True)
 
     def prepare(self, G: Array, bilateral: Mask) -> PreparedFriction:
         """Check and scale G (m d, m d)."""
