@@ -248,7 +248,6 @@ def test_stagnation_is_a_sentence_with_the_history(parallel: bool) -> None:
 def test_solvers_are_freed(parallel: bool) -> None:
     """Only PETSc objects outlive the last reference."""
     c = random_case(Coulomb(0.4), parallel=parallel)
-    gc.collect()
     gc.disable()
     try:
         solver = prepared(c)

@@ -183,7 +183,6 @@ def test_a_limit_of_iterations_is_told(parallel: bool) -> None:
 def test_solvers_are_freed(parallel: bool) -> None:
     """As without friction: only PETSc objects outlive the last reference."""
     c = random_case(Coulomb(0.4), parallel=parallel)
-    gc.collect()
     gc.disable()
     try:
         prepared = VOLUME.prepare(c.step.A, c.step.surface, 1.0)
