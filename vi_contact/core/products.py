@@ -40,7 +40,11 @@ class Remembered:
             del self._known[next(iter(self._known))]
         self._known[key] = x, value
 
-    def know(self, x: Array, value: Callable[[], Array]) -> Array:
+    def know(self, x: Any, value: Callable[[], Array]) -> Any:
         """Return x, frozen; ``value`` tells the value there when somebody asks for it."""
-        self._keep(id(x), frozen(x), value)
+        self._keep(x if type(x) is float else id(frozen(x)), x, value)
         return x
+
+    def numbers(self) -> list[float]:
+        """Return the numbers at which the values are known."""
+        return [x for x in self._known if type(x) is float]

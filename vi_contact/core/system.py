@@ -192,14 +192,20 @@ class SemiDiscreteSystem:
         function = self.load if name == "load" else getattr(self, name).__matmul__
         return self._products.setdefault(name, Remembered(function, KEPT[name]))
 
-    def know_rows(self, many: "SemiDiscreteSystem", row: int, *known: tuple[str, Array, Array]) -> None:
-        """Take (name, x, rows): the product with x is a row of that with the rows, when somebody asks for it."""
+    def know_rows(self, many: "SemiDiscreteSystem", row: int, *known: tuple[str, Any, Any]) -> None:
+        """Take (name, x, rows): the product with x is a row of that with the rows, when somebody asks for it; and
+        ("load", t, t)."""
 
-        def value(name: str, rows: Array) -> Callable[[], Array]:
+        def value(name: str, rows: Any) -> Callable[[], Array]:
             return lambda: np.asarray(many.product(name, rows)[row])
 
         for name, x, rows in known:
             self._remembered(name).know(x, value(name, rows))
+
+    @property
+    def times(self) -> list[float]:
+        """Return the times at which the load is known."""
+        return self._products["load"].numbers() if "load" in self._products else []
 
     def load_at(self, t: float) -> Array:
         """Return f(t), read-only; made once for each of the last two times, unless something is marched beside it."""

@@ -6,7 +6,7 @@ solved alone; who then has to escalate, or fails, goes on alone.
 """
 
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -17,7 +17,7 @@ import numpy as np
 from ..core.algebra import EffectiveMatrix
 from ..core.errors import ViContactError
 from ..core.products import frozen
-from ..core.step import Answers, Report, State, StepProblem, StepResult
+from ..core.step import Answers, Balance, Report, State, StepProblem, StepResult
 from ..core.verify import kkt_residuals
 from ..solvers.certified import NEAR, CertifiedSolver
 from .march import March, after_impact
@@ -198,9 +198,14 @@ class Group:
             frozen(vector)  # what is known of them stays true
         free = own_states(self._problem, problems, rows)
         self._many, self._states = self._struck(rows, free)
-        averages = Each(lambda row: partial(scheme.balance, problems[row], old[row], free[row], dt))
+        system, loads = self._problem.equations, [("load", t, t) for t in self._problem.equations.times]
+
+        def averages(row: int) -> Callable[[], Balance]:
+            problems[row].equations.know_rows(system, row, *loads)
+            return partial(scheme.balance, problems[row], old[row], free[row], dt)
+
         parts |= {"problem": problems, "old": old, "new": self._states, "v_minus": Each(lambda row: free[row].v),
-                  "averages": averages, "escalated": Each(lambda row: False)}
+                  "averages": Each(averages), "escalated": Each(lambda row: False)}
         for row, run in enumerate(self._runs):
             run.waiting.append((dt, RowReport(parts=parts, row=row)))
 
@@ -212,9 +217,15 @@ class Group:
             return rows, free
         if getattr(problem.impact, "by_rows", False) and not rows.memory:
             new = after_impact(problem, scheme, self._many, rows, dt)
-            struck = (frozen(new.v) != rows.v).any(axis=1)
-            moved = own_states(problem, self._problems, new)
-            return new, Each(lambda row: moved[row] if struck[row] else free[row])
+            struck, problems = (frozen(new.v) != rows.v).any(axis=1), self._problems
+
+            def moved(row: int) -> State:
+                if not struck[row]:
+                    return free[row]
+                problems[row].equations.know_rows(problem.equations, row, ("M", v := new.v[row], new.v))
+                return free[row].with_velocity(v)
+
+            return new, Each(moved)
         own = [after_impact(one, scheme, old[row], free[row], dt) if closed[row].any() else free[row]
                for row, one in enumerate(self._problems)]
         return replace(joined(own), u=rows.u), Each(own.__getitem__)
