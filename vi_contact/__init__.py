@@ -1,9 +1,8 @@
 """vi_contact: dynamic unilateral contact of elastic structures, certified step by step.
 
 The names most runs need, imported when they are first used: ``import vi_contact`` needs numpy and scipy only.
-Everything else has a room: ``vi_contact.fem`` (meshes, assembly, contact surfaces), ``solvers``, ``laws``,
-``ground_motion``, ``soil``, ``engineering``, ``exact``, ``bem``, ``beam``, ``boundary_layer``, ``models``, ``studies``,
-``plots``.
+All else has a room: ``vi_contact.fem`` (meshes, assembly, surfaces), ``solvers``, ``laws``, ``ground_motion``,
+``soil``, ``engineering``, ``exact``, ``bem``, ``beam``, ``boundary_layer``, ``models``, ``studies``, ``plots``.
 """
 
 from . import schemes

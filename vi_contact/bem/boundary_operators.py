@@ -52,8 +52,7 @@ class OperatorMatrices:
 class Galerkin:
     """Integrate radial kernels over all pairs of elements of one mesh.
 
-    kernels(r (m,)) -> KernelSet are of density 1 and speeds (c_p, c_s); fronts: distances [m] at which they have kinks,
-    the greatest being where they end.
+    kernels(r (m,)) -> KernelSet: of density 1, speeds (c_p, c_s); fronts: distances [m] of kinks, the last their end.
     """
 
     def __init__(self, mesh: BoundaryMesh, c_s: float, orders: Orders = Orders()) -> None:

@@ -9,8 +9,7 @@ integrated n times in time and closed (square roots, logarithms): F_n = n-fold i
 
     F_1 = ln((t + R) c/r),  F_2 = t F_1 - R,  (n-1)² F_n = (2n-3) t F_(n-1) - R² F_(n-2),   R = sqrt(t² - r²/c²).
 
-Ahead of its front (r >= c t) every function is zero. Derivation: docs/theory/bem.md; n = 0 is Achenbach, Wave
-Propagation in Elastic Solids, section 3.10.
+Zero ahead of its front (r >= c t). See docs/theory/bem.md; n = 0: Achenbach, Wave Propagation in Elastic Solids, 3.10.
 """
 
 from dataclasses import dataclass

@@ -43,8 +43,7 @@ class LayeredStep(StepProblem):
 class BoundaryLayer(Midpoint):
     """Step without friction, on rigid supports at rest, with mass at the contact nodes: the module's equations.
 
-    InputError for anything else, and for a start that is not inside the admissible set; StepFailure, naming the step,
-    when Newton's method does not converge.
+    InputError for anything else, and a start outside the admissible set; StepFailure where Newton's method fails.
     """
 
     law: ContactLayer

@@ -16,8 +16,7 @@ class StepFailure(ViContactError, RuntimeError):
 
 
 class Interrupted(KeyboardInterrupt):
-    """Say that a signal ended a run after a step, on all ranks: Ctrl-C, SIGTERM, SIGHUP. What was computed is in its
-    folder.
+    """Say that a signal (Ctrl-C, SIGTERM, SIGHUP) ended a run after a step, on all ranks; its folder has what there is.
 
     Like Ctrl-C itself it is no ``Exception``, so that no loop over runs goes on with the next one. ``number``: of the
     signal; ``status``: 128 + number, with which the command line exits.

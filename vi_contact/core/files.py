@@ -70,8 +70,7 @@ def sentence(error: OSError) -> str:
 
 
 def write_atomically(path: Path, data: bytes, *, safe: bool = True) -> None:
-    """Write a file that has its old content or all of the new one, whatever happens; OSError names it. ``safe``: even
-    when the power fails, which takes a while."""
+    """Write a file as a whole or not at all; OSError names it. ``safe``: even if the power fails, which takes time."""
     with _whole_or_not_at_all(path, safe) as file:
         write_all(file, data)
 

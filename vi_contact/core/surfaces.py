@@ -143,8 +143,7 @@ class ContactSurface:
         return load if turn is None else turn @ load
 
     def whole(self) -> "ContactSurface":
-        """Return the conditions of all ranks, by their numbers, on every rank as if it were alone: where they are and
-        how large, for output. Collective."""
+        """Return the places and sizes of the conditions of all ranks, by number, everywhere. Collective."""
         names = ("points", "normals", "weights", "gap0", "bilateral", "compliance")
         arrays = {name: self.everywhere(getattr(self, name)) for name in names}
         return replace(self, comm=SerialComm(), slots=np.arange(self.total), **arrays)
@@ -254,8 +253,7 @@ def nodal_frames(directions: Array) -> Array:
 def nodal_blocks(frames: Array) -> tuple[Indices, Array]:
     """Return (c, Q): nodal frames (k, d, d) with the contact direction in column c: component c is the normal one.
 
-    c is the direction's largest component. Axes at right angles to the direction keep their own columns: these are the
-    components that may be prescribed.
+    c is the direction's largest component. Axes at right angles to it keep their columns: components to be prescribed.
     """
     k, d, _ = frames.shape
     directions, every = frames[:, :, 0], np.arange(k)

@@ -16,8 +16,7 @@ from .products import Remembered
 class Space(Protocol):
     """Say what the unknowns mean: how an owned vector of unknowns becomes displacements of points.
 
-    ``ids`` are rank-independent numbers of the owned unknowns, node * dimension + component; ``coordinates`` (rows, d)
-    the positions of their nodes [m].
+    ``ids``: numbers of the owned unknowns on any ranks, node * dimension + component; ``coordinates`` (rows, d) [m].
     """
 
     dimension: int

@@ -17,9 +17,8 @@ def racking(corners: ArrayLike, displacements: Array) -> tuple[Array, Array]:
     """Return (racking, rotation) of four corners (4, 2) [m] moved by (..., 4, 2) [m]; each (...,), in radians.
 
     The displacement gradient G that fits the corners best, u = a + G X, gives racking = du_x/dy + du_y/dx and rotation
-    = (du_y/dx - du_x/dy)/2, anticlockwise. For a rectangle du_x/dy is the mean over its two sides and du_y/dx that over
-    bottom and top (Wang 1993: the racking ratio is this over the free field's shear strain).
-    InputError for corners on one line.
+    = (du_y/dx - du_x/dy)/2, anticlockwise. For a rectangle du_x/dy is the mean over its sides, du_y/dx over bottom and
+    top (Wang 1993: the racking ratio is this over the free field's shear strain). InputError for corners on one line.
     """
     x = array("racking", "corners", corners, (4, 2), unit="m")
     arms = x - x.mean(axis=0)

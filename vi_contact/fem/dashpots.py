@@ -39,8 +39,7 @@ NO_RESISTANCE = 1e-12  # of the resistance of all dashpots: a smaller share is n
 class BoundaryLoads:
     """Hold what a boundary puts on the body: functions t [s] -> (n,) [N] on the free unknowns.
 
-    ``elastic`` and ``viscous`` enter the load as its general and viscous parts; ``companions`` are the motions behind
-    them that are marched beside the run.
+    ``elastic`` and ``viscous``: general and viscous parts of the load; ``companions``: motions marched beside the run.
     """
 
     elastic: tuple[Callable[[float], Array], ...] = ()

@@ -78,8 +78,7 @@ class SlipRateCoulomb:
     """Bound dry friction by a coefficient that depends on the slip rate: limit = mu(|v|) · r_n.
 
     ``mu``: ExponentialDecay, StaticKinetic, or any function that takes speeds [m/s] >= 0, shape (n,), and returns as
-    many coefficients, or one. Raises InputError when it is no function, and, when used, for a coefficient that is
-    negative or not finite, naming the rate.
+    many coefficients, or one. InputError for no function and, when used, a negative or infinite coefficient.
 
     Implicit: |v| is the rate of the step that is being solved, (B_t u1 - B_t u0)/dt, or B_t v1 for velocity schemes.
     mu(0) is the static coefficient.

@@ -26,9 +26,8 @@ NOTHING = 1e-10  # of a node's own mass: neighbours with less cannot carry it
 def from_neighbours(system: SemiDiscreteSystem, massless: Mask, contact: Mask, nodal: Array) -> list[Matrix]:
     """Return the matrices P_k of v = P_0 P_1 … v that replace massless unknowns; contact: all those of contact nodes.
 
-    Contact nodes with neighbours behind the surface come last in the product, those with contact nodes around them
-    only, in corners, follow these. Tied nodes carry nothing: they are in two places. InputError when some contact
-    nodes have no material behind them at all.
+    Contact nodes with neighbours behind the surface come last in the product; those in corners, with contact nodes
+    around, follow them. Tied nodes, in two places, carry nothing. InputError for contact nodes without material behind.
     """
     algebra, comm = system.algebra, system.algebra.comm
     node = np.asarray(system.space.ids) // system.influence.shape[1]
@@ -168,8 +167,7 @@ def named(system: SemiDiscreteSystem, columns: Indices) -> Indices:
 
 
 def rigid_motions(directions: Array, offset: Array) -> Array:
-    """Return the rows R of rigid motions (…, modes): d translations and the rotations, of unknowns with these
-    directions (…, d) at these places."""
+    """Return rows R of rigid motions (…, modes), d translations and the rotations, of directions (…, d) at offsets."""
     d = directions.shape[-1]
     turns = [
         directions[..., j] * offset[..., i] - directions[..., i] * offset[..., j]

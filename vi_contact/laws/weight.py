@@ -28,8 +28,7 @@ def own_weight(
 ) -> Array:
     """Return M r g [N] on the unknowns; see ``with_weight``.
 
-    InputError for a direction of another length or number of components, and for a system without ``base_inertia``,
-    which has lost the mass at held nodes.
+    InputError for a direction of another length, and a system without ``base_inertia``: it lost the mass at held nodes.
     """
     instance("with_weight", "system", system, SemiDiscreteSystem, "give a system, such as fem.assemble returns")
     number("with_weight", "acceleration", acceleration, unit="m/s²")

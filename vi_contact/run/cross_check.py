@@ -135,8 +135,7 @@ class Disagreement:
 class CrossChecked:
     """Solve by one solver, whose answer counts, ask others at every step too, and remember how far they are off.
 
-    ``found`` does not count attempts that ``HalvedAtImpact`` threw away; ``differences``: what ``cross_check`` found
-    about answers of other methods.
+    ``found``: without attempts that ``HalvedAtImpact`` threw away; ``differences``: from references of ``cross_check``
     """
 
     primary: Solver

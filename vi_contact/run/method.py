@@ -24,8 +24,7 @@ SLACK = 10.0  # of the tolerance, and of the largest displacement: what a state 
 
 @dataclass(frozen=True)
 class Method:
-    """Hold how a problem is marched: scheme, solver and those of its escalation, time steps [s] as they were asked for,
-    and what a certificate may not exceed."""
+    """Hold how a problem is marched: scheme, solver and its escalation, time steps [s] as asked for, tolerance."""
 
     problem: ContactProblem
     scheme: Scheme

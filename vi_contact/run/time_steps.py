@@ -1,8 +1,7 @@
 """Plan how long the steps of a run are: a constant dt [s], a ``Schedule``, or steps halved where contact closes.
 
-Changing dt changes neither u nor v, and so no energy. A scheme that carries its past, like LinearMultistep, restarts it
-from u and v (``Scheme.start``). ``steps``, ``t_end``, ``checkpoint_every`` and progress count *base steps*: those
-of the plan, whether they were halved or not.
+Changing dt changes neither u nor v, and so no energy. A scheme that carries its past restarts it from them (``start``).
+``steps``, ``t_end``, ``checkpoint_every`` and progress count *base steps*: of the plan, halved or not.
 """
 
 from collections.abc import Callable

@@ -72,8 +72,7 @@ class FreeField(Dashpots):
 class FreeFieldSide:
     """March the column beside one side, and give the forces it puts on the body.
 
-    InputError for a body that is not in the plane, a side that is not vertical, or a lowest node that is not held on a
-    rigid base, or held on a compliant one.
+    InputError for a body in space, a side not vertical, a lowest node free on a rigid base or held on a compliant one.
     """
 
     def __init__(self, absorber: DashpotMatrix, given: FreeField, forms: Any) -> None:

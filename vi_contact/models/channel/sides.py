@@ -62,9 +62,8 @@ def bedrock(
 
 @dataclass(frozen=True)
 class Rollers:
-    """Hold the ends along one component, free along the other. Under horizontal shaking of a horizontal layer ends that
-    move horizontally only (component 1 held) follow the free field exactly; under vertical shaking those with component
-    0 held do."""
+    """Hold the ends along one component, free along the other. Under horizontal shaking of a horizontal layer ends with
+    component 1 held follow the free field exactly, under vertical shaking those with component 0 held."""
 
     firm: ClassVar[bool] = True
     component: int = 1

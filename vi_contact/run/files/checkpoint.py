@@ -3,8 +3,7 @@
 ``checkpoint.npz`` holds t, k, u, v, the reactions, active and the scheme's memory, vectors in the order of
 ``space.ids`` (the rotated basis has the same numbers as the system's own), the base steps done, what problem it is of
 (``identity``), checksums of the histories and of itself, and the number of its format. It is of the end of a base step,
-never from inside a halved one, so that a restart takes the steps of the straight run. The file is replaced as a whole:
-after a crash it is the last complete one.
+never inside a halved one, so that a restart takes the steps of the straight run, and always replaced as a whole.
 """
 
 import hashlib

@@ -43,8 +43,7 @@ class FieldWriter(Protocol):
 class Writer:
     """Write into the folder of a run, or into none: then nothing is written. Every method but ``rescue`` is collective.
 
-    ``stored``: the rows of an earlier run that this one continues. When they are in this folder, all that is there is
-    kept; otherwise it is cleared by ``open``.
+    ``stored``: the rows of an earlier run that this one continues. Unless they are in this folder, ``open`` clears it.
     """
 
     def __init__(

@@ -26,8 +26,7 @@ from .problem import FrictionMethod, Iterated, PreparedFriction, ScaledDelassus,
 
 @dataclass(frozen=True)
 class GivenForces(Settings):
-    """Hold the settings. ``tolerance``: change of the tangential reactions relative to the largest; ``tangential``:
-    method for the tangential problems.
+    """Hold the settings. ``tolerance``: change of r_t over the largest; ``tangential``: method of tangential problems.
 
     In the result ``iterations`` counts pairs of problems and ``history`` the relative change in each.
     """

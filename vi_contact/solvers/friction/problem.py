@@ -60,8 +60,7 @@ class FrictionMethod(Protocol):
         """Say True: that tells such a method from those for the problem without friction."""
 
     def prepare(self, G: Array, bilateral: Mask) -> Any:
-        """Return ``PreparedFriction`` or its like: check G (m d, m d) and scale it, once for many right-hand sides;
-        ``bilateral`` (m,)."""
+        """Check and scale G (m d, m d), ``bilateral`` (m,); return ``PreparedFriction`` or its like for many q."""
 
 
 @dataclass(frozen=True)
@@ -133,8 +132,7 @@ class ScaledProblem:
         return np.column_stack([r_n, project(r[:, 1:], self.limit(r_n))])
 
     def start(self, guess: Array | Mask | None) -> Array:
-        """Return reactions to start from: those guessed; or what opens the guessed set row by row, times the number
-        that makes ½ rᵀG r + qᵀr least."""
+        """Return reactions to start from: the guess; or what opens the guessed set, scaled to the least energy."""
         if guess is None:
             return np.zeros_like(self.q)
         if guess.dtype != bool:

@@ -37,8 +37,7 @@ PATIENCE = 10  # Júdice and Pires, Comput. Oper. Res. 21, 1994
 class ActiveSet:
     """Hold the settings. ``max_iterations``: set changes allowed; ``tolerance``: residual above which it refuses.
 
-    In the result ``iterations`` is the number of changes of the set (0: the guess was right) and ``history`` the number
-    of rows that changed sides in each.
+    In the result ``iterations`` counts changes of the set (0: the guess was right), ``history`` the rows moved in each.
     """
 
     tolerance: float = 1e-9

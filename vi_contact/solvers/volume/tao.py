@@ -1,7 +1,6 @@
 """Solve by PETSc TAO on the same bounds: minimise ½ xᵀA x - bᵀx subject to x_n <= bound, as a second opinion.
 
-TAO's tolerances and trust regions are absolute, which the scaled step makes harmless; its own convergence tests
-are replaced by ``ScaledStep.verdict``.
+TAO's tolerances and trust regions are absolute, harmless in a scaled step; ``ScaledStep.verdict`` judges convergence.
 """
 
 from dataclasses import dataclass

@@ -28,8 +28,7 @@ _MPI = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_RANK")  # in the environment o
 
 
 def command(runs: Sequence[OneRun], launch: Sequence[str], end: WallTime) -> list[str]:
-    """Return the command that makes these runs, each from its checkpoint where there is one; OutOfTime when nothing of
-    the wall time is left for them."""
+    """Return the command of these runs, each from its checkpoint if there is one; OutOfTime without wall time left."""
     asked = {
         "case": str(runs[0].case.path), "allow": runs[0].case.allowed, "settings": [one.settings for one in runs],
         "folders": [str(one.folder) for one in runs],
@@ -74,8 +73,7 @@ class Processes:
         return sum(list(self._shares.values()))
 
     def rows(self, runs: Sequence[OneRun]) -> Iterator[Row | None]:
-        """Yield the row of each run as it ends, None when more is done. What a process that died has left is run again,
-        each by itself."""
+        """Yield the row of each run as it ends, None when more is done; run what a dead process has left one by one."""
         for _ in range(ATTEMPTS):
             left, said = list(runs), []
             process = self._started(runs)
