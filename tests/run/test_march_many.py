@@ -122,6 +122,10 @@ def test_reports_hold_what_reports_of_march_hold(steps_together):
         assert np.abs(report.step.b - other.step.b).max(initial=0.0) <= 1e-12 * np.abs(other.step.b).max(initial=0.0)
         assert (report.step.t, report.result.iterations) == (alone.t, other.result.iterations)
         assert not hasattr(report, "another")
+        for name, x in (("M", report.v_minus), ("M", report.new.v), ("K", report.new.u)):
+            expected = getattr(report.problem.equations, name) @ x
+            found = report.problem.equations.product(name, x)
+            assert np.abs(found - expected).max(initial=0.0) <= 1e-13 * np.abs(expected).max(initial=0.0)
     for before, after in itertools.pairwise(reports[1]):
         assert after.old is before.new
 

@@ -98,8 +98,7 @@ class ContactSurface:
 
     @cached_property
     def readable(self) -> tuple[tuple[int, ...], list[Any], tuple[Any, ...]]:
-        """Return (m, d - 1), where compiled functions find the unknowns and, unless all is plain, compliance and
-        bilateral conditions, and what lies there."""
+        """Return (m, d - 1), where compiled functions find these arrays, None where all is plain, and the arrays."""
         kept = (np.ascontiguousarray(self.owned, np.int64), np.ascontiguousarray(self.tangents, np.int64),
                 *((None, None) if self.plain else (self.compliance + 0.0, self.bilateral.copy())))
         return self.tangents.shape, [None if one is None else at(one) for one in kept], kept

@@ -192,8 +192,7 @@ class SemiDiscreteSystem:
         return self._products.setdefault(name, Remembered(function, KEPT[name]))
 
     def know_rows(self, many: "SemiDiscreteSystem", row: int, *known: tuple[str, Any, Any]) -> None:
-        """Take (name, x, rows): the product with x is a row of that with the rows, when somebody asks for it; and
-        ("load", t, t)."""
+        """Take (name, x, rows), and ("load", t, t): the product with x is a row of that with the rows, when asked."""
 
         def value(name: str, rows: Any) -> Callable[[], Array]:
             return lambda: np.asarray(many.product(name, rows)[row])

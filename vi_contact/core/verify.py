@@ -28,15 +28,13 @@ def kkt_residual(step: StepProblem, result: StepResult) -> Certificate:
 def kkt_residuals(
     many: StepProblem, result: StepResult, own: Callable[[int], tuple[StepProblem, StepResult]]
 ) -> list[Certificate]:
-    """Return the certificate of each of several steps on one rank: ``many`` and ``result`` hold their rows, ``own``
-    makes one of each."""
+    """Return the certificate of each of several steps on one rank, whose rows these hold; ``own`` makes one of each."""
     rubs, rows = many.slip0 is not None, enumerate(_sizes(many, result))
     return [_judged(*(own(row) if rubs else (many, result)), sizes) for row, sizes in rows]
 
 
 def _sizes(step: StepProblem, result: StepResult) -> list[list[float]]:
-    """The largest sizes in the definitions, over all ranks, of each of the steps that are rows of this one; infinite
-    for NaN, which no reduction keeps."""
+    """The largest sizes in the definitions, over all ranks, of each step in rows; infinite for NaN, which would go."""
     comm, functions = step.surface.comm, already()
     Ax = step.A.image(result.x)
     found = _sizes_in_numpy(step, result, Ax) if functions is None else _sizes_compiled(step, result, Ax, functions)

@@ -44,8 +44,7 @@ class RowReport(Report):
 
 
 def joined(states: Sequence[State]) -> State:
-    """Return the state of all runs, read-only; of a memory's arrays the vectors differ from run to run, the others do
-    not."""
+    """Return the state of all runs, read-only; of a memory's arrays only the vectors differ from run to run."""
     first, rubs = states[0], next((0.0 * one.r_t for one in states if one.r_t is not None), None)
     u, v, r_n, active = (np.stack([getattr(one, name) for one in states]) for name in ("u", "v", "r_n", "active"))
     memory = {name: frozen(np.stack([one.memory[name] for one in states])) if value.shape == first.u.shape else value
@@ -91,9 +90,8 @@ def loads_of(problems: Sequence[ContactProblem]) -> Loads:
     shaken = [(run, *pair) for run, one in enumerate(problems)
               for pair in one.equations.load.separable[len(body.separable) :]]
     vectors = {force.tobytes(): force for _, force, _ in shaken}
-    order = {key: place for place, key in enumerate(vectors)}
-    places = [(run, order[force.tobytes()], history) for run, force, history in shaken]
-    forces = np.array(list(vectors.values())).reshape(len(vectors), len(body.constant))
+    order, forces = list(vectors), np.array(list(vectors.values())).reshape(len(vectors), len(body.constant))
+    places = [(run, order.index(force.tobytes()), history) for run, force, history in shaken]
 
     def rows(t: float) -> Array:
         factors = np.zeros((len(problems), len(forces)))

@@ -17,7 +17,7 @@ import numpy as np
 from ..core.algebra import EffectiveMatrix
 from ..core.errors import ViContactError
 from ..core.products import frozen
-from ..core.step import Answers, Balance, Report, State, StepProblem, StepResult
+from ..core.step import Balance, Report, State, StepProblem, StepResult
 from ..core.verify import kkt_residuals
 from ..solvers.certified import NEAR, CertifiedSolver
 from .march import March, after_impact
@@ -115,30 +115,23 @@ class Group:
             self._problems = [run.method.problem for run in runs]
             self._problem = replace(first := self._problems[0])
             self._problem.__dict__["equations"] = first.unshaken.loaded(loads_of(self._problems))
-            self._at(joined(states), states)
-
-    def _at(self, many: State, states: list[State]) -> None:
-        """Hold these states as rows, and one by one."""
-        self._many, self._states = many, Each(states.__getitem__)
+            self._many, self._states = joined(states), Each(states.__getitem__)
 
     def without(self, leaving: Sequence[Together]) -> None:
         """Let these runs go on alone from where they are."""
         for row, run in enumerate(self._runs):
-            if run in leaving:
-                run.group, run.state = None, self._states[row]
-        left = [row for row, run in enumerate(self._runs) if run not in leaving]
-        self._chosen([self._runs[row] for row in left], [self._states[row] for row in left])
+            run.group, run.state = None, self._states[row]
+        left = [run for run in self._runs if run not in leaving]
+        self._chosen(left, [run.state for run in left])
         if self._runs and self._dt == self._dt:
             self._A = self._scheme.effective_matrix(self._problem, self._dt).factorised_as(self._A)
 
     def advance(self) -> None:
         """Make the next step of all runs; those that cannot make it together leave."""
-        leaving = [run for run in self._runs if run.step_plan.steps == self._base]
-        if leaving:
-            self.without(leaving)
         while self._runs:
-            dt = self._runs[0].step_plan.dt(self._base)
-            leaving = [run for run in self._runs if run.step_plan.dt(self._base) != dt] or self._step(dt)
+            plans = [(run, run.step_plan) for run in self._runs]
+            dt, ended = plans[0][1].dt(self._base), [run for run, plan in plans if plan.steps == self._base]
+            leaving = ended or [run for run, plan in plans if plan.dt(self._base) != dt] or self._step(dt)
             if not leaving:
                 self._base += 1
                 return
@@ -149,7 +142,7 @@ class Group:
         runs, scheme, problem = self._runs, self._scheme, self._problem
         if dt != self._dt:
             states = [scheme.start(one, self._states[row], dt) for row, one in enumerate(self._problems)]
-            self._at(joined(states), states)
+            self._many, self._states = joined(states), Each(states.__getitem__)
             self._dt, self._A, self._solver = dt, scheme.effective_matrix(problem, dt), None
         many = scheme.step(problem, self._many, self._A, dt)
         if not np.isfinite(many.b.sum()) and len(wrong := np.flatnonzero(~np.isfinite(many.b).all(axis=-1))):
@@ -157,25 +150,23 @@ class Group:
         if self._solver is None:
             method = runs[0].method
             self._solver = CertifiedSolver(problem, self._A, many.scale, method.solvers, self._tolerance)
-        problems = self._problems
-        steps, together = Each(lambda row: own_step(problems[row], many, row)), self._solver.first
+        problems, together = self._problems, self._solver.first
+        steps = Each(lambda row: own_step(problems[row], many, row))
         answers = together.solve_many(many, steps.__getitem__) if hasattr(together, "solve_many") else None
         if answers is None:
             return list(runs)
         for run in () if dt in runs[0].prepared else runs:
             run.prepared = {dt: (self._A, self._solver)}
-        leaving = list(answers.failed)
+        parts, leaving = {"step": steps, "result": Each(answers.own)}, list(answers.failed)
         if not leaving:
-            parts = {"step": steps, "result": Each(answers.own)}
-            result, leaving = self._judged(many, answers, parts)
+            result, leaving = self._judged(many, answers.rows, parts)
         if not leaving:
             self._finish(many, result, parts)
         return [runs[row] for row in leaving]
 
-    def _judged(self, many: StepProblem, answers: Answers, parts: dict[str, Any]) -> tuple[StepResult, list[int]]:
-        """The answers as rows, those that are not good at once found alone; the rows of runs that have to escalate, or
-        fail."""
-        steps, results, rows, leaving = parts["step"], parts["result"], answers.rows, []
+    def _judged(self, many: StepProblem, rows: StepResult, parts: dict[str, Any]) -> tuple[StepResult, list[int]]:
+        """The answers as rows, those not good at once found alone; the rows of runs that have to escalate, or fail."""
+        steps, results, leaving = parts["step"], parts["result"], []
         certificates = kkt_residuals(many, rows, lambda row: (steps[row], results[row]))
         doubtful = [row for row, one in enumerate(certificates) if not one.worst <= NEAR * self._tolerance]
         for row in doubtful:

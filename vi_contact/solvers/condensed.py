@@ -141,9 +141,8 @@ class PreparedCondensed:
         return StepResult(x, surface.mine(found.r), surface.mine(found.active), found.iterations, self._name)
 
     def solve_many(self, many: StepProblem, own: Callable[[int], StepProblem]) -> Answers | None:
-        """Return the answers to the steps of several runs: ``many`` holds the rows of b, guess and active set, ``own``
-        makes the step of one. None where this cannot be: on several ranks, without contact unknowns last in the factor,
-        and with other methods than ActiveSet."""
+        """Return the answers to the steps that are rows of ``many``; ``own`` makes one. None where this cannot be: on
+        several ranks, without contact unknowns last in the factor, and with other methods than ActiveSet."""
         surface, rubs = self._surface, many.slip0 is not None and self._surface.total > 0
         condensed, small = (self.friction.condensed, None) if rubs else self._normal
         if surface.comm.size > 1 or not isinstance(condensed, Last):

@@ -106,8 +106,7 @@ class Exchanges:
         self._arguments = (m, most, c_double(4.0 * EPS * scaled.norm), c_double(method.tolerance), *map(at, self._kept))
 
     def __call__(self, q: Array, guess: Mask) -> tuple[Array, Mask, Array, Indices, Indices]:
-        """Return r, active, residual, iterations (-1: not solved) and the rows that each of them moved, of q and a
-        guessed set (k, m), or (m,) for one."""
+        """Return r, active, residual, iterations (-1: not solved) and rows that each moved; q, guess (k, m) or (m,)."""
         k = len(q) if q.ndim == 2 else 1
         if k > self._rows:
             self._made(k)
