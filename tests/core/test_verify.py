@@ -247,7 +247,8 @@ def test_ledger_finds_a_wrong_step():
 
 def test_compiled_sizes_are_those_of_numpy(monkeypatch):
     """Digit by digit: of one step and of several, with springs, held conditions, friction, and NaN."""
-    library(SerialComm())
+    if library(SerialComm()) is None:
+        pytest.skip("needs a compiler and CHOLMOD")
     step, result = pressed()
     A = EffectiveMatrix(step.A.matrix, step.A.algebra, image=lambda x: np.ascontiguousarray((step.A.matrix @ x.T).T))
     step = replace(step, A=A)
