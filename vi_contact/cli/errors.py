@@ -108,8 +108,7 @@ def world() -> Any:
 
 
 def fail_together(text: str) -> None:
-    """Return when all ranks have come here; else say what stopped this one alone and end the others, which wait for it
-    in a collective call. Collective, but for that."""
+    """Return when all ranks come here; else say what stopped this one and end the others, which wait. Collective."""
     ranks = world()
     if ranks.size == 1:
         return

@@ -109,8 +109,7 @@ class WallModel:
     ) -> ContactProblem:
         """Set up the wall in a case; by default the harmonic of Fig. 3 and the source's inelastic impact on its mass.
 
-        Schemes with massless contact nodes take no impact law: give impact=None, and leave mass to them. An impact law
-        runs on consistent mass unless another is given.
+        Schemes with massless contact nodes take impact=None and their own mass; an impact law runs on consistent mass.
         """
         return ContactProblem(self.system, self.surface(case), impact=impact,
                               mass=ConsistentMass() if impact is not None and mass is None else mass,

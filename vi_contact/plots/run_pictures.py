@@ -1,5 +1,4 @@
-"""Draw the pictures of a run beside its page, from its folder alone: ground motion, displacements, energy, certificate,
-contact; of the buried channel its interface and a film too."""
+"""Draw the pictures of a run from its folder alone: motion, energy, certificate, contact; of the channel a film too."""
 
 from collections.abc import Sequence
 from pathlib import Path

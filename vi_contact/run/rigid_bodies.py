@@ -81,8 +81,7 @@ def _free(system: SemiDiscreteSystem) -> Iterator[FreeMotions]:
 
 
 def _kernel(form: Array, zero: float) -> Array:
-    """Columns whose form is zero: the axes themselves where they are of that kind, so that no round-off of one sum of
-    forces gets into another; and others between the axes that are left."""
+    """Columns whose form is zero: axes of that kind, so that sums of forces stay apart, and others between the rest."""
     free = np.abs(form.diagonal()) <= zero
     values, vectors = np.linalg.eigh(form[np.ix_(~free, ~free)])
     others = np.zeros((len(form), len(values)))

@@ -28,8 +28,7 @@ from ..space import FemSpace, known_matrices, space_of
 class VonMises:
     """Compute the mean von Mises stress of owned cells [Pa]: ∫ sqrt(3/2 s:s) / ∫ 1 over a cell, s = dev(sigma).
 
-    Plane strain has sigma_zz = lambda tr(eps), plane stress has none; a one-dimensional body is taken for a bar in
-    uniaxial stress. Viscous stresses are not included.
+    Plane strain has sigma_zz = lambda tr(eps), plane stress none, a bar uniaxial stress. Without viscous stresses.
     """
 
     def __init__(self, forms: Any) -> None:

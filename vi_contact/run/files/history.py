@@ -34,8 +34,7 @@ GROWTH = 1.25  # history.h5 is rewritten when it has grown by this factor: what 
 class HistoryFiles:
     """Keep the files of a table (rank 0 only) and the GEOMETRY of contact points. Every method may raise OSError.
 
-    ``stored``: the rows of an earlier run that this one continues, in the same folder (later ones are dropped) or in
-    another; without them the table has its first row only.
+    ``stored``: the rows of an earlier run that this one continues, in this folder (later ones are dropped) or another.
     """
 
     def __init__(

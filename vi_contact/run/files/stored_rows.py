@@ -1,7 +1,6 @@
 """Read the rows that an earlier run left in its folder, block by block: what a restart goes on from.
 
-Numbers are in history.csv, arrays in history.h5 and, of later steps, in history.journal. What was read is known by a
-checksum over lines and arrays, which the checkpoint keeps.
+Numbers are in history.csv, arrays in history.h5, of later steps in history.journal; the checkpoint has their checksum.
 """
 
 import hashlib

@@ -69,7 +69,6 @@ class PreparedFixedPoint:
 
 
 def contraction(result: FrictionResult) -> float:
-    """Return the observed mean factor between successive changes of the thresholds, of those above rounding (1e-10 of
-    the first); NaN when there were fewer than two."""
+    """Return the mean factor between changes of the thresholds above rounding (1e-10 of the first); NaN below two."""
     changes = [change for change in result.history if change > 1e-10 * result.history[0]]
     return float((changes[-1] / changes[0]) ** (1.0 / (len(changes) - 1))) if len(changes) > 1 else float("nan")
