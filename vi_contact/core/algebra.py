@@ -50,7 +50,7 @@ def largest(comm: Comm, value: SupportsFloat) -> float:
 
 def total(comm: Comm, value: SupportsFloat) -> float:
     """Return the sum of the ranks' values, the same on every rank."""
-    return float(comm.sum(np.array([float(value)]))[0])
+    return float(value) if comm.size == 1 else float(comm.sum(np.array([float(value)]))[0])
 
 
 def from_each(comm: Comm, value: Any) -> list[Any]:
