@@ -53,8 +53,10 @@ class FrictionNewton(Settings):
 
     def prepare(self, G: Array, bilateral: Mask) -> PreparedFriction:
         """Check and scale G (m d, m d). Answers depend on their right-hand side alone, not on steps before."""
-        delassus = ScaledDelassus(G, bilateral)
-        return PreparedFriction(self, self.tolerance, delassus, partial(self._loop, library(SerialComm()), {}))
+        delassus, compiled = ScaledDelassus(G, bilateral), library(SerialComm())
+        if compiled and delassus.count:
+            delassus.short  # noqa: B018  a part of set-up
+        return PreparedFriction(self, self.tolerance, delassus, partial(self._loop, compiled, {}))
 
     def _loop(self, compiled: Any, kept: Kept, step: ScaledProblem, r: Array) -> Iterated:
         history: list[float] = []
