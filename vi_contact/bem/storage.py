@@ -23,8 +23,7 @@ def stored_blocks(
 ) -> EnergeticBlocks:
     """Return the first `steps` blocks of the file if it exists; else compute and write them.
 
-    Raises InputError, naming what differs, when the file belongs to another mesh, material or time step, holds fewer
-    steps, or is no such file, and for a file that cannot be written.
+    InputError, naming what differs, for a file of another mesh, material or dt, too few steps, or not to be written.
     """
     owner = "stored_blocks"
     target = checks.path(owner, "path", path)

@@ -18,8 +18,7 @@ class StepFailure(ViContactError, RuntimeError):
 class Interrupted(KeyboardInterrupt):
     """Say that a signal (Ctrl-C, SIGTERM, SIGHUP) ended a run after a step, on all ranks; its folder has what there is.
 
-    Like Ctrl-C itself it is no ``Exception``, so that no loop over runs goes on with the next one. ``number``: of the
-    signal; ``status``: 128 + number, with which the command line exits.
+    Like Ctrl-C it is no ``Exception``: no loop over runs goes on. ``number``: the signal; ``status``: 128 + number.
     """
 
     def __init__(self, message: str = "interrupted", number: int = signal.SIGINT) -> None:

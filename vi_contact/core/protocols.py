@@ -52,8 +52,7 @@ class FrictionLaw(Protocol):
     def at(self, speed: Array) -> "FrictionLaw":
         """Return the law at slip rates ``speed`` = |v_t| (m,) [m/s], >= 0, with limit and slope of its own.
 
-        ``limit`` and ``slope`` of the law itself are those at rest. A law that does not know rates returns itself,
-        the same object: that spares the iteration over rates.
+        ``limit`` and ``slope`` of the law itself are those at rest. A law without rates returns itself: no iteration.
         """
 
 

@@ -80,8 +80,7 @@ class SlipRateCoulomb:
     ``mu``: ExponentialDecay, StaticKinetic, or any function that takes speeds [m/s] >= 0, shape (n,), and returns as
     many coefficients, or one. InputError for no function and, when used, a negative or infinite coefficient.
 
-    Implicit: |v| is the rate of the step that is being solved, (B_t u1 - B_t u0)/dt, or B_t v1 for velocity schemes.
-    mu(0) is the static coefficient.
+    Implicit: |v| is that of the step being solved, (B_t u1 - B_t u0)/dt or B_t v1. mu(0) is the static coefficient.
     """
 
     mu: "ExponentialDecay | StaticKinetic | Callable[[Array], Any]"

@@ -23,8 +23,7 @@ SHORT = 80  # bytes in which what comes first is found
 def safe_copy(file: Path, folder: Path) -> Path:
     """Copy a mesh file into this folder, safe for Gmsh to read.
 
-    InputError for a file that is missing, empty, no MSH file (a script most of all), cut short, or that announces more
-    nodes or cells than it has bytes.
+    InputError for a file that is missing, empty, no MSH file (a script), cut short, or announces more than it holds.
     """
     copy = folder / "mesh.msh"
     try:

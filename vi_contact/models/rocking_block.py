@@ -108,8 +108,7 @@ class RockingModel:
         return replace(self.problem, excitation=excitation)
 
     def time_steps(self, *, dt: float | None = None, halvings: int = 4) -> HalvedAtImpact:
-        """Return steps of 1/(400 p), about a millisecond, halved where a corner lands: the loss of an impact is that of
-        the rigid block only if the step resolves when it happens."""
+        """Return steps of 1/(400 p), halved where a corner lands: the loss of an impact needs its time resolved."""
         return HalvedAtImpact(1.0 / (400.0 * self.block.shape.p) if dt is None else dt, halvings)
 
     def tilted(self, theta: float, *, rate: float = 0.0) -> State:

@@ -48,8 +48,7 @@ class Reference(Protocol):
 class RunDifference:
     """Hold the largest differences between a run and a reference over their common times, relative.
 
-    The impulse is compared with the largest one, the mean displacement with the largest displacement of any point;
-    ``bound``: up to which they are said to agree.
+    Impulses over the largest one, mean displacements over the largest of any point; ``bound``: up to which they agree.
     """
 
     name: str

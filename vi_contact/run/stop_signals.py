@@ -46,8 +46,7 @@ class StopSignals:
             signal.signal(number, signal.SIG_DFL)
 
     def asked(self, comm: Comm, over: bool = False) -> tuple[int, bool]:
-        """Return the number of a signal that some rank has got, 0 for none, and whether the time is over for one of
-        them: the same on all ranks. Collective, one reduction."""
+        """Return the number of a signal that a rank has got, or 0, and whether time is over for one. Collective."""
         over = over or self._late
         number, late = (self._found, over) if comm.size == 1 else comm.max(np.array([self._found, over], dtype=float))
         if self._lasting:

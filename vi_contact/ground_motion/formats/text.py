@@ -39,8 +39,7 @@ Entries = Mapping[str, tuple[int, str]]  # key of a header -> index of its line,
 
 @dataclass(frozen=True, kw_only=True)
 class TextFile:
-    """Describe a file as read: its path as the caller gave it, its lines without ends, the sha256 of its bytes; and
-    what the caller says about it, see ``read_record``."""
+    """Hold a file as read: path as given, lines without ends, sha256 of its bytes; and what ``read_record`` is told."""
 
     path: str
     lines: tuple[str, ...]

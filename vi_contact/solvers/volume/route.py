@@ -111,8 +111,7 @@ class Volume:
 class PreparedVolume:
     """Run a PETSc solver bound to A. ``close`` frees it.
 
-    Without ``close`` it is freed at the first ``prepare`` after its last reference: destruction is collective, and
-    Python's is not, so petsc4py only puts it aside.
+    Without ``close`` it is freed at the first ``prepare`` after its last reference: to free it is collective.
     """
 
     def __init__(self, settings: Volume, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> None:
