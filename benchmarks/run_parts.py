@@ -27,8 +27,7 @@ from vi_contact.core.contact_last import ContactLast
 from vi_contact.fem.petsc_algebra import PetscMatrix
 from vi_contact.run.march import March
 from vi_contact.solvers import certified, condensed
-from vi_contact.solvers.normal.active_set import ActiveSet
-from vi_contact.solvers.normal.lcp import PreparedLCP
+from vi_contact.solvers.normal.active_set import ActiveSet, PreparedSets
 
 RUNS = (("wall", wall, 216), ("wall", wall, 2e4), ("wall", wall, 2e5), ("block in space", block, 2e4))
 PARTS = ("set-up", "forward", "small problem", "backward", "products", "certificate", "scheme and loop", "records")
@@ -92,7 +91,7 @@ def watched(clock: Clock) -> Iterator[None]:
     places: list[tuple[str, Any, str]] = [
         ("set-up", condensed, "condense"), ("set-up", ActiveSet, "prepare"),
         ("set-up", type(SCHEME), "effective_matrix"), ("forward", ContactLast, "forward"),
-        ("small problem", PreparedLCP, "solve"), ("backward", ContactLast, "backward"),
+        ("small problem", PreparedSets, "solve"), ("backward", ContactLast, "backward"),
         ("products", PetscMatrix, "__matmul__"), ("products", PetscMatrix, "transpose_apply"),
         ("certificate", certified, "kkt_residual"),
     ]
