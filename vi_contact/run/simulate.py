@@ -19,7 +19,7 @@ from .files.folder import HISTORY_H5, locked, run_folder
 from .files.stored_rows import StoredRows
 from .files.table import Block, Table
 from .files.writer import FieldWriter, Writer
-from .method import Method, checked_method, with_defaults
+from .method import checked_method, with_defaults
 from .recorders import Contact, Energy, Steps
 from .session import Comparison, Session
 from .solution import Solution
@@ -91,7 +91,11 @@ def opened(
     source = _source(restart, folder := None if out is None else run_folder(comm, out))
     recorders: list[Recorder] = [Steps(), *((Energy(), Contact()) if record is None else record)]
     with locked(comm, folder):
-        place, checksum = _place(method, source, state, changed)
+        if source is None:
+            begin = initial_state(method.problem) if state is None else state
+            place, checksum = RestartPoint(begin, begin.t, begin.k), ""
+        else:
+            place, checksum = read_checkpoint(source, method.problem, scheme=method.scheme, dt=dt, changed=changed)
         plan = step_plan(dt, steps, t_end, place.t_start)
         place = replace(place, state=method.scheme.start(problem, place.state, plan.dt(place.base)))
         table = Table(*_started(problem, recorders, place.state), None if folder is None else folder / HISTORY_H5, comm)
@@ -101,13 +105,6 @@ def opened(
         session = Session(method, recorders, table, plan, place, checkpoint_every, cross_check, progress, end,
                           resumed_from=None if stored is None else stored.k)
         yield session, Writer(problem, folder, fields, table, stored)
-
-
-def _place(method: Method, source: Path | None, state: State | None, changed: bool) -> tuple[RestartPoint, str]:
-    """Where the run begins, and the checksum of the rows before it: at a state, or the checkpoint in ``source``."""
-    if source is None:
-        return RestartPoint.first(initial_state(method.problem) if state is None else state), ""
-    return read_checkpoint(source, method.problem, scheme=method.scheme, dt=method.dt, changed=changed)
 
 
 def _check_outputs(

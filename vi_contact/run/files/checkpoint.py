@@ -49,11 +49,6 @@ class RestartPoint:
     base: int = 0
     halved: int = 0
 
-    @classmethod
-    def first(cls, state: State) -> "RestartPoint":
-        """Return the beginning of a run."""
-        return cls(state, state.t, state.k)
-
     @property
     def number(self) -> int:
         """Return the number of the base step, counted on from the k of the first state."""
