@@ -78,10 +78,11 @@ def test_the_loss_is_in_the_ledger(comm, scheme):
     assert abs(run.history["energy_defect"][-1]) < 1e-10 * given
 
 
-CASES = [("P", 60, 2.2), pytest.param("S", 60, 1.5, marks=pytest.mark.serial)]
+CASES = [("P", 60, 2.2), ("S", 60, 1.5)]
 
 
 @pytest.mark.slow
+@pytest.mark.serial  # ranks change nothing of it: the columns above show that
 @pytest.mark.parametrize("wave, angle, length", CASES)
 def test_oblique_waves(comm, wave, angle, length):
     """V8.1: a packet on a periodic strip, 10 cells per wavelength: within 20 % of the table, and of its own mean."""

@@ -145,7 +145,9 @@ def test_history_is_that_of_the_thresholds(parallel: bool) -> None:
 # Spatial -------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("law", [Coulomb(0.4), Tresca(0.1), Tresca((0.0, 0.1, 0.3, 0.6, 1.0, 2.0))], ids=repr)
+@pytest.mark.parametrize("law", [
+    pytest.param(Coulomb(0.4), marks=pytest.mark.slow), Tresca(0.1), Tresca((0.0, 0.1, 0.3, 0.6, 1.0, 2.0)),
+], ids=repr)
 def test_disks_agree_with_the_condensed_route(parallel: bool, law: Any) -> None:
     """V4.0 with friction in space: the exact disk, no polygon; both routes to 1e-9."""
     seen = []
