@@ -12,6 +12,7 @@ so a law that asks for one is refused: its value at rest would be wrong for poin
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
+from itertools import accumulate, islice
 
 import numpy as np
 
@@ -106,13 +107,9 @@ def quasi_static(
     else:
         check_sizes("quasi_static", problem, state)
     order = _checked(times, state.t)
-    return _stages(Equilibria(problem, solver=solver, tolerance=tolerance), state, order)
-
-
-def _stages(equilibria: Equilibria, state: State, times: list[float]) -> Iterator[State]:
-    for t in times:
-        state = replace(equilibria.after(state, t), k=state.k + 1)
-        yield state
+    equilibria = Equilibria(problem, solver=solver, tolerance=tolerance)
+    stages = accumulate(order, lambda old, t: replace(equilibria.after(old, t), k=old.k + 1), initial=state)
+    return islice(stages, 1, None)  # the first one is the start
 
 
 def _checked(times: Iterable[float], start: float) -> list[float]:

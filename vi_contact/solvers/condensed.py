@@ -81,8 +81,7 @@ class Condensed:
                lambda: problem.friction.limit(np.zeros(surface.count), surface.weights, 1.0))
 
     def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> "PreparedCondensed":
-        """Return what condenses A, once per time step size, at the first step: that tells whether it rubs. InputError
-        for more contact conditions than a dense matrix suits."""
+        """Return what condenses A at its first step, which tells of friction. InputError for too many conditions."""
         refuse_dense("Condensed()", surface.total)
         return PreparedCondensed(self, A, surface, scale)
 

@@ -40,8 +40,7 @@ Identity = dict[str, Any]
 
 
 def identity(problem: ContactProblem, scheme: Scheme, dt: TimeSteps, *, start: float, end: float) -> Identity:
-    """Name -> number, text or numbers with their sizes, the same on all ranks; functions of time are looked at between
-    ``start`` and ``end`` [s]. Collective."""
+    """Name -> number, text or numbers with sizes, of all ranks; histories from ``start`` to ``end`` [s]. Collective."""
     system, surface = problem.system, problem.surface
     probes = [probe(np.asarray(system.space.ids), j) for j in range(PROBES)]
     first = min(end - start, STEPS * min(pieces_of(dt))[0])

@@ -102,8 +102,7 @@ class Writer:
             self.flush()
 
     def flush(self, *, alone: bool = False) -> None:
-        """Write the rows that wait, and put them into the table: a checkpoint never knows one that the disk refused.
-        Collective, unless other ranks might not come (``alone``)."""
+        """Write rows that wait, then put them into the table. Collective, unless others may not come (``alone``)."""
         if self._waiting:
             on_root(SerialComm() if alone else self._comm, self._flush)
             for row in self._waiting:
