@@ -103,16 +103,10 @@ class Session:
     def go(self, writer: Writer) -> Solution:
         """Make the remaining steps, and write everything before, during and after them."""
         with StopSignals() as signals:
-            steps = self.steps(writer, signals)
-            while True:
-                try:
-                    next(steps)
-                except StopIteration as end:
-                    solution: Solution = end.value
-                    return solution
+            return next(filter(None, self.steps(writer, signals)))
 
-    def steps(self, writer: Writer, signals: StopSignals) -> Generator[None, None, Solution]:
-        """Do the same, and stop to yield after every base step."""
+    def steps(self, writer: Writer, signals: StopSignals) -> Generator[Solution | None, None, None]:
+        """Do the same, and yield None after every base step, the solution in the end."""
         begin = time.perf_counter()
         self.halved = self.place.halved
         try:
@@ -134,7 +128,7 @@ class Session:
         if warning and self.root:
             log.warning("%s", warning)
         writer.close(facts)
-        return Solution(self.table.history(), self.table.columns, self.place.state, facts)
+        yield Solution(self.table.history(), self.table.columns, self.place.state, facts)
 
     def _march(self, writer: Writer, signals: StopSignals) -> Iterator[None]:
         place = self.place

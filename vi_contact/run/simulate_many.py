@@ -54,7 +54,7 @@ class _Turn:
     number: int
     session: Session
     loop: Together
-    steps: Generator[None, None, Solution]
+    steps: Generator[Solution | None, None, None]
     begun: bool = False
 
     def step(self) -> Solution | ViContactError | Interrupted | None:
@@ -62,13 +62,9 @@ class _Turn:
         self.begun = True
         with turn_of(self.number):
             try:
-                next(self.steps)
-            except StopIteration as end:
-                solution: Solution = end.value
-                return solution
+                return next(self.steps)
             except (ViContactError, Interrupted) as error:
                 return error
-        return None
 
     def close(self) -> None:
         """End a run that nobody waits for any more, with its checkpoint."""
