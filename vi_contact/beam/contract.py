@@ -121,7 +121,8 @@ def rubbing_problem(
 
 @dataclass(frozen=True)
 class StepForces:
-    """Hold forces [N], one per step of dt [s], as a function of the time in the step. InputError for times beyond."""
+    """Hold forces [N], one per step of dt [s], as a function of the time: that of the step in progress or about to
+    begin. InputError for a time that no step covers."""
 
     dt: float
     forces: tuple[float, ...]

@@ -152,7 +152,8 @@ class BoundaryMesh:
 def polygon(corners: ArrayLike, h: float | Sequence[int], *, exterior: bool = False) -> BoundaryMesh:
     """Mesh a polygon; label of an element = number of its side, side i from corner i to corner i + 1.
 
-    corners: (m, 2) [m], counter-clockwise (exterior body: clockwise). h: largest element [m], or their number a side.
+    corners: (m, 2) [m], counter-clockwise (clockwise for an exterior body). h: greatest element length [m], or the
+    number of elements of every side.
     """
     start = array("polygon", "corners", corners, (None, 2), unit="m")
     if len(start) < 3:

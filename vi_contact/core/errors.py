@@ -16,7 +16,8 @@ class StepFailure(ViContactError, RuntimeError):
 
 
 class Interrupted(KeyboardInterrupt):
-    """Say that a signal (Ctrl-C, SIGTERM, SIGHUP) ended a run after a step, on all ranks; its folder has what there is.
+    """Say that a signal ended a run after a step, on all ranks: Ctrl-C, SIGTERM, SIGHUP. What was computed is in its
+    folder.
 
     Like Ctrl-C it is no ``Exception``: no loop over runs goes on. ``number``: the signal; ``status``: 128 + number.
     """

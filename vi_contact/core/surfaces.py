@@ -252,7 +252,8 @@ def nodal_frames(directions: Array) -> Array:
 def nodal_blocks(frames: Array) -> tuple[Indices, Array]:
     """Return (c, Q): nodal frames (k, d, d) with the contact direction in column c: component c is the normal one.
 
-    c is the direction's largest component. Axes at right angles to it keep their columns: components to be prescribed.
+    c is the direction's largest component. Axes at right angles to the direction keep their own columns: these are the
+    components that may be prescribed.
     """
     k, d, _ = frames.shape
     directions, every = frames[:, :, 0], np.arange(k)

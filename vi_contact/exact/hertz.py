@@ -1,4 +1,5 @@
-"""Solve Hertz contact, quasi-static impact and a flat punch on a half-space, no friction (Johnson 1985, ch. 2-4, 11).
+"""Solve Hertz contact of smooth bodies, the quasi-static impact of a sphere, and a flat rigid punch on an elastic
+half-space, all without friction (Johnson 1985, ch. 2 to 4 and 11).
 
 Bodies of moduli E_i, nu_i and radii R_i touch without friction, with E* and R from
 
@@ -61,7 +62,8 @@ class HertzLine(Pressed):
 
         a = sqrt(4 P R/(pi E*)),   p0 = 2 P/(pi a) = sqrt(P E*/(pi R)),   p = p0 sqrt(1 - x²/a²)
 
-    The approach is not defined. force [N/m], modulus E* [Pa], radius R [m]: InputError unless finite and positive.
+    The approach of half-planes is not defined (logarithmic). force [N/m], modulus E* [Pa], radius R [m]. Raises
+    InputError unless all are finite and positive.
     """
 
     @property
@@ -122,7 +124,8 @@ class HertzImpact:
 
         d_max = (15 m v²/(16 E* sqrt(R)))^(2/5),   duration = 4 sqrt(pi) Gamma(2/5)/(5 Gamma(9/10)) d_max/v
 
-    (factor 2.9433). It rebounds with v: no waves. InputError unless mass [kg], v [m/s], E* [Pa], R [m] are positive.
+    (factor 2.9433). It rebounds with v: waves in the bodies are left out. mass [kg], speed v [m/s], modulus E* [Pa],
+    radius R [m]. Raises InputError unless all are finite and positive.
     """
 
     mass: float

@@ -33,7 +33,8 @@ TURNED = 8.0 * CATALAN / math.pi**2  # 0.74245
 class RigidWall:
     """Hold height H [m], density rho [kg/m³], Poisson's ratio nu in [0, 1/2); ``simple``: psi_e = psi_s.
 
-    ``flexibility`` d = G H²/R, R [N m/m] a rotational spring at its foot; 0: it cannot turn. InputError for other data.
+    ``flexibility`` d = G H²/R is that of a rotational spring R [N m/m] at the foot of the wall; 0: it cannot turn.
+    Raises InputError for values out of range.
     """
 
     height: float

@@ -154,7 +154,8 @@ class Traction(ActingLoad):
 
 @dataclass(frozen=True)
 class TangentialTraction(Traction):
-    """Apply the tangential traction S_T = C_T(x, t) of eq. 6 on the contact boundary: ``value`` along the facet."""
+    """Apply the tangential traction S_T = C_T(x, t) of eq. 6 on the contact boundary: the part of ``value`` along the
+    facet, its normal component is removed."""
 
     def acting(self, g: Any, mesh: Mesh) -> Any:
         n = ufl.FacetNormal(mesh)

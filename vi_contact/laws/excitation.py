@@ -44,7 +44,8 @@ class Harmonic:
 
 @dataclass(frozen=True)
 class Ricker:
-    """Shake with a(t) = amplitude · (1 - 2 x) exp(-x), x = (pi frequency (t - peak_time))² (Ricker, Geophysics, 1953).
+    """Shake with a(t) = amplitude · (1 - 2 x) exp(-x), x = (pi frequency (t - peak_time))² (Ricker, Geophysics 18,
+    1953).
 
     amplitude [m/s²], the peak; frequency [Hz] > 0, where the spectrum peaks; delay [s] >= 0, the time of the peak, by
     default 1.5 / frequency, which makes |a(0)| < 1e-8 |amplitude|; a smaller one starts with a jump. Velocity and
@@ -124,7 +125,8 @@ class Rectangular(Pulse):
 class Tabulated:
     """Shake with accelerations [m/s²] at given times [s], straight lines between them, zero before and after them.
 
-    times: strictly increasing, two or more; values: as many; kept as tuples. InputError for others, NaN and infinity.
+    times: strictly increasing, at least two; values: as many. Both are kept as tuples. Raises InputError for lengths
+    that differ, times that do not increase, NaN or infinite entries.
     """
 
     times: Sequence[float]

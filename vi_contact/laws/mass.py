@@ -41,7 +41,8 @@ class Redistributed:
     coordinates times those of M and of the order of (mesh size / body size)², restore what the lumping changed: the
     mass matrix of rigid motions (total mass, centre of mass, all moments and products of inertia) of every body; in 1D
     also what the shift by one element changed, centre and second moment. Damping sees the same velocities, C* = PᵀCP:
-    a force on massless unknowns that depends on their rate would ring. Bodies with tied sides keep the mass alone.
+    a force on massless unknowns that depends on their rate would ring. Bodies with tied sides cannot turn: of them the
+    total mass is kept.
 
     ``lumping`` 0.4 balances the dispersion of mesh and time step: consistent mass sends high frequencies ahead of
     the wave, lumped mass leaves them behind (table in docs/guide/schemes.md). InputError for lumping outside [0, 1], a

@@ -17,7 +17,8 @@ EXTREME = 1e100  # beyond it, and below its inverse, squares are no numbers any 
 class LinearElastic:
     """Describe isotropic elasticity, sigma = lame_lambda tr(eps) I + 2 shear_modulus eps.
 
-    E: Young's modulus [Pa] > 0; nu: Poisson's ratio, -1 < nu < 1/2; rho: mass density [kg/m³] > 0. Else InputError.
+    E: Young's modulus [Pa] > 0; nu: Poisson's ratio, -1 < nu < 1/2; rho: mass density [kg/m³] > 0.
+    Raises InputError when one of them is outside its range or not finite.
     """
 
     E: float
@@ -155,7 +156,8 @@ class MassProportional:
 class Rayleigh:
     """Damp by C = alpha M + beta K; alpha [1/s] >= 0, beta [s] >= 0, K the stiffness without any contact term.
 
-    alpha M also resists rigid rocking, which nothing physical does: with uplift prefer alpha = 0. InputError below 0.
+    Once a body lifts off, alpha M also resists its rigid rocking, which nothing physical does: with uplift prefer
+    alpha = 0. Raises InputError for a negative or non-finite coefficient.
     """
 
     alpha: float

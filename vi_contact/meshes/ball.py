@@ -1,8 +1,9 @@
 """Mesh a quarter or an eighth of a ball by tetrahedra, finest at its lowest point, which lies on or strikes a plane.
 
 The ball touches the plane y = 0 at the origin, its centre is (0, R, 0), and the planes x = 0 and z = 0 are planes of
-symmetry: the quarter has x, z >= 0, the eighth also y <= R. Physical groups: cells "ball"; boundary "surface" (the
-sphere), "foot" (its part near the origin: the contact side), "side_x" (x = 0), "side_z" (z = 0), "cut" (y = R).
+symmetry: the quarter has x >= 0 and z >= 0, the eighth also y <= R. Physical groups: cells "ball"; boundary "surface"
+(the sphere), "foot" (its part near the origin: the contact side), "side_x" (x = 0), "side_z" (z = 0) and, of the
+eighth, "cut" (y = R).
 """
 
 import math

@@ -26,8 +26,9 @@ class ChannelMesh:
     """Describe a layer, width x depth [m], and a channel in it, `outer_width` x `height`, of `wall` and `slab` [m].
 
     `left`: x of the outer left side of the channel, by default in the middle. `size` [m]: of the cells, a grid of
-    rectangles or, with `triangles`, of their halves; every part is divided evenly. With `far` [m] an irregular mesh of
-    triangles: those of `size` on the channel grow to `far` at bedrock and sides. InputError for other sizes.
+    rectangles or, with `triangles`, of their halves; every part is divided evenly into cells of about that size. With
+    `far` [m] an irregular mesh of triangles: those of `size` on the channel grow to `far` at bedrock and sides.
+    InputError for sizes that make no such layer.
     """
 
     width: float = 24.0

@@ -52,7 +52,8 @@ def plot_report(
 ) -> Path:
     """Draw the page as PNG, PDF or SVG, by the name of the file. Panels that would be empty are left out.
 
-    ``columns``: groups of one unit, a panel each, for the page's own. InputError for unknown ones, a run of one row.
+    ``columns``: groups of columns of one unit, a panel each, in place of those the page chooses. InputError for columns
+    that do not exist, a run of one row, or another kind of file.
     """
     import matplotlib
     from matplotlib.figure import Figure

@@ -100,7 +100,8 @@ class Proximal:
         return replace(kkt_residual(self.step, result), resultant=resultant)
 
     def solve(self, step: StepProblem) -> StepResult:
-        """Iterate to the tolerance and until two answers are no better; if the solver fails, with stronger springs."""
+        """Iterate to the tolerance, and on until two answers running are no better. A solver that fails gets stronger
+        springs once: more steps, each of them easier."""
         self.step = step
         progress = _Progress(self._tolerance)
         answer = StepResult(step.guess, np.zeros(step.surface.count), step.active, 0, "")
@@ -150,14 +151,16 @@ class Proximal:
             centre = answer.x
 
     def _missing(self, inner: StepProblem, found: StepResult) -> Array:
-        """What a solver left of a step's resultants, for the next: bodies would drift along motions only P holds."""
+        """What a solver that stops at its aim left of the resultants of a step: the next one carries it, or bodies
+        would end somewhere else along motions that only P holds."""
         if found.aim == 0.0:
             return np.zeros_like(found.x)
         reaction = inner.surface.reaction_load(found.r_n, len(found.x), found.r_t)
         return self._bodies.resultants(inner.b - self._springs @ found.x - reaction)
 
     def _left_over(self, answer: StepResult, share: float, centre: Array, carried: Array) -> StepProblem:
-        """The next step; resultants of b are those of the forces: K u has none but round-off, which moves bodies."""
+        """The next step. The resultants of K u are zero, so that those of b are the forces' own: the round-off of a
+        million times larger parts would move the body."""
         left, x, surface = left_over(self.step, answer, share), answer.x, self.step.surface
         r_n, r_t = kept(self.step, answer, share)
         forces = self.step.b - surface.reaction_load(r_n, len(x), r_t)

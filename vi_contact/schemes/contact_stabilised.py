@@ -39,7 +39,8 @@ from .consistent_data import mass_matrix, rigid_part
 
 @dataclass(frozen=True)
 class ContactStabilisedNewmark(SingleStep):
-    """Step by the module's equations. ``projected``: whether the predictor is; StepFailure when not to tolerance."""
+    """Step by the module's equations, which need mass at contact nodes. ``projected``: whether the predictor is
+    projected. StepFailure when the projection cannot be certified."""
 
     projected: bool = True
 

@@ -32,7 +32,8 @@ def begin_data(text: TextFile) -> int | None:
 
 
 def recognises(text: TextFile) -> bool:
-    """Tell whether first lines say NPTS, not behind "#", or `*** Begin data ***` comes before rows without times."""
+    """Tell whether the first lines say NPTS, outside "#" comments, or a `*** Begin data ***` line stands before rows of
+    accelerations, and not before times and accelerations."""
     start = begin_data(text)
     if start is not None:
         rows = list(text.rows(text.filled(start)))

@@ -5,7 +5,8 @@ from typing import Any, Protocol
 
 
 class Sides(Protocol):
-    """Give the conditions at the layer's ends. ``firm``: they hold static loads, which others (``staged``) do not."""
+    """Give the conditions at the ends of the layer. ``firm``: whether they hold static loads; others need a gravity
+    stage on firm ones (``staged``)."""
 
     @property
     def firm(self) -> bool: ...

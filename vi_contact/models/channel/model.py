@@ -89,7 +89,8 @@ class Channel:
 
 @dataclass(frozen=True)
 class ChannelModel:
-    """Hold the assembled channel and soil; ``surface``: contact of its base, left and right wall, in this order."""
+    """Hold the assembled channel and soil; ``surface``: the contact of base, left and right wall, in this order,
+    normals and forces those of the channel."""
 
     channel: Channel
     mesh: Any
@@ -102,7 +103,8 @@ class ChannelModel:
         excitation: Excitation | Sequence[Excitation] | None = None,
         impact: ImpactLaw | None = Inelastic(ImpulseUpdate()), mass: MassLaw | None = None,
     ) -> ContactProblem:
-        """Set up both under the harmonic motion, sliding freely; inelastic impacts, as impulses, on consistent mass.
+        """Set up channel and soil under the harmonic motion, sliding freely; with the inelastic impact rule, as an
+        impulse, on consistent mass.
 
         Args:
             friction: Coulomb(mu) for instance.

@@ -84,7 +84,8 @@ class Fixed:
 
 @dataclass(frozen=True)
 class TiedSides:
-    """Tie the ends to each other: the exact free field of horizontal layers; waves come back at the other end."""
+    """Tie the ends to each other in both directions: the exact free field of horizontal layers under horizontal and
+    vertical shaking; what leaves at one end comes back at the other."""
 
     firm: ClassVar[bool] = True
 

@@ -32,7 +32,8 @@ class RunLog:
     """Send everything logged under ``vi_contact`` to a file while it is open, and warnings to the terminal: on rank 0.
 
     Runs that take turns set ``turn``, each to its own value, before they open their logs and whenever it is theirs:
-    a line goes to the logs that were opened in this turn. The root logger is left out: form compilers make it print.
+    a line goes to the logs that were opened in this turn. The root logger is left out: form compilers make it print
+    every line.
     """
 
     turn: ClassVar[object] = None

@@ -2,7 +2,8 @@
 
 PETSc sees the whole operator and a preconditioner that masks: directions have no part in held rows, so that iterates
 and inner products are those of the reduced system, and the residual that PETSc carries along is, in held rows, the
-reaction there. To look at the signs costs no product, nor does it to go on: PETSc solves for the correction.
+reaction there. To look at the signs costs no product, and to go on from a known residual costs none either: PETSc
+solves for the correction.
 """
 
 from collections.abc import Callable

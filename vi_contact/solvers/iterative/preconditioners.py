@@ -2,10 +2,12 @@
 
 ICC and Jacobi are made of the whole A, once. On several ranks each has the incomplete factor of its own rows and one
 layer of its neighbours' (additive Schwarz). Their sum counts a row as often as there are factors that hold it; to
-divide by the square root of that number on either side takes this back, or the layer were no gain; M stays symmetric.
+divide by the square root of that number on either side takes this back, and M stays symmetric. Counted twice, the
+layer would be no gain.
 
 GAMG is made of A with the held rows and columns replaced by their diagonal, or its coarse grids would believe the
-contact open; only the Galerkin products are renewed, when more than a tenth of the contact set has moved since.
+contact open; its interpolation is kept, and only the Galerkin products are renewed, when more than a tenth of the
+contact set has moved since.
 """
 
 from typing import Any

@@ -71,7 +71,8 @@ def surface(
     points: Sequence[tuple[float, ...]] | None = None, feature_angle: float = FEATURE_ANGLE, held: bool = False,
     springs: float | None = None, frictionless_corners: bool = False,
 ) -> ContactSurface:
-    """Make a ``contact_surface``, ``.bilateral_everywhere()``, ``.on_springs(…)``, ``.with_frictionless_corners()``."""
+    """Make a ``contact_surface``; held: ``.bilateral_everywhere()``; springs: ``.on_springs(stiffness)``; the last:
+    ``.with_frictionless_corners()``."""
     found = fem.contact_surface(system, facets, obstacle=obstacle, points=points, feature_angle=feature_angle)
     found = found if springs is None else found.on_springs(springs)
     found = found.with_frictionless_corners() if frictionless_corners else found
