@@ -2,8 +2,7 @@
 
 import argparse
 import gc
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, suppress
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -53,17 +52,6 @@ def _cases(options: argparse.Namespace) -> str:
     return "\n".join([*lines, f"the files: {FOLDER}"])
 
 
-@contextmanager
-def _uncollected() -> Iterator[None]:
-    """Let modules be imported without a look for garbage each time: that takes a tenth of the way to the first step."""
-    collects = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        (gc.enable if collects else gc.disable)()
-
-
 def _run(options: argparse.Namespace) -> str:
     from ..run.wall_time import seconds_of
     from ..studies.cases.own_case import OwnCase, open_case
@@ -77,7 +65,9 @@ def _run(options: argparse.Namespace) -> str:
     if options.steps is not None and options.steps < 1:
         raise InputError(f"--steps {options.steps}: give at least one step")
     short = ShortOptions(**{one.name: getattr(options, one.name) for one in fields(ShortOptions)})
-    with _uncollected():
+    with ExitStack() as after:
+        after.callback(gc.enable if gc.isenabled() else gc.disable)
+        gc.disable()  # modules are no garbage: looking for it takes a tenth of the way to the first step
         case = open_case(path, short.settings(read_toml(path), options.settings), options.allow)
     name = case.tables.get("title") or path.stem
     restart = options.restart or options.changed

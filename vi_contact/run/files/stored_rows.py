@@ -98,9 +98,7 @@ def numbers_of(path: str, lines: list[bytes], width: int, before: int) -> Array:
     for i, line in enumerate(lines):
         texts = line.replace(b"_", b"?").split(b",")  # float() would read 1_0 as ten
         try:
-            if len(texts) != width:
-                raise ValueError(line)
-            values.append([float(text) for text in texts])
+            values.append([float(text) for _, text in zip(range(width), texts, strict=True)])
         except ValueError as error:
             raise InputError(f"line {before + i + 2} of '{path}' is damaged: restore it or start a new run") from error
     return np.array(values).reshape(-1, width)
