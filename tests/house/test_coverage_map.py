@@ -96,7 +96,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
         "solvers.iterative.friction solvers.iterative.friction_krylov solvers.iterative.friction_laws "
         "solvers.iterative.friction_states",
     "solvers/test_iterative_on_finite_elements.py":
-        "solvers.iterative.conjugate_gradients solvers.iterative.measures solvers.iterative.modes "
+        "solvers.iterative.conjugate_gradients solvers.iterative.measures "
         "solvers.iterative.operator solvers.iterative.preconditioners",
     "solvers/test_volume.py": "solvers.volume.snes solvers.volume.tao",
     "solvers/test_volume_friction.py": "solvers.friction.nsgs solvers.volume.friction solvers.volume.route",
