@@ -9,14 +9,16 @@ array([0.5, 0. ])
 """
 
 from ..core.lazy import lazy
-from . import friction, iterative, normal, volume
+from . import friction, normal
 
 _CONTENTS = {
     "automatic": ("Automatic",),
     "condensed": ("Condensed",),
     "friction": friction.__all__,
-    "iterative": iterative.__all__,
+    "iterative.route": ("Iterative",),
     "normal": normal.__all__,
-    "volume": volume.__all__,
+    "volume.route": ("Volume",),
+    "volume.snes": ("ReducedNewton", "SemismoothNewton"),
+    "volume.tao": ("TaoTron",),
 }
 __all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)

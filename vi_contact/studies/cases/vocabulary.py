@@ -27,7 +27,7 @@ from ...models import channel, wall
 from ...run import HalvedAtImpact, Schedule
 from ...run.files.writer import FieldWriter
 from ...soil import UpgoingVelocity
-from ...solvers import friction, normal, volume
+from ...solvers import friction, normal
 from ...solvers.condensed import SmallMethod
 from ...solvers.friction.extrapolation import Extrapolation
 from ...solvers.friction.problem import FrictionMethod
@@ -42,7 +42,7 @@ _KINDS: Mapping[ModuleType, tuple[Any, ...]] = {  # room -> the kinds of things 
     ground_motion: (Excitation,),
     meshes: (MeshScript,),
     fem: (Prescribed, Traction, BodyForce, Dashpots, Matching, Recorder, FieldWriter),
-    solvers: (Solver,), normal: (SmallMethod,), friction: (FrictionMethod, Extrapolation), volume: (Method,),
+    solvers: (Solver, Method), normal: (SmallMethod,), friction: (FrictionMethod, Extrapolation),
     schemes: (Scheme,),
     run: (Solver, Schedule, HalvedAtImpact, Recorder),
     engineering: (Recorder,),
