@@ -112,10 +112,11 @@ def test_bouncing_strip(body: str, courant: float, periods: float, floor: float)
 
 
 @pytest.mark.serial
-@pytest.mark.parametrize("courant, periods, floor", [(1.0, 10, 0.88), (0.5, 10, 0.97), (0.1, 2, 0.998)])
+@pytest.mark.parametrize("courant, periods, floor", [(1.0, 10, 0.88), (0.5, 5, 0.992), (0.1, 1, 0.9999)])
 def test_bouncing_bar_for_ten_periods(courant: float, periods: int, floor: float) -> None:
-    """V1.2: energy >= 0.88, 0.97 of the first after ten periods, 0.998 after two (of 16 000 steps each), at most 1.001
-    of it; the foot as the exact bar's in the first period, 1.5 % rms of the height (measured 1.4, 1.1 and 0.9 %)."""
+    """V1.2: energy >= 0.88 of the first after ten periods, 0.992 after five, 0.9999 after one (of 16 000 steps), at
+    most 1.001 of it; the foot as the exact bar's in the first period, 1.5 % rms of the height (measured 1.4, 1.1 and
+    0.9 %)."""
     exact, dt = BouncingBar(), courant / 300.0
     problem = bouncing(100, mass=Redistributed())
     lowest, highest, impulse, error = 1.0, 0.0, 0.0, []
