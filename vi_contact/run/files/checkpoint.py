@@ -26,7 +26,7 @@ from ...core.problem import ContactProblem
 from ...core.step import Scheme, State
 from ..time_steps import TimeSteps
 from .folder import CHECKPOINT, FORMAT, check_format
-from .identity import FIXED, difference, identity
+from .identity import FIXED, differences, identity
 
 log = logging.getLogger(__name__)
 Arrays = dict[str, Any]
@@ -145,18 +145,14 @@ def _compare(
 ) -> list[str]:
     """The names of what is another problem's; InputError unless that was allowed, or can be. Collective."""
     start, end = about["span"]
-    ours, theirs = identity(problem, scheme, dt, start=start, end=end), dict(about["run"])
-    names: list[str] = []
-    while found := difference(ours, theirs):
-        name, how = found
+    found = differences(identity(problem, scheme, dt, start=start, end=end), about["run"])
+    for name, how in found.items():
         if name in FIXED or not changed:
             remedy = "or start a new one" + ("" if name in FIXED else ", or allow it by name (changed=True)")
             raise InputError(f"the checkpoint '{file}' is of a run with {how}: restart the same run, {remedy}")
-        names.append(name)
-        del theirs[name]
-    if names and problem.system.algebra.comm.rank == 0:
-        log.warning("the checkpoint '%s' is continued as another problem: %s", file, ", ".join(names))
-    return names
+    if found and problem.system.algebra.comm.rank == 0:
+        log.warning("the checkpoint '%s' is continued as another problem: %s", file, ", ".join(found))
+    return list(found)
 
 
 def _damaged(file: Path, why: Any) -> InputError:

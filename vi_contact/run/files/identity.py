@@ -75,18 +75,16 @@ def text_of(value: Any) -> str:
     return _NUMPY.sub(r"\1", _ADDRESS.sub("", repr(value)))
 
 
-def difference(ours: Identity, theirs: Mapping[str, Any]) -> tuple[str, str] | None:
-    """Return (name, how) of the first fact of theirs that is another one in ours."""
+def differences(ours: Identity, theirs: Mapping[str, Any]) -> dict[str, str]:
+    """Return name -> how, of the facts of theirs that are others in ours."""
+    found: dict[str, str] = {}
     for name, own in ours.items():
-        if name not in theirs:
-            continue  # it differs, and that was allowed
-        other = theirs[name]
+        other = theirs.get(name)
         if isinstance(own, list):
-            if not _same_numbers(own, other):
-                return name, f"another {name}"
+            found |= {} if _same_numbers(own, other) else {name: f"another {name}"}
         elif not _same_text(str(own), str(other)):
-            return name, f"{name} = {str(other)[:SHOWN]} but this one has {str(own)[:SHOWN]}"
-    return None
+            found[name] = f"{name} = {str(other)[:SHOWN]} but this one has {str(own)[:SHOWN]}"
+    return found
 
 
 def _same_numbers(own: Numbers, other: Any) -> bool:
