@@ -118,10 +118,9 @@ def read_checkpoint(
     about = comm.bcast(whole and whole[0])
     other = _compare(file, problem, scheme, dt, about, changed)
     arrays: Arrays = {"r_t": None} | _own(problem, about["vectors"], whole and whole[1])
-    memory = {name.removeprefix(MEMORY): array for name, array in arrays.items() if name.startswith(MEMORY)}
+    known = {} if other else arrays  # what a scheme keeps in mind was made of the old problem's matrices and loads
+    memory = {name.removeprefix(MEMORY): array for name, array in known.items() if name.startswith(MEMORY)}
     state = State(about["t"], about["k"], memory=memory, **{name: arrays[name] for name in ("u", "v", *CONTACT)})
-    if other:  # what the scheme keeps in mind was made of the old problem's matrices and loads
-        state = replace(state, memory={})
     place = RestartPoint(state, about["t_start"], about["k_start"], about["base"], about["halved"])
     if "dt" in other:
         place = replace(place, t_start=state.t, k_start=place.number, base=0)

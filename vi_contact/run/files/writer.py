@@ -125,16 +125,13 @@ class Writer:
         self.flush()
         if self._folder is None or self._saved == k:
             return
-        checksum, safe = self._comm.bcast(on_root(self._comm, lambda: self._sync(k)))
+        files = self._files
+        told = on_root(self._comm, lambda: (files.checksum(k), files.sync()) if files else ("", True))
+        checksum, safe = self._comm.bcast(told)
         write_checkpoint(self._folder, self._problem, place, of=of(), rows=checksum, safe=safe)
         self._saved = k
         if self._comm.rank == 0:
             log.info("checkpoint of step %d", k)
-
-    def _sync(self, k: int) -> tuple[str, bool]:
-        if self._files is None:
-            return "", True
-        return self._files.checksum(k), self._files.sync()
 
     def close(self, facts: Mapping[str, Any]) -> None:
         """Write the last version of every file."""
