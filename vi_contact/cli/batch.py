@@ -8,9 +8,8 @@ and now and then {"share": of the steps that are done}.
 import json
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -22,22 +21,13 @@ from ..studies.cases.vocabulary import Parts
 from .entry import status_of
 from .errors import told, world
 
+Runs = dict[int, tuple[Case, dict[str, Any]]]  # by number, with arguments of Case.run
 SECONDS = 5.0  # between two shares
-
-
-@dataclass(frozen=True)
-class OneCase:
-    """Hold a run: its number and folder, its case, and how it begins and ends."""
-
-    number: int
-    case: Case
-    folder: Path
-    more: dict[str, Any]
 
 
 def results(asked: Mapping[str, Any], comm: Any, tell: Callable[[float], None]) -> Iterator[Ended]:
     """Yield (number, solution or error) as the runs end; those of a body that serves all excitations go together."""
-    runs: list[OneCase] = []
+    runs: Runs = {}
     for number, (settings, folder, restart) in enumerate(
         zip(asked["settings"], asked["folders"], asked["restart"], strict=True)
     ):
@@ -47,29 +37,28 @@ def results(asked: Mapping[str, Any], comm: Any, tell: Callable[[float], None]) 
         except ViContactError as error:
             yield number, error
         else:
-            more = {"restart": restart, "wall_time": asked["wall_time"]}
-            runs.append(OneCase(number, case, Path(folder), more))
-    parts = runs[0].case.parts(comm) if runs else None
+            runs[number] = case, {"out": Path(folder), "restart": restart, "wall_time": asked["wall_time"]}
+    parts = next(iter(runs.values()))[0].parts(comm) if runs else None
     if parts is not None and parts.steady:
         yield from _together(runs, parts, tell)
         return
-    for done, one in enumerate(runs, start=1):
+    for done, (number, (case, more)) in enumerate(runs.items(), start=1):
         try:
-            yield one.number, one.case.run(comm, out=one.folder, progress=False, **one.more)
+            yield number, case.run(comm, progress=False, **more)
         except ViContactError as error:
-            yield one.number, error
+            yield number, error
         tell(done / len(runs))
 
 
-def _together(runs: Sequence[OneCase], parts: Parts, tell: Callable[[float], None]) -> Iterator[Ended]:
+def _together(runs: Runs, parts: Parts, tell: Callable[[float], None]) -> Iterator[Ended]:
     """Make runs of one body, which begin at rest in the same state."""
     state, calls = None, []
     with ExitStack() as stack:
-        for one in runs:
-            calls.append(stack.enter_context(one.case.call(parts, one.folder, state)) | one.more)
+        for case, more in runs.values():
+            calls.append(stack.enter_context(case.call(parts, more["out"], state)) | more)
             state = calls[0]["state"]
         for place, ended in simulate_many(calls, tell=tell):
-            yield runs[place].number, ended
+            yield list(runs)[place], ended
 
 
 class Shares:

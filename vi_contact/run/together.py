@@ -77,7 +77,7 @@ def grouped(runs: Sequence[Together]) -> None:
             continue
         for group in groups:
             first, found = group[0], problem.beside(group[0].method.problem)
-            if found is not None and _place(first) == _place(run) and _way(first.method) == _way(run.method):
+            if found is not None and _ways(first) == _ways(run):
                 run.method = replace(run.method, problem=found)
                 group.append(run)
                 break
@@ -87,12 +87,9 @@ def grouped(runs: Sequence[Together]) -> None:
         Group(group)
 
 
-def _place(run: Together) -> tuple[float, int, int]:
-    return run.state.t, run.state.k, run.base
-
-
-def _way(method: Method) -> tuple[Any, ...]:
-    return method.scheme, *method.solvers, method.tolerance
+def _ways(run: Together) -> tuple[Any, ...]:
+    """Where a run is, and how it goes on."""
+    return run.state.t, run.state.k, run.base, run.method.scheme, *run.method.solvers, run.method.tolerance
 
 
 class Group:

@@ -143,8 +143,7 @@ class Parts:
     @property
     def steady(self) -> bool:
         """Say whether they serve other excitations too: nothing in them moves with these."""
-        companions = self.system.companions or self.surface.companions
-        return not (companions or self.moved or self.firm)
+        return not (self.system.companions or self.surface.companions or self.moved or self.firm)
 
 
 def _wall(shape: wall.Wall, comm: Any, *, case: str = "b", weight: bool = False, base_inertia: str = "whole") -> Parts:

@@ -59,18 +59,13 @@ def started(runs: Sequence[OneRun], launch: Sequence[str], end: WallTime) -> sub
 
 
 class Processes:
-    """Keep the processes that go on, until they are all told to stop. ``done``: runs, and parts of runs."""
+    """Keep the processes that go on, until they are all told to stop. ``shares``: runs that each has made."""
 
     def __init__(self, launch: Sequence[str], end: WallTime) -> None:
         self._launch, self._end = launch, end
         self._stopped, self._lock = threading.Event(), threading.Lock()
         self._going: set[subprocess.Popen[str]] = set()
-        self._shares: dict[subprocess.Popen[str], float] = {}
-
-    @property
-    def done(self) -> float:
-        """Return how many runs have been made, with parts of those that go on."""
-        return sum(list(self._shares.values()))
+        self.shares: dict[subprocess.Popen[str], float] = {}
 
     def rows(self, runs: Sequence[OneRun]) -> Iterator[Row | None]:
         """Yield the row of each run as it ends, None when more is done; run what a dead process has left one by one."""
@@ -84,12 +79,16 @@ class Processes:
                     left.remove(one)
                     yield one.keep(found["said"], found["status"])
                 elif "share" in found:
-                    self._shares[process] = found["share"] * len(runs)
+                    self.shares[process] = found["share"] * len(runs)
                     yield None
                 else:
                     said.append(line)
-            self._ended(process)
-            self._shares[process] = len(runs) - len(left)
+            process.wait()
+            with self._lock:
+                self._going.discard(process)
+                if self._stopped.is_set():
+                    raise KeyboardInterrupt
+            self.shares[process] = len(runs) - len(left)
             if process.returncode == os.EX_TEMPFAIL:
                 raise OutOfTime(f"{self._end.words} {AGAIN}")
             runs = left
@@ -108,13 +107,6 @@ class Processes:
             process = started(runs, self._launch, self._end)
             self._going.add(process)
         return process
-
-    def _ended(self, process: subprocess.Popen[str]) -> None:
-        process.wait()
-        with self._lock:
-            self._going.discard(process)
-            if self._stopped.is_set():
-                raise KeyboardInterrupt
 
     def stop(self) -> None:
         """Stop those that go on; none begins any more."""
@@ -151,7 +143,7 @@ def executed(runs: Sequence[OneRun], jobs: int, launch: Sequence[str], end: Wall
                 if isinstance(found, BaseException):
                     raise found
                 ended += found is not None
-                yield len(wrong) + processes.done if found is None else found
+                yield float(len(wrong) + sum(list(processes.shares.values()))) if found is None else found
         finally:
             processes.stop()
             for future in futures:
