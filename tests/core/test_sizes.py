@@ -66,6 +66,8 @@ def test_tangents_count_with_friction() -> None:
 
 def test_small_is_counted_over_all_ranks() -> None:
     class Two(SerialComm):
+        size = 2
+
         def sum(self, x: np.ndarray) -> np.ndarray:
             return 2.0 * x
 
