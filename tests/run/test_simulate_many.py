@@ -19,7 +19,9 @@ MODEL = build(Wall(divisions=(4, 6)), MPI.COMM_WORLD)
 DT = MODEL.time_step()
 BASE = MODEL.problem("face")
 SHAKEN = [replace(BASE, excitation=replace(BASE.excitation, amplitude=amplitude)) for amplitude in (1.0, 0.3, 2.5)]
-COLUMNS = ("t", "energy_strain", "loss_impact", "contact_resultant", "contact_y", "contact_uplift")
+RECORDER = vc.Energy()
+COLUMNS = ("t", "energy_kinetic", "energy_strain", "work_input", "loss_contact", "loss_impact", "contact_resultant",
+           "contact_y", "contact_uplift")
 
 
 def runs(path, problems=SHAKEN, steps=40, **settings):
@@ -122,5 +124,7 @@ def test_wrong_arguments_are_told(tmp_path):
         vc.simulate_many([{"problem": BASE, "dt": DT, "step": 3}])
     with pytest.raises(vc.InputError, match="simulate_many: missing a required argument: 'dt'"):
         vc.simulate_many([{"problem": BASE}])
+    with pytest.raises(vc.InputError, match="a recorder is in two runs"):
+        vc.simulate_many([{"problem": BASE, "dt": DT, "steps": 1, "record": (RECORDER,)}] * 2)
     with pytest.raises(vc.InputError, match="simulate_many: runs is"):
         vc.simulate_many({"problem": BASE, "dt": DT})

@@ -21,13 +21,16 @@ import numpy as np
 import pytest
 
 pytest.importorskip("dolfinx")
+from mpi4py import MPI
 
+from vi_contact.cli.batch import results
 from vi_contact.cli.entry import main
 from vi_contact.core.algebra import SerialComm
 from vi_contact.core.errors import InputError, OutOfTime
 from vi_contact.ground_motion import Record, arias, pga, psa, read_record, scaled, tapered
 from vi_contact.plots.studies import DemandPanel, plot_ida
 from vi_contact.run.files.folder import locked
+from vi_contact.run.solution import Solution
 from vi_contact.run.wall_time import WallTime
 from vi_contact.studies import IDA, read_case, run_ida
 from vi_contact.studies.cases.library import located
@@ -186,6 +189,25 @@ def test_stopping_stops_the_runs(study: Path, monkeypatch: pytest.MonkeyPatch) -
     with pytest.raises(KeyboardInterrupt):
         rows.throw(KeyboardInterrupt())
     assert time.monotonic() - start < 600.0 and not (long.folder / "row.json").exists()
+
+
+def test_runs_of_a_model_keep_their_own_books(study: Path, tmp_path: Path) -> None:
+    """Runs that share a process share the model's body, and none of its recorders: the ledger of each is its own."""
+    (tmp_path / "model.toml").write_text(
+        '[model]\ntype = "Wall"\n[excitation]\ntype = "GroundMotion"\nrecord = "x.at2"\n'
+        'direction = [1, 0]\n[run]\ndt = 0.005\nsteps = 20\n')
+    case, shaking = read_case(tmp_path / "model.toml"), Shaking("motion_1", (Path("motion_1.at2").resolve(),))
+    runs = [OneRun(case, shaking, scale, tmp_path / f"x{scale}") for scale in (1.0, 2.0)]
+    shares: list[float] = []
+    ends = dict(results(json.loads(command(runs, (), WallTime())[-1]), MPI.COMM_SELF, shares.append))
+    assert shares[-1] == 1.0
+    for number, run in enumerate(runs):
+        alone = read_case(case.path, run.settings).run(MPI.COMM_SELF, out=tmp_path / "alone", progress=False)
+        together = ends[number]
+        assert isinstance(together, Solution) and together.facts["energy_defect"] < 1e-10
+        for name in ("work_input", "energy_strain", "loss_contact"):
+            expected = alone.history[name]
+            assert together.history[name] == pytest.approx(expected, abs=1e-10 * np.abs(expected).max())
 
 
 def test_what_a_process_that_died_has_left_runs_alone(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -28,9 +28,8 @@ SECONDS = 5.0  # between two shares
 def results(asked: Mapping[str, Any], comm: Any, tell: Callable[[float], None]) -> Iterator[Ended]:
     """Yield (number, solution or error) as the runs end; those of a body that serves all excitations go together."""
     runs: Runs = {}
-    for number, (settings, folder, restart) in enumerate(
-        zip(asked["settings"], asked["folders"], asked["restart"], strict=True)
-    ):
+    every = zip(asked["settings"], asked["folders"], asked["restart"], strict=True)
+    for number, (settings, folder, restart) in enumerate(every):
         try:
             case = told(partial(read_case, asked["case"], settings, allow=asked["allow"]), {})
             told(case.check, {})
@@ -61,19 +60,6 @@ def _together(runs: Runs, parts: Parts, tell: Callable[[float], None]) -> Iterat
             yield list(runs)[place], ended
 
 
-class Shares:
-    """Print the share of the steps that is done, now and then."""
-
-    def __init__(self) -> None:
-        self._told = time.monotonic()
-
-    def tell(self, share: float) -> None:
-        """Print this share, unless one has just been told."""
-        if time.monotonic() > self._told + SECONDS:
-            self._told = time.monotonic()
-            _print({"share": share})
-
-
 def _print(line: Mapping[str, Any]) -> None:
     if world().rank == 0:
         print(json.dumps(line), flush=True)
@@ -83,7 +69,15 @@ def main() -> None:
     """Make the runs of the argument and tell of each."""
     import mpi4py.MPI  # noqa: F401
 
-    for number, ended in results(json.loads(sys.argv[1]), world(), Shares().tell):
+    told = time.monotonic()
+
+    def tell(share: float) -> None:
+        nonlocal told
+        if time.monotonic() > told + SECONDS:
+            told = time.monotonic()
+            _print({"share": share})
+
+    for number, ended in results(json.loads(sys.argv[1]), world(), tell):
         error = isinstance(ended, ViContactError)
         _print({"ended": number, "status": int(error), "said": f"vi-contact: {ended}" if error else ""})
 

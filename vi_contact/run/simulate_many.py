@@ -34,7 +34,11 @@ def simulate_many(
     when all runs that have begun have written their checkpoints: ``restart=True`` continues them.
     """
     given = several("simulate_many", "runs", runs, "give a list of dictionaries of the arguments of simulate")
-    return _in_turn([_arguments(run) for run in given], tell)
+    every = [_arguments(run) for run in given]
+    recorders = [one for run in every for one in run["record"] or ()]
+    if len(set(map(id, recorders))) < len(recorders):
+        raise InputError("simulate_many: a recorder is in two runs, and keeps the books of one: give each run its own")
+    return _in_turn(every, tell)
 
 
 def _arguments(run: Mapping[str, Any]) -> dict[str, Any]:

@@ -10,6 +10,7 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from copy import copy
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -132,8 +133,9 @@ class Case:
         )
 
     def _recorders(self, parts: Parts) -> tuple[Recorder, ...] | None:
-        """Return the recorders of [[record]], else the model's own; None for those of ``simulate``."""
-        return self._several("record", tags=parts.tags) if "record" in self.nodes else parts.recorders
+        """Return the recorders of [[record]], else such as the model's own; None for those of ``simulate``."""
+        own = parts.recorders and tuple(map(copy, parts.recorders))  # each run has its own, on whatever parts
+        return self._several("record", tags=parts.tags) if "record" in self.nodes else own
 
     def run(
         self, comm: Any, *, out: str | Path | None = None, restart: bool | str | Path = False, progress: bool = True,
