@@ -30,7 +30,7 @@ from vi_contact.laws.materials import LinearElastic, Rayleigh
 from vi_contact.run.march import march
 from vi_contact.run.static import static_equilibrium
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.solvers.volume.snes import ReducedNewton
+from vi_contact.solvers.volume import ReducedNewton
 
 G, SLOPE = 9.81, pi / 6.0
 MIDPOINT = vc.ZienkiewiczWoodTaylor()

@@ -21,7 +21,7 @@ from vi_contact.core.errors import InputError
 from vi_contact.laws.friction import ExponentialDecay, SlipRateCoulomb
 from vi_contact.run.cross_check import CrossChecked
 from vi_contact.solvers import Iterative
-from vi_contact.solvers.volume.snes import ReducedNewton
+from vi_contact.solvers.volume import ReducedNewton
 
 COMM = MPI.COMM_WORLD
 RATES, AT_REST = (SlipRateCoulomb(ExponentialDecay(*mu, 2.0)) for mu in ((0.5, 0.3), (0.2, 0.1)))

@@ -22,7 +22,7 @@ from vi_contact.solvers import Iterative
 from vi_contact.solvers.iterative.layout import Nodewise
 from vi_contact.solvers.iterative.preconditioners import rigid_modes
 from vi_contact.solvers.iterative.regime import KINDS
-from vi_contact.solvers.volume.snes import ReducedNewton
+from vi_contact.solvers.volume import ReducedNewton
 
 COMM = MPI.COMM_WORLD
 

@@ -132,36 +132,36 @@ def test_iterative_linear_solver(pushed: Case, pc: str) -> None:
     options = {"ksp_type": "cg", "pc_type": pc, "ksp_rtol": 1e-8}
     prepared = prepare(pushed, Volume(method=ReducedNewton(), petsc_options=options))
     assert kkt_residual(pushed.step, prepared.solve(pushed.step)).worst <= 1e-9
-    assert (prepared.petsc.ksp.getType(), prepared.petsc.ksp.pc.getType()) == ("cg", pc)
+    assert (prepared.snes.ksp.getType(), prepared.snes.ksp.pc.getType()) == ("cg", pc)
 
 
 def test_petsc_objects_are_reachable(pushed: Case) -> None:
     for method in METHODS:
         prepared = prepare(pushed, Volume(method=method))
         result = prepared.solve(pushed.step)
-        solver = prepared.petsc
+        solver = prepared.tao if prepared.snes is None else prepared.snes
         assert solver.getIterationNumber() == result.iterations
         assert solver.getOptionsPrefix() == PREFIX
         prepared.close()
-        assert prepared.petsc is None
+        assert prepared.snes is None and prepared.tao is None
 
 
 def test_option_layers(pushed: Case, database: Any) -> None:
     """Defaults, then the settings, then the command line; ours are gone from the database after every call."""
     before = database.getAll()
-    assert prepare(pushed, Volume()).petsc.getTolerances()[3] == 100
-    assert prepare(pushed, Volume(petsc_options={"-snes_max_it": 7})).petsc.getTolerances()[3] == 7
+    assert prepare(pushed, Volume()).snes.getTolerances()[3] == 100
+    assert prepare(pushed, Volume(petsc_options={"-snes_max_it": 7})).snes.getTolerances()[3] == 7
     database[PREFIX + "snes_max_it"] = 9
     prepared = prepare(pushed, Volume(petsc_options={"snes_max_it": 7}))
-    assert prepared.petsc.getTolerances()[3] == 9
+    assert prepared.snes.getTolerances()[3] == 9
     prepared.solve(pushed.step)
     assert database.getAll() == {**before, PREFIX + "snes_max_it": "9"}
 
 
 def test_prefix(pushed: Case, database: Any) -> None:
     database["mine_snes_max_it"] = 9
-    assert prepare(pushed, Volume(prefix="mine_")).petsc.getTolerances()[3] == 9
-    assert prepare(pushed, Volume()).petsc.getTolerances()[3] == 100
+    assert prepare(pushed, Volume(prefix="mine_")).snes.getTolerances()[3] == 9
+    assert prepare(pushed, Volume()).snes.getTolerances()[3] == 100
 
 
 @pytest.mark.serial

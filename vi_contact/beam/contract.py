@@ -121,8 +121,7 @@ def rubbing_problem(
 
 @dataclass(frozen=True)
 class StepForces:
-    """Hold forces [N], one per step of dt [s], as a function of the time: that of the step in progress or about to
-    begin. InputError for a time that no step covers."""
+    """Hold forces [N], one per step of dt [s], as a function of the time in a step; InputError for times of no step."""
 
     dt: float
     forces: tuple[float, ...]

@@ -41,8 +41,7 @@ def published_friction(eps: float = 0.002) -> RegularisedFriction:
 
 
 def readings(dt: float = DT) -> dict[str, Force]:
-    """Return the readings of |r_N| [N] as functions of t [s] by their letters, and "none", a free tip; dt [s] is the
-    step of reading C. InputError unless dt > 0."""
+    """Return the readings of |r_N|(t) [N] by their letters, and "none", a free tip; dt > 0 [s]: step of reading C."""
     number("readings", "dt", dt, positive=True, unit="s")
     return {
         "none": lambda t: 0.0,

@@ -52,8 +52,7 @@ def refuse_retired(arguments: Sequence[str]) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command and print its text, or one sentence on standard error and return 1; 128 + n after signal n, 75 when
-    the wall time was nearly over."""
+    """Run a command and print its text; return 0, 1 (one sentence on stderr), 128 + n (signal n) or 75 (wall time)."""
     own, petsc = split_petsc(sys.argv[1:] if arguments is None else arguments)
 
     def command() -> None:

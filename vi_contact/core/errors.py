@@ -16,8 +16,7 @@ class StepFailure(ViContactError, RuntimeError):
 
 
 class Interrupted(KeyboardInterrupt):
-    """Say that a signal ended a run after a step, on all ranks: Ctrl-C, SIGTERM, SIGHUP. What was computed is in its
-    folder.
+    """Say that a signal (Ctrl-C, SIGTERM, SIGHUP) ended a run after a step, on all ranks; its folder has all so far.
 
     Like Ctrl-C it is no ``Exception``: no loop over runs goes on. ``number``: the signal; ``status``: 128 + number.
     """

@@ -33,8 +33,7 @@ TURNED = 8.0 * CATALAN / math.pi**2  # 0.74245
 class RigidWall:
     """Hold height H [m], density rho [kg/m³], Poisson's ratio nu in [0, 1/2); ``simple``: psi_e = psi_s.
 
-    ``flexibility`` d = G H²/R is that of a rotational spring R [N m/m] at the foot of the wall; 0: it cannot turn.
-    Raises InputError for values out of range.
+    ``flexibility`` d = G H²/R for a rotational spring R [N m/m] at the foot; 0: no turning. InputError out of range.
     """
 
     height: float

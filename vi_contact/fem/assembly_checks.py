@@ -23,8 +23,7 @@ LOCKING = 0.495  # Poisson's ratio; CHOSEN: 0.49 is common for wet soil, 0.499 i
 
 
 def check_body(mesh: Any, material: Any, section: Any, damping: Any, base_inertia: Any) -> tuple[Section, Damping]:
-    """Return (section, damping), the usual ones for None; InputError for a mesh, material, section or damping of
-    another kind, or cells of another mesh."""
+    """Return (section, damping), the usual for None; InputError for objects of another kind, cells of another mesh."""
     instance(OWNER, "mesh", mesh, Mesh, "give a DOLFINx mesh, such as fem.read_mesh(path, comm)[0]")
     if mesh.topology.dim != mesh.geometry.dim:
         raise InputError(f"assemble: the mesh has cells of dimension {mesh.topology.dim} at points of "

@@ -154,8 +154,7 @@ class Traction(ActingLoad):
 
 @dataclass(frozen=True)
 class TangentialTraction(Traction):
-    """Apply the tangential traction S_T = C_T(x, t) of eq. 6 on the contact boundary: the part of ``value`` along the
-    facet, its normal component is removed."""
+    """Apply the tangential traction S_T = C_T(x, t) (eq. 6) on the contact boundary: ``value`` less its normal part."""
 
     def acting(self, g: Any, mesh: Mesh) -> Any:
         n = ufl.FacetNormal(mesh)

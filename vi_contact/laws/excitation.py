@@ -125,8 +125,7 @@ class Rectangular(Pulse):
 class Tabulated:
     """Shake with accelerations [m/s²] at given times [s], straight lines between them, zero before and after them.
 
-    times: strictly increasing, at least two; values: as many. Both are kept as tuples. Raises InputError for lengths
-    that differ, times that do not increase, NaN or infinite entries.
+    times: strictly increasing, at least two; values: as many, kept as tuples. InputError for others, NaN, infinity.
     """
 
     times: Sequence[float]

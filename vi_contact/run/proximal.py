@@ -151,8 +151,7 @@ class Proximal:
             centre = answer.x
 
     def _missing(self, inner: StepProblem, found: StepResult) -> Array:
-        """What a solver that stops at its aim left of the resultants of a step: the next one carries it, or bodies
-        would end somewhere else along motions that only P holds."""
+        """What a solver left of a step's resultants: the next carries it, or bodies would drift along what P holds."""
         if found.aim == 0.0:
             return np.zeros_like(found.x)
         reaction = inner.surface.reaction_load(found.r_n, len(found.x), found.r_t)

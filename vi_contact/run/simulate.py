@@ -76,10 +76,8 @@ def opened(
     progress: bool, fields: FieldWriter | None, cross_check: Comparison | None, wall_time: str | None,
     others: Sequence[ContactProblem] = (), runs: int = 1,
 ) -> Iterator[tuple[Session, Writer]]:
-    """Check the arguments of ``simulate`` and set a run up, with the lock of its folder. Collective.
-
-    ``others``: problems whose matrices and factors serve it too, if they are its own. ``runs``: that take turns.
-    """
+    """Check the arguments of ``simulate`` and set a run up, in its locked folder. ``others``: problems that lend their
+    matrices and factors to it, if they are its own. ``runs``: how many take turns. Collective."""
     _check_outputs(record, out, restart, checkpoint_every, (progress, changed), fields, cross_check)
     if wall_time is not None and out is None:
         raise InputError("wall_time needs out, the folder of the run to continue afterwards")

@@ -48,10 +48,7 @@ def _born() -> float:
 
 
 class WallTime:
-    """Keep what base steps and checkpoints take, against the wall time of the process; None: there is no end.
-
-    ``runs``: so many take turns, and each has a checkpoint to write in the end.
-    """
+    """Keep what base steps take, and checkpoints of so many ``runs``, against the wall time; None: there is no end."""
 
     def __init__(self, wall_time: str | None = None, runs: int = 1) -> None:
         self.text, self._runs = wall_time, runs

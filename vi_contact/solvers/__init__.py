@@ -9,16 +9,14 @@ array([0.5, 0. ])
 """
 
 from ..core.lazy import lazy
-from . import friction, normal
+from . import friction, iterative, normal, volume
 
 _CONTENTS = {
     "automatic": ("Automatic",),
     "condensed": ("Condensed",),
     "friction": friction.__all__,
-    "iterative.route": ("Iterative",),
+    "iterative": iterative.__all__,
     "normal": normal.__all__,
-    "volume.route": ("Volume",),
-    "volume.snes": ("ReducedNewton", "SemismoothNewton"),
-    "volume.tao": ("TaoTron",),
+    "volume": volume.__all__,
 }
 __all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)

@@ -62,7 +62,7 @@ class Automatic:
             return self.condensed
         if self.iterative is not None:
             return self.iterative
-        from .iterative.route import Iterative  # needs petsc4py, which small problems do without
+        from .iterative import Iterative  # needs petsc4py, which small problems do without
 
         return Iterative()
 

@@ -16,6 +16,6 @@ def solver_beside_steps(A: EffectiveMatrix, surface: ContactSurface) -> Solver:
     nothing: these matrices, of mass or of a layer of nodes, are well-conditioned. Collective."""
     if small(surface.comm, A.matrix.rows, surface.count) or find_spec("petsc4py") is None:
         return Condensed()
-    from .iterative.route import Iterative
+    from .iterative import Iterative
 
     return Iterative("jacobi", tolerance=TOLERANCE)

@@ -5,8 +5,7 @@ from typing import Any, Protocol
 
 
 class Sides(Protocol):
-    """Give the conditions at the ends of the layer. ``firm``: whether they hold static loads; others need a gravity
-    stage on firm ones (``staged``)."""
+    """Give the conditions at the layer's ends. ``firm``: they hold static loads; else see ``staged`` for gravity."""
 
     @property
     def firm(self) -> bool: ...

@@ -89,8 +89,7 @@ class Channel:
 
 @dataclass(frozen=True)
 class ChannelModel:
-    """Hold the assembled channel and soil; ``surface``: the contact of base, left and right wall, in this order,
-    normals and forces those of the channel."""
+    """Hold the assembled channel and soil; ``surface``: base, left, right wall in contact, with its normals."""
 
     channel: Channel
     mesh: Any

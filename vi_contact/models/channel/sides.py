@@ -84,8 +84,7 @@ class Fixed:
 
 @dataclass(frozen=True)
 class TiedSides:
-    """Tie the ends to each other in both directions: the exact free field of horizontal layers under horizontal and
-    vertical shaking; what leaves at one end comes back at the other."""
+    """Tie the ends to each other: exact free field of horizontal layers; waves leave at one end and come back."""
 
     firm: ClassVar[bool] = True
 

@@ -31,9 +31,8 @@ class _LogFile(logging.FileHandler):
 class RunLog:
     """Send everything logged under ``vi_contact`` to a file while it is open, and warnings to the terminal: on rank 0.
 
-    Runs that take turns set ``turn``, each to its own value, before they open their logs and whenever it is theirs:
-    a line goes to the logs that were opened in this turn. The root logger is left out: form compilers make it print
-    every line.
+    While runs take turns (``turn_of``) a line goes to the logs that were opened in this turn. The root logger is left
+    out: form compilers make it print every line.
     """
 
     turn: ClassVar[object] = None

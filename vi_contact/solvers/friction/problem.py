@@ -132,8 +132,7 @@ class ScaledProblem:
         return np.column_stack([r_n, project(r[:, 1:], self.limit(r_n))])
 
     def start(self, guess: Array | Mask | None) -> Array:
-        """Return reactions to start from: those guessed; or what opens the guessed set row by row, times the number
-        that makes ½ rᵀG r + qᵀr least."""
+        """Return reactions to start from: those guessed; or what opens the guessed set row by row, at least energy."""
         if guess is None:
             return np.zeros_like(self.q)
         if guess.dtype != bool:

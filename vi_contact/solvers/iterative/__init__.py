@@ -1,1 +1,6 @@
 """Solve the step in the volume by conjugate gradients, without any factor: one row of a mask is a contact condition."""
+
+from ...core.lazy import lazy
+
+_CONTENTS = {"route": ("Iterative",)}
+__all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)

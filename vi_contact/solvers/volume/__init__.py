@@ -1,1 +1,10 @@
 """Solve the step in the volume, with PETSc's variational-inequality solvers: the whole u, no condensation."""
+
+from ...core.lazy import lazy
+
+_CONTENTS = {
+    "route": ("Volume",),
+    "snes": ("ReducedNewton", "SemismoothNewton"),
+    "tao": ("TaoTron",),
+}
+__all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)

@@ -109,7 +109,7 @@ class Volume:
 
 
 class PreparedVolume:
-    """Run a PETSc solver bound to A. ``close`` frees it.
+    """Run a PETSc solver bound to A; ``snes`` or ``tao`` is the PETSc object. ``close`` frees it.
 
     Without ``close`` it is freed at the first ``prepare`` after its last reference: to free it is collective.
     """
@@ -137,10 +137,19 @@ class PreparedVolume:
         return self._friction
 
     @property
-    def petsc(self) -> Any:
-        """Return PETSc's object, SNES or TAO; None when the solver is closed."""
+    def snes(self) -> Any:
+        """Return the SNES object; None when the method is TAO's or the solver is closed."""
+        return self._petsc("SNES")
+
+    @property
+    def tao(self) -> Any:
+        """Return the TAO object; None when the method is SNES's or the solver is closed."""
+        return self._petsc("TAO")
+
+    def _petsc(self, kind: str) -> Any:
         driver = self._driver if self._friction is None else self._friction.driver
-        return driver and driver.solver
+        solver = None if driver is None else driver.solver
+        return solver if isinstance(solver, getattr(PETSc, kind)) else None
 
     def close(self) -> None:
         """Free the PETSc objects; collective."""

@@ -76,8 +76,7 @@ def with_settings(tables: dict[str, Any], settings: Sequence[str]) -> dict[str, 
     """Return a copy of the tables with KEY=VALUE settings made; what is missing on the way to a key is added.
 
     KEY: names joined by dots; entries of lists are counted from 1 ("excitation.1.scale"). VALUE: as in TOML; what is no
-    TOML is text; none at all takes the key away. Raises InputError for a setting without "=", an entry that is not
-    there, a way through a plain value.
+    TOML is text; none takes the key away. InputError for a setting without "=", no such entry, a way through a value.
     """
     result = deepcopy(tables)
     for setting in settings:

@@ -27,7 +27,7 @@ from ...models import channel, wall
 from ...run import HalvedAtImpact, Schedule
 from ...run.files.writer import FieldWriter
 from ...soil import UpgoingVelocity
-from ...solvers import friction, normal
+from ...solvers import friction, normal, volume
 from ...solvers.condensed import SmallMethod
 from ...solvers.friction.extrapolation import Extrapolation
 from ...solvers.friction.problem import FrictionMethod
@@ -42,7 +42,7 @@ _KINDS: Mapping[ModuleType, tuple[Any, ...]] = {  # room -> the kinds of things 
     ground_motion: (Excitation,),
     meshes: (MeshScript,),
     fem: (Prescribed, Traction, BodyForce, Dashpots, Matching, Recorder, FieldWriter),
-    solvers: (Solver, Method), normal: (SmallMethod,), friction: (FrictionMethod, Extrapolation),
+    solvers: (Solver,), normal: (SmallMethod,), friction: (FrictionMethod, Extrapolation), volume: (Method,),
     schemes: (Scheme,),
     run: (Solver, Schedule, HalvedAtImpact, Recorder),
     engineering: (Recorder,),
@@ -71,8 +71,7 @@ def surface(
     points: Sequence[tuple[float, ...]] | None = None, feature_angle: float = FEATURE_ANGLE, held: bool = False,
     springs: float | None = None, frictionless_corners: bool = False,
 ) -> ContactSurface:
-    """Make a ``contact_surface``; held: ``.bilateral_everywhere()``; springs: ``.on_springs(stiffness)``; the last:
-    ``.with_frictionless_corners()``."""
+    """Make a ``contact_surface``; held: bilateral everywhere; springs: on these; the last: no friction in corners."""
     found = fem.contact_surface(system, facets, obstacle=obstacle, points=points, feature_angle=feature_angle)
     found = found if springs is None else found.on_springs(springs)
     found = found.with_frictionless_corners() if frictionless_corners else found
