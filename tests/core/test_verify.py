@@ -268,3 +268,21 @@ def test_compiled_sizes_are_those_of_numpy(monkeypatch):
         monkeypatch.undo()
         assert verify.already() is not None and compiled[1] == compiled[0][1:2] and np.inf in compiled[0][3]
         assert np.isfinite(compiled[0][:3]).all() and min(compiled[0][0][:6]) > 0.0
+
+
+@pytest.mark.skipif(library(SerialComm()) is None, reason="no compiler here")
+@pytest.mark.parametrize("worse", [
+    lambda result: replace(result, active=result.active.astype(int)),
+    lambda result: replace(result, x=result.x.astype(np.float32)),
+    lambda result: replace(result, x=np.repeat(result.x, 2)[::2]),
+])
+def test_what_solvers_of_others_give_is_read_as_what_it_is(worse):
+    """Whole numbers for a set, single precision, every second number: the certificate is that of the numpy way."""
+    step, result = pressed()
+    asked = worse(result)
+    for first in (True, False):  # of its shape, or after others
+        if first:
+            step.A.desk.clear()
+        found = kkt_residual(step, asked)
+        sizes = verify._sizes_in_numpy(step, asked, step.A.image(asked.x))
+        assert found == verify._judged(step, asked, sizes.tolist()[0])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import signal
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -119,12 +119,50 @@ def test_runs_with_other_schemes_and_solvers_are_the_runs_alone(shared_tmp):
         assert alike(found[number].history, alone.history)
 
 
+@dataclass(frozen=True)
+class Raises:
+    """Shake until 12 steps are done, and refuse to go on."""
+
+    direction: tuple[float, float] = (1.0, 0.0)
+    duration: float = np.inf
+
+    def acceleration(self, t: float) -> float:
+        if t > 12.0 * DT:
+            raise vc.InputError("no record any more")
+        return np.sin(t)
+
+
+def test_an_error_in_what_is_made_for_all_is_of_the_guilty_run_alone():
+    """The load of one raises while those of all are made: the others are the runs that they are alone."""
+    problems = [SHAKEN[0], replace(BASE, excitation=Raises()), SHAKEN[2]]
+    found = dict(vc.simulate_many([{"problem": one, "dt": DT, "steps": 30} for one in problems]))
+    assert isinstance(found[1], vc.InputError) and "no record any more" in str(found[1])
+    for number in (0, 2):
+        assert alike(found[number].history, vc.simulate(problems[number], dt=DT, steps=30, progress=False).history)
+    ends = dict(vc.march_many(problems, dt=DT, steps=30))
+    assert [getattr(ends[number], "new", BASE) is not BASE for number in range(3)] == [True, False, True]
+
+
+def test_states_of_other_schemes_go_together():
+    """What only some states have in mind is left out: the scheme that marches them did not ask for it."""
+    light = replace(BASE, impact=None, mass=None)
+    other = replace(vc.simulate(light, scheme=vc.HHT(), dt=DT, steps=1, progress=False).state, t=0.0, k=0)
+    assert other.memory
+    found = dict(vc.simulate_many([{"problem": BASE, "dt": DT, "steps": 20, "state": one} for one in (other, None)]))
+    for number, state in enumerate((other, None)):
+        assert alike(found[number].history, vc.simulate(BASE, dt=DT, steps=20, state=state, progress=False).history)
+
+
 def test_wrong_arguments_are_told(tmp_path):
     with pytest.raises(vc.InputError, match="simulate_many: got an unexpected keyword argument 'step'"):
         vc.simulate_many([{"problem": BASE, "dt": DT, "step": 3}])
     with pytest.raises(vc.InputError, match="simulate_many: missing a required argument: 'dt'"):
         vc.simulate_many([{"problem": BASE}])
-    with pytest.raises(vc.InputError, match="a recorder is in two runs"):
+    with pytest.raises(vc.InputError, match="a recorder is given twice"):
         vc.simulate_many([{"problem": BASE, "dt": DT, "steps": 1, "record": (RECORDER,)}] * 2)
+    with pytest.raises(vc.InputError, match="a folder is given twice"):
+        vc.simulate_many([{"problem": BASE, "dt": DT, "out": one} for one in (tmp_path, str(tmp_path / "."))])
+    (end,) = vc.simulate_many([{"problem": BASE, "dt": DT, "steps": 1, "record": 5}])
+    assert "record is 5" in str(end[1])
     with pytest.raises(vc.InputError, match="simulate_many: runs is"):
         vc.simulate_many({"problem": BASE, "dt": DT})

@@ -18,8 +18,7 @@ def traction_forces(
 ) -> Array:
     """Return (steps, 2, n) nodal forces [N/m], mean over each step, of traction(points, normals, t) -> (m, 2) [Pa].
 
-    points, normals: (m, 2); elements: mask (n,) of the loaded elements, all if None; order: Gauss points in time and
-    along an element.
+    points, normals: (m, 2); elements: mask (n,) of loaded ones, None: all; order: Gauss points in time and along each.
     """
     owner = "traction_forces"
     instance(owner, "mesh", mesh, BoundaryMesh, "give a BoundaryMesh, for example polygon(...)")

@@ -138,8 +138,7 @@ def layer_for(
 ) -> Layer:
     """Return the layer from which this mass [kg] with this speed [m/s] returns with e times its speed (dominant terms).
 
-    ``deepest``: x_min/a, the part of the distance a that is left at the greatest compression. InputError unless
-    0 < e <= 1 and 0 < deepest < 1.
+    ``deepest``: x_min/a, left of the distance a at the greatest compression. InputError unless 0 < e <= 1, deepest < 1.
     """
     if not 0.0 < number("layer_for", "deepest", deepest) < 1.0:
         raise InputError(f"layer_for: deepest is {deepest}; give the part of the layer that is left, between 0 and 1")

@@ -100,8 +100,7 @@ def passage(layer: Layer, mass: float, speed: float, metric: Metric, *, rtol: fl
 class _Passages:
     """Flights and passages through the layer one after the other.
 
-    The unknowns are v and the way q - q_start since the last crossing, over the time since then: a layer of 1e-8 m is
-    resolved beside a q of 1 m.
+    The unknowns are v and q - q_start since the last crossing, over the time since: 1e-8 m is resolved beside 1 m.
     """
 
     def __init__(self, system: ConstrainedSystem, layer: Layer, metric: Metric, rtol: float, refine: int) -> None:

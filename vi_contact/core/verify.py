@@ -42,26 +42,30 @@ def _sizes(step: StepProblem, result: StepResult) -> list[list[float]]:
 
 
 def _sizes_compiled(step: StepProblem, result: StepResult, Ax: Array, functions: Any) -> Array:
-    arrays = step.b, result.x, step.guess, step.bound, result.r_n, result.r_t, result.active
-    (*places, room, found), kept = _places(step.A.desk, Ax, *arrays)
     counts, fixed, _ = step.surface.readable
+    arrays = Ax, step.b, result.x, step.guess, step.bound, result.r_n, result.r_t, result.active
+    (*places, room, found), kept = _places(step.A.desk, counts, arrays)
     functions.largest(len(kept[-1]), Ax.shape[-1], *counts, *places, c_double(step.scale), *fixed, room, found)
     return np.asarray(kept[-1])
 
 
-def _places(desk: dict[Any, tuple[list[Any], list[Any]]], Ax: Array, *others: Any) -> tuple[list[Any], list[Any]]:
-    """Where compiled functions find the arrays, room and sizes, and what lies there: copies on the desk where they are
-    small, as numpy takes longer to tell where an array lies than to copy it."""
-    arrays = Ax, *others
+def _places(
+    desk: dict[Any, tuple[list[Any], list[Any]]], counts: tuple[int, ...], arrays: tuple[Any, ...]
+) -> tuple[list[Any], list[Any]]:
+    """Where compiled functions find the arrays, room and sizes, and what lies there, of their types and sizes whatever
+    a solver gave: copies on the desk where they are small, which takes less than to ask numpy where an array lies."""
     shapes = tuple([None if one is None else one.shape for one in arrays])
     if shapes in desk:
         for copy, one in zip(desk[shapes][1], arrays, strict=False):
             if one is not None:
                 copy[...] = one
         return desk[shapes]
-    small, n = Ax.size <= COPIED, Ax.shape[-1]
-    kept = [None if one is None else np.array(one) if small else np.ascontiguousarray(one) for one in arrays]
-    kept += [np.empty(n), np.empty((math.prod(Ax.shape[:-1]), 10))]
+    *rows, n = arrays[0].shape
+    small = arrays[0].size <= COPIED
+    forms = *[(*rows, n)] * 4, counts[:1], (*rows, counts[0]), (*rows, *counts), (*rows, counts[0])
+    kept = [None if one is None else (np.array if small else np.asarray)(np.broadcast_to(one, form), kind, order="C")
+            for one, form, kind in zip(arrays, forms, [float] * 7 + [bool], strict=True)]
+    kept += [np.empty(n), np.empty((math.prod(rows), 10))]
     made = [None if one is None else at(one) for one in kept], kept
     if small:
         desk[shapes] = made

@@ -44,8 +44,7 @@ class Harmonic:
 
 @dataclass(frozen=True)
 class Ricker:
-    """Shake with a(t) = amplitude · (1 - 2 x) exp(-x), x = (pi frequency (t - peak_time))² (Ricker, Geophysics 18,
-    1953).
+    """Shake with a(t) = amplitude (1 - 2 x) exp(-x), x = (pi frequency (t - peak_time))² (Ricker, Geophysics 18, 1953).
 
     amplitude [m/s²], the peak; frequency [Hz] > 0, where the spectrum peaks; delay [s] >= 0, the time of the peak, by
     default 1.5 / frequency, which makes |a(0)| < 1e-8 |amplitude|; a smaller one starts with a jump. Velocity and

@@ -92,8 +92,7 @@ def cut_open(
 def welded(arrays: MeshArrays, first: str, second: str) -> MeshArrays:
     """Replace every node of the group `second` by the node of `first` at its place.
 
-    Both groups remain, as the same inner boundary. InputError for nodes of `second` without a partner (within 1e-9 of
-    the mesh's size).
+    Both groups remain, as the same inner boundary. InputError for nodes of `second` without a partner (1e-9 of size).
     """
     one, two = (np.unique(_group(arrays, name)) for name in (first, second))
     size = float(np.ptp(arrays.points, axis=0).max())

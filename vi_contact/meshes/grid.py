@@ -28,8 +28,7 @@ class Grid:
     """Describe a structured mesh of one body.
 
     `nodes` (n_1+1, ..., n_d+1, d) are the points of the deformed lattice [m]; `sides[a]` names the two sides on which
-    lattice index a is lowest and highest; `body` names all cells. `simplices` splits every box along its diagonal
-    (Kuhn).
+    lattice index a is lowest and highest; `body` names all cells. `simplices` splits boxes along a diagonal (Kuhn).
     """
 
     nodes: Array

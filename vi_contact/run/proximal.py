@@ -100,8 +100,7 @@ class Proximal:
         return replace(kkt_residual(self.step, result), resultant=resultant)
 
     def solve(self, step: StepProblem) -> StepResult:
-        """Iterate to the tolerance, and on until two answers running are no better. A solver that fails gets stronger
-        springs once: more steps, each of them easier."""
+        """Iterate until two answers running are no better; once, if the solver fails, with stronger springs instead."""
         self.step = step
         progress = _Progress(self._tolerance)
         answer = StepResult(step.guess, np.zeros(step.surface.count), step.active, 0, "")
@@ -158,8 +157,7 @@ class Proximal:
         return self._bodies.resultants(inner.b - self._springs @ found.x - reaction)
 
     def _left_over(self, answer: StepResult, share: float, centre: Array, carried: Array) -> StepProblem:
-        """The next step. The resultants of K u are zero, so that those of b are the forces' own: the round-off of a
-        million times larger parts would move the body."""
+        """The next step, b with the forces' own resultants: K u has none, and its round-off would move the body."""
         left, x, surface = left_over(self.step, answer, share), answer.x, self.step.surface
         r_n, r_t = kept(self.step, answer, share)
         forces = self.step.b - surface.reaction_load(r_n, len(x), r_t)

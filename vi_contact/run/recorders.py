@@ -5,7 +5,6 @@ Displacements and velocities are those of the equations: relative to the ground 
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass
 from math import isfinite
 from typing import Any, ClassVar
@@ -100,16 +99,15 @@ class Energy:
 
     def row(self, report: Report) -> Row:
         system, new = self._problem.equations, report.new
-        free = energies(system, new.u, report.v_minus)
         end = new if new.v is report.v_minus else new.with_velocity(report.v_minus)
-        known = isfinite(free.kinetic + free.strain + self._now.kinetic + self._now.strain)  # so are u, v, M v and K u
-        with nullcontext() if known else np.errstate(over="ignore", invalid="ignore"):  # refuse_overflow tells of it
+        with np.errstate(over="ignore", invalid="ignore"):  # refuse_overflow tells of it
+            free = energies(system, new.u, report.v_minus)
             step = energy_balance(self._problem, report.old, end, report.balance, before=self._now, after=free)
-        self._now = free
-        if new.v is not report.v_minus:  # the impact law changed it; displacements do not jump
-            momentum = system.product("M", new.v)
-            kinetic = 0.5 * system.algebra.dot(new.v, momentum)
-            self._now = Energies(momentum, free.elastic, kinetic, free.strain)
+            self._now = free
+            if new.v is not report.v_minus:  # the impact law changed it; displacements do not jump
+                momentum = system.product("M", new.v)
+                kinetic = 0.5 * system.algebra.dot(new.v, momentum)
+                self._now = Energies(momentum, free.elastic, kinetic, free.strain)
         impact = free.kinetic - self._now.kinetic
         losses = (step.input, step.damping, step.contact, step.friction, impact, step.algorithmic, step.defect)
         for term, loss in zip(self._SUMS, losses, strict=True):

@@ -48,7 +48,7 @@ def joined(states: Sequence[State]) -> State:
     first, rubs = states[0], next((0.0 * one.r_t for one in states if one.r_t is not None), None)
     u, v, r_n, active = (np.stack([getattr(one, name) for one in states]) for name in ("u", "v", "r_n", "active"))
     memory = {name: frozen(np.stack([one.memory[name] for one in states])) if value.shape == first.u.shape else value
-              for name, value in first.memory.items()}
+              for name, value in first.memory.items() if all(name in one.memory for one in states)}
     r_t = None if rubs is None else np.stack([rubs if one.r_t is None else one.r_t for one in states])
     return State(first.t, first.k, frozen(u), frozen(v), r_n, active, memory, r_t)
 

@@ -5,6 +5,7 @@ from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from inspect import signature
+from pathlib import Path
 from typing import Any
 
 from ..core.checks import several
@@ -33,11 +34,12 @@ def simulate_many(
     Raises InputError for arguments that ``simulate`` does not know; Interrupted and OutOfTime as ``simulate`` does,
     when all runs that have begun have written their checkpoints: ``restart=True`` continues them.
     """
-    given = several("simulate_many", "runs", runs, "give a list of dictionaries of the arguments of simulate")
-    every = [_arguments(run) for run in given]
-    recorders = [one for run in every for one in run["record"] or ()]
-    if len(set(map(id, recorders))) < len(recorders):
-        raise InputError("simulate_many: a recorder is in two runs, and keeps the books of one: give each run its own")
+    every = [_arguments(run) for run in several("simulate_many", "runs", runs, "give a list of arguments of simulate")]
+    folders = [str(Path(run["out"]).resolve()) for run in every if isinstance(run["out"], str | Path)]
+    books = [id(one) for run in every if isinstance(run["record"], Sequence) for one in run["record"]]
+    for what, own in (("recorder", books), ("folder", folders)):
+        if len(set(own)) < len(own):
+            raise InputError(f"simulate_many: a {what} is given twice, and keeps what one run finds: give each its own")
     return _in_turn(every, tell)
 
 
@@ -64,7 +66,7 @@ class _Turn:
     def step(self) -> Solution | ViContactError | Interrupted | None:
         """Make a base step; what the run has ended with, None when it goes on."""
         self.begun = True
-        with turn_of(self.number):
+        with turn_of(self):
             try:
                 return next(self.steps)
             except (ViContactError, Interrupted) as error:
@@ -72,8 +74,10 @@ class _Turn:
 
     def close(self) -> None:
         """End a run that nobody waits for any more, with its checkpoint."""
-        with turn_of(self.number):
+        with turn_of(self):
             self.steps.close()
+        self.session.last = self.session.loop = None  # the matrices of one that has ended serve nobody
+        self.loop.prepared.clear()
 
 
 def _in_turn(runs: Sequence[Mapping[str, Any]], tell: Callable[[float], None]) -> Iterator[Ended]:
@@ -105,6 +109,7 @@ def _in_turn(runs: Sequence[Mapping[str, Any]], tell: Callable[[float], None]) -
                     one.session.seconds[-1] = (time.perf_counter() - begin) / len(ends)
                     continue
                 one.loop.leave()
+                one.close()
                 going.remove(one)
                 if isinstance(end, Interrupted):
                     stopped = end

@@ -128,7 +128,10 @@ class Group:
         while self._runs:
             plans = [(run, run.step_plan) for run in self._runs]
             dt, ended = plans[0][1].dt(self._base), [run for run, plan in plans if plan.steps == self._base]
-            leaving = ended or [run for run, plan in plans if plan.dt(self._base) != dt] or self._step(dt)
+            try:
+                leaving = ended or [run for run, plan in plans if plan.dt(self._base) != dt] or self._step(dt)
+            except ViContactError:  # of one of them, which meets it again alone
+                leaving = self._runs
             if not leaving:
                 self._base += 1
                 return

@@ -120,7 +120,6 @@ def equilibrated(problem: ContactProblem, state: State) -> State:
 
 
 def massless_take(problem: ContactProblem, given: Array | float, x: Array) -> Array:
-    """Return x with these values on massless unknowns: the mean velocity of a step, for they have no momentum to carry
-    on, and no acceleration."""
+    """Return x with these values on massless unknowns: a mean velocity, without momentum to keep; no acceleration."""
     massless = problem.equations.massless
     return x if massless is None else np.where(massless, given, x)

@@ -64,8 +64,7 @@ _RUBBING = ("contact_traction_t", "slip")
 class XDMF:
     """Write a frame every so many steps, and one of the initial state. InputError unless both numbers are >= 1.
 
-    ``frames_per_file``: each time so many frames have files of their own they are put into one, for file systems that
-    do not like many.
+    ``frames_per_file``: each time so many frames have files of their own they are put into one: some systems want few.
     """
 
     every: int = 10

@@ -102,8 +102,7 @@ class ChannelModel:
         excitation: Excitation | Sequence[Excitation] | None = None,
         impact: ImpactLaw | None = Inelastic(ImpulseUpdate()), mass: MassLaw | None = None,
     ) -> ContactProblem:
-        """Set up channel and soil under the harmonic motion, sliding freely; with the inelastic impact rule, as an
-        impulse, on consistent mass.
+        """Set up channel and soil under the harmonic motion, sliding freely; inelastic impulses, consistent mass.
 
         Args:
             friction: Coulomb(mu) for instance.

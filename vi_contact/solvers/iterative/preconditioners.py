@@ -6,8 +6,7 @@ divide by the square root of that number on either side takes this back, and M s
 layer would be no gain.
 
 GAMG is made of A with the held rows and columns replaced by their diagonal, or its coarse grids would believe the
-contact open; its interpolation is kept, and only the Galerkin products are renewed, when more than a tenth of the
-contact set has moved since.
+contact open; the interpolation is kept, Galerkin products are renewed when over a tenth of the set has moved since.
 """
 
 from typing import Any
