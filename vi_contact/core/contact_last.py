@@ -175,5 +175,5 @@ def _readable(A: sp.csr_matrix) -> sp.csr_matrix:
 
 
 def at(array: NDArray[Any]) -> ctypes.c_void_p:
-    """Return where an array lies in memory."""
-    return ctypes.c_void_p(array.ctypes.data)
+    """Return where an array lies in memory; ``array.ctypes`` takes several times as long to tell."""
+    return ctypes.c_void_p(array.__array_interface__["data"][0])

@@ -4,7 +4,7 @@ A step of a small system costs as much as the objects that tell of it: those tha
 made stays as it is, whatever the runs do later: every step has arrays of its own, and nobody writes to them.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,8 +20,7 @@ from ..core.system import Load, history_value
 class Each(dict[int, Any]):
     """Hold something of every run by its row, made when somebody asks for it."""
 
-    def __init__(self, make: Callable[[int], Any], made: Iterable[Any] = ()) -> None:
-        super().__init__(enumerate(made))
+    def __init__(self, make: Callable[[int], Any]) -> None:
         self._make = make
 
     def __missing__(self, row: int) -> Any:

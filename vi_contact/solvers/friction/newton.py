@@ -9,7 +9,7 @@ Wohlmuth, SIAM J. Sci. Comput. 30, 2008):
     stick  w_t = 0                        slip     r_t = limit(r_n) n + eta t,   t·w_t + (|y_t| - limit)/limit eta = 0
 
 eta is the turn of the slip direction, t perpendicular to n: in 2D there is none, the problem is piecewise linear, and
-the iterate of the right states is exact. friction_linear.py solves these problems.
+the iterate of the right states is exact. linear.py solves these problems.
 
 Compiled Gauss-Seidel sweeps go before, in single precision. In 2D they alternate between G, whose sweeps damp the long
 waves of r, and its inverse H, whose sweeps damp the short ones: some fifteen find all states, up to one or two. In 3D
@@ -19,7 +19,7 @@ Slip that turned back within one iteration overshot: such a node sticks in the n
 slip to and fro. Where Newton cycles all the same, Gauss-Seidel sweeps (nsgs.py) lead to a better start.
 """
 
-import ctypes
+from ctypes import c_double
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -28,6 +28,7 @@ import numpy as np
 
 from ...core.algebra import Array, Mask, SerialComm
 from ...core.compiled import library
+from ...core.contact_last import at
 from .linear import Factored, LinearProblems, States
 from .nsgs import sweeper
 from .problem import Iterated, PreparedFriction, ScaledDelassus, ScaledProblem, Settings
@@ -102,11 +103,11 @@ def relaxed(compiled: Any, step: ScaledProblem, r: Array) -> tuple[Array, Array,
     of, r, w = step.delassus, np.array(r, order="C"), np.array(step.w(r), order="C")
     room = np.empty(r.size + len(r), dtype=np.float32)
     given = (*of.short, step.cohesion, step.slope, of.bilateral, r, w, room)
-    at = [None if array is None else ctypes.c_void_p(array.__array_interface__["data"][0]) for array in given]
+    places = [None if array is None else at(array) for array in given]
     left, before = np.inf, np.inf
     for _ in range(STAGES[of.dimension]):
         least = 0.5 * step.rounding(r) if of.dimension > 2 else 0.0
-        compiled.relax(of.count, of.dimension, *at[:-3], SWEEPS[of.dimension], ctypes.c_double(least), *at[-3:])
+        compiled.relax(of.count, of.dimension, *places[:-3], SWEEPS[of.dimension], c_double(least), *places[-3:])
         if of.dimension > 2:
             w[:] = step.w(r)
         left, before = step.residual(r, w), left
