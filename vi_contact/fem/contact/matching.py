@@ -4,7 +4,7 @@ The rows of P sum to one, so that a common translation of both bodies opens and 
 """
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from ...core.algebra import Array, Indices, Mask
 from ...core.checks import at, attributes
 from ...core.errors import InputError
-from .nodes import Nodes
+from .nodes import Nodes, Rows
 
 NEARBY = 8  # nodes of side 2 that are looked at first
 DISTANCES = 2**20  # in a table, where all nodes of side 2 are looked at
@@ -28,7 +28,7 @@ class Side:
 
 
 @dataclass(frozen=True, eq=False)
-class Matched:
+class Matched(Rows):
     """Hold the m nodes of side 1 that face side 2: ``rows`` among those of side 1, P (m, nodes of side 2), the weights
     [m] or [m²] of their shares of the interface, and by how much the sides may overlap there [m] and count as touching.
     """
@@ -37,10 +37,6 @@ class Matched:
     P: sp.csr_matrix
     weights: Array
     overlap: Array
-
-    def pick(self, rows: Any) -> "Matched":
-        """Return the matched nodes of these rows."""
-        return Matched(self.rows[rows], self.P[rows], self.weights[rows], self.overlap[rows])
 
 
 class Matching(Protocol):

@@ -8,15 +8,23 @@ nodes stays with their owners, but for the two sides of a pair of bodies, which 
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, Self, cast
 
 import numpy as np
 
 from ...core.algebra import Array, Comm, Indices, Mask, from_each, largest
 
 
+class Rows:
+    """Take rows out of all arrays of a dataclass that holds nothing else."""
+
+    def pick(self, rows: Any) -> Self:
+        """Return what is in these rows."""
+        return type(self)(*(getattr(self, one.name)[rows] for one in fields(cast(Any, self))))
+
+
 @dataclass(frozen=True, eq=False)
-class Nodes:
+class Nodes(Rows):
     """Hold nodes of a boundary, those of this rank or all: original numbers, coordinates, body normals, weights, held
     components, and the numbers over all ranks of their free unknowns, -1 for held ones."""
 
@@ -26,10 +34,6 @@ class Nodes:
     weights: Array
     held: Mask
     unknowns: Indices
-
-    def pick(self, rows: Any) -> "Nodes":
-        """Return the nodes of these rows."""
-        return Nodes(*(getattr(self, one.name)[rows] for one in fields(self)))
 
 
 def joined_nodes(parts: Sequence[Nodes]) -> Nodes:
