@@ -54,13 +54,13 @@ class Boundary:
             turn = _turn(self.normals[facet[one]], self.normals[facet[other]])
             close = turn <= angle * (1.0 + 1e-9)
             links.append(np.stack([one[close], other[close]]))
-        return _components(len(node), links).reshape(self.vertices.shape)
+        return components(len(node), links).reshape(self.vertices.shape)
 
     def faces(self, angle: float) -> Indices:
         """Number the face (k,) of each facet over the whole boundary."""
         k, v = self.vertices.shape
         of_facet = np.stack([np.repeat(np.arange(k), v), k + self.corner_faces(angle).ravel()])
-        return np.unique(_components(k + k * v, [of_facet])[:k], return_inverse=True)[1].ravel()
+        return np.unique(components(k + k * v, [of_facet])[:k], return_inverse=True)[1].ravel()
 
 
 def checked_angle(owner: str, value: Any) -> float:
@@ -128,8 +128,8 @@ def _turn(one: Array, other: Array) -> Array:
     return np.asarray(2.0 * np.arctan2(np.linalg.norm(one - other, axis=1), np.linalg.norm(one + other, axis=1)))
 
 
-def _components(count: int, links: list[Indices]) -> Indices:
-    """Number of the connected part of each of ``count`` things."""
+def components(count: int, links: list[Indices]) -> Indices:
+    """Return the number of the connected part of each of ``count`` things, of which pairs are linked."""
     one, other = np.concatenate([np.zeros((2, 0), dtype=np.int64), *links], axis=1)
     graph = sp.coo_matrix((np.ones(len(one)), (one, other)), shape=(count, count))
     from scipy.sparse.csgraph import connected_components  # late: it takes a while

@@ -1,11 +1,12 @@
-"""Couple sides of plane bodies that are not meshed alike: mortar coupling with dual Lagrange multipliers.
+"""Couple sides of bodies that are not meshed alike: mortar coupling with dual Lagrange multipliers.
 
 The gap is asked not at points but in the mean, weighted with functions psi_s on side 1, one per node,
 
     D_s (u_1 at s) = sum_j M_sj u_j,   D_s = ∫ psi_s,   M_sj = ∫ psi_s phi_j,   P = D⁻¹ M
 
-over the part of side 1 that faces side 2. Side 2 is projected onto each segment of side 1 along the segment's normal,
-which cuts it into pieces where all functions are polynomials; two Gauss points are exact. On each segment
+over the part of side 1 that faces side 2. In the plane, side 2 is projected onto each segment of side 1 along the
+segment's normal, which cuts it into pieces where all functions are polynomials; two Gauss points are exact. For space
+see ``mortar_in_space``. On each segment
 
     psi = A phi,   A = diag(∫ phi_k) (∫ phi phiᵀ)⁻¹
 
@@ -25,56 +26,64 @@ import scipy.sparse as sp
 from ...core.algebra import Array
 from ...core.errors import InputError
 from .matching import Matched, Side, refuse_same_way
+from .mortar_in_space import EDGE_ON, LEAST_COVERED, in_space
 
-LEAST_COVERED = 1e-3  # of a segment: less of it in front of side 2 is no contact
 POINTS = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0)  # of Gauss, on [0, 1], weights ½
-CURVED = 0.05  # of a segment: what polygons of one curve may overlap
+CURVED = 0.05  # of a facet: what polygons of one curve may overlap
 
 
 @dataclass(frozen=True)
 class DualMortar:
-    """Match sides of plane bodies with any meshes: dual Lagrange multipliers on side 1 (head of this file).
+    """Match sides of plane and solid bodies with any meshes: dual Lagrange multipliers on side 1 (head of this file).
 
     Nodes of side 1 at the ends of what is in front of side 2 keep their conditions, in the mean over that part.
-    Initial gaps are means too; where polygons of the same curve overlap by up to 5 % of a segment the gap is zero.
-    InputError in one and three dimensions, and for sides that do not face each other.
+    Initial gaps are means too; where polygons of the same curve overlap by up to 5 % of a facet the gap is zero.
+    InputError for bars, for sides that do not face each other, in space for facets that are slivers or not convex.
     """
 
     partial: ClassVar[bool] = True  # parts of side 1 in front of nothing have no conditions
 
     def match(self, one: Side, two: Side, size: float) -> Matched:
-        if one.nodes.points.shape[1] != 2:
-            raise InputError(
-                "DualMortar joins sides of plane bodies: mesh the sides alike, so that matching=NodeToNode() serves"
-            )
-        ends1, ends2 = one.nodes.points[one.facets], two.nodes.points[two.facets]
-        normals1, normals2 = (_normals(side, ends) for side, ends in ((one, ends1), (two, ends2)))
-        m, n = len(one.nodes.points), len(two.nodes.points)
-        D, M, longest = np.zeros(m), sp.lil_matrix((m, n)), np.zeros(m)
-        for facet, ends, normal in zip(one.facets, ends1, normals1, strict=True):
-            pieces = list(_pieces(ends, normal, ends2, normals2))
-            if sum(high - low for low, high, *_ in pieces) <= LEAST_COVERED:
-                continue
-            length = float(np.linalg.norm(ends[1] - ends[0]))
-            own, mixed = _integrals(pieces, length)
-            dual = np.diag(own.sum(axis=1)) @ np.linalg.inv(own)
-            D[facet] += own.sum(axis=1)
-            longest[facet] = np.maximum(longest[facet], length)
-            for segment, values in mixed.items():
-                for j, column in zip(two.facets[segment], (dual @ values).T, strict=True):
-                    for i, value in zip(facet, column, strict=True):
-                        M[i, j] += value
+        d = one.nodes.points.shape[1]
+        if d == 1:
+            raise InputError("DualMortar joins sides of plane and solid bodies: use matching=NodeToNode() for bars")
+        D, M, longest = in_space(one, two) if d == 3 else _in_plane(one, two)
         rows = np.flatnonzero(D > 0.0)
         if not len(rows):
-            self._refuse(one, two, normals1, normals2)
-        P = sp.csr_matrix(sp.diags([1.0 / D[rows]], [0]) @ sp.csr_matrix(M)[rows])
+            _refuse(one, two)
+        P = sp.csr_matrix(sp.diags([1.0 / D[rows]], [0]) @ M[rows])
         return Matched(rows, P, D[rows], CURVED * longest[rows])
 
-    def _refuse(self, one: Side, two: Side, normals1: Array, normals2: Array) -> None:
-        if np.all(normals1 @ normals2.T > 0.0):
-            refuse_same_way(one.name, two.name, one.nodes.points[0])
-        raise InputError(f"no part of '{two.name}' lies opposite '{one.name}', along the normals of the latter: choose "
-                         "the two boundaries between the bodies")
+
+def _refuse(one: Side, two: Side) -> None:
+    """Raise InputError for sides of which no part lies opposite the other."""
+    some, others = (side.nodes.normals[:: 1 + len(side.nodes.normals) // 1000] for side in (one, two))
+    if np.all(some @ others.T > EDGE_ON):
+        refuse_same_way(one.name, two.name, one.nodes.points[0])
+    raise InputError(f"no part of '{two.name}' lies opposite '{one.name}', along the normals of the latter: choose the "
+                     "two boundaries between the bodies")
+
+
+def _in_plane(one: Side, two: Side) -> tuple[Array, sp.csr_matrix, Array]:
+    """D (m,), M (m, n) and the length (m,) of the longest segment in front of side 2 of each node of side 1."""
+    ends1, ends2 = one.nodes.points[one.facets], two.nodes.points[two.facets]
+    normals1, normals2 = (_normals(side, ends) for side, ends in ((one, ends1), (two, ends2)))
+    m, n = len(one.nodes.points), len(two.nodes.points)
+    D, M, longest = np.zeros(m), sp.lil_matrix((m, n)), np.zeros(m)
+    for facet, ends, normal in zip(one.facets, ends1, normals1, strict=True):
+        pieces = list(_pieces(ends, normal, ends2, normals2))
+        if sum(high - low for low, high, *_ in pieces) <= LEAST_COVERED:
+            continue
+        length = float(np.linalg.norm(ends[1] - ends[0]))
+        own, mixed = _integrals(pieces, length)
+        dual = np.diag(own.sum(axis=1)) @ np.linalg.inv(own)
+        D[facet] += own.sum(axis=1)
+        longest[facet] = np.maximum(longest[facet], length)
+        for segment, values in mixed.items():
+            for j, column in zip(two.facets[segment], (dual @ values).T, strict=True):
+                for i, value in zip(facet, column, strict=True):
+                    M[i, j] += value
+    return D, sp.csr_matrix(M), longest
 
 
 def _normals(side: Side, ends: Array) -> Array:

@@ -25,6 +25,7 @@ from ...core.errors import InputError
 from ...core.stages import stage
 from ...core.surfaces import ContactSurface, tangential_columns
 from ...core.system import SemiDiscreteSystem
+from ...meshes.rows import number_alike
 from .. import compat
 from ..mesh import Facets, node_numbers
 from ..space import FemSpace
@@ -53,7 +54,7 @@ def contact_pair(
     has one condition for each, as if every face were a pair of its own, joined by ``joined_surfaces``.
 
     Args:
-        matching: NodeToNode() by default, for sides meshed alike; DualMortar() for others, in 2D.
+        matching: NodeToNode() by default, for sides meshed alike; DualMortar() for others.
         points: (k, d) coordinates; only the nodes of side 1 nearest to them, in this order.
         feature_angle: in radians; facets round a node that turn by less from one another are one smooth face.
     Raises:
@@ -68,6 +69,7 @@ def contact_pair(
     if shared.all():
         raise InputError(f"'{one.name}' and '{two.name}' are the same nodes, so that nothing can part there: mesh the "
                          "bodies one by one, or cut the mesh open (meshes.cut.CutOpen)")
+    _refuse_common(one, two)
     around = boundary(space, facets1, beyond=angle)
     faces = _faces(space, one, boundary(space, facets1) if len(around.vertices) else around, angle)
     nodes, matched = _by_face(faces, two, NodeToNode() if matching is None else matching, space.size)
@@ -98,6 +100,15 @@ def side_of(space: FemSpace, facets: Facets) -> Side:
     rows = np.concatenate(space.comm.bcast(space.comm.gather(vertices.astype(np.int64))))
     _, first = np.unique(np.sort(rows, axis=1), axis=0, return_index=True)
     return Side(facets.name, nodes, np.searchsorted(nodes.numbers, rows[first]))
+
+
+def _refuse_common(one: Side, two: Side) -> None:
+    """Raise InputError for a facet that is listed on both sides."""
+    own, others = number_alike(*(side.nodes.numbers[side.facets] for side in (one, two)))
+    for facet in np.flatnonzero(np.isin(own, others))[:1]:
+        where = at(one.nodes.points[one.facets[facet]].mean(axis=0))
+        raise InputError(f"a facet of both '{one.name}' and '{two.name}' at {where}: it cannot touch itself, list it "
+                         "on one side only")
 
 
 def _faces(space: FemSpace, one: Side, around: Boundary, angle: float) -> list[tuple[Side, Array]]:
