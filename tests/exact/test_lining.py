@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from box_frame import BoxFrame, racking_ratio
+from rigid_wall import RigidWall
+from thick_lining import ThickLining
 from thin_lining import ThinLining
 
 from vi_contact import LinearElastic
 from vi_contact.core.errors import InputError
-from vi_contact.exact.lining import ThickLining
-from vi_contact.exact.racking import BoxFrame, racking_ratio
-from vi_contact.exact.rigid_wall import RigidWall
 
 pytestmark = pytest.mark.serial
 CONCRETE, SOIL, GAMMA = LinearElastic(E=25e9, nu=0.2, rho=2400.0), LinearElastic(E=100e6, nu=0.3, rho=1900.0), 1e-3

@@ -38,7 +38,6 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "engineering/test_resultants.py":
         "engineering.floor_spectra engineering.peak_values engineering.racking plots.maps",
     "exact/test_exact_hertz.py": "exact.hertz",
-    "exact/test_lining.py": "exact.racking exact.rigid_wall",
     "fem/test_assembly.py": "fem.assembly_checks",
     "fem/test_corners.py": "core.corners laws.mass_transfer",
     "fem/test_mortar_in_space.py": "fem.contact.clipping",

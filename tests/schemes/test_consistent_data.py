@@ -14,6 +14,7 @@ import pytest
 from bar import bar, before_impact, bouncing, energy, period_three, run, thrown
 from chain import chain_problem
 from column import column
+from exact_columns import ObliqueImpact
 from oscillator import SHAKEN
 from shaken import changes, shaken
 
@@ -23,7 +24,6 @@ from vi_contact.core.problem import ContactProblem
 from vi_contact.core.state_checks import initial_state
 from vi_contact.core.step import Report, State
 from vi_contact.core.verify import energies, energy_balance
-from vi_contact.exact.columns import ObliqueImpact
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.impact import ImpulseUpdate, Inelastic
 from vi_contact.laws.mass import ConsistentMass, Redistributed

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from box_frame import BoxFrame
 from mpi4py import MPI
 from scipy.optimize import brentq
 
 from vi_contact import Condensed, ContactProblem, LinearElastic, State, fem, static_equilibrium
 from vi_contact.core.surfaces import ContactSurface, empty_surface
 from vi_contact.core.system import SemiDiscreteSystem
-from vi_contact.exact.racking import BoxFrame
 from vi_contact.meshes.extract import MeshArrays, add_arrays
 from vi_contact.meshes.grid import Grid, add_grids
 

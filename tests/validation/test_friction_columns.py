@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from column import UNIT, column, rubbing_mass
 from energy_checks import rounded
+from exact_columns import ObliqueImpact, ShearColumn
 
 from vi_contact.core.problem import ContactProblem
-from vi_contact.exact.columns import ObliqueImpact, ShearColumn
 from vi_contact.laws.friction import Coulomb, Tresca
 from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.run.recorders import Contact, Energy

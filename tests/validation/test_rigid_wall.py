@@ -7,9 +7,9 @@ import pytest
 
 pytest.importorskip("dolfinx")
 from mpi4py import MPI
+from rigid_wall import RigidWall
 
 from vi_contact import Condensed, ContactProblem, HalfSpace, LinearElastic, State, fem, static_equilibrium
-from vi_contact.exact.rigid_wall import RigidWall
 from vi_contact.meshes.block import BlockMesh
 
 pytestmark = pytest.mark.serial

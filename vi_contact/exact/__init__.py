@@ -11,12 +11,8 @@ from ..core.lazy import lazy
 _CONTENTS = {
     "bar": ("PeriodicBar", "ThrownBar", "TwoBars"),
     "bouncing_bar": ("BouncingBar",),
-    "columns": ("ObliqueImpact", "ShearColumn"),
     "hertz": ("HertzImpact", "HertzLine", "HertzPoint", "StripPunch", "contact_modulus", "contact_radius"),
     "housner": ("HousnerBlock",),
-    "lining": ("ThickLining",),
-    "racking": ("BoxFrame", "racking_ratio"),
-    "rigid_wall": ("RigidWall",),
     "sliding": ("SlidingBlock",),
     "surface_waves": ("dashpot_energy", "dashpot_reflection", "rayleigh_motion", "rayleigh_speed"),
 }

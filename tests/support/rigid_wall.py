@@ -11,6 +11,8 @@ rock, p [Pa] the pressure of the layer on the wall for a body force rho a toward
 The two-dimensional theory of elasticity gives thrusts 2 to 6 % off.
 """
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass
 
@@ -18,9 +20,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import zeta
 
-from ..core.algebra import Array
-from ..core.checks import attributes
-from ..core.errors import InputError
+from vi_contact.core.algebra import Array
+from vi_contact.core.checks import attributes
+from vi_contact.core.errors import InputError
 
 CATALAN = 0.915965594177219
 TERMS = 4000  # of the series of p: its tail is below 3e-5 of p

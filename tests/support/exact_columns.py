@@ -5,6 +5,8 @@ ignore each other but for the friction of the base. Tractions, impulses and ener
 Methods take arrays y and t >= 0 whose shapes broadcast.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..core.algebra import Array
-from ..core.checks import attributes
-from ..laws.materials import LinearElastic
+from vi_contact.core.algebra import Array
+from vi_contact.core.checks import attributes
+from vi_contact.laws.materials import LinearElastic
 
 History = Callable[[Array], Array]
 

@@ -7,10 +7,12 @@ roof for a unit racking displacement. Frames are of thin members with bending st
 E/(1-nu²) for E. R is of a frame in the full space without slip at its faces; finite elements are up to 15 % off.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
-from ..core.checks import attributes
-from ..core.errors import InputError
+from vi_contact.core.checks import attributes
+from vi_contact.core.errors import InputError
 
 
 @dataclass(frozen=True)

@@ -14,15 +14,17 @@ with A = -G gamma/2, B = 0 in the soil. It tends to the usual formulas for thin 
 and supposes that soil and lining do not part: with full slip that needs a pressure beforehand.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from ..core.algebra import Array
-from ..core.checks import attributes
-from ..core.errors import InputError
-from ..laws.materials import LinearElastic
+from vi_contact.core.algebra import Array
+from vi_contact.core.checks import attributes
+from vi_contact.core.errors import InputError
+from vi_contact.laws.materials import LinearElastic
 
 
 @dataclass(frozen=True)
