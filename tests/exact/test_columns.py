@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from exact_checks import derivative_defect, wave_defect
 from exact_columns import ObliqueImpact, ShearColumn
+from two_bars import TwoBars
 
 from vi_contact.core.errors import InputError
-from vi_contact.exact.bar import TwoBars
 from vi_contact.laws.materials import LinearElastic
 
 pytestmark = pytest.mark.serial

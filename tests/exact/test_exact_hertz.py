@@ -4,14 +4,13 @@ import math
 
 import numpy as np
 import pytest
+from hertz_line import HertzLine, StripPunch
 from scipy.integrate import quad, solve_ivp
 
 from vi_contact.core.errors import InputError
 from vi_contact.exact.hertz import (
     HertzImpact,
-    HertzLine,
     HertzPoint,
-    StripPunch,
     contact_modulus,
     contact_radius,
 )

@@ -25,12 +25,12 @@ import numpy as np
 import pytest
 from gathered import gathered
 from graded import even_then_growing, growing
+from hertz_line import HertzLine
 from mpi4py import MPI
 
 from vi_contact.core.algebra import Array
 from vi_contact.core.obstacles import AnalyticGap
 from vi_contact.core.problem import ContactProblem
-from vi_contact.exact.hertz import HertzLine
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.pairs import contact_pair
 from vi_contact.fem.contact.surface import contact_surface

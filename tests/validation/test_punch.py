@@ -10,11 +10,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from graded import Pressed, growing, pressed_half
+from hertz_line import StripPunch
 from mpi4py import MPI
 
 from vi_contact.core.algebra import Array, Mask
 from vi_contact.core.obstacles import AnalyticGap
-from vi_contact.exact.hertz import StripPunch
 from vi_contact.laws.materials import LinearElastic
 
 COMM = MPI.COMM_WORLD

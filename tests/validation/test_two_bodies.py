@@ -14,12 +14,12 @@ pytest.importorskip("dolfinx")
 from fem_problems import block, field, held_by, nodal, run, turned
 from fem_problems import linear as without_contact
 from mpi4py import MPI
+from two_bars import TwoBars
 from two_bodies import SOFT, blocks, momenta, per_body, relative, thrown, two_blocks
 
 from vi_contact.core.algebra import Array
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.protocols import Frictionless
-from vi_contact.exact.bar import TwoBars
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.pairs import contact_pair
 from vi_contact.fem.loads import Prescribed

@@ -9,11 +9,11 @@ Each is a value of its data, with functions of time and place; its file has equa
 from ..core.lazy import lazy
 
 _CONTENTS = {
-    "bar": ("PeriodicBar", "ThrownBar", "TwoBars"),
+    "bar": ("PeriodicBar", "ThrownBar"),
     "bouncing_bar": ("BouncingBar",),
-    "hertz": ("HertzImpact", "HertzLine", "HertzPoint", "StripPunch", "contact_modulus", "contact_radius"),
+    "hertz": ("HertzImpact", "HertzPoint", "contact_modulus", "contact_radius"),
     "housner": ("HousnerBlock",),
     "sliding": ("SlidingBlock",),
-    "surface_waves": ("dashpot_energy", "dashpot_reflection", "rayleigh_motion", "rayleigh_speed"),
+    "surface_waves": ("dashpot_energy", "dashpot_reflection"),
 }
 __all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)

@@ -1,12 +1,10 @@
-"""Solve Hertz contact of smooth bodies, the quasi-static impact of a sphere, and a flat rigid punch on an elastic
-half-space, all without friction (Johnson 1985, ch. 2 to 4 and 11).
+"""Solve Hertz contact of spheres and the quasi-static impact of one, without friction (Johnson 1985, ch. 4 and 11).
 
 Bodies of moduli E_i, nu_i and radii R_i touch without friction, with E* and R from
 
     1/E* = sum over i of (1 - nu_i²)/E_i,   1/R = sum over i of 1/R_i.
 
-Pressures are positive in compression; under a punch they are infinite at the edge, where they grow with the power -1/2
-of the distance. Lengths [m], pressures and moduli [Pa], forces [N], or any consistent units.
+Pressures are positive in compression. Lengths [m], pressures and moduli [Pa], forces [N], or any consistent units.
 """
 
 import math
@@ -45,44 +43,7 @@ def contact_radius(*radii: float) -> float:
 
 
 @dataclass(frozen=True)
-class Pressed:
-    """Hold what presses bodies together: force, modulus E* and radius R, all finite and positive, else InputError."""
-
-    force: float
-    modulus: float
-    radius: float
-
-    def __post_init__(self) -> None:
-        attributes(self, positive=("force", "modulus", "radius"))
-
-
-@dataclass(frozen=True)
-class HertzLine(Pressed):
-    """Describe parallel cylinders pressed with `force` P per unit of length (plane strain):
-
-        a = sqrt(4 P R/(pi E*)),   p0 = 2 P/(pi a) = sqrt(P E*/(pi R)),   p = p0 sqrt(1 - x²/a²)
-
-    The approach of half-planes is not defined (logarithmic). force [N/m], modulus E* [Pa], radius R [m]. Raises
-    InputError unless all are finite and positive.
-    """
-
-    @property
-    def half_width(self) -> float:
-        """Return a [m]: contact on |x| < a."""
-        return math.sqrt(4.0 * self.force * self.radius / (math.pi * self.modulus))
-
-    @property
-    def peak(self) -> float:
-        """Return p0 [Pa]."""
-        return 2.0 * self.force / (math.pi * self.half_width)
-
-    def pressure(self, x: ArrayLike) -> Array:
-        """Return p(x) [Pa] at the distance x from the centre line, 0 outside the contact."""
-        return _ellipse(self.peak, self.half_width, x)
-
-
-@dataclass(frozen=True)
-class HertzPoint(Pressed):
+class HertzPoint:
     """Describe spheres pressed with `force` F:
 
         a = (3 F R/(4 E*))^(1/3),   p0 = 3 F/(2 pi a²),   p = p0 sqrt(1 - r²/a²),
@@ -90,6 +51,13 @@ class HertzPoint(Pressed):
 
     force [N], modulus E* [Pa], radius R [m]. Raises InputError unless all are finite and positive.
     """
+
+    force: float
+    modulus: float
+    radius: float
+
+    def __post_init__(self) -> None:
+        attributes(self, positive=("force", "modulus", "radius"))
 
     @classmethod
     def from_approach(cls, approach: float, *, modulus: float, radius: float) -> "HertzPoint":
@@ -115,7 +83,7 @@ class HertzPoint(Pressed):
 
     def pressure(self, r: ArrayLike) -> Array:
         """Return p(r) [Pa] at the distance r from the axis, 0 outside the contact."""
-        return _ellipse(self.peak, self.contact_radius, r)
+        return self.peak * np.sqrt(np.maximum(1.0 - (np.asarray(r, dtype=float) / self.contact_radius) ** 2, 0.0))
 
 
 @dataclass(frozen=True)
@@ -151,29 +119,3 @@ class HertzImpact:
     def deepest(self) -> HertzPoint:
         """Return the contact at d_max: its force is F_max, its contact_radius a_max."""
         return HertzPoint.from_approach(self.approach, modulus=self.modulus, radius=self.radius)
-
-
-def _ellipse(peak: float, half_axis: float, x: ArrayLike) -> Array:
-    """Return peak · sqrt(1 - (x/half_axis)²), 0 outside."""
-    return peak * np.sqrt(np.maximum(1.0 - (np.asarray(x, dtype=float) / half_axis) ** 2, 0.0))
-
-
-@dataclass(frozen=True)
-class StripPunch:
-    """Describe a long punch of width 2a under `force` P per unit of length: p = P/(pi sqrt(a² - x²)).
-
-    half_width a [m], force [N/m]. Raises InputError unless both are finite and positive.
-    """
-
-    half_width: float
-    force: float
-
-    def __post_init__(self) -> None:
-        attributes(self, positive=("half_width", "force"))
-
-    def pressure(self, x: ArrayLike) -> Array:
-        """Return p(x) [Pa] at the distance x from the centre line, 0 beside the punch, infinite at its edge."""
-        square = self.half_width**2 - np.asarray(x, dtype=float) ** 2
-        with np.errstate(divide="ignore"):
-            root = 1.0 / np.sqrt(np.maximum(square, 0.0))
-        return self.force / math.pi * np.where(square < 0.0, 0.0, root)
