@@ -20,7 +20,7 @@ from .loads import Prescribed, evaluate_here
 from .mesh import Facets, node_numbers
 from .petsc_algebra import PetscMatrix, triple_product
 from .petsc_rows import aij_of
-from .ties import PLACE_TOLERANCE, Pairs, Tied, paired
+from .ties import PLACE_TOLERANCE, Links, Tied, linked
 
 
 def body_numbers(mesh: Any) -> Indices:
@@ -105,15 +105,15 @@ class FemSpace:
             components = components_of("prescribed", one.components, self.dimension)
             self._where_held.append((self.facet_blocks(one.facets.indices)[:, None], components))
             self.held[self._where_held[-1]] = True
-        pairs = paired(tied, self.dimension, PLACE_TOLERANCE * self.size, self._everywhere)
-        self.tied_nodes: Indices = np.array([n for pair in pairs for n in (*pair.first, *pair.second)], dtype=np.int64)
-        self.tied: Mask = self._followers(pairs)
+        links = linked(tied, self.dimension, PLACE_TOLERANCE * self.size, self._everywhere)
+        self.tied_nodes: Indices = np.union1d(links.followers, links.leaders) // self.dimension
+        self.tied: Mask = self._followers(links)
         self.free: Mask = ~(self.held | self.tied).ravel()
         ids = self.nodes[:, None] * self.dimension + np.arange(self.dimension)
         self.ids: Indices = ids.ravel()[self.free]
         self.unknowns = int(total(self.comm, self.free.sum()))
         self.free_index: Indices = np.where(self.free, np.cumsum(self.free) - 1, -1)
-        self._P = PetscMatrix(self._selection(pairs)) if pairs else None
+        self._P = PetscMatrix(self._selection(links)) if tied else None
         self.forms: Any = None  # the ElasticForms of the system made on it; stress output needs them
 
     @property
@@ -139,19 +139,19 @@ class FemSpace:
         order = np.argsort(numbers)
         return numbers[order], points[order]
 
-    def _followers(self, pairs: Sequence[Pairs]) -> Mask:
-        """Which owned components follow a node of another boundary; InputError where only one of a pair is held."""
-        followers = np.zeros_like(self.held)
-        for pair in pairs:
-            held = [self.at_nodes(numbers, self.held.astype(float)) > 0.0 for numbers in (pair.first, pair.second)]
-            for c in pair.components:
-                if np.any(held[0][:, c] != held[1][:, c]):
-                    raise InputError(f"component {c} of a tied node is prescribed on one side only: prescribe both "
-                                     "sides alike, or tie the other components (components=)")
-                where = self.blocks_of(pair.second)
-                mine = (where >= 0) & ~held[1][:, c]
-                followers[where[mine], c] = True
-        return followers
+    def _followers(self, links: Links) -> Mask:
+        """Which owned components follow another node; InputError where some of those that move as one are held."""
+        held = [self._of_unknowns(numbers, self.held) > 0.0 for numbers in (links.followers, links.leaders)]
+        for number in links.followers[held[0] != held[1]]:
+            raise InputError(f"component {number % self.dimension} of a tied node is prescribed on one side only: "
+                             "prescribe both sides alike, or tie the other components (components=)")
+        ids = self.nodes[:, None] * self.dimension + np.arange(self.dimension)
+        return np.isin(ids, links.followers[~held[0]])
+
+    def _of_unknowns(self, numbers: Indices, values: Array) -> Array:
+        """Return owned nodal values (k, d) of unknowns, node number * d + component, on every rank."""
+        rows = self.at_nodes(numbers // self.dimension, values.astype(float))
+        return rows[np.arange(len(numbers)), numbers % self.dimension]
 
     def at_nodes(self, numbers: Indices, values: Array) -> Array:
         """Return owned nodal values (k, d) at original node numbers, on every rank; zero for nodes of nobody."""
@@ -159,18 +159,16 @@ class FemSpace:
         found[where >= 0] = values[where[where >= 0]]
         return self.comm.sum(found)
 
-    def _selection(self, pairs: Sequence[Pairs]) -> Any:
+    def _selection(self, links: Links) -> Any:
         """P as a PETSc matrix: one 1 per free component, and one for each that follows another."""
         d, rows, columns = self.dimension, len(self.free), int(self.free.sum())
         first = int(self.comm.mpi.exscan(columns) or 0)
         column = np.where(self.free, first + self.free_index, -1)
-        for pair in pairs:
-            leaders = self.at_nodes(pair.first, column.reshape(-1, d).astype(float)).astype(np.int64)
-            where = self.blocks_of(pair.second)
-            for row, leader in zip(where[where >= 0], leaders[where >= 0], strict=True):
-                for c in pair.components:
-                    if self.tied[row, c]:
-                        column[d * row + c] = leader[c]
+        leaders = self._of_unknowns(links.leaders, column.reshape(-1, d)).astype(np.int64)
+        where = self.blocks_of(links.followers // d)
+        row, leader = (d * where + links.followers % d)[where >= 0], leaders[where >= 0]
+        follows = self.tied.ravel()[row]
+        column[row[follows]] = leader[follows]
         kept = np.flatnonzero(column >= 0)
         ones = sp.csr_matrix((np.ones(len(kept)), (kept, column[kept])), shape=(rows, self.unknowns))
         return aij_of(ones, self.comm.mpi, columns)

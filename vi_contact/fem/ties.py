@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
 
 from ..core.algebra import Array, Indices
 from ..core.checks import at
@@ -38,37 +39,53 @@ class Tied:
 
 
 @dataclass(frozen=True, eq=False)
-class Pairs:
-    """Hold the original numbers of nodes that move together, the same on every rank; ``components`` they share."""
+class Links:
+    """Hold unknowns, node number * d + component, that move as others do; the same arrays on every rank."""
 
-    first: Indices
-    second: Indices
-    components: tuple[int, ...]
+    followers: Indices
+    leaders: Indices
 
 
-def paired(tied: Sequence[Tied], dimension: int, near: float, nodes: NodesOf) -> list[Pairs]:
-    """Pair the nodes of every tie, those that are ``near`` [m] to the place of their partner. Collective.
+def linked(tied: Sequence[Tied], dimension: int, near: float, nodes: NodesOf) -> Links:
+    """Link the unknowns of every tie; partners are ``near`` [m] to the place that they should have. Collective.
 
-    InputError when nodes have no partner, when a node is tied twice, or a component that does not exist.
+    What several ties join moves as one: of the four vertical edges of a box whose sides are tied both ways, three
+    follow the one that is on no second boundary. InputError for nodes without a partner, boundaries that share nodes,
+    and a component that does not exist.
     """
-    found = [_pairs(tie, dimension, near, nodes) for tie in tied]
-    seconds = [number * dimension + c for one in found for number in one.second for c in one.components]
-    firsts = [number * dimension + c for one in found for number in one.first for c in one.components]
-    if len(set(seconds)) < len(seconds) or set(seconds) & set(firsts):
-        raise InputError("a node is on several tied boundaries: tie a corner once, and no boundary to two others")
-    return found
+    if not tied:
+        return Links(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64))
+    from scipy.sparse.csgraph import connected_components  # late: it takes a while
+
+    pairs = [_pairs(tie, dimension, near, nodes) for tie in tied]
+    first, second = (np.concatenate(side) for side in zip(*pairs, strict=True))
+    members, index = np.unique(np.concatenate([first, second]), return_inverse=True)
+    ends = index.ravel().reshape(2, -1)
+    graph = sp.coo_matrix((np.ones(len(first)), (ends[0], ends[1])), shape=(len(members), len(members)))
+    _, part = connected_components(graph, directed=False)
+    order = np.lexsort((members, np.isin(members, second), part))  # of every part the leader first
+    _, start = np.unique(part[order], return_index=True)
+    leaders = members[order[start]][part]
+    follows = leaders != members
+    return Links(members[follows], leaders[follows])
 
 
-def _pairs(tie: Tied, dimension: int, near: float, nodes: NodesOf) -> Pairs:
+def _pairs(tie: Tied, dimension: int, near: float, nodes: NodesOf) -> tuple[Indices, Indices]:
+    """The unknowns of the first boundary, and those of the second that move alike."""
     first, second = nodes(tie.first), nodes(tie.second)
     names = f"'{tie.first.name}' and '{tie.second.name}'"
     if len(first[0]) != len(second[0]) or not len(first[0]):
         raise InputError(f"tied boundaries {names} have {len(first[0])} and {len(second[0])} nodes: mesh them alike")
+    for shared in first[1][np.isin(first[0], second[0])]:
+        raise InputError(f"tied boundaries {names} share the node {at(shared)}: tie opposite boundaries")
+    from scipy.spatial import cKDTree
+
     apart = second[1].mean(axis=0) - first[1].mean(axis=0)
-    distance = np.linalg.norm(first[1][:, None] + apart - second[1][None, :], axis=2)
-    partner = distance.argmin(axis=1)
-    worst = int(distance.min(axis=1).argmax())
-    if distance[worst, partner[worst]] > near or len(set(partner)) < len(partner):
+    distance, partner = cKDTree(second[1]).query(first[1] + apart)
+    worst = int(distance.argmax())
+    if distance[worst] > near or len(set(partner)) < len(partner):
         raise InputError(f"node {at(first[1][worst])} of tied boundaries {names} has no partner at the same height on "
                          "the other: mesh both sides alike")
-    return Pairs(first[0], second[0][partner], components_of("tied", tie.components, dimension))
+    components = np.array(components_of("tied", tie.components, dimension))
+    one, two = ((numbers[:, None] * dimension + components).ravel() for numbers in (first[0], second[0][partner]))
+    return one, two
