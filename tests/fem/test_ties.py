@@ -12,6 +12,7 @@ import vi_contact as vc
 from vi_contact import fem
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.block import BlockMesh
+from vi_contact.meshes.two_blocks import TwoBlocks
 from vi_contact.soil.soil_column import SoilColumn
 
 
@@ -35,6 +36,52 @@ def test_tied_layers_are_a_column(comm, simplices):
     for x in range(3):
         assert np.abs(found[:, x::3][:, 1:] - exact).max() < 1e-11 * np.abs(exact).max()
     assert not found[:, :3].any()
+
+
+SHAKE_IN_SPACE = tuple(vc.Ricker(2.0, f, direction=tuple(e)) for f, e in zip((4.0, 6.0, 5.0), np.eye(3), strict=True))
+ROUND = [("left", "right"), ("back", "front")]  # pairs of vertical sides of a box
+
+
+@pytest.mark.parametrize("simplices, solver", [(False, vc.Condensed()), (True, vc.Iterative(tolerance=1e-12))])
+def test_tied_box_is_a_column(comm, simplices, solver):
+    """All three components at once, two layers, damping: four vertical edges are one, and all is the column."""
+    mesh, tags = block(comm, lengths=(2.0, 6.0, 3.0), divisions=(2, 6, 3), simplices=simplices)
+    soft, stiff = (fem.Cells("cells", np.flatnonzero(m).astype(np.int32), mesh)
+                   for m in (middles(mesh)[:, 1] > 3.0, middles(mesh)[:, 1] < 3.0))
+    system = fem.assemble(mesh, [(stiff, STIFF), (soft, SOIL)], clamped=tags["bottom"], damping=vc.Rayleigh(0.8, 1e-3),
+                          tied=[fem.Tied(tags[one], tags[two]) for one, two in ROUND])
+    assert system.space.unknowns == 3 * 2 * 3 * 6
+    heights = np.arange(7.0)
+    points = [(x, y, z) for y in heights[1:] for x in (0.0, 1.0, 2.0) for z in (0.0, 1.0, 3.0)]
+    run = {"dt": 5e-3, "steps": 60}
+    found = history(linear(system, excitation=SHAKE_IN_SPACE), points, solver=solver, **run).reshape(60, 6, 9, 3)
+    layers = [STIFF] * 3 + [SOIL] * 3
+    column = SoilColumn(heights, *np.array([(m.lame_lambda, m.shear_modulus, m.rho, 0.8, 1e-3) for m in layers]).T)
+    for plane in ([0, 1], [2, 1]):
+        problem = column.on_rigid_base(lambda t, c=plane: np.sum([one(t) for one in SHAKE_IN_SPACE], axis=0)[c])
+        exact = np.array([state.u for state, _ in vc.march(problem, **run)]).reshape(60, 6, 1, 2)
+        error = np.abs(found[..., plane] - exact).max(axis=(0, 1, 2)) / np.abs(exact).max(axis=(0, 1, 2))
+        assert error.max() < (1e-9 if isinstance(solver, vc.Iterative) else 1e-11)
+
+
+def test_edges_of_a_box_move_as_one(comm):
+    """An uneven push: opposite sides move alike, their four edges as one; which side is given first does not matter."""
+    mesh, tags = block(comm, lengths=(2.0, 1.0, 3.0), divisions=(2, 2, 3), simplices=True)
+    push = fem.Traction(tags["top"], lambda x, t: 1e4 * np.column_stack([x[:, 0], x[:, 2] - 1.0, x[:, 0] * x[:, 2]]))
+    solved = []
+    for ties in (ROUND, [pair[::-1] for pair in ROUND[::-1]], [*ROUND, ROUND[0]]):
+        tied = [fem.Tied(tags[one], tags[two]) for one, two in ties]
+        system = fem.assemble(mesh, SOIL, clamped=tags["bottom"], tied=tied, loads=push)
+        points, u = field(system, system.algebra.factor(system.K).solve(system.load(0.0)))
+        solved.append(u)
+    assert max(np.abs(u - solved[0]).max() for u in solved) < 1e-12 * np.abs(solved[0]).max()
+    for c, length in ((0, 2.0), (2, 3.0)):
+        low, high = (solved[0][points[:, c] == x] for x in (0.0, length))
+        assert np.array_equal(low, high)
+    top = solved[0][points[:, 1] == 1.0]
+    assert np.ptp(top, axis=0).min() > 0.01 * np.abs(top).max()
+    edge = solved[0][(points[:, 1] == 1.0) & (points[:, 0] % 2.0 == 0.0) & (points[:, 2] % 3.0 == 0.0)]
+    assert len(edge) == 4 and np.array_equal(edge, np.tile(edge[0], (4, 1)))
 
 
 def test_forces_on_one_side_act_on_the_pair(comm):
@@ -67,6 +114,29 @@ def test_contact_between_tied_sides(comm):
         fem.contact_surface(system, tags["bottom"])
 
 
+@pytest.mark.parametrize("solver", [vc.Condensed(), vc.Iterative(tolerance=1e-12)])
+def test_contact_with_a_boundary_that_is_tied_at_its_edges(comm, solver):
+    """A box pressed on all of a tied layer, meshes that do not match: confined compression, exact at the nodes of the
+    layer also where they are tied; contact nodes themselves must not be tied."""
+    lower, upper = (BlockMesh(lengths=(2.0, 1.0, 2.0), divisions=(n, 2, n)) for n in (2, 3))
+    mesh, tags = fem.build_mesh(TwoBlocks(lower=lower, upper=upper), comm)
+    ties = {name: [fem.Tied(tags[f"{name}_{a}"], tags[f"{name}_{b}"]) for a, b in ROUND] for name in ("lower", "upper")}
+    data = {"clamped": tags["lower_bottom"], "loads": fem.Traction(tags["upper_top"], (0.0, -2e4, 0.0))}
+    sides, matching = (tags["upper_bottom"], tags["lower_top"]), fem.DualMortar()
+    system = fem.assemble(mesh, SOIL, tied=ties["lower"], **data)
+    problem = vc.ContactProblem(system, fem.contact_pair(system, *sides, matching=matching))
+    state = vc.static_equilibrium(problem, solver=solver)
+    points, u = field(system, problem.cartesian(state.u))
+    confined = SOIL.rho * SOIL.c_p**2
+    layer = np.isin(np.arange(len(points)), np.arange(3 * 3 * 3)) & (points[:, 1] == 1.0)
+    settled = -2e4 * 1.0 / confined
+    assert layer.sum() == 9 and np.abs(u[layer] - [0.0, settled, 0.0]).max() < 1e-9 * abs(settled)
+    for tied in (ties["upper"], ties["lower"] + ties["upper"]):
+        other = fem.assemble(mesh, SOIL, tied=tied, **data)
+        with pytest.raises(InputError, match=r"contact node \(0, 1, 0\) of 'upper_bottom' is tied to another"):
+            fem.contact_pair(other, *sides, matching=matching)
+
+
 def test_mass_beside_a_tie_is_handed_over_alike(comm):
     """A periodic block falls on a plane: left and right contact points press alike, mass and energy are kept."""
     mesh, tags = block(comm, lengths=(2.0, 1.0), divisions=(4, 4))
@@ -83,13 +153,13 @@ def test_mass_beside_a_tie_is_handed_over_alike(comm):
 
 
 def test_what_does_not_fit_is_refused(comm):
-    """Sides meshed differently, held on one side only, tied twice, components that do not exist."""
+    """Sides meshed differently, held on one side only, not opposite, components that do not exist."""
     def bent(x):
         return x + np.outer(0.02 * x[:, 0] * np.sin(np.pi * x[:, 1]), [0.0, 1.0])
 
     mesh, tags = fem.build_mesh(BlockMesh(lengths=(2.0, 1.0), divisions=(4, 4), deform=bent), comm)
     tie = fem.Tied(tags["left"], tags["right"])
-    with pytest.raises(InputError, match="no partner at the same height"):
+    with pytest.raises(InputError, match="no partner opposite it"):
         fem.assemble(mesh, SOIL, tied=tie)
     with pytest.raises(InputError, match="5 and 25 nodes|5 and 9 nodes|have 5 and"):
         fem.assemble(mesh, SOIL, tied=fem.Tied(tags["left"], whole_boundary(tags, mesh)))
@@ -97,10 +167,27 @@ def test_what_does_not_fit_is_refused(comm):
     tie = fem.Tied(tags["left"], tags["right"])
     with pytest.raises(InputError, match="prescribed on one side only"):
         fem.assemble(mesh, SOIL, tied=tie, clamped=tags["left"])
-    with pytest.raises(InputError, match="on several tied boundaries"):
-        fem.assemble(mesh, SOIL, tied=[tie, fem.Tied(tags["bottom"], tags["top"])])
+    with pytest.raises(InputError, match=r"'left' and 'bottom' share the node \(0, 0\): tie opposite"):
+        fem.assemble(mesh, SOIL, tied=fem.Tied(tags["left"], tags["bottom"]))
     with pytest.raises(InputError, match="component 2 does not exist"):
         fem.assemble(mesh, SOIL, tied=fem.Tied(tags["left"], tags["right"], components=(2,)))
+
+
+def test_sides_of_a_box_that_do_not_fit_are_refused(comm):
+    """Sides with as many nodes elsewhere; an edge held although its partners are free; one side with itself."""
+    def bent(x):
+        return x + np.outer(0.02 * x[:, 0] * np.sin(np.pi * x[:, 1]), [0.0, 0.0, 1.0])
+
+    mesh, tags = block(comm, lengths=(2.0, 1.0, 2.0), divisions=(2, 2, 2), deform=bent)
+    tie = fem.Tied(tags["left"], tags["right"])
+    with pytest.raises(InputError, match="no partner opposite it on the other: mesh both sides alike"):
+        fem.assemble(mesh, SOIL, tied=tie)
+    mesh, tags = block(comm, lengths=(2.0, 1.0, 2.0), divisions=(2, 2, 2))
+    tied = [fem.Tied(tags[one], tags[two]) for one, two in ROUND]
+    with pytest.raises(InputError, match="component 0 of a tied node is prescribed on one side only"):
+        fem.assemble(mesh, SOIL, tied=tied[1], prescribed=fem.Prescribed(tags["front"], components=(0,)))
+    with pytest.raises(InputError, match="'left' and 'left' share the node"):
+        fem.assemble(mesh, SOIL, tied=fem.Tied(tags["left"], tags["left"]))
 
 
 def whole_boundary(tags, mesh):

@@ -46,7 +46,7 @@ def release(static: ContactProblem, state: State, problem: ContactProblem) -> tu
     system = problem.system.changed(u0=u0, v0=np.zeros_like(u0))
     still = system.load.at_rest(0.0)
     force = system.K @ u0 - still + _contact_force(problem, state)
-    was_held = (before.held | before.tied).ravel()[after.free]
+    was_held = (before.held | np.isin(before.nodes, before.tied_nodes)[:, None]).ravel()[after.free]
     missing = after.comm.max(np.array([max_abs(force[~was_held]), max_abs(system.K @ u0), max_abs(force)]))
     if missing[0] > BALANCED * max(missing[1:]):
         raise InputError(f"{missing[0]:.3g} N are missing where no support was released: give both stages the same "

@@ -81,6 +81,7 @@ class FemSpace:
         V: the DOLFINx function space; dimension d; free: (owned full,) mask of free components.
         held, tied: (owned nodes, d) masks of components that are prescribed, or follow those of another node;
             tied_nodes: numbers of all nodes that move together with another, on every rank.
+        numbers: (owned nodes, d) which unknown of all ranks a component is, also one that follows; -1 where held.
         nodes: original node numbers of the owned blocks; points: their coordinates (k, d).
         ids: rank-independent numbers of the free unknowns (node * d + component).
         unknowns: number of free unknowns on all ranks.
@@ -113,7 +114,8 @@ class FemSpace:
         self.ids: Indices = ids.ravel()[self.free]
         self.unknowns = int(total(self.comm, self.free.sum()))
         self.free_index: Indices = np.where(self.free, np.cumsum(self.free) - 1, -1)
-        self._P = PetscMatrix(self._selection(links)) if tied else None
+        self.numbers: Indices = self._numbers(links)
+        self._P = PetscMatrix(self._selection()) if tied else None
         self.forms: Any = None  # the ElasticForms of the system made on it; stress output needs them
 
     @property
@@ -159,19 +161,23 @@ class FemSpace:
         found[where >= 0] = values[where[where >= 0]]
         return self.comm.sum(found)
 
-    def _selection(self, links: Links) -> Any:
-        """P as a PETSc matrix: one 1 per free component, and one for each that follows another."""
-        d, rows, columns = self.dimension, len(self.free), int(self.free.sum())
-        first = int(self.comm.mpi.exscan(columns) or 0)
-        column = np.where(self.free, first + self.free_index, -1)
-        leaders = self._of_unknowns(links.leaders, column.reshape(-1, d)).astype(np.int64)
+    def _numbers(self, links: Links) -> Indices:
+        """The unknown of every owned component, numbered over all ranks."""
+        d, first = self.dimension, int(self.comm.mpi.exscan(int(self.free.sum())) or 0)
+        numbers = np.where(self.free, first + self.free_index, -1)
+        leaders = self._of_unknowns(links.leaders, numbers.reshape(-1, d)).astype(np.int64)
         where = self.blocks_of(links.followers // d)
         row, leader = (d * where + links.followers % d)[where >= 0], leaders[where >= 0]
         follows = self.tied.ravel()[row]
-        column[row[follows]] = leader[follows]
+        numbers[row[follows]] = leader[follows]
+        return numbers.reshape(-1, d)
+
+    def _selection(self) -> Any:
+        """P as a PETSc matrix: one 1 per free component, and one for each that follows another."""
+        rows, column = len(self.free), self.numbers.ravel()
         kept = np.flatnonzero(column >= 0)
         ones = sp.csr_matrix((np.ones(len(kept)), (kept, column[kept])), shape=(rows, self.unknowns))
-        return aij_of(ones, self.comm.mpi, columns)
+        return aij_of(ones, self.comm.mpi, len(self.ids))
 
     @property
     def tied_unknowns(self) -> Mask | None:

@@ -84,8 +84,8 @@ def _pairs(tie: Tied, dimension: int, near: float, nodes: NodesOf) -> tuple[Indi
     distance, partner = cKDTree(second[1]).query(first[1] + apart)
     worst = int(distance.argmax())
     if distance[worst] > near or len(set(partner)) < len(partner):
-        raise InputError(f"node {at(first[1][worst])} of tied boundaries {names} has no partner at the same height on "
-                         "the other: mesh both sides alike")
+        raise InputError(f"node {at(first[1][worst])} of tied boundaries {names} has no partner opposite it on the "
+                         "other: mesh both sides alike")
     components = np.array(components_of("tied", tie.components, dimension))
     one, two = ((numbers[:, None] * dimension + components).ravel() for numbers in (first[0], second[0][partner]))
     return one, two

@@ -33,7 +33,7 @@ from .faces import Boundary, boundary, checked_angle, split, tell_corners
 from .frames import Facing, NodalConditions, NodalFrames, given, surface_of
 from .matching import Matched, Matching, NodeToNode, Side
 from .nodes import Nodes, everywhere, joined_nodes
-from .surface import contact_space, listed, nodes_on, snapped
+from .surface import contact_space, listed, nodes_on, refuse_tied, snapped
 
 log = logging.getLogger(__name__)
 
@@ -85,6 +85,7 @@ def contact_pair(
     gap = _gap(space, one.name, two, nodes, directions, matched)
     slots = np.flatnonzero(space.blocks_of(nodes.numbers) >= 0)  # from here on every rank has its own nodes of side 1
     nodes, matched = nodes.pick(slots), matched.pick(slots)
+    refuse_tied(space, nodes, slots, one.name)
     tell_corners(space, one.name, nodes, slots, angle)
     conditions = NodalConditions(nodes, directions[slots], slots, Facing(two.nodes, matched.P))
     weights = matched.weights * space.forms.section.thickness

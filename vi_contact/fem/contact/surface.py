@@ -60,7 +60,7 @@ def contact_surface(
     nodes, directions, gap = one_per_direction(whole, nodes, directions, gap)
     slots = slots_of(comm, _places(nodes, chosen))
     weights = nodes.weights * space.forms.section.thickness
-    _refuse_tied(space, nodes, slots, facets.name)
+    refuse_tied(space, nodes, slots, facets.name)
     tell_corners(space, facets.name, nodes, slots, angle)
     return surface_of(space, [NodalConditions(nodes, directions, slots)], gap0=gap, weights=weights)
 
@@ -128,12 +128,9 @@ def contact_space(owner: str, system: SemiDiscreteSystem, groups: Mapping[str, F
 
 def nodes_on(space: FemSpace, facets: Facets) -> Nodes:
     """Return this rank's nodes of the facets, ordered by original node number. Collective."""
-    d = space.dimension
     values = integrals(space, facets.indices)
     blocks = space.facet_blocks(facets.indices)
     blocks = blocks[np.argsort(space.nodes[blocks])]
-    first = int(space.mesh.comm.exscan(len(space.ids)) or 0)
-    unknowns = np.where(space.free, first + space.free_index, -1).reshape(-1, d)[blocks]
     weights, sums, held = values[blocks, 0], values[blocks, 1:], space.held[blocks]
     if not largest(space.comm, len(blocks)):
         raise InputError(f"no contact nodes: boundary group '{facets.name}' is empty, choose a group that has facets")
@@ -142,7 +139,7 @@ def nodes_on(space: FemSpace, facets: Facets) -> Nodes:
                          "nodes: cut the mesh open there (meshes.cut.CutOpen), or choose an outer boundary")
     length = np.linalg.norm(sums, axis=1)[:, None]
     normals = in_symmetry_planes(sums / np.maximum(length, np.finfo(float).tiny), held)
-    return Nodes(space.nodes[blocks], space.points[blocks], normals, weights, held, unknowns)
+    return Nodes(space.nodes[blocks], space.points[blocks], normals, weights, held, space.numbers[blocks])
 
 
 def free_nodes(space: FemSpace, nodes: Nodes, name: str) -> Nodes:
@@ -183,7 +180,8 @@ def listed(space: FemSpace, nodes: Nodes, points: Sequence[Sequence[float]], nam
     return np.asarray(nodes.numbers[rows])
 
 
-def _refuse_tied(space: FemSpace, nodes: Nodes, slots: Indices, name: str) -> None:
+def refuse_tied(space: FemSpace, nodes: Nodes, slots: Indices, name: str) -> None:
+    """Raise InputError, on all ranks, for contact nodes of this rank that move together with others. Collective."""
     def refuse(points: Array, tied: Mask) -> tuple[()]:
         for point in points[tied]:
             raise InputError(f"contact node {at(point)} of '{name}' is tied to another: leave it out (points=), or tie "
