@@ -14,6 +14,7 @@ _CONTENTS = {
     "channel": ("ChannelMesh",),
     "cut": ("CutOpen", "Welded"),
     "disk": ("DiskMesh",),
+    "raft": ("RaftMesh",),
     "two_blocks": ("Blocks", "TwoBlocks"),
     "wall": ("WallMesh",),
 }
