@@ -218,11 +218,7 @@ class BoundaryContact:
         """Return step k (from 0) after loads (k, f) = -B_nᵀ r_n - B_tᵀ r_t of earlier steps; before: v at its start."""
         dt, surface = self.compliance.dt, self.surface
         past = self.v_free[k] + summed(self.W[k:0:-1], loads[:k, :, None])[:, 0] if k else self.v_free[0]
-        slip0 = None
-        if self.frictional:
-            slip0 = surface.tangential_values(before)
-            sliding = surface.sliding(k * dt, (k + 1) * dt)
-            slip0 = slip0 if sliding is None else slip0 + sliding
+        slip0 = surface.slip_origin(before, k * dt, (k + 1) * dt) if self.frictional else None
         return StepProblem(
             A=self.matrix, b=self.matrix @ past, bound=surface.gap((k + 1) * dt), surface=surface, scale=1.0,
             guess=before, active=active, t=(k + 1) * dt, k=k + 1, friction=self.friction, slip0=slip0,

@@ -99,10 +99,7 @@ class ContactProblem:
 
     def slip_origin(self, u: Array, start: float, end: float) -> Array | None:
         """Return B_t u plus what the obstacle slides: where the slip of a step is zero; None without friction."""
-        if not self.frictional:
-            return None
-        origin, sliding = self.surface.tangential_values(u), self.surface.sliding(start, end)
-        return origin if sliding is None else origin + sliding
+        return self.surface.slip_origin(u, start, end) if self.frictional else None
 
     def cartesian(self, x: Array) -> Array:
         """Return T R x: unknowns of the equations back to the system's own."""

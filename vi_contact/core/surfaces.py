@@ -160,6 +160,11 @@ class ContactSurface:
         there = self.tangential_values(u)
         return there if self.slide is None else there - self.slide(t)
 
+    def slip_origin(self, u: Array, start: float, end: float) -> Array:
+        """Return B_t u plus what the obstacle slides between two times, (m, d - 1): where the slip is zero."""
+        origin, sliding = self.tangential_values(u), self.sliding(start, end)
+        return origin if sliding is None else origin + sliding
+
     def reaction_load(self, r_n: Array, rows: int, r_t: Array | None = None) -> Array:
         """Return B_nᵀ r_n + B_tᵀ r_t: the owned part of the contact reaction on the unknowns [N]."""
         load = np.zeros((*r_n.shape[:-1], rows))

@@ -7,9 +7,12 @@ stiffness, is corrected by what it leaves over (``correction``) before it is jud
 from collections.abc import Sequence
 from math import isfinite
 
+import numpy as np
+
 from ..core.algebra import EffectiveMatrix, largest, max_abs
 from ..core.certificate import Certificate
-from ..core.errors import StepFailure
+from ..core.checks import on_all
+from ..core.errors import InputError, StepFailure
 from ..core.problem import ContactProblem
 from ..core.products import frozen
 from ..core.stages import stage
@@ -70,6 +73,14 @@ class CertifiedSolver:
             tried.append(f"{result.method}: {certificate}")
         raise StepFailure(f"step {step.k} at t = {step.t:.6g} s stayed above the certificate tolerance "
                           f"{self._tolerance:g} ({'; '.join(tried)}): {self._advice}")
+
+
+def check_friction(owner: str, problem: ContactProblem) -> None:
+    """Raise InputError for friction without a tangential direction, or of a wrong number of values. Collective."""
+    surface, law = problem.surface, problem.friction
+    if problem.frictional and surface.tangents.shape[1] == 0:
+        raise InputError(f"{owner} would ignore {law}: a body in one dimension cannot slide, use Frictionless()")
+    on_all(surface.comm, "the friction law", lambda: law.limit(np.zeros(surface.count), surface.weights, 1.0))
 
 
 def refuse_nan(step: StepProblem) -> None:

@@ -20,15 +20,15 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..core.algebra import Array, EffectiveMatrix, Mask
-from ..core.checks import instance, on_all, provides
+from ..core.checks import instance, provides
 from ..core.condensation import Condensation, Last, condense
-from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.products import frozen
 from ..core.sizes import refuse_dense
 from ..core.stages import stage
 from ..core.step import Answers, StepProblem, StepResult
 from ..core.surfaces import ContactSurface
+from .certified import check_friction
 from .friction.condensed import CondensedFriction
 from .friction.newton import FrictionNewton
 from .friction.problem import FrictionMethod, inner_method
@@ -74,11 +74,7 @@ class Condensed:
             refuse_dense(f"Condensed() with {problem.friction}", surface.total * (1 + surface.tangents.shape[1]))
         else:
             refuse_dense("Condensed()", surface.total)
-        if problem.frictional and surface.tangents.shape[1] == 0:
-            law = problem.friction
-            raise InputError(f"Condensed would ignore {law}: a body in one dimension cannot slide, use Frictionless()")
-        on_all(surface.comm, "the friction law",
-               lambda: problem.friction.limit(np.zeros(surface.count), surface.weights, 1.0))
+        check_friction("Condensed", problem)
 
     def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> "PreparedCondensed":
         """Return what condenses A at its first step, which tells of friction. InputError for too many conditions."""

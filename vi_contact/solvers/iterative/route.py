@@ -22,6 +22,7 @@ from ...core.errors import InputError
 from ...core.problem import ContactProblem
 from ...core.step import StepProblem, StepResult
 from ...core.surfaces import ContactSurface
+from ..certified import check_friction
 from ..volume.failures import raised
 from ..volume.options import OptionLayers
 from .conjugate_gradients import SOLVED, WRONG_SIGNS, ConjugateGradients
@@ -77,10 +78,8 @@ class Iterative:
                              "3e-10")
 
     def check(self, problem: ContactProblem) -> None:
-        """Raise InputError for friction in one dimension."""
-        if problem.frictional and problem.surface.tangents.shape[1] == 0:
-            raise InputError(f"Iterative() would ignore {problem.friction}: a body in one dimension cannot slide, use "
-                             "Frictionless()")
+        """Raise InputError for friction without a tangential direction, or of a wrong number of values."""
+        check_friction("Iterative()", problem)
 
     def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> "PreparedIterative":
         """Choose and make the preconditioner; collective. InputError for options that cannot work."""

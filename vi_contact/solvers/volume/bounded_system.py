@@ -109,20 +109,22 @@ class BoundedSystem:
         remote = np.concatenate([body.col, first + feet, first + tips, first + feet, first + tips])
         k = self.spring
         entries = np.concatenate([body.data, k, -k, -k, k])
-        csr = sp.csr_matrix((entries, (local, remote)), shape=(self.size, total))
-        arrays = (csr.indptr.astype(PETSc.IntType), csr.indices.astype(PETSc.IntType), csr.data)
-        size = (self.size, total)
-        return PETSc.Mat().createAIJ((size, size), csr=arrays, comm=self.comm)
+        return aij(sp.csr_matrix((entries, (local, remote)), shape=(self.size, total)), self.comm)
 
 
 def assembled(A: EffectiveMatrix) -> Any:
     """Return A as PETSc's AIJ matrix, its own where it has one."""
     matrix = A.matrix
-    if not isinstance(matrix, SerialMatrix):
-        return matrix.mat  # type: ignore[attr-defined]
-    csr, kind = matrix.csr, PETSc.IntType
-    arrays = (csr.indptr.astype(kind), csr.indices.astype(kind), csr.data)
-    return PETSc.Mat().createAIJ(csr.shape, csr=arrays, comm=PETSc.COMM_SELF)
+    if isinstance(matrix, SerialMatrix):
+        return aij(matrix.csr, PETSc.COMM_SELF)
+    return matrix.mat  # type: ignore[attr-defined]
+
+
+def aij(rows: sp.csr_matrix, comm: Any) -> Any:
+    """Return the square AIJ matrix with these rows of this rank, columns numbered over all ranks. Collective."""
+    size, kind = (rows.shape[0], None), PETSc.IntType
+    arrays = rows.indptr.astype(kind), rows.indices.astype(kind), rows.data
+    return PETSc.Mat().createAIJ((size, size), csr=arrays, comm=comm)
 
 
 def renumbered(comm: Comm, old_size: int, new_size: int, columns: Any) -> tuple[int, Indices, int]:

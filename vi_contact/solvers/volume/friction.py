@@ -9,7 +9,6 @@ friction, every other starts from the solution before, its sliding points on the
 one factorisation. A law that depends on the slip rate makes this a sequence of such sequences: ``friction.slip_rate``.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,9 +20,7 @@ from ...core.step import StepProblem, StepResult
 from ...laws.friction import project
 from ..friction.extrapolation import Anderson
 from ..friction.slip_rate import RateIteration
-from .bounded_system import BoundedSystem
-from .failures import stopped
-from .friction_system import FrictionSystem, FrictionUnknowns, ScaledFrictionStep
+from .friction_system import FrictionUnknowns, ScaledFrictionStep
 
 TOLERANCE = 1e-11  # change of the thresholds relative to the largest: the error of the friction cone
 NOISE = 1e-10  # below this, changes that do not shrink are those of round-off
@@ -44,15 +41,11 @@ class Found:
 
 
 class VolumeFriction:
-    """Solve the step with friction of one A; ``driver`` is the PETSc solver, made by ``make`` from the scaled step."""
+    """Solve the step with friction of one A; ``driver`` is the PETSc solver of the scaled step."""
 
-    def __init__(
-        self, body: BoundedSystem, tolerance: float, make: Callable[[ScaledFrictionStep], Any], name: str
-    ) -> None:
-        self._body, self._name = body, name
-        self._friction = FrictionSystem(body)
-        self._scaled = ScaledFrictionStep(self._friction, tolerance)
-        self.driver = make(self._scaled)
+    def __init__(self, scaled: ScaledFrictionStep, driver: Any, name: str) -> None:
+        self._scaled, self.driver, self._name = scaled, driver, name
+        self._body, self._friction = scaled.system, scaled.friction
 
     def solve(self, step: StepProblem) -> StepResult:
         """Return the step; StepFailure with PETSc's reason, or when the thresholds do not settle."""
@@ -113,16 +106,11 @@ class VolumeFriction:
 
     def _tresca(self, step: StepProblem, limit: Array, start: FrictionUnknowns) -> Found:
         """The problem with thresholds (m,)."""
-        body, scaled, driver = self._body, self._scaled, self.driver
+        scaled = self._scaled
         scaled.set_friction(step, limit, start)
-        y, F, reason, iterations = driver.run()
-        if reason <= 0 and not scaled.accepts(y, F):
-            raise stopped(self._name, driver.reasons, reason, iterations, scaled.worst)
+        y, active, r_n, iterations = scaled.answer(self.driver, self._name)
         state = scaled.physical(y)
-        active = scaled.active(y, F)
-        r_n = np.where(active, body.reactions(F * scaled.r_ref), 0.0)
-        slip = scaled.slip(state.z, scaled.sliding(y))
-        return Found(state, r_n, active, slip, iterations)
+        return Found(state, r_n, active, scaled.slip(state.z, scaled.sliding(y)), iterations)
 
     def _result(self, step: StepProblem, found: Found) -> StepResult:
         """x, with sticking points put exactly where they were, and r_t within the last digit of its disk."""

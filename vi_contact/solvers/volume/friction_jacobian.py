@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from petsc4py import PETSc
 
 from ...core.algebra import Array, Indices
-from .bounded_system import renumbered
+from .bounded_system import aij, renumbered
 from .friction_system import FrictionSystem, ScaledFrictionStep
 
 Entries = tuple[Any, Any, Array]  # rows of this rank, columns of all, values
@@ -21,18 +21,18 @@ class FrictionJacobian:
         self._system: FrictionSystem = scaled.friction
         self._scaled = weakref.proxy(scaled)  # PETSc holds the matrix: see weakly()
         self._ratio = np.nan
-        first, total, parts = self._entries()
-        self._where, self._csr = _merged(list(parts.values()), (self._system.size, total))
-        self._place = dict(zip(parts, self._where, strict=True))
-        self._values = np.zeros(len(self._csr[1]))
-        for name, (_, _, values) in parts.items():
-            self._values[self._place[name]] = values
+        total, parts = self._entries()
+        rows, columns = (np.concatenate([part[i] for part in parts.values()]) for i in (0, 1))
+        places = sp.csr_matrix((np.arange(1.0, 1.0 + len(rows)), (rows, columns)), shape=(self._system.size, total))
+        places.sort_indices()
+        self._order = places.data.astype(np.int64) - 1  # of the entries of all parts, none of which is given twice
+        self._values = {name: values for name, (_, _, values) in parts.items()}
         self._A, self._inverse = parts["A"][2], 1.0 / self._system.stiffness[self._system.line]
-        shape = (self._system.size, None)
-        self.mat = PETSc.Mat().createAIJ((shape, shape), csr=(*self._csr, self._values), comm=self._system.comm)
+        self.mat = aij(places, self._system.comm)
+        self._csr = places.indptr.astype(PETSc.IntType), places.indices.astype(PETSc.IntType)
 
-    def _entries(self) -> tuple[int, int, dict[str, Entries]]:
-        """First global number of this rank, their total, and the parts of the matrix; zeros for what changes."""
+    def _entries(self) -> tuple[int, dict[str, Entries]]:
+        """How many columns there are on all ranks, and the parts of the matrix; zeros for what changes."""
         system = self._system
         body, line, pairs = system.body, system.line, system.pairs
         indptr, columns, A = _rows_of(body)
@@ -45,7 +45,7 @@ class FrictionJacobian:
         both, twice = body.size + pairs.T.ravel(), np.tile(gamma, 2)
         moved = system.tangent[pairs.T.ravel()]
         none = np.zeros(len(both))
-        return first, total, {
+        return total, {
             "A": (np.repeat(np.arange(body.size), np.diff(indptr)), columns, A),
             "B": (system.tangent, first + lam, np.ones(len(lam))),
             "line": (row, column, A[entry] / stiffness - (column == first + tangent)),
@@ -62,8 +62,7 @@ class FrictionJacobian:
         """Take the units of a step."""
         if ratio != self._ratio:
             self._ratio = ratio
-            self._values[self._place["A"]] = self._A * ratio
-            self._values[self._place["line lambda"]] = self._inverse / ratio
+            self._values |= {"A": self._A * ratio, "line lambda": self._inverse / ratio}
             self._write()
 
     def evaluate(self, snes: Any, y: Any, J: Any, P: Any) -> None:
@@ -77,17 +76,16 @@ class FrictionJacobian:
         pairs, still, gamma = self._scaled.disks(y)
         c, over = self._scaled.disk_stiffness, self._scaled.disk_inverse
         by_reaction = (c[:, None] * (still + gamma[:, None] * pairs) - 2.0 * pairs) * over[:, None]
-        for name, values in (
-            ("disk lambda", np.tile(gamma, 2)),
-            ("disk gamma", pairs.T.ravel()),
-            ("gamma lambda", by_reaction.T.ravel()),
-            ("gamma x", -((c * over)[:, None] * pairs).T.ravel()),
-            ("gamma gamma", c * over * np.sum(pairs**2, axis=1)),
-        ):
-            self._values[self._place[name]] = values
+        self._values |= {
+            "disk lambda": np.tile(gamma, 2),
+            "disk gamma": pairs.T.ravel(),
+            "gamma lambda": by_reaction.T.ravel(),
+            "gamma x": -((c * over)[:, None] * pairs).T.ravel(),
+            "gamma gamma": c * over * np.sum(pairs**2, axis=1),
+        }
 
     def _write(self) -> None:
-        self.mat.setValuesCSR(*self._csr, self._values)
+        self.mat.setValuesCSR(*self._csr, np.concatenate(list(self._values.values()))[self._order])
         self.mat.assemble()
 
     def destroy(self) -> None:
@@ -108,16 +106,3 @@ def _spread(values: Any, slices: list[Indices]) -> tuple[Any, Any]:
     """values[i] for every entry of slices[i], and these entries."""
     lengths = [len(part) for part in slices]
     return np.repeat(values, lengths), np.concatenate(slices) if slices else np.zeros(0, dtype=np.int64)
-
-
-def _merged(parts: list[Entries], shape: tuple[int, int]) -> tuple[list[Indices], tuple[Any, Any]]:
-    """Where the entries of each part, none given twice, are in the CSR matrix of all, and its indptr and columns."""
-    count = [len(part[0]) for part in parts]
-    order = np.arange(1.0, 1.0 + sum(count))
-    rows, columns = (np.concatenate([part[i] for part in parts]) for i in (0, 1))
-    csr = sp.csr_matrix((order, (rows, columns)), shape=shape)
-    csr.sort_indices()
-    where = np.empty(len(order), dtype=np.int64)
-    where[csr.data.astype(np.int64) - 1] = np.arange(len(order))
-    kind = PETSc.IntType
-    return np.split(where, np.cumsum(count)[:-1]), (csr.indptr.astype(kind), csr.indices.astype(kind))

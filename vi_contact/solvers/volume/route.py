@@ -11,19 +11,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol, cast
 
-import numpy as np
 from petsc4py import PETSc
 
 from ...core.algebra import Array, EffectiveMatrix
-from ...core.checks import instance, on_all, provides, real, shown
+from ...core.checks import instance, provides, real, shown
 from ...core.errors import InputError, StepFailure
 from ...core.problem import ContactProblem
 from ...core.step import StepProblem, StepResult
 from ...core.surfaces import ContactSurface
+from ..certified import check_friction
 from .bounded_system import BoundedSystem
-from .failures import raised, stopped
+from .failures import raised
 from .friction import VolumeFriction
-from .friction_system import ScaledFrictionStep
+from .friction_system import FrictionSystem, ScaledFrictionStep
 from .options import OptionLayers, Options
 from .scaled_step import ScaledStep
 from .snes import ReducedNewton, SemismoothNewton
@@ -91,17 +91,12 @@ class Volume:
 
     def check(self, problem: ContactProblem) -> None:
         """Raise InputError for friction that the method cannot carry, without a tangent, or of wrong length."""
-        if not problem.frictional:
-            return
-        surface, law = problem.surface, problem.friction
-        if not self.method.carries_friction:
+        if problem.frictional and not self.method.carries_friction:
             raise InputError(
-                f"Volume({self.method}) only enforces bounds on displacements and would ignore {law}: use "
+                f"Volume({self.method}) only enforces bounds on displacements and would ignore {problem.friction}: use "
                 "Volume(ReducedNewton()), or Condensed(), the condensed route"
             )
-        if surface.tangents.shape[1] == 0:
-            raise InputError(f"Volume would ignore {law}: a body in one dimension cannot slide, use Frictionless()")
-        on_all(surface.comm, "the friction law", lambda: law.limit(np.zeros(surface.count), surface.weights, 1.0))
+        check_friction("Volume", problem)
 
     def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> "PreparedVolume":
         """Return the solver for one effective matrix; collective. InputError for options that cannot work."""
@@ -118,22 +113,23 @@ class PreparedVolume:
         self._system = BoundedSystem(A, surface, scale)
         PETSc.garbage_cleanup(self._system.comm)
         self._settings, self._method = settings, settings.method
-        defaults = settings.method.defaults(surface.comm.size)
-        self._layers = OptionLayers(settings.prefix, defaults, settings.petsc_options)
+        self._layers = self._layered(settings.method.defaults(surface.comm.size))
         self._scaled = ScaledStep(self._system, settings.tolerance)
-        self._name = f"Volume({getattr(settings.method, 'petsc_type', type(settings.method).__name__)})"
+        self._name = f"Volume({type(settings.method).__name__})"
         self._friction: VolumeFriction | None = None
         self._driver: Driver | None = self._method.driver(self._scaled, self._layers)
+
+    def _layered(self, defaults: Options) -> OptionLayers:
+        return OptionLayers(self._settings.prefix, defaults, self._settings.petsc_options)
 
     def _friction_method(self) -> VolumeFriction:
         """The problem with friction, made at the first step that has some, in the place of the other one."""
         if self._friction is None:
             self.close()
-            settings, method = self._settings, cast(FrictionMethod, self._settings.method)
-            layers = OptionLayers(settings.prefix, method.friction_defaults(), settings.petsc_options)
-            self._friction = VolumeFriction(
-                self._system, settings.tolerance, lambda scaled: method.friction_driver(scaled, layers), self._name
-            )
+            method, tolerance = cast(FrictionMethod, self._method), self._settings.tolerance
+            scaled = ScaledFrictionStep(FrictionSystem(self._system), tolerance)
+            self._driver = method.friction_driver(scaled, self._layered(method.friction_defaults()))
+            self._friction = VolumeFriction(scaled, self._driver, self._name)
         return self._friction
 
     @property
@@ -147,18 +143,14 @@ class PreparedVolume:
         return self._petsc("TAO")
 
     def _petsc(self, kind: str) -> Any:
-        driver = self._driver if self._friction is None else self._friction.driver
-        solver = None if driver is None else driver.solver
+        solver = None if self._driver is None else self._driver.solver
         return solver if isinstance(solver, getattr(PETSc, kind)) else None
 
     def close(self) -> None:
         """Free the PETSc objects; collective."""
         if self._driver is not None:
             self._driver.destroy()
-            self._driver = None
-        if self._friction is not None:
-            self._friction.driver.destroy()
-            self._friction = None
+        self._driver = self._friction = None
 
     def solve(self, step: StepProblem) -> StepResult:
         """Return the step; StepFailure with PETSc's reason when it does not converge."""
@@ -175,17 +167,10 @@ class PreparedVolume:
 
     def _solve(self, step: StepProblem) -> StepResult:
         """The step without friction."""
-        driver: Driver = self._driver or self._method.driver(self._scaled, self._layers)
-        self._driver = driver
-        self._scaled.set(step, self._system.start(step))
-        y, F, reason, iterations = driver.run()
-        if reason <= 0 and not self._scaled.accepts(y, F):
-            raise stopped(self._name, driver.reasons, reason, iterations, self._scaled.worst)
-        return self._result(y, F, iterations)
-
-    def _result(self, y: Array, F: Array, iterations: int) -> StepResult:
-        """x, and r_n on the active set. Off it r_n is zero, so that what is left of F shows in the certificate."""
         system, scaled = self._system, self._scaled
-        active = scaled.active(y, F)
-        r_n = np.where(active, system.reactions(F * scaled.r_ref), 0.0)
+        if self._driver is None or self._friction is not None:
+            self.close()
+            self._driver = self._method.driver(scaled, self._layers)
+        scaled.set(step, system.start(step))
+        y, active, r_n, iterations = scaled.answer(self._driver, self._name)
         return StepResult(y[: system.rows] * scaled.x_ref, r_n, active, iterations, self._name)

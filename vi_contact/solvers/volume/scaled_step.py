@@ -13,7 +13,7 @@ from petsc4py import PETSc
 from ...core.algebra import Array, Mask, max_abs, total
 from ...core.step import StepProblem
 from .bounded_system import BoundedSystem
-from .failures import NOT_A_NUMBER
+from .failures import NOT_A_NUMBER, stopped
 
 ROUND_OFF = 1e-14  # backward error |A z - b| / (|A| |z| + |b|), largest entries, of a solve that cannot be improved
 
@@ -109,6 +109,17 @@ class ScaledStep:
         if 0.5 * before < worst <= self.tolerance and np.isfinite(before):
             return int(PETSc.SNES.ConvergedReason.CONVERGED_SNORM_RELATIVE)
         return 0
+
+    def answer(self, driver: Any, name: str) -> tuple[Array, Mask, Array, int]:
+        """Run a PETSc solver of this step; return (y, active (m,), r_n (m,), iterations). StepFailure with its reason.
+
+        Off the active set r_n is zero, so that what is left of F shows in the certificate.
+        """
+        y, F, reason, iterations = driver.run()
+        if reason <= 0 and not self.accepts(y, F):
+            raise stopped(name, driver.reasons, reason, iterations, self.worst)
+        active = self.active(y, F)
+        return y, active, np.where(active, self.system.reactions(F * self.r_ref), 0.0), iterations
 
     def accepts(self, y: Array, F: Array) -> bool:
         """Return True below the tolerance: a solver whose line search fails at the floor of round-off is done."""
