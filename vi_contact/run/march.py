@@ -39,56 +39,53 @@ def march(
 
 
 class March:
-    """Step along a plan, and keep the books of it.
+    """Step along a plan, and keep the books of it. ``prepared``: matrices and solvers by the length of their steps.
 
     Attributes, at the time a step is handed out:
         base: base steps done. ended: whether this step ended one, so that a restart may begin here.
         dt: the length of this step [s]. halved: attempts that were thrown away.
     """
 
-    def __init__(
-        self, method: Method, step_plan: StepPlan, state: State, base: int = 0, halved: int = 0,
-        prepared: dict[float, tuple[EffectiveMatrix, CertifiedSolver]] | None = None,
-    ) -> None:
-        self._method, self._step_plan, self._state = method, step_plan, state
-        self._prepared = prepared or {}
+    def __init__(self, method: Method, step_plan: StepPlan, state: State, base: int = 0, halved: int = 0) -> None:
+        self.method, self.step_plan, self.state = method, step_plan, state
+        self.prepared: dict[float, tuple[EffectiveMatrix, CertifiedSolver]] = {}
         self.base, self.halved, self.ended, self.dt = base, halved, True, float("nan")
 
     def __iter__(self) -> Iterator[tuple[State, Report]]:
         sizes: list[float] = []
-        while self.base < self._step_plan.steps:
-            dt = self._step_plan.dt(self.base)
-            self._method.bind()  # another run of the problem may be under way
+        while self.base < self.step_plan.steps:
+            dt = self.step_plan.dt(self.base)
+            self.method.bind()  # another run of the problem may be under way
             if not sizes or sizes[0] != dt:
-                sizes = [dt / 2**level for level in range(self._step_plan.halvings + 1)]
-                self._prepared = {size: self._prepared[size] for size in sizes if size in self._prepared}
-            self._state, self.dt = self._restarted(dt), dt
+                sizes = [dt / 2**level for level in range(self.step_plan.halvings + 1)]
+                self.prepared = {size: self.prepared[size] for size in sizes if size in self.prepared}
+            self.state, self.dt = self._restarted(dt), dt
             levels = [0]  # how often the parts of the base step that are left were halved
             while levels:
                 level = levels.pop()
-                report = self._attempt(sizes[level], final=level == self._step_plan.halvings)
+                report = self._attempt(sizes[level], final=level == self.step_plan.halvings)
                 if report is None:
                     self.halved += 1
                     levels += [level + 1, level + 1]
                     continue
-                self._state, self.dt, self.ended = report.new, sizes[level], not levels
+                self.state, self.dt, self.ended = report.new, sizes[level], not levels
                 self.base += self.ended
                 yield report.new, report
 
     def _restarted(self, dt: float) -> State:
         """The state, with a past for this dt."""
-        method = self._method
-        return self._state if dt == self.dt else method.scheme.start(method.problem, self._state, dt)
+        method = self.method
+        return self.state if dt == self.dt else method.scheme.start(method.problem, self.state, dt)
 
     def _attempt(self, dt: float, *, final: bool) -> Report | None:
         """A step of dt; None when it closes a point and is to be halved: nothing has happened then."""
-        problem, scheme, state = self._method.problem, self._method.scheme, self._restarted(dt)
-        A, solver = self._prepared.get(dt, (None, None))
+        problem, scheme, state = self.method.problem, self.method.scheme, self._restarted(dt)
+        A, solver = self.prepared.get(dt, (None, None))
         A = scheme.effective_matrix(problem, dt) if A is None else A
         step = scheme.step(problem, state, A, dt)
         if solver is None:
-            solver = CertifiedSolver(problem, A, step.scale, self._method.solvers, self._method.tolerance)
-            self._prepared[dt] = A, solver
+            solver = CertifiedSolver(problem, A, step.scale, self.method.solvers, self.method.tolerance)
+            self.prepared[dt] = A, solver
         result, certificate, escalated = solver.solve(step)
         if not final and problem.surface.some(result.active & ~state.active):
             return None

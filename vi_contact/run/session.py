@@ -28,7 +28,6 @@ from .recorders import refuse_overflow
 from .solution import Solution, energy_warning, sampling_warning
 from .stop_signals import StopSignals
 from .time_steps import StepPlan, described, pieces_of
-from .together import Together
 from .wall_time import WallTime
 
 log = logging.getLogger(__name__)
@@ -62,7 +61,7 @@ class Session:
     cross_check: Comparison | None
     progress: bool
     wall_time: WallTime
-    loop: March | Together | None = None
+    loop: March | None = None
     resumed_from: int | None = None
     last: Report | None = None
     dt: float = float("nan")

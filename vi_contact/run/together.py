@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from ..core.algebra import EffectiveMatrix
 from ..core.errors import ViContactError
 from ..core.products import frozen
 from ..core.step import Balance, Report, State, StepProblem, StepResult
@@ -26,17 +25,12 @@ from .rows import Each, RowReport, joined, loads_of, own_states, own_step
 from .time_steps import StepPlan
 
 
-class Together:
-    """March one of several runs: what ``March`` yields, made with others as long as it can be.
-
-    Attributes, of the step that was handed out last: as of ``March``.
-    """
+class Together(March):
+    """March one of several runs: what ``March`` yields, made with others as long as it can be."""
 
     def __init__(self, method: Method, step_plan: StepPlan, state: State, base: int = 0, halved: int = 0) -> None:
-        self.method, self.step_plan, self.state = method, step_plan, state
-        self.base, self.halved, self.ended, self.dt = base, halved, True, float("nan")
+        super().__init__(method, step_plan, state, base, halved)
         self.group: Group | None = None
-        self.prepared: dict[float, tuple[EffectiveMatrix, CertifiedSolver]] = {}
         self.waiting: deque[tuple[float, Report]] = deque()  # made, and not handed out yet
 
     def __iter__(self) -> Iterator[tuple[State, Report]]:
@@ -55,9 +49,8 @@ class Together:
             self.base += 1
             yield report
         if self.base < steps:
-            loop = March(self.method, self.step_plan, self.state, self.base, self.halved, self.prepared)
-            for _, report in loop:
-                self.base, self.halved, self.ended, self.dt = loop.base, loop.halved, loop.ended, loop.dt
+            self.dt = float("nan")  # the scheme starts anew
+            for _, report in super().__iter__():
                 yield report
 
     def leave(self) -> None:

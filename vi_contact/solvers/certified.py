@@ -75,7 +75,7 @@ class CertifiedSolver:
                           f"{self._tolerance:g} ({'; '.join(tried)}): {self._advice}")
 
 
-def check_friction(owner: str, problem: ContactProblem) -> None:
+def check_friction_law(owner: str, problem: ContactProblem) -> None:
     """Raise InputError for friction without a tangential direction, or of a wrong number of values. Collective."""
     surface, law = problem.surface, problem.friction
     if problem.frictional and surface.tangents.shape[1] == 0:

@@ -48,7 +48,7 @@ class CondensedFriction:
     def reactions(self, step: StepProblem, free: Array, rigid: Mask) -> tuple[FrictionResult, Mask, Array]:
         """Return the reactions for contact unknowns that would be ``free``, and where they are put: closed points on
         a rigid support on their bound, those that stick where they were, which removes round-off only."""
-        surface, law = self._surface, step.friction
+        surface = self._surface
         assert step.slip0 is not None
         none = np.zeros(surface.count)
         rest = step.friction_at(np.zeros_like(step.slip0))
@@ -56,7 +56,12 @@ class CondensedFriction:
         given = surface.everywhere(np.column_stack([step.bound, step.slip0, cohesion, slope, step.active]))
         places, (cohesion, slope, closed) = given[:, :-3], given[:, -3:].T
         q = places - free.reshape(places.shape)
-        found = self._reactions(step, q, cohesion, slope, closed > 0.0, fixed=rest is law)
+        active = closed > 0.0
+
+        def solved(mu: Array, before: FrictionResult | None) -> FrictionResult:
+            return self._small.solve(q, cohesion, mu, active if before is None else before.r)
+
+        found = self._rates.solve(step, rest, slope, solved, lambda found: self._slip(q, found)[surface.slots])
         held = np.repeat(found.stick[:, None], places.shape[1], axis=1)
         held[:, 0] = (found.r[:, 0] != 0.0) & rigid
         held &= found.r.any()
@@ -78,23 +83,6 @@ class CondensedFriction:
         x = frozen(self.condensed.answer(r.reshape(free.shape), held, places))
         rows = StepResult(x, r[..., 0].copy(), active, 0, self._name, r_t=r[..., 1:].copy())
         return Answers(rows, counts, failed, histories)
-
-    def _reactions(
-        self, step: StepProblem, q: Array, cohesion: Array, slope: Array, active: Mask, *, fixed: bool
-    ) -> FrictionResult:
-        """The reactions for gaps and slips q (m, d), of a law that is ``fixed`` or depends on the slip rate."""
-        surface = self._surface
-        if fixed:
-            return self._small.solve(q, cohesion, slope, active)
-
-        def solved(mu: Array, before: FrictionResult | None) -> FrictionResult:
-            return self._small.solve(q, cohesion, mu, active if before is None else before.r)
-
-        def coefficients(found: FrictionResult) -> Array:
-            rates = step.friction_at(self._slip(q, found)[surface.slots])
-            return np.asarray(surface.everywhere(rates.slope(surface.weights)))
-
-        return self._rates.solve(slope, solved, coefficients)
 
     def _slip(self, q: Array, found: FrictionResult) -> Array:
         """B_t x - slip0 (m, d - 1) of points that rub, exactly zero where they stick."""

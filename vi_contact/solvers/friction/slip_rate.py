@@ -13,14 +13,16 @@ point.
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from ...core.algebra import Array, max_abs
 from ...core.checks import attributes
 from ...core.errors import StepFailure
+from ...core.protocols import FrictionLaw
+from ...core.step import StepProblem
 from .extrapolation import Anderson, Extrapolation, accelerated
-from .problem import FrictionResult
 
 
 @dataclass(frozen=True)
@@ -39,18 +41,23 @@ class RateIteration:
         accelerated("RateIteration", self.extrapolation)
 
     def solve(
-        self, mu: Array, solved: Callable[[Array, FrictionResult | None], FrictionResult],
-        image: Callable[[FrictionResult], Array],
-    ) -> FrictionResult:
-        """Iterate from mu (m,), those at rest. ``solved``: the problem of given coefficients, starting from the last
-        result; ``image``: the coefficients at its slip rates. StepFailure when the tolerance is not reached."""
-        following, spent = self.extrapolation.start(), 0
+        self, step: StepProblem, rest: FrictionLaw, mu: Array, solved: Callable[[Array, Any], Any],
+        slip: Callable[[Any], Array],
+    ) -> Any:
+        """Iterate from mu, the coefficients of all conditions under the law at ``rest``; once for one without rates.
+
+        ``solved``: the problem of given coefficients, starting from the last result, None at first; ``slip``: that of a
+        result, B_t x - slip0 (m, d - 1) of this rank. StepFailure when the tolerance is not reached. Collective.
+        """
+        if rest is step.friction:
+            return solved(mu, None)
+        following, spent, surface = self.extrapolation.start(), 0, step.surface
         history: list[float] = []
-        found: FrictionResult | None = None
+        found = None
         while len(history) < self.max_iterations:
             found = solved(mu, found)
             spent += found.iterations
-            new = image(found)
+            new = np.asarray(surface.everywhere(step.friction_at(slip(found)).slope(surface.weights)))
             size = max(max_abs(new), max_abs(mu))
             history.append(max_abs(new - mu) / size if size else 0.0)
             if history[-1] <= self.tolerance:

@@ -49,21 +49,15 @@ class VolumeFriction:
 
     def solve(self, step: StepProblem) -> StepResult:
         """Return the step; StepFailure with PETSc's reason, or when the thresholds do not settle."""
-        surface, law = self._body.surface, step.friction
+        surface = self._body.surface
         rest = step.friction_at(np.zeros((surface.count, surface.tangents.shape[1])))
         cohesion = rest.limit(np.zeros(surface.count), surface.weights, step.scale)
-        slope = rest.slope(surface.weights)
-        if rest is law:
-            return self._result(step, self._sequence(step, cohesion, slope, None))
+        slope = surface.everywhere(rest.slope(surface.weights))
 
-        def solved(mu: Array, before: Any) -> Any:
+        def solved(mu: Array, before: Found | None) -> Found:
             return self._sequence(step, cohesion, mu[surface.slots], before)
 
-        def coefficients(found: Any) -> Array:
-            rates = step.friction_at(self._friction.by_point(found.slip))
-            return np.asarray(surface.everywhere(rates.slope(surface.weights)))
-
-        found: Any = RateIteration().solve(surface.everywhere(slope), solved, coefficients)
+        found = RateIteration().solve(step, rest, slope, solved, lambda found: self._friction.by_point(found.slip))
         return self._result(step, found)
 
     def _sequence(self, step: StepProblem, cohesion: Array, slope: Array, before: Found | None) -> Found:

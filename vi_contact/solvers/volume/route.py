@@ -19,7 +19,7 @@ from ...core.errors import InputError, StepFailure
 from ...core.problem import ContactProblem
 from ...core.step import StepProblem, StepResult
 from ...core.surfaces import ContactSurface
-from ..certified import check_friction
+from ..certified import check_friction_law
 from .bounded_system import BoundedSystem
 from .failures import raised
 from .friction import VolumeFriction
@@ -96,7 +96,7 @@ class Volume:
                 f"Volume({self.method}) only enforces bounds on displacements and would ignore {problem.friction}: use "
                 "Volume(ReducedNewton()), or Condensed(), the condensed route"
             )
-        check_friction("Volume", problem)
+        check_friction_law("Volume", problem)
 
     def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> "PreparedVolume":
         """Return the solver for one effective matrix; collective. InputError for options that cannot work."""
