@@ -281,7 +281,7 @@ def test_tangents_are_those_of_the_surfaces() -> None:
         inclined = rng.normal(size=(40, d))
         inclined[:10, 0] = 0.0
         directions = np.vstack([np.eye(d), -np.eye(d), inclined / np.linalg.norm(inclined, axis=1)[:, None]])
-        tangents = tangent_vectors(directions)
+        tangents = tangent_vectors(directions, np.arange(len(directions)))
         for direction, found in zip(directions, tangents, strict=True):
             frame = np.column_stack([direction, found])
             assert np.allclose(frame.T @ frame, np.eye(d), atol=1e-14)

@@ -5,6 +5,8 @@ are oblique, with the cosines G_ij = n_i·n_j, a change of velocity along one no
 and a lumped mass m is m G⁻¹.
 """
 
+from itertools import permutations
+
 import numpy as np
 
 from .algebra import Array, Indices, from_each
@@ -19,6 +21,25 @@ PARALLEL = 1e-9  # 1 - cosine of the angle between directions that count as one,
 def at_right_angles(directions: Array) -> bool:
     """Say whether unit vectors (k, d) are orthogonal to one another, to round-off."""
     return bool(np.all(np.abs(directions @ directions.T)[np.triu_indices(len(directions), 1)] <= PARALLEL))
+
+
+def corner_of(directions: Array) -> tuple[list[int], Array]:
+    """Return (columns, Q): the frame of a node with two or three independent contact directions (k, d)."""
+    d, square = directions.shape[1], at_right_angles(directions)
+    columns: list[int] = []
+    for direction in directions:
+        order = np.argsort(-np.abs(direction), kind="stable")
+        columns.append(next(int(c) for c in order if c not in columns))
+    if not square:  # columns in which no direction vanishes: components that are prescribed keep theirs
+        choices = list(permutations(range(d), len(directions)))
+        sizes = [np.prod([abs(direction[c]) for direction, c in zip(directions, own, strict=True)]) for own in choices]
+        columns = list(choices[int(np.argmax(sizes))])
+    block = np.zeros((d, d))
+    block[:, columns] = directions.T
+    for c in set(range(d)) - set(columns):  # in space, one vector may be missing
+        edge = np.cross(block[:, (c + 1) % 3], block[:, (c + 2) % 3])
+        block[:, c] = edge if square else edge / np.linalg.norm(edge)
+    return columns, block
 
 
 def oblique_corners(surface: ContactSurface) -> list[Indices]:

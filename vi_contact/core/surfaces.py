@@ -123,13 +123,7 @@ class ContactSurface:
     @cached_property
     def corners(self) -> tuple[Indices, ...]:
         """Return the conditions of each node that has several, in the order of the nodes."""
-        if self.nodes is None:
-            return ()
-        _, place, counts = np.unique(self.nodes, return_inverse=True, return_counts=True)
-        several = np.flatnonzero(counts[place.ravel()] > 1)
-        order = several[np.argsort(self.nodes[several], kind="stable")]
-        groups = np.split(order, np.flatnonzero(np.diff(self.nodes[order])) + 1)
-        return tuple(group for group in groups if len(group))
+        return () if self.nodes is None else same_node(self.nodes)
 
     def in_frames(self, u: Array) -> Array:
         """Return T⁻¹ u: displacements along the axes in the nodal frames."""
@@ -145,7 +139,8 @@ class ContactSurface:
         """Return the places and sizes of the conditions of all ranks, by number, everywhere. Collective."""
         names = ("points", "normals", "weights", "gap0", "bilateral", "compliance")
         arrays = {name: self.everywhere(getattr(self, name)) for name in names}
-        return replace(self, comm=SerialComm(), slots=np.arange(self.total), **arrays)
+        nodes = None if self.nodes is None else self.everywhere(self.nodes)
+        return replace(self, comm=SerialComm(), slots=np.arange(self.total), nodes=nodes, **arrays)
 
     def normal_values(self, x: Array) -> Array:
         """Return B_n x, shape (m,); rows (k, m) of rows (k, n), as in all these products with B."""
@@ -233,6 +228,15 @@ def _spread(name: str, value: Any, shape: tuple[int, ...], t: float) -> Array:
         raise InputError(f"a moving obstacle: {name}({t:g} s) is {shown(value)}; return finite metres, one number or "
                          f"an array of shape {shape}")
     return np.broadcast_to(found.astype(float), shape)
+
+
+def same_node(nodes: Indices) -> tuple[Indices, ...]:
+    """Return the places of each number that stands several times in ``nodes`` (m,), in the order of the numbers."""
+    _, place, counts = np.unique(nodes, return_inverse=True, return_counts=True)
+    several = np.flatnonzero(counts[place.ravel()] > 1)
+    order = several[np.argsort(nodes[several], kind="stable")]
+    groups = np.split(order, np.flatnonzero(np.diff(nodes[order])) + 1)
+    return tuple(group for group in groups if len(group))
 
 
 def nodal_frames(directions: Array) -> Array:

@@ -8,23 +8,33 @@ the support, the force on the body at a point X is f = -r_n n - r_t t. Over the 
 
 n̄ is the mean direction of the part by weight, t̄ = (-n̄_y, n̄_x), up the last axis. On level ground N is the vertical
 force, T points to the right, and N acts at the distance e to the right of the centre; of a wall N is the thrust and
-``height`` the height of its line of action above the centre. Positions are those of the undeformed body.
+``height`` the height of its line of action above the centre. Positions are those of the undeformed body. In space T and
+e are the sizes of vectors in the plane across n̄, whose components along the axes stand beside them:
+
+    T = F + N n̄,    e = M x n̄ / N   (from the centre to where N acts)
+
+The rotation theta and the settlement u·n̄ of the centre are those of the smallest rigid motion u + theta x (X - c) whose
+normal displacements fit those of the part best, by weight; nan for what they say nothing about: a level base does not
+tell how it turns about the vertical.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
 
-from ..core.algebra import Array, Mask
+from ..core.algebra import Array, Indices, Mask
 from ..core.checks import array, column_name, function, instance, mask, optional, provides
+from ..core.corners import corner_of
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.step import AXES, Columns, Report, Row, State
-from ..core.surfaces import ContactSurface, nodal_blocks, nodal_frames, tangential_columns
+from ..core.surfaces import ContactSurface, nodal_blocks, nodal_frames, same_node, tangential_columns
 
 Where = Callable[[Array, Array], Mask]
+DETERMINED = 1e-9  # of the largest singular value of the rigid modes of a part: less says nothing about a motion
 
 
 class Geometry(Protocol):
@@ -63,12 +73,14 @@ class Part:
         if not chosen.any():
             raise InputError(f"part '{name}' has no contact points: change its mask")
         self.centre = array(f"part '{name}'", "the centre", centre, points.shape[1:], unit="metres")
+        self.name, self.dimension = name, points.shape[1]
         self.mask, self.weights = chosen, geometry.weights[chosen]
         self.normals, self.arms = normals[chosen], points[chosen] - self.centre
-        self.normal = self._direction(name, normal)
-        self.tangents = tangent_vectors(self.normals)
-        self.shared = len(np.unique(points[chosen], axis=0)) < int(chosen.sum())
-        self.name, self.dimension = name, points.shape[1]
+        self.normal, self.whole = self._direction(name, normal), self.weights.sum()
+        nodes = getattr(geometry, "nodes", None)  # run folders do not tell: what is at one place is one node there
+        nodes = np.unique(points, axis=0, return_inverse=True)[1].ravel() if nodes is None else nodes
+        self.tangents = tangent_vectors(normals, nodes)[chosen]
+        self.fit = self._fit()
 
     def _direction(self, name: str, given: Sequence[float] | None) -> Array:
         direction = self.weights @ self.normals if given is None else given
@@ -78,66 +90,90 @@ class Part:
             raise InputError(f"part '{name}': its contact directions cancel, give normal= the direction of N")
         return np.asarray(direction / size)
 
-    def resultants(self, r_n: Array, r_t: Array | None) -> dict[str, Array]:
-        """Return force, N, T, M, e and height of reactions (rows, m), (rows, m, d - 1); nan where N or r_n is zero."""
+    def _fit(self) -> Array:
+        """Return rows (q + 1, k) that make theta and settlement of normal displacements; nan what is not determined."""
+        size = float(np.max(np.abs(self.arms), initial=0.0)) or 1.0
+        turns = [one / size for one in turning(self.arms, self.normals)]
+        root, modes = np.sqrt(self.weights), np.column_stack([self.normals, *turns])
+        asked = np.diag(np.r_[np.zeros(self.dimension), np.full(len(turns), 1.0 / size)])[self.dimension :]
+        asked = np.vstack([asked, np.r_[self.normal, np.zeros(len(turns))]])
+        inverse = np.linalg.pinv(root[:, None] * modes, rcond=DETERMINED) * root
+        told = np.linalg.norm(asked @ inverse @ modes, axis=1) > DETERMINED * np.linalg.norm(asked, axis=1)
+        return np.where(told[:, None], asked @ inverse, np.nan)
+
+    def share(self, slots: Indices) -> "Part":
+        """Return what the conditions with these numbers contribute to it, of surfaces of several ranks."""
+        found, here = copy(self), self.mask[slots]
+        rows = (np.cumsum(self.mask) - 1)[slots[here]]
+        found.mask, found.fit = here, self.fit[:, rows]
+        for name in ("weights", "normals", "arms", "tangents"):
+            setattr(found, name, getattr(self, name)[rows])
+        return found
+
+    def sums(self, r_n: Array, r_t: Array | None, active: Mask) -> Array:
+        """Return (rows, …) F, M, Σ r_n, Σ r_n (X - c)·up and the open weight of rows of reactions, (rows, m),
+        (rows, m, d - 1) or None, and closed conditions (rows, m)."""
         r_n = r_n[:, self.mask]
         at_points = -r_n[:, :, None] * self.normals
         if r_t is not None:
-            if self.shared and self.dimension == 3:
-                raise InputError(f"part '{self.name}' has points with two contact directions, whose friction has no "
-                                 "frame of its own in three dimensions: leave them out of the mask")
             at_points = at_points - np.einsum("rkc,kdc->rkd", r_t[:, self.mask], self.tangents)
-        force = 0.0 + at_points.sum(axis=1)
-        thrust = r_n.sum(axis=1)
-        raised = np.full(len(thrust), np.nan)
-        np.divide(r_n @ self.arms[:, -1], thrust, out=raised, where=thrust != 0.0)
-        found = {f"force_{axis}": force[:, i] for i, axis in enumerate(AXES[: self.dimension])}
-        return found | self._about_centre(at_points, force) | {"height": raised}
+        moments = [one.sum(axis=1) for one in turning(self.arms, at_points)]
+        lifted = (~active[:, self.mask]) @ self.weights
+        return np.column_stack([at_points.sum(axis=1), *moments, r_n.sum(axis=1), r_n @ self.arms[:, -1], lifted])
 
-    def _about_centre(self, at_points: Array, force: Array) -> dict[str, Array]:
-        """Return N, T, M, e: with signs in the plane; in 3D T, e are sizes and M a vector; no M in one."""
-        compression = 0.0 - force @ self.normal
-        if self.dimension == 2:
-            tangent = np.array([-self.normal[1], self.normal[0]])
-            moment = (self.arms[:, 0] * at_points[:, :, 1] - self.arms[:, 1] * at_points[:, :, 0]).sum(axis=1)
-            moments, lever, along = {"M": moment}, moment, force @ tangent
-        elif self.dimension == 3:
-            vector = np.cross(self.arms, at_points).sum(axis=1)
-            moments = {f"M_{axis}": vector[:, i] for i, axis in enumerate(AXES)}
-            lever = np.linalg.norm(np.cross(self.normal, vector), axis=1)
-            along = np.linalg.norm(force + compression[:, None] * self.normal, axis=1)
-        else:
-            moments, lever, along = {}, np.zeros(len(force)), np.zeros(len(force))
-        away = np.full(len(force), np.nan)
-        np.divide(lever, compression, out=away, where=compression != 0.0)
-        return {"N": compression, "T": along} | moments | {"e": away}
-
-    def opening(self, active: Mask, gap: Array, slip: Array | None) -> dict[str, Array]:
-        """Return uplift ratio, largest gap and, with slips, the largest slip of every row."""
-        found = {
-            "uplift": (~active[:, self.mask]) @ self.weights / self.weights.sum(),
-            "opening": gap[:, self.mask].max(axis=1),
-        }
+    def tops(self, gap: Array, slip: Array | None) -> Array:
+        """Return (rows, 1 or 2) the largest gap and slip of rows (rows, m), (rows, m, d - 1) or None."""
+        found = [gap[:, self.mask]]
         if slip is not None and slip.shape[2]:
-            found["slip"] = np.linalg.norm(slip[:, self.mask], axis=2).max(axis=1)
-        return found
+            found.append(np.linalg.norm(slip[:, self.mask], axis=2))
+        return np.column_stack([one.max(axis=1, initial=-np.inf) for one in found])
 
-    def rotation(self, u_n: Array) -> dict[str, float]:
-        """Return rocking angle and settlement of the smallest rigid motion that fits u_n best by weight; plane only."""
-        size = float(np.max(np.abs(self.arms), initial=0.0)) or 1.0
-        turn = (self.normals[:, 1] * self.arms[:, 0] - self.normals[:, 0] * self.arms[:, 1]) / size
-        root = np.sqrt(self.weights)
-        modes = np.column_stack([self.normals, turn])
-        motion = np.linalg.lstsq(root[:, None] * modes, root * u_n[self.mask], rcond=1e-9)[0]
-        return {"theta": float(motion[2] / size), "settlement": float(motion[:2] @ self.normal)}
+    def quantities(self, sums: Array, tops: Array) -> dict[str, Array]:
+        """Return quantity -> (rows,) of sums and tops of all its points; nan where N or Σ r_n is zero."""
+        d, axes = self.dimension, AXES[: self.dimension]
+        force, moment, (thrust, raised, lifted) = 0.0 + sums[:, :d], sums[:, d:-3], sums.T[-3:]
+        compression = 0.0 - force @ self.normal
+        along, lever = force + compression[:, None] * self.normal, np.zeros((len(sums), d))
+        found = {"uplift": lifted / self.whole} | dict(zip(("opening", "slip"), tops.T, strict=False))
+        found |= {f"force_{axis}": force[:, i] for i, axis in enumerate(axes)} | {"N": compression}
+        if d == 2:
+            tangent = np.array([-self.normal[1], self.normal[0]])
+            found |= {"T": force @ tangent, "M": moment[:, 0], "e": _ratio(moment[:, 0], compression)}
+        else:
+            if d == 3:
+                lever = np.cross(moment, self.normal)
+            found |= {"T": np.linalg.norm(along, axis=1)}
+            found |= {f"T_{axis}": along[:, i] for i, axis in enumerate(axes) if d == 3}
+            found |= {f"M_{axis}": moment[:, i] for i, axis in enumerate(axes) if d == 3}
+            found |= {"e": _ratio(np.linalg.norm(lever, axis=1), compression)}
+            found |= {f"e_{axis}": _ratio(lever[:, i], compression) for i, axis in enumerate(axes) if d == 3}
+        return found | {"height": _ratio(raised, thrust)}
+
+    def motion(self, fitted: Array) -> dict[str, float]:
+        """Return rotation and settlement, ``fit`` times the normal displacements; none on a line."""
+        names = {1: [], 2: ["theta", "settlement"], 3: [*(f"theta_{axis}" for axis in AXES), "settlement"]}
+        return dict(zip(names[self.dimension], fitted.tolist(), strict=False))
 
 
-def tangent_vectors(normals: Array) -> Array:
-    """Return the tangents (m, d, d - 1) of contact directions (m, d), in which surfaces have slip and r_t.
+def turning(arms: Array, vectors: Array) -> list[Array]:
+    """Return the components (…) of arms x vectors (…, d): x, y, z in space, z in the plane, none on a line."""
+    pairs = {1: (), 2: ((0, 1),), 3: ((1, 2), (2, 0), (0, 1))}[arms.shape[-1]]
+    return [arms[..., i] * vectors[..., j] - arms[..., j] * vectors[..., i] for i, j in pairs]
 
-    Points with several directions are not covered: in the plane nothing rubs there.
+
+def _ratio(one: Array, other: Array) -> Array:
+    return np.divide(one, other, out=np.full(len(other), np.nan), where=other != 0.0)
+
+
+def tangent_vectors(normals: Array, nodes: Indices) -> Array:
+    """Return the tangents (m, d, d - 1) of contact directions (m, d) at nodes (m,), along which slip and r_t are.
+
+    Of a node with several directions they are the other vectors of its frame.
     """
     column, blocks = nodal_blocks(nodal_frames(normals))
+    for rows in same_node(nodes):
+        if np.linalg.matrix_rank(normals[rows]) == len(rows):  # else two nodes at one place
+            column[rows], blocks[rows] = corner_of(normals[rows])
     return np.take_along_axis(blocks, tangential_columns(column, normals.shape[1])[:, None, :], axis=2)
 
 
@@ -150,7 +186,7 @@ _MEANING = {
     "M": ("N m", "moment on the body about the centre, anticlockwise positive"),
     "e": ("m", "eccentricity M/N; nan without normal force"),
     "height": ("m", "height of the thrust above the centre; nan while open"),
-    "theta": ("rad", "rocking angle, anticlockwise positive"),
+    "theta": ("rad", "rocking angle, anticlockwise positive; nan where the part does not tell"),
     "settlement": ("m", "mean displacement towards the support"),
 }
 
@@ -167,8 +203,9 @@ def _unit_and_meaning(quantity: str, name: str) -> tuple[str, str]:
 class Resultants:
     """Record columns <quantity>_<name> of a named part of the contact surface; the module's head lists the quantities.
 
-    uplift, opening, slip, force_x, force_y (force_z), N, T, M (M_x, M_y, M_z in 3D), e, height and, in the plane, theta
-    and settlement: the rigid motion of the part relative to its support that fits the normal displacements best.
+    uplift, opening, slip, force_x, force_y, N, T, M, e, height, theta and settlement: the rigid motion of the part
+    relative to its support that fits the normal displacements best. In space also force_z, T_x, …, e_x, …, and M_x, …,
+    theta_x, … in place of M and theta.
 
     Args:
         name: names the columns. centre: (d,) the point of reference, of a footing the middle of its base, of a wall a
@@ -192,28 +229,26 @@ class Resultants:
         return {f"{quantity}_{self.name}": _unit_and_meaning(quantity, self.name) for quantity in self._quantities}
 
     def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
-        """Find the part once, and return the row of the state, a static one or the start of a run."""
+        """Find the part once, and return the row of the state, a static one or the start of a run. Collective."""
         self._surface = problem.surface
-        self._part = Part(self.name, problem.surface.whole(), self.centre, self.where, self.normal)
+        whole = Part(self.name, problem.surface.whole(), self.centre, self.where, self.normal)
+        self._part = whole.share(problem.surface.slots)
         return self._row(state)
 
     def row(self, report: Report) -> Row:
         return self._row(report.new)
 
     def _row(self, state: State) -> Row:
-        surface, part = self._surface, self._part
+        """Sums and maxima of this rank's conditions, then of all ranks."""
+        surface, part, r_n = self._surface, self._part, state.r_n
         u_n, slip = surface.normal_values(state.u), surface.slip(state.u, state.t)
-        gap = surface.gap(state.t) - u_n + surface.compliance * state.r_n
-        rubbing = [slip] if state.r_t is None else [slip, state.r_t]
-        values = surface.everywhere(np.column_stack([gap, state.r_n, u_n, state.active, *rubbing]))
-        gap, r_n, u_n, active = (np.ascontiguousarray(column) for column in values.T[:4])
-        slip, r_t = (np.ascontiguousarray(part) for part in np.hsplit(values[:, 4:], [slip.shape[1]]))
-        series = part.opening(active[None] > 0.0, gap[None], slip[None]) | part.resultants(
-            r_n[None], None if state.r_t is None else r_t[None]
-        )
-        found: dict[str, Any] = {quantity: float(values[0]) for quantity, values in series.items()}
-        if part.dimension == 2:
-            found |= part.rotation(u_n)
+        gap = surface.gap(state.t) - u_n + surface.compliance * r_n
+        sums = part.sums(r_n[None], None if state.r_t is None else state.r_t[None], state.active[None])
+        sums = surface.comm.sum(np.concatenate([sums[0], part.fit @ u_n[part.mask]]))
+        tops = surface.comm.max(part.tops(gap[None], slip[None])[0])
+        fitted = len(part.fit)
+        series = part.quantities(sums[None, :-fitted], tops[None])
+        found = {quantity: float(values[0]) for quantity, values in series.items()} | part.motion(sums[-fitted:])
         self._quantities = list(found)
         return {f"{quantity}_{self.name}": value for quantity, value in found.items()}
 
@@ -222,7 +257,7 @@ def contact_summary(
     history: Mapping[str, Array], geometry: Geometry, *, centre: Sequence[float], name: str = "contact",
     where: Where | None = None, normal: Sequence[float] | None = None,
 ) -> dict[str, Array]:
-    """Return the resultants of a run that recorded ``Contact()``: quantity -> (rows,), without theta.
+    """Return the resultants of a run that recorded ``Contact()``: quantity -> (rows,), without theta and settlement.
 
     ``geometry``: the surface of the problem (then collective), or ``read_run(folder).contact``. Slip and friction count
     where they were recorded, with friction. InputError without arrays of the contact points.
@@ -242,5 +277,5 @@ def contact_summary(
 
     r_t = per_point("traction_t") * geometry.weights[:, None] if "traction_t" in history else None
     slip = per_point("slip") if "slip" in history else None
-    found = part.opening(per_point("active")[:, :, 0] > 0.5, per_point("gap")[:, :, 0], slip)
-    return found | part.resultants(per_point("pressure")[:, :, 0] * geometry.weights, r_t)
+    sums = part.sums(per_point("pressure")[:, :, 0] * geometry.weights, r_t, per_point("active")[:, :, 0] > 0.5)
+    return part.quantities(sums, part.tops(per_point("gap")[:, :, 0], slip))

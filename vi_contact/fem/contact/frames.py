@@ -8,7 +8,6 @@ directions has the unit vector along its edge as the third. A rank holds the con
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import permutations
 from typing import Any
 
 import numpy as np
@@ -16,9 +15,9 @@ import scipy.sparse as sp
 
 from ...core.algebra import Array, Indices, Mask, largest
 from ...core.checks import at
-from ...core.corners import PARALLEL, at_right_angles
+from ...core.corners import PARALLEL, at_right_angles, corner_of
 from ...core.errors import InputError
-from ...core.surfaces import ContactSurface, nodal_blocks, nodal_frames, tangential_columns
+from ...core.surfaces import ContactSurface, nodal_blocks, nodal_frames, same_node, tangential_columns
 from ..petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc
 from ..space import FemSpace
 from .nodes import Nodes, asked, joined_nodes
@@ -75,16 +74,10 @@ class NodalFrames:
         column, self.blocks = nodal_blocks(nodal_frames(self.directions[first]))
         self.column, self.turns = column[self.place], self.blocks.copy()
         self.rubs = np.ones((len(numbers), self.blocks.shape[1] - 1), dtype=bool)
-        for slots in self._corners():
+        for slots in same_node(self.place):
             self._refuse_dependent(slots)
             self._turn_corner(slots)
         self.oblique = not np.array_equal(self.turns, self.blocks)
-
-    def _corners(self) -> list[Indices]:
-        """The conditions of each node that has several."""
-        several = np.flatnonzero(self.double[self.place])
-        order = several[np.argsort(self.place[several], kind="stable")]
-        return [slots for slots in np.split(order, np.flatnonzero(np.diff(self.place[order])) + 1) if len(slots)]
 
     def _turn_corner(self, slots: Indices) -> None:
         """Give a node with several conditions its frame."""
@@ -127,25 +120,6 @@ class NodalFrames:
             raise InputError(f"{where} has {k} contact directions, {'more than' if k > d else 'not independent in'} "
                              f"its {d} dimensions: take the corner for smooth (a larger feature_angle=), or leave the "
                              "node out of some of its surfaces (points=)")
-
-
-def corner_of(directions: Array) -> tuple[list[int], Array]:
-    """Return (columns, Q): the frame of a node with two or three independent contact directions (k, d)."""
-    d, square = directions.shape[1], at_right_angles(directions)
-    columns: list[int] = []
-    for direction in directions:
-        order = np.argsort(-np.abs(direction), kind="stable")
-        columns.append(next(int(c) for c in order if c not in columns))
-    if not square:  # columns in which no direction vanishes: components that are prescribed keep theirs
-        choices = list(permutations(range(d), len(directions)))
-        sizes = [np.prod([abs(direction[c]) for direction, c in zip(directions, own, strict=True)]) for own in choices]
-        columns = list(choices[int(np.argmax(sizes))])
-    block = np.zeros((d, d))
-    block[:, columns] = directions.T
-    for c in set(range(d)) - set(columns):  # in space, one vector may be missing
-        edge = np.cross(block[:, (c + 1) % 3], block[:, (c + 2) % 3])
-        block[:, c] = edge if square else edge / np.linalg.norm(edge)
-    return columns, block
 
 
 def given(parts: Sequence[NodalConditions]) -> tuple[Indices, Array, Array, Mask]:
