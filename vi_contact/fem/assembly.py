@@ -76,7 +76,7 @@ def assemble(
     check_boundaries(mesh, held, moved, as_tuple(tied), boundaries, as_tuple(loads))
     check_initial(mesh, displacement=initial_displacement, velocity=initial_velocity)
     space = FemSpace(mesh, tuple(Prescribed(facets) for facets in held) + moved, as_tuple(tied))
-    forms = ElasticForms(space, cell_materials(mesh, material), section, damping)
+    forms = ElasticForms(space, cell_materials(mesh, material), section, damping, boundaries)
     algebra = algebra_for(space.comm.mpi, space.dimension, space.unknowns)
     absorbers = [DashpotMatrix(space, forms, one) for one in boundaries]
     acting = [one.dashpots.loads(one, forms) for one in absorbers]
@@ -122,10 +122,16 @@ def _reduced(
 
 
 class ElasticForms:
-    """Hold the variational forms of one body; constants are cellwise: one compiled form serves all materials."""
+    """Hold the variational forms of one body; constants are cellwise: one compiled form serves all materials.
 
-    def __init__(self, space: FemSpace, materials: list[tuple[Any, LinearElastic]], section: Section, damping: Damping):
-        self.space, self.section = space, section
+    ``boundaries``: the dashpots that belong to the same system.
+    """
+
+    def __init__(
+        self, space: FemSpace, materials: list[tuple[Any, LinearElastic]], section: Section, damping: Damping,
+        boundaries: Sequence[Dashpots] = (),
+    ):
+        self.space, self.section, self.boundaries = space, section, boundaries
         cells = compat.cell_space(space.mesh)
         names = ("lame", "shear", "rho", "alpha_rho", "beta", "lame_out")
         self.damped = any(any(damping.coefficients(material)) for _, material in materials)

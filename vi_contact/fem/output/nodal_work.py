@@ -26,6 +26,7 @@ from ..space import known_matrices, space_of
 
 log = logging.getLogger(__name__)
 
+Taken = Callable[[Array | float, Traction | BodyForce | None], Array]  # (density, load of it) -> (owned components,)
 Loads = Traction | BodyForce | Sequence[Traction | BodyForce]
 
 
@@ -84,17 +85,22 @@ class NodalWork:
             log.warning("%s: the system has constant loads of (%s) N in all and none were given: if they act on these "
                         "elements give the loads of fem.assemble, or the gravity of with_weight", owner, text)
 
-    def take(self, fields: Sequence[tuple[Array, Mask | None]]) -> None:
-        """Take every r (owned nodes, d) with its group (mask of local cells, ghosts too; all when None). Collective."""
+    def take(self, fields: Sequence[tuple[Array, Mask | None, Taken | None]]) -> None:
+        """Take every r (owned nodes, d) with its group (mask of local cells, ghosts too; all when None), less what a
+        function makes of the densities of inertia, its damping and loads, if one is given. Collective."""
         forms = [*self._forms, *self._load_forms]
+        own_fields, thickness = self.space.forms.fields, self.space.forms.section.thickness
+        densities = [(own_fields[name].x.array, None) for name in ("alpha_rho", "rho")]
+        densities += [(thickness, load) for load in self._loads]
         rows: list[list[Any]] = [[] for _ in forms]
-        for r, cells in fields:
+        for r, cells, taken in fields:
             self._r.x.array[: r.size] = r.ravel()
             self._r.x.scatter_forward()
             self._inside.x.array[:] = 1.0 if cells is None else cells
-            for own, form in zip(rows, forms, strict=True):
+            for own, form, density in zip(rows, forms, [None, *densities], strict=True):
                 if form is not None:
-                    own.append(sp.csr_matrix(compat.assemble_vector(form).array_r))
+                    row = compat.assemble_vector(form).array_r
+                    own.append(sp.csr_matrix(row if taken is None or density is None else row - taken(*density)))
         self._count = len(fields)
         self._matrices: list[Any] = [sp.vstack(own).tocsr() if own else None for own in rows]
         self._still: dict[int, Array] = {}

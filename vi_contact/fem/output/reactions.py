@@ -1,4 +1,4 @@
-"""Record reactions of prescribed boundaries: base shear and overturning moment."""
+"""Record reactions of boundaries, held or absorbing ones: base shear and overturning moment."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -18,13 +18,16 @@ from .nodal_work import Loads, NodalWork, check_actions, rigid_fields
 
 @dataclass
 class Reactions:
-    """Record what a clamped or prescribed boundary does to its body: force [N] and moment about a centre [N m].
+    """Record what a prescribed or absorbing boundary does to its body: force [N] and moment about a centre [N m].
 
-    On the held components c of the nodes of the facets, with the loads f on them and the absolute acceleration a + a_g:
+    On the components c of the nodes of the facets that are held, and on all of those with dashpots, with the loads f on
+    them, K, C, M of the elements and the absolute acceleration a + a_g:
 
         R = (K u + C v + M (a + r a_g) - f)_c
 
-    The rows of the equation of motion that the elimination of prescribed displacements took out. In the relative frame
+    On held components they are rows of the equation of motion that the elimination of prescribed displacements took
+    out; at nodes with dashpots what these and the waves that come in (CompliantBase, FreeField) do to the elements, and
+    contact if there is any at these nodes. Nodes that two boundaries share count in both. In the relative frame
     the inertia load of the ground motion is M r a_g, of the held nodes too, so that R is the same force as with the
     ground moved by ``Prescribed``, and balances all masses, loads and contact forces of the body (with
     ``base_inertia=True``, the default of ``assemble``; K, C, M are those of the elements, whatever a time scheme does
@@ -36,11 +39,11 @@ class Reactions:
     moment of the body on its base is -reaction_M.
 
     Args:
-        facets: a boundary with prescribed components; other components of its nodes are not counted.
+        facets: a boundary with prescribed components or dashpots; other components of its nodes are not counted.
         loads: those given to ``assemble``: their part on the held nodes goes straight into the support.
         gravity: acceleration (d,) [m/s²] of ``with_weight``, (0, -9.80665) for example: likewise.
     Raises:
-        InputError: nothing is prescribed on the facets.
+        InputError: nothing is prescribed on the facets, and they have no dashpots.
     """
 
     name: str
@@ -76,10 +79,13 @@ class Reactions:
         facets_of(owner, "facets", self.facets, space.mesh)
         blocks = space.facet_blocks(self.facets.indices)
         held[blocks] = space.held[blocks]
+        for one in space.forms.boundaries:
+            held[space.facet_blocks(np.intersect1d(self.facets.indices, one.facets.indices))] = True
         if not largest(space.comm, held.any()):
-            raise InputError(f"nothing is prescribed on boundary group '{self.facets.name}': it has no reactions")
+            raise InputError(f"nothing is prescribed on boundary group '{self.facets.name}', and it has no dashpots: "
+                             "it has no reactions")
         fields, self._parts = rigid_fields(space.points, self.centre)
-        self._work.take([(np.where(held, field, 0.0), None) for field in fields])
+        self._work.take([(np.where(held, field, 0.0), None, None) for field in fields])
         return self._named(self._work.at_rest(state))
 
     def row(self, report: Report) -> Row:
