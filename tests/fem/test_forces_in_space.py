@@ -82,6 +82,10 @@ def test_sections_of_a_column_are_those_of_statics(comm: Any, simplices: bool, t
     for name, place in places.items():
         expected = above(*place)
         assert np.abs(six_of(row, name) - expected).max() < 1e-10 * np.abs(expected).max(), name
+    back = {name: cuts[name][[0, 2, 1]] for name in ("foot", "inclined")}  # sides exchanged
+    turned = fem.SectionForces(back, loads=loads).start(problem, state)
+    for name in back:  # the other way through: N and M_t stay, along the same axes the others change their signs
+        assert six_of(turned, name) == pytest.approx(six_of(row, name)[[0, 2, 1, 3, 5, 4]] * (1, -1, -1, 1, -1, -1))
     held = fem.Reactions("foot", tags["bottom"], tuple(Q @ (0.25, 0.0, 0.35)), loads).start(problem, state)
     held_up = [[held[f"reaction_{kind}{axis}_foot"] for axis in "xyz"] for kind in ("", "M_")]
     axes = Q @ np.array([(0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, -1.0)]).T

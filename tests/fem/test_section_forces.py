@@ -46,7 +46,7 @@ def test_section_forces_are_those_of_equilibrium(comm: Any, simplices: bool) -> 
     """N, V, M of a cantilever under tip, uniform and body loads to 1e-10, on a mesh two elements wide."""
     problem, tags, loads = cantilever(comm, simplices)
     state = vc.static_equilibrium(problem, solver=vc.Condensed())
-    levels = {"foot": 0.0, "middle": 2.0, "high": 3.5}
+    levels = {"foot": 0.0, "through": 1.3, "middle": 2.0, "close": 2.001, "high": 3.5}
     cuts = {name: ((0.0, y), (WIDTH, y)) for name, y in levels.items()}
     row = fem.SectionForces(cuts | {"back": ((WIDTH, 2.0), (0.0, 2.0))}, loads=loads).start(problem, state)
     for name, y in levels.items():
@@ -56,6 +56,21 @@ def test_section_forces_are_those_of_equilibrium(comm: Any, simplices: bool) -> 
     assert row["N_back"] == pytest.approx(row["N_middle"], rel=1e-10)
     assert row["V_back"] == pytest.approx(row["V_middle"], rel=1e-10)
     assert row["M_back"] == pytest.approx(-row["M_middle"], rel=1e-10)
+
+
+def test_a_section_through_what_is_pulled_along(comm: Any) -> None:
+    """An inclined wall under a tangential traction of its left face: the part of it above a cut through elements."""
+    angle = 0.7
+    mesh, tags = block(comm, lengths=(WIDTH, HEIGHT), divisions=(2, 5), angle=angle)
+    up, right = np.array([-np.sin(angle), np.cos(angle)]), np.array([np.cos(angle), np.sin(angle)])
+    pull = fem.TangentialTraction(tags["left"], tuple(3e3 * up + 7e3 * right))
+    problem = linear(fem.assemble(mesh, CONCRETE, clamped=tags["bottom"], loads=pull))
+    state = vc.static_equilibrium(problem, solver=vc.Condensed())
+    row = fem.SectionForces({"a": (1.9 * up, 1.9 * up + WIDTH * right)}, loads=pull).start(problem, state)
+    force = 3e3 * (HEIGHT - 1.9)
+    assert row["N_a"] == pytest.approx(force, rel=1e-10)
+    assert row["V_a"] == pytest.approx(0.0, abs=1e-10 * force)
+    assert row["M_a"] == pytest.approx(-force * 0.5 * WIDTH, rel=1e-10)
 
 
 def test_reactions_carry_all_loads(comm: Any, caplog: pytest.LogCaptureFixture) -> None:

@@ -40,6 +40,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "exact/test_exact_hertz.py": "exact.hertz",
     "fem/test_assembly.py": "fem.assembly_checks",
     "fem/test_corners.py": "core.corners laws.mass_transfer",
+    "fem/test_forces_in_space.py": "fem.output.cut_cells",
     "fem/test_mortar_in_space.py": "fem.contact.clipping",
     "fem/test_pairs.py": "fem.contact.matching",
     "fem/test_section_forces.py":

@@ -202,14 +202,17 @@ class _Trace:
         self.left, self.right = d.max(axis=1) > 0.0, d.min(axis=1) < 0.0
         self.faces = np.count_nonzero(d == 0.0, axis=1) > s.shape[2]
         self.low, self.high = np.full(s.shape[::2], np.inf), np.full(s.shape[::2], -np.inf)
+        near = (self.left & self.right) | (d == 0.0).any(axis=1)
+        low, high, s, d = self.low[near], self.high[near], s[near], d[near]
         for i in range(s.shape[1]):
             for j in range(s.shape[1]):
                 rise = d[:, j] - d[:, i]
                 cuts = (d[:, i] <= 0.0) & (d[:, j] >= 0.0) & (rise > 0.0)
                 share = np.divide(-d[:, i], rise, out=np.zeros_like(rise), where=cuts)
                 at = s[:, i] + share[:, None] * (s[:, j] - s[:, i])
-                self.low = np.where(cuts[:, None], np.minimum(self.low, at), self.low)
-                self.high = np.where(cuts[:, None], np.maximum(self.high, at), self.high)
+                low = np.where(cuts[:, None], np.minimum(low, at), low)
+                high = np.where(cuts[:, None], np.maximum(high, at), high)
+        self.low[near], self.high[near] = low, high
         self.touches = ((self.low <= size + tol) & (self.high >= -tol)).all(axis=1)
         self.inner = ((self.low < size - tol) & (self.high > tol)).all(axis=1)
         self.beyond = self.touches & np.hstack([self.low < -tol, self.high > size + tol]).T
