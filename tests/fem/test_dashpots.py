@@ -7,8 +7,9 @@ import math
 
 import numpy as np
 import pytest
-from fem_problems import linear
-from soil import SOIL, burst, energies, history, strip
+from fem_problems import block, field, linear
+from mpi4py import MPI
+from soil import SOIL, burst, column_of, energies, history, strip
 from wave_packet import energy_sent_back
 
 import vi_contact as vc
@@ -118,6 +119,139 @@ def test_compliant_base(comm, wave):
     assert np.abs(top[t > shake.duration + 1.2 * crossing]).max() < 2e-3 * peak  # the echo, 1e-6 of the energy
 
 
+SIDES = (("left", "right"), ("bottom", "top"), ("back", "front"))  # of a box: x, y, z
+P, S = SOIL.rho * SOIL.c_p, SOIL.rho * SOIL.c_s  # impedances [Pa s/m]
+
+
+def resistance(system):
+    """Rᵀ C R [N s/m] of a body that moves as a whole."""
+    R = system.influence
+    return system.space.comm.sum(np.array([[r @ (system.C @ q) for q in R.T] for r in R.T]))
+
+
+@pytest.mark.parametrize("simplices", [False, True])
+@pytest.mark.parametrize("angle", [0.0, 0.4])
+def test_faces_of_a_box_have_their_impedance(comm, simplices, angle):
+    """Together rho c_P A along the normals and rho c_S A along the faces, exactly, however the box is turned."""
+    mesh, tags = block(comm, lengths=(2.0, 1.0, 3.0), divisions=(2, 2, 3), simplices=simplices, angle=angle)
+    axes = np.array([[np.cos(angle), np.sin(angle), 0.0], [-np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])
+    wanted = np.zeros((3, 3))
+    for name, axis, area in (("left", 0, 3.0), ("bottom", 1, 6.0), ("front", 2, 2.0), ("right", 0, 3.0)):
+        one = fem.assemble(mesh, SOIL, dashpots=fem.Dashpots(tags[name]))
+        exact = area * (S * np.eye(3) + (P - S) * np.outer(axes[axis], axes[axis]))
+        np.testing.assert_allclose(resistance(one), exact, rtol=0.0, atol=1e-12 * exact.max())
+        wanted += exact
+    every = fem.assemble(mesh, SOIL, dashpots=[fem.Dashpots(tags[n]) for n in ("left", "bottom", "front", "right")])
+    np.testing.assert_allclose(resistance(every), wanted, rtol=0.0, atol=1e-12 * wanted.max())
+
+
+def test_nodes_on_edges_and_corners_have_the_dashpots_of_all_their_faces(comm):
+    """A quarter of the area of every cell face round a node, P along its normal, S along it: one face, two, three."""
+    mesh, tags = block(comm, lengths=(2.0, 1.0, 3.0), divisions=(2, 2, 3))  # cells of 1 m x 0.5 m x 1 m
+    quarter = {"left": (0, 0.125), "bottom": (1, 0.25), "back": (2, 0.125)}
+    system = fem.assemble(mesh, SOIL, dashpots=[fem.Dashpots(tags[name]) for name in quarter])
+    for c, rigid in enumerate(system.influence.T):
+        points, force = field(system, system.C @ rigid)
+        for point, cells in (
+            ((0.0, 0.0, 0.0), {"left": 1, "bottom": 1, "back": 1}), ((0.0, 0.0, 1.0), {"left": 2, "bottom": 2}),
+            ((1.0, 0.0, 0.0), {"bottom": 2, "back": 2}), ((0.0, 0.5, 0.0), {"left": 2, "back": 2}),
+            ((1.0, 0.0, 1.0), {"bottom": 4}), ((1.0, 0.5, 1.0), {}), ((2.0, 1.0, 3.0), {}),
+        ):
+            found = force[np.abs(points - point).max(axis=1) < 1e-9][0, c]
+            shares = [count * quarter[name][1] * (P if quarter[name][0] == c else S) for name, count in cells.items()]
+            assert abs(found - sum(shares)) < 1e-12 * P
+
+
+@pytest.mark.parametrize("simplices", [False, True])
+def test_a_curved_face_has_its_impedance_in_the_limit(comm, simplices):
+    """A patch of a sphere, whose facets of hexahedra are not plane: the integral over the sphere, of second order."""
+    def bulging(x):  # from y = 1 on to y = 2, where the points are 2 m from the origin
+        rays = np.column_stack([x[:, 0], np.ones(len(x)), x[:, 2]])
+        return rays * (1.0 + (x[:, 1] - 1.0) * (2.0 / np.linalg.norm(rays, axis=1) - 1.0))[:, None]
+
+    s, w = np.polynomial.legendre.leggauss(20)
+    a, b = np.meshgrid(0.5 * s, 0.5 * s)
+    rays = np.stack([a, np.ones_like(a), b], axis=-1)
+    weights = 4.0 * np.outer(w, w) / 4.0 / np.linalg.norm(rays, axis=-1) ** 3
+    normals = rays / np.linalg.norm(rays, axis=-1)[..., None]
+    exact = S * weights.sum() * np.eye(3) + (P - S) * np.einsum("ij,ijk,ijl->kl", weights, normals, normals)
+    errors = []
+    for n in (2, 4):
+        mesh, tags = block(comm, lengths=(1.0, 1.0, 1.0), corner=(-0.5, 1.0, -0.5), divisions=(n, 1, n),
+                           simplices=simplices, deform=bulging)
+        errors.append(np.abs(resistance(fem.assemble(mesh, SOIL, dashpots=fem.Dashpots(tags["top"]))) - exact).max())
+    assert errors[0] < 0.05 * exact.max() and errors[1] < 0.3 * errors[0]
+
+
+@pytest.mark.serial  # ranks change nothing of it: the compliant base of a box shows that
+@pytest.mark.parametrize("wave, axis, moves, solver", [
+    ("P", 1, 1, vc.Condensed()), ("S", 0, 1, vc.Condensed()), ("S", 2, 0, vc.Iterative()),
+])
+def test_waves_at_right_angles_leave_a_box(comm, wave, axis, moves, solver):
+    """V8.1: P and both S waves, along every axis, sides tied both ways: what is left of the energy falls with the
+    fourth power of h, as the square of the mesh's reflection, which is that of its error of dispersion."""
+    speed, left = WAVES[wave][0], []
+    for cells in (80, 160):
+        h = HEIGHT / cells
+        lengths, divisions = (tuple(one if c == axis else other for c in range(3)) for one, other in ((HEIGHT, h),
+                                                                                                   (cells, 1)))
+        mesh, tags = block(comm, lengths=lengths, divisions=divisions)
+        tied = [fem.Tied(tags[one], tags[two]) for c, (one, two) in enumerate(SIDES) if c != axis]
+        push = fem.Traction(tags[SIDES[axis][1]], tuple(1e4 * np.eye(3)[moves]), history=burst(5.0 / speed))
+        system = fem.assemble(mesh, SOIL, tied=tied, loads=push, dashpots=fem.Dashpots(tags[SIDES[axis][0]]))
+        steps = round(1.5 * cells) * 2
+        energy = energies(linear(system), dt=0.5 * h / speed, steps=steps, solver=solver)
+        left.append(energy[-1] / energy.max())
+    assert left[0] < 1e-5 and left[1] < 0.2 * left[0]
+
+
+@pytest.mark.parametrize("simplices, solver", [(False, vc.Condensed()), (True, vc.Iterative(tolerance=1e-12))])
+def test_compliant_base_of_a_box(comm, simplices, solver):
+    """V8.2 in three components at once, P impedance for the vertical one: the discrete column to round-off, and the
+    outcrop's motion at the surface (1 %)."""
+    mesh, tags = block(comm, lengths=(1.0, 15.0, 0.5), divisions=(1, 30, 1), simplices=simplices)
+    waves = [vc.Ricker(1.0, c / length, direction=tuple(e))
+             for c, length, e in zip((SOIL.c_s, SOIL.c_p, SOIL.c_s), (30.0, 15.0, 40.0), np.eye(3), strict=True)]
+    up = soil.upgoing(waves, dt=1e-4)
+    assert np.array_equal(up(0.03), sum(soil.upgoing(one, dt=1e-4)(0.03) for one in waves))
+    system = fem.assemble(mesh, SOIL, tied=[fem.Tied(tags[one], tags[two]) for one, two in (SIDES[0], SIDES[2])],
+                          dashpots=fem.CompliantBase(tags["bottom"], motion=up))
+    dt = 0.7 * 0.5 / SOIL.c_p
+    run = {"dt": dt, "steps": math.ceil(0.35 / dt)}
+    heights = np.linspace(0.0, 15.0, 31)
+    found = history(linear(system), [(0.0, y, 0.0) for y in heights], derivative=1, solver=solver, **run)
+    for plane in ([0, 1], [2, 1]):
+        column = column_of(SOIL, heights).on_dashpots(S, P, lambda t, c=plane: up(t)[c])
+        exact = np.array([state.v for state, _ in vc.march(column, **run)]).reshape(-1, 31, 2)
+        assert np.abs(found[..., plane] - exact).max() < (1e-9 if simplices else 1e-11) * np.abs(exact).max()
+    t = dt * np.arange(1, run["steps"] + 1)
+    for c, speed in enumerate((SOIL.c_s, SOIL.c_p, SOIL.c_s)):
+        outcrop = 2.0 * np.array([up(s - 15.0 / speed)[c] for s in t])
+        assert np.abs(found[:, -1, c] - outcrop).max() < 0.01 * np.abs(outcrop).max()
+
+
+@pytest.mark.slow
+def test_contact_between_dashpots(comm):
+    """Contact nodes on edges that have dashpots too: a box falls on a plane between absorbing sides. What leaves is in
+    the ledger, the forces are as symmetric as the box, both routes and one rank alone find the same."""
+    plane, found = vc.HalfSpace((0.0, -1e-4, 0.0), (0.0, 1.0, 0.0)), []
+    condensed, iterative = vc.Condensed(), vc.Iterative(tolerance=1e-12)
+    for ranks, solver in ((comm, condensed), (comm, iterative), (MPI.COMM_SELF, condensed)):
+        mesh, tags = block(ranks, lengths=(2.0, 2.0, 2.0), divisions=(4, 4, 4))
+        sides = [fem.Dashpots(tags[name]) for pair in (SIDES[0], SIDES[2]) for name in pair]
+        system = fem.assemble(mesh, SOIL, dashpots=sides, initial_velocity=(0.0, -0.5, 0.0))
+        surface = fem.contact_surface(system, tags["bottom"], obstacle=plane)
+        problem = vc.ContactProblem(system, surface, friction=vc.Coulomb(0.3))
+        run = vc.simulate(problem, dt=1e-4, steps=40, solver=solver, record=[vc.Energy(), vc.Contact()], progress=False)
+        h, force = run.history, np.abs(run.history["contact_force_y"]).max()
+        assert h["contact_max_slip"][-1] > 0.0 and run.facts["worst_certificate"] < 1e-10
+        assert h["loss_damping"][-1] > 0.1 * h["energy_kinetic"][0]
+        assert np.abs(h["energy_defect"]).max() < 1e-10 * h["energy_kinetic"][0]
+        assert max(np.abs(h[f"friction_force_{c}"]).max() for c in "xz") < 1e-9 * force
+        found.append((h["contact_force_y"] / force, h["contact_max_slip"] / h["contact_max_slip"][-1]))
+    assert np.abs(np.array(found) - found[0]).max() < 1e-8
+
+
 def test_the_base_says_what_it_expects(comm, caplog):
     """In the log, and in the summary of a run; a second shaking is refused."""
     with caplog.at_level(logging.INFO, logger="vi_contact.fem.dashpots"):
@@ -147,3 +281,19 @@ def test_held_and_dashed_is_refused(comm):
         fem.assemble(mesh, SOIL, dashpots=fem.Dashpots(tags["bottom"], normal=0.0, tangential=0.0))
     with pytest.raises(InputError, match="Dashpots: normal is -1"):
         fem.Dashpots(tags["bottom"], normal=-1.0)
+
+
+def test_what_does_not_fit_a_box_is_refused(comm):
+    """A motion of two components, several motions that disagree or none at all, a side that is held and damped."""
+    mesh, tags = block(comm, lengths=(1.0, 1.0, 1.0), divisions=(1, 1, 1))
+    plane, space = vc.Ricker(1.0, 10.0), vc.Ricker(1.0, 10.0, direction=(0.0, 1.0, 0.0))
+    with pytest.raises(InputError, match=r"CompliantBase: motion\(0\) is \[0. 0.\]: return 3 finite velocities"):
+        fem.assemble(mesh, SOIL, dashpots=fem.CompliantBase(tags["bottom"], motion=soil.upgoing(plane, dt=1e-3)))
+    for waves in ([], [plane, space]):
+        with pytest.raises(InputError, match="directions of the same number of components"):
+            soil.upgoing(waves, dt=1e-3)
+    rollers = fem.Prescribed(tags["front"], components=(2,))
+    with pytest.raises(InputError, match="'front' has dashpots in a direction that is prescribed on 'front'"):
+        fem.assemble(mesh, SOIL, prescribed=rollers, dashpots=fem.Dashpots(tags["front"]))
+    beside = fem.assemble(mesh, SOIL, prescribed=rollers, dashpots=fem.Dashpots(tags["left"]))
+    assert beside.C is not None

@@ -6,7 +6,7 @@ from collections import deque
 
 import numpy as np
 import pytest
-from fem_problems import linear
+from fem_problems import block, linear
 from layered import SHAKE, STIFF, middles
 from soil import SOIL, history, strip
 
@@ -93,3 +93,6 @@ def test_sides_that_cannot_be_are_refused(comm):
     base = fem.CompliantBase(tags["bottom"], motion=UP)
     with pytest.raises(InputError, match="held, but its base is compliant"):
         fem.assemble(mesh, SOIL, clamped=tags["bottom"], dashpots=soil.FreeField(tags["left"], base=base))
+    mesh, tags = block(comm, lengths=(1.0, 1.0, 1.0), divisions=(1, 1, 1))
+    with pytest.raises(InputError, match="FreeField is for bodies in the plane: tie the sides of others"):
+        fem.assemble(mesh, SOIL, clamped=tags["bottom"], dashpots=soil.FreeField(tags["left"], base=SHAKE))

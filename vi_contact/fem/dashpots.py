@@ -89,7 +89,9 @@ class CompliantBase(Dashpots):
 
     def loads(self, matrix: "DashpotMatrix", forms: Any) -> BoundaryLoads:
         """Return the load of the upgoing wave, 2 Pᵀ D v_up."""
-        return BoundaryLoads(viscous=(matrix.moved_by(self.motion, 2.0),))
+        load = matrix.moved_by(self.motion, 2.0)
+        load(0.0)  # a motion of other components is refused before any work
+        return BoundaryLoads(viscous=(load,))
 
     @property
     def expects(self) -> str:

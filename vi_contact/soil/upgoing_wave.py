@@ -5,10 +5,13 @@ profile holds what came back down and is of no use here without deconvolution. W
 expects the *within* motion, a compliant base the *upgoing* one (Mejia and Dawson 2006).
 """
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
 
 from ..core.algebra import Array
 from ..core.checks import flag, number, provides
+from ..core.errors import InputError
 from ..core.problem_checks import EXCITATION
 from ..core.protocols import Excitation
 from ..ground_motion.excitation import GroundMotion
@@ -37,18 +40,25 @@ class UpgoingVelocity:
 
 
 def upgoing(
-    motion: Record | Excitation, *, direction: tuple[float, ...] = (1.0, 0.0), dt: float | None = None,
-    outcrop: bool = True,
-) -> UpgoingVelocity:
+    motion: Record | Excitation | Sequence[Excitation], *, direction: tuple[float, ...] = (1.0, 0.0),
+    dt: float | None = None, outcrop: bool = True,
+) -> Callable[[float], Array]:
     """Return the upgoing velocity of a motion: half its velocity, or all when ``outcrop`` is False (already upgoing).
 
-    motion: a record, along ``direction``, or an excitation, which has its own. dt: step of the integration [s], of the
-    record when None. A record keeps its drift: correct its baseline first (``baseline_corrected``).
-    InputError for an excitation other than a record without dt, or a dt that is not positive.
+    motion: a record, along ``direction``, or an excitation, which has its own, or several, which act together (the
+    components of an earthquake). dt: step of the integration [s], of the record when None. A record keeps its drift:
+    correct its baseline first (``baseline_corrected``).
+    InputError for an excitation other than a record without dt, a dt that is not positive, none at all, or directions
+    of different numbers of components.
     """
     flag("upgoing", "outcrop", outcrop)
+    if isinstance(motion, Sequence):
+        waves = [upgoing(one, direction=direction, dt=dt, outcrop=outcrop) for one in motion]
+        if len({len(wave(0.0)) for wave in waves}) != 1:
+            raise InputError("upgoing needs one or more excitations with directions of the same number of components")
+        return lambda t: np.asarray(np.sum([wave(t) for wave in waves], axis=0))
     if not isinstance(motion, Record):
-        provides("upgoing", "motion", motion, EXCITATION, "give a Record or an excitation")
+        provides("upgoing", "motion", motion, EXCITATION, "give a Record or an excitation, or a list of excitations")
     excitation = GroundMotion(motion, direction=direction) if isinstance(motion, Record) else motion
     if dt is None and isinstance(excitation, GroundMotion):
         dt = excitation.record.dt
