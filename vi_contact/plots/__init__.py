@@ -6,9 +6,11 @@ The ending of a file's name says its format: docs/guide/outputs.md."""
 from ..core.lazy import lazy
 
 _CONTENTS = {
+    "bodies": ("film", "plot_deformed"),
     "channel": ("Outline", "plot_envelope", "plot_interface", "plot_openings", "plot_rocking"),
     "channel_mesh": ("animate",),
     "deformed": ("read_frames", "read_tractions"),
+    "faces": ("plot_faces",),
     "histories": ("plot_certificate", "plot_energy", "plot_excitation", "plot_points", "plot_runs"),
     "maps": ("plot_contact",),
     "records": ("plot_loop", "plot_motion", "plot_spectra", "plot_transfer"),

@@ -1,25 +1,41 @@
-"""Read deformed bodies in the plane and their contact tractions from the folder of a run, to draw them.
+"""Read bodies and what happens on their contact from the folder of a run, in the plane and in space, to draw them.
 
 A run that writes fields (``fields=fem.XDMF(every=...)``) and records ``Contact()`` leaves all that is needed there.
 """
 
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from ..core.algebra import Array, Indices
 from ..core.errors import InputError
-from ..core.files import FIELDS, frames_of
-from ..run.files.folder import HISTORY_H5
-from ..run.files.reading import read_run
+from ..core.files import FIELDS, frames_of, open_hdf5
+from ..engineering.resultants import Geometry, tangent_vectors
+from ..run.files.reading import RunFolder, read_run
+
+OPEN, STICK, SLIP = 1, 2, 3  # as contact_status in fields.xdmf
+SAME = 1e-6  # of the size of what is drawn: what lies at one place or in one plane
+FACING = 0.5  # least cosine between the contact direction of a node and the normals of its facets
+_SIDES = {  # the sides of a cell by (dimension, corners), its corners in the order of VTK
+    (2, 3): ((0, 1), (1, 2), (2, 0)), (2, 4): ((0, 1), (1, 2), (2, 3), (3, 0)),
+    (3, 4): ((0, 1, 2), (0, 1, 3), (0, 2, 3), (1, 2, 3)),
+    (3, 8): ((0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
+}
 
 
 @dataclass(frozen=True)
 class Tractions:
-    """Hold contact tractions on the body: ``points`` (m, 2) [m]; ``normals``, ``tangents`` (m, 2), the normals towards
-    the support; times ``t`` (k,) [s]; pressures ``normal`` (k, m) [Pa] and shear tractions ``shear`` (k, m) [Pa] of the
-    support on the body along the tangents."""
+    """Hold contact tractions on the body: ``points``, ``normals`` (m, d) [m], the normals towards the support;
+    ``tangents`` (m, d, d - 1); times ``t`` (k,) [s]; pressures ``normal`` (k, m) [Pa] and shear tractions ``shear``
+    (k, m, d - 1) [Pa] of the support on the body along the tangents."""
 
     points: Array
     normals: Array
@@ -29,14 +45,14 @@ class Tractions:
     shear: Array
 
     def at(self, t: float) -> tuple[Array, Array]:
-        """Return (pressure, shear) of the step that ends next to t."""
+        """Return (pressure (m,), shear (m, d) along the axes) of the step that ends next to t."""
         row = int(np.argmin(np.abs(self.t - t)))
-        return self.normal[row], self.shear[row]
+        return self.normal[row], np.einsum("mj,mij->mi", self.shear[row], self.tangents)
 
 
 @dataclass(frozen=True)
 class StoredFrames:
-    """Hold fields of a run: ``points`` (n, 2) [m], ``cells`` (c, corners), times ``t`` (f,) [s], (file, group) each."""
+    """Hold fields of a run: ``points`` (n, d) [m], ``cells`` (c, corners), times ``t`` (f,) [s], (file, group) each."""
 
     points: Array
     cells: Indices
@@ -44,38 +60,112 @@ class StoredFrames:
     places: tuple[tuple[Path, str], ...]
 
     def at(self, t: float) -> tuple[float, Array, Array]:
-        """Return (its time [s], u (n, 2) [m], von Mises stress (c,) [Pa]) of the frame nearest to t."""
-        import h5py
-
+        """Return (its time [s], u (n, d) [m], von Mises stress (c,) [Pa]) of the frame nearest to t."""
         row = int(np.argmin(np.abs(self.t - t)))
         path, group = self.places[row]
-        with h5py.File(path) as file:
-            return float(self.t[row]), file[group]["u"][:, :2], file[group]["von_mises"][:]
+        with _opened(path) as file:
+            return float(self.t[row]), file[group]["u"][:, : self.points.shape[1]], file[group]["von_mises"][:]
+
+    @cached_property
+    def bodies(self) -> Indices:
+        """Return the number (c,) of the body of each cell: cells that share nodes are of one body."""
+        cell = np.repeat(np.arange(len(self.cells)), self.cells.shape[1])
+        shape = len(self.cells), len(self.points)
+        shared = coo_matrix((np.ones(len(cell)), (cell, self.cells.ravel())), shape).tocsr()
+        nodes = connected_components(shared.T @ shared, directed=False)[1][self.cells[:, 0]]
+        return np.asarray(np.unique(nodes, return_inverse=True)[1].ravel())
+
+    @cached_property
+    def boundary(self) -> tuple[Indices, Indices]:
+        """Return the sides of cells (s, corners) that are no other cell's, and the cell (s,) of each."""
+        sides = self.cells[:, np.array(_SIDES[self.points.shape[1], self.cells.shape[1]])]
+        rows = np.sort(sides.reshape(-1, sides.shape[2]), axis=1)
+        _, first, counts = np.unique(rows, axis=0, return_index=True, return_counts=True)
+        alone = np.sort(first[counts == 1])
+        return sides.reshape(rows.shape)[alone], alone // sides.shape[1]
+
+    def facing(self, contact: Geometry) -> tuple[Indices, Indices]:
+        """Return the boundary's sides whose corners are contact points, as conditions (s, corners), and the node (m,)
+        of each condition: on the body that its direction points away from, not on one that it touches there."""
+        sides, cell = self.boundary
+        nodes, place = np.unique(sides, return_inverse=True)
+        reach = SAME * float(np.ptp(self.points, axis=0).max())
+        tree = cKDTree(contact.points)
+        _, near = tree.query(self.points[nodes], k=[1, 2, 3, 4], distance_upper_bound=reach)
+        candidates = near[place.ravel()].reshape(*sides.shape, 4)  # those of all faces at this place; m: none
+        outwards = self._outwards(sides, cell)
+        normals = np.vstack([contact.normals, np.zeros_like(contact.normals[:1])])
+        cosines = np.einsum("scki,si->sck", normals[candidates], outwards)
+        chosen = np.take_along_axis(candidates, cosines.argmax(axis=2)[:, :, None], axis=2)[:, :, 0]
+        found = np.all(cosines.max(axis=2) > FACING, axis=1)
+        node = cKDTree(self.points).query(contact.points)[1]
+        node[chosen[found]] = sides[found]
+        return chosen[found], node
+
+    def _outwards(self, sides: Indices, cell: Indices) -> Array:
+        """Unit normals (s, d) of sides, away from their cells."""
+        corners = self.points[sides]
+        if corners.shape[2] == 2:
+            way = corners[:, 1] - corners[:, 0]
+            normals = np.column_stack([way[:, 1], -way[:, 0]])
+        else:  # of quadrilaterals by their diagonals
+            normals = np.cross(corners[:, 2] - corners[:, 0], corners[:, -1] - corners[:, 1])
+        away = corners.mean(axis=1) - self.points[self.cells[cell]].mean(axis=1)
+        normals *= np.sign(np.sum(normals * away, axis=1))[:, None]
+        return np.asarray(normals / np.linalg.norm(normals, axis=1)[:, None])
+
+
+def contact_states(history: Mapping[str, Array]) -> Array:
+    """Return 1 open, 2 stick, 3 slip, (rows, m): closed points slip when their slip changed since the row before.
+
+    Changes below 1e-9 of the largest one are rounding. In the first row, and without friction, closed points stick.
+    """
+    rows = len(history["t"])
+    active = np.reshape(history["active"], (rows, -1)).astype(bool)
+    change = np.zeros(active.shape)
+    if "slip" in history:
+        change[1:] = np.linalg.norm(np.diff(np.reshape(history["slip"], (*active.shape, -1)), axis=0), axis=2)
+    moved = change > 1e-9 * np.max(change, initial=0.0)
+    return np.where(active, np.where(moved, SLIP, STICK), OPEN)
+
+
+def stored_tangents(contact: Geometry) -> Array:
+    """Return the tangents (m, d, d - 1) of slip and traction_t in a history; what is at one place is one node."""
+    return tangent_vectors(contact.normals, np.unique(contact.points, axis=0, return_inverse=True)[1].ravel())
 
 
 def read_tractions(folder: str | Path) -> Tractions:
-    """Read tractions from the history of a run in the plane. InputError for a folder without one."""
+    """Read tractions from the history of a run. InputError for a folder without one."""
     run = read_run(folder)
     contact, history = run.contact, run.history
-    if contact is None or "pressure" not in history or contact.points.shape[1] != 2:
-        raise InputError(f"'{folder}' is not of a finished run in the plane with Contact(): run it with both")
-    turned = np.column_stack([-contact.normals[:, 1], contact.normals[:, 0]])
-    along = np.count_nonzero(contact.normals, axis=1) == 1  # an axis: tangents of nodal frames are along the other one
-    tangents = np.where(along[:, None], np.abs(turned), turned)
-    shear = -history["traction_t"][:, :, 0] if "traction_t" in history else np.zeros_like(history["pressure"])
-    return Tractions(contact.points, contact.normals, tangents, history["t"], history["pressure"], shear)
+    if contact is None or "pressure" not in history or contact.points.shape[1] < 2:
+        raise InputError(f"'{folder}' is not of a finished run in plane or space with Contact(): run it with both")
+    pressure, tangents = history["pressure"], stored_tangents(contact)
+    shear = -history["traction_t"] if "traction_t" in history else np.zeros((*pressure.shape, tangents.shape[2]))
+    return Tractions(contact.points, contact.normals, tangents, history["t"], pressure, shear)
 
 
-def read_frames(folder: str | Path) -> StoredFrames:
-    """Read the frames from the fields of a run. InputError for a folder without them."""
-    import h5py
+def read_frames(run: RunFolder | str | Path) -> StoredFrames:
+    """Read the frames from the fields of a run in plane or space. InputError for a folder without them."""
+    folder = run.folder if isinstance(run, RunFolder) else Path(run)
+    places = frames_of(folder)
+    if places:
+        history = run.history if isinstance(run, RunFolder) else read_run(folder).history
+        times = dict(zip(history["k"].astype(int).tolist(), history["t"].tolist(), strict=True))
+        places = {k: places[k] for k in sorted(places) if k in times}  # not those whose rows a killed run has lost
+    if not places:
+        raise InputError(f"no frames in {folder / FIELDS}: run it with out and fields=fem.XDMF(every=...)")
+    with _opened(folder / FIELDS / "mesh.h5") as file:
+        points, cells = file["points"][:], file["cells"][:]
+    d = 3 if np.any(points[:, 2]) else 2  # a mesh of the plane is stored with z = 0
+    return StoredFrames(points[:, :d], cells, np.array([times[k] for k in places]), tuple(places.values()))
 
-    fields, history = Path(folder) / FIELDS, Path(folder) / HISTORY_H5
-    places = dict(sorted(frames_of(Path(folder)).items()))
-    if not places or not history.is_file():
-        raise InputError(f"no frames in {fields}: run it with out and fields=fem.XDMF(every=...)")
-    with h5py.File(history) as file:
-        times = dict(zip(file["k"][:].astype(int), file["t"][:], strict=True))
-    with h5py.File(fields / "mesh.h5") as file:
-        t = np.array([times[k] for k in places])
-        return StoredFrames(file["points"][:, :2], file["cells"][:], t, tuple(places.values()))
+
+@contextmanager
+def _opened(path: Path) -> Iterator[Any]:
+    """Open a file of fields; InputError when it is missing or damaged."""
+    try:
+        with open_hdf5(path) as file:
+            yield file
+    except (OSError, KeyError, ValueError, IndexError) as error:
+        raise InputError(f"'{path}' is missing or damaged: restore it, or draw without fields") from error

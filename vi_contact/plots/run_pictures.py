@@ -1,31 +1,38 @@
-"""Draw the pictures of a run from its folder alone: motion, energy, certificate, contact; of the channel a film too."""
+"""Draw the pictures of a run from its folder alone: motion, energy, certificate, contact, bodies, a film."""
 
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-from ..core.algebra import Array
 from ..core.errors import InputError
+from ..core.files import frames_of
 from ..core.surfaces import ContactSurface
 from ..run.files.reading import ContactGeometry, RunFolder
-from .channel import Outline, opening, plot_envelope, plot_interface, plot_openings, plot_rocking
-from .channel_mesh import animate, read_bodies
+from .bodies import film, plot_deformed
+from .channel import Outline, plot_envelope, plot_interface, plot_openings, plot_rocking
+from .deformed import read_frames
+from .faces import plot_faces
 from .histories import History, plain, plot_certificate, plot_energy, plot_excitation, plot_points, shaken
 from .maps import arc_position, plot_contact
 
 SOIL = "_soil"  # after the label of a point: that of the soil which touches it
-FILM_FRAMES = 48  # at most: a film of two megabytes
-DRAWN = 0.15  # of the channel's height: how large its largest displacement is drawn
 
 
 def draw_run(run: RunFolder, out: Path, *, title: str, unilateral: Sequence[str] | None = None) -> list[Path]:
-    """Draw all pictures of a run folder into ``out``, of the buried channel those of its interface too.
+    """Draw all pictures of a run folder into ``out``: of its histories, of the buried channel its interface, in space
+    the contact faces, with fields the deformed bodies and a film of them.
 
     ``unilateral``: labels of probes that are contact points, drawn with their bound (see ``plot_points``).
     """
     drawn = draw_histories(run.history, run.contact, out, title=title, unilateral=unilateral)
-    return drawn + (illustrate(run, out, title=plain(title)) if of_channel(run) else [])
+    if of_channel(run):
+        drawn += illustrate(run, out, title=plain(title))
+    if run.contact is not None and run.contact.points.shape[1] == 3 and "active" in run.history:
+        drawn.append(plot_faces(run, out / "faces.png", title=title))
+    if frames_of(run.folder) and read_frames(run).cells.shape[1] > 2:  # no bars
+        drawn += [plot_deformed(run, out / "deformed.png", title=title), film(run, out / "film.gif", title=title)]
+    return drawn
 
 
 def draw_histories(
@@ -58,43 +65,16 @@ def of_channel(run: RunFolder) -> bool:
 
 
 def illustrate(run: RunFolder, folder: Path, *, title: str = "Buried channel") -> list[Path]:
-    """Draw openings.png, rocking.png, interface.png and envelope.png of a run of the buried channel into a folder, and
-    with fields channel.gif, around the widest opening.
+    """Draw openings.png, rocking.png, interface.png and envelope.png of a run of the buried channel into a folder.
 
     Returns what was drawn. InputError for another run.
     """
     if run.contact is None or not of_channel(run):
         raise InputError(f"'{run.folder}' is not of a finished run of the buried channel: give the folder of one")
     outline = Outline.of(run.contact.points, run.contact.normals)
-    drawn = [
+    return [
         plot_openings(run.history, folder / "openings.png", title=f"{title}, openings of the interface"),
         plot_rocking(run.history, folder / "rocking.png", title=f"{title}, bottom corners"),
         plot_interface({"": run.history}, outline, folder / "interface.png", title=f"{title}, interface"),
         plot_envelope({title: run.history}, outline, folder / "envelope.png", title=f"{title}, envelopes"),
     ]
-    if (run.folder / "fields" / "mesh.h5").is_file():
-        tops = {
-            "top of the left wall": opening(run.history, "19", (-1.0, 0.0)),
-            "of the right wall": opening(run.history, "13", (1.0, 0.0)),
-        }
-        widest = float(run.history["t"][int(np.argmax(sum(tops.values())))])
-        times, magnified = film(run.folder, widest)
-        drawn.append(animate(run.folder, folder / "channel.gif", title=title, history=run.history, openings=tops,
-                             times=times.tolist(), magnified=magnified))
-    return drawn
-
-
-def film(folder: Path, around: float) -> tuple[Array, float]:
-    """Return (times of the frames next to a moment [s], a round factor that makes their displacements visible)."""
-    bodies = read_bodies(folder)
-    frames = bodies.frames
-    first = int(np.argmin(np.abs(frames.t - around))) - FILM_FRAMES // 2
-    first = max(min(first, len(frames.t) - FILM_FRAMES), 0)
-    times = frames.t[first : first + FILM_FRAMES]
-    own = np.unique(frames.cells[bodies.cells])
-    largest = max(float(np.abs(frames.at(t)[1][own]).max()) for t in times)
-    if largest == 0.0:
-        return times, 1.0
-    factor = DRAWN * bodies.height / largest
-    power = 10.0 ** np.floor(np.log10(factor))
-    return times, float(max(step for step in (1.0, 2.0, 5.0) if step * power <= factor) * power)

@@ -1,0 +1,183 @@
+"""Pictures of contact in space, drawn from the folder of a small run with friction between blocks whose meshes do not
+match: what they show is what was recorded."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from kept_figures import keep_figures
+
+pytest.importorskip("dolfinx")
+pytest.importorskip("matplotlib")
+from mpi4py import MPI
+from two_bodies import SOFT, two_blocks
+
+import vi_contact as vc
+from vi_contact import fem
+from vi_contact.core.errors import InputError
+from vi_contact.meshes.block import BlockMesh
+from vi_contact.meshes.two_blocks import TwoBlocks
+from vi_contact.plots import bodies, faces
+from vi_contact.plots.bodies import film, plot_deformed
+from vi_contact.plots.deformed import OPEN, SLIP, STICK, contact_states, read_frames
+from vi_contact.plots.faces import faces_of, plot_faces
+from vi_contact.run.files.reading import RunFolder, read_run
+
+pytestmark = pytest.mark.serial
+STEPS, DT = 30, 1e-3
+
+
+def rubbed(folder: Path, simplices: bool) -> RunFolder:
+    """A block of 3 x 3 x 3 cells on one of 4 x 2 x 4, which is wider by half of it; pressed and pushed aside."""
+    lower, upper = (
+        BlockMesh(lengths=lengths, divisions=divisions, simplices=simplices)
+        for lengths, divisions in (((2.0, 1.0, 2.0), (4, 2, 4)), ((1.0, 1.0, 1.0), (3, 3, 3)))
+    )
+
+    def push(x: Any, t: float) -> Any:
+        return np.tile(min(t / 0.01, 1.0) * np.array([2.2e3, -4.0e3, 1.1e3]), (len(x), 1))
+
+    system, tags = two_blocks(
+        MPI.COMM_SELF, TwoBlocks(lower=lower, upper=upper, offset=(0.5, 0.5)), SOFT,
+        clamped=lambda tags: tags["lower_bottom"], loads=lambda tags: [fem.Traction(tags["upper_top"], push)],
+    )
+    surface = fem.contact_pair(system, tags["upper_bottom"], tags["lower_top"], matching=fem.DualMortar())
+    problem = vc.ContactProblem(system, surface, friction=vc.Coulomb(0.3))
+    vc.simulate(problem, dt=DT, steps=STEPS, out=folder, record=[vc.Contact()], fields=fem.XDMF(every=3),
+                progress=False)
+    return read_run(folder)
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, RunFolder]:
+    found = {kind: rubbed(tmp_path_factory.mktemp(kind), kind == "tetrahedra") for kind in ("hexahedra", "tetrahedra")}
+    for run in found.values():
+        states = contact_states(run.history)
+        assert all(np.any(states == state) for state in (OPEN, STICK, SLIP))
+    return found
+
+
+@pytest.fixture
+def figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+    return keep_figures(monkeypatch, bodies, faces)
+
+
+@pytest.mark.parametrize("kind", ["hexahedra", "tetrahedra"])
+def test_what_belongs_to_whom(runs: Any, kind: str) -> None:
+    """Bodies by what their cells share; the surface of both; the sides of the face are those of the upper block alone,
+    though the lower one has nodes at the same places; their shares are as large as the weights."""
+    run, frames = runs[kind], read_frames(runs[kind])
+    per_cell, per_side = (1, 1) if kind == "hexahedra" else (6, 2)
+    assert np.bincount(frames.bodies).tolist() == [32 * per_cell, 27 * per_cell]
+    sides, cells = frames.boundary
+    boxes = (2 * 16 + 4 * 8, 6 * 9)
+    assert np.bincount(frames.bodies[cells]).tolist() == [per_side * count for count in boxes]
+    facing, nodes = frames.facing(run.contact)
+    assert len(facing) == 9 * per_side
+    assert np.array_equal(frames.points[nodes], run.contact.points)
+    assert np.all(np.isin(nodes, frames.cells[frames.bodies == 1]))
+    (face,) = faces_of(run.contact, facing)
+    assert face.name == "face towards -y" and np.array_equal(face.conditions, np.arange(16))
+    shares, conditions = face.shares(run.contact.points)
+    areas = 0.5 * np.linalg.norm(np.cross(shares[:, 2] - shares[:, 0], shares[:, 3] - shares[:, 1]), axis=1)
+    weights = np.bincount(conditions, areas)
+    assert weights.sum() == pytest.approx(1.0, rel=1e-12)
+    assert weights == pytest.approx(run.contact.weights, rel=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["hexahedra", "tetrahedra"])
+def test_faces(runs: Any, kind: str, figures: list[Any], tmp_path: Path) -> None:
+    """Pressures, states and slips of the rows next to the times, on the shares of their points."""
+    run, times = runs[kind], (0.0, 0.0151, STEPS * DT)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        path = plot_faces(run, tmp_path / "faces.png", times=times, title="$")
+    assert path.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+    history, axes = run.history, figures[0].axes[:6]
+    conditions = read_frames(run).facing(run.contact)[0].ravel()
+    states, slip = contact_states(history), history["slip"]
+    for column, row in enumerate((0, 15, STEPS)):
+        over, under = axes[column], axes[3 + column]
+        assert over.get_title() == f"face towards -y, t = {row * DT:.4g} s"
+        assert (over.get_xlabel(), over.get_ylabel()) == ("x [m]", "z [m]") == (under.get_xlabel(), under.get_ylabel())
+        pressure = over.collections[0]
+        assert np.asarray(pressure.get_array()) == pytest.approx(1e-3 * history["pressure"][row, conditions])
+        shown = pressure.to_rgba(pressure.get_array())
+        open_points = history["active"][row, conditions] == 0
+        assert np.array_equal(np.all(shown[:, :3] == 1.0, axis=1), open_points)
+        assert np.array_equal(under.collections[0].get_array(), states[row, conditions])
+        arrows = [one for one in under.collections if hasattr(one, "U")]
+        drawn = np.column_stack([arrows[0].U, arrows[0].V]) if arrows else np.zeros((0, 2))
+        rubs = (states[row] != OPEN) & (np.linalg.norm(slip[row], axis=1) > 0.0)
+        assert len(drawn) == np.count_nonzero(rubs)
+        if len(drawn):
+            places = run.contact.points[rubs][:, [0, 2]]
+            assert np.array_equal(np.column_stack([arrows[0].X, arrows[0].Y]), places)
+            assert drawn / np.abs(drawn).max() == pytest.approx(slip[row][rubs] / np.abs(slip[row][rubs]).max())
+    assert "contact pressure [kPa]" in figures[0].axes[6].get_ylabel()
+    texts = [text.get_text() for text in figures[0].legends[0].get_texts()]
+    longest = max(float(np.linalg.norm(slip[row][states[row] != OPEN], axis=1).max(initial=0.0)) for row in (15, STEPS))
+    assert texts[:3] == ["open", "stick", "slip"] and texts[3].endswith(f" {1e6 * longest:.3g} µm")
+
+
+def test_faces_without_fields(runs: Any, figures: list[Any], tmp_path: Path) -> None:
+    """Dots at the points, of the same values; another run is refused in one sentence."""
+    run = replace(runs["hexahedra"], folder=tmp_path)
+    plot_faces(run, tmp_path / "faces.png", times=[STEPS * DT])
+    (dots,) = figures[0].axes[0].collections
+    assert np.array_equal(dots.get_offsets(), run.contact.points[:, [0, 2]])
+    assert np.asarray(dots.get_array()) == pytest.approx(1e-3 * run.history["pressure"][STEPS])
+    arrayless = {name: run.history[name] for name in ("t", "iterations")}
+    for less in (replace(run, contact=None), replace(run, history=arrayless)):
+        with pytest.raises(InputError, match="run in space"):
+            plot_faces(less, tmp_path / "none.png")
+        with pytest.raises(InputError, match="no frames in"):
+            plot_deformed(less, tmp_path / "none.png")
+
+
+@pytest.mark.parametrize("kind", ["hexahedra", "tetrahedra"])
+def test_deformed_bodies(runs: Any, kind: str, figures: list[Any], tmp_path: Path) -> None:
+    """The outside of both bodies, displaced as the title tells, coloured by the stress of the cells behind it."""
+    run, frames = runs[kind], read_frames(runs[kind])
+    plot_deformed(run, tmp_path / "bodies.png", times=[0.0, 0.0205], magnified=7.0, title="Blocks")
+    assert figures[0]._suptitle.get_text() == "Blocks (displacements x 7)"
+    assert [axis.get_title() for axis in figures[0].axes[:2]] == ["t = 0 s", "t = 0.021 s"]
+    sides, cells = frames.boundary
+    _, u, stress = frames.at(0.021)
+    axis, bar = figures[0].axes[1:]
+    (drawn,) = axis.collections
+    corners = drawn._vec[:3].T.reshape(*sides.shape, 3)
+    assert corners == pytest.approx((frames.points + 7.0 * u)[sides], abs=1e-12)
+    assert "von Mises stress [kPa]" in bar.get_ylabel()
+    most = float(np.percentile(np.array([frames.at(t)[2] for t in (0.0, 0.021)])[:, cells], 99.0))
+    from matplotlib import colormaps
+
+    colours = drawn._facecolor3d[:, :3] / colormaps["YlGnBu"](stress[cells] / most)[:, :3]
+    assert np.ptp(colours, axis=1) == pytest.approx(0.0, abs=1e-12) and 0.59 < colours.min() < colours.max() < 1.01
+    assert len(np.unique(drawn._edgecolor3d, axis=0)) == 2  # bodies
+    low, high = np.array([getattr(axis, f"get_{letter}lim")() for letter in "xyz"]).T
+    assert axis._box_aspect / axis._box_aspect[0] == pytest.approx((high - low) / (high - low)[0])
+
+
+def test_the_film(runs: Any, tmp_path: Path) -> None:
+    """A frame per time, which moves, with the round magnification of the largest displacement; errors in a sentence."""
+    from PIL import Image
+
+    run = runs["hexahedra"]
+    path = film(run, tmp_path / "film.gif", times=[0.012, 0.021, 0.03], column="contact_resultant")
+    with Image.open(path) as shown:
+        assert shown.n_frames == 3
+        shots = []
+        for k in range(3):
+            shown.seek(k)
+            shots.append(np.asarray(shown.convert("L"), dtype=float))
+    assert min(np.mean(np.abs(one - two)) for one, two in zip(shots, shots[1:], strict=False)) > 0.2
+    with pytest.raises(InputError, match=r"'film\.mp4'"):
+        film(run, tmp_path / "film.mp4")
+    with pytest.raises(InputError, match="no column 'nosuch'"):
+        film(run, tmp_path / "film.gif", column="nosuch")

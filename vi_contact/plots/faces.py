@@ -1,0 +1,254 @@
+"""Draw contact faces in space at some times: pressure; open, sticking and slipping points; slip."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from ..core.algebra import Array, Indices
+from ..core.corners import FEATURE_ANGLE
+from ..core.errors import InputError
+from ..core.files import frames_of
+from ..core.step import AXES
+from ..engineering.resultants import Geometry
+from ..run.files.reading import RunFolder
+from .deformed import OPEN, SAME, SLIP, STICK, contact_states, read_frames, stored_tangents
+from .histories import STYLE, History, length_unit, plain, save, scale
+
+ARROW = 0.15  # of the size of the face: how long the longest arrow is
+NEIGHBOURS = 24  # nearest points that make one face if they point the same way
+STATES = {OPEN: ("open", "white"), STICK: ("stick", "tab:blue"), SLIP: ("slip", "tab:orange")}
+
+
+@dataclass(frozen=True)
+class Face:
+    """Hold a contact face: conditions (k,); ``axes`` (3, 2) of the plane it lies in, None of a curved one; ``sides`` of
+    elements (s, corners) as conditions, none where no fields were stored."""
+
+    conditions: Indices
+    axes: Array | None
+    sides: Indices
+    name: str
+
+    def seen(self, vectors: Array) -> Array:
+        """Return vectors (..., 3) in the plane of the face, (..., 2), as they are where it is curved."""
+        return vectors if self.axes is None else vectors @ self.axes
+
+    def shares(self, points: Array) -> tuple[Array, Indices]:
+        """Return the parts (p, 4, 3) of the sides around their corners, and the condition (p,) of each."""
+        corners = points[self.sides]
+        before, after = (0.5 * (corners + np.roll(corners, way, axis=1)) for way in (1, -1))
+        middle = np.broadcast_to(corners.mean(axis=1, keepdims=True), corners.shape)
+        return np.stack([corners, after, middle, before], axis=2).reshape(-1, 4, 3), self.sides.ravel()
+
+
+def faces_of(contact: Geometry, sides: Indices) -> list[Face]:
+    """Return the faces of a contact surface: points near to each other whose directions differ by less than 30°; pieces
+    in one plane are one face. ``sides``: of elements, as conditions."""
+    points, normals = contact.points, contact.normals
+    m, size = len(points), float(np.ptp(points, axis=0).max()) or 1.0
+    near = cKDTree(points).query(points, k=min(NEIGHBOURS, m))[1].reshape(m, -1)
+    alike = np.einsum("mki,mi->mk", normals[near], normals) > np.cos(FEATURE_ANGLE)
+    rows = np.repeat(np.arange(m), alike.sum(axis=1))
+    piece = connected_components(coo_matrix((np.ones(len(rows)), (rows, near[alike])), (m, m)), directed=False)[1]
+    planes: dict[Any, list[Indices]] = {}
+    for own in (np.flatnonzero(piece == number) for number in range(piece.max() + 1)):
+        mean = contact.weights[own] @ normals[own] / contact.weights[own].sum()
+        level = points[own] @ mean
+        flat = np.ptp(level) <= SAME * size and np.linalg.norm(normals[own] - mean, axis=1).max() <= SAME
+        key = (*np.round(mean / SAME), round(level.mean() / (SAME * size))) if flat else own[0]
+        planes.setdefault(key, []).append(own)
+    return [_face(np.sort(np.concatenate(parts)), key, contact, sides) for key, parts in planes.items()]
+
+
+def _face(own: Indices, key: Any, contact: Geometry, sides: Indices) -> Face:
+    """The face of these conditions, all of one direction unless ``key`` is a number."""
+    mine = sides[np.all(np.isin(sides, own), axis=1)]
+    if not isinstance(key, tuple):
+        return Face(own, None, mine, "curved face")
+    normal = contact.normals[own[0]]
+    axis = int(np.argmax(np.abs(normal)))
+    if abs(normal[axis]) > 1.0 - SAME:
+        axes = np.delete(np.eye(3), axis, axis=1)
+        return Face(own, axes, mine, f"face towards {'-' if normal[axis] < 0.0 else '+'}{AXES[axis]}")
+    across = np.cross([0.0, 0.0, 1.0], normal) if abs(normal[2]) < 1.0 - SAME else np.array([1.0, 0.0, 0.0])
+    across *= np.sign(across[np.argmax(np.abs(across))]) / np.linalg.norm(across)
+    up = np.cross(normal, across)
+    return Face(own, np.column_stack([across, up * np.sign(up[2])]), mine, f"face towards {_components(normal)}")
+
+
+def _components(way: Array) -> str:
+    """A direction as numbers, or the name of its axis."""
+    return AXES[int(np.argmax(way))] if way.max() > 1.0 - SAME else "(" + ", ".join(f"{one:.2g}" for one in way) + ")"
+
+
+@dataclass(frozen=True)
+class Painter:
+    """Draw on faces: colours by ``norm`` and ``cmap`` of values times ``factor``, named ``label``."""
+
+    norm: Any
+    cmap: Any
+    label: str = ""
+    factor: float = 1.0
+
+    @classmethod
+    def of_pressure(cls, pressure: Array) -> "Painter":
+        """Make the colours for all pressures [Pa] that are drawn: open points white; where some points pull, they are
+        blue."""
+        from matplotlib import colormaps
+        from matplotlib.colors import Normalize
+
+        size = float(np.abs(pressure).max(initial=0.0)) or 1.0
+        factor, unit = scale(size, "Pa")
+        pulls = bool(np.any(pressure < 0.0))
+        low = -size if pulls else 1e-9 * size
+        palette = colormaps["RdBu_r" if pulls else "YlOrRd"].with_extremes(under="white")
+        meaning = "negative: pull" if pulls else "white: open"
+        return cls(Normalize(factor * low, factor * size), palette, f"contact pressure [{unit}], {meaning}", factor)
+
+    @classmethod
+    def of_states(cls) -> "Painter":
+        """Make the colours of open, sticking and slipping points."""
+        from matplotlib.colors import BoundaryNorm, ListedColormap
+
+        return cls(BoundaryNorm([0.5, 1.5, 2.5, 3.5], 3), ListedColormap([colour for _, colour in STATES.values()]))
+
+    def bar(self, figure: Any, axes: Any, **look: Any) -> None:
+        """Draw the colour bar beside axes."""
+        from matplotlib.cm import ScalarMappable
+
+        shown = ScalarMappable(self.norm, self.cmap)
+        figure.colorbar(shown, ax=axes, label=self.label, fraction=0.04, aspect=25, **look)
+
+    def draw(self, axis: Any, face: Face, points: Array, values: Array) -> None:
+        """Draw values (m,) of the conditions of a face, each on its share of the sides around it; as dots without."""
+        from matplotlib.collections import PolyCollection
+        from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+        own, look = face.conditions, {"norm": self.norm, "cmap": self.cmap}
+        kind, add = (PolyCollection, axis.add_collection) if face.axes is not None else (
+            Poly3DCollection, axis.add_collection3d)
+        if len(face.sides):
+            shares, conditions = face.shares(points)
+            coloured = kind(face.seen(shares), edgecolors="face", linewidths=0.2, **look)
+            coloured.set_array(self.factor * values[conditions])
+            add(coloured)
+            add(kind(face.seen(points[face.sides]), facecolors="none", edgecolors="0.6", linewidths=0.3))
+        else:
+            self.dots(axis, face.seen(points[own]), values[own])
+        seen, names = face.seen(points[own]), AXES if face.axes is None else [_components(way) for way in face.axes.T]
+        limit(axis, seen.min(axis=0), seen.max(axis=0), names, margin=1.2 * ARROW)  # with room for arrows
+
+
+    def dots(self, axis: Any, places: Array, values: Array) -> None:
+        """Draw values (k,) as dots at places (k, d)."""
+        look = {"norm": self.norm, "cmap": self.cmap, "edgecolors": "0.3", "linewidths": 0.4, "zorder": 4}
+        axis.scatter(*places.T, c=self.factor * values, s=24, **look)
+
+def limit(
+    axis: Any, low: Array, high: Array, names: Sequence[str] = AXES, *, margin: float = 0.0, up: str = "z"
+) -> None:
+    """Set limits (d,) [m], one scale along all axes, and their names; ``margin``: part of the largest size; ``up``: the
+    axis that points upwards in projection."""
+    room = margin * float((high - low).max())
+    axis.grid(False)
+    for letter, name, a, b in zip(AXES, names, low - room, high + room, strict=False):
+        axis.set(**{f"{letter}lim": (a, b), f"{letter}label": f"{name if len(name) == 1 else f'along {name}'} [m]"})
+    if len(low) == 3:
+        axis.set_box_aspect(high - low + 2.0 * room, zoom=0.85)  # with room for names
+        axis.view_init(25.0, -60.0, vertical_axis=up)
+        axis.tick_params(labelsize=7)
+        axis.locator_params(nbins=5)
+    else:
+        axis.set_aspect("equal")
+
+
+def leading(history: History) -> str:
+    """Return the column that tells when most happens: uplift, largest pressure or a displacement that varies."""
+    names = ("contact_uplift", "contact_max_pressure", *(name for name in history if name.startswith("u_")))
+    varies = (name for name in names if name in history and np.ptp(np.nan_to_num(history[name])) > 0.0)
+    return next(varies, "iterations")
+
+
+def moments(history: History) -> list[float]:
+    """Return the first time, the one when most happens (``leading``), and the last."""
+    t, values = history["t"], np.nan_to_num(history[leading(history)])
+    return [float(t[0]), float(t[int(np.argmax(np.abs(values)))]), float(t[-1])]
+
+
+def plot_faces(
+    run: RunFolder, path: str | Path, *, times: Sequence[float] | None = None, title: str = "Contact faces"
+) -> Path:
+    """Draw the contact faces of a run in space, a column for each of ``times`` [s] (None: see ``moments``), for every
+    face a row with its pressure and one with its open, sticking and slipping points and the slip of the body.
+
+    Flat faces are drawn in their plane, curved ones in projection; each point colours its share of the element sides
+    around it, where the run stored fields, or is a dot. Arrows are the tangential displacements on the support of
+    closed points. InputError for a run in the plane or without arrays of ``Contact()``.
+    """
+    contact, history = run.contact, run.history
+    if contact is None or "active" not in history or contact.points.shape[1] != 3:
+        raise InputError(f"'{run.folder}' is not of a finished run in space with Contact(): run it with both")
+    sides = read_frames(run).facing(contact)[0] if frames_of(run.folder) else np.zeros((0, 3), dtype=np.int64)
+    faces = faces_of(contact, sides)
+    rows = [int(np.argmin(np.abs(history["t"] - t))) for t in (sorted({*moments(history)}) if times is None else times)]
+    states, slip = contact_states(history)[rows], np.zeros((len(rows), *contact.points.shape))
+    if "slip" in history:
+        slip += np.einsum("rmj,mij->rmi", history["slip"][rows], stored_tangents(contact))
+    slip[states == OPEN] = 0.0
+    figure, axes = sheet([face.axes is not None for face in faces for _ in "ab"], len(rows), (3.4, 2.8))
+    pressure, painter = history["pressure"][rows], Painter.of_pressure(history["pressure"][rows])
+    longest = float(np.linalg.norm(slip, axis=2).max())
+    for place, face in enumerate(faces):
+        for column, row in enumerate(rows):
+            over, under = axes[2 * place : 2 * place + 2, column]
+            painter.draw(over, face, contact.points, pressure[column])
+            Painter.of_states().draw(under, face, contact.points, states[column])
+            _arrows(under, face, contact.points, slip[column], longest)
+            over.set_title(f"{face.name}, t = {history['t'][row]:.4g} s", fontsize=9)
+    painter.bar(figure, list(axes.ravel()))
+    _legend(figure, longest, "slip" in history)
+    return save(figure, path, plain(title))
+
+
+def sheet(flat: Sequence[bool], columns: int, size: tuple[float, float]) -> tuple[Any, Array]:
+    """Make (figure, axes (rows, columns)), each of a size [inches]; rows that are not flat are in projection."""
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(size[0] * columns + 1.4, size[1] * len(flat) + 0.9), layout="constrained")
+        grid = figure.add_gridspec(len(flat), columns)
+        axes = [[figure.add_subplot(grid[row, column], projection=None if plane else "3d") for column in range(columns)]
+                for row, plane in enumerate(flat)]
+    return figure, np.array(axes, dtype=object)
+
+
+def _arrows(axis: Any, face: Face, points: Array, slip: Array, longest: float) -> None:
+    """The slips (m, 3) of a face, the longest of all panels as long as ARROW says."""
+    own = face.conditions[np.linalg.norm(slip[face.conditions], axis=1) > SAME * longest]
+    if len(own):
+        size = ARROW * float(np.ptp(points[face.conditions], axis=0).max()) / longest
+        ends, ways = face.seen(points[own]).T, face.seen(size * slip[own]).T
+        flat = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "width": 0.006, "zorder": 3}
+        axis.quiver(*ends, *ways, color="black", **(flat if face.axes is not None else {"lw": 0.8}))
+
+
+def _legend(figure: Any, longest: float, frictional: bool) -> None:
+    """What the colours of the states mean, and how long the longest arrow is."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    shown = STATES if frictional else {OPEN: STATES[OPEN], STICK: ("closed", STATES[STICK][1])}
+    handles = [Patch(facecolor=colour, edgecolor="0.5", label=name) for name, colour in shown.values()]
+    if longest > 0.0:
+        metres, unit = length_unit(longest)
+        handles.append(Line2D([], [], color="black", marker=r"$\rightarrow$", ms=14, ls="none",
+                              label=f"slip of the body, the longest {longest / metres:.3g} {unit}"))
+    figure.supxlabel(" ", fontsize=16)  # keeps room for the legend, which the layout of matplotlib 3.6 does not
+    figure.legend(handles=handles, loc="lower center", ncol=len(handles), fontsize=9, frameon=False)
