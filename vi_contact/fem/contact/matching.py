@@ -15,6 +15,7 @@ from ...core.errors import InputError
 from .nodes import Nodes, Rows
 
 NEARBY = 8  # nodes of side 2 that are looked at first
+EDGE_ON = 0.01  # cosine of the angle between a normal and what it is seen from: under less no side faces another
 DISTANCES = 2**20  # in a table, where all nodes of side 2 are looked at
 
 
@@ -99,9 +100,11 @@ def _opposite(one: Nodes, two: Nodes, places: Indices, reach: Array) -> tuple[In
     along = np.einsum("ijk,ik->ij", offset, one.normals)
     beside = np.linalg.norm(offset - along[:, :, None] * one.normals[:, None, :], axis=2)
     near = beside <= reach[:, None]
-    faces = np.einsum("ijk,ik->ij", two.normals[places], one.normals) < 0.0
-    distance = np.where(near & faces, np.abs(along), np.inf)
-    rows, nearest = np.arange(len(reach)), distance.argmin(axis=1)
+    slope = np.einsum("ijk,ik->ij", two.normals[places], one.normals)
+    distance = np.where(near & (slope < -EDGE_ON), np.abs(along), np.inf)
+    # where several bodies meet they have a node each at one place, told apart by their normals
+    alike = distance <= distance.min(axis=1)[:, None] + 1e-6 * reach[:, None]
+    rows, nearest = np.arange(len(reach)), np.where(alike, slope, np.inf).argmin(axis=1)
     found = np.isfinite(distance[rows, nearest])
     partner = np.where(found, np.broadcast_to(places, distance.shape)[rows, nearest], -1)
     return partner, distance[rows, nearest], near.any(axis=1) & ~found

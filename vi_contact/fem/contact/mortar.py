@@ -25,8 +25,8 @@ import scipy.sparse as sp
 
 from ...core.algebra import Array
 from ...core.errors import InputError
-from .matching import Matched, Side, refuse_same_way
-from .mortar_in_space import EDGE_ON, LEAST_COVERED, in_space
+from .matching import EDGE_ON, Matched, Side, refuse_same_way
+from .mortar_in_space import LEAST_COVERED, in_space
 
 POINTS = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0)  # of Gauss, on [0, 1], weights ½
 CURVED = 0.05  # of a facet: what polygons of one curve may overlap

@@ -23,11 +23,10 @@ from ...core.errors import InputError
 from ...core.surfaces import nodal_frames
 from .clipping import areas, cross, hats, overlaps, rule, triangles, turns, without
 from .faces import components
-from .matching import DISTANCES, Side
+from .matching import DISTANCES, EDGE_ON, Side
 from .nodes import Nodes, Rows
 
 LEAST_COVERED = 1e-3  # of a facet: less of it in front of side 2 is no contact
-EDGE_ON = 0.01  # cosine of the angle between a normal and the line of sight: facets seen under less are not seen
 SHARED = 1e-13  # of a facet's area: less is nothing
 WHOLE = 1e-6  # of a facet's area: round-off of what is cut out of it
 SLIVER = 1e-6  # area of a facet over the square of its length: less has no reliable normal
