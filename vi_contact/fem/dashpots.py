@@ -21,7 +21,7 @@ from typing import Any, ClassVar
 import numpy as np
 import ufl
 
-from ..core.algebra import Array
+from ..core.algebra import Array, largest
 from ..core.checks import attributes, function, instance, optional
 from ..core.errors import InputError
 from ..laws.materials import LinearElastic, Section
@@ -136,6 +136,8 @@ class DashpotMatrix:
                              "factor")
         for condition in self.space.prescribed:
             both = np.intersect1d(self.dashpots.facets.indices, condition.facets.indices)
+            if not largest(self.space.comm, len(both)):
+                continue
             resisted = self._resistance(self._matrix(both)) > NO_RESISTANCE * total
             if any(resisted[c] for c in components_of("prescribed", condition.components, self.space.dimension)):
                 raise InputError(f"boundary '{name}' has dashpots in a direction that is prescribed on "
