@@ -26,6 +26,7 @@ from mpi4py import MPI
 
 import vi_contact as vc
 from demos.pictures.channel import plot_beside, plot_layout, plot_moments
+from demos.pictures.channel_mesh import animate
 from demos.pictures.friction import plot_states
 from vi_contact import fem
 from vi_contact.cli import main as command
@@ -33,7 +34,6 @@ from vi_contact.cli import status_of
 from vi_contact.meshes.channel import ChannelMesh
 from vi_contact.models.channel.model import REFERENCE, Channel, build
 from vi_contact.plots import channel as pictures
-from vi_contact.plots.channel_mesh import animate
 from vi_contact.plots.histories import History, plot_energy, plot_excitation
 from vi_contact.run.static import static_equilibrium
 

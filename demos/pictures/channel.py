@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from vi_contact.plots.channel import LEGEND, RUNS, unit_of
-from vi_contact.plots.channel_mesh import (
+from demos.pictures.channel_mesh import (
     AROUND,
     CONCRETE,
     CONTACT,
@@ -22,6 +21,7 @@ from vi_contact.plots.channel_mesh import (
     plane,
     read_bodies,
 )
+from vi_contact.plots.channel import LEGEND, RUNS, unit_of
 from vi_contact.plots.histories import History, canvas, panels, save
 
 

@@ -13,6 +13,7 @@ from kept_figures import keep_figures
 import vi_contact as vc
 from demos.pictures import channel as own_pictures
 from demos.pictures.channel import plot_beside, plot_layout, plot_moments
+from demos.pictures.channel_mesh import animate, read_bodies
 from vi_contact import fem
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.channel import ChannelMesh
@@ -27,7 +28,6 @@ from vi_contact.plots.channel import (
     plot_openings,
     plot_rocking,
 )
-from vi_contact.plots.channel_mesh import animate, read_bodies
 from vi_contact.plots.run_pictures import illustrate
 from vi_contact.run.files.reading import read_run
 from vi_contact.run.static import static_equilibrium

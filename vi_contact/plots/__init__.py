@@ -8,7 +8,6 @@ from ..core.lazy import lazy
 _CONTENTS = {
     "bodies": ("film", "plot_deformed"),
     "channel": ("Outline", "plot_envelope", "plot_interface", "plot_openings", "plot_rocking"),
-    "channel_mesh": ("animate",),
     "deformed": ("read_frames", "read_tractions"),
     "faces": ("plot_faces",),
     "histories": ("plot_certificate", "plot_energy", "plot_excitation", "plot_points", "plot_runs"),

@@ -1,5 +1,7 @@
 """Draw the buried channel's mesh: Fig. 6 of the boundary method, the deformed bodies with their contact, a film."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from ..core.algebra import Array, Indices, Mask
-from ..core.errors import InputError
-from .deformed import StoredFrames, Tractions, read_frames, read_tractions
-from .histories import History, canvas, scale
+from vi_contact.core.algebra import Array, Indices, Mask
+from vi_contact.core.errors import InputError
+from vi_contact.plots.deformed import StoredFrames, Tractions, read_frames, read_tractions
+from vi_contact.plots.histories import History, canvas, scale
 
 SOIL, CONCRETE, CONTACT = "#efe3c8", "#9aa3ab", "tab:red"
 MAP = "YlOrRd"  # colours of pressures
@@ -63,7 +65,7 @@ class Colours:
     norm: Any
 
     @classmethod
-    def of(cls, pressures: Array) -> "Colours":
+    def of(cls, pressures: Array) -> Colours:
         """Make the colours for all pressures [Pa] that are drawn."""
         from matplotlib.colors import PowerNorm
 
