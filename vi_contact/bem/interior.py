@@ -14,7 +14,7 @@ from .fundamental_solution import TimeKernels
 from .loops import distances
 from .poincare_steklov import BoundaryMotion, PoincareSteklov
 from .quadrature import at_points
-from .rules import pieces, roots, smoothed, stretched
+from .rules import pieces, placed, roots, smoothed
 
 ORDER, CLOSEST = 8, 1e-3  # points a piece; least distance from the boundary in element lengths
 
@@ -75,7 +75,7 @@ def _moments(mesh: BoundaryMesh, x: Array, t: float, c_p: float, c_s: float) -> 
         fronts = [roots(b2, -2.0 * projection, d2 - (c * t) ** 2) for c in (c_p, c_s)]
         foot, height = projection / b2, np.abs(b[:, 0] * offset[:, 1] - b[:, 1] * offset[:, 0]) / b2
         row, low, length = pieces(np.concatenate([*fronts, foot[:, None]], axis=1))
-        eta, weight = (part.ravel() for part in stretched(low, length, smoothed(ORDER), foot[row], height[row]))
+        eta, weight = (part.ravel() for part in placed(low, length, smoothed(ORDER), about=(foot[row], height[row])))
         owner = np.repeat(row, ORDER)
         weight = weight * np.sqrt(b2)[owner]
         d = (offset[owner] - eta[:, None] * b[owner]).T

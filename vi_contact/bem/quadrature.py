@@ -7,7 +7,7 @@ inner integral: z = xi - eta on one element, Duffy's (u, u w) at a common corner
 
 Elements that face each other at a fraction of their length have peaks of that width: the inner integral is split and
 stretched about the foot of x on the second element, the outer one about the feet of that element's ends, the integral
-over w about the foot of one end on the other element (rules.stretched).
+over w about the foot of one end on the other element (rules.placed).
 
 Every piece is mapped with w -> w²(3 - 2w), which makes square roots and logarithms at both ends harmless.
 """
@@ -22,7 +22,7 @@ from scipy.sparse import csc_matrix
 from ..core.algebra import Array, Indices
 from ..core.checks import whole
 from .element_pairs import ElementPairs
-from .rules import gauss, graded, linear, pieces, roots, smoothed, stretched
+from .rules import gauss, graded, pieces, placed, roots, smoothed
 
 Rule = tuple[Array, Array]
 MOST_POINTS = 200  # Gauss points a rule may have
@@ -151,10 +151,10 @@ def _outer(
         feet, heights = _feet(pairs, part)
         row, low, length = pieces(np.concatenate([breaks, feet, feet.mean(axis=1, keepdims=True)], axis=1))
         nearer = np.hypot(feet[row] - (low + 0.5 * length)[:, None], heights[row]).argmin(axis=1)
-        xi, weight = stretched(low, length, rule, feet[row, nearer], heights[row, nearer])
+        xi, weight = placed(low, length, rule, about=(feet[row, nearer], heights[row, nearer]))
     else:
         row, low, length = pieces(breaks)
-        xi, weight = linear(low, length, rule)
+        xi, weight = placed(low, length, rule)
     return np.repeat(row, len(rule[0])), xi.ravel(), weight.ravel()
 
 
@@ -170,10 +170,7 @@ def _inner(
     middle = d[:, row] - b[:, row] * (low + 0.5 * length)
     heard = (middle**2).sum(0) < max(fronts, default=np.inf) ** 2
     row, low, length = row[heard], low[heard], length[heard]
-    if close:
-        eta, weight = stretched(low, length, rule, foot[row], height[row], scale[row])
-    else:
-        eta, weight = linear(low, length, rule, scale[row])
+    eta, weight = placed(low, length, rule, scale[row], (foot[row], height[row]) if close else None)
     return np.repeat(row, len(rule[0])), eta.ravel(), weight.ravel()
 
 
@@ -242,14 +239,12 @@ def _at_corners(
         cuts = [roots(c2, -2.0 * ab, c0 - front**2) for front in fronts]
         foot = (ab / c2)[:, None]
         row, low, length = pieces(np.concatenate([*cuts, foot] if sharp else [foot[:, :0], *cuts], axis=1))
-        if sharp:
-            ratios, weights = stretched(low, length, smoothed(order), foot[row, 0], (height / c2)[row])
-        else:
-            ratios, weights = linear(low, length, smoothed(order))
+        about = (foot[row, 0], (height / c2)[row]) if sharp else None
+        ratios, weights = placed(low, length, smoothed(order), about=about)
         owner, ratio, outer_weight = np.repeat(row, order), ratios.ravel(), weights.ravel()
         distance = np.sqrt(c0[owner] - 2.0 * ratio * ab[owner] + ratio**2 * c2[owner])
         row, low, length = _reached(distance, fronts)
-        along, weight = linear(low, length, graded(order), outer_weight[row])
+        along, weight = placed(low, length, graded(order), outer_weight[row])
         weight, long = (weight * along).ravel(), along.ravel()
         short = (along * ratio[row, None]).ravel()
         sets.append((np.repeat(owner[row], order), *((long, short) if first else (short, long)), weight))

@@ -47,22 +47,20 @@ def roots(a: Array, b: Array, c: Array) -> Array:
         return np.stack([q / a, c / q], axis=-1)
 
 
-def linear(low: Array, length: Array, rule: tuple[Array, Array], scale: Array | float = 1.0) -> tuple[Array, Array]:
-    """Return points and weights (p, n) of a rule on pieces from ``low`` (p,); scale: of the weights."""
-    x, w = rule
-    return low[:, None] + length[:, None] * x, (scale * length)[:, None] * w
-
-
-def stretched(
-    low: Array, length: Array, rule: tuple[Array, Array], centre: Array, height: Array, scale: Array | float = 1.0
+def placed(
+    low: Array, length: Array, rule: tuple[Array, Array], scale: Array | float = 1.0,
+    about: tuple[Array, Array] | None = None,
 ) -> tuple[Array, Array]:
-    """Return them with x = centre + height sinh(v), the rule being one in v.
+    """Return points and weights (p, n) of a rule on pieces from ``low`` (p,); scale: of the weights.
 
-    For functions of sqrt((x - centre)² + height²) that are singular where it is zero, however near that is: a peak
-    becomes 1/cosh(v). Far from the centre the substitution is an exponential; beside a great height it is linear.
+    about: (centre, height), then x = centre + height sinh(v), the rule being one in v, for functions of
+    sqrt((x - centre)² + height²) that are singular where it is zero, however near that is: a peak becomes 1/cosh(v).
+    Far from the centre the substitution is an exponential; beside a great height it is linear.
     """
     x, w = rule
-    height = np.maximum(height, FLAT * length)
+    if about is None:
+        return low[:, None] + length[:, None] * x, (scale * length)[:, None] * w
+    centre, height = about[0], np.maximum(about[1], FLAT * length)
     start = np.arcsinh((low - centre) / height)
     span = np.arcsinh((low + length - centre) / height) - start
     v = start[:, None] + span[:, None] * x

@@ -39,18 +39,10 @@ Initial = Field | Sequence[tuple[Cells, Field]] | None
 
 @stage("assembling")
 def assemble(
-    mesh: Any,
-    material: Materials,
-    *,
-    section: Section | None = None,
-    clamped: Facets | Sequence[Facets] = (),
-    prescribed: Prescribed | Sequence[Prescribed] = (),
-    tied: Tied | Sequence[Tied] = (),
-    dashpots: Dashpots | Sequence[Dashpots] = (),
-    loads: Traction | BodyForce | Sequence[Traction | BodyForce] = (),
-    damping: Damping | None = None,
-    initial_displacement: Initial = None,
-    initial_velocity: Initial = None,
+    mesh: Any, material: Materials, *, section: Section | None = None, clamped: Facets | Sequence[Facets] = (),
+    prescribed: Prescribed | Sequence[Prescribed] = (), tied: Tied | Sequence[Tied] = (),
+    dashpots: Dashpots | Sequence[Dashpots] = (), loads: Traction | BodyForce | Sequence[Traction | BodyForce] = (),
+    damping: Damping | None = None, initial_displacement: Initial = None, initial_velocity: Initial = None,
     base_inertia: bool = True,
 ) -> SemiDiscreteSystem:
     """Assemble the system of a body, on the free unknowns.

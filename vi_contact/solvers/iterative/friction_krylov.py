@@ -61,31 +61,13 @@ class Turned(Masked):
         v[tangents.rows] -= tangents.flat(across)
 
 
-class Linearised:
-    """Apply the matrix of the linear problem on the rows that are not held: the context of a PETSc shell matrix."""
-
-    def __init__(self, operator: Operator, contact: Contact) -> None:
-        self._operator, self._contact = operator, contact
-        self.states: States | None = None
-        self.free: Array = np.ones(0)
-
-    def mult(self, _shell: Any, x: Any, y: Any) -> None:
-        """Apply it to x: PETSc vectors."""
-        assert self.states is not None
-        self._operator.mult(None, x, y)
-        values = y.array
-        self.states.apply(self._contact, x.array_r, values)
-        values *= self.free
-
-
 class Gmres:
-    """Run PETSc's KSP ``gmres``, preconditioned from the right, or ``cg`` where no point slips."""
+    """Run PETSc's KSP ``gmres``, preconditioned from the right, or ``cg`` where no point slips, on the matrix of the
+    linear problem, as whose context it serves. ``free``: 1 in rows that are not held, and 0."""
 
     def __init__(self, comm: Comm, operator: Operator, contact: Contact, turned: Turned, patience: int) -> None:
         self._comm, self._operator, self._turned, self._contact = comm, operator, turned, contact
-        self._linearised = Linearised(operator, contact)
-        lent, blocks = Lent(self._linearised), operator.blocks
-        shell = PETSc.Mat().createPython(blocks.getSizes(), lent, comm=blocks.comm)
+        shell = PETSc.Mat().createPython(operator.blocks.getSizes(), Lent(self), comm=operator.blocks.comm)
         shell.setUp()
         self._b, self._x = shell.createVecs()
         self._patience = patience
@@ -102,14 +84,15 @@ class Gmres:
     def take(self, states: States) -> None:
         """Take the linear problem of these states and of the closed set of the contact."""
         self._turned.take(self._contact, states)
-        self._linearised.states = states
-        self._linearised.free = (self._turned.weights > 0.0).astype(float)
+        self._states, self.free = states, (self._turned.weights > 0.0).astype(float)
         self._slips = bool(largest(self._comm, np.any(states.slips)))
 
-    @property
-    def free(self) -> Array:
-        """Return 1 in rows that are not held, and 0."""
-        return self._linearised.free
+    def mult(self, _shell: Any, x: Any, y: Any) -> None:
+        """Apply the matrix of the linear problem to x: PETSc vectors."""
+        self._operator.mult(None, x, y)
+        values = y.array
+        self._states.apply(self._contact, x.array_r, values)
+        values *= self.free
 
     def solve(self, residual: Array, share: float, goal: float) -> tuple[Array, float, int]:
         """Return (dx, norm of what is left, PETSc's reason): ``share`` is left, or about ``goal`` in a row."""
