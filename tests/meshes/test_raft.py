@@ -29,8 +29,8 @@ def area(arrays, name):
 
 def test_two_bodies_fill_what_was_asked_for_without_a_common_node(arrays):
     """Volumes by hand: raft, walls between the slabs, three slabs; areas of the faces; the building's on top."""
-    walls = (6.0 * 5.0 - 4.4 * 3.4) * 3 * (4.0 - 0.6)
-    assert volumes(arrays, "building") == pytest.approx(12.0 * 9.0 * (1.2 + 3 * 0.6) + walls, rel=1e-12)
+    walls = (8.0 * 6.0 - 6.4 * 4.4) * 3 * (4.0 - 0.6)
+    assert volumes(arrays, "building") == pytest.approx(12.0 * 9.0 * (1.5 + 3 * 0.6) + walls, rel=1e-12)
     assert volumes(arrays, "soil") == pytest.approx(42.0 * 36.0 * 12.0, rel=1e-12)
     own, others = (np.unique(arrays.cells[arrays.cell_groups[name]]) for name in ("building", "soil"))
     assert not np.isin(own, others).any() and len(own) + len(others) == len(arrays.points)
@@ -59,8 +59,8 @@ def test_the_faces_that_meet_do_not_match(arrays):
 
 @pytest.mark.parametrize(("wrong", "says"), [
     ({"raft": (12.0, 9.0)}, "raft has shape"), ({"core": (4.0, 0.0, 6.0, 5.0)}, "the raft under all of it"),
-    ({"wall": 2.5}, "room inside"), ({"storeys": (0.5,)}, "storeys higher than their slabs"),
-    ({"storeys": ()}, "storeys higher"), ({"soil": (15.0, 36.0, 12.0)}, "two cells of 1.5 m"),
+    ({"wall": 3.0}, "room inside"), ({"storeys": (0.5,)}, "storeys higher than their slabs"),
+    ({"storeys": ()}, "storeys higher"), ({"soil": (15.0, 36.0, 12.0)}, "two cells of 0.8 m"),
     ({"size": 0.0}, "above zero"), ({"size": 1e-3}, "ask for fewer"), ({"far": float("nan")}, "far"),
 ])
 def test_what_is_no_building_is_refused_in_a_sentence(wrong, says):

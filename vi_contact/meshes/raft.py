@@ -26,14 +26,14 @@ class RaftMesh:
     `soil_size` under the raft and `far` at its outer edges. InputError for what makes no such building.
     """
 
-    raft: tuple[float, ...] = (12.0, 9.0, 1.2)
-    core: tuple[float, ...] = (1.5, 0.0, 6.0, 5.0)
+    raft: tuple[float, ...] = (12.0, 9.0, 1.5)
+    core: tuple[float, ...] = (0.75, 0.0, 8.0, 6.0)
     wall: float = 0.8
     storeys: tuple[float, ...] = (4.0, 4.0, 4.0)
     slab: float = 0.6
     soil: tuple[float, ...] = (42.0, 36.0, 12.0)
-    size: float = 1.0
-    soil_size: float = 1.5
+    size: float = 1.2
+    soil_size: float = 0.8
     far: float = 4.0
 
     def __post_init__(self) -> None:
