@@ -47,7 +47,7 @@ class Links:
 
 
 def linked(tied: Sequence[Tied], dimension: int, near: float, nodes: NodesOf) -> Links:
-    """Link the unknowns of every tie; partners are ``near`` [m] to the place that they should have. Collective.
+    """Join the unknowns of every tie; partners are ``near`` [m] to the place that they should have. Collective.
 
     What several ties join moves as one: of the four vertical edges of a box whose sides are tied both ways, three
     follow the one that is on no second boundary. InputError for nodes without a partner, boundaries that share nodes,

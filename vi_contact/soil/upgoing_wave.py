@@ -52,7 +52,7 @@ def upgoing(
     of different numbers of components.
     """
     flag("upgoing", "outcrop", outcrop)
-    if isinstance(motion, Sequence):
+    if isinstance(motion, Sequence) and not isinstance(motion, str):
         waves = [upgoing(one, direction=direction, dt=dt, outcrop=outcrop) for one in motion]
         if len({len(wave(0.0)) for wave in waves}) != 1:
             raise InputError("upgoing needs one or more excitations with directions of the same number of components")
