@@ -141,7 +141,7 @@ def test_acceleration(ground):
         sticking.append((state.active & ~slipped(report)).sum())
     exact = G * (tangent - mu) / np.hypot(1.0, tangent)
     found = np.diff(v, axis=0) @ slope.down / dt / exact
-    assert sticking[0] > 8 and not any(sticking[30:]) and np.abs(found[:4]).max() < 0.05
+    assert sticking[0] > 8 and not any(sticking[30:]) and np.abs(found[:4]).max() < 0.15
     assert np.abs(found[90:] - 1.0).max() < 1e-9
 
 
