@@ -19,11 +19,11 @@ tell how it turns about the vertical.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from copy import copy
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from ..core.algebra import Array, Indices, Mask
 from ..core.checks import array, column_name, function, instance, mask, optional, provides
@@ -34,18 +34,8 @@ from ..core.step import AXES, Columns, Report, Row, State
 from ..core.surfaces import ContactSurface, nodal_blocks, nodal_frames, same_node, tangential_columns
 
 Where = Callable[[Array, Array], Mask]
+Geometry = Any  # with points (m, d), normals (m, d), weights (m,): a ContactSurface, the contact of a RunFolder
 DETERMINED = 1e-9  # of the largest singular value of the rigid modes of a part: less says nothing about a motion
-
-
-class Geometry(Protocol):
-    """Describe where contact points are: a ContactSurface, or the contact of a ``run_folder.RunFolder``."""
-
-    @property
-    def points(self) -> Array: ...
-    @property
-    def normals(self) -> Array: ...
-    @property
-    def weights(self) -> Array: ...
 
 
 def check_part(name: str, centre: Any, where: Any, normal: Any) -> None:
@@ -60,11 +50,12 @@ class Part:
 
     ``where``: points (m, d), normals (m, d) -> mask (m,); all points when None. InputError for a part without points,
     a centre of other dimension, or directions that cancel (a closed ring), unless ``normal`` says which N is meant.
+    ``slots``: the numbers of the conditions whose share in it is held; those of one rank, all when None.
     """
 
     def __init__(
         self, name: str, geometry: Geometry, centre: Sequence[float], where: Where | None,
-        normal: Sequence[float] | None,
+        normal: Sequence[float] | None, slots: Indices | None = None,
     ) -> None:
         check_part(name, centre, where, normal)
         points, normals = geometry.points, geometry.normals
@@ -74,13 +65,15 @@ class Part:
             raise InputError(f"part '{name}' has no contact points: change its mask")
         self.centre = array(f"part '{name}'", "the centre", centre, points.shape[1:], unit="metres")
         self.name, self.dimension = name, points.shape[1]
-        self.mask, self.weights = chosen, geometry.weights[chosen]
-        self.normals, self.arms = normals[chosen], points[chosen] - self.centre
+        self.weights, self.normals, self.arms = geometry.weights[chosen], normals[chosen], points[chosen] - self.centre
         self.normal, self.whole = self._direction(name, normal), self.weights.sum()
         nodes = getattr(geometry, "nodes", None)  # run folders do not tell: what is at one place is one node there
         nodes = np.unique(points, axis=0, return_inverse=True)[1].ravel() if nodes is None else nodes
-        self.tangents = tangent_vectors(normals, nodes)[chosen]
-        self.fit = self._fit()
+        self.tangents, self.fit = tangent_vectors(normals, nodes)[chosen], self._fit().T
+        slots = np.arange(len(points)) if slots is None else slots
+        self.mask = chosen[slots]
+        for kept in ("weights", "normals", "arms", "tangents", "fit"):
+            setattr(self, kept, getattr(self, kept)[(np.cumsum(chosen) - 1)[slots[self.mask]]])
 
     def _direction(self, name: str, given: Sequence[float] | None) -> Array:
         direction = self.weights @ self.normals if given is None else given
@@ -95,20 +88,10 @@ class Part:
         size = float(np.max(np.abs(self.arms), initial=0.0)) or 1.0
         turns = [one / size for one in turning(self.arms, self.normals)]
         root, modes = np.sqrt(self.weights), np.column_stack([self.normals, *turns])
-        asked = np.diag(np.r_[np.zeros(self.dimension), np.full(len(turns), 1.0 / size)])[self.dimension :]
-        asked = np.vstack([asked, np.r_[self.normal, np.zeros(len(turns))]])
+        asked = np.roll(block_diag(self.normal, np.eye(len(turns)) / size), -1, axis=0)
         inverse = np.linalg.pinv(root[:, None] * modes, rcond=DETERMINED) * root
         told = np.linalg.norm(asked @ inverse @ modes, axis=1) > DETERMINED * np.linalg.norm(asked, axis=1)
         return np.where(told[:, None], asked @ inverse, np.nan)
-
-    def share(self, slots: Indices) -> "Part":
-        """Return what the conditions with these numbers contribute to it, of surfaces of several ranks."""
-        found, here = copy(self), self.mask[slots]
-        rows = (np.cumsum(self.mask) - 1)[slots[here]]
-        found.mask, found.fit = here, self.fit[:, rows]
-        for name in ("weights", "normals", "arms", "tangents"):
-            setattr(found, name, getattr(self, name)[rows])
-        return found
 
     def sums(self, r_n: Array, r_t: Array | None, active: Mask) -> Array:
         """Return (rows, …) F, M, Σ r_n, Σ r_n (X - c)·up and the open weight of rows of reactions, (rows, m),
@@ -130,29 +113,23 @@ class Part:
 
     def quantities(self, sums: Array, tops: Array) -> dict[str, Array]:
         """Return quantity -> (rows,) of sums and tops of all its points; nan where N or Σ r_n is zero."""
-        d, axes = self.dimension, AXES[: self.dimension]
+        d = self.dimension
         force, moment, (thrust, raised, lifted) = 0.0 + sums[:, :d], sums[:, d:-3], sums.T[-3:]
         compression = 0.0 - force @ self.normal
-        along, lever = force + compression[:, None] * self.normal, np.zeros((len(sums), d))
-        found = {"uplift": lifted / self.whole} | dict(zip(("opening", "slip"), tops.T, strict=False))
-        found |= {f"force_{axis}": force[:, i] for i, axis in enumerate(axes)} | {"N": compression}
-        if d == 2:
-            tangent = np.array([-self.normal[1], self.normal[0]])
-            found |= {"T": force @ tangent, "M": moment[:, 0], "e": _ratio(moment[:, 0], compression)}
-        else:
-            if d == 3:
-                lever = np.cross(moment, self.normal)
-            found |= {"T": np.linalg.norm(along, axis=1)}
-            found |= {f"T_{axis}": along[:, i] for i, axis in enumerate(axes) if d == 3}
-            found |= {f"M_{axis}": moment[:, i] for i, axis in enumerate(axes) if d == 3}
-            found |= {"e": _ratio(np.linalg.norm(lever, axis=1), compression)}
-            found |= {f"e_{axis}": _ratio(lever[:, i], compression) for i, axis in enumerate(axes) if d == 3}
-        return found | {"height": _ratio(raised, thrust)}
+        across, lever = force + compression[:, None] * self.normal, np.zeros((len(sums), d))
 
-    def motion(self, fitted: Array) -> dict[str, float]:
-        """Return rotation and settlement, ``fit`` times the normal displacements; none on a line."""
-        names = {1: [], 2: ["theta", "settlement"], 3: [*(f"theta_{axis}" for axis in AXES), "settlement"]}
-        return dict(zip(names[self.dimension], fitted.tolist(), strict=False))
+        def along(kind: str, vectors: Array) -> dict[str, Array]:
+            return {f"{kind}_{axis}": vectors[:, i] for i, axis in enumerate(AXES[:d])}
+
+        found = {"uplift": lifted / self.whole} | dict(zip(("opening", "slip"), tops.T, strict=False))
+        found |= along("force", force) | {"N": compression, "T": np.linalg.norm(across, axis=1)}
+        if d == 2:
+            found |= {"T": force @ [-self.normal[1], self.normal[0]], "M": moment[:, 0]}
+            return found | {"e": _ratio(moment[:, 0], compression), "height": _ratio(raised, thrust)}
+        if d == 3:
+            lever = np.cross(moment, self.normal)
+            found |= along("T", across) | along("M", moment) | along("e", _ratio(lever.T, compression).T)
+        return found | {"e": _ratio(np.linalg.norm(lever, axis=1), compression), "height": _ratio(raised, thrust)}
 
 
 def turning(arms: Array, vectors: Array) -> list[Array]:
@@ -162,7 +139,7 @@ def turning(arms: Array, vectors: Array) -> list[Array]:
 
 
 def _ratio(one: Array, other: Array) -> Array:
-    return np.divide(one, other, out=np.full(len(other), np.nan), where=other != 0.0)
+    return np.divide(one, other, out=np.full(one.shape, np.nan), where=other != 0.0)
 
 
 def tangent_vectors(normals: Array, nodes: Indices) -> Array:
@@ -181,6 +158,7 @@ _MEANING = {
     "uplift": ("-", "uplift ratio 1 - L_contact/L"),
     "opening": ("m", "largest gap"),
     "slip": ("m", "largest tangential displacement on the support"),
+    "force": ("N", "contact force on the body"),
     "N": ("N", "normal force -F·n, compression positive"),
     "T": ("N", "tangential force F·t on the body"),
     "M": ("N m", "moment on the body about the centre, anticlockwise positive"),
@@ -193,8 +171,6 @@ _MEANING = {
 
 def _unit_and_meaning(quantity: str, name: str) -> tuple[str, str]:
     kind, _, axis = quantity.partition("_")
-    if kind == "force":
-        return "N", f"contact force on the body along {axis}, part {name}"
     unit, text = _MEANING[kind]
     return unit, f"{text}{f' along {axis}' if axis else ''}, part {name}"
 
@@ -231,8 +207,8 @@ class Resultants:
     def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
         """Find the part once, and return the row of the state, a static one or the start of a run. Collective."""
         self._surface = problem.surface
-        whole = Part(self.name, problem.surface.whole(), self.centre, self.where, self.normal)
-        self._part = whole.share(problem.surface.slots)
+        whole = problem.surface.whole()
+        self._part = Part(self.name, whole, self.centre, self.where, self.normal, problem.surface.slots)
         return self._row(state)
 
     def row(self, report: Report) -> Row:
@@ -244,11 +220,12 @@ class Resultants:
         u_n, slip = surface.normal_values(state.u), surface.slip(state.u, state.t)
         gap = surface.gap(state.t) - u_n + surface.compliance * r_n
         sums = part.sums(r_n[None], None if state.r_t is None else state.r_t[None], state.active[None])
-        sums = surface.comm.sum(np.concatenate([sums[0], part.fit @ u_n[part.mask]]))
+        sums = surface.comm.sum(np.concatenate([sums[0], u_n[part.mask] @ part.fit]))
         tops = surface.comm.max(part.tops(gap[None], slip[None])[0])
-        fitted = len(part.fit)
-        series = part.quantities(sums[None, :-fitted], tops[None])
-        found = {quantity: float(values[0]) for quantity, values in series.items()} | part.motion(sums[-fitted:])
+        series, motion = part.quantities(sums[None, : -part.fit.shape[1]], tops[None]), sums[-part.fit.shape[1] :]
+        names = ([], ["theta", "settlement"], [*(f"theta_{axis}" for axis in AXES), "settlement"])[part.dimension - 1]
+        found = {quantity: float(values[0]) for quantity, values in series.items()}
+        found |= dict(zip(names, motion.tolist(), strict=False))
         self._quantities = list(found)
         return {f"{quantity}_{self.name}": value for quantity, value in found.items()}
 

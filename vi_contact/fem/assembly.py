@@ -68,7 +68,8 @@ def assemble(
     check_boundaries(mesh, held, moved, as_tuple(tied), boundaries, as_tuple(loads))
     check_initial(mesh, displacement=initial_displacement, velocity=initial_velocity)
     space = FemSpace(mesh, tuple(Prescribed(facets) for facets in held) + moved, as_tuple(tied))
-    forms = ElasticForms(space, cell_materials(mesh, material), section, damping, boundaries)
+    forms = ElasticForms(space, cell_materials(mesh, material), section, damping)
+    forms.boundaries = boundaries
     algebra = algebra_for(space.comm.mpi, space.dimension, space.unknowns)
     absorbers = [DashpotMatrix(space, forms, one) for one in boundaries]
     acting = [one.dashpots.loads(one, forms) for one in absorbers]
@@ -114,16 +115,12 @@ def _reduced(
 
 
 class ElasticForms:
-    """Hold the variational forms of one body; constants are cellwise: one compiled form serves all materials.
+    """Hold the variational forms of one body; constants are cellwise: one compiled form serves all materials."""
 
-    ``boundaries``: the dashpots that belong to the same system.
-    """
+    boundaries: tuple[Dashpots, ...] = ()  # of the same system
 
-    def __init__(
-        self, space: FemSpace, materials: list[tuple[Any, LinearElastic]], section: Section, damping: Damping,
-        boundaries: Sequence[Dashpots] = (),
-    ):
-        self.space, self.section, self.boundaries = space, section, boundaries
+    def __init__(self, space: FemSpace, materials: list[tuple[Any, LinearElastic]], section: Section, damping: Damping):
+        self.space, self.section = space, section
         cells = compat.cell_space(space.mesh)
         names = ("lame", "shear", "rho", "alpha_rho", "beta", "lame_out")
         self.damped = any(any(damping.coefficients(material)) for _, material in materials)

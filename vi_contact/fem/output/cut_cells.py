@@ -5,7 +5,6 @@ which nodal values are taken for linear: exact for linear fields on cells with p
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from itertools import permutations
 from math import factorial
 from typing import Any
@@ -18,58 +17,48 @@ from ..loads import BodyForce, TangentialTraction, Traction
 from ..mesh import node_numbers
 from ..space import FemSpace
 
-Motion = Callable[[Array], Array]  # points (…, d) -> virtual displacements (…, d)
+
+def work_beyond(
+    space: FemSpace, crossed: Mask, level: Callable[[Array], Array], motion: Callable[[Array], Array],
+    density: Array | float, load: Traction | BodyForce | None,
+) -> Array:
+    """Return (motions, owned components) ∫ density motion·phi_i over parts of cells, or of the facets of a traction.
+
+    The parts of ``crossed`` cells (local mask) where the ``level`` of points (…, d) is not positive. ``motion``: points
+    (k, d) -> virtual displacements (motions, k, d), linear in them; ``density``: one for all or one of each local cell.
+    Collective.
+    """
+    d = space.dimension
+    cells, nodes = _entities(space.mesh, crossed, load.facets.indices if isinstance(load, Traction) else None)
+    whole = space.mesh.geometry.x[nodes][:, :, :d]
+    corners, owner = parts(simplices(nodes.shape[1], d - isinstance(load, Traction)), level(whole))
+    at = np.matmul(corners, whole[owner])
+    edges, r = at[:, 1:] - at[:, :1], motion(at.reshape(-1, d))
+    r = r.reshape(len(r), *at.shape)
+    if isinstance(load, TangentialTraction):
+        r = r @ (np.linalg.pinv(edges) @ edges)
+    n = corners.shape[1]  # ∫ f g over a simplex of n corners: (Σf Σg + Σ f g) of its size / (n (n + 1))
+    size = np.sqrt(np.abs(np.linalg.det(edges @ edges.swapaxes(1, 2)))) / factorial(n + 1)
+    size = size * np.broadcast_to(density, len(crossed))[cells[owner]]
+    shares = np.einsum("p,pnv,jpmd,nm->pvjd", size, corners, r, 1.0 + np.eye(n), optimize=True)
+    found = np.zeros((len(space.nodes), len(r), d))
+    for numbers, values in from_each(space.comm, (node_numbers(space.mesh)[nodes[owner]].ravel(), shares)):
+        own = space.blocks_of(numbers)
+        np.add.at(found, own[own >= 0], values.reshape(-1, len(r), d)[own >= 0])
+    return found.swapaxes(0, 1).reshape(len(r), -1)
 
 
-@dataclass(frozen=True)
-class OneSide:
-    """Hold what of the ``crossed`` cells (local mask) lies where ``level`` of points (…, d) [m] is not positive."""
-
-    space: FemSpace
-    crossed: Mask
-    level: Callable[[Array], Array]
-
-    def row(self, motion: Motion, density: Array | float, load: Traction | BodyForce | None = None) -> Array:
-        """Return (owned components,) ∫ density motion·phi_i over the parts of cells, or of the facets of a traction.
-
-        ``density``: one value for all, or one of each local cell. Collective.
-        """
-        cells, nodes = self._facets(load) if isinstance(load, Traction) else self._cells()
-        mesh, d = self.space.mesh, self.space.dimension
-        whole = mesh.geometry.x[nodes][:, :, :d]
-        corners, owner = parts(simplices(nodes.shape[1], mesh.topology.dim - isinstance(load, Traction)),
-                               self.level(whole))
-        at = np.matmul(corners, whole[owner])
-        edges, r = at[:, 1:] - at[:, :1], motion(at)
-        if isinstance(load, TangentialTraction):
-            r = r @ (np.linalg.pinv(edges) @ edges)
-        n = corners.shape[1]  # ∫ f g over a simplex of n corners: (Σf Σg + Σ f g) of its size / (n (n + 1))
-        size = np.sqrt(np.abs(np.linalg.det(edges @ edges.swapaxes(1, 2)))) / factorial(n - 1)
-        shares = np.einsum("knv,knd->kvd", corners, r) + corners.sum(axis=1)[:, :, None] * r.sum(axis=1)[:, None, :]
-        shares *= (np.broadcast_to(density, len(self.crossed))[cells[owner]] * size / (n * (n + 1)))[:, None, None]
-        found = np.zeros((len(self.space.nodes), d))
-        for numbers, values in from_each(self.space.comm, (node_numbers(mesh)[nodes[owner]].ravel(), shares)):
-            own = self.space.blocks_of(numbers)
-            np.add.at(found, own[own >= 0], values.reshape(-1, d)[own >= 0])
-        return found.ravel()
-
-    def _cells(self) -> tuple[Any, Any]:
-        """The crossed cells that this rank owns, and their geometry nodes."""
-        mesh = self.space.mesh
-        cells = np.flatnonzero(self.crossed[: mesh.topology.index_map(mesh.topology.dim).size_local])
+def _entities(mesh: Any, crossed: Mask, facets: Any) -> tuple[Any, Any]:
+    """(cells, geometry nodes) of the crossed cells of this rank, or the nodes of those outer facets beside them."""
+    dim, owned = mesh.topology.dim, mesh.topology.index_map
+    if facets is None:
+        cells = np.flatnonzero(crossed[: owned(dim).size_local])
         return cells, compat.geometry_dofmap(mesh)[cells]
-
-    def _facets(self, load: Traction) -> tuple[Any, Any]:
-        """The crossed cells beside those outer facets of a load that this rank owns, and the nodes of the facets."""
-        mesh: Any = self.space.mesh
-        dim = mesh.topology.dim - 1
-        facets = load.facets.indices[load.facets.indices < mesh.topology.index_map(dim).size_local]
-        compat.entities_to_geometry(mesh, dim, facets)  # makes the connectivity
-        beside = mesh.topology.connectivity(dim, dim + 1)
-        outer = np.diff(beside.offsets)[facets] == 1
-        cells = beside.array[beside.offsets[:-1][facets]]
-        kept = outer & self.crossed[cells]
-        return cells[kept], compat.entities_to_geometry(mesh, dim, facets[kept])
+    facets = facets[facets < owned(dim - 1).size_local]
+    beside = mesh.topology.connectivity(dim - 1, dim)  # made with the measure of the traction
+    cells = beside.array[beside.offsets[:-1][facets]]
+    kept = (np.diff(beside.offsets)[facets] == 1) & crossed[cells]
+    return cells[kept], compat.entities_to_geometry(mesh, dim - 1, facets[kept])
 
 
 def simplices(vertices: int, dimension: int) -> Array:
@@ -83,21 +72,18 @@ def simplices(vertices: int, dimension: int) -> Array:
 def parts(whole: Array, level: Array) -> tuple[Array, Indices]:
     """Return (shares of the vertices in corners (p, n, v), entity (p,)) of simplices: what of the simplices ``whole``
     (k, n, v) of each entity lies where the level of its vertices (entities, v), linear in them, is not positive."""
-    k, n, v = whole.shape
-    corners, owner = np.tile(whole, (len(level), 1, 1)), np.repeat(np.arange(len(level)), k)
-    height = np.einsum("pnv,pv->pn", corners, level[owner])
-    for _ in range(n - 1):  # every cut of an edge leaves one corner less on the wrong side in both halves
-        every = np.arange(len(height))
-        low, high = height.argmin(axis=1), height.argmax(axis=1)
-        below, above = height[every, low], height[every, high]
-        cut = (below < 0.0) & (above > 0.0)
-        share = np.divide(below, below - above, out=np.zeros_like(below), where=cut)[:, None]
-        middle = (1.0 - share) * corners[every, low] + share * corners[every, high]
-        other, other_height = corners[cut], height[cut]
-        rows = np.flatnonzero(cut)
-        corners[rows, high[cut]], height[rows, high[cut]] = middle[cut], 0.0
-        other[np.arange(len(rows)), low[cut]], other_height[np.arange(len(rows)), low[cut]] = middle[cut], 0.0
-        corners, height = np.concatenate([corners, other]), np.concatenate([height, other_height])
-        owner = np.concatenate([owner, owner[rows]])
-    kept = (height <= 0.0).all(axis=1)
-    return corners[kept], owner[kept]
+    owner = np.repeat(np.arange(len(level)), len(whole))
+    corners = np.tile(whole, (len(level), 1, 1))
+    corners = np.concatenate([corners, corners @ level[owner][:, :, None]], axis=2)  # their level as last share
+    for _ in range(whole.shape[1] - 1):  # a cut edge leaves one corner less on the wrong side in both halves
+        low, high = corners[:, :, -1].argmin(axis=1), corners[:, :, -1].argmax(axis=1)
+        every = np.arange(len(owner))
+        below, above = corners[every, low], corners[every, high]
+        cut = np.flatnonzero((below[:, -1] < 0.0) & (above[:, -1] > 0.0))
+        below, above, rest = below[cut], above[cut], corners[cut]
+        middle = (above[:, -1:] * below - below[:, -1:] * above) / (above - below)[:, -1:]
+        middle[:, -1] = 0.0
+        corners[cut, high[cut]] = rest[np.arange(len(cut)), low[cut]] = middle
+        corners, owner = np.concatenate([corners, rest]), np.concatenate([owner, owner[cut]])
+    kept = (corners[:, :, -1] <= 0.0).all(axis=1)
+    return corners[kept, :, :-1], owner[kept]

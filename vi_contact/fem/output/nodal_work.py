@@ -26,7 +26,10 @@ from ..space import known_matrices, space_of
 
 log = logging.getLogger(__name__)
 
-Taken = Callable[[Array | float, Traction | BodyForce | None], Array]  # (density, load of it) -> (owned components,)
+Beyond = Callable[[Array | float, Any], Array]  # (density, its load or None) -> (motions, owned components)
+# (components of nodes that move, (owned, d) or (owned, 1); centre of their rotations (d,); mask of local cells of the
+# group, ghosts too, None for all; what is taken away of inertia, its damping and loads, or None)
+Rigid = tuple[Mask, Array, Mask | None, Beyond | None]
 Loads = Traction | BodyForce | Sequence[Traction | BodyForce]
 
 
@@ -85,23 +88,23 @@ class NodalWork:
             log.warning("%s: the system has constant loads of (%s) N in all and none were given: if they act on these "
                         "elements give the loads of fem.assemble, or the gravity of with_weight", owner, text)
 
-    def take(self, fields: Sequence[tuple[Array, Mask | None, Taken | None]]) -> None:
-        """Take every r (owned nodes, d) with its group (mask of local cells, ghosts too; all when None), less what a
-        function makes of the densities of inertia, its damping and loads, if one is given. Collective."""
-        forms = [*self._forms, *self._load_forms]
-        own_fields, thickness = self.space.forms.fields, self.space.forms.section.thickness
-        densities = [(own_fields[name].x.array, None) for name in ("alpha_rho", "rho")]
-        densities += [(thickness, load) for load in self._loads]
+    def take(self, parts: Sequence[Rigid]) -> None:
+        """Take the rigid motions of each part as r, one after the other. Collective."""
+        forms, constants = [*self._forms, *self._load_forms], self.space.forms.fields
+        densities = [(constants[name].x.array, None) for name in ("alpha_rho", "rho")]
+        densities += [(self.space.forms.section.thickness, load) for load in self._loads]
         rows: list[list[Any]] = [[] for _ in forms]
-        for r, cells, taken in fields:
-            self._r.x.array[: r.size] = r.ravel()
-            self._r.x.scatter_forward()
+        for where, centre, cells, beyond in parts:
             self._inside.x.array[:] = 1.0 if cells is None else cells
-            for own, form, density in zip(rows, forms, [None, *densities], strict=True):
-                if form is not None:
-                    row = compat.assemble_vector(form).array_r
-                    own.append(sp.csr_matrix(row if taken is None or density is None else row - taken(*density)))
-        self._count = len(fields)
+            less = [beyond and beyond(*density) for density in densities]
+            for k, motion in enumerate(rigid_motions(self.space.points, centre)):
+                self._r.x.array[: motion.size] = np.where(where, motion, 0.0).ravel()
+                self._r.x.scatter_forward()
+                for own, form, away in zip(rows, forms, [None, *less], strict=True):
+                    if form is not None:
+                        row = compat.assemble_vector(form).array_r
+                        own.append(sp.csr_matrix(row if away is None else row - away[k]))
+        self._count = len(rows[0])
         self._matrices: list[Any] = [sp.vstack(own).tocsr() if own else None for own in rows]
         self._still: dict[int, Array] = {}
 
@@ -160,17 +163,9 @@ class NodalWork:
         return self._still[k] if load.history is None else np.asarray(at(load.history) * self._still[k])
 
 
-def rigid_fields(points: Array, centre: Sequence[float]) -> tuple[list[Array], list[str]]:
-    """Return the nodal fields (k, d) of unit translations and of the unit rotations about the centre, and names of
-    their work: axes, then M, in three dimensions M_x, M_y, M_z, in one none."""
-    d = points.shape[1]
-    arms = points - np.asarray(centre, dtype=float)
-    fields = [np.tile(axis, (len(points), 1)) for axis in np.eye(d)]
-    names = list("xyz"[:d])
-    if d == 2:
-        fields.append(np.column_stack([-arms[:, 1], arms[:, 0]]))
-        names.append("M")
-    if d == 3:
-        fields += [np.cross(axis, arms) for axis in np.eye(3)]
-        names += [f"M_{axis}" for axis in "xyz"]
-    return fields, names
+def rigid_motions(points: Array, centre: Array) -> Array:
+    """Return (motions, k, d) unit translations and, but on a line, rotations about a centre of points (k, d)."""
+    d, arms = points.shape[1], points - centre
+    shifts = [np.tile(axis, (len(points), 1)) for axis in np.eye(d)]
+    turns = [np.column_stack([-arms[:, 1], arms[:, 0]])] if d == 2 else []
+    return np.array([*shifts, *turns, *(np.cross(axis, arms) for axis in np.eye(3) if d == 3)])

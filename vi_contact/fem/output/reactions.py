@@ -13,7 +13,7 @@ from ...core.step import Columns, Report, Row, State
 from ..groups import facets_of
 from ..mesh import Facets
 from ..space import FemSpace
-from .nodal_work import Loads, NodalWork, check_actions, rigid_fields
+from .nodal_work import Loads, NodalWork, check_actions
 
 
 @dataclass
@@ -84,8 +84,8 @@ class Reactions:
         if not largest(space.comm, held.any()):
             raise InputError(f"nothing is prescribed on boundary group '{self.facets.name}', and it has no dashpots: "
                              "it has no reactions")
-        fields, self._parts = rigid_fields(space.points, self.centre)
-        self._work.take([(np.where(held, field, 0.0), None, None) for field in fields])
+        self._parts = {1: ["x"], 2: ["x", "y", "M"], 3: ["x", "y", "z", "M_x", "M_y", "M_z"]}[space.dimension]
+        self._work.take([(held, np.asarray(self.centre, dtype=float), None, None)])
         return self._named(self._work.at_rest(state))
 
     def row(self, report: Report) -> Row:
