@@ -1,11 +1,14 @@
 #!/usr/bin/env python3
 """What soil boundaries send back: dashpots at an angle, and how far the sides of a soil with a structure must be.
 
-    python3 benchmarks/soil_boundaries.py [--angles 15 30 45 60 75] [--cells 14] [--only dashpots|sides]
+    python3 benchmarks/soil_boundaries.py [--angles 15 30 45 60 75] [--cells 14] [--only dashpots|sides|boxes]
 
 Dashpots: a packet of plane waves on a strip that is one wavelength wide along the boundary, its sides tied; energy left
 after the reflection over energy before (verification V8.1). Sides: a heavy stiff box at the surface of a soft layer on
 rigid rock, shaken horizontally; largest deviation of the box's displacement from that with sides twelve depths away.
+Boxes: the same in space with sides that are tied both ways, against sides six depths away; and level ground on a
+compliant base, shaken in three components, between dashpots or free sides: deviation of the velocity in the middle of
+the surface from that of tied sides, which is exact.
 """
 
 from __future__ import annotations
@@ -33,7 +36,7 @@ from vi_contact import fem  # noqa: E402
 from vi_contact.exact import dashpot_energy  # noqa: E402
 from vi_contact.fem.compat import geometry_dofmap  # noqa: E402
 from vi_contact.meshes.block import BlockMesh  # noqa: E402
-from vi_contact.soil import FreeField  # noqa: E402
+from vi_contact.soil import FreeField, upgoing  # noqa: E402
 
 NU = 0.25
 LENGTH = 2.5  # of the packet, in wavelengths
@@ -41,6 +44,7 @@ SOIL = vc.LinearElastic.from_wave_speeds(280.0, 150.0, 1900.0)
 CONCRETE = vc.LinearElastic(E=3.0e10, nu=0.2, rho=2400.0)
 DEPTH, BOX, H = 10.0, (6.0, 4.0), 1.0  # m: soil, box, cells
 DT, STEPS = 5e-3, 400
+PAIRS = (("left", "right"), ("back", "front"))
 SHAKE = vc.Ricker(1.0, 4.0)
 
 
@@ -66,6 +70,55 @@ def shaken_box(sides: str, distance: float) -> np.ndarray:
     node = system.space.find_nodes(np.array([[0.0, 0.0]]))
     march = vc.march(linear(system, excitation=SHAKE), dt=DT, steps=STEPS)
     return np.array([system.space.sample(state.u, node, state.t)[0] for state, _ in march])
+
+
+def shaken_box_in_space(distance: float) -> np.ndarray:
+    """History of the displacement (steps, 3) of a box, 8 m x 8 m x 4 m in 8 m of soil, tied sides at ``distance``."""
+    width, h = 8.0 + 2.0 * distance, 2.0
+    block = BlockMesh(lengths=(width, 8.0, width), divisions=(round(width / h), 4, round(width / h)),
+                      corner=(-0.5 * width, -8.0, -0.5 * width))
+    mesh, tags = fem.build_mesh(block, MPI.COMM_WORLD)
+    middle = np.abs(mesh.geometry.x[geometry_dofmap(mesh)].mean(axis=1))
+    inside = middle.max(axis=1) < 4.0
+    box, soil = (fem.Cells(n, np.flatnonzero(m).astype(np.int32), mesh) for n, m in (("box", inside), ("s", ~inside)))
+    system = fem.assemble(
+        mesh, [(box, CONCRETE), (soil, SOIL)], clamped=tags["bottom"],
+        tied=[fem.Tied(tags[a], tags[b]) for a, b in PAIRS],
+        damping=vc.Rayleigh.from_frequencies(2.0, 8.0, xi1=0.03, xi2=0.03),
+    )
+    shake = vc.Ricker(1.0, 4.0, direction=(1.0, 0.0, 0.0))
+    return surface_history(system, vc.march(linear(system, excitation=shake), dt=DT, steps=200), 0)
+
+
+def level_box(width: float, sides: str) -> np.ndarray:
+    """History of the velocity (steps, 3) in the middle of the surface of 8 m of level soil on a compliant base."""
+    block = BlockMesh(lengths=(width, 8.0, width), divisions=(round(width / 2.0), 8, round(width / 2.0)),
+                      corner=(-0.5 * width, -8.0, -0.5 * width))
+    mesh, tags = fem.build_mesh(block, MPI.COMM_WORLD)
+    waves = [vc.Ricker(1.0, 4.0, direction=tuple(e)) for e in np.eye(3)]
+    base = fem.CompliantBase(tags["bottom"], motion=upgoing(waves, dt=1e-3))
+    tied = [fem.Tied(tags[a], tags[b]) for a, b in PAIRS] if sides == "tied" else ()
+    around = [fem.Dashpots(tags[one]) for pair in PAIRS for one in pair] if sides == "dashpots" else []
+    system = fem.assemble(mesh, SOIL, tied=tied, dashpots=[base, *around])
+    return surface_history(system, vc.march(linear(system), dt=DT, steps=100), 1)
+
+
+def surface_history(system: Any, march: Any, derivative: int) -> np.ndarray:
+    """u or v (steps, 3) in the middle of the surface."""
+    node = system.space.find_nodes(np.zeros((1, 3)))
+    return np.array([system.space.sample((state.u, state.v)[derivative], node, state.t)[0] for state, _ in march])
+
+
+def box_tables() -> None:
+    reference = shaken_box_in_space(48.0)[:, 0]
+    for depths in (0.5, 1.0, 2.0, 3.0):
+        error = np.abs(shaken_box_in_space(8.0 * depths)[:, 0] - reference).max() / np.abs(reference).max()
+        print(f"tied sides {depths:g} depths away: {100 * error:.2g} %", flush=True)
+    for width in (8.0, 16.0, 32.0):
+        exact = level_box(width, "tied")
+        for sides in ("dashpots", "free"):
+            error = np.abs(level_box(width, sides) - exact).max(axis=0) / np.abs(exact).max(axis=0)
+            print(f"level ground {width / 8.0:g} depths wide, {sides}: {np.round(100 * error)} %", flush=True)
 
 
 def dashpot_table(angles: Sequence[float], cells: int) -> None:
@@ -94,12 +147,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("--angles", type=float, nargs="+", default=[15.0, 30.0, 45.0, 60.0, 75.0])
     parser.add_argument("--cells", type=int, default=12, help="per wavelength")
-    parser.add_argument("--only", choices=("dashpots", "sides"))
+    parser.add_argument("--only", choices=("dashpots", "sides", "boxes"))
     given = parser.parse_args()
-    if given.only != "dashpots":
+    if given.only in (None, "sides"):
         side_table((0.5, 1.0, 2.0, 3.0, 5.0))
-    if given.only != "sides":
+    if given.only in (None, "dashpots"):
         dashpot_table(given.angles, given.cells)
+    if given.only in (None, "boxes"):
+        box_tables()
 
 
 if __name__ == "__main__":

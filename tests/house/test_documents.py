@@ -72,6 +72,13 @@ def test_other_examples_run_on_its_problem(tmp_path: Path, document: str) -> Non
     run(ready + example, tmp_path)
 
 
+@pytest.mark.slow
+def test_soil_in_space_prints_what_its_page_says(tmp_path: Path) -> None:
+    page = ROOT / "docs" / "guide" / "soil.md"
+    (printed,) = blocks(page, "text")
+    assert run(blocks(page, "python")[-1], tmp_path) == printed
+
+
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
 def test_commands_exist(document: Path) -> None:
     """Every script that a document calls is there and bash can read it; every demo too."""
