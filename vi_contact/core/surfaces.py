@@ -137,10 +137,10 @@ class ContactSurface:
 
     def whole(self) -> "ContactSurface":
         """Return the places and sizes of the conditions of all ranks, by number, everywhere. Collective."""
-        names = ("points", "normals", "weights", "gap0", "bilateral", "compliance")
-        arrays = {name: self.everywhere(getattr(self, name)) for name in names}
-        nodes = None if self.nodes is None else self.everywhere(self.nodes)
-        return replace(self, comm=SerialComm(), slots=np.arange(self.total), nodes=nodes, **arrays)
+        names = ("points", "normals", "weights", "gap0", "bilateral", "compliance", "nodes")
+        known = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
+        arrays = {name: self.everywhere(values) for name, values in known.items()}
+        return replace(self, comm=SerialComm(), slots=np.arange(self.total), **arrays)
 
     def normal_values(self, x: Array) -> Array:
         """Return B_n x, shape (m,); rows (k, m) of rows (k, n), as in all these products with B."""
@@ -232,11 +232,10 @@ def _spread(name: str, value: Any, shape: tuple[int, ...], t: float) -> Array:
 
 def same_node(nodes: Indices) -> tuple[Indices, ...]:
     """Return the places of each number that stands several times in ``nodes`` (m,), in the order of the numbers."""
-    _, place, counts = np.unique(nodes, return_inverse=True, return_counts=True)
-    several = np.flatnonzero(counts[place.ravel()] > 1)
-    order = several[np.argsort(nodes[several], kind="stable")]
-    groups = np.split(order, np.flatnonzero(np.diff(nodes[order])) + 1)
-    return tuple(group for group in groups if len(group))
+    order = np.argsort(nodes, kind="stable")
+    _, first, counts = np.unique(nodes[order], return_index=True, return_counts=True)
+    several = counts > 1
+    return tuple(order[at : at + k] for at, k in zip(first[several].tolist(), counts[several].tolist(), strict=True))
 
 
 def nodal_frames(directions: Array) -> Array:

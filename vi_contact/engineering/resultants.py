@@ -169,12 +169,6 @@ _MEANING = {
 }
 
 
-def _unit_and_meaning(quantity: str, name: str) -> tuple[str, str]:
-    kind, _, axis = quantity.partition("_")
-    unit, text = _MEANING[kind]
-    return unit, f"{text}{f' along {axis}' if axis else ''}, part {name}"
-
-
 @dataclass
 class Resultants:
     """Record columns <quantity>_<name> of a named part of the contact surface; the module's head lists the quantities.
@@ -202,7 +196,12 @@ class Resultants:
 
     def columns(self) -> Columns:
         """Call ``start`` first."""
-        return {f"{quantity}_{self.name}": _unit_and_meaning(quantity, self.name) for quantity in self._quantities}
+        found = {}
+        for quantity in self._quantities:
+            kind, _, axis = quantity.partition("_")
+            unit, text = _MEANING[kind]
+            found[f"{quantity}_{self.name}"] = (unit, f"{text}{f' along {axis}' if axis else ''}, part {self.name}")
+        return found
 
     def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
         """Find the part once, and return the row of the state, a static one or the start of a run. Collective."""

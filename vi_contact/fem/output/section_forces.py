@@ -138,6 +138,7 @@ def find_cut(space: FemSpace, name: str, given: Any, group: Cells | None) -> tup
     inside = np.zeros(len(x), dtype=bool)
     inside[slice(None) if group is None else cells_of(f"section '{name}'", "cells", group, mesh).indices] = True
     trace = _Trace((x - corners[0]) @ axes[1:].T, level(x), size, tol)
+    inside &= trace.touches
     sides = [[(inside & ends & side).any() for side in (trace.left, trace.right)] for ends in trace.beyond]
     if space.comm.max(np.array(sides, dtype=float)).all(axis=1).any():
         raise InputError(f"section '{name}' ends inside the group of cells: let it reach from surface to surface")
@@ -151,12 +152,12 @@ def find_cut(space: FemSpace, name: str, given: Any, group: Cells | None) -> tup
     sign = 1.0 if left >= right else -1.0
     away, at = level(space.points), (space.points - corners[0]) @ axes[1:].T
     nodes = (sign * away < 0.0) | ((away == 0.0) & ((at >= -tol) & (at <= size + tol)).all(axis=1))
-    crossed = inside & trace.touches & trace.left & trace.right
+    crossed = inside & trace.left & trace.right
     middle = corners[0] + 0.5 * (corners[1:] - corners[0]).sum(axis=0)
     motions = partial(rigid_motions, centre=middle)
     beyond = partial(work_beyond, space, crossed, lambda points: sign * level(points), motions) if through else None
-    cells = inside & trace.touches & (trace.left if sign > 0.0 else trace.right)
-    return (nodes[:, None], middle, cells, beyond), -sign * block_diag(axes, axes if len(axes) == 3 else 1.0)
+    moved = nodes[:, None], middle, inside & (trace.left if sign > 0.0 else trace.right), beyond
+    return moved, -sign * block_diag(axes, axes if len(axes) == 3 else 1.0)
 
 
 class _Trace:
