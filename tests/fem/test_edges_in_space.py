@@ -13,7 +13,7 @@ import pytest
 pytest.importorskip("dolfinx")
 
 from all_ranks import seen
-from fem_problems import dense, field
+from fem_problems import dense, field, max_over_ranks
 from mpi4py import MPI
 from reference_lcp import enumerate_lcp
 from test_mortar_in_space import rotation
@@ -27,9 +27,11 @@ from vi_contact.fem.contact.matching import NodeToNode
 from vi_contact.fem.contact.mortar import DualMortar
 from vi_contact.fem.contact.pairs import contact_pair
 from vi_contact.fem.contact.surface import contact_surface
-from vi_contact.fem.loads import Traction
+from vi_contact.fem.loads import Prescribed, Traction
 from vi_contact.fem.mesh import Facets, build_mesh
+from vi_contact.laws.materials import PlaneStress
 from vi_contact.meshes.block import BlockMesh
+from vi_contact.meshes.cut import Welded
 from vi_contact.meshes.two_blocks import Blocks
 from vi_contact.run.static import static_equilibrium
 from vi_contact.solvers.condensed import Condensed
@@ -164,3 +166,56 @@ def test_a_box_in_a_corner_by_enumeration(shape, n):
             assert np.abs(r_n[order] - expected).max() < 1e-9 * expected.max()
             found = field(placed.system, placed.cartesian(state.u))[1] @ PLACED[place]
             assert np.abs(found - u).max() < 1e-9 * np.abs(u).max()
+
+
+# Beside welds and symmetry planes -------------------------------------------------------------------------------------
+
+PRESSURE = 1e3
+
+
+def pressed(x: Array) -> Array:
+    """Displacements under a uniform pressure on top, between smooth planes x = 0, y = 0, z = 0."""
+    return PRESSURE / SOFT.E * x * np.array([SOFT.nu, -1.0, SOFT.nu][: x.shape[1]])
+
+
+def uniform(mesh: Any, rollers: list[str], tops: list[str], surface_of: Any) -> ContactProblem:
+    """Blocks between smooth planes under pressure: that of the contact and the displacements are exact to 1e-10."""
+    built, tags = build_mesh(mesh, COMM)
+    d, along = built.geometry.dim, {"left": (0,), "bottom": (1,), "back": (2,)}
+    held = [Prescribed(tags[name], components=along[name.split("_")[1]]) for name in rollers]
+    loads = [Traction(tags[name], tuple(-PRESSURE * np.eye(3)[1, :d])) for name in tops]
+    section = PlaneStress(1.0) if d == 2 else None
+    system = assemble(built, SOFT, prescribed=held, loads=loads, section=section)
+    problem = ContactProblem(system, surface_of(system, tags))
+    state = static_equilibrium(problem, solver=Condensed())
+    exact = system.space.restrict(pressed(system.space.points))
+    assert max_over_ranks(COMM, problem.cartesian(state.u) - exact) < 1e-10 * max_over_ranks(COMM, exact)
+    pressures = seen(problem.surface).all(state.r_n) / seen(problem.surface).weights
+    assert np.abs(pressures / PRESSURE - 1.0).max() < 1e-10
+    return problem
+
+
+@pytest.mark.parametrize(("kind", "n"), [("hexahedra", 3), pytest.param("tetrahedra", 3, marks=serial),
+                                         pytest.param("tetrahedra", 1, marks=serial), ("triangles", 3)])
+def test_the_pressure_is_uniform_up_to_a_weld(kind, n):
+    """Two bodies welded on one half of their interface, meshed unlike each other on the rest: nodes of the weld have no
+    condition, and the pressure beside it is what it is elsewhere; also where every facet has nodes of the weld."""
+    d = 2 if kind == "triangles" else 3
+    places = {"lower0": (0.0, 0.0, 0.0), "lower": (1.0, 0.0, 0.0), "upper0": (0.0, 1.0, 0.0), "upper": (1.0, 1.0, 0.0)}
+    mesh: Any = Blocks({
+        name: BlockMesh(lengths=(1.0,) * d, divisions=(n if name == "lower" else 2, 2, 2)[:d], corner=corner[:d],
+                        simplices=kind != "hexahedra") for name, corner in places.items()
+    })  # fmt: skip
+    for pair in (("lower0_right", "lower_left"), ("upper0_right", "upper_left"), ("lower0_top", "upper0_bottom")):
+        mesh = Welded(mesh, *pair)
+    found = []
+
+    def pair(system: Any, tags: Any) -> Any:
+        found.append(system.space.body_of_node.max(initial=0))
+        sides = tags["upper_bottom"], tags["lower_top"]
+        return contact_pair(system, *(sides[::-1] if n == 1 else sides), matching=DualMortar())
+
+    rollers = ["lower0_left", "upper0_left", "lower0_bottom", "lower_bottom", *(f"{name}_back" for name in places)]
+    problem = uniform(mesh, rollers[: 4 if d == 2 else 8], ["upper0_top", "upper_top"], pair)
+    assert max(found) == 0 and seen(problem.surface).points[:, 0].min() > 1.0
+    assert seen(problem.surface).count == (1 if n == 1 else 2) * 3 ** (d - 2)

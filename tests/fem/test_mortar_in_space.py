@@ -83,7 +83,7 @@ def face(
             share = 1.0 / 18.0 if kind == "t" else (4.0, 2.0, 1.0, 2.0)[j - i] / 36.0
             np.add.at(weights, rows[:, j], share * np.linalg.norm(turned, axis=1))
     normals /= np.linalg.norm(normals, axis=1)[:, None]
-    numbers, held = np.arange(len(points)), np.zeros(points.shape, dtype=bool)
+    numbers, held = np.arange(len(points)) + 1000 * up, np.zeros(points.shape, dtype=bool)
     return Side(name, Nodes(numbers, points, normals, weights, held, np.zeros(points.shape, dtype=np.int64)), rows)
 
 

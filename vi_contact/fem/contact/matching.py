@@ -28,6 +28,14 @@ class Side:
     facets: Indices
 
 
+def common_nodes(one: Side, two: Side) -> Indices:
+    """Return the places (m,) on side 2 of the nodes of side 1 that are nodes of both, at a tip or a weld; else -1."""
+    places = np.full(len(one.nodes.numbers), -1)
+    _, own, others = np.intersect1d(one.nodes.numbers, two.nodes.numbers, return_indices=True)
+    places[own] = others
+    return places
+
+
 @dataclass(frozen=True, eq=False)
 class Matched(Rows):
     """Hold the m nodes of side 1 that face side 2: ``rows`` among those of side 1, P (m, nodes of side 2), the weights

@@ -12,8 +12,12 @@ see ``mortar_in_space``. On each segment
 
 over its part in front of side 2, so that ∫ psi_s phi_k = 0 for the other node k (biorthogonal) and sum_s psi_s = 1.
 Then every linear field is matched exactly (P x_2 = x_1 on fitting sides) and a uniform pressure passes through exactly
-(the patch test). Literature: Wohlmuth, SIAM J. Numer. Anal. 38 (2000); Hüeber and Wohlmuth, Comput. Methods Appl. Mech.
-Engrg. 194 (2005); dual functions of partly covered segments: Cichosz and Bischoff, ibid. 200 (2011).
+(the patch test). Nodes t of both sides, at the tip of a crack or beside a weld, have no function; the other nodes of a
+facet share theirs and, which keeps P x_2 = x_1, pass ∫ psi_t to u_t: pressure is uniform up to the weld, which carries
+what a multiplier of t would.
+
+Literature: Wohlmuth, SIAM J. Numer. Anal. 38 (2000); Hüeber and Wohlmuth, Comput. Methods Appl. Mech. Engrg. 194
+(2005); dual functions of partly covered segments: Cichosz and Bischoff, ibid. 200 (2011).
 """
 
 from collections.abc import Iterator
@@ -25,8 +29,8 @@ import scipy.sparse as sp
 
 from ...core.algebra import Array
 from ...core.errors import InputError
-from .matching import EDGE_ON, Matched, Side, refuse_same_way
-from .mortar_in_space import LEAST_COVERED, in_space
+from .matching import EDGE_ON, Matched, Side, common_nodes, refuse_same_way
+from .mortar_in_space import LEAST_COVERED, handed_over, in_space
 
 POINTS = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0)  # of Gauss, on [0, 1], weights ½
 CURVED = 0.05  # of a facet: what polygons of one curve may overlap
@@ -69,7 +73,7 @@ def _in_plane(one: Side, two: Side) -> tuple[Array, sp.csr_matrix, Array]:
     ends1, ends2 = one.nodes.points[one.facets], two.nodes.points[two.facets]
     normals1, normals2 = (_normals(side, ends) for side, ends in ((one, ends1), (two, ends2)))
     m, n = len(one.nodes.points), len(two.nodes.points)
-    D, M, longest = np.zeros(m), sp.lil_matrix((m, n)), np.zeros(m)
+    D, M, longest, partner = np.zeros(m), sp.lil_matrix((m, n)), np.zeros(m), common_nodes(one, two)
     for facet, ends, normal in zip(one.facets, ends1, normals1, strict=True):
         pieces = list(_pieces(ends, normal, ends2, normals2))
         if sum(high - low for low, high, *_ in pieces) <= LEAST_COVERED:
@@ -77,12 +81,16 @@ def _in_plane(one: Side, two: Side) -> tuple[Array, sp.csr_matrix, Array]:
         length = float(np.linalg.norm(ends[1] - ends[0]))
         own, mixed = _integrals(pieces, length)
         dual = np.diag(own.sum(axis=1)) @ np.linalg.inv(own)
-        D[facet] += own.sum(axis=1)
+        common = partner[facet]
+        dual, own_D, forces = (a[0] for a in handed_over(dual[None], own.sum(axis=1)[None], common[None] >= 0))
+        D[facet] += own_D
         longest[facet] = np.maximum(longest[facet], length)
         for segment, values in mixed.items():
             for j, column in zip(two.facets[segment], (dual @ values).T, strict=True):
                 for i, value in zip(facet, column, strict=True):
                     M[i, j] += value
+        for j in np.flatnonzero(common >= 0):
+            M[facet[1 - j], common[j]] -= forces[1 - j, j]
     return D, sp.csr_matrix(M), longest
 
 

@@ -23,7 +23,7 @@ from ...core.errors import InputError
 from ...core.surfaces import nodal_frames
 from .clipping import areas, cross, hats, overlaps, rule, triangles, turns, without
 from .faces import components
-from .matching import DISTANCES, EDGE_ON, Side
+from .matching import DISTANCES, EDGE_ON, Side, common_nodes
 from .nodes import Nodes, Rows
 
 LEAST_COVERED = 1e-3  # of a facet: less of it in front of side 2 is no contact
@@ -249,13 +249,31 @@ def dual(looks: Looks, own: Array, whole: Mask) -> Array:
     return D[:, :, None] * A
 
 
+def entries(values: Array, rows: Indices, columns: Indices, m: int, n: int) -> sp.coo_matrix:
+    """Return values (k, v, w) summed at their rows (k, v) and columns (k, w); column -1 stands for none."""
+    places = [place.ravel() for place in np.broadcast_arrays(rows[:, :, None], columns[:, None, :])]
+    used = places[1] >= 0
+    return sp.csr_matrix((values.ravel()[used], tuple(place[used] for place in places)), shape=(m, n)).tocoo()
+
+
+def handed_over(functions: Array, D: Array, common: Mask) -> tuple[Array, Array, Array]:
+    """Return (psi (k, v, v), D (k, v), forces (k, v, v)) where nodes (k, v) are ``common`` to both sides (``mortar``):
+    others of their facet share their functions. ``forces``: shares of ∫ psi_t, which they pass to the former."""
+    if not common.any():
+        return functions, D, np.zeros_like(functions)
+    share = ~common / np.maximum(np.sum(~common, axis=1), 1)[:, None]
+    lost = np.sum(functions * common[:, :, None], axis=1)
+    forces = share[:, :, None] * (D * common)[:, None, :]
+    return functions * ~common[:, :, None] + share[:, :, None] * lost[:, None, :], D * ~common, forces
+
+
 def in_space(one: Side, two: Side) -> tuple[Array, sp.csr_matrix, Array]:
     """Return D (m,), M (m, n) and the size (m,) [m] of the largest facet in front of side 2 of each node of side 1."""
     ours, theirs = facets_of(one, 1), facets_of(two, -1)
     from scipy.spatial import cKDTree  # late: it takes a while
 
     tree, looks = cKDTree(theirs.middles), looks_of(ours, one.nodes)
-    m, n = len(one.nodes.points), len(two.nodes.points)
+    m, n, partner = len(one.nodes.points), len(two.nodes.points), common_nodes(one, two)
     D, longest, parts = np.zeros(m), np.zeros(m), [sp.coo_matrix((m, n))]
     for rows in np.array_split(np.arange(len(looks.nodes)), 1 + len(looks.nodes) // BLOCK):
         if not len(rows):
@@ -269,11 +287,14 @@ def in_space(one: Side, two: Side) -> tuple[Array, sp.csr_matrix, Array]:
         some = some.pick(kept)
         pieces = replace(pieces, look=look.ravel())
         own, mixed = integrals(some, pieces)
-        functions = dual(some, own, covered[kept] >= 1.0 - WHOLE) * some.asking[:, :, None]
-        values = functions[pieces.look] @ mixed
-        places = np.broadcast_arrays(some.nodes[pieces.look][:, :, None], theirs.nodes[pieces.facet][:, None, :])
-        parts.append(sp.csr_matrix((values.ravel(), tuple(place.ravel() for place in places)), shape=(m, n)).tocoo())
-        np.add.at(D, some.nodes, own.sum(axis=2) * some.asking)
+        common, asking = partner[some.nodes], some.asking[:, :, None]
+        functions = dual(some, own, covered[kept] >= 1.0 - WHOLE)
+        functions, own_D, forces = handed_over(functions, own.sum(axis=2), common >= 0)
+        values = (functions * asking)[pieces.look] @ mixed
+        parts.append(entries(values, some.nodes[pieces.look], theirs.nodes[pieces.facet], m, n))
+        if (common >= 0).any():
+            parts.append(entries(-forces * asking, some.nodes, common, m, n))
+        np.add.at(D, some.nodes, own_D * some.asking)
         reach = np.maximum(some.reach[pieces.look], theirs.reach[pieces.facet])
         np.maximum.at(longest, some.nodes[pieces.look], 2.0 * reach[:, None] * some.asking[pieces.look])
     values, *places = (np.concatenate([getattr(part, name) for part in parts]) for name in ("data", "row", "col"))
