@@ -83,9 +83,8 @@ def test_what_belongs_to_whom(runs: Any, kind: str) -> None:
     assert np.all(np.isin(nodes, frames.cells[frames.bodies == 1]))
     (face,) = faces_of(run.contact, facing)
     assert face.name == "face towards -y" and np.array_equal(face.conditions, np.arange(16))
-    shares, conditions = face.shares(run.contact.points)
-    areas = 0.5 * np.linalg.norm(np.cross(shares[:, 2] - shares[:, 0], shares[:, 3] - shares[:, 1]), axis=1)
-    weights = np.bincount(conditions, areas)
+    one, other = face.parts[:, 2] - face.parts[:, 0], face.parts[:, 3] - face.parts[:, 1]
+    weights = np.bincount(face.owners, 0.5 * np.linalg.norm(np.cross(one, other), axis=1))
     assert weights.sum() == pytest.approx(1.0, rel=1e-12)
     assert weights == pytest.approx(run.contact.weights, rel=1e-9)
 
@@ -123,6 +122,38 @@ def test_faces(runs: Any, kind: str, figures: list[Any], tmp_path: Path) -> None
     texts = [text.get_text() for text in figures[0].legends[0].get_texts()]
     longest = max(float(np.linalg.norm(slip[row][states[row] != OPEN], axis=1).max(initial=0.0)) for row in (15, STEPS))
     assert texts[:3] == ["open", "stick", "slip"] and texts[3].endswith(f" {1e6 * longest:.3g} µm")
+
+
+def test_curved_faces_and_corners(tmp_path: Path, figures: list[Any]) -> None:
+    """A bent base is one face, in projection, and a side of the same body another; the edge between them has conditions
+    on both. Nothing rubs: closed points are said to be closed."""
+    def bend(x: Any) -> Any:
+        return np.column_stack([x[:, :2], x[:, 2] + 0.4 * (1.0 - x[:, 2]) * x[:, 1] ** 2])
+
+    mesh, tags = fem.build_mesh(BlockMesh(lengths=(1.0,) * 3, divisions=(3, 3, 3), deform=bend), MPI.COMM_SELF)
+
+    def push(x: Any, t: float) -> Any:
+        return np.tile([3.0e3, 0.0, -4.0e3], (len(x), 1))
+
+    system = fem.assemble(mesh, SOFT, loads=[fem.Traction(tags["front"], push)])
+    surface = fem.joined_surfaces(*(fem.contact_surface(system, tags[side]) for side in ("back", "right")))
+    problem = vc.ContactProblem(system, surface, mass=vc.ConsistentMass())
+    vc.simulate(problem, scheme=vc.Newmark(), dt=DT, steps=2, out=tmp_path, record=[vc.Contact()],
+                fields=fem.XDMF(every=1), progress=False)
+    run = read_run(tmp_path)
+    curved, flat = faces_of(run.contact, read_frames(run).facing(run.contact)[0])
+    assert (curved.name, flat.name) == ("curved face", "face towards x")
+    assert len(curved.owners) == len(flat.owners) == 36 and not np.intersect1d(curved.owners, flat.owners).size
+    assert np.sort([*curved.conditions, *flat.conditions]).tolist() == list(range(32))
+    plot_faces(run, tmp_path / "faces.png", times=[2.0 * DT])
+    in_space, states = figures[0].axes[:2]
+    shown = in_space.collections[0]
+    assert np.asarray(shown.get_array()) == pytest.approx(1e-3 * run.history["pressure"][2, curved.owners])
+    corners = shown._vec[:3].T.reshape(-1, 4, 3)
+    assert np.array_equal(corners, curved.parts)
+    assert [axis.name for axis in figures[0].axes[:4]] == ["3d", "3d", "rectilinear", "rectilinear"]
+    assert np.array_equal(states.collections[0].get_array(), contact_states(run.history)[2, curved.owners])
+    assert [text.get_text() for text in figures[0].legends[0].get_texts()] == ["open", "closed"]
 
 
 def test_faces_without_fields(runs: Any, figures: list[Any], tmp_path: Path) -> None:

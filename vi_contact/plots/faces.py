@@ -15,7 +15,7 @@ from ..core.corners import FEATURE_ANGLE
 from ..core.errors import InputError
 from ..core.files import frames_of
 from ..core.step import AXES
-from ..engineering.resultants import Geometry
+from ..engineering.resultants import Geometry, tangent_vectors
 from ..run.files.reading import RunFolder
 from .deformed import OPEN, SAME, SLIP, STICK, contact_states, read_frames, stored_tangents
 from .histories import STYLE, History, length_unit, plain, save, scale
@@ -27,29 +27,24 @@ STATES = {OPEN: ("open", "white"), STICK: ("stick", "tab:blue"), SLIP: ("slip", 
 
 @dataclass(frozen=True)
 class Face:
-    """Hold a contact face: conditions (k,); ``axes`` (3, 2) of the plane it lies in, None of a curved one; ``sides`` of
-    elements (s, corners) as conditions, none where no fields were stored."""
+    """Hold a contact face: conditions (k,) and their ``points`` (k, 3); ``axes`` (3, 2) of the plane it lies in, None
+    of a curved one; parts of the sides of elements (p, 4, 3) with the condition (p,) of each, none without fields."""
 
-    conditions: Indices
-    axes: Array | None
-    sides: Indices
     name: str
+    conditions: Indices
+    points: Array
+    axes: Array | None
+    parts: Array
+    owners: Indices
 
     def seen(self, vectors: Array) -> Array:
         """Return vectors (..., 3) in the plane of the face, (..., 2), as they are where it is curved."""
         return vectors if self.axes is None else vectors @ self.axes
 
-    def shares(self, points: Array) -> tuple[Array, Indices]:
-        """Return the parts (p, 4, 3) of the sides around their corners, and the condition (p,) of each."""
-        corners = points[self.sides]
-        before, after = (0.5 * (corners + np.roll(corners, way, axis=1)) for way in (1, -1))
-        middle = np.broadcast_to(corners.mean(axis=1, keepdims=True), corners.shape)
-        return np.stack([corners, after, middle, before], axis=2).reshape(-1, 4, 3), self.sides.ravel()
-
 
 def faces_of(contact: Geometry, sides: Indices) -> list[Face]:
     """Return the faces of a contact surface: points near to each other whose directions differ by less than 30°; pieces
-    in one plane are one face. ``sides``: of elements, as conditions."""
+    in one plane are one face. ``sides`` of elements, as conditions (n, corners), are shared by their corners."""
     points, normals = contact.points, contact.normals
     m, size = len(points), float(np.ptp(points, axis=0).max()) or 1.0
     near = cKDTree(points).query(points, k=min(NEIGHBOURS, m))[1].reshape(m, -1)
@@ -58,33 +53,33 @@ def faces_of(contact: Geometry, sides: Indices) -> list[Face]:
     piece = connected_components(coo_matrix((np.ones(len(rows)), (rows, near[alike])), (m, m)), directed=False)[1]
     planes: dict[Any, list[Indices]] = {}
     for own in (np.flatnonzero(piece == number) for number in range(piece.max() + 1)):
-        mean = contact.weights[own] @ normals[own] / contact.weights[own].sum()
-        level = points[own] @ mean
-        flat = np.ptp(level) <= SAME * size and np.linalg.norm(normals[own] - mean, axis=1).max() <= SAME
-        key = (*np.round(mean / SAME), round(level.mean() / (SAME * size))) if flat else own[0]
-        planes.setdefault(key, []).append(own)
-    return [_face(np.sort(np.concatenate(parts)), key, contact, sides) for key, parts in planes.items()]
+        normal = normals[own[0]]
+        level = points[own] @ normal / size
+        flat = max(float(np.ptp(level)), float(np.abs(normals[own] - normal).max())) <= SAME
+        planes.setdefault((*np.round(normal / SAME), round(level[0] / SAME)) if flat else own[0], []).append(own)
+    found = []
+    for key, pieces in planes.items():
+        own, flat = np.sort(np.concatenate(pieces)), isinstance(key, tuple)
+        normal, mine = normals[own[:1]], sides[np.all(np.isin(sides, own), axis=1)]
+        name = f"face towards {direction(normal[0])}" if flat else "curved face"
+        axes = tangent_vectors(normal, np.zeros(1, dtype=np.int64))[0] if flat else None
+        found.append(Face(name, own, points[own], axes, shares(points[mine]), mine.ravel()))
+    return found
 
 
-def _face(own: Indices, key: Any, contact: Geometry, sides: Indices) -> Face:
-    """The face of these conditions, all of one direction unless ``key`` is a number."""
-    mine = sides[np.all(np.isin(sides, own), axis=1)]
-    if not isinstance(key, tuple):
-        return Face(own, None, mine, "curved face")
-    normal = contact.normals[own[0]]
-    axis = int(np.argmax(np.abs(normal)))
-    if abs(normal[axis]) > 1.0 - SAME:
-        axes = np.delete(np.eye(3), axis, axis=1)
-        return Face(own, axes, mine, f"face towards {'-' if normal[axis] < 0.0 else '+'}{AXES[axis]}")
-    across = np.cross([0.0, 0.0, 1.0], normal) if abs(normal[2]) < 1.0 - SAME else np.array([1.0, 0.0, 0.0])
-    across *= np.sign(across[np.argmax(np.abs(across))]) / np.linalg.norm(across)
-    up = np.cross(normal, across)
-    return Face(own, np.column_stack([across, up * np.sign(up[2])]), mine, f"face towards {_components(normal)}")
+def shares(corners: Array) -> Array:
+    """Return the parts (n corners, 4, 3) of sides (n, corners, 3), each around a corner."""
+    before, after = (0.5 * (corners + np.roll(corners, way, axis=1)) for way in (1, -1))
+    middle = np.broadcast_to(corners.mean(axis=1, keepdims=True), corners.shape)
+    return np.stack([corners, after, middle, before], axis=2).reshape(-1, 4, 3)
 
 
-def _components(way: Array) -> str:
-    """A direction as numbers, or the name of its axis."""
-    return AXES[int(np.argmax(way))] if way.max() > 1.0 - SAME else "(" + ", ".join(f"{one:.2g}" for one in way) + ")"
+def direction(way: Array) -> str:
+    """Return the name of a direction (d,): its axis with its sign, or its components."""
+    axis = int(np.argmax(np.abs(way)))
+    if abs(way[axis]) > 1.0 - SAME:
+        return ("-" if way[axis] < 0.0 else "") + AXES[axis]
+    return "(" + ", ".join(f"{one + 0.0:.2g}" for one in way) + ")"
 
 
 @dataclass(frozen=True)
@@ -118,6 +113,10 @@ class Painter:
 
         return cls(BoundaryNorm([0.5, 1.5, 2.5, 3.5], 3), ListedColormap([colour for _, colour in STATES.values()]))
 
+    def colours(self, values: Array) -> Array:
+        """Return the colours (…, 4) of values (…)."""
+        return np.asarray(self.cmap(self.norm(self.factor * values)))
+
     def bar(self, figure: Any, axes: Any, **look: Any) -> None:
         """Draw the colour bar beside axes."""
         from matplotlib.cm import ScalarMappable
@@ -125,37 +124,35 @@ class Painter:
         shown = ScalarMappable(self.norm, self.cmap)
         figure.colorbar(shown, ax=axes, label=self.label, fraction=0.04, aspect=25, **look)
 
-    def draw(self, axis: Any, face: Face, points: Array, values: Array) -> None:
-        """Draw values (m,) of the conditions of a face, each on its share of the sides around it; as dots without."""
+    def draw(self, axis: Any, face: Face, values: Array) -> None:
+        """Draw values (m,) of all conditions on a face: each on its share of the element sides, as dots without."""
         from matplotlib.collections import PolyCollection
         from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-        own, look = face.conditions, {"norm": self.norm, "cmap": self.cmap}
-        kind, add = (PolyCollection, axis.add_collection) if face.axes is not None else (
-            Poly3DCollection, axis.add_collection3d)
-        if len(face.sides):
-            shares, conditions = face.shares(points)
-            coloured = kind(face.seen(shares), edgecolors="face", linewidths=0.2, **look)
-            coloured.set_array(self.factor * values[conditions])
-            add(coloured)
-            add(kind(face.seen(points[face.sides]), facecolors="none", edgecolors="0.6", linewidths=0.3))
+        if len(face.parts):
+            look = {"norm": self.norm, "cmap": self.cmap, "edgecolors": "0.7", "linewidths": 0.2}
+            kind = PolyCollection if face.axes is not None else Poly3DCollection
+            parts = kind(face.seen(face.parts), **look)
+            parts.set_array(self.factor * values[face.owners])
+            axis.add_collection(parts)
         else:
-            self.dots(axis, face.seen(points[own]), values[own])
-        seen, names = face.seen(points[own]), AXES if face.axes is None else [_components(way) for way in face.axes.T]
+            self.dots(axis, face.seen(face.points), values[face.conditions])
+        names = AXES if face.axes is None else [direction(way) for way in face.axes.T]
+        seen = face.seen(face.points)
         limit(axis, seen.min(axis=0), seen.max(axis=0), names, margin=1.2 * ARROW)  # with room for arrows
-
 
     def dots(self, axis: Any, places: Array, values: Array) -> None:
         """Draw values (k,) as dots at places (k, d)."""
         look = {"norm": self.norm, "cmap": self.cmap, "edgecolors": "0.3", "linewidths": 0.4, "zorder": 4}
         axis.scatter(*places.T, c=self.factor * values, s=24, **look)
 
+
 def limit(
     axis: Any, low: Array, high: Array, names: Sequence[str] = AXES, *, margin: float = 0.0, up: str = "z"
 ) -> None:
     """Set limits (d,) [m], one scale along all axes, and their names; ``margin``: part of the largest size; ``up``: the
     axis that points upwards in projection."""
-    room = margin * float((high - low).max())
+    room = margin * (float((high - low).max()) or 1.0)
     axis.grid(False)
     for letter, name, a, b in zip(AXES, names, low - room, high + room, strict=False):
         axis.set(**{f"{letter}lim": (a, b), f"{letter}label": f"{name if len(name) == 1 else f'along {name}'} [m]"})
@@ -169,16 +166,20 @@ def limit(
 
 
 def leading(history: History) -> str:
-    """Return the column that tells when most happens: uplift, largest pressure or a displacement that varies."""
+    """Return the column that tells when most happens: of uplift, largest pressure and displacements the first one that
+    is not largest at the start."""
     names = ("contact_uplift", "contact_max_pressure", *(name for name in history if name.startswith("u_")))
-    varies = (name for name in names if name in history and np.ptp(np.nan_to_num(history[name])) > 0.0)
-    return next(varies, "iterations")
+    return next((name for name in names if name in history and _most(history, name) > 0), "iterations")
+
+
+def _most(history: History, column: str) -> int:
+    """The row in which a column is largest in size."""
+    return int(np.argmax(np.abs(np.nan_to_num(history[column]))))
 
 
 def moments(history: History) -> list[float]:
     """Return the first time, the one when most happens (``leading``), and the last."""
-    t, values = history["t"], np.nan_to_num(history[leading(history)])
-    return [float(t[0]), float(t[int(np.argmax(np.abs(values)))]), float(t[-1])]
+    return history["t"][[0, _most(history, leading(history)), -1]].tolist()
 
 
 def plot_faces(
@@ -207,9 +208,9 @@ def plot_faces(
     for place, face in enumerate(faces):
         for column, row in enumerate(rows):
             over, under = axes[2 * place : 2 * place + 2, column]
-            painter.draw(over, face, contact.points, pressure[column])
-            Painter.of_states().draw(under, face, contact.points, states[column])
-            _arrows(under, face, contact.points, slip[column], longest)
+            painter.draw(over, face, pressure[column])
+            Painter.of_states().draw(under, face, states[column])
+            _arrows(under, face, slip[column], longest)
             over.set_title(f"{face.name}, t = {history['t'][row]:.4g} s", fontsize=9)
     painter.bar(figure, list(axes.ravel()))
     _legend(figure, longest, "slip" in history)
@@ -229,13 +230,13 @@ def sheet(flat: Sequence[bool], columns: int, size: tuple[float, float]) -> tupl
     return figure, np.array(axes, dtype=object)
 
 
-def _arrows(axis: Any, face: Face, points: Array, slip: Array, longest: float) -> None:
+def _arrows(axis: Any, face: Face, slip: Array, longest: float) -> None:
     """The slips (m, 3) of a face, the longest of all panels as long as ARROW says."""
-    own = face.conditions[np.linalg.norm(slip[face.conditions], axis=1) > SAME * longest]
-    if len(own):
-        size = ARROW * float(np.ptp(points[face.conditions], axis=0).max()) / longest
-        ends, ways = face.seen(points[own]).T, face.seen(size * slip[own]).T
+    own = np.linalg.norm(slip[face.conditions], axis=1) > SAME * longest
+    if own.any():
+        size = ARROW * float(np.ptp(face.points, axis=0).max()) / longest
         flat = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "width": 0.006, "zorder": 3}
+        ends, ways = face.seen(face.points[own]).T, face.seen(size * slip[face.conditions[own]]).T
         axis.quiver(*ends, *ways, color="black", **(flat if face.axes is not None else {"lw": 0.8}))
 
 
