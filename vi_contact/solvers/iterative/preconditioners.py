@@ -5,6 +5,10 @@ layer of its neighbours' (additive Schwarz). Their sum counts a row as often as 
 divide by the square root of that number on either side takes this back, and M stays symmetric. Counted twice, the
 layer would be no gain.
 
+An incomplete factor of a positive definite matrix need not be positive definite: flat tetrahedra, or a stiff body on a
+soft one, are enough. Factors are then made of A with a larger diagonal (Manteuffel, 1980, Math. Comput. 34, 473-497),
+since PETSc's own shifts know nothing of blocks.
+
 GAMG is made of A with the held rows and columns replaced by their diagonal, or its coarse grids would believe the
 contact open; the interpolation is kept, Galerkin products are renewed when over a tenth of the set has moved since.
 """
@@ -26,6 +30,7 @@ from .work import Work
 
 DRIFT = 0.1  # of the contact set that may move before GAMG is renewed
 RENEWALS = 4  # in a step, at most
+RAISED = 0.5  # of the diagonal, for factors that were not positive definite; CHOSEN: docs/guide/solvers.md
 DEFAULTS: dict[str, Options] = {
     JACOBI: {"pc_type": "jacobi"},
     ICC: {"pc_type": "bjacobi", "sub_pc_type": "icc"},
@@ -88,10 +93,15 @@ class Masked:
 
 
 class Inverse:
-    """Hold M⁻¹ as the PETSc preconditioner ``pc``: Jacobi and ICC, which do not depend on the contact set."""
+    """Hold M⁻¹ as the PETSc preconditioner ``pc``: Jacobi and ICC, which do not depend on the contact set; made of the
+    matrix with a diagonal larger by the factor 1 + ``raised``."""
 
-    def __init__(self, matrix: Any, layers: OptionLayers, work: Work) -> None:
-        self.pc = made(matrix, layers, work)
+    def __init__(self, matrix: Any, layers: OptionLayers, work: Work, raised: float = 0.0) -> None:
+        made_of = matrix
+        if raised:
+            made_of, diagonal = matrix.duplicate(copy=True), matrix.getDiagonal()
+            made_of.setDiagonal(diagonal * (1.0 + raised))
+        self.pc = made(made_of, layers, work)
 
     def begin(self) -> None:
         """Begin a step."""

@@ -18,7 +18,7 @@ from petsc4py import PETSc
 
 from ...core.algebra import EffectiveMatrix
 from ...core.checks import attributes, check_word, instance, shown, whole
-from ...core.errors import InputError
+from ...core.errors import InputError, StepFailure
 from ...core.problem import ContactProblem
 from ...core.step import StepProblem, StepResult
 from ...core.surfaces import ContactSurface
@@ -32,7 +32,7 @@ from .friction import Friction
 from .layout import Nodewise
 from .measures import Worth
 from .operator import Operator
-from .preconditioners import Inverse, Masked, Multigrid, defaults
+from .preconditioners import RAISED, Inverse, Masked, Multigrid, defaults
 from .projected_gradients import largest_eigenvalue, projected_gradients
 from .regime import GAMG, ICC, KINDS, chosen, courant
 from .search import Search, search
@@ -98,11 +98,10 @@ class PreparedIterative:
             blocks = nodewise.blocks()
         PETSc.garbage_cleanup(blocks.comm)
         self._operator = Operator(blocks, self.work)
-        layers = OptionLayers(settings.prefix, defaults(self.kind, A.algebra.comm.size), settings.petsc_options)
-        self._inverse = (Multigrid(nodewise, surface, layers, self.work) if self.kind == GAMG
-                         else Inverse(blocks, layers, self.work))
-        self._masked = Masked(self._inverse.pc, blocks.createVecLeft())
-        self._cg = ConjugateGradients(self._operator, self._masked)
+        self._layers = OptionLayers(settings.prefix, defaults(self.kind, A.algebra.comm.size), settings.petsc_options)
+        self._blocks, self._raised = blocks, False
+        self._take(Multigrid(nodewise, surface, self._layers, self.work) if self.kind == GAMG
+                   else Inverse(blocks, self._layers, self.work))
         self._diagonal = np.array(blocks.getDiagonal().array_r)
         self._contact = Contact(surface, scale, layout.places[surface.owned], self._diagonal, layout.missing)
         self._norm: float | None = None
@@ -118,6 +117,12 @@ class PreparedIterative:
                      "chosen" if asked == AUTO else "asked for", number, "; ranks overlap by a layer" if layer else "")
         return kind
 
+    def _take(self, inverse: Inverse) -> None:
+        """Precondition with this one from now on."""
+        self._inverse, self._masked = inverse, Masked(inverse.pc, self._blocks.createVecLeft())
+        self._cg = ConjugateGradients(self._operator, self._masked)
+        self.__dict__.pop("_friction", None)
+
     @property
     def ksp(self) -> Any:
         """Return PETSc's linear solver."""
@@ -125,6 +130,20 @@ class PreparedIterative:
 
     def solve(self, step: StepProblem) -> StepResult:
         """Return the step; StepFailure, on all ranks, with the history of residuals when there is no answer."""
+        if self.kind != ICC or self._raised:
+            return self._attempt(step)
+        try:
+            with np.errstate(over="ignore", invalid="ignore"):  # of factors that are not positive definite
+                return self._attempt(step)
+        except StepFailure as error:
+            if self._surface.comm.rank == 0:
+                log.info("%s: incomplete factors are made again with a larger diagonal", error)
+        self._raised = True
+        self._take(Inverse(self._blocks, self._layers, self.work, RAISED))
+        return self._attempt(step)
+
+    def _attempt(self, step: StepProblem) -> StepResult:
+        """The step with the preconditioner that there is."""
         try:
             return self._solve(step) if step.slip0 is None else self._friction.solve(step)
         except PETSc.Error as error:
