@@ -29,6 +29,8 @@ from demos.pictures import raft as pictures
 from vi_contact import engineering, fem, ground_motion, soil
 from vi_contact.cli import status_of
 from vi_contact.meshes.raft import RaftMesh
+from vi_contact.plots.bodies import film, plot_deformed
+from vi_contact.plots.faces import plot_faces
 from vi_contact.plots.histories import plot_certificate, plot_energy
 
 # Parameters ----------------------------------------------------------------------------------------------------------
@@ -42,7 +44,8 @@ MU = 0.5
 PEAKS, SEEDS = (2.0, 1.6, 1.0), (1, 2, 3)  # of an outcrop of the rock along x, y, z [m/s²]
 DAMPING = vc.Rayleigh(alpha=0.0, beta=0.03 / (np.pi * 4.0))  # 3 % at 4 Hz; alpha would brake the rocking
 DT, T_END = 5e-3, 5.0
-FRAMES = 100  # of the film and for ParaView
+FRAMES = 200  # for ParaView and the film
+MAGNIFIED = 100.0  # displacements in the pictures
 OUT = Path("results/raft")
 ROOF = RAFT[2] + sum(STOREYS)
 POINTS = {"foot": (CORE[0], 0.0, RAFT[2]), "roof": (CORE[0], 0.0, ROOF),
@@ -69,7 +72,7 @@ def main(
     if comm.rank == 0:
         print(solution.summary())
         print("\n".join(f"  {name:<42} {value:.4g}" for name, value in numbers.items()))
-        draw(out, solution.history, weight)
+        draw(out, weight, quick=quick, filmed=size == "2e4")
         print(f"\nFigures, film, histories and ParaView files are in {out}.")
     comm.Barrier()  # nobody leaves before the figures are there
     return numbers
@@ -147,10 +150,17 @@ def key_numbers(history: Any, weight: float) -> dict[str, float]:
     }
 
 
-def draw(out: Path, history: Any, weight: float) -> None:
-    """Draw all figures and the film."""
+def draw(out: Path, weight: float, *, quick: bool, filmed: bool) -> None:
+    """Draw all figures and, where there are not too many cells, the film around the largest uplift."""
+    run = vc.read_run(out)
+    history, times = run.history, pictures.instants(run.history)
     pictures.plot_motions(history, out / "motions.png", weight=weight, mu=MU)
     pictures.plot_moments(history, out / "moments.png", weight=weight, sides=RAFT[:2])
+    plot_faces(run, out / "faces.png", times=times, title="The raft from above: closed, half open, open widest")
+    plot_deformed(run, out / "deformed.png", times=times, magnified=MAGNIFIED, title="Building and soil")
+    if filmed:
+        around = times[-1] + (np.arange(2) if quick else np.linspace(-0.35, 0.35, 29))
+        film(run, out / "raft.gif", times=around, magnified=MAGNIFIED, column="uplift_raft")
     plot_energy(history, out / "energy.png")
     plot_certificate(history, out / "certificate.png")
 

@@ -13,6 +13,15 @@ from vi_contact.plots.histories import History, canvas, panels, save, scale
 CORNERS = {f"{x}_{y}": (i, j) for x, i in (("left", -1), ("right", 1)) for y, j in (("back", -1), ("front", 1))}
 
 
+def instants(history: History) -> list[float]:
+    """Return the last time [s] before the largest uplift at which a twentieth of it was open, half of it, and that of
+    the largest."""
+    uplift = history["uplift_raft"]
+    widest = int(np.argmax(uplift))
+    below = [np.flatnonzero(uplift[: widest + 1] <= part * uplift[widest]) for part in (0.05, 0.5)]
+    return [float(history["t"][rows[-1] if len(rows) else 0]) for rows in below] + [float(history["t"][widest])]
+
+
 def plot_motions(history: History, path: str | Path, *, weight: float, mu: float) -> Path:
     """Draw ground and roof, the force of the soil on the raft over the ``weight`` [N], what is open, and the slip."""
     t = history["t"]
