@@ -8,10 +8,9 @@ import numpy as np
 
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
+from vi_contact.plots.deformed import contact_states
+from vi_contact.plots.faces import STATES
 from vi_contact.plots.histories import History, canvas, cell_edges, length_unit, panels, save, scaled
-
-OPEN, STICK, SLIP = 1, 2, 3  # as contact_status in fields.xdmf
-_COLOURS = {OPEN: ("open", "white"), STICK: ("stick", "tab:blue"), SLIP: ("slip", "tab:orange")}
 
 
 def plot_hysteresis(
@@ -54,33 +53,20 @@ def plot_states(
     from matplotlib.patches import Patch
 
     t, order = history["t"], np.argsort(position)
+    _slip(history)
     states = contact_states(history)[:, order]
     figure, (panel,) = panels(1, (9.0, 4.0))
     panel.grid(False)
-    colours = ListedColormap([colour for _, colour in _COLOURS.values()])
+    colours = ListedColormap([colour for _, colour in STATES.values()])
     panel.pcolormesh(
         cell_edges(t), cell_edges(np.asarray(position)[order]), states.T, cmap=colours,
         norm=BoundaryNorm([0.5, 1.5, 2.5, 3.5], 3), rasterized=True,
     )
-    patches = [Patch(facecolor=colour, edgecolor="0.5", label=label) for label, colour in _COLOURS.values()]
+    patches = [Patch(facecolor=colour, edgecolor="0.5", label=label) for label, colour in STATES.values()]
     panel.legend(handles=patches, fontsize=8, ncol=3, loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
     panel.set_ylabel(axis_label)
     panel.set_title(title, loc="left")
     return save(figure, path)
-
-
-def contact_states(history: History) -> Array:
-    """Return 1 open, 2 stick, 3 slip, (rows, m): closed points slip when their slip changed since the row before.
-
-    Changes below 1e-9 of the largest one are rounding. In the first row closed points stick. InputError without records
-    of friction.
-    """
-    slip = _slip(history)
-    active = np.reshape(history["active"], slip.shape[:2]).astype(bool)
-    change = np.zeros(slip.shape[:2])
-    change[1:] = np.linalg.norm(np.diff(slip, axis=0), axis=2)
-    moved = change > 1e-9 * np.max(change, initial=0.0)
-    return np.where(active, np.where(moved, SLIP, STICK), OPEN)
 
 
 def _slip(history: History) -> Array:

@@ -11,9 +11,10 @@ from kept_figures import keep_figures
 from rubbing import rubbing_block
 
 from demos.pictures import friction as plotting_friction
-from demos.pictures.friction import contact_states, plot_hysteresis, plot_states
+from demos.pictures.friction import plot_hysteresis, plot_states
 from vi_contact.core.errors import InputError
 from vi_contact.laws.friction import Coulomb
+from vi_contact.plots.deformed import contact_states
 from vi_contact.run.recorders import Contact
 from vi_contact.run.simulate import simulate
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor

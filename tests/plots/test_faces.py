@@ -3,9 +3,11 @@ match: what they show is what was recorded."""
 
 from __future__ import annotations
 
+import sys
 import warnings
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -26,6 +28,7 @@ from vi_contact.plots import bodies, faces
 from vi_contact.plots.bodies import film, plot_deformed
 from vi_contact.plots.deformed import OPEN, SLIP, STICK, contact_states, read_frames
 from vi_contact.plots.faces import faces_of, plot_faces
+from vi_contact.plots.rendered import render_deformed
 from vi_contact.run.files.reading import RunFolder, read_run
 
 pytestmark = pytest.mark.serial
@@ -212,3 +215,37 @@ def test_the_film(runs: Any, tmp_path: Path) -> None:
         film(run, tmp_path / "film.mp4")
     with pytest.raises(InputError, match="no column 'nosuch'"):
         film(run, tmp_path / "film.gif", column="nosuch")
+
+
+def test_rendering(runs: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """What a stand-in for pyvista gets: both bodies displaced with the stress of every side, the contact face with its
+    pressures; without pyvista one sentence."""
+    run, frames, calls = runs["tetrahedra"], read_frames(runs["tetrahedra"]), []
+
+    class PolyData:
+        def __init__(self, points: Any, faces: Any) -> None:
+            self.points, self.faces, self.cell_data, self.point_data = points, faces.reshape(-1, 4), {}, {}
+
+    class Plotter:
+        def __init__(self, off_screen: bool) -> None:
+            assert off_screen
+
+        def __getattr__(self, name: str) -> Any:
+            return lambda *data, **look: calls.append((name, *data))
+
+    monkeypatch.setitem(sys.modules, "pyvista", SimpleNamespace(PolyData=PolyData, Plotter=Plotter))
+    assert render_deformed(run, tmp_path / "bodies.png", t=0.0205, magnified=3.0) == tmp_path / "bodies.png"
+    (_, skin), (_, face) = (call for call in calls if call[0] == "add_mesh")
+    assert [call[0] for call in calls[-2:]] == ["screenshot", "close"]
+    assert ("add_text", "t = 0.021 s, displacements x 3") in calls
+    _, u, stress = frames.at(0.021)
+    sides, cells = frames.boundary
+    moved = frames.points + 3.0 * u
+    assert np.all(skin.faces[:, 0] == 3) and np.array_equal(skin.points[skin.faces[:, 1:]], moved[sides])
+    assert np.array_equal(skin.cell_data["von Mises stress [Pa]"], stress[cells])
+    facing, nodes = frames.facing(run.contact)
+    assert np.array_equal(face.points, moved[nodes]) and np.array_equal(face.faces[:, 1:], facing)
+    assert np.array_equal(face.point_data["contact pressure [Pa]"], run.history["pressure"][21])
+    monkeypatch.setitem(sys.modules, "pyvista", None)
+    with pytest.raises(InputError, match="needs pyvista"):
+        render_deformed(run, tmp_path / "none.png", t=0.0)

@@ -13,6 +13,7 @@ _CONTENTS = {
     "histories": ("plot_certificate", "plot_energy", "plot_excitation", "plot_points", "plot_runs"),
     "maps": ("plot_contact",),
     "records": ("plot_loop", "plot_motion", "plot_spectra", "plot_transfer"),
+    "rendered": ("render_deformed",),
     "report": ("plot_report",),
     "run_pictures": ("draw_run", "illustrate"),
     "studies": ("plot_beam_energies", "plot_ida", "plot_particle", "plot_shapes", "plot_tips"),
