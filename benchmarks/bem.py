@@ -27,6 +27,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "bem"), str(ROOT / "tests" / "support")]
 
 import numpy as np  # noqa: E402
+from convolution_operator import convolution_operator  # noqa: E402
 from plane_waves import MATERIAL, SQUARE, pulse  # noqa: E402
 from test_convolution import rod as convolution_rod  # noqa: E402
 from test_energetic import echoes, rod, smooth_integral, smooth_load  # noqa: E402
@@ -101,7 +102,7 @@ def thin(share: float, *, h: float = 0.1, end: float = 6.0) -> str:
     for dt in (h, 0.5 * h):
         blocks = bem.energetic_blocks(mesh, MATERIAL, dt=dt, steps=round(end / dt))
         errors.append(rod_errors(blocks)["sin²"])
-    operator = bem.convolution_operator(mesh, MATERIAL, dt=h, steps=round(end / h))
+    operator = convolution_operator(mesh, MATERIAL, dt=h, steps=round(end / h))
     motion = convolution_rod(operator, smooth_load).solve()
     exact = echoes(motion.times, smooth_integral)[:, None]
     top = motion.displacement[:, 1][:, mesh.nodes_of(mesh.labels == 2)]

@@ -28,6 +28,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "bem"), str(ROOT / "tests" / "support")]
 
 import numpy as np  # noqa: E402
+from convolution_operator import convolution_operator  # noqa: E402
 from plane_waves import MATERIAL, SQUARE, pulse  # noqa: E402
 from test_energetic import echoes, smooth_integral, smooth_load  # noqa: E402
 
@@ -50,7 +51,7 @@ def discretised(method: str, k: int) -> tuple[Problem, Callable[[Forces], np.nda
     if method == "energetic":
         operator = bem.PoincareSteklov(bem.energetic_blocks(mesh, MATERIAL, dt=dt, steps=steps), MATERIAL.rho)
         return lambda *a, **more: bem.BoundaryProblem(operator, *a, **more), lambda forces: forces(dt, steps)
-    transformed = bem.convolution_operator(mesh, MATERIAL, dt=dt, steps=steps)
+    transformed = convolution_operator(mesh, MATERIAL, dt=dt, steps=steps)
     return (lambda *a, **more: bem.BoundaryProblem(transformed, *a, **more),
             transformed.frequencies.substep_means)
 

@@ -268,6 +268,6 @@ def table(numbers: dict[str, float]) -> str:
 
 
 # Things to try: ELEMENTS of twice the number; bem.SpaceTimeUzawa(rho=...), whose iterations depend on rho;
-# bem.convolution_operator instead of the energetic method; vc.cross_check(..., references=[run]).
+# vc.cross_check(..., references=[run]).
 if __name__ == "__main__":
     raise SystemExit(status_of(main))

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from boundary_matrices import in_time, laplace
+from laplace_kernels import LaplaceKernels
 from plane_waves import MATERIAL, SQUARE, exponential, stress_vector
 
-from vi_contact.bem import BoundaryMesh, LaplaceKernels, Orders, circle, polygon
+from vi_contact.bem import BoundaryMesh, Orders, circle, polygon
 
 pytestmark = pytest.mark.serial
 S = 2.0 + 3.0j

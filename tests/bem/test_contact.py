@@ -7,13 +7,13 @@ from functools import cache
 
 import numpy as np
 import pytest
+from convolution_operator import convolution_operator
 
 import vi_contact as vc
 from vi_contact import solvers
 from vi_contact.bem import (
     BoundaryProblem,
     PoincareSteklov,
-    convolution_operator,
     polygon,
 )
 from vi_contact.bem.contact import BoundaryContact, conditions_on

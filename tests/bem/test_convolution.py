@@ -6,25 +6,24 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from convolution_operator import ConvolutionOperator, convolution_operator
+from convolution_quadrature import Frequencies
+from laplace_kernels import LaplaceKernels
 from plane_waves import MATERIAL, SQUARE, pulse
+from radial_table import RadialTable
 from scipy.linalg import expm
 
 from vi_contact import LinearElastic, Tresca
 from vi_contact.bem import (
     BoundaryProblem,
-    ConvolutionOperator,
-    Frequencies,
     Galerkin,
-    LaplaceKernels,
     PoincareSteklov,
-    convolution_operator,
     energetic_blocks,
     polygon,
     traction_forces,
 )
 from vi_contact.bem.contact import BoundaryContact
 from vi_contact.bem.contact_run import ledger, march_contact
-from vi_contact.bem.radial_table import RadialTable
 from vi_contact.bem.uzawa_space_time import SpaceTimeUzawa
 from vi_contact.core.errors import InputError
 

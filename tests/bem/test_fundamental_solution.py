@@ -6,9 +6,10 @@ from decimal import Decimal, localcontext
 
 import numpy as np
 import pytest
+from laplace_kernels import LaplaceKernels, kappa
 from scipy.special import kv
 
-from vi_contact.bem.fundamental_solution import KernelSet, LaplaceKernels, TimeKernels, kappa
+from vi_contact.bem.fundamental_solution import KernelSet, TimeKernels
 
 pytestmark = pytest.mark.serial
 C_P, C_S = 1.0, 0.5

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from boundary_matrices import in_time
+from convolution_operator import convolution_operator
 from plane_waves import MATERIAL, SQUARE
 
 from vi_contact.bem import (
@@ -13,7 +14,6 @@ from vi_contact.bem import (
     Orders,
     PoincareSteklov,
     circle,
-    convolution_operator,
     energetic_blocks,
     interior_displacement,
     polygon,

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from laplace_kernels import LaplaceKernels
 from plane_waves import MATERIAL
 
-from vi_contact.bem import BoundaryMesh, Galerkin, LaplaceKernels, OperatorMatrices, Orders, TimeKernels
+from vi_contact.bem import BoundaryMesh, Galerkin, OperatorMatrices, Orders, TimeKernels
 
 
 def laplace(mesh: BoundaryMesh, s: complex, orders: Orders = Orders()) -> OperatorMatrices:

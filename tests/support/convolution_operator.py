@@ -9,18 +9,18 @@ not see the difference: forces are means over steps, displacements are at the en
 from dataclasses import dataclass
 
 import numpy as np
+from convolution_quadrature import WIDTHS, Frequencies
+from laplace_kernels import LaplaceKernels
 from numpy.typing import NDArray
+from radial_table import RadialTable
 
-from ..core.algebra import Array, Indices, Mask
-from ..core.checks import counted, flag
-from ..laws.materials import LinearElastic
-from .boundary_mesh import BoundaryMesh
-from .boundary_operators import check_body
-from .convolution_quadrature import WIDTHS, Frequencies
-from .energetic import NUMBERS, check_time_step
-from .fundamental_solution import LaplaceKernels
-from .quadrature import Orders
-from .radial_table import RadialTable
+from vi_contact.bem.boundary_mesh import BoundaryMesh
+from vi_contact.bem.boundary_operators import check_body
+from vi_contact.bem.energetic import NUMBERS, check_time_step
+from vi_contact.bem.quadrature import Orders
+from vi_contact.core.algebra import Array, Indices, Mask
+from vi_contact.core.checks import counted, flag
+from vi_contact.laws.materials import LinearElastic
 
 # |s| h/c_S reaches 100 with small steps; points cost nothing per frequency
 ORDERS = Orders(far=6, near=8, touching=32, close=16)

@@ -23,9 +23,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.algebra import Array
-from ..core.checks import function, number, shape_of, whole
-from ..core.errors import InputError
+from vi_contact.core.algebra import Array
+from vi_contact.core.checks import function, number, shape_of, whole
+from vi_contact.core.errors import InputError
 
 RADAU = np.array([[5.0, -1.0], [9.0, 3.0]]) / 12.0
 STAGES = np.array([1.0 / 3.0, 1.0])

@@ -78,7 +78,7 @@ def operators() -> Table:
     blocks = bem.energetic_blocks(mesh, MATERIAL, dt=0.5, steps=2)
     steklov, still = bem.PoincareSteklov(blocks, 1.0), np.zeros((2, 2, 8))
     problem = bem.BoundaryProblem(steklov, still, contact=mesh.labels == 0)
-    motion, wave = problem.solve(), bem.convolution_operator(mesh, MATERIAL, dt=0.5, steps=2)
+    motion = problem.solve()
     histories = RAGGED | {"text": "up", "nan": np.full((2, 2, 8), nan), "flat": np.zeros(16),
                  "short": np.zeros((2, 2, 7)),
                  "texts": np.full((2, 2, 8), "a"), "none": None, "complex": 1j * np.ones((2, 2, 8))}
@@ -88,10 +88,6 @@ def operators() -> Table:
         (bem.energetic_blocks, body | {"dt": 0.5, "steps": 2}, BODY | {
             "dt": POSITIVE | {"small": 1e-6, "great": 50.0}, "steps": STEPS | {"endless": 10**12},
             "orders": OTHER | {"numbers": (4, 8)}}),
-        (bem.convolution_operator, body | {"dt": 0.5, "steps": 2}, BODY | {
-            "dt": POSITIVE, "steps": STEPS, "symmetric": FLAG}),
-        (bem.LaplaceKernels, {"s": 1.0 + 1.0j, "c_p": 1.0, "c_s": 0.5},
-         speed | {"s": {"text": "1", "nan": complex(nan, 1.0), "negative": -1.0 + 1.0j, "zero": 0.0, "none": None}}),
         (bem.TimeKernels, {"t": 1.0, "c_p": 1.0, "c_s": 0.5}, speed | {"t": POSITIVE}),
         (bem.traction_forces, {"mesh": mesh, "traction": lambda x, n, t: n, "dt": 0.1, "steps": 2}, {
             "mesh": OTHER, "dt": POSITIVE, "steps": STEPS | {"endless": 10**12}, "elements": MASK,
@@ -100,9 +96,6 @@ def operators() -> Table:
         (bem.BoundaryProblem, {"operator": steklov, "forces": still},
          fields | {"operator": OTHER | {"blocks": blocks}, "forces": histories}),
         (problem.solve, {}, {"contact_forces": {"text": "up", "nan": np.full((2, 6), nan), "short": np.zeros((2, 5))}}),
-        (bem.BoundaryProblem, {"operator": wave, "forces": still},
-         fields | {"operator": OTHER | {"blocks": blocks}, "forces": histories | {"many": np.zeros((3, 2, 8))}}),
-        (bem.Frequencies, {"dt": 0.1, "steps": 2}, {"dt": POSITIVE, "steps": STEPS}),
         (bem.interior_displacement, {"operator": steklov, "motion": motion, "points": [(0.5, 0.4)]}, {
             "operator": OTHER, "motion": OTHER, "steps": {"text": "ab", "far": [7], "half": [0.5]},
             "points": RAGGED | {"text": "middle", "nan": [(nan, 0.0)], "space": np.eye(3), "outside": [(2.0, 2.0)]}}),

@@ -17,12 +17,12 @@ from numpy.polynomial.chebyshev import chebvander
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix, vstack
 
-from ..core.algebra import Array
-from ..core.checks import counted, number
-from .boundary_mesh import BoundaryMesh
-from .boundary_operators import Galerkin
-from .fundamental_solution import TWO_PI, KernelSet
-from .quadrature import Orders, point_sets
+from vi_contact.bem.boundary_mesh import BoundaryMesh
+from vi_contact.bem.boundary_operators import Galerkin
+from vi_contact.bem.fundamental_solution import TWO_PI, KernelSet
+from vi_contact.bem.quadrature import Orders, point_sets
+from vi_contact.core.algebra import Array
+from vi_contact.core.checks import counted, number
 
 POINTS = 16  # Chebyshev points of a panel
 PANELS = 100_000  # of equal width

@@ -148,11 +148,11 @@ class CondensedCompliance:
 class BoundaryProblem:
     """Describe a body with supports, loads and a boundary that may come into contact.
 
-    operator: its S, PoincareSteklov or that of convolution_operator; forces: (steps, 2, n) nodal forces of the loads
-    [N/m] (loads.py), means over the steps, or by convolution quadrature also (steps, stages, 2, n), means between the
-    stages (Frequencies.substep_means); fixed: (2, n) supported unknowns; prescribed: (steps, 2, n) their displacement
-    [m] at the ends of the steps, zero if None; contact: (n,) mask of the elements of the contact boundary. Everything
-    else is free of traction. Raises InputError for wrong shapes and what is no mask.
+    operator: its S, such as PoincareSteklov; forces: (steps, 2, n) nodal forces of the loads [N/m] (loads.py), means
+    over the steps, or of the shape that the operator asks for (``load_shape``); fixed: (2, n) supported unknowns;
+    prescribed: (steps, 2, n) their displacement [m] at the ends of the steps, zero if None; contact: (n,) mask of the
+    elements of the contact boundary. Everything else is free of traction. Raises InputError for wrong shapes and what
+    is no mask.
     """
 
     operator: BodyOperator
@@ -163,7 +163,7 @@ class BoundaryProblem:
 
     def __post_init__(self) -> None:
         owner, names = "BoundaryProblem", ("load_shape", "motion", "condense")
-        provides(owner, "operator", self.operator, names, "give PoincareSteklov(…) or convolution_operator(…)")
+        provides(owner, "operator", self.operator, names, "give PoincareSteklov(…)")
         n, wanted = len(self.operator.mesh), self.operator.load_shape(len(shape_of(self.forces)))
         object.__setattr__(self, "forces", array(owner, "forces", self.forces, wanted, unit="N/m"))
         for name, shape in (("fixed", (2, n)), ("contact", (n,))):
