@@ -173,9 +173,8 @@ _MEANING = {
 class Resultants:
     """Record columns <quantity>_<name> of a named part of the contact surface; the module's head lists the quantities.
 
-    uplift, opening, slip, force_x, force_y, N, T, M, e, height, theta and settlement: the rigid motion of the part
-    relative to its support that fits the normal displacements best. In space also force_z, T_x, …, e_x, …, and M_x, …,
-    theta_x, … in place of M and theta.
+    uplift, opening, slip, force_x, force_y, N, T, M, e, height, theta, settlement (relative to the support); in space
+    also force_z, T_x, …, e_x, …, and M_x, …, theta_x, … in place of M and theta.
 
     Args:
         name: names the columns. centre: (d,) the point of reference, of a footing the middle of its base, of a wall a

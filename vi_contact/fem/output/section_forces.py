@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import block_diag
 
-from ...core.algebra import Array, Mask
+from ...core.algebra import Array
 from ...core.checks import array, column_name, instance, optional, shape_of
 from ...core.errors import InputError
 from ...core.problem import ContactProblem
@@ -142,8 +142,8 @@ def find_cut(space: FemSpace, name: str, given: Any, group: Cells | None) -> tup
     sides = [[(inside & ends & side).any() for side in (trace.left, trace.right)] for ends in trace.beyond]
     if space.comm.max(np.array(sides, dtype=float)).all(axis=1).any():
         raise InputError(f"section '{name}' ends inside the group of cells: let it reach from surface to surface")
-    own = np.arange(len(x)) < mesh.topology.index_map(mesh.topology.dim).size_local
-    left, right, through = space.comm.sum(trace.covered(inside & own))
+    owned = mesh.topology.index_map(mesh.topology.dim).size_local
+    left, right, through = space.comm.sum(trace.cover[:, :owned] @ inside[:owned])
     cover = through + max(left, right)
     if not cover > 0.0 or (space.dimension == 2 and abs(cover - size[0]) > UNCOVERED * size[0]):
         raise InputError(f"section '{name}': elements cover {cover:.4g} of its {size.prod():.4g} m"
@@ -161,29 +161,26 @@ def find_cut(space: FemSpace, name: str, given: Any, group: Cells | None) -> tup
 
 
 class _Trace:
-    """What the plane of a cut leaves in cells: low, high (cells, d - 1), a box round it along the sides of the cut.
+    """What the plane of a cut leaves in cells, by boxes round it along the sides of the cut, low, high (cells, d - 1).
 
-    left, right: cells with vertices before and behind the plane; faces: with a side in it; touches: with a point of the
-    cut; beyond: (2 (d - 1), cells) those of them that go on over one of its ends.
+    left, right: cells with vertices before and behind the plane; touches: with a point of the cut; beyond: (2 (d - 1),
+    cells) those of them that go on over one of its ends; cover: (3, cells) how much [m] of the cut (in space, [m²], of
+    boxes round it) sides of cells on its left, of cells on its right, and cells that it goes through cover.
     """
 
     def __init__(self, s: Array, d: Array, size: Array, tol: float) -> None:
         self.left, self.right = d.max(axis=1) > 0.0, d.min(axis=1) < 0.0
-        self.faces = np.count_nonzero(d == 0.0, axis=1) > s.shape[2]
-        self.low, self.high = np.full(s.shape[::2], np.inf), np.full(s.shape[::2], -np.inf)
+        faces = np.count_nonzero(d == 0.0, axis=1) > s.shape[2]
+        low, high = np.full(s.shape[::2], np.inf), np.full(s.shape[::2], -np.inf)
         near = (self.left & self.right) | (d == 0.0).any(axis=1)
         s, below, above = s[near], d[near][:, :, None], d[near][:, None]  # of all pairs of vertices
         cuts = (below <= 0.0) & (above >= 0.0) & (above > below)
         share = np.divide(-below, above - below, out=np.zeros_like(below + above), where=cuts)
         at = s[:, :, None] + share[..., None] * (s[:, None] - s[:, :, None])
-        self.low[near] = np.where(cuts[..., None], at, np.inf).min(axis=(1, 2))
-        self.high[near] = np.where(cuts[..., None], at, -np.inf).max(axis=(1, 2))
-        self.touches = ((self.low <= size + tol) & (self.high >= -tol)).all(axis=1)
-        self.beyond = self.touches & np.hstack([self.low < -tol, self.high > size + tol]).T
-        self.inner = ((self.low < size - tol) & (self.high > tol)).all(axis=1)
-
-    def covered(self, cells: Mask) -> Array:
-        """Return how much [m] of the cut (in space, [m²], of boxes round it) sides of these cells on its left and on
-        its right and cells that it goes through cover."""
-        kinds = self.faces & ~self.right, self.faces & ~self.left, self.left & self.right
-        return np.array([(self.high - self.low)[cells & self.inner & kind].prod(axis=1).sum() for kind in kinds])
+        low[near] = np.where(cuts[..., None], at, np.inf).min(axis=(1, 2))
+        high[near] = np.where(cuts[..., None], at, -np.inf).max(axis=(1, 2))
+        self.touches = ((low <= size + tol) & (high >= -tol)).all(axis=1)
+        self.beyond = self.touches & np.hstack([low < -tol, high > size + tol]).T
+        kinds = np.array([faces & ~self.right, faces & ~self.left, self.left & self.right])
+        inner = ((low < size - tol) & (high > tol)).all(axis=1)
+        self.cover = np.where(kinds & inner, (high - low).prod(axis=1), 0.0)
