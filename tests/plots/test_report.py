@@ -174,6 +174,8 @@ def test_example_of_the_documentation(tmp_path: Path) -> None:
     )
     assert done.returncode == 0, done.stderr
     assert re.fullmatch(r"50 periods, 101 points of the loop, \d+ columns\n", done.stdout)
+    for picture in ("faces.png", "deformed.png"):
+        assert (tmp_path / "results" / picture).stat().st_size > 30_000
     run = read_run(tmp_path / "results" / "engineering")
     described = json.loads((run.folder / "columns.json").read_text())
     for name in ("uplift_face", "height_upper", "theta_face", "racking_wall", "reaction_M_base", "M_third", "a_x_top"):
