@@ -12,7 +12,7 @@ import numpy as np
 from .algebra import Array, Indices, from_each
 from .checks import at
 from .errors import InputError
-from .surfaces import ContactSurface
+from .surfaces import ContactSurface, nodal_blocks, nodal_frames, same_node, tangential_columns
 
 FEATURE_ANGLE = np.pi / 6  # CHOSEN: 30°, a usual feature angle; the coarsest circles of the models turn by less
 PARALLEL = 1e-9  # 1 - cosine of the angle between directions that count as one, cosine between those at right angles
@@ -40,6 +40,18 @@ def corner_of(directions: Array) -> tuple[list[int], Array]:
         edge = np.cross(block[:, (c + 1) % 3], block[:, (c + 2) % 3])
         block[:, c] = edge if square else edge / np.linalg.norm(edge)
     return columns, block
+
+
+def tangent_vectors(normals: Array, nodes: Indices | None) -> Array:
+    """Return the tangents (m, d, d - 1) of contact directions (m, d) at nodes (m,), along which slip and r_t are.
+
+    Of a node with several directions they are the other vectors of its frame. ``nodes``: None for one each.
+    """
+    column, blocks = nodal_blocks(nodal_frames(normals))
+    for rows in () if nodes is None else same_node(nodes):
+        if np.linalg.matrix_rank(normals[rows]) == len(rows):  # else two nodes at one place
+            column[rows], blocks[rows] = corner_of(normals[rows])
+    return np.take_along_axis(blocks, tangential_columns(column, normals.shape[1])[:, None, :], axis=2)
 
 
 def oblique_corners(surface: ContactSurface) -> list[Indices]:

@@ -27,11 +27,11 @@ from scipy.linalg import block_diag
 
 from ..core.algebra import Array, Indices, Mask
 from ..core.checks import array, column_name, function, instance, mask, optional, provides
-from ..core.corners import corner_of
+from ..core.corners import tangent_vectors
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.step import AXES, Columns, Report, Row, State
-from ..core.surfaces import ContactSurface, nodal_blocks, nodal_frames, same_node, tangential_columns
+from ..core.surfaces import ContactSurface
 
 Where = Callable[[Array, Array], Mask]
 Geometry = Any  # with points (m, d), normals (m, d), weights (m,): a ContactSurface, the contact of a RunFolder
@@ -67,9 +67,9 @@ class Part:
         self.name, self.dimension = name, points.shape[1]
         self.weights, self.normals, self.arms = geometry.weights[chosen], normals[chosen], points[chosen] - self.centre
         self.normal, self.whole = self._direction(name, normal), self.weights.sum()
-        nodes = getattr(geometry, "nodes", None)  # run folders do not tell: what is at one place is one node there
-        nodes = np.unique(points, axis=0, return_inverse=True)[1].ravel() if nodes is None else nodes
-        self.tangents, self.fit = tangent_vectors(normals, nodes)[chosen], self._fit().T
+        places = np.unique(points, axis=0, return_inverse=True)[1].ravel()  # run folders do not tell of nodes
+        self.tangents = tangent_vectors(normals, getattr(geometry, "nodes", places))[chosen]
+        self.fit = self._fit().T
         slots = np.arange(len(points)) if slots is None else slots
         self.mask = chosen[slots]
         for kept in ("weights", "normals", "arms", "tangents", "fit"):
@@ -140,18 +140,6 @@ def turning(arms: Array, vectors: Array) -> list[Array]:
 
 def _ratio(one: Array, other: Array) -> Array:
     return np.divide(one, other, out=np.full(one.shape, np.nan), where=other != 0.0)
-
-
-def tangent_vectors(normals: Array, nodes: Indices) -> Array:
-    """Return the tangents (m, d, d - 1) of contact directions (m, d) at nodes (m,), along which slip and r_t are.
-
-    Of a node with several directions they are the other vectors of its frame.
-    """
-    column, blocks = nodal_blocks(nodal_frames(normals))
-    for rows in same_node(nodes):
-        if np.linalg.matrix_rank(normals[rows]) == len(rows):  # else two nodes at one place
-            column[rows], blocks[rows] = corner_of(normals[rows])
-    return np.take_along_axis(blocks, tangential_columns(column, normals.shape[1])[:, None, :], axis=2)
 
 
 _MEANING = {

@@ -97,12 +97,6 @@ class NodalFrames:
         own[np.arange(m), self.column] = True
         return own
 
-    @property
-    def tangents(self) -> Array:
-        """Return the tangential vectors (m, d, d-1) of each condition, in the order of the tangential unknowns."""
-        beside = tangential_columns(self.column, self.blocks.shape[1])
-        return np.take_along_axis(self.blocks[self.place], beside[:, None, :], axis=2)
-
     def _refuse_prescribed(self, held: Mask) -> None:
         for slot in np.flatnonzero(np.any(held & (self.directions != 0.0), axis=1)):
             raise InputError(f"contact node {at(self.points[slot])} is also prescribed along its contact direction: "

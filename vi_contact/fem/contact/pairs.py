@@ -20,7 +20,7 @@ import scipy.sparse as sp
 
 from ...core.algebra import Array, Mask, largest
 from ...core.checks import at, optional, provides
-from ...core.corners import FEATURE_ANGLE
+from ...core.corners import FEATURE_ANGLE, tangent_vectors
 from ...core.errors import InputError
 from ...core.stages import stage
 from ...core.surfaces import ContactSurface, tangential_columns
@@ -210,7 +210,7 @@ def _prescribed_motion(space: FemSpace, conditions: NodalConditions) -> dict[str
         return {}
     frames, numbers, P = NodalFrames(*given([conditions])), facing.nodes.numbers, facing.P
     free = np.take_along_axis(~held, tangential_columns(frames.column, space.dimension), axis=1) & frames.rubs
-    tangents, directions = frames.tangents, frames.directions
+    tangents, directions = tangent_vectors(frames.directions, frames.place), frames.directions
     nothing = np.zeros(len(space.ids))
 
     def displacement(t: float) -> Array:
