@@ -297,3 +297,8 @@ def test_what_does_not_fit_a_box_is_refused(comm):
         fem.assemble(mesh, SOIL, prescribed=rollers, dashpots=fem.Dashpots(tags["front"]))
     beside = fem.assemble(mesh, SOIL, prescribed=rollers, dashpots=fem.Dashpots(tags["left"]))
     assert beside.C is not None
+    for side in ("left", "right"):
+        with pytest.raises(InputError, match=f"'{side}' is tied and has dashpots, which would brake"):
+            fem.assemble(mesh, SOIL, tied=fem.Tied(tags["left"], tags["right"]), dashpots=fem.Dashpots(tags[side]))
+    with pytest.raises(InputError, match="upgoing: motion is"):
+        soil.upgoing("north.at2", dt=1e-3)

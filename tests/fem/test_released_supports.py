@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from fem_problems import linear
 from mpi4py import MPI
 from soil import SOIL, strip
 
@@ -94,6 +95,14 @@ def test_what_does_not_fit_is_refused(comm):
     _, _, elsewhere, _ = stages(comm)
     with pytest.raises(InputError, match="on one mesh"):
         fem.release(static, state, elsewhere)
+    mesh, tags = strip(comm, 6.0, 4.0, (6, 4))
+    bulging = fem.assemble(mesh, SOIL, clamped=tags["bottom"], loads=WEIGHT,
+                           prescribed=fem.Prescribed(tags["left"], components=(0,)))
+    tied = fem.assemble(mesh, SOIL, clamped=tags["bottom"], loads=WEIGHT, tied=fem.Tied(tags["left"], tags["right"]))
+    static, problem = (linear(system) for system in (bulging, tied))
+    state = vc.static_equilibrium(static, solver=vc.Condensed())
+    with pytest.raises(InputError, match="a support or tie of the problem is .* m away from where the static stage"):
+        fem.release(static, state, problem)
 
 
 HOUSE = vc.LinearElastic(E=2e8, nu=0.2, rho=1500.0)

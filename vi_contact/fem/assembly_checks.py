@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Iterator, Sequence
-from itertools import combinations
+from itertools import combinations, product
 from typing import Any
 
 import numpy as np
@@ -72,15 +72,20 @@ def check_boundaries(mesh: Mesh, clamped: Any, prescribed: Any, tied: Any, dashp
                 if group is not None:
                     facets_of(OWNER, f"the facets of {name}", group, mesh)
     conditions = [Prescribed(group) for group in clamped] + list(prescribed)
-    refuse(_contradictions(conditions), MpiComm(mesh.comm))
+    refuse(_contradictions(conditions, tied, dashpots), MpiComm(mesh.comm))
 
 
-def _contradictions(conditions: Sequence[Prescribed]) -> Iterator[str]:
-    """Pairs that prescribe other values of one component on the same facets of this rank."""
-    for one, two in combinations(conditions, 2):
+def _contradictions(held: Sequence[Prescribed], tied: Sequence[Tied], damped: Sequence[Dashpots]) -> Iterator[str]:
+    """Pairs of conditions on the same facets of this rank: other values of one component, ties and dashpots."""
+    for one, two in combinations(held, 2):
         if not one.same_motion(two) and len(np.intersect1d(one.facets.indices, two.facets.indices)):
             yield (f"assemble: boundary groups '{one.facets.name}' and '{two.facets.name}' share facets on which "
                    "different displacements are prescribed: leave out the one or the other")
+    sides = [side for tie in tied if tie.components is None for side in (tie.first, tie.second)]
+    for side, absorbing in product(sides, damped):
+        if len(np.intersect1d(side.indices, absorbing.facets.indices)):
+            yield (f"assemble: boundary '{side.name}' is tied and has dashpots, which would brake what goes on through "
+                   "the ties: leave out the one or the other")
 
 
 def check_initial(mesh: Mesh, **values: Any) -> None:

@@ -62,8 +62,8 @@ def _refuse_moved(space: FemSpace, nodal: Array, u0: Array) -> None:
     away = np.array([max_abs((space.expand(u0, 0.0) - nodal).ravel()), max_abs(nodal.ravel())])
     distance, size = space.comm.max(away)
     if distance > BALANCED * size:
-        raise InputError(f"a support of the problem is {distance:.3g} m away from where the static stage has left the "
-                         "body: hold it there in both stages, or free it in both")
+        raise InputError(f"a support or tie of the problem is {distance:.3g} m away from where the static stage has "
+                         "left the body: hold or tie it there in both stages, or free it in both")
 
 
 def _contact_force(problem: ContactProblem, state: State) -> Array:
