@@ -16,24 +16,33 @@ from all_ranks import seen
 from fem_problems import dense, field, max_over_ranks
 from mpi4py import MPI
 from reference_lcp import enumerate_lcp
-from test_mortar_in_space import rotation
-from two_bodies import SOFT
+from test_mortar_in_space import rotation, unlike
+from two_bodies import SOFT, forces, momenta, relative, thrown
 
 from vi_contact.core.algebra import Array
+from vi_contact.core.errors import InputError
 from vi_contact.core.obstacles import AnalyticGap
 from vi_contact.core.problem import ContactProblem
 from vi_contact.fem.assembly import assemble
+from vi_contact.fem.compat import entities_to_geometry
+from vi_contact.fem.contact.joined import joined_surfaces
 from vi_contact.fem.contact.matching import NodeToNode
 from vi_contact.fem.contact.mortar import DualMortar
 from vi_contact.fem.contact.pairs import contact_pair
 from vi_contact.fem.contact.surface import contact_surface
-from vi_contact.fem.loads import Prescribed, Traction
+from vi_contact.fem.loads import BodyForce, Prescribed, Traction
 from vi_contact.fem.mesh import Facets, build_mesh
+from vi_contact.laws.friction import Coulomb
+from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.laws.materials import PlaneStress
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.cut import Welded
-from vi_contact.meshes.two_blocks import Blocks
+from vi_contact.meshes.two_blocks import Blocks, TwoBlocks
+from vi_contact.run.march import march
+from vi_contact.run.recorders import Contact, Energy
+from vi_contact.run.simulate import simulate
 from vi_contact.run.static import static_equilibrium
+from vi_contact.schemes.midpoint import Midpoint
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.volume.route import Volume
 
@@ -219,3 +228,245 @@ def test_the_pressure_is_uniform_up_to_a_weld(kind, n):
     problem = uniform(mesh, rollers[: 4 if d == 2 else 8], ["upper0_top", "upper_top"], pair)
     assert max(found) == 0 and seen(problem.surface).points[:, 0].min() > 1.0
     assert seen(problem.surface).count == (1 if n == 1 else 2) * 3 ** (d - 2)
+
+
+@pytest.mark.parametrize("simplices", [False, pytest.param(True, marks=serial)])
+@pytest.mark.parametrize("upper, lower", [((3, 2, 2), (2, 2, 3)), pytest.param((1, 1, 1), (10, 1, 10), marks=serial),
+                                          pytest.param((10, 1, 10), (1, 1, 1), marks=serial)])
+def test_the_pressure_is_uniform_up_to_symmetry_planes(simplices, upper, lower):
+    """A quarter of a block on a quarter of another on rigid ground, facets of up to ten times the size of those
+    opposite, one a side; distorted where there are several."""
+    def moved(x: Array) -> Array:
+        a, b = np.pi * x[:, 0] / 1.5, np.pi * x[:, 2] / 1.2
+        return x + 0.08 * np.column_stack([np.sin(2 * a) * np.cos(b), 0.0 * a, np.cos(a) * np.sin(2 * b)])
+
+    one, two = (BlockMesh(lengths=(1.5, 1.0, 1.2), divisions=n, simplices=simplices, deform=deform)
+                for n, deform in ((upper, moved if upper[0] == 3 else None), (lower, None)))
+    mesh = TwoBlocks(upper=one, lower=two)
+    rollers = [f"{body}_{side}" for side in ("left", "back") for body in ("upper", "lower")]
+
+    def surfaces(system: Any, tags: Any) -> Any:
+        pair = contact_pair(system, tags["upper_bottom"], tags["lower_top"], matching=DualMortar())
+        return joined_surfaces(pair, contact_surface(system, tags["lower_bottom"]))
+
+    problem = uniform(mesh, rollers, ["upper_top"], surfaces)
+    assert seen(problem.surface).count == (upper[0] + 1) * (upper[2] + 1) + (lower[0] + 1) * (lower[2] + 1)
+
+
+def bent(x: Array, along: float) -> Array:
+    """A floor that hangs and a wall that bulges, symmetric about z = 0; not ``along`` z where facets of two bodies look
+    past one another at the plane: nothing is behind it in half the model."""
+    a, b, c = x.T
+    return x + 0.04 * np.column_stack([along * c**2 + b**2, along * c**2 + a**2, 0.0 * c])
+
+
+def half(way: float, two: bool) -> tuple[ContactProblem, Array]:
+    """(problem, r_n by place and face, displacements of the box) of a box on a floor beside a wall, rigid or two other
+    blocks; of the half z > 0 with way 0, of the whole with way 1."""
+    n = round(1.0 + way)
+    places = {"box": ((0.0, 0.0), (2, 2, 2)), "under": ((0.0, -1.0), (3, 1, 3)), "west": ((-1.0, 0.0), (1, 3, 1))}
+    mesh = Blocks({
+        name: BlockMesh(lengths=(1.0, 1.0, 1.0 * n), divisions=(*k[:2], k[2] * n), corner=(*xy, -way),
+                        deform=lambda x: bent(x, 0.0 if two else 1.0))
+        for name, (xy, k) in places.items() if two or name == "box"
+    })  # fmt: skip
+    built, tags = build_mesh(mesh, COMM)
+    held = () if way else [Prescribed(tags[f"{name}_back"], components=(2,)) for name in mesh.blocks]
+    push = [Traction(tags[f"box_{side}"], p) for side, p in (("top", (-2e3, -6e3, 0.0)), ("right", (-5e3, 3e3, 0.0)))]
+    system = assemble(built, SOFT, prescribed=held, loads=push)
+    system = system.changed(K=system.algebra.combine([(1.0, system.K), (30.0**2, system.M)]))
+    hull = group(tags, ["box_bottom", "box_left"])
+    if two:
+        surface = contact_pair(system, hull, group(tags, ["under_top", "west_right"]), matching=DualMortar())
+    else:
+        surface = contact_surface(system, hull, obstacle=AnalyticGap(lambda x: 1e-3 * (x[:, 0] + x[:, 2] ** 2)))
+    problem = ContactProblem(system, surface)
+    state = static_equilibrium(problem, solver=Condensed())
+    found = seen(surface)
+    rows = np.column_stack([found.points, found.normals, found.weights, found.gap0, found.all(state.r_n)])
+    x, u = field(system, problem.cartesian(state.u))
+    order = np.lexsort(np.round(rows[:, :6], 6).T)
+    points = np.lexsort(np.round(x, 6).T)
+    keep = x[points, 2] > -1e-9
+    return problem, rows[order][rows[order, 2] > -1e-9], np.column_stack([x, u])[points][keep]
+
+
+@pytest.mark.parametrize("two", [True, pytest.param(False, marks=serial)], ids=["mortar", "rigid"])
+def test_an_edge_that_ends_in_a_symmetry_plane(two):
+    """Curved faces that meet in a curved edge, and half of them: the same conditions and displacements, at nodes of the
+    plane half of the weights and reactions; some open."""
+    (_, whole, u), (problem, rows, u_half) = half(1.0, two), half(0.0, two)
+    assert sorted(len(corner) for corner in seen(problem.surface).corners) == [2, 2, 2]
+    share = np.where(np.abs(rows[:, 2]) < 1e-9, 0.5, 1.0)
+    assert rows[:, :6] == pytest.approx(whole[:, :6], abs=1e-12)
+    assert np.abs(rows[:, 7] - whole[:, 7]).max() < 1e-12
+    assert rows[:, 6] == pytest.approx(share * whole[:, 6], rel=1e-11)
+    assert rows[:, 8] == pytest.approx(share * whole[:, 8], abs=1e-9 * whole[:, 8].max())
+    assert np.abs(u - u_half).max() < 1e-9 * np.abs(u[:, 3:]).max()
+    assert 4 < np.count_nonzero(rows[:, 8]) < len(rows)
+
+
+# Friction along edges -------------------------------------------------------------------------------------------------
+
+def trough(shape: str, kind: str) -> ContactProblem:
+    """A block that slides along z in a trough of floor and wall, pressed on both: rigid ones, one group or two joined,
+    or blocks with meshes of their own, held all over."""
+    way = SHAPES[shape] @ PLACED["turned"].T
+    places = {"box": ((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), 2)}
+    if kind == "mortar":
+        places |= {"under": ((0.0, -1.0, -0.5), (1.0, 1.0, 2.0), 3), "west": ((-1.0, 0.0, -0.5), (1.0, 1.0, 2.0), 3)}
+    mesh = Blocks({name: BlockMesh(lengths=size, divisions=(n, n, n), corner=corner, deform=lambda x: x @ way)
+                   for name, (corner, size, n) in places.items()})
+    built, tags = build_mesh(mesh, COMM)
+    along = way.T[:, 2]
+    down = -np.linalg.inv(way)
+    pull = 3e4 * down[:, 1] / np.linalg.norm(down[:, 1]) + 2e4 * down[:, 0] / np.linalg.norm(down[:, 0])
+    held = [tags[f"{name}_{side}"] for name in list(places)[1:] for side in ("bottom", "top", "left", "right")]
+    system = assemble(built, SOFT, clamped=held, loads=BodyForce(tuple(pull)))
+    system = thrown(system, *[lambda x: np.tile(along, (len(x), 1)), np.zeros_like, np.zeros_like][: len(places)])
+    sides = ("box_left", "box_bottom") if kind == "wall first" else ("box_bottom", "box_left")
+    if kind == "mortar":
+        pairs = zip(sides, ("under_top", "west_right"), strict=True)
+        parts = [contact_pair(system, tags[a], tags[b], matching=DualMortar()) for a, b in pairs]
+    else:
+        parts = [contact_surface(system, tags[side]) for side in sides]
+    surface = contact_surface(system, group(tags, list(sides))) if kind == "one group" else joined_surfaces(*parts)
+    return ContactProblem(system, surface.with_frictionless_corners(), friction=Coulomb(0.3), mass=ConsistentMass())
+
+
+@pytest.mark.parametrize(("shape", "kind"), [
+    ("prism", "mortar"), *(pytest.param(*one, marks=serial) for one in (
+        ("square", "one group"), ("prism", "one group"), ("prism", "wall first"), ("square", "mortar")))
+])
+def test_edges_rub_along_themselves_by_one_face(shape, kind):
+    """The first condition of a node on an edge rubs, along the edge, with its own r_n; the others do not. What the body
+    loses of its momentum along the trough is the sum, step by step."""
+    problem, along = trough(shape, kind), PLACED["turned"] @ SHAPES[shape][2]
+    surface = seen(problem.surface)
+    first, other = np.transpose(surface.corners)
+    assert len(first) == 3
+    floor = surface.normals[np.argmax(surface.weights)] if kind == "one group" else surface.normals[0]
+    if kind != "one group":
+        assert np.allclose(surface.normals[first], floor, atol=1e-9)
+    plain = np.setdiff1d(np.arange(surface.count), [*first, *other])
+    rigid = relative(problem, problem.system.influence @ along * (problem.system.space.bodies == 0))
+    equations = problem.equations
+    before = start = equations.algebra.dot(rigid, equations.M @ equations.v0)
+    for state, report in march(problem, scheme=Midpoint(), dt=1e-3, steps=4):
+        assert report.certificate.worst <= 1e-9
+        r_n, r_t = surface.all(state.r_n), np.linalg.norm(surface.all(state.r_t), axis=1)
+        assert r_n[first].max() > 0.0 and r_n[other].max() > 0.0
+        assert not r_t[other].any()
+        assert r_t[first] == pytest.approx(0.3 * r_n[first], abs=1e-9 * r_n.max())
+        assert r_t[plain] == pytest.approx(0.3 * r_n[plain], abs=1e-9 * r_n.max())
+        now = equations.algebra.dot(rigid, equations.M @ state.v)
+        rubbed = forces(problem, problem.surface.reaction_load(0.0 * state.r_n, problem.system.rows, state.r_t))[:27]
+        assert now - before == pytest.approx(-1e-3 * np.sum(rubbed @ along), abs=1e-11 * start)
+        assert np.sum(rubbed @ along) == pytest.approx(0.3 * (r_n.sum() - r_n[other].sum()), rel=1e-2)
+        assert np.abs(rubbed[surface.nodes[first]] @ np.delete(PLACED["turned"], 2, axis=1)).max() < 1e-9 * r_n.max()
+        before = now
+
+
+# Redistributed mass across meshes that do not match -------------------------------------------------------------------
+
+def inertia_of(problem: ContactProblem) -> Array:
+    """RᵀMR (6, 6) of the rigid motions of each of two bodies: masses, centres, moments and products of inertia."""
+    space, found = problem.system.space, []
+    for body in (0, 1):
+        x = space.points
+        motions = [np.tile(e, (len(x), 1)) for e in np.eye(3)] + [np.cross(e, x) for e in np.eye(3)]
+        R = np.column_stack([relative(problem, space.restrict(one) * (space.bodies == body)) for one in motions])
+        found.append(space.comm.sum(R.T @ np.column_stack([problem.equations.M @ one for one in R.T])))
+    return np.array(found)
+
+
+@pytest.mark.parametrize(("simplices", "mu"), [(False, 0.3), pytest.param(True, 0.0, marks=serial)])
+def test_massless_nodes_between_meshes_that_do_not_match(simplices, mu):
+    """Two bodies that touch and approach each other, curved sides of warped facets, partly covered: inertia of each to
+    1e-12, no mass at the nodes of either side that meet, momenta to 1e-12; the impact starts without a jump, no
+    energy is gained or unaccounted for (1e-10)."""
+    mesh = unlike(turn=2, upper=(0.8, 0.6, 0.7), offset=(0.5, 0.4), distorted=(0.05, 0.0), bent=0.2,
+                  divisions=((4, 4, 4), (5, 5, 4)), simplices=simplices)
+    built, tags = build_mesh(mesh, COMM)
+    down = rotation(2) @ [0.1, -2.0, 0.2]
+    system = thrown(assemble(built, SOFT), np.zeros_like, lambda x: np.outer(1.0 + 0.2 * x[:, 0], down))
+    surface = contact_pair(system, tags["upper_bottom"], tags["lower_top"], matching=DualMortar())
+    friction = {"friction": Coulomb(mu)} if mu else {}
+    problem, consistent = (ContactProblem(system, surface, mass=mass, **friction)
+                           for mass in (Redistributed(), ConsistentMass()))
+    own, expected = inertia_of(problem), inertia_of(consistent)
+    assert np.abs(own - expected).max() < 1e-12 * np.abs(expected).max()
+    massless = problem.equations.massless
+    assert massless[surface.owned].all() and massless[surface.tangents].all() and seen(surface).gap0.min() == 0.0
+    assert 3 * surface.total < COMM.allreduce(int(massless.sum())) < 3 * (surface.total + 30)
+    assert np.abs(problem.equations.M @ np.where(massless, 1.0, 0.0)).max() == 0.0
+    recorded = simulate(problem, dt=1e-3, steps=30, record=[Energy(), Contact()], progress=False)
+    history = recorded.history
+    start = history["energy_kinetic"][0]
+    assert np.abs(history["energy_defect"]).max() < 1e-10 * start
+    assert (history["energy_kinetic"] + history["energy_strain"]).max() < (1.0 + 1e-10) * start
+    before, after = (momenta(problem, v).sum(axis=0) for v in (problem.equations.v0, recorded.state.v))
+    assert after == pytest.approx(before, abs=1e-12 * np.abs(before).max())
+    force = np.linalg.norm(np.array([history[f"contact_force_{axis}"] for axis in "xyz"]), axis=0)
+    assert force[0] == 0.0 and 0.0 < force[1] < 0.2 * force.max()
+
+
+# Refusals, each with its sentence, on all ranks -----------------------------------------------------------------------
+
+def part(side: Facets, name: str, low: float, high: float) -> Facets:
+    """Those facets of a side whose middles have x between these values."""
+    x = side.mesh.geometry.x[entities_to_geometry(side.mesh, 2, side.indices)].mean(axis=1)[:, 0]
+    return Facets(name, side.indices[(x > low) & (x < high)], side.mesh)
+
+
+def test_refused_pairs():
+    """Groups of another kind and without facets, sides of one body, facets and pairs that are given twice, sides before
+    which there is nothing."""
+    built, tags = build_mesh(unlike(), COMM)
+    system = assemble(built, SOFT)
+    lower, upper = tags["lower_top"], tags["upper_bottom"]
+
+    def pair(one: Any, two: Any) -> Any:
+        return contact_pair(system, one, two, matching=DualMortar())
+
+    cases: dict[str, Any] = {
+        "facets1 is the cell group 'upper'; give a boundary group": lambda: pair(tags["upper"], lower),
+        "facets2 is 'lower_top'; give a boundary group, such as tags": lambda: pair(upper, "lower_top"),
+        "boundary group 'none' is empty, choose a group that": lambda: pair(upper, part(lower, "none", 9, 9)),
+        "no part of 'upper_left' lies opposite 'upper_bottom', along": lambda: pair(upper, tags["upper_left"]),
+        r"'upper_top' lies 1 m behind 'upper_bottom' at \(.*\): the bod": lambda: pair(upper, tags["upper_top"]),
+        r"a facet of both 'hull' and 'lower_top' at \(.*\): it cannot": lambda: pair(
+            group(tags, ["upper_bottom", "lower_top"]), lower),
+        "on several contact surfaces with one contact direction: list every boundary and every pair once, and "
+        "boundaries that continue one another as one group": lambda: joined_surfaces(
+            pair(part(upper, "left", 0.0, 0.9), lower), pair(part(upper, "right", 0.9, 1.5), lower)),
+        "is on side 1 of one contact pair and on side 2 of another: exchange the sides of one of them, or give it "
+        "once if both are the same": lambda: joined_surfaces(pair(upper, lower), pair(lower, upper)),
+    }
+    for sentence, ask in cases.items():
+        with pytest.raises(InputError, match=sentence):
+            ask()
+    twice = Facets("twice", np.repeat(upper.indices, 2), built)
+    assert seen(pair(twice, lower)).weights.sum() == pytest.approx(1.5 * 1.2, rel=1e-12)
+
+
+def spoilt(corner: tuple[float, float, float], to: tuple[float, float, float]) -> Any:
+    """Move the nodes of one place in the upper block."""
+    return lambda x: np.where(np.abs(x - corner).max(axis=1)[:, None] < 1e-9, to, x)
+
+
+@pytest.mark.parametrize(("simplices", "to", "sentence"), [
+    (False, (0.5, 1.0, np.nan), "TwoBlocks has nodes whose coordinates are no numbers"),
+    (False, (0.95, 1.0, 1.15), "1 cell of TwoBlocks has crossing sides, first at"),
+    (False, (0.75, 1.0, 0.9 - 1e-9), "a facet of 'upper_bottom' at .* is a sliver or not convex: no normal can be"),
+    (True, (1e-9, 1.0, 0.6), "a facet of 'upper_bottom' at .* is a sliver or not convex: no normal can be trusted"),
+    (True, (0.5, 0.8, 0.6), r"'lower_top' lies 0\..* m behind 'upper_bottom' at \(.*\): the bodies overlap there, or"),
+])
+def test_refused_facets_of_a_mesh(simplices, to, sentence):
+    """Nodes without a place, cells turned inside out, quadrilaterals with a straight corner, slivers, overlap."""
+    upper = BlockMesh(lengths=(1.5, 1.0, 1.2), divisions=(3, 2, 2), simplices=simplices,
+                      deform=spoilt((0.5, 1.0, 0.6), to))
+    lower = BlockMesh(lengths=(1.5, 1.0, 1.2), divisions=(2, 2, 3), simplices=simplices)
+    with pytest.raises(InputError, match=sentence):
+        built, tags = build_mesh(TwoBlocks(upper=upper, lower=lower), COMM)
+        contact_pair(assemble(built, SOFT), tags["upper_bottom"], tags["lower_top"], matching=DualMortar())

@@ -109,7 +109,7 @@ class NodalFrames:
         cosines = (directions @ directions.T)[np.triu_indices(k, 1)]
         if np.any(cosines > 1.0 - PARALLEL):
             raise InputError(f"{where} is on several contact surfaces with one contact direction: list every boundary "
-                             "and every pair once")
+                             "and every pair once, and boundaries that continue one another as one group")
         if k > d or np.linalg.svd(directions, compute_uv=False)[-1] < INDEPENDENT:
             raise InputError(f"{where} has {k} contact directions, {'more than' if k > d else 'not independent in'} "
                              f"its {d} dimensions: take the corner for smooth (a larger feature_angle=), or leave the "
@@ -215,4 +215,4 @@ def _refuse_chains(space: FemSpace, parts: Sequence[NodalConditions]) -> None:
         both = np.flatnonzero(space.at_nodes(facing.nodes.numbers, first)[:, 0] * space.comm.max(used))
         if len(both):
             raise InputError(f"node {at(facing.nodes.points[both[0]])} is on side 1 of one contact pair and on side 2 "
-                             "of another: exchange the sides of one of the pairs")
+                             "of another: exchange the sides of one of them, or give it once if both are the same")
