@@ -112,11 +112,6 @@ class PreparedCondensed:
         """Return G of the normal unknowns."""
         return self._normal[0].flexibility
 
-    @property
-    def schur(self) -> Array:
-        """Return D~ = G⁻¹: reactions of the contact points to unit normal displacements (eq. 49)."""
-        return np.asarray(np.linalg.inv(self.delassus))
-
     @cached_property
     def friction(self) -> CondensedFriction:
         """Return the small problem with friction, made at the first step that has some."""
