@@ -3,9 +3,11 @@ match: what they show is what was recorded."""
 
 from __future__ import annotations
 
+import shutil
 import sys
 import warnings
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -22,12 +24,13 @@ from two_bodies import SOFT, two_blocks
 import vi_contact as vc
 from vi_contact import fem
 from vi_contact.core.errors import InputError
+from vi_contact.core.files import open_hdf5
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import TwoBlocks
-from vi_contact.plots import bodies, faces
+from vi_contact.plots import bodies, faces, run_pictures
 from vi_contact.plots.bodies import film, plot_deformed
 from vi_contact.plots.deformed import OPEN, SLIP, STICK, contact_states, read_frames
-from vi_contact.plots.faces import faces_of, plot_faces
+from vi_contact.plots.faces import faces_of, leading, moments, plot_faces
 from vi_contact.plots.rendered import render_deformed
 from vi_contact.run.files.reading import RunFolder, read_run
 
@@ -84,6 +87,8 @@ def test_what_belongs_to_whom(runs: Any, kind: str) -> None:
     assert len(facing) == 9 * per_side
     assert np.array_equal(frames.points[nodes], run.contact.points)
     assert np.all(np.isin(nodes, frames.cells[frames.bodies == 1]))
+    with open_hdf5(frames.places[7][0]) as file:  # of step 21, told by the solver
+        assert np.array_equal(file["contact_status"][:][nodes], contact_states(run.history)[21])
     (face,) = faces_of(run.contact, facing)
     assert face.name == "face towards -y" and np.array_equal(face.conditions, np.arange(16))
     one, other = face.parts[:, 2] - face.parts[:, 0], face.parts[:, 3] - face.parts[:, 1]
@@ -198,23 +203,56 @@ def test_deformed_bodies(runs: Any, kind: str, figures: list[Any], tmp_path: Pat
     assert axis._box_aspect / axis._box_aspect[0] == pytest.approx((high - low) / (high - low)[0])
 
 
-def test_the_film(runs: Any, tmp_path: Path) -> None:
-    """A frame per time, which moves, with the round magnification of the largest displacement; errors in a sentence."""
+def test_moments() -> None:
+    """When most happens: the largest uplift, or pressure where all was open at the start, or displacement."""
+    t = np.arange(4.0)
+    uplift, pressure, u = np.array([[0.0, 0.1, 0.5, 0.2], [np.nan, 3.0, 1.0, 2.0], [0.0, 1.0, 2.0, -3.0]])
+    for less, column, when in (((), "contact_uplift", 2.0), ((1.0,), "contact_max_pressure", 1.0)):
+        history = {"t": t, "contact_uplift": np.append(less, uplift)[:4], "contact_max_pressure": pressure, "u_x_a": u}
+        assert leading(history) == column and moments(history) == [0.0, when, 3.0]
+    assert moments({"t": t, "u_x_top": u}) == [0.0, 3.0, 3.0]
+    assert moments({"t": t, "iterations": np.zeros(4)}) == [0.0, 0.0, 3.0]
+
+
+def test_all_pictures_of_a_run(
+    runs: Any, figures: list[Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What ``vi-contact report`` draws; the frames of the film move."""
     from PIL import Image
 
     run = runs["hexahedra"]
-    path = film(run, tmp_path / "film.gif", times=[0.012, 0.021, 0.03], column="contact_resultant")
-    with Image.open(path) as shown:
-        assert shown.n_frames == 3
+    monkeypatch.setattr(run_pictures, "film", partial(film, times=[0.012, 0.021, 0.03]))
+    names = ["certificate.png", "faces.png", "deformed.png", "film.gif"]
+    assert [path.name for path in run_pictures.draw_run(run, tmp_path, title="Blocks")] == names
+    shown = sorted(set(moments(run.history)))
+    assert [axis.get_title() for axis in figures[0].axes[: len(shown)]] == [
+        f"face towards -y, t = {t:.4g} s" for t in shown
+    ]
+    with Image.open(tmp_path / "film.gif") as moving:
+        assert moving.n_frames == 3
         shots = []
         for k in range(3):
-            shown.seek(k)
-            shots.append(np.asarray(shown.convert("L"), dtype=float))
+            moving.seek(k)
+            shots.append(np.asarray(moving.convert("L"), dtype=float))
     assert min(np.mean(np.abs(one - two)) for one, two in zip(shots, shots[1:], strict=False)) > 0.2
+
+
+def test_films_and_what_is_no_film(runs: Any, tmp_path: Path) -> None:
+    """A film of bodies whose contact was not recorded; other files, columns and damaged folders in one sentence."""
+    run = runs["tetrahedra"]
+    assert film(replace(run, contact=None), tmp_path / "film.gif", times=[0.03]).stat().st_size > 5000
     with pytest.raises(InputError, match=r"'film\.mp4'"):
         film(run, tmp_path / "film.mp4")
     with pytest.raises(InputError, match="no column 'nosuch'"):
         film(run, tmp_path / "film.gif", column="nosuch")
+    shutil.copytree(run.folder, tmp_path / "copy")
+    copy = read_run(tmp_path / "copy")
+    (copy.folder / "fields" / "frame_000030.h5").write_bytes(b"no frame")
+    with pytest.raises(InputError, match=r"frame_000030\.h5' is missing or damaged"):
+        plot_deformed(copy, tmp_path / "none.png")
+    (copy.folder / "fields" / "mesh.h5").unlink()
+    with pytest.raises(InputError, match=r"mesh\.h5' is missing or damaged"):
+        plot_faces(copy, tmp_path / "none.png")
 
 
 def test_rendering(runs: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -210,7 +210,8 @@ def _trace(axis: Any, run: RunFolder, column: str, times: Array) -> Any:
         raise InputError(f"the run has no column '{column}': see columns.json in its folder")
     values, unit = scaled(history[column], run.columns[column][0])
     axis.plot(history["t"], values, color="black", lw=1.0)
-    axis.set(xlabel="time [s]", ylabel=f"{column} [{unit}]", xlim=(times[0], times[-1]))
+    shown = times if len(times) > 1 else history["t"]
+    axis.set(xlabel="time [s]", ylabel=f"{column} [{unit}]", xlim=(shown[0], shown[-1]))
     if shaken(history):
         behind = axis.twinx()
         for ground in shaken(history):
