@@ -205,7 +205,10 @@ def test_waves_at_right_angles_leave_a_box(comm, wave, axis, moves, solver):
     assert left[0] < 1e-5 and left[1] < 0.2 * left[0]
 
 
-@pytest.mark.parametrize("simplices, solver", [(False, vc.Condensed()), (True, vc.Iterative(tolerance=1e-12))])
+@pytest.mark.slow
+@pytest.mark.parametrize("simplices, solver", [
+    (False, vc.Condensed()), pytest.param(True, vc.Iterative(tolerance=1e-12), marks=pytest.mark.serial),
+])
 def test_compliant_base_of_a_box(comm, simplices, solver):
     """V8.2 in three components at once, P impedance for the vertical one: the discrete column to round-off, and the
     outcrop's motion at the surface (1 %)."""
