@@ -26,7 +26,7 @@ NodesOf = Callable[[Facets], tuple[Indices, Array]]  # original numbers, ascendi
 
 @dataclass(frozen=True)
 class Tied:
-    """Tie the nodes of ``second`` to those of ``first`` that face them: in all components, or in those given."""
+    """Tie the nodes of ``second`` to those of ``first`` that face them, in all or given components. Ties may meet."""
 
     first: Facets
     second: Facets
