@@ -243,6 +243,10 @@ def test_films_and_what_is_no_film(runs: Any, tmp_path: Path) -> None:
     assert film(replace(run, contact=None), tmp_path / "film.gif", times=[0.03]).stat().st_size > 5000
     with pytest.raises(InputError, match=r"'film\.mp4'"):
         film(run, tmp_path / "film.mp4")
+    for times, words in (([], "times is empty"), (["soon"], "times is .*give real numbers")):
+        for draw in (plot_faces, plot_deformed, film):
+            with pytest.raises(InputError, match=words):
+                draw(run, tmp_path / "none.gif", times=times)
     with pytest.raises(InputError, match="no column 'nosuch'"):
         film(run, tmp_path / "film.gif", column="nosuch")
     shutil.copytree(run.folder, tmp_path / "copy")

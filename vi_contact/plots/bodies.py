@@ -11,14 +11,14 @@ import numpy as np
 from ..core.algebra import Array, Indices
 from ..core.errors import InputError
 from ..run.files.reading import ContactGeometry, RunFolder
-from .deformed import read_frames
+from .deformed import nearest, plane_normals, read_frames
 from .faces import Painter, faces_of, leading, limit, moments, sheet
 from .histories import STYLE, plain, save, scale, scaled, shaken
 
 DRAWN = 0.1  # of the size of the bodies: how large their largest displacement is drawn, if it is not larger
 FILM_FRAMES = 48  # at most: a film of two megabytes
 BODIES = ("0.35", "tab:blue", "tab:green", "tab:purple")  # edges of their elements
-LIGHT = np.array([0.3, -0.5, 0.81])  # from where it comes
+LIGHT = np.array([0.3, -0.5, 0.81])  # from where it comes; sides along it have 0.6 of their brightness
 INWARDS = 0.015  # of the size of the bodies: how far inside the dots are that show the contact in the plane
 
 
@@ -49,7 +49,7 @@ class Scene:
         frames, history = read_frames(run), run.history
         if frames.cells.shape[1] < 3:
             raise InputError(f"the run in '{run.folder}' is of bars in one dimension: there is nothing to deform")
-        found = frames.t[sorted({int(np.argmin(np.abs(frames.t - t))) for t in times})]
+        found = frames.t[np.unique(nearest(frames.t, times))]
         plane = frames.points.shape[1] == 2
         corners, cells = (frames.cells, np.arange(len(frames.cells))) if plane else frames.boundary
         seen, places = np.unique(corners, return_inverse=True)
@@ -57,8 +57,7 @@ class Scene:
         size, largest = float(np.ptp(frames.points[seen], axis=0).max()), float(np.linalg.norm(u, axis=2).max())
         contact = run.contact if "pressure" in history else None
         sides, nodes = (corners[:0], seen[:0]) if contact is None else frames.facing(contact)
-        rows = [int(np.argmin(np.abs(history["t"] - t))) for t in found]
-        pressure = np.zeros((len(rows), 0)) if contact is None else history["pressure"][rows]
+        pressure = np.zeros((len(found), 0)) if contact is None else history["pressure"][nearest(history["t"], found)]
         return cls(found, frames.points[seen], places.reshape(corners.shape), frames.bodies[cells], u, stress,
                    magnified or _round_down(DRAWN * size / (largest or np.inf)), contact, sides,
                    np.searchsorted(seen, nodes), pressure)
@@ -100,20 +99,13 @@ class Scene:
         if flat:
             axis.add_collection(PolyCollection(moved[self.polygons], facecolors=colours, **look))
         else:
-            colours[:, :3] *= shades(moved[self.polygons])[:, None]
+            colours[:, :3] *= 0.6 + 0.4 * np.abs(plane_normals(moved[self.polygons]) @ LIGHT)[:, None]
             axis.add_collection3d(Poly3DCollection(moved[self.polygons], facecolors=colours, **look))
         along = np.zeros(1) if self.contact is None else np.abs(self.contact.normals.sum(axis=0))
         limit(axis, *self.box, margin=0.03, up="y" if along[1 % len(along)] > along[-1] else "z")
         if flat and self.contact is not None:
             inwards = INWARDS * float(np.ptp(self.points, axis=0).max()) * self.contact.normals
             self.pressures.dots(axis, moved[self.nodes] - inwards, self.pressure[k])
-
-
-def shades(polygons: Array) -> Array:
-    """Return how bright polygons (p, corners, 3) are, 0.6 to 1: by the angle of the light to their planes."""
-    normals = np.cross(polygons[:, 2] - polygons[:, 0], polygons[:, -1] - polygons[:, 1])
-    sizes = np.linalg.norm(normals, axis=1)
-    return np.asarray(0.6 + 0.4 * np.abs(normals @ LIGHT) / np.where(sizes > 0.0, sizes, 1.0))
 
 
 def _round_down(factor: float) -> float:
@@ -198,8 +190,8 @@ def film(
 def _around(run: RunFolder) -> list[float]:
     """The times of the frames next to the one in which most happens."""
     t = read_frames(run).t
-    first = int(np.argmin(np.abs(t - moments(run.history)[1]))) - FILM_FRAMES // 2
-    first = max(min(first, len(t) - FILM_FRAMES), 0)
+    (middle,) = nearest(t, [moments(run.history)[1]])
+    first = max(min(middle - FILM_FRAMES // 2, len(t) - FILM_FRAMES), 0)
     return list(t[first : first + FILM_FRAMES])
 
 

@@ -3,7 +3,7 @@
 A run that writes fields (``fields=fem.XDMF(every=...)``) and records ``Contact()`` leaves all that is needed there.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,6 +16,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..core.algebra import Array, Indices
+from ..core.checks import array
 from ..core.errors import InputError
 from ..core.files import FIELDS, frames_of, open_hdf5
 from ..engineering.resultants import Geometry, tangent_vectors
@@ -46,7 +47,7 @@ class Tractions:
 
     def at(self, t: float) -> tuple[Array, Array]:
         """Return (pressure (m,), shear (m, d) along the axes) of the step that ends next to t."""
-        row = int(np.argmin(np.abs(self.t - t)))
+        (row,) = nearest(self.t, [t])
         return self.normal[row], np.einsum("mj,mij->mi", self.shear[row], self.tangents)
 
 
@@ -61,7 +62,7 @@ class StoredFrames:
 
     def at(self, t: float) -> tuple[float, Array, Array]:
         """Return (its time [s], u (n, d) [m], von Mises stress (c,) [Pa]) of the frame nearest to t."""
-        row = int(np.argmin(np.abs(self.t - t)))
+        (row,) = nearest(self.t, [t])
         path, group = self.places[row]
         with _opened(path) as file:
             return float(self.t[row]), file[group]["u"][:, : self.points.shape[1]], file[group]["von_mises"][:]
@@ -93,7 +94,10 @@ class StoredFrames:
         tree = cKDTree(contact.points)
         _, near = tree.query(self.points[nodes], k=[1, 2, 3, 4], distance_upper_bound=reach)
         candidates = near[place.ravel()].reshape(*sides.shape, 4)  # those of all faces at this place; m: none
-        outwards = self._outwards(sides, cell)
+        corners = self.points[sides]
+        away = corners.mean(axis=1) - self.points[self.cells[cell]].mean(axis=1)
+        outwards = plane_normals(corners)
+        outwards *= np.sign(np.sum(outwards * away, axis=1))[:, None]
         normals = np.vstack([contact.normals, np.zeros_like(contact.normals[:1])])
         cosines = np.einsum("scki,si->sck", normals[candidates], outwards)
         chosen = np.take_along_axis(candidates, cosines.argmax(axis=2)[:, :, None], axis=2)[:, :, 0]
@@ -102,17 +106,23 @@ class StoredFrames:
         node[chosen[found]] = sides[found]
         return chosen[found], node
 
-    def _outwards(self, sides: Indices, cell: Indices) -> Array:
-        """Unit normals (s, d) of sides, away from their cells."""
-        corners = self.points[sides]
-        if corners.shape[2] == 2:
-            way = corners[:, 1] - corners[:, 0]
-            normals = np.column_stack([way[:, 1], -way[:, 0]])
-        else:  # of quadrilaterals by their diagonals
-            normals = np.cross(corners[:, 2] - corners[:, 0], corners[:, -1] - corners[:, 1])
-        away = corners.mean(axis=1) - self.points[self.cells[cell]].mean(axis=1)
-        normals *= np.sign(np.sum(normals * away, axis=1))[:, None]
-        return np.asarray(normals / np.linalg.norm(normals, axis=1)[:, None])
+
+def plane_normals(polygons: Array) -> Array:
+    """Return a unit normal (p, d) of each line (p, 2, 2) or polygon (p, corners, 3), of one without any size zero."""
+    if polygons.shape[2] == 2:
+        normals = (polygons[:, 1] - polygons[:, 0]) @ np.array([[0.0, -1.0], [1.0, 0.0]])
+    else:  # of quadrilaterals by their diagonals
+        normals = np.cross(polygons[:, 2] - polygons[:, 0], polygons[:, -1] - polygons[:, 1])
+    sizes = np.linalg.norm(normals, axis=1, keepdims=True)
+    return np.asarray(normals / np.where(sizes > 0.0, sizes, 1.0))
+
+
+def nearest(t: Array, times: Sequence[float] | Array) -> Indices:
+    """Return the rows of ``t`` next to each of ``times`` [s]. InputError for no times, or what is none."""
+    wanted = array("pictures of a run", "times", times, (None,), unit="seconds")
+    if not len(wanted):
+        raise InputError("pictures of a run: times is empty; give moments in seconds, or leave it out")
+    return np.abs(t - wanted[:, None]).argmin(axis=1)
 
 
 def contact_states(history: Mapping[str, Array]) -> Array:

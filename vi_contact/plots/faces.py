@@ -17,7 +17,7 @@ from ..core.files import frames_of
 from ..core.step import AXES
 from ..engineering.resultants import Geometry, tangent_vectors
 from ..run.files.reading import RunFolder
-from .deformed import OPEN, SAME, SLIP, STICK, contact_states, read_frames, stored_tangents
+from .deformed import OPEN, SAME, SLIP, STICK, contact_states, nearest, read_frames, stored_tangents
 from .histories import STYLE, History, length_unit, plain, save, scale
 
 ARROW = 0.15  # of the size of the face: how long the longest arrow is
@@ -197,7 +197,7 @@ def plot_faces(
         raise InputError(f"'{run.folder}' is not of a finished run in space with Contact(): run it with both")
     sides = read_frames(run).facing(contact)[0] if frames_of(run.folder) else np.zeros((0, 3), dtype=np.int64)
     faces = faces_of(contact, sides)
-    rows = [int(np.argmin(np.abs(history["t"] - t))) for t in (sorted({*moments(history)}) if times is None else times)]
+    rows = nearest(history["t"], sorted({*moments(history)}) if times is None else times)
     states, slip = contact_states(history)[rows], np.zeros((len(rows), *contact.points.shape))
     if "slip" in history:
         slip += np.einsum("rmj,mij->rmi", history["slip"][rows], stored_tangents(contact))
@@ -205,12 +205,13 @@ def plot_faces(
     figure, axes = sheet([face.axes is not None for face in faces for _ in "ab"], len(rows), (3.4, 2.8))
     pressure, painter = history["pressure"][rows], Painter.of_pressure(history["pressure"][rows])
     longest = float(np.linalg.norm(slip, axis=2).max())
+    drawn = ARROW * max(float(np.ptp(face.points, axis=0).max()) for face in faces) / (longest or 1.0)
     for place, face in enumerate(faces):
         for column, row in enumerate(rows):
             over, under = axes[2 * place : 2 * place + 2, column]
             painter.draw(over, face, pressure[column])
             Painter.of_states().draw(under, face, states[column])
-            _arrows(under, face, slip[column], longest)
+            _arrows(under, face, drawn * slip[column])
             over.set_title(f"{face.name}, t = {history['t'][row]:.4g} s", fontsize=9)
     painter.bar(figure, list(axes.ravel()))
     _legend(figure, longest, "slip" in history)
@@ -230,13 +231,12 @@ def sheet(flat: Sequence[bool], columns: int, size: tuple[float, float]) -> tupl
     return figure, np.array(axes, dtype=object)
 
 
-def _arrows(axis: Any, face: Face, slip: Array, longest: float) -> None:
-    """The slips (m, 3) of a face, the longest of all panels as long as ARROW says."""
-    own = np.linalg.norm(slip[face.conditions], axis=1) > SAME * longest
+def _arrows(axis: Any, face: Face, slip: Array) -> None:
+    """The slips (m, 3) of a face as long as they are to be drawn; specks are left out."""
+    own = np.linalg.norm(slip[face.conditions], axis=1) > SAME * float(np.ptp(face.points, axis=0).max())
     if own.any():
-        size = ARROW * float(np.ptp(face.points, axis=0).max()) / longest
         flat = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "width": 0.006, "zorder": 3}
-        ends, ways = face.seen(face.points[own]).T, face.seen(size * slip[face.conditions[own]]).T
+        ends, ways = face.seen(face.points[own]).T, face.seen(slip[face.conditions[own]]).T
         axis.quiver(*ends, *ways, color="black", **(flat if face.axes is not None else {"lw": 0.8}))
 
 
