@@ -2,7 +2,8 @@
 """Measure the building on a raft of demos/raft.py: what it costs at several sizes, and what halving h and dt changes.
 
     python3 benchmarks/raft.py                          # costs at 2e4 and 1e5 unknowns
-    python3 benchmarks/raft.py --sizes 1e6 --steps 4
+    python3 benchmarks/raft.py --sizes 2e4 1e5 --iterative      # the same steps without any factor
+    python3 benchmarks/raft.py --sizes 1e6 --steps 2 --iterative --no-gravity
     python3 benchmarks/raft.py --halving                # runs of 5 s on three meshes, and with three time steps
     python3 benchmarks/raft.py --json raft.json         # all of it as a file too
 
@@ -18,6 +19,7 @@ import os
 import sys
 from argparse import ArgumentParser
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from resource import RUSAGE_SELF, getrusage
 from time import process_time
@@ -37,7 +39,7 @@ from vi_contact.core.state_checks import initial_state  # noqa: E402
 
 COMM = MPI.COMM_WORLD
 ROCKING = np.array([0.03, -0.04, 0.0])  # rad/s
-HALVED = [(1.4, 5e-3), (0.7, 5e-3), (0.35, 5e-3), (0.7, 1e-2), (0.7, 2.5e-3)]  # factor of the cells, dt [s]
+HALVED = [(1.4, 5e-3), (0.7, 5e-3), (0.35, 5e-3), (0.7, 1e-2), (0.7, 2.5e-3), (0.7, 1.25e-3)]  # of CELLS, dt [s]
 
 
 class Timer:
@@ -51,22 +53,29 @@ class Timer:
         begin = process_time()
         found = work(*given)
         self.seconds[stage] = process_time() - begin
+        if COMM.rank == 0:
+            print(f"  {stage:<42} {self.seconds[stage]:.4g}", flush=True)
         return found
 
 
-def cost(finer: float, steps: int) -> dict[str, Any]:
-    """Return what set-up and steps of one mesh cost."""
+def cost(finer: float, steps: int, solver: vc.Condensed | vc.Iterative, gravity: bool) -> dict[str, Any]:
+    """Return what set-up and steps of one mesh cost; without ``gravity`` its stage is left out, and the weight falls on
+    bodies without stresses."""
     timer = Timer()
     mesh, tags = timer("mesh", raft.meshed, finer, COMM)
     static, problem = timer("assembling, contact", raft.problems, mesh, tags)
-    state = timer("gravity", vc.static_equilibrium, static)
-    problem, state = timer("release", fem.release, static, state, problem)
+    state = initial_state(problem)
+    if gravity:
+        state = timer("gravity", partial(vc.static_equilibrium, static, solver=vc.Condensed()))
+        problem, state = timer("release", fem.release, static, state, problem)
     del static
-    marching = vc.march(problem, dt=raft.DT, steps=steps, state=thrown(problem, state))
+    marching = vc.march(problem, dt=raft.DT, steps=steps, state=thrown(problem, state), solver=solver)
     surface, begin = problem.surface, process_time()
     stamps, open_shares, changes, iterations, worst, method = [begin], [], [], [], 0.0, ""
     for new, report in marching:
         stamps.append(process_time())
+        if COMM.rank == 0:
+            print(f"  step to t = {new.t:<29.4g} {stamps[-1] - stamps[-2]:.4g}", flush=True)
         closed, before = surface.everywhere(new.active), surface.everywhere(report.old.active)
         open_shares.append(1.0 - closed.mean())
         changes.append(int(np.sum(closed != before)))
@@ -75,7 +84,7 @@ def cost(finer: float, steps: int) -> dict[str, Any]:
     each = np.diff(stamps)
     return {
         "factor": finer, "unknowns": round(COMM.allreduce(problem.system.rows)), "points": surface.total,
-        "method": method, **timer.seconds, "first step": each[0], "step": float(each[1:].mean()),
+        "method": method, **timer.seconds, "first step": float(each[0]), "step": float(each[1:].mean()),
         "iterations": float(np.mean(iterations[1:])), "changes of the set": float(np.mean(changes[1:])),
         "open": float(np.mean(open_shares)), "steps": steps, "worst": worst, "ranks": COMM.size,
         "peak GB": 1e-9 * COMM.allreduce(1024 * getrusage(RUSAGE_SELF).ru_maxrss),
@@ -97,10 +106,11 @@ def thrown(problem: vc.ContactProblem, state: vc.State) -> vc.State:
 def halved() -> Iterator[dict[str, Any]]:
     """Yield the key numbers of the whole run on every mesh and with every time step."""
     for finer, dt in HALVED:
-        problem, start = raft.stages(finer, COMM)
+        problem, start = raft.stages(finer, COMM, vc.Condensed())
         weight = float(COMM.allreduce(start.r_n.sum()))
         begin = process_time()
-        solution = vc.simulate(problem, dt=dt, t_end=raft.T_END, state=start, record=raft.recorders(), progress=False)
+        solution = vc.simulate(problem, dt=dt, t_end=raft.T_END, state=start, solver=vc.Condensed(),
+                               record=raft.recorders(), progress=False)
         yield {
             "factor": finer, "dt": dt, "unknowns": round(COMM.allreduce(problem.system.rows)),
             **raft.key_numbers(solution.history, weight), "worst certificate": solution.facts["worst_certificate"],
@@ -120,10 +130,13 @@ def main() -> None:
     parser = ArgumentParser(description=__doc__)
     parser.add_argument("--sizes", nargs="+", choices=raft.SIZES, default=["2e4", "1e5"], help="unknowns, about")
     parser.add_argument("--steps", type=int, default=20, help="steps of a row of costs")
+    parser.add_argument("--iterative", action="store_true", help="Iterative() in place of Condensed()")
+    parser.add_argument("--no-gravity", action="store_true", help="leave out the gravity stage")
     parser.add_argument("--halving", action="store_true", help="whole runs with other meshes and time steps instead")
     parser.add_argument("--json", type=Path, help="file for all figures")
     options = parser.parse_args()
-    costs = (cost(raft.SIZES[size], options.steps) for size in options.sizes)
+    solver = vc.Iterative() if options.iterative else vc.Condensed()
+    costs = (cost(raft.SIZES[size], options.steps, solver, not options.no_gravity) for size in options.sizes)
     found: list[dict[str, Any]] = []
     for one in halved() if options.halving else costs:
         found.append(one)
