@@ -247,6 +247,8 @@ def test_films_and_what_is_no_film(runs: Any, tmp_path: Path) -> None:
         for draw in (plot_faces, plot_deformed, film):
             with pytest.raises(InputError, match=words):
                 draw(run, tmp_path / "none.gif", times=times)
+    with pytest.raises(InputError, match="magnified is -1"):
+        plot_deformed(run, tmp_path / "none.png", magnified=-1.0)
     with pytest.raises(InputError, match="no column 'nosuch'"):
         film(run, tmp_path / "film.gif", column="nosuch")
     shutil.copytree(run.folder, tmp_path / "copy")

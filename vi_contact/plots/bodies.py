@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from ..core.algebra import Array, Indices
+from ..core.checks import number, optional
 from ..core.errors import InputError
 from ..run.files.reading import ContactGeometry, RunFolder
 from .deformed import nearest, plane_normals, read_frames
-from .faces import Painter, faces_of, leading, limit, moments, sheet
+from .faces import Painter, add_polygons, faces_of, leading, limit, moments, sheet
 from .histories import STYLE, plain, save, scale, scaled, shaken
 
 DRAWN = 0.1  # of the size of the bodies: how large their largest displacement is drawn, if it is not larger
@@ -49,6 +50,7 @@ class Scene:
         frames, history = read_frames(run), run.history
         if frames.cells.shape[1] < 3:
             raise InputError(f"the run in '{run.folder}' is of bars in one dimension: there is nothing to deform")
+        optional(number, "pictures of a run", "magnified", magnified, positive=True)
         found = frames.t[np.unique(nearest(frames.t, times))]
         plane = frames.points.shape[1] == 2
         corners, cells = (frames.cells, np.arange(len(frames.cells))) if plane else frames.boundary
@@ -90,17 +92,12 @@ class Scene:
     def draw(self, axis: Any, k: int) -> None:
         """Draw the bodies at the time number k, each with edges of a colour of its own; in the plane dots inside of
         them with the contact pressure, those of both sides of a corner apart."""
-        from matplotlib.collections import PolyCollection
-        from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-
         moved, colours = self.moved(k), self.stresses.colours(self.stress[k])
-        look: dict[str, Any] = {"edgecolors": [BODIES[body % len(BODIES)] for body in self.body], "linewidths": 0.3}
-        flat = moved.shape[1] == 2
-        if flat:
-            axis.add_collection(PolyCollection(moved[self.polygons], facecolors=colours, **look))
-        else:
-            colours[:, :3] *= 0.6 + 0.4 * np.abs(plane_normals(moved[self.polygons]) @ LIGHT)[:, None]
-            axis.add_collection3d(Poly3DCollection(moved[self.polygons], facecolors=colours, **look))
+        flat, polygons = moved.shape[1] == 2, moved[self.polygons]
+        if not flat:
+            colours[:, :3] *= 0.6 + 0.4 * np.abs(plane_normals(polygons) @ LIGHT)[:, None]
+        edges = [BODIES[body % len(BODIES)] for body in self.body]
+        add_polygons(axis, polygons, facecolors=colours, edgecolors=edges, linewidths=0.3)
         along = np.zeros(1) if self.contact is None else np.abs(self.contact.normals.sum(axis=0))
         limit(axis, *self.box, margin=0.03, up="y" if along[1 % len(along)] > along[-1] else "z")
         if flat and self.contact is not None:
@@ -203,7 +200,8 @@ def _trace(axis: Any, run: RunFolder, column: str, times: Array) -> Any:
     values, unit = scaled(history[column], run.columns[column][0])
     axis.plot(history["t"], values, color="black", lw=1.0)
     shown = times if len(times) > 1 else history["t"]
-    axis.set(xlabel="time [s]", ylabel=f"{column} [{unit}]", xlim=(shown[0], shown[-1]))
+    axis.set(xlabel="time [s]", xlim=(shown[0], shown[-1]))
+    axis.set_ylabel(f"{column} [{unit}]", fontsize=8)
     if shaken(history):
         behind = axis.twinx()
         for ground in shaken(history):

@@ -70,11 +70,10 @@ class StoredFrames:
     @cached_property
     def bodies(self) -> Indices:
         """Return the number (c,) of the body of each cell: cells that share nodes are of one body."""
-        cell = np.repeat(np.arange(len(self.cells)), self.cells.shape[1])
-        shape = len(self.cells), len(self.points)
-        shared = coo_matrix((np.ones(len(cell)), (cell, self.cells.ravel())), shape).tocsr()
-        nodes = connected_components(shared.T @ shared, directed=False)[1][self.cells[:, 0]]
-        return np.asarray(np.unique(nodes, return_inverse=True)[1].ravel())
+        count, corners = self.cells.shape
+        links = np.repeat(np.arange(count), corners), count + self.cells.ravel()  # from cells to their nodes
+        graph = coo_matrix((np.ones(count * corners), links), (count + len(self.points),) * 2)
+        return np.asarray(connected_components(graph, directed=False)[1][:count])
 
     @cached_property
     def boundary(self) -> tuple[Indices, Indices]:

@@ -126,15 +126,10 @@ class Painter:
 
     def draw(self, axis: Any, face: Face, values: Array) -> None:
         """Draw values (m,) of all conditions on a face: each on its share of the element sides, as dots without."""
-        from matplotlib.collections import PolyCollection
-        from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-
         if len(face.parts):
             look = {"norm": self.norm, "cmap": self.cmap, "edgecolors": "0.7", "linewidths": 0.2}
-            kind = PolyCollection if face.axes is not None else Poly3DCollection
-            parts = kind(face.seen(face.parts), **look)
+            parts = add_polygons(axis, face.seen(face.parts), **look)
             parts.set_array(self.factor * values[face.owners])
-            axis.add_collection(parts)
         else:
             self.dots(axis, face.seen(face.points), values[face.conditions])
         names = AXES if face.axes is None else [direction(way) for way in face.axes.T]
@@ -145,6 +140,16 @@ class Painter:
         """Draw values (k,) as dots at places (k, d)."""
         look = {"norm": self.norm, "cmap": self.cmap, "edgecolors": "0.3", "linewidths": 0.4, "zorder": 4}
         axis.scatter(*places.T, c=self.factor * values, s=24, **look)
+
+
+def add_polygons(axis: Any, polygons: Array, **look: Any) -> Any:
+    """Add polygons (p, corners, d) to an axis, in space to one in projection; return them."""
+    from matplotlib.collections import PolyCollection
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    if polygons.shape[2] == 3:
+        return axis.add_collection3d(Poly3DCollection(polygons, **look))
+    return axis.add_collection(PolyCollection(polygons, **look))
 
 
 def limit(
