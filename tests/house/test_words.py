@@ -37,7 +37,7 @@ Name Normalise Note Number
 Obtain Offer Open Order Overwrite
 Pad Pair Parse Partition Pass Pick Place Plan Plot Point Pose Post Precondition Predict Prepare Prescribe Press Print
 Process Produce Project Propose Prove Provide Pull Push Put
-Raise Ramp Read Rebuild Recognise Record Reduce Refer Refine Refuse Register Relax Release Remember Remove Rename
+Raise Ramp Read Rebuild Recognise Record Reduce Refer Refine Refuse Register Relax Release Remember Remove Rename Render
 Replace Report Represent Resample Resolve Restore Restrict Return Reverse Rotate Round Run
 Sample Save Say Scale Scatter Search Select Send Separate Serve Set Shake Share Shift Show Shrink Simulate Skip Slide
 Smooth Solve Sort Split Stack Start State Step Stop Store Subtract Sum Support Suppress Swap Sweep
