@@ -83,7 +83,7 @@ class Condensed:
 
 
 class PreparedCondensed:
-    """Solve the condensed problem of one A. ``delassus`` and ``schur`` are G and D~ (dense, equal on all ranks)."""
+    """Solve the condensed problem of one A. ``delassus`` is G (dense, equal on all ranks)."""
 
     def __init__(self, settings: Condensed, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> None:
         self._settings, self._A, self._surface, self._scale = settings, A, surface, scale
