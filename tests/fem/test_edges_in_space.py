@@ -32,6 +32,7 @@ from vi_contact.fem.contact.pairs import contact_pair
 from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import BodyForce, Prescribed, Traction
 from vi_contact.fem.mesh import Facets, build_mesh
+from vi_contact.fem.ties import Tied
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.laws.materials import PlaneStress
@@ -304,6 +305,38 @@ def test_an_edge_that_ends_in_a_symmetry_plane(two):
     assert rows[:, 8] == pytest.approx(share * whole[:, 8], abs=1e-9 * whole[:, 8].max())
     assert np.abs(u - u_half).max() < 1e-9 * np.abs(u[:, 3:]).max()
     assert 4 < np.count_nonzero(rows[:, 8]) < len(rows)
+
+
+@pytest.mark.parametrize("two", [True, pytest.param(False, marks=serial)], ids=["mortar", "rigid"])
+def test_an_edge_between_tied_ends(two):
+    """A box on a floor beside a wall, of which both ends move alike: one condition for each face of the nodes that are
+    one, with the weight of both; loads that do not depend on z leave every plane with the same reactions."""
+    places = {"box": ((0.0, 0.0), (2, 2, 3)), "under": ((0.0, -1.0), (3, 1, 2)), "west": ((-1.0, 0.0), (1, 3, 2))}
+    mesh = Blocks({
+        name: BlockMesh(lengths=(1.0,) * 3, divisions=k, corner=(*xy, 0.0),
+                        deform=lambda x: x @ SHAPES["prism"] @ PLACED["turned"].T)
+        for name, (xy, k) in places.items() if two or name == "box"
+    })  # fmt: skip
+    built, tags = build_mesh(mesh, COMM)
+    ends = [Tied(tags[f"{name}_back"], tags[f"{name}_front"]) for name in mesh.blocks]
+    push = [Traction(tags[f"box_{side}"], tuple(PLACED["turned"] @ p))
+            for side, p in (("top", (-2e3, -6e3, 1e3)), ("right", (-5e3, 3e3, 0.0)))]
+    system = assemble(built, SOFT, tied=ends, loads=push)
+    system = system.changed(K=system.algebra.combine([(1.0, system.K), (30.0**2, system.M)]))
+    hull = group(tags, ["box_bottom", "box_left"])
+    if two:
+        surface = contact_pair(system, hull, group(tags, ["under_top", "west_right"]), matching=DualMortar())
+    else:
+        surface = contact_surface(system, hull)
+    state = static_equilibrium(ContactProblem(system, surface), solver=Condensed())
+    found = seen(surface)
+    x = found.points @ PLACED["turned"] @ np.linalg.inv(SHAPES["prism"])
+    rows = np.column_stack([x, found.normals, found.weights, found.all(state.r_n)])
+    rows = rows[np.lexsort(np.round(rows[:, [0, 1, 3, 4, 2]], 6).T)].reshape(3, 6, 8)
+    assert np.abs(rows - rows[0]).max(axis=(0, 1))[[0, 1, 3, 4, 5, 6]].max() < 1e-12
+    assert np.abs(rows[:, :, 7] - rows[0, :, 7]).max() < 1e-9 * rows[:, :, 7].max()
+    assert rows[0, :, 6].sum() == pytest.approx(2.0 / 3.0, rel=1e-12)
+    assert np.count_nonzero(rows[0, :, 7]) >= 2
 
 
 # Friction along edges -------------------------------------------------------------------------------------------------

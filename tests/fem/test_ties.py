@@ -102,7 +102,8 @@ def test_forces_on_one_side_act_on_the_pair(comm):
 
 
 def test_contact_between_tied_sides(comm):
-    """Contact nodes elsewhere: a periodic layer pressed on a plane carries its weight."""
+    """A periodic layer pressed on a plane carries its weight, on some points and, uniformly, on all; nodes that are
+    tied in part, or to one elsewhere, are refused."""
     mesh, tags = block(comm, lengths=(2.0, 1.0), divisions=(4, 4))
     ties = fem.Tied(tags["left"], tags["right"])
     held = fem.Prescribed(tags["top"], components=(0,))
@@ -110,14 +111,20 @@ def test_contact_between_tied_sides(comm):
     surface = fem.contact_surface(system, tags["bottom"], points=[(0.5, 0.0), (1.0, 0.0), (1.5, 0.0)])
     state = vc.static_equilibrium(vc.ContactProblem(system, surface), solver=vc.Condensed())
     assert np.isclose(surface.everywhere(state.r_n).sum(), 4e4, rtol=1e-9)
-    with pytest.raises(InputError, match="is tied to another"):
+    surface = fem.contact_surface(system, tags["bottom"])
+    state = vc.static_equilibrium(vc.ContactProblem(system, surface), solver=vc.Condensed())
+    assert surface.total == 4 and surface.everywhere(state.r_n) == pytest.approx(np.full(4, 1e4), rel=1e-9)
+    with pytest.raises(InputError, match=r"\(2, 0\) of 'bottom' is tied .* or to one that is not in this contact: l"):
+        fem.contact_surface(system, tags["bottom"], points=[(2.0, 0.0), (1.0, 0.0)])
+    system = fem.assemble(mesh, SOIL, tied=fem.Tied(tags["left"], tags["right"], components=(0,)))
+    with pytest.raises(InputError, match=r"\(0, 0\) of 'bottom' is tied to another in some components only, or"):
         fem.contact_surface(system, tags["bottom"])
 
 
 @pytest.mark.parametrize("solver", [vc.Condensed(), vc.Iterative(tolerance=1e-12)])
 def test_contact_with_a_boundary_that_is_tied_at_its_edges(comm, solver):
     """A box pressed on all of a tied layer, meshes that do not match: confined compression, exact at the nodes of the
-    layer also where they are tied; contact nodes themselves must not be tied."""
+    layer also where they are tied; with the box tied too, a uniform pressure on conditions that are there once."""
     lower, upper = (BlockMesh(lengths=(2.0, 1.0, 2.0), divisions=(n, 2, n)) for n in (2, 3))
     mesh, tags = fem.build_mesh(TwoBlocks(lower=lower, upper=upper), comm)
     ties = {name: [fem.Tied(tags[f"{name}_{a}"], tags[f"{name}_{b}"]) for a, b in ROUND] for name in ("lower", "upper")}
@@ -131,25 +138,28 @@ def test_contact_with_a_boundary_that_is_tied_at_its_edges(comm, solver):
     layer = np.isin(np.arange(len(points)), np.arange(3 * 3 * 3)) & (points[:, 1] == 1.0)
     settled = -2e4 * 1.0 / confined
     assert layer.sum() == 9 and np.abs(u[layer] - [0.0, settled, 0.0]).max() < 1e-9 * abs(settled)
-    for tied in (ties["upper"], ties["lower"] + ties["upper"]):
-        other = fem.assemble(mesh, SOIL, tied=tied, **data)
-        with pytest.raises(InputError, match=r"contact node \(0, 1, 0\) of 'upper_bottom' is tied to another"):
-            fem.contact_pair(other, *sides, matching=matching)
+    both = fem.assemble(mesh, SOIL, tied=ties["lower"] + ties["upper"], **data)
+    problem = vc.ContactProblem(both, fem.contact_pair(both, *sides, matching=matching))
+    state = vc.static_equilibrium(problem, solver=solver)
+    assert problem.surface.total == 9
+    assert problem.surface.everywhere(state.r_n / problem.surface.weights) == pytest.approx(np.full(9, 2e4), rel=1e-9)
 
 
 def test_mass_beside_a_tie_is_handed_over_alike(comm):
-    """A periodic block falls on a plane: left and right contact points press alike, mass and energy are kept."""
+    """A periodic block falls on a plane: left and right contact points press alike, tied ones too; mass is kept."""
     mesh, tags = block(comm, lengths=(2.0, 1.0), divisions=(4, 4))
     system = fem.assemble(mesh, SOIL, tied=fem.Tied(tags["left"], tags["right"]), initial_velocity=(0.0, -0.5))
     plane = vc.HalfSpace((0.0, -1e-4), (0.0, 1.0))
-    surface = fem.contact_surface(system, tags["bottom"], points=[(x, 0.0) for x in (0.5, 1.0, 1.5)], obstacle=plane)
-    problem = vc.ContactProblem(system, surface, mass=vc.Redistributed())
-    for r in problem.equations.influence.T:
-        mass = problem.equations.algebra.dot(r, problem.equations.M @ r)
-        assert np.isclose(mass, 2.0 * SOIL.rho, rtol=1e-12)
-    reactions = np.array([surface.everywhere(state.r_n) for state, _ in vc.march(problem, dt=2e-5, steps=200)])
-    assert reactions.max() > 0.0
-    assert np.abs(reactions[:, 0] - reactions[:, 2]).max() < 1e-10 * reactions.max()
+    for points in (None, [(x, 0.0) for x in (0.5, 1.0, 1.5)]):
+        surface = fem.contact_surface(system, tags["bottom"], points=points, obstacle=plane)
+        problem = vc.ContactProblem(system, surface, mass=vc.Redistributed())
+        for r in problem.equations.influence.T:
+            mass = problem.equations.algebra.dot(r, problem.equations.M @ r)
+            assert np.isclose(mass, 2.0 * SOIL.rho, rtol=1e-12)
+        steps = vc.march(problem, dt=2e-5, steps=200)
+        reactions = np.array([surface.everywhere(state.r_n) for state, _ in steps])[:, surface.total - 3 :]
+        assert reactions.max() > 0.0
+        assert np.abs(reactions[:, 0] - reactions[:, 2]).max() < 1e-10 * reactions.max()
 
 
 def test_what_does_not_fit_is_refused(comm):

@@ -108,6 +108,7 @@ class FemSpace:
             self.held[self._where_held[-1]] = True
         links = linked(tied, self.dimension, PLACE_TOLERANCE * self.size, self._everywhere)
         self.tied_nodes: Indices = np.union1d(links.followers, links.leaders) // self.dimension
+        self._leader = links.of_nodes(self.dimension)
         self.tied: Mask = self._followers(links)
         self.free: Mask = ~(self.held | self.tied).ravel()
         ids = self.nodes[:, None] * self.dimension + np.arange(self.dimension)
@@ -154,6 +155,10 @@ class FemSpace:
         """Return owned nodal values (k, d) of unknowns, node number * d + component, on every rank."""
         rows = self.at_nodes(numbers // self.dimension, values.astype(float))
         return rows[np.arange(len(numbers)), numbers % self.dimension]
+
+    def leaders(self, nodes: Indices) -> Indices:
+        """Return these node numbers, of nodes that follow another that of the other; -1 for those tied in part."""
+        return np.array([self._leader.get(n, n) for n in nodes.tolist()], dtype=np.int64) if self._leader else nodes
 
     def at_nodes(self, numbers: Indices, values: Array) -> Array:
         """Return owned nodal values (k, d) at original node numbers, on every rank; zero for nodes of nobody."""

@@ -45,6 +45,13 @@ class Links:
     followers: Indices
     leaders: Indices
 
+    def of_nodes(self, d: int) -> dict[int, int]:
+        """Return whom tied nodes follow: one other in all d components, or themselves; -1 for those tied in part."""
+        nodes = np.column_stack([self.followers, self.leaders]) // d
+        found, count = np.unique(nodes, axis=0, return_counts=True)
+        whole = found[count == d]
+        return dict.fromkeys(nodes.ravel().tolist(), -1) | dict(whole[:, [1, 1]].tolist()) | dict(whole.tolist())
+
 
 def linked(tied: Sequence[Tied], dimension: int, near: float, nodes: NodesOf) -> Links:
     """Join the unknowns of every tie; partners are ``near`` [m] to the place that they should have. Collective.

@@ -27,22 +27,21 @@ def from_neighbours(system: SemiDiscreteSystem, massless: Mask, contact: Mask, n
     """Return the matrices P_k of v = P_0 P_1 … v that replace massless unknowns; contact: all those of contact nodes.
 
     Contact nodes with neighbours behind the surface come last in the product; those in corners, with contact nodes
-    around, follow them. Tied nodes, in two places, carry nothing. InputError for contact nodes without material behind.
+    around, follow them, and tied ones, which are in two places. InputError for contact nodes without material behind.
     """
     algebra, comm = system.algebra, system.algebra.comm
     node = np.asarray(system.space.ids) // system.influence.shape[1]
     levels: list[Matrix] = []
-    left, donors, exact = massless.copy(), ~contact, True
-    if system.tied is not None:
-        donors &= ~system.tied
+    tied = np.zeros_like(contact) if system.tied is None else system.tied
+    left, donors, exact = massless.copy(), ~contact & ~tied, True
     while largest(comm, left.any()):
-        ready, entries = _rows(system, left, donors, nodal, exact=exact)
+        ready, entries = _rows(system, left & ~tied if exact else left, donors, nodal, exact=exact)
         if largest(comm, len(ready)):
             levels.append(algebra.replaced_rows(system.rows, ready, entries))
             left[ready] = False
             donors |= contact & np.isin(node, node[ready])
         elif exact:
-            exact = False  # too few neighbours to tell a rotation: translations will do
+            exact, donors = False, donors | (tied & ~contact)  # too few to tell a rotation: translations will do
         else:
             raise InputError("the mass of some contact nodes has nowhere to go, no node behind them carries any: "
                              "refine the mesh across the body, or give the problem mass=ConsistentMass()")

@@ -189,7 +189,7 @@ def _turns(space: FemSpace, frames: NodalFrames, numbers: Indices) -> Array:
     known = np.zeros((len(space.nodes), 1 + d * d))
     own = space.blocks_of(frames.numbers)
     known[own, 0], known[own, 1:] = 1.0, frames.turns.reshape(-1, d * d)
-    found = space.at_nodes(numbers, known)
+    found = space.at_nodes(space.leaders(numbers), known)
     return np.asarray(np.where(found[:, :1, None] > 0.0, found[:, 1:].reshape(-1, d, d), np.eye(d)))
 
 
@@ -212,7 +212,7 @@ def _refuse_chains(space: FemSpace, parts: Sequence[NodalConditions]) -> None:
     for _, facing in coupled:
         used = np.zeros(len(facing.nodes.numbers))
         used[facing.P.indices] = 1.0
-        both = np.flatnonzero(space.at_nodes(facing.nodes.numbers, first)[:, 0] * space.comm.max(used))
+        both = np.flatnonzero(space.at_nodes(space.leaders(facing.nodes.numbers), first)[:, 0] * space.comm.max(used))
         if len(both):
             raise InputError(f"node {at(facing.nodes.points[both[0]])} is on side 1 of one contact pair and on side 2 "
                              "of another: exchange the sides of one of them, or give it once if both are the same")

@@ -33,7 +33,7 @@ from .faces import Boundary, boundary, checked_angle, split, tell_corners
 from .frames import Facing, NodalConditions, NodalFrames, given, surface_of
 from .matching import Matched, Matching, NodeToNode, Side
 from .nodes import Nodes, everywhere, joined_nodes
-from .surface import contact_space, listed, nodes_on, refuse_tied, snapped
+from .surface import contact_space, listed, merged, nodes_on, snapped
 
 log = logging.getLogger(__name__)
 
@@ -82,14 +82,15 @@ def contact_pair(
         rows = np.concatenate([np.flatnonzero(nodes.numbers == number) for number in chosen])
         nodes, matched = nodes.pick(rows), matched.pick(rows)
     directions = snapped(nodes.normals)
-    gap = _gap(space, one.name, two, nodes, directions, matched)
+    gap, P = _gap(space, one.name, two, nodes, directions, matched), matched.P
+    if len(space.tied_nodes):
+        nodes, directions, shares = merged(space, one.name, nodes, directions, angle)
+        gap, P = shares @ gap, sp.csr_matrix(shares @ P)
     slots = np.flatnonzero(space.blocks_of(nodes.numbers) >= 0)  # from here on every rank has its own nodes of side 1
-    nodes, matched = nodes.pick(slots), matched.pick(slots)
-    refuse_tied(space, nodes, slots, one.name)
+    nodes = nodes.pick(slots)
     tell_corners(space, one.name, nodes, slots, angle)
-    conditions = NodalConditions(nodes, directions[slots], slots, Facing(two.nodes, matched.P))
-    weights = matched.weights * space.forms.section.thickness
-    surface = surface_of(space, [conditions], gap0=gap[slots], weights=weights)
+    conditions = NodalConditions(nodes, directions[slots], slots, Facing(two.nodes, P[slots]))
+    surface = surface_of(space, [conditions], gap0=gap[slots], weights=nodes.weights * space.forms.section.thickness)
     moving: dict[str, Any] = _prescribed_motion(space, conditions)
     return replace(surface, **moving)
 

@@ -6,8 +6,9 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 
-from ...core.algebra import Array, Indices, Mask, largest, total
+from ...core.algebra import Array, Indices, from_each, largest, total
 from ...core.checks import array, at, optional, provides, several
 from ...core.corners import FEATURE_ANGLE, PARALLEL
 from ...core.errors import InputError
@@ -20,7 +21,7 @@ from ..mesh import Facets
 from ..space import FemSpace, space_of
 from .faces import boundary, checked_angle, in_symmetry_planes, integrals, split, tell_corners
 from .frames import NodalConditions, surface_of
-from .nodes import Nodes, asked, everywhere, slots_of
+from .nodes import Nodes, asked, everywhere, joined_nodes, slots_of
 
 log = logging.getLogger(__name__)
 
@@ -34,7 +35,8 @@ def contact_surface(
 
     Nodal weights are ∫ phi_i times the section's thickness (so that r_n / weights is in Pa), nodal normals the
     direction of ∫ phi_i n over the facets, on rollers (a symmetry plane) without the component held there. Nodes of
-    the facets that are clamped in every component (where the boundary meets a clamped part) are left out.
+    the facets that are clamped in every component (where the boundary meets a clamped part) are left out. Nodes that
+    move as one (``fem.Tied`` in all components) have one condition, with the weights of all.
 
     Where the facets turn by more than the feature angle the boundary has faces, and a node on several of them has one
     condition for each, with the normal and the weight of this face, at any angle between them (``fem.contact.faces``).
@@ -58,9 +60,11 @@ def contact_surface(
     slots = slots_of(comm, _places(nodes, chosen))
     directions, gap = asked(comm, slots, _obstacle(obstacle, space.size), nodes.points, nodes.normals)
     nodes, directions, gap = one_per_direction(whole, nodes, directions, gap)
+    nodes, directions, gap = with_ties(space, facets.name, nodes, directions, gap, angle)
+    order = np.argsort(_places(nodes, chosen), kind="stable")
+    nodes, directions, gap = nodes.pick(order), directions[order], gap[order]
     slots = slots_of(comm, _places(nodes, chosen))
     weights = nodes.weights * space.forms.section.thickness
-    refuse_tied(space, nodes, slots, facets.name)
     tell_corners(space, facets.name, nodes, slots, angle)
     return surface_of(space, [NodalConditions(nodes, directions, slots)], gap0=gap, weights=weights)
 
@@ -180,15 +184,39 @@ def listed(space: FemSpace, nodes: Nodes, points: Sequence[Sequence[float]], nam
     return np.asarray(nodes.numbers[rows])
 
 
-def refuse_tied(space: FemSpace, nodes: Nodes, slots: Indices, name: str) -> None:
-    """Raise InputError, on all ranks, for contact nodes of this rank that move together with others. Collective."""
-    def refuse(points: Array, tied: Mask) -> tuple[()]:
-        for point in points[tied]:
-            raise InputError(f"contact node {at(point)} of '{name}' is tied to another: leave it out (points=), or tie "
-                             "boundaries that end before the contact")
-        return ()
+def merged(space: FemSpace, name: str, nodes: Nodes, directions: Array, angle: float) -> tuple[Nodes, Array, Any]:
+    """Return (nodes, directions, shares (k, m)) of the k conditions that are left of the m of all ranks when nodes that
+    move as one (tied boundaries) have one for each face: sums of weights, means with shares by weight.
 
-    asked(space.comm, slots, refuse, nodes.points, np.isin(nodes.numbers, space.tied_nodes))
+    InputError for a node that is tied in some components only, or to one without such a condition.
+    """
+    leaders, target = space.leaders(nodes.numbers), np.arange(len(nodes.numbers))
+    for row in np.flatnonzero(np.isin(nodes.numbers, space.tied_nodes)):
+        alike = np.flatnonzero(nodes.numbers == leaders[row])
+        turn = directions[alike] @ directions[row]
+        if turn.max(initial=-2.0) < np.cos(angle):
+            raise InputError(f"contact node {at(nodes.points[row])} of '{name}' is tied to another in some components "
+                             "only, or to one that is not in this contact: leave it out (points=), or tie and take all")
+        target[row] = alike[turn.argmax()]
+    kept, place = np.unique(target, return_inverse=True)
+    sums = sp.csr_matrix((nodes.weights, (place.ravel(), np.arange(len(target)))))
+    weights = np.asarray(sums.sum(axis=1)).ravel()
+    shares = sp.csr_matrix(sp.diags([1.0 / weights], [0]) @ sums)
+    directions = np.where((np.diff(shares.indptr) > 1)[:, None], snapped(shares @ directions), directions[kept])
+    return replace(nodes.pick(kept), weights=weights), directions, shares
+
+
+def with_ties(space: FemSpace, name: str, nodes: Nodes, directions: Array, gap: Array, angle: float) -> Any:
+    """Return (nodes, directions, gaps) of this rank, those of nodes that move as one ``merged``. Collective."""
+    tied = np.isin(nodes.numbers, space.tied_nodes)
+    parts = from_each(space.comm, (nodes.pick(tied), directions[tied], gap[tied]))
+    every, (n, g) = joined_nodes([part[0] for part in parts]), (np.concatenate([p[i] for p in parts]) for i in (1, 2))
+    if not len(g):
+        return nodes, directions, gap
+    every, n, shares = merged(space, name, every, n, angle)
+    own = np.flatnonzero(space.blocks_of(every.numbers) >= 0)
+    nodes, directions = joined_nodes([nodes.pick(~tied), every.pick(own)]), np.concatenate([directions[~tied], n[own]])
+    return nodes, directions, np.concatenate([gap[~tied], (shares @ g)[own]])
 
 
 def snapped(directions: Array) -> Array:
