@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 import pytest
+from newmark_block import SlidingBlock
 
 from vi_contact.core.errors import InputError
-from vi_contact.exact.sliding import SlidingBlock
 
 pytestmark = pytest.mark.serial
 G = 9.81

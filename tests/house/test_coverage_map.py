@@ -116,7 +116,6 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "validation/test_tennis_ball.py": "models.disk",
     "validation/test_concrete_in_concrete.py": "models.embedded",
     "validation/test_pressed_square.py": "models.square plots.deformed",
-    "validation/test_sliding_block.py": "models.sliding_block",
 }
 BY = {module: test for test, modules in COVERS.items() for module in modules.split()}
 

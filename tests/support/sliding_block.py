@@ -7,20 +7,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..core.errors import InputError
-from ..core.obstacles import HalfSpace
-from ..core.problem import ContactProblem
-from ..core.protocols import Excitation
-from ..core.step import State
-from ..exact.sliding import SlidingBlock
-from ..fem.assembly import assemble
-from ..fem.contact.surface import contact_surface
-from ..fem.loads import BodyForce
-from ..fem.mesh import build_mesh
-from ..laws.friction import Coulomb
-from ..laws.materials import Damping, LinearElastic, PlaneStress, Rayleigh
-from ..meshes.block import BlockMesh
-from ..run.static import static_equilibrium
+from newmark_block import SlidingBlock
+
+from vi_contact.core.errors import InputError
+from vi_contact.core.obstacles import HalfSpace
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.protocols import Excitation
+from vi_contact.core.step import State
+from vi_contact.fem.assembly import assemble
+from vi_contact.fem.contact.surface import contact_surface
+from vi_contact.fem.loads import BodyForce
+from vi_contact.fem.mesh import build_mesh
+from vi_contact.laws.friction import Coulomb
+from vi_contact.laws.materials import Damping, LinearElastic, PlaneStress, Rayleigh
+from vi_contact.meshes.block import BlockMesh
+from vi_contact.run.static import static_equilibrium
 
 
 @dataclass(frozen=True)

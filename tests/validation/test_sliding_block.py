@@ -6,15 +6,14 @@ from collections.abc import Mapping
 
 import numpy as np
 import pytest
+import sliding_block as sliding
 from energy_checks import rounded
 from mpi4py import MPI
 
 import vi_contact as vc
-from vi_contact import exact
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.core.protocols import Excitation
-from vi_contact.models import sliding_block as sliding
 
 pytestmark = pytest.mark.serial  # ranks change none of these numbers: cheaper tests show it
 
@@ -23,7 +22,7 @@ G = 9.81
 
 def shaken(mu: float, excitation: Excitation, t_end: float, dt: float) -> tuple[Mapping[str, Array], Array]:
     """(history, displacement of the centre relative to the ground since the gravity stage)."""
-    model = sliding.build(sliding.SlidingBody(exact.SlidingBlock(mu)), MPI.COMM_WORLD, excitation=excitation)
+    model = sliding.build(sliding.SlidingBody(sliding.SlidingBlock(mu)), MPI.COMM_WORLD, excitation=excitation)
     solution = vc.simulate(
         model.problem, scheme=vc.MoreauJean(), solver=vc.Condensed(), dt=dt, t_end=t_end, state=model.rest,
         record=(vc.Energy(), vc.Contact(), vc.Probe({"centre": model.centre})), progress=False,
@@ -63,4 +62,4 @@ def test_weak_shaking_moves_nothing():
 
 def test_slender_blocks_are_refused():
     with pytest.raises(InputError, match="rocks before it slides"):
-        sliding.SlidingBody(exact.SlidingBlock(0.6), lengths=(0.5, 1.0))
+        sliding.SlidingBody(sliding.SlidingBlock(0.6), lengths=(0.5, 1.0))

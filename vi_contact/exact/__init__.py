@@ -13,7 +13,6 @@ _CONTENTS = {
     "bouncing_bar": ("BouncingBar",),
     "hertz": ("HertzImpact", "HertzPoint", "contact_modulus", "contact_radius"),
     "housner": ("HousnerBlock",),
-    "sliding": ("SlidingBlock",),
     "surface_waves": ("dashpot_energy", "dashpot_reflection"),
 }
 __all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)

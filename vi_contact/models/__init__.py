@@ -13,6 +13,6 @@ from ..core.lazy import lazy
 
 _CONTENTS = {  # modules that are handed on whole
     "ball": (), "bar": (), "boundary_curve": (), "boundary_elements": (), "channel": (), "disk": (), "embedded": (),
-    "rocking_block": (), "sliding_block": (), "square": (), "wall": (),
+    "rocking_block": (), "square": (), "wall": (),
 }
 __all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)
