@@ -30,7 +30,7 @@ from vi_contact.meshes.two_blocks import TwoBlocks
 from vi_contact.plots import bodies, faces, run_pictures
 from vi_contact.plots.bodies import film, plot_deformed
 from vi_contact.plots.deformed import OPEN, SLIP, STICK, contact_states, read_frames
-from vi_contact.plots.faces import faces_of, leading, moments, plot_faces
+from vi_contact.plots.faces import Painter, faces_of, leading, moments, plot_faces
 from vi_contact.plots.rendered import render_deformed
 from vi_contact.run.files.reading import RunFolder, read_run
 
@@ -97,10 +97,9 @@ def test_what_belongs_to_whom(runs: Any, kind: str) -> None:
     assert weights == pytest.approx(run.contact.weights, rel=1e-9)
 
 
-@pytest.mark.parametrize("kind", ["hexahedra", "tetrahedra"])
-def test_faces(runs: Any, kind: str, figures: list[Any], tmp_path: Path) -> None:
+def test_faces(runs: Any, figures: list[Any], tmp_path: Path) -> None:
     """Pressures, states and slips of the rows next to the times, on the shares of their points."""
-    run, times = runs[kind], (0.0, 0.0151, STEPS * DT)
+    run, times = runs["tetrahedra"], (0.0, 0.0151, STEPS * DT)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         path = plot_faces(run, tmp_path / "faces.png", times=times, title="$")
@@ -179,10 +178,9 @@ def test_faces_without_fields(runs: Any, figures: list[Any], tmp_path: Path) -> 
             plot_deformed(less, tmp_path / "none.png")
 
 
-@pytest.mark.parametrize("kind", ["hexahedra", "tetrahedra"])
-def test_deformed_bodies(runs: Any, kind: str, figures: list[Any], tmp_path: Path) -> None:
+def test_deformed_bodies(runs: Any, figures: list[Any], tmp_path: Path) -> None:
     """The outside of both bodies, displaced as the title tells, coloured by the stress of the cells behind it."""
-    run, frames = runs[kind], read_frames(runs[kind])
+    run, frames = runs["hexahedra"], read_frames(runs["hexahedra"])
     plot_deformed(run, tmp_path / "bodies.png", times=[0.0, 0.0205], magnified=7.0, title="Blocks")
     assert figures[0]._suptitle.get_text() == "Blocks (displacements x 7)"
     assert [axis.get_title() for axis in figures[0].axes[:2]] == ["t = 0 s", "t = 0.021 s"]
@@ -201,6 +199,15 @@ def test_deformed_bodies(runs: Any, kind: str, figures: list[Any], tmp_path: Pat
     assert len(np.unique(drawn._edgecolor3d, axis=0)) == 2  # bodies
     low, high = np.array([getattr(axis, f"get_{letter}lim")() for letter in "xyz"]).T
     assert axis._box_aspect / axis._box_aspect[0] == pytest.approx((high - low) / (high - low)[0])
+
+
+def test_points_that_pull() -> None:
+    """Held points may pull: then zero is in the middle of the colours, else at their end, where it alone is white."""
+    pulling, pushing = (Painter.of_pressure(1.0e3 * np.array(values)) for values in ((-2.0, 1.0), (0.0, 1.0)))
+    assert pulling.label == "contact pressure [kPa], negative: pull"
+    assert pulling.norm([-2.0, 0.0, 2.0]) == pytest.approx([0.0, 0.5, 1.0])
+    assert pushing.norm([0.0, 0.25, 1.0]) == pytest.approx([0.0, 0.5, 1.0])
+    assert np.all(pushing.colours(np.array([0.0, 0.1, 1.0e3])) == 1.0, axis=1).tolist() == [True, False, False]
 
 
 def test_moments() -> None:

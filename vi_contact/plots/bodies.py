@@ -97,7 +97,8 @@ class Scene:
         if not flat:
             colours[:, :3] *= 0.6 + 0.4 * np.abs(plane_normals(polygons) @ LIGHT)[:, None]
         edges = [BODIES[body % len(BODIES)] for body in self.body]
-        add_polygons(axis, polygons, facecolors=colours, edgecolors=edges, linewidths=0.3)
+        thin = min(0.3, 600.0 / len(polygons))  # or fine meshes show nothing but their edges
+        add_polygons(axis, polygons, facecolors=colours, edgecolors=edges, linewidths=thin)
         along = np.zeros(1) if self.contact is None else np.abs(self.contact.normals.sum(axis=0))
         limit(axis, *self.box, margin=0.03, up="y" if along[1 % len(along)] > along[-1] else "z")
         if flat and self.contact is not None:

@@ -93,18 +93,19 @@ class Painter:
 
     @classmethod
     def of_pressure(cls, pressure: Array) -> "Painter":
-        """Make the colours for all pressures [Pa] that are drawn: open points white; where some points pull, they are
-        blue."""
+        """Make the colours for all pressures [Pa] that are drawn: open points white, on a root scale, as edges of faces
+        carry much more than the rest; where some points pull these blue, on a linear one."""
         from matplotlib import colormaps
-        from matplotlib.colors import Normalize
+        from matplotlib.colors import ListedColormap, Normalize, PowerNorm
 
         size = float(np.abs(pressure).max(initial=0.0)) or 1.0
         factor, unit = scale(size, "Pa")
-        pulls = bool(np.any(pressure < 0.0))
-        low = -size if pulls else 1e-9 * size
-        palette = colormaps["RdBu_r" if pulls else "YlOrRd"].with_extremes(under="white")
-        meaning = "negative: pull" if pulls else "white: open"
-        return cls(Normalize(factor * low, factor * size), palette, f"contact pressure [{unit}], {meaning}", factor)
+        label, size = f"contact pressure [{unit}]", factor * size
+        if np.any(pressure < 0.0):
+            return cls(Normalize(-size, size), colormaps["RdBu_r"], f"{label}, negative: pull", factor)
+        palette = colormaps["YlOrRd"](np.linspace(0.0, 1.0, 256))
+        palette[0] = 1.0  # zero, and on this scale less than 2e-5 of the largest
+        return cls(PowerNorm(0.5, 0.0, size), ListedColormap(palette), f"{label}, white: open", factor)
 
     @classmethod
     def of_states(cls) -> "Painter":
