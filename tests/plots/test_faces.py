@@ -205,8 +205,8 @@ def test_points_that_pull() -> None:
     """Held points may pull: then zero is in the middle of the colours, else at their end, where it alone is white."""
     pulling, pushing = (Painter.of_pressure(1.0e3 * np.array(values)) for values in ((-2.0, 1.0), (0.0, 1.0)))
     assert pulling.label == "contact pressure [kPa], negative: pull"
-    assert pulling.norm([-2.0, 0.0, 2.0]) == pytest.approx([0.0, 0.5, 1.0])
-    assert pushing.norm([0.0, 0.25, 1.0]) == pytest.approx([0.0, 0.5, 1.0])
+    assert np.asarray(pulling.norm([-2.0, 0.0, 2.0])) == pytest.approx([0.0, 0.5, 1.0])
+    assert np.asarray(pushing.norm([0.0, 0.25, 1.0])) == pytest.approx([0.0, 0.5, 1.0])
     assert np.all(pushing.colours(np.array([0.0, 0.1, 1.0e3])) == 1.0, axis=1).tolist() == [True, False, False]
 
 
