@@ -216,7 +216,7 @@ def test_moments() -> None:
     uplift, pressure, u = np.array([[0.0, 0.1, 0.5, 0.2], [np.nan, 3.0, 1.0, 2.0], [0.0, 1.0, 2.0, -3.0]])
     for less, column, when in (((), "contact_uplift", 2.0), ((1.0,), "contact_max_pressure", 1.0)):
         history = {"t": t, "contact_uplift": np.append(less, uplift)[:4], "contact_max_pressure": pressure, "u_x_a": u}
-        assert leading(history) == column and moments(history) == [0.0, when, 3.0]
+        assert leading(history) == (column, when) and moments(history) == [0.0, when, 3.0]
     assert moments({"t": t, "u_x_top": u}) == [0.0, 3.0, 3.0]
     assert moments({"t": t, "iterations": np.zeros(4)}) == [0.0, 0.0, 3.0]
 

@@ -69,12 +69,6 @@ class Scene:
         return np.asarray(self.points + self.magnified * self.u[k])
 
     @cached_property
-    def box(self) -> tuple[Array, Array]:
-        """Return the lowest and highest coordinates (d,) of what is drawn at all times."""
-        low, high = (getattr(self.u, which)(axis=0) for which in ("min", "max"))
-        return (self.points + self.magnified * low).min(axis=0), (self.points + self.magnified * high).max(axis=0)
-
-    @cached_property
     def stresses(self) -> Painter:
         """Return the colours of the stresses; the largest per cent has one colour."""
         from matplotlib import colormaps
@@ -100,7 +94,9 @@ class Scene:
         thin = min(0.3, 600.0 / len(polygons))  # or fine meshes show nothing but their edges
         add_polygons(axis, polygons, facecolors=colours, edgecolors=edges, linewidths=thin)
         along = np.zeros(1) if self.contact is None else np.abs(self.contact.normals.sum(axis=0))
-        limit(axis, *self.box, margin=0.03, up="y" if along[1 % len(along)] > along[-1] else "z")
+        up = "y" if along[1 % len(along)] > along[-1] else "z"
+        every = (self.points + self.magnified * self.u).reshape(-1, moved.shape[1])
+        limit(axis, every.min(axis=0), every.max(axis=0), margin=0.03, up=up)
         if flat and self.contact is not None:
             inwards = INWARDS * float(np.ptp(self.points, axis=0).max()) * self.contact.normals
             self.pressures.dots(axis, moved[self.nodes] - inwards, self.pressure[k])
@@ -164,7 +160,7 @@ def film(
         grid = figure.add_gridspec(2, len(wide), height_ratios=(3.6, 1.0), width_ratios=wide)
         planes = [flat, *(face.axes is not None for face in faces)]
         axes = [figure.add_subplot(grid[0, i], projection=None if plane else "3d") for i, plane in enumerate(planes)]
-        marker = _trace(figure.add_subplot(grid[1, :]), run, column or leading(run.history), scene.times)
+        marker = _trace(figure.add_subplot(grid[1, :]), run, column or leading(run.history)[0], scene.times)
         scene.stresses.bar(figure, axes[0], extend="max", shrink=0.85)
         if contact is not None:
             scene.pressures.bar(figure, axes[-1], shrink=0.85)

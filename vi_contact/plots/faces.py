@@ -171,21 +171,17 @@ def limit(
         axis.set_aspect("equal")
 
 
-def leading(history: History) -> str:
-    """Return the column that tells when most happens: of uplift, largest pressure and displacements the first one that
-    is not largest at the start."""
+def leading(history: History) -> tuple[str, int]:
+    """Return the column and the row that tell when most happens: of uplift, largest pressure and displacements the
+    first one that is not largest in size at the start."""
     names = ("contact_uplift", "contact_max_pressure", *(name for name in history if name.startswith("u_")))
-    return next((name for name in names if name in history and _most(history, name) > 0), "iterations")
-
-
-def _most(history: History, column: str) -> int:
-    """The row in which a column is largest in size."""
-    return int(np.argmax(np.abs(np.nan_to_num(history[column]))))
+    most = ((name, int(np.argmax(np.abs(np.nan_to_num(history[name]))))) for name in names if name in history)
+    return next((found for found in most if found[1] > 0), ("iterations", 0))
 
 
 def moments(history: History) -> list[float]:
     """Return the first time, the one when most happens (``leading``), and the last."""
-    return history["t"][[0, _most(history, leading(history)), -1]].tolist()
+    return history["t"][[0, leading(history)[1], -1]].tolist()
 
 
 def plot_faces(
