@@ -4,6 +4,7 @@ bodies, beside symmetry planes, with friction along edges, with redistributed ma
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 from typing import Any
 
@@ -310,11 +311,17 @@ def test_an_edge_that_ends_in_a_symmetry_plane(two):
 @pytest.mark.parametrize("two", [True, pytest.param(False, marks=serial)], ids=["mortar", "rigid"])
 def test_an_edge_between_tied_ends(two):
     """A box on a floor beside a wall, of which both ends move alike: one condition for each face of the nodes that are
-    one, with the weight of both; loads that do not depend on z leave every plane with the same reactions."""
-    places = {"box": ((0.0, 0.0), (2, 2, 3)), "under": ((0.0, -1.0), (3, 1, 2)), "west": ((-1.0, 0.0), (1, 3, 2))}
+    one, with the weight of both; loads that do not depend on z leave every plane, of uneven ones, with the same
+    pressures, and a uniform pressure arrives at the blocks as the same forces in every plane."""
+    places = {"box": ((0.0, 0.0), (2, 2, 3)), "under": ((0.0, -1.0), (3, 1, 4)), "west": ((-1.0, 0.0), (1, 3, 4))}
+    uneven = {"box": 0.4, "under": 0.0, "west": 0.0}
+
+    def placed(x: Array, share: float) -> Array:
+        x = np.column_stack([x[:, :2], x[:, 2] + share * x[:, 2] * (1.0 - x[:, 2])])
+        return x @ SHAPES["prism"] @ PLACED["turned"].T
+
     mesh = Blocks({
-        name: BlockMesh(lengths=(1.0,) * 3, divisions=k, corner=(*xy, 0.0),
-                        deform=lambda x: x @ SHAPES["prism"] @ PLACED["turned"].T)
+        name: BlockMesh(lengths=(1.0,) * 3, divisions=k, corner=(*xy, 0.0), deform=partial(placed, share=uneven[name]))
         for name, (xy, k) in places.items() if two or name == "box"
     })  # fmt: skip
     built, tags = build_mesh(mesh, COMM)
@@ -328,12 +335,22 @@ def test_an_edge_between_tied_ends(two):
         surface = contact_pair(system, hull, group(tags, ["under_top", "west_right"]), matching=DualMortar())
     else:
         surface = contact_surface(system, hull)
-    state = static_equilibrium(ContactProblem(system, surface), solver=Condensed())
+    problem = ContactProblem(system, surface)
+    state = static_equilibrium(problem, solver=Condensed())
     found = seen(surface)
     x = found.points @ PLACED["turned"] @ np.linalg.inv(SHAPES["prism"])
-    rows = np.column_stack([x, found.normals, found.weights, found.all(state.r_n)])
+    rows = np.column_stack([x, found.normals, found.weights, found.all(state.r_n / surface.weights)])
     rows = rows[np.lexsort(np.round(rows[:, [0, 1, 3, 4, 2]], 6).T)].reshape(3, 6, 8)
-    assert np.abs(rows - rows[0]).max(axis=(0, 1))[[0, 1, 3, 4, 5, 6]].max() < 1e-12
+    assert np.abs(rows - rows[0]).max(axis=(0, 1))[[0, 1, 3, 4, 5]].max() < 1e-12
+    shares = np.array([1.0, 17.0 / 15.0, 13.0 / 15.0])  # cells along z are 38, 30 and 22 ninetieths long
+    assert rows[:, :, 6] == pytest.approx(shares[:, None] * rows[0, :, 6], rel=1e-12)
+    if two:
+        push = forces(problem, found.reaction_load(found.weights, system.rows))
+        places = field(system, system.u0)[0] @ PLACED["turned"] @ np.linalg.inv(SHAPES["prism"])
+        pit = np.arange(len(push)) >= 3 * 3 * 4
+        planes = [push[pit & (np.abs(places[:, 2] - z) < 1e-9)] for z in (0.0, 0.25, 0.5, 0.75)]
+        assert np.abs(planes[0]).max() > 0.01
+        assert max(np.abs(plane - planes[0]).max() for plane in planes) < 1e-12
     assert np.abs(rows[:, :, 7] - rows[0, :, 7]).max() < 1e-9 * rows[:, :, 7].max()
     assert rows[0, :, 6].sum() == pytest.approx(2.0 / 3.0, rel=1e-12)
     assert np.count_nonzero(rows[0, :, 7]) >= 2
