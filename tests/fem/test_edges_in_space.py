@@ -18,7 +18,7 @@ from fem_problems import dense, field, max_over_ranks
 from mpi4py import MPI
 from reference_lcp import enumerate_lcp
 from test_mortar_in_space import rotation, unlike
-from two_bodies import SOFT, forces, momenta, relative, thrown
+from two_bodies import SOFT, forces, momenta, per_body, relative, thrown
 
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
@@ -177,6 +177,26 @@ def test_a_box_in_a_corner_by_enumeration(shape, n):
             assert np.abs(r_n[order] - expected).max() < 1e-9 * expected.max()
             found = field(placed.system, placed.cartesian(state.u))[1] @ PLACED[place]
             assert np.abs(found - u).max() < 1e-9 * np.abs(u).max()
+
+
+@pytest.mark.parametrize(("shape", "n"), [("prism", 2), pytest.param("leaning", 3, marks=serial)])
+def test_a_pit_of_one_body(shape, n):
+    """Floor and wall of one body, whose nodes in the bend belong to both: every condition is the relative displacement
+    along the normal of its face, exactly where both bodies deform linearly."""
+    places = {"box": (0.0, 0.0, 0.0), "below": (-1.0, -1.0, 0.0), "under": (0.0, -1.0, 0.0), "west": (-1.0, 0.0, 0.0)}
+    mesh: Any = Blocks({name: BlockMesh(lengths=(1.0,) * 3, divisions=(2 if name == "box" else n,) * 3, corner=corner,
+                                        deform=lambda x: x @ SHAPES[shape] @ PLACED["turned"].T)
+                        for name, corner in places.items()})
+    mesh = Welded(Welded(mesh, "below_right", "under_left"), "below_top", "west_bottom")
+    built, tags = build_mesh(mesh, COMM)
+    system = assemble(built, SOFT)
+    sides = group(tags, ["box_bottom", "box_left"]), group(tags, ["under_top", "west_right"], "pit")
+    surface = contact_pair(system, *sides, matching=NodeToNode() if n == 2 else DualMortar())
+    found, A = seen(surface), np.arange(9.0).reshape(3, 3)
+    u = relative(ContactProblem(system, surface), per_body(system, lambda x: x @ A + 1.0, lambda x: 2.0 * x @ A.T))
+    jump = found.points @ A + 1.0 - 2.0 * found.points @ A.T
+    assert found.count == 18 and [len(corner) for corner in found.corners] == [2, 2, 2]
+    assert found.normal_values(u) == pytest.approx(np.sum(jump * found.normals, axis=1), abs=1e-12)
 
 
 # Beside welds and symmetry planes -------------------------------------------------------------------------------------

@@ -48,7 +48,8 @@ def contact_pair(
     They are those of the nodes of side 1: its normals, weights (times the section's thickness) and forces; r_n /
     weights is the pressure. Side 1 should be the smaller and finer one, or the softer body. Initial gaps are measured
     along the normals of side 1. Nodes that both sides share, at the tip of a crack, have no condition; nor have nodes
-    clamped on both sides. Prescribed nodes of side 2 move as they are told: a moving obstacle.
+    clamped on both sides. Nodes that are tied to one another have one. Prescribed nodes of side 2 move as they are
+    told: a moving obstacle.
 
     Where side 1 turns by more than the feature angle its faces are matched one by one, and a node on several of them
     has one condition for each, as if every face were a pair of its own, joined by ``joined_surfaces``.
