@@ -64,6 +64,12 @@ class Scene:
                    magnified or _round_down(DRAWN * size / (largest or np.inf)), contact, sides,
                    np.searchsorted(seen, nodes), pressure)
 
+    @property
+    def up(self) -> str:
+        """Return the axis that points upwards: y where contact is along y rather than z, else z."""
+        along = np.zeros(1) if self.contact is None else np.abs(self.contact.normals.sum(axis=0))
+        return "y" if along[1 % len(along)] > along[-1] else "z"
+
     def moved(self, k: int) -> Array:
         """Return where the nodes are drawn at the time number k, (s, d) [m]."""
         return np.asarray(self.points + self.magnified * self.u[k])
@@ -93,10 +99,8 @@ class Scene:
         edges = [BODIES[body % len(BODIES)] for body in self.body]
         thin = min(0.3, 600.0 / len(polygons))  # or fine meshes show nothing but their edges
         add_polygons(axis, polygons, facecolors=colours, edgecolors=edges, linewidths=thin)
-        along = np.zeros(1) if self.contact is None else np.abs(self.contact.normals.sum(axis=0))
-        up = "y" if along[1 % len(along)] > along[-1] else "z"
         every = (self.points + self.magnified * self.u).reshape(-1, moved.shape[1])
-        limit(axis, every.min(axis=0), every.max(axis=0), margin=0.03, up=up)
+        limit(axis, every.min(axis=0), every.max(axis=0), margin=0.03, up=self.up)
         if flat and self.contact is not None:
             inwards = INWARDS * float(np.ptp(self.points, axis=0).max()) * self.contact.normals
             self.pressures.dots(axis, moved[self.nodes] - inwards, self.pressure[k])

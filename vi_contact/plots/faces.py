@@ -169,6 +169,7 @@ def limit(
         axis.locator_params(nbins=5)
     else:
         axis.set_aspect("equal")
+        axis.locator_params(nbins=5)
 
 
 def leading(history: History) -> tuple[str, int]:

@@ -27,12 +27,15 @@ def render_deformed(run: RunFolder, path: str | Path, *, t: float, magnified: fl
     plotter = pyvista.Plotter(off_screen=True)
     skin = pyvista.PolyData(scene.moved(0), _counted(scene.polygons))
     skin.cell_data["von Mises stress [Pa]"] = scene.stress[0]
-    plotter.add_mesh(skin, cmap="YlGnBu", opacity=0.4, show_edges=True)
+    bars = ({"vertical": True, "position_x": x, "position_y": 0.1, "height": 0.7, "fmt": "%.3g"} for x in (0.06, 0.83))
+    plotter.add_mesh(skin, cmap="YlGnBu", opacity=0.4, show_edges=True, scalar_bar_args=next(bars))
     if len(scene.sides):
         faces = pyvista.PolyData(scene.moved(0)[scene.nodes], _counted(scene.sides))
         faces.point_data["contact pressure [Pa]"] = scene.pressure[0]
-        plotter.add_mesh(faces, cmap="YlOrRd")
+        plotter.add_mesh(faces, cmap="YlOrRd", scalar_bar_args=next(bars))
     plotter.add_text(f"t = {scene.times[0]:.4g} s, displacements x {scene.magnified:g}", font_size=10)
+    upright = scene.up == "z"
+    plotter.view_vector((0.6, -1.0, 0.5) if upright else (0.6, 0.5, 1.0), viewup=(0, not upright, upright))
     plotter.add_axes()
     plotter.screenshot(str(path))
     plotter.close()
