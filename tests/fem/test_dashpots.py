@@ -15,6 +15,7 @@ from wave_packet import energy_sent_back
 import vi_contact as vc
 from vi_contact import exact, fem, soil
 from vi_contact.core.errors import InputError
+from vi_contact.ground_motion.record import Record
 
 HEIGHT, CELLS = 20.0, 80  # of 0.25 m
 WAVES = {"S": (SOIL.c_s, (1.0, 0.0)), "P": (SOIL.c_p, (0.0, 1.0))}
@@ -303,5 +304,8 @@ def test_what_does_not_fit_a_box_is_refused(comm):
     for side in ("left", "right"):
         with pytest.raises(InputError, match=f"'{side}' is tied and has dashpots, which would brake"):
             fem.assemble(mesh, SOIL, tied=fem.Tied(tags["left"], tags["right"]), dashpots=fem.Dashpots(tags[side]))
+    record = Record(dt=0.01, acceleration=np.zeros(5))
+    with pytest.raises(InputError, match="a record in a list has no direction of its own"):
+        soil.upgoing([record, record])
     with pytest.raises(InputError, match="upgoing: motion is"):
         soil.upgoing("north.at2", dt=1e-3)

@@ -113,11 +113,14 @@ def test_uniform_stress_on_any_plane(comm: Any) -> None:
     e_2 = np.cross(n, (0.0, 0.0, 1.0)) / np.linalg.norm(np.cross(n, (0.0, 0.0, 1.0)))
     axes = np.array([n, e_2, np.cross(n, e_2)])
     a = np.array([0.5, 0.7, 0.6]) - axes[1] - axes[2]
-    cuts = {"skew": (a, a + 2.0 * axes[1], a + 2.0 * axes[2])}
-    found = six_of(fem.SectionForces(cuts, loads=loads).start(problem, state), "skew")
+    cuts = {"skew": (a, a + 2.0 * axes[1], a + 2.0 * axes[2]), "huge": a + 1e6 * np.array([-axes[1] - axes[2],
+            axes[1] - axes[2], axes[2] - axes[1]])}
+    row = fem.SectionForces(cuts, loads=loads).start(problem, state)
     area = 1.0 * 1.2 / n[1]
     expected = np.concatenate([axes @ stress @ n * area, np.zeros(3)])
-    assert np.abs(found - expected).max() < 1e-10 * np.abs(expected).max()
+    assert np.abs(six_of(row, "skew") - expected).max() < 1e-10 * np.abs(expected).max()
+    # its lengths are known to 1e-10 m; about its middle 1e6 m away arms are, too
+    assert np.abs(six_of(row, "huge")[:3] - expected[:3]).max() < 1e-7 * np.abs(expected).max()
 
 
 def shaken_column(comm: Any) -> tuple[vc.ContactProblem, Any]:
@@ -166,6 +169,7 @@ def test_one_leg_of_two(comm: Any) -> None:
         (rectangle(0.0, 0.3), "ends inside"), (rectangle(0.6, 1.2), "elements cover 0 of its 0.6 m²"),
         (rectangle(0.0, 0.5) + np.array([(0, 0, 0), (0, 0, 0.1), (0, 0, 0)]), "right angle at a"),
         (rectangle(0.0, 0.5)[[0, 0, 1]], "same point"), (((0.0, 1.0), (0.5, 1.0)), "2 corners"),
+        (((0.0, 1.0, 0.5), (0.5, 1.0, 0.5)), "2 points of 3 coordinates; give 2 ends"),
     ):
         with pytest.raises(InputError, match=text):
             fem.SectionForces({"bad": corners}).start(problem, state)

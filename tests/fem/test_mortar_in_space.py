@@ -113,8 +113,8 @@ def test_polygons():
     two = np.array([(0.2, -0.3), (1.4, 0.5), (-0.1, 0.8)]) + 0.3 * random.random((200, 3, 2))
     common = areas(overlaps(one, two))
     assert common.min() > 0.1 and common == pytest.approx(areas(overlaps(two, one)), rel=1e-12)
-    for a, b, inside in zip(one, two, common, strict=True):
-        assert sum(areas(part[None])[0] for part in without(a, b, 0.0)) + inside == pytest.approx(areas(a[None])[0])
+    owner, parts = without(one, two, np.zeros(200))
+    assert np.bincount(owner, areas(parts), 200) + common == pytest.approx(areas(one))
     assert not areas(overlaps(one, two + 9.0)).any()
     places, weights = rule(3)
     x, y = places[:, 0], places[:, 1]
@@ -180,6 +180,39 @@ def test_only_what_is_nearest_counts(kinds, length):
     assert force[:count].sum() == pytest.approx(below, rel=1e-12)
     assert force[count:] @ step.nodes.points == pytest.approx(0.2 * TURN @ [0.55, 0.4, 0.1 + 0.3 * 0.55], abs=1e-12)
     assert np.abs(offset(one, two, found)[1]).max() < 1e-12
+
+
+@serial
+@facets
+def test_a_hidden_layer_of_the_same_outline_is_not_felt(kinds):
+    """Two layers with one outline, whose facets have edges in common up to round-off: only the near one counts."""
+    near, far = (face(kinds[1], (4, 4), up=True, height=height) for height in (-0.05, -0.1))
+    count = len(near.nodes.numbers)
+    behind = replace(far.nodes, numbers=far.nodes.numbers + count)
+    two = Side("both", joined_nodes([near.nodes, behind]), np.concatenate([near.facets, far.facets + count]))
+    one = face(kinds[0], (4, 4), up=False)
+    found, alone = (DualMortar().match(one, side, 1.0) for side in (two, near))
+    assert found.weights == pytest.approx(alone.weights, rel=1e-12)
+    assert np.abs((found.P[:, :count] - alone.P).toarray()).max() < 1e-12 and abs(found.P[:, count:]).max() < 1e-12
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.1])
+def test_sides_of_a_block_do_not_see_the_ground_beside_it(gap):
+    """Side 1 is the bottom of a block, or the bottom and all vertical sides: the same conditions."""
+    upper = BlockMesh(lengths=(1.0,) * 3, divisions=(3,) * 3)
+    lower = BlockMesh(lengths=(2.0, 1.0, 2.0), divisions=(4, 2, 5))
+    mesh, tags = build_mesh(TwoBlocks(upper=upper, lower=lower, offset=(0.5, 0.5), gap=gap), MPI.COMM_WORLD)
+    system = assemble(mesh, LinearElastic(E=1e6, nu=0.3, rho=1e3), clamped=tags["lower_bottom"])
+    sides = [tags[f"upper_{name}"].indices for name in ("bottom", "left", "right", "front", "back")]
+    bottom, all_sides = (
+        contact_pair(system, Facets("block", np.unique(np.concatenate(some)), mesh), tags["lower_top"],
+                     matching=DualMortar())
+        for some in (sides[:1], sides)
+    )
+    assert all_sides.total == bottom.total == 16
+    for name in ("normals", "weights", "gap0"):
+        one, other = (getattr(seen(surface), name) for surface in (all_sides, bottom))
+        assert one == pytest.approx(other, abs=1e-12)
 
 
 def dome(radius: float) -> Any:

@@ -48,11 +48,14 @@ def upgoing(
     motion: a record, along ``direction``, or an excitation, which has its own, or several, which act together (the
     components of an earthquake). dt: step of the integration [s], of the record when None. A record keeps its drift:
     correct its baseline first (``baseline_corrected``).
-    InputError for an excitation other than a record without dt, a dt that is not positive, none at all, or directions
-    of different numbers of components.
+    InputError for an excitation other than a record without dt, a dt that is not positive, none at all, records in a
+    list, or directions of different numbers of components.
     """
     flag("upgoing", "outcrop", outcrop)
     if isinstance(motion, Sequence) and not isinstance(motion, str):
+        if any(isinstance(one, Record) for one in motion):
+            raise InputError("upgoing: a record in a list has no direction of its own; give GroundMotion(record, "
+                             "direction=...) for each")
         waves = [upgoing(one, direction=direction, dt=dt, outcrop=outcrop) for one in motion]
         if len({len(wave(0.0)) for wave in waves}) != 1:
             raise InputError("upgoing needs one or more excitations with directions of the same number of components")

@@ -7,6 +7,8 @@ import numpy as np
 
 from ...core.algebra import Array, Indices, Mask
 
+SHORT = 1e-9  # of the longest side of a polygon: round-off of what was cut
+
 
 def cut(polygons: Array, start: Array, along: Array) -> Array:
     """Return what of each polygon is on the left of its line, through ``start`` (k, 2) along ``along`` (k, 2)."""
@@ -23,23 +25,37 @@ def cut(polygons: Array, start: Array, along: Array) -> Array:
     return np.take_along_axis(corners.reshape(*used.shape, 2), order[:, :, None], axis=1)
 
 
+def sides(polygons: Array) -> Array:
+    """Return the vectors (k, m, 2) from each corner to the next; zero for round-off, which has no direction."""
+    edges = np.roll(polygons, -1, axis=1) - polygons
+    length = np.linalg.norm(edges, axis=2, keepdims=True)
+    return np.where(length > SHORT * length.max(axis=1, keepdims=True), edges, 0.0)
+
+
 def overlaps(polygons: Array, others: Array) -> Array:
     """Return what each polygon shares with another one."""
-    edges = np.roll(others, -1, axis=1) - others
+    edges = sides(others)
     for edge in range(others.shape[1]):
         polygons = cut(polygons, others[:, edge], edges[:, edge])
     return polygons
 
 
-def without(polygon: Array, other: Array, least: float) -> list[Array]:
-    """Return the convex parts of one polygon (m, 2) that are outside another one, if their areas are above ``least``.
-    """
-    parts, inside = [], polygon[None]
-    for start, end in zip(other[:, None], np.roll(other, -1, axis=0)[:, None], strict=True):
-        if np.any(start != end):  # other corners than repeated ones
-            parts.append(cut(inside, end, start - end))
-            inside = cut(inside, start, end - start)
-    return [part[0] for part in parts if areas(part)[0] > least]
+def without(polygons: Array, others: Array, least: Array) -> tuple[Indices, Array]:
+    """Return (number of its polygon, polygons) of the convex parts of each polygon outside of another one, if their
+    areas are above ``least`` (k,)."""
+    owner, inside, parts = np.arange(len(polygons)), polygons, []
+    for start, along in zip(others.swapaxes(0, 1), sides(others).swapaxes(0, 1), strict=True):
+        outside = cut(inside, start + along, -along)
+        kept = (areas(outside) > least) & along.any(axis=1)  # other corners than repeated ones
+        parts.append((owner[kept], outside[kept]))
+        inside = cut(inside, start, along)
+    return np.concatenate([part[0] for part in parts]), stacked([part[1] for part in parts])
+
+
+def stacked(parts: list[Array]) -> Array:
+    """Return all polygons of the parts, of as many corners as the largest has."""
+    width = max(part.shape[1] for part in parts)
+    return np.concatenate([np.pad(p, ((0, 0), (0, width - p.shape[1]), (0, 0)), "edge") for p in parts])
 
 
 def areas(polygons: Array) -> Array:

@@ -21,7 +21,7 @@ from ...core.algebra import Array, Indices, Mask
 from ...core.checks import at
 from ...core.errors import InputError
 from ...core.surfaces import nodal_frames
-from .clipping import areas, cross, hats, overlaps, rule, triangles, turns, without
+from .clipping import areas, cross, hats, overlaps, rule, stacked, triangles, turns, without
 from .faces import components
 from .matching import DISTANCES, EDGE_ON, Side, common_nodes
 from .nodes import Nodes, Rows
@@ -160,7 +160,12 @@ def opposite(looks: Looks, theirs: Facets, tree: Any) -> tuple[Pieces, Array]:
     # what is nearer along the direction lies in a ball of this size: unless all of it was looked at, all facets are
     sure = (np.abs(covered - 1.0) <= WHOLE) & (np.hypot(farthest, looks.reach + largest) <= radius)
     sure &= layers(found, theirs, k) == 1
-    rest, parts = np.flatnonzero(~sure), [found.pick(np.flatnonzero(sure[found.look]))]
+    middle = 0.5 * (theirs.middles.min(axis=0) + theirs.middles.max(axis=0))
+    away = middle - looks.middles
+    beside = np.linalg.norm(away - np.sum(away * looks.normals, axis=1)[:, None] * looks.normals, axis=1)
+    span = looks.reach + largest + np.linalg.norm(theirs.middles - middle, axis=1).max()
+    parts = [found.pick(np.flatnonzero(sure[found.look]))]
+    rest = np.flatnonzero(~sure & (beside <= (1.0 + WHOLE) * span))  # others look past all of side 2
     for rows in np.array_split(rest, -(-len(rest) * n // DISTANCES)) if len(rest) else ():
         offset = theirs.middles - looks.middles[rows, None]
         along = np.einsum("knc,kc->kn", offset, looks.normals[rows])
@@ -184,19 +189,36 @@ def layers(pieces: Pieces, theirs: Facets, count: int) -> Indices:
 
 def nearest(pieces: Pieces, several: Mask, size: Array) -> Pieces:
     """Return the pieces, in front of looks with several layers without what lies behind others."""
-    parts = [pieces.pick(np.flatnonzero(~several[pieces.look]))]
-    for look in np.flatnonzero(several):
-        ours, least = pieces.pick(np.flatnonzero(pieces.look == look)), SHARED * size[look]
-        for row, polygon in enumerate(ours.polygons):
-            common = overlaps(np.repeat(polygon[None], len(ours.look), axis=0), ours.polygons)
-            middles = common.mean(axis=1, keepdims=True)
-            here = ours.pick(np.full(len(middles), row)).distances(middles)[:, 0]
-            behind = (areas(common) > least) & (ours.distances(middles)[:, 0] < here)
-            left = [polygon]
-            for other in ours.polygons[behind]:
-                left = [part for one in left for part in without(one, other, least)]
-            parts += [replace(ours.pick([row]), polygons=one[None]) for one in left]
-    return joined(parts)
+    among = several[pieces.look]
+    ours = pieces.pick(np.flatnonzero(among))
+    ours = ours.pick(np.argsort(ours.look, kind="stable"))
+    piece, other = pairs_of(ours.look)
+    least, hides = SHARED * size[ours.look], np.zeros(len(piece), dtype=bool)
+    for rows in np.array_split(np.arange(len(piece)), 1 + len(piece) // POINTS):
+        one, two = ours.pick(piece[rows]), ours.pick(other[rows])
+        common = overlaps(one.polygons, two.polygons)
+        middles, shares = common.mean(axis=1, keepdims=True), areas(common)
+        hides[rows] = (shares > least[piece[rows]]) & (two.distances(middles) < one.distances(middles))[:, 0]
+    piece, other = piece[hides], other[hides]
+    turn = np.arange(len(piece)) - np.searchsorted(piece, piece)
+    owner, left = np.arange(len(ours.look)), ours.polygons
+    for k in range(int(turn.max(initial=-1)) + 1):  # what is left of each, without the next that hides it
+        hider = np.full(len(ours.look), -1)
+        hider[piece[turn == k]] = other[turn == k]
+        cut_now = hider[owner] >= 0
+        now = owner[cut_now]
+        place, rest = without(left[cut_now], ours.polygons[hider[now]], least[now])
+        owner, left = np.concatenate([owner[~cut_now], now[place]]), stacked([left[~cut_now], rest])
+    return joined([pieces.pick(np.flatnonzero(~among)), replace(ours.pick(owner), polygons=left)])
+
+
+def pairs_of(groups: Indices) -> tuple[Indices, Indices]:
+    """Return all pairs of different places with the same number in ``groups``, which ascend."""
+    _, first, counts = np.unique(groups, return_index=True, return_counts=True)
+    start, count = np.repeat(first, counts), np.repeat(counts, counts)
+    one = np.repeat(np.arange(len(groups)), count)
+    two = np.arange(len(one)) - np.repeat(np.cumsum(count) - count, count) + np.repeat(start, count)
+    return one[one != two], two[one != two]
 
 
 def integrals(looks: Looks, pieces: Pieces) -> tuple[Array, Array]:

@@ -160,11 +160,12 @@ def _by_face(faces: Sequence[tuple[Side, Array]], two: Side, matching: Matching,
 
 def _match(side: Side, mean: Array, two: Side, matching: Matching, size: float) -> Matched:
     """What a face of side 1 faces: along its own normals or, since across a gap the partner of a corner lies on the
-    bisector, along the ``mean`` normals of its nodes."""
+    bisector, along the ``mean`` normals of its nodes; not where a matching leaves out what faces nothing: sides of a
+    block would see the ground beside its base."""
     try:
         return matching.match(side, two, size)
     except InputError:
-        if np.array_equal(mean, side.nodes.normals):
+        if getattr(matching, "partial", False) or np.array_equal(mean, side.nodes.normals):
             raise
         try:
             return matching.match(replace(side, nodes=replace(side.nodes, normals=mean)), two, size)
@@ -183,7 +184,7 @@ def _unclamped(space: FemSpace, name: str, nodes: Nodes, two: Side, matched: Mat
                          f"'{two.name}': make '{two.name}' the first side, or clamp less")
     if clamped.all():
         raise InputError(
-            f"no contact nodes: every node of '{name}' that faces '{two.name}' is also clamped; clamp less"
+            f"no contact nodes: every node of '{name}' that faces '{two.name}' is clamped or on both sides; clamp less"
         )
     if clamped.any() and space.comm.rank == 0:
         log.info("%d clamped nodes of '%s' are left out of the contact", clamped.sum(), name)

@@ -75,7 +75,11 @@ class SectionForces:
         instance("SectionForces", "cuts", self.cuts, Mapping, "give labels and two ends each, {'base': (a, b)}")
         for label, ends in self.cuts.items():
             column_name("section label", label)
-            d = 3 if shape_of(ends)[:1] == (3,) else 2
+            shape = shape_of(ends)
+            if len(shape) == 2 and shape not in ((2, 2), (3, 3)):
+                raise InputError(f"SectionForces: section '{label}' has {shape[0]} points of {shape[1]} coordinates; "
+                                 "give 2 ends (x, y) in the plane, 3 corners (x, y, z) of a rectangle in space")
+            d = 3 if shape[:1] == (3,) else 2
             array("SectionForces", f"section '{label}' of two ends, or three corners", ends, (d, d), unit="metres")
         optional(cells_of, "SectionForces", "cells", self.cells)
         check_actions("SectionForces", self.loads, self.gravity)
@@ -128,7 +132,7 @@ def find_cut(space: FemSpace, name: str, given: Any, group: Cells | None) -> tup
         raise InputError(f"section '{name}' has {len(corners)} corners: give 2 ends in the plane, 3 corners of a "
                          f"rectangle in space; this mesh has {space.dimension} dimensions")
     axes, size = axes_of(name, corners)
-    tol = ON_LINE * float(size.max())
+    tol = ON_LINE * min(float(size.max()), space.size)  # a rectangle may be much larger than the body
 
     def level(x: Array) -> Array:
         away = (x - corners[0]) @ axes[0]

@@ -137,7 +137,7 @@ class PreparedIterative:
                 return self._attempt(step)
         except StepFailure as error:
             if self._surface.comm.rank == 0:
-                log.info("%s: incomplete factors are made again with a larger diagonal", error)
+                log.info("%s: tried again with incomplete factors of a larger diagonal", error)
         self._raised = True
         self._take(Inverse(self._blocks, self._layers, self.work, RAISED))
         return self._attempt(step)
