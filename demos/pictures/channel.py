@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from demos.pictures.channel_interface import LEGEND, RUNS, unit_of
 from demos.pictures.channel_mesh import (
     AROUND,
     CONCRETE,
@@ -21,7 +22,6 @@ from demos.pictures.channel_mesh import (
     plane,
     read_bodies,
 )
-from vi_contact.plots.channel import LEGEND, RUNS, unit_of
 from vi_contact.plots.histories import History, canvas, panels, save
 
 

@@ -70,7 +70,6 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
         "studies.cases.short_settings",
     "models/test_wall.py": "core.units",
     "plots/test_faces.py": "plots.bodies plots.rendered",
-    "plots/test_plots_channel.py": "plots.channel",
     "plots/test_report.py": "cli.report run.files.reading",
     "run/test_folder.py": "core.files run.files.history run.files.stored_rows run.files.table",
     "run/test_fuzz_folders.py": "run.files.writer run.session run.solution",

@@ -12,14 +12,9 @@ from kept_figures import keep_figures
 
 import vi_contact as vc
 from demos.pictures import channel as own_pictures
+from demos.pictures import channel_interface as pictures
 from demos.pictures.channel import plot_beside, plot_layout, plot_moments
-from demos.pictures.channel_mesh import animate, read_bodies
-from vi_contact import fem
-from vi_contact.core.errors import InputError
-from vi_contact.meshes.channel import ChannelMesh
-from vi_contact.models.channel.model import Channel, ChannelModel, build
-from vi_contact.plots import channel as pictures
-from vi_contact.plots.channel import (
+from demos.pictures.channel_interface import (
     SHOWN,
     Outline,
     opening,
@@ -28,7 +23,12 @@ from vi_contact.plots.channel import (
     plot_openings,
     plot_rocking,
 )
-from vi_contact.plots.run_pictures import illustrate
+from demos.pictures.channel_mesh import animate, read_bodies
+from vi_contact import fem
+from vi_contact.core.errors import InputError
+from vi_contact.meshes.channel import ChannelMesh
+from vi_contact.models.channel.model import Channel, ChannelModel, build
+from vi_contact.plots.run_pictures import draw_run
 from vi_contact.run.files.reading import read_run
 from vi_contact.run.static import static_equilibrium
 
@@ -186,18 +186,8 @@ def test_the_film(run: Any, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_all_pictures_from_the_folder_alone(run: Any, figures: list[Any], tmp_path: Path) -> None:
-    """What a run of the command left is enough; a folder of something else is refused in one sentence."""
-    import shutil
-
-    _, history, folder = run
-    copy = tmp_path / "copy"
-    shutil.copytree(folder, copy)
-    drawn = illustrate(read_run(copy), copy)
-    names = ["openings.png", "rocking.png", "interface.png", "envelope.png"]
-    assert [path.name for path in drawn] == names and all(path.stat().st_size > 10_000 for path in drawn)
-    top = {line.get_label(): line.get_ydata() for line in figures[0].axes[1].lines}
-    np.testing.assert_allclose(top["point 19"], 1e3 * opening(history, "19", (-1.0, 0.0)), atol=1e-12)
-    (copy / "history.h5").unlink()
-    with pytest.raises(InputError, match="buried channel"):
-        illustrate(read_run(copy), copy)
+def test_pictures_of_a_plane_run_from_its_folder_alone(run: Any, tmp_path: Path) -> None:
+    """What a run of the command left is enough: histories, map of the contact, deformed bodies, film."""
+    drawn = [path.name for path in draw_run(read_run(run[2]), tmp_path, title="Channel")]
+    assert {"excitation.png", "energy.png", "certificate.png", "contact.png", "deformed.png", "film.gif"} <= set(drawn)
+    assert all((tmp_path / name).stat().st_size > 10_000 for name in drawn)

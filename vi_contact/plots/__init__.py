@@ -7,7 +7,6 @@ from ..core.lazy import lazy
 
 _CONTENTS = {
     "bodies": ("film", "plot_deformed"),
-    "channel": ("Outline", "plot_envelope", "plot_interface", "plot_openings", "plot_rocking"),
     "deformed": ("read_frames", "read_tractions"),
     "faces": ("plot_faces",),
     "histories": ("plot_certificate", "plot_energy", "plot_excitation", "plot_points", "plot_runs"),
@@ -15,7 +14,7 @@ _CONTENTS = {
     "records": ("plot_loop", "plot_motion", "plot_spectra", "plot_transfer"),
     "rendered": ("render_deformed",),
     "report": ("plot_report",),
-    "run_pictures": ("draw_run", "illustrate"),
+    "run_pictures": ("draw_run",),
     "studies": ("plot_beam_energies", "plot_ida", "plot_particle", "plot_shapes", "plot_tips"),
 }
 __all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)
