@@ -2,6 +2,7 @@
 """Measure the building on a raft of demos/raft.py: what it costs at several sizes, and what halving h and dt changes.
 
     python3 benchmarks/raft.py                          # costs at 2e4 and 1e5 unknowns
+    python3 benchmarks/raft.py --sizes 2e4 1e5 3e5 --steps 8    # the table of the guide: seven minutes, 7 GB
     python3 benchmarks/raft.py --sizes 2e4 1e5 --iterative      # the same steps without any factor
     python3 benchmarks/raft.py --sizes 1e6 --steps 2 --iterative --no-gravity
     python3 benchmarks/raft.py --halving                # runs of 5 s on three meshes, and with three time steps
