@@ -27,6 +27,7 @@ import pytest
 RANK = int(os.environ.get("OMPI_COMM_WORLD_RANK", os.environ.get("PMI_RANK", "0")))
 SIZE = int(os.environ.get("OMPI_COMM_WORLD_SIZE", os.environ.get("PMI_SIZE", "1")))
 LEFT_OUT = ("serial", "slow") if SIZE > 2 else ("serial",) if SIZE > 1 else ()
+ABOVE = ("validation", "models", "soil", "studies", "house")  # what they are made of runs on three ranks, they on two
 TEST_SECONDS = 600  # a test that takes longer on an idle machine is taken to be stuck
 WATCH_SECONDS = 30  # how long one watch over the tests stands: a new one for each would wait for a thread to end
 MEETING_SECONDS = 30  # patience of a rank that has failed: the others are probably waiting for it in a collective call
@@ -80,7 +81,7 @@ def pytest_ignore_collect(collection_path: Path) -> bool | None:
     """Files that are left out as a whole are not even imported: that takes longer than many of their tests."""
     if SIZE == 1 or collection_path.suffix != ".py":
         return None
-    if SIZE > 2 and collection_path.parent.name == "validation":  # exact answers do not know ranks: two have shown it
+    if SIZE > 2 and collection_path.parent.name in ABOVE:
         return True
     text = collection_path.read_text()
     return True if any(f"\npytestmark = pytest.mark.{marker}" in text for marker in LEFT_OUT) else None
@@ -92,8 +93,9 @@ def _left_out(item: pytest.Item) -> bool:
 
 
 def _covering(items: list[pytest.Item]) -> set[pytest.Item]:
-    """Tests without parameters, and of every other function so many that each value of each parameter occurs: all of
-    their combinations run on one rank, where a law, a scheme or a shape takes the path that it takes on several."""
+    """Tests without parameters, and of every other function so many that each value of each parameter occurs, on three
+    ranks that each parameter varies: all of their combinations run on one rank, where a law, a scheme or a shape takes
+    the path that it takes on several."""
     kept: set[pytest.Item] = set()
     functions: dict[str, list[pytest.Item]] = {}
     for item in items if SIZE % 2 == 0 else reversed(items):  # other combinations on three ranks than on two
@@ -101,7 +103,8 @@ def _covering(items: list[pytest.Item]) -> set[pytest.Item]:
     for ones in functions.values():
         alike = set.intersection(*map(_parameters, ones)) if len(ones) > 1 else set()
         seen: set[tuple[str, int]] = set()
-        for new in (all, any):  # those of new values only, then those of some new value
+        # those of new values only and, on two ranks, those of some new value
+        for new in (all, any) if SIZE == 2 else (all,):
             for item in ones:
                 values = _parameters(item) - alike
                 if item not in kept and (not values or new(value not in seen for value in values)):
