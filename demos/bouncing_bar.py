@@ -24,9 +24,9 @@ from mpi4py import MPI
 
 import vi_contact as vc
 from demos.pictures.bars import plot_bounces
+from demos.problems.bar import Bar, build
 from vi_contact import exact
 from vi_contact.cli import status_of
-from vi_contact.models.bar import Bar, build
 
 # Parameters ----------------------------------------------------------------------------------------------------------
 BAR = Bar(exact.PeriodicBar(), elements=100, dimension=1)  # dimension=2: a strip of 3 elements across

@@ -26,10 +26,10 @@ from mpi4py import MPI
 
 import vi_contact as vc
 from demos.pictures.boundary import SHEAR, Curve, Panel, Shot, plot_boundary_snapshots, plot_panels
+from demos.problems import disk, embedded, square
+from demos.problems.boundary_elements import disk_contact, disk_problem, embedded_problem, square_problem
 from vi_contact import bem
 from vi_contact.cli import status_of
-from vi_contact.models import disk, embedded, square
-from vi_contact.models.boundary_elements import disk_contact, disk_problem, embedded_problem, square_problem
 
 # Parameters ----------------------------------------------------------------------------------------------------------
 ELEMENTS = {"square": 20, "steel": 10, "concrete": 10, "ball": 80}  # along a side, around the ball

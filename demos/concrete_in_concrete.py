@@ -22,10 +22,10 @@ from mpi4py import MPI
 
 import vi_contact as vc
 from demos.pictures.deformed import plot_snapshots
+from demos.problems.embedded import Embedded, build
+from demos.problems.square import concrete
 from vi_contact import fem
 from vi_contact.cli import status_of
-from vi_contact.models.embedded import Embedded, build
-from vi_contact.models.square import concrete
 from vi_contact.plots.histories import History, plot_runs
 
 # Parameters ----------------------------------------------------------------------------------------------------------

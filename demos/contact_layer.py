@@ -24,11 +24,11 @@ from mpi4py import MPI
 
 import vi_contact as vc
 from demos.pictures.layer import plot_layered_bar, plot_thin_limit
+from demos.problems.bar import Bar, build
 from vi_contact import boundary_layer
 from vi_contact.cli import status_of
 from vi_contact.exact import BouncingBar, ThrownBar
 from vi_contact.models import wall
-from vi_contact.models.bar import Bar, build
 
 # Parameters ----------------------------------------------------------------------------------------------------------
 BARS = (Bar(ThrownBar(), elements=100), Bar(BouncingBar(), elements=100))

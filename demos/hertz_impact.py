@@ -21,8 +21,8 @@ from mpi4py import MPI
 
 import vi_contact as vc
 from demos.pictures.impact import ImpactCurves, plot_impact
+from demos.problems.ball import QUARTERS, Ball, BallModel, build, hertz_motion
 from vi_contact.cli import status_of
-from vi_contact.models.ball import QUARTERS, Ball, BallModel, build, hertz_motion
 
 # Parameters ----------------------------------------------------------------------------------------------------------
 BALL = Ball(radius=0.01, speed=0.1, material=vc.LinearElastic(E=2.1e11, nu=0.3, rho=7800.0))

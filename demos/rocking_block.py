@@ -23,9 +23,9 @@ from mpi4py import MPI
 
 import vi_contact as vc
 from demos.pictures.rocking import plot_pulses, plot_rocking
+from demos.problems import rocking_block as rocking
 from vi_contact import exact, fem
 from vi_contact.cli import status_of
-from vi_contact.models import rocking_block as rocking
 from vi_contact.plots.histories import plot_certificate, plot_energy
 
 # Parameters ----------------------------------------------------------------------------------------------------------

@@ -12,19 +12,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import betaincinv
 
-from ..core.algebra import Array
-from ..core.errors import InputError
-from ..core.obstacles import HalfSpace
-from ..core.problem import ContactProblem
-from ..core.protocols import MassLaw
-from ..core.system import SemiDiscreteSystem
-from ..exact.hertz import HertzImpact, contact_modulus
-from ..fem.assembly import assemble
-from ..fem.contact.surface import contact_surface
-from ..fem.loads import Prescribed
-from ..fem.mesh import build_mesh
-from ..laws.materials import LinearElastic
-from ..meshes.ball import BallMesh
+from vi_contact.core.algebra import Array
+from vi_contact.core.errors import InputError
+from vi_contact.core.obstacles import HalfSpace
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.protocols import MassLaw
+from vi_contact.core.system import SemiDiscreteSystem
+from vi_contact.exact.hertz import HertzImpact, contact_modulus
+from vi_contact.fem.assembly import assemble
+from vi_contact.fem.contact.surface import contact_surface
+from vi_contact.fem.loads import Prescribed
+from vi_contact.fem.mesh import build_mesh
+from vi_contact.laws.materials import LinearElastic
+from vi_contact.meshes.ball import BallMesh
 
 QUARTERS = 4.0
 FOOT = 1.3  # contact side over the largest contact radius

@@ -9,19 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from ..core.algebra import Array
-from ..core.obstacles import HalfSpace
-from ..core.problem import ContactProblem
-from ..core.protocols import ImpactLaw, MassLaw
-from ..core.system import SemiDiscreteSystem
-from ..exact.bar import PeriodicBar, ThrownBar
-from ..exact.bouncing_bar import BouncingBar
-from ..fem.assembly import assemble
-from ..fem.contact.surface import contact_surface
-from ..fem.loads import BodyForce
-from ..fem.mesh import build_mesh
-from ..laws.materials import LinearElastic, PlaneStrain, Solid
-from ..meshes.block import BlockMesh
+from vi_contact.core.algebra import Array
+from vi_contact.core.obstacles import HalfSpace
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.protocols import ImpactLaw, MassLaw
+from vi_contact.core.system import SemiDiscreteSystem
+from vi_contact.exact.bar import PeriodicBar, ThrownBar
+from vi_contact.exact.bouncing_bar import BouncingBar
+from vi_contact.fem.assembly import assemble
+from vi_contact.fem.contact.surface import contact_surface
+from vi_contact.fem.loads import BodyForce
+from vi_contact.fem.mesh import build_mesh
+from vi_contact.laws.materials import LinearElastic, PlaneStrain, Solid
+from vi_contact.meshes.block import BlockMesh
 
 SIDES = {1: ("left", "right"), 2: ("bottom", "top"), 3: ("bottom", "top")}  # foot and top of a BlockMesh
 UP = {1: 0, 2: 1, 3: 1}  # component of the bar's axis

@@ -8,18 +8,18 @@ from typing import Any
 
 import numpy as np
 
-from ..bem.boundary_mesh import BoundaryMesh, circle, polygon
-from ..bem.contact import BoundaryContact, conditions_on
-from ..bem.energetic import energetic_blocks
-from ..bem.loads import traction_forces
-from ..bem.poincare_steklov import BoundaryProblem, PoincareSteklov
-from ..bem.two_bodies import TwoBodies
-from ..core.algebra import Array, Mask
-from ..core.checks import function, instance, number, whole
-from ..core.errors import InputError
-from ..core.obstacles import HalfSpace
-from ..core.protocols import FrictionLaw, Frictionless
-from ..laws.materials import LinearElastic
+from vi_contact.bem.boundary_mesh import BoundaryMesh, circle, polygon
+from vi_contact.bem.contact import BoundaryContact, conditions_on
+from vi_contact.bem.energetic import energetic_blocks
+from vi_contact.bem.loads import traction_forces
+from vi_contact.bem.poincare_steklov import BoundaryProblem, PoincareSteklov
+from vi_contact.bem.two_bodies import TwoBodies
+from vi_contact.core.algebra import Array, Mask
+from vi_contact.core.checks import function, instance, number, whole
+from vi_contact.core.errors import InputError
+from vi_contact.core.obstacles import HalfSpace
+from vi_contact.core.protocols import FrictionLaw, Frictionless
+from vi_contact.laws.materials import LinearElastic
 
 Load = Callable[[float], float]
 BOTTOM, RIGHT, TOP, LEFT = range(4)  # sides of a box

@@ -9,17 +9,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..core.checks import attributes, function, instance
-from ..core.obstacles import HalfSpace
-from ..core.problem import ContactProblem
-from ..core.protocols import FrictionLaw, Frictionless, MassLaw
-from ..core.step import Columns, Report, Row, State
-from ..core.system import SemiDiscreteSystem
-from ..fem.assembly import assemble
-from ..fem.contact.surface import contact_surface
-from ..fem.mesh import build_mesh
-from ..laws.materials import LinearElastic, PlaneStrain
-from ..meshes.disk import DiskMesh
+from vi_contact.core.checks import attributes, function, instance
+from vi_contact.core.obstacles import HalfSpace
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.protocols import FrictionLaw, Frictionless, MassLaw
+from vi_contact.core.step import Columns, Report, Row, State
+from vi_contact.core.system import SemiDiscreteSystem
+from vi_contact.fem.assembly import assemble
+from vi_contact.fem.contact.surface import contact_surface
+from vi_contact.fem.mesh import build_mesh
+from vi_contact.laws.materials import LinearElastic, PlaneStrain
+from vi_contact.meshes.disk import DiskMesh
 
 
 @dataclass(frozen=True)

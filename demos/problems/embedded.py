@@ -9,22 +9,22 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..core.checks import instance, optional
-from ..core.errors import InputError
-from ..core.problem import ContactProblem
-from ..core.protocols import FrictionLaw, Frictionless, MassLaw
-from ..core.surfaces import ContactSurface
-from ..core.system import SemiDiscreteSystem
-from ..fem.assembly import assemble
-from ..fem.contact.joined import joined_surfaces
-from ..fem.contact.pairs import contact_pair
-from ..fem.loads import Traction
-from ..fem.mesh import build_mesh
-from ..laws.materials import LinearElastic, PlaneStrain
-from ..meshes.block import BlockMesh
-from ..meshes.cut import Welded
-from ..meshes.two_blocks import Blocks
-from .square import Square, concrete
+from demos.problems.square import Square, concrete
+from vi_contact.core.checks import instance, optional
+from vi_contact.core.errors import InputError
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.protocols import FrictionLaw, Frictionless, MassLaw
+from vi_contact.core.surfaces import ContactSurface
+from vi_contact.core.system import SemiDiscreteSystem
+from vi_contact.fem.assembly import assemble
+from vi_contact.fem.contact.joined import joined_surfaces
+from vi_contact.fem.contact.pairs import contact_pair
+from vi_contact.fem.loads import Traction
+from vi_contact.fem.mesh import build_mesh
+from vi_contact.laws.materials import LinearElastic, PlaneStrain
+from vi_contact.meshes.block import BlockMesh
+from vi_contact.meshes.cut import Welded
+from vi_contact.meshes.two_blocks import Blocks
 
 CONTACT = (("foot_bottom", "under_top"), ("foot_left", "left_wall_right"), ("foot_right", "right_wall_left"))
 TRANSMISSION = (

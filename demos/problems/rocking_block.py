@@ -18,22 +18,22 @@ from typing import Any
 
 import numpy as np
 
-from ..core.algebra import Array
-from ..core.errors import InputError
-from ..core.obstacles import HalfSpace
-from ..core.problem import ContactProblem
-from ..core.protocols import Excitation
-from ..core.step import Columns, Report, Row, State
-from ..exact.housner import HousnerBlock
-from ..fem.assembly import assemble
-from ..fem.contact.surface import contact_surface
-from ..fem.initial_stress import geometric_stiffness
-from ..fem.loads import BodyForce, Prescribed
-from ..fem.mesh import build_mesh
-from ..laws.materials import Damping, LinearElastic, PlaneStress, Rayleigh
-from ..meshes.block import BlockMesh
-from ..run.static import static_equilibrium
-from ..run.time_steps import HalvedAtImpact
+from vi_contact.core.algebra import Array
+from vi_contact.core.errors import InputError
+from vi_contact.core.obstacles import HalfSpace
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.protocols import Excitation
+from vi_contact.core.step import Columns, Report, Row, State
+from vi_contact.exact.housner import HousnerBlock
+from vi_contact.fem.assembly import assemble
+from vi_contact.fem.contact.surface import contact_surface
+from vi_contact.fem.initial_stress import geometric_stiffness
+from vi_contact.fem.loads import BodyForce, Prescribed
+from vi_contact.fem.mesh import build_mesh
+from vi_contact.laws.materials import Damping, LinearElastic, PlaneStress, Rayleigh
+from vi_contact.meshes.block import BlockMesh
+from vi_contact.run.static import static_equilibrium
+from vi_contact.run.time_steps import HalvedAtImpact
 
 RIGID = 200.0  # least sqrt(E/rho)/height over p
 

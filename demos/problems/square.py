@@ -9,16 +9,16 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..core.checks import attributes, function, instance, optional
-from ..core.problem import ContactProblem
-from ..core.protocols import FrictionLaw, Frictionless, MassLaw
-from ..core.system import SemiDiscreteSystem
-from ..fem.assembly import assemble
-from ..fem.contact.surface import contact_surface
-from ..fem.loads import Prescribed, Traction
-from ..fem.mesh import build_mesh
-from ..laws.materials import LinearElastic, PlaneStrain
-from ..meshes.block import BlockMesh
+from vi_contact.core.checks import attributes, function, instance, optional
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.protocols import FrictionLaw, Frictionless, MassLaw
+from vi_contact.core.system import SemiDiscreteSystem
+from vi_contact.fem.assembly import assemble
+from vi_contact.fem.contact.surface import contact_surface
+from vi_contact.fem.loads import Prescribed, Traction
+from vi_contact.fem.mesh import build_mesh
+from vi_contact.laws.materials import LinearElastic, PlaneStrain
+from vi_contact.meshes.block import BlockMesh
 
 
 @dataclass(frozen=True)

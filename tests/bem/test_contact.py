@@ -10,6 +10,7 @@ import pytest
 from convolution_operator import convolution_operator
 
 import vi_contact as vc
+from demos.problems.boundary_elements import pressed, square_problem, steklov, unloaded
 from vi_contact import solvers
 from vi_contact.bem import (
     BoundaryProblem,
@@ -21,7 +22,6 @@ from vi_contact.bem.contact_run import ContactRun, ledger, march_contact
 from vi_contact.bem.two_bodies import TwoBodies
 from vi_contact.bem.uzawa_space_time import SpaceTimeUzawa
 from vi_contact.core.errors import InputError, StepFailure
-from vi_contact.models.boundary_elements import pressed, square_problem, steklov, unloaded
 
 pytestmark = pytest.mark.serial
 MATERIAL = vc.LinearElastic.from_wave_speeds(1.0, 0.5, 1.0)
@@ -243,7 +243,7 @@ def test_a_third_opinion(law):
     steps differ; another problem is noticed; a reference in space is refused."""
     from mpi4py import MPI
 
-    from vi_contact.models.square import Square, build
+    from demos.problems.square import Square, build
 
     problem = build(Square(cells=20, pressure=1.0), MPI.COMM_WORLD).problem(friction=LAWS[law])
     wrong = run("Coulomb")

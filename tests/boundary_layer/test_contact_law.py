@@ -241,7 +241,7 @@ def test_a_gap_lost_to_rounding_is_named():
 # Finite elements -----------------------------------------------------------------------------------------------------
 def test_a_stiff_block_of_finite_elements(comm):
     """A 2D block of nine cells falls flat on a plane: rebound e, 1 %, on any number of ranks."""
-    from vi_contact.models.bar import Bar, build
+    from demos.problems.bar import Bar, build
 
     case = ThrownBar(length=0.3, E=1e9, rho=1.0, height=0.02, speed=10.0)
     model = build(Bar(case, elements=3, dimension=2), comm)

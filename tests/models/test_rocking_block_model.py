@@ -12,8 +12,8 @@ from demo_runs import demo
 from mpi4py import MPI
 
 import vi_contact as vc
+from demos.problems import rocking_block as rocking
 from vi_contact.core.errors import InputError
-from vi_contact.models import rocking_block as rocking
 
 COMM = MPI.COMM_WORLD
 ROOT = Path(__file__).resolve().parents[2]

@@ -14,6 +14,10 @@ import numpy as np
 from misuses_core import COUNT, FLAG, FUNCTION, NEEDED, NOT_NEGATIVE, NUMBER, POSITIVE, THING, Table, but, calls, rights
 
 import vi_contact as vc
+from demos.problems.boundary_elements import disk_contact, disk_problem, embedded_problem, square_problem
+from demos.problems.disk import Disk, Push
+from demos.problems.embedded import Embedded
+from demos.problems.square import Square
 from vi_contact import beam, bem
 from vi_contact.boundary_layer.bilateral import bilateral_motion
 from vi_contact.boundary_layer.contact_law import ContactLayer, contact_layer
@@ -23,10 +27,6 @@ from vi_contact.boundary_layer.particle import ParticleImpact, damping_ratio, la
 from vi_contact.boundary_layer.rigid_body import Ellipsoid, RigidBody
 from vi_contact.boundary_layer.scheme import BoundaryLayer
 from vi_contact.boundary_layer.trajectory import layer_motion
-from vi_contact.models.boundary_elements import disk_contact, disk_problem, embedded_problem, square_problem
-from vi_contact.models.disk import Disk, Push
-from vi_contact.models.embedded import Embedded
-from vi_contact.models.square import Square
 
 SQUARE = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
 EIGHT = [(0.0, 0.0), (1.0, 1.0), (1.0, 0.0), (0.0, 1.0)]

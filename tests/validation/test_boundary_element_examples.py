@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 import vi_contact as vc
+from demos.problems.boundary_elements import disk_contact, disk_problem, embedded_problem, square_problem
+from demos.problems.disk import Push
 from vi_contact.bem import BoundaryProblem
 from vi_contact.bem.contact import BoundaryContact
 from vi_contact.bem.contact_run import ContactLedger, ContactRun, ledger, march_contact
 from vi_contact.bem.uzawa_space_time import SpaceTimeUzawa
 from vi_contact.core.algebra import Array
-from vi_contact.models.boundary_elements import disk_contact, disk_problem, embedded_problem, square_problem
-from vi_contact.models.disk import Push
 
 pytestmark = pytest.mark.serial
 UNIT = vc.LinearElastic.from_wave_speeds(1.0, 0.5, 1.0)
@@ -96,7 +96,7 @@ def test_square_tractions_beside_finite_elements(law):
     """V7.1: pressures, means over 0.2 s, against 40 x 40 cells: 5 % in L2 away from the corners."""
     from mpi4py import MPI
 
-    from vi_contact.models.square import Square, build
+    from demos.problems.square import Square, build
 
     model = build(Square(cells=40, pressure=1.0), MPI.COMM_WORLD)
     fine = vc.simulate(model.problem(friction=LAWS[law]), dt=0.025, t_end=5.0, progress=False).history

@@ -17,6 +17,8 @@ from mpi4py import MPI
 from two_bodies import relative
 
 import vi_contact as vc
+from demos.problems.embedded import CONTACT, Embedded, build
+from demos.problems.square import concrete
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.core.problem import ContactProblem
@@ -27,8 +29,6 @@ from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.cut import Welded
 from vi_contact.meshes.extract import MeshArrays, add_arrays, arrays_of
 from vi_contact.meshes.rows import cell_sides
-from vi_contact.models.embedded import CONTACT, Embedded, build
-from vi_contact.models.square import concrete
 from vi_contact.run.march import march
 from vi_contact.run.static import quasi_static
 from vi_contact.solvers.condensed import Condensed

@@ -13,8 +13,8 @@ from demo_runs import demo
 from mpi4py import MPI
 
 import vi_contact as vc
+from demos.problems.square import Square, build, concrete
 from vi_contact.core.algebra import Array
-from vi_contact.models.square import Square, build, concrete
 
 pytestmark = pytest.mark.slow
 

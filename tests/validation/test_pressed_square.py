@@ -12,9 +12,9 @@ from demo_runs import demo
 from mpi4py import MPI
 
 import vi_contact as vc
+from demos.problems.square import Square, SquareModel, build
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
-from vi_contact.models.square import Square, SquareModel, build
 from vi_contact.plots.deformed import read_frames, read_tractions
 
 pytestmark = pytest.mark.slow

@@ -16,10 +16,10 @@ from bar import thrown
 from chain import chain_problem
 from mpi4py import MPI
 
+from demos.problems.bar import Bar, build
 from vi_contact.exact.bar import ThrownBar
 from vi_contact.laws.impact import ComponentReset, Elastic, ImpulseUpdate, Inelastic, Newton
 from vi_contact.laws.mass import ConsistentMass
-from vi_contact.models.bar import Bar, build
 from vi_contact.run.march import march
 from vi_contact.schemes.moreau_jean import MoreauJean
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor

@@ -19,12 +19,12 @@ from scipy.linalg import expm
 from two_bodies import per_body, relative
 
 import vi_contact as vc
+from demos.problems import rocking_block
 from vi_contact import exact, fem
 from vi_contact.core.algebra import Array
 from vi_contact.core.step import State
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import Blocks
-from vi_contact.models import rocking_block
 
 pytestmark = pytest.mark.serial  # ranks change none of these numbers: cheaper tests show it
 
