@@ -5,7 +5,7 @@
 >>> import vi_contact as vc
 >>> from vi_contact import models
 >>> model = models.wall.build(models.wall.Wall(), MPI.COMM_WORLD)
->>> vc.simulate(model.problem("a", model.harmonic()), dt=model.time_step(), steps=10).facts["status"]
+>>> vc.simulate(model.problem("a", impact=None), dt=model.time_step(), steps=10).facts["status"]
 'finished'
 """
 
