@@ -19,10 +19,10 @@ from two_bodies import SOFT, blocks, thrown, two_blocks
 import vi_contact as vc
 from vi_contact import fem
 from vi_contact.core.algebra import Matrix
+from vi_contact.core.matrix_checks import probe
 from vi_contact.fem import compact
 from vi_contact.fem.petsc_algebra import PetscMatrix
 from vi_contact.fem.petsc_rows import aij_of
-from vi_contact.run.files.identity import probe
 
 COMM = MPI.COMM_WORLD
 CLOSE = 1e-13  # of the largest entry of a product: round-off of some tens of terms

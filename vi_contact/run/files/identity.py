@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from ...core.algebra import Array, Indices, from_each
+from ...core.matrix_checks import probe
 from ...core.problem import ContactProblem, with_values
 from ...core.step import Scheme
 from ...core.surfaces import ContactSurface
@@ -23,7 +24,6 @@ from ..time_steps import TimeSteps, described, pieces_of
 
 ROUND_OFF = 1e-6  # of coordinates: SAME of it is a hundred times the last digit of a gap
 SAME = 1e-8  # relative difference of numbers that count as equal: above round-off, below what anybody means to change
-GOLDEN = 0.6180339887498949
 PROBES = 2  # vectors w
 SAMPLES = 256  # times of functions of time alone, all over the run
 EARLY = 5  # times of other loads, which may have to be marched to: in the first steps
@@ -63,11 +63,6 @@ def identity(problem: ContactProblem, scheme: Scheme, dt: TimeSteps, *, start: f
         "contact surface or obstacle": _contact(surface, early),
         "friction": _friction(problem),
     }
-
-
-def probe(numbers: Any, j: int) -> Array:
-    """Return values between -1/2 and 1/2 at these whole numbers; each j gives others."""
-    return np.asarray((np.asarray(numbers, dtype=float) * (GOLDEN / (j + 1))) % 1.0 - 0.5)
 
 
 def text_of(value: Any) -> str:

@@ -1,0 +1,49 @@
+"""Check matrices that a user brings: finite, symmetric, and masses that are not negative, on any number of ranks.
+
+A matrix is seen through its products A w and Aᵀ w with a vector made of the numbers of the unknowns, in units in which
+its diagonal is one: nothing is stored, and the answer depends neither on the ranks nor on the units.
+"""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from .algebra import Array, Comm, Indices, Matrix, largest, max_abs
+
+SYMMETRIC = 1e-9  # of A w: far above the round-off of assembly, far below what anybody means by another entry
+GOLDEN = 0.6180339887498949
+
+
+def probe(numbers: Any, j: int) -> Array:
+    """Return values between -1/2 and 1/2 at these whole numbers; each j gives others."""
+    return np.asarray((np.asarray(numbers, dtype=float) * (GOLDEN / (j + 1))) % 1.0 - 0.5)
+
+
+def asymmetry(A: Matrix, comm: Comm, numbers: Indices) -> float:
+    """Return max |A w - Aᵀ w| / max |A w|, NaN or infinity where A has them; ``numbers`` (n,) are those of the owned
+    unknowns. Collective."""
+    size = np.sqrt(np.abs(A.diagonal()))
+    size = np.where(size > 0.0, size, largest(comm, max_abs(size)) or 1.0)
+    w = probe(numbers, 0) / size
+    with np.errstate(all="ignore"):  # infinite entries
+        forth, back = (A @ w) / size, A.transpose_apply(w) / size
+        error, scale = (largest(comm, max_abs(np.nan_to_num(x, nan=np.inf))) for x in (forth - back, forth))
+        return float(np.float64(error) / scale) if scale else error
+
+
+def matrix_defects(owner: str, comm: Comm, numbers: Indices, **matrices: Matrix | None) -> Iterator[str]:
+    """Yield a sentence for each matrix that is not finite or not symmetric, and for masses below zero. Collective: take
+    all of them on every rank."""
+    for name, A in matrices.items():
+        if A is None:
+            continue
+        found = asymmetry(A, comm, numbers)
+        if not np.isfinite(found):
+            yield f"{owner}: {name} has NaN or infinite entries; give finite numbers"
+        elif found > SYMMETRIC:
+            yield (f"{owner}: {name} is not symmetric, A w and Aᵀ w differ by {found:.1g} of their size; give a "
+                   "symmetric matrix")
+    M = matrices.get("M")
+    if M is not None and largest(comm, -np.min(M.diagonal(), initial=0.0)) > 0.0:
+        yield f"{owner}: M has a diagonal entry below zero; give masses that are positive, or zero"
