@@ -27,13 +27,13 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "support")]
 
 import numpy as np  # noqa: E402
+from dashpot_reflection import dashpot_energy  # noqa: E402
 from fem_problems import linear  # noqa: E402
 from mpi4py import MPI  # noqa: E402
 from wave_packet import energy_sent_back  # noqa: E402
 
 import vi_contact as vc  # noqa: E402
 from vi_contact import fem  # noqa: E402
-from vi_contact.exact import dashpot_energy  # noqa: E402
 from vi_contact.fem.compat import geometry_dofmap  # noqa: E402
 from vi_contact.meshes.block import BlockMesh  # noqa: E402
 from vi_contact.soil import FreeField, upgoing  # noqa: E402

@@ -23,13 +23,13 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the sou
 from mpi4py import MPI
 
 import vi_contact as vc
+from demos.exact.bar import PeriodicBar
 from demos.pictures.bars import plot_bounces
 from demos.problems.bar import Bar, build
-from vi_contact import exact
 from vi_contact.cli import status_of
 
 # Parameters ----------------------------------------------------------------------------------------------------------
-BAR = Bar(exact.PeriodicBar(), elements=100, dimension=1)  # dimension=2: a strip of 3 elements across
+BAR = Bar(PeriodicBar(), elements=100, dimension=1)  # dimension=2: a strip of 3 elements across
 COURANT = 0.5  # dt c / h
 BOUNCES = 4
 SCHEMES = {  # name -> (scheme, mass matrix; None: the scheme's own choice)
@@ -85,8 +85,8 @@ def table(numbers: dict[str, float]) -> str:
     return "\n".join(lines)
 
 
-# Things to try: dimension=2 or 3 in BAR; vc.ThrownBar() or vc.BouncingBar() as its case; COURANT = 4, where the default
-# gains a little and HHT does not; dt=vc.HalvedAtImpact(dt); impact=vc.Inelastic() with consistent mass.
+# Things to try: dimension=2 or 3 in BAR; ThrownBar() or BouncingBar() of demos.exact as its case; COURANT = 4: the
+# default gains a little there and HHT does not; dt=vc.HalvedAtImpact(dt); impact=vc.Inelastic() with consistent mass.
 if __name__ == "__main__":
     logging.getLogger("vi_contact.schemes").setLevel(logging.ERROR)  # the last scheme is here because it gains energy
     raise SystemExit(status_of(main))

@@ -16,8 +16,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..core.algebra import Array
-from ..core.checks import attributes
+from vi_contact.core.algebra import Array
+from vi_contact.core.checks import attributes
 
 # of PeriodicBar: u = c0 + c1 x + c2 s in [phase][zone]
 _PERIOD_THREE = 0.5 * np.array([

@@ -20,10 +20,10 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..core.algebra import Array
-from ..core.checks import attributes
-from ..core.errors import InputError
-from .bar import UprightBar
+from demos.exact.bar import UprightBar
+from vi_contact.core.algebra import Array
+from vi_contact.core.checks import attributes
+from vi_contact.core.errors import InputError
 
 COINCIDENT = 1e-12  # events and piece ends closer than this, relative to the problem's own scales, are the same
 

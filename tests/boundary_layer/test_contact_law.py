@@ -11,6 +11,7 @@ import pytest
 from bar import bar, bouncing, energy, run, thrown
 from chain import chain_problem
 
+from demos.exact.bar import ThrownBar
 from vi_contact.boundary_layer import scheme as layered
 from vi_contact.boundary_layer.contact_law import ContactLayer, contact_layer
 from vi_contact.boundary_layer.layer import Layer
@@ -19,7 +20,6 @@ from vi_contact.boundary_layer.scheme import BoundaryLayer
 from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.state_checks import initial_state
-from vi_contact.exact.bar import ThrownBar
 from vi_contact.laws.excitation import Harmonic
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.impact import Inelastic

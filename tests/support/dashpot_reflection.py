@@ -7,9 +7,9 @@ import math
 
 import numpy as np
 
-from ..core.algebra import Array
-from ..core.errors import InputError
-from ..laws.materials import LinearElastic
+from vi_contact.core.algebra import Array
+from vi_contact.core.errors import InputError
+from vi_contact.laws.materials import LinearElastic
 
 
 def dashpot_reflection(

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from demos.exact.bouncing_bar import first_root
 from vi_contact.core.algebra import Array
 from vi_contact.core.checks import array, attributes
 from vi_contact.core.errors import InputError
-from vi_contact.exact.bouncing_bar import first_root
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from dashpot_reflection import dashpot_energy
 from fem_problems import linear
 
 from vi_contact import fem
 from vi_contact.core.algebra import Array
-from vi_contact.exact.surface_waves import dashpot_energy
 from vi_contact.laws.materials import LinearElastic
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.run.march import march
