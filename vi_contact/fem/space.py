@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from petsc4py import PETSc
 
-from ..core.algebra import Array, Indices, Mask, largest, total
+from ..core.algebra import Array, Indices, Mask, total
 from ..core.checks import instance, refuse
 from ..core.errors import InputError
 from ..core.system import SemiDiscreteSystem
@@ -18,7 +18,8 @@ from .communicators import MpiComm, kept
 from .groups import components_of
 from .loads import Prescribed, evaluate_here
 from .mesh import Facets, node_numbers
-from .petsc_algebra import PetscMatrix, triple_product
+from .nodal_space import NodalSpace, bounding_box, parts_of
+from .petsc_algebra import PetscAlgebra, PetscMatrix, triple_product
 from .petsc_rows import aij_of
 from .ties import PLACE_TOLERANCE, Links, Tied, linked
 
@@ -28,26 +29,8 @@ def body_numbers(mesh: Any) -> Indices:
     cells, numbers = compat.geometry_dofmap(mesh), node_numbers(mesh)
     count = mesh.topology.index_map(mesh.topology.dim).size_local
     first = np.repeat(cells[:, :1], cells.shape[1] - 1, axis=1)
-    part = _smallest(first.ravel(), cells[:, 1:].ravel(), numbers)
-    shared = np.unique(cells[count:])  # nodes of ghost cells: there parts of different ranks meet, and are one body
-    meeting = np.column_stack([numbers[shared], part[shared]])
-    meeting = np.unique(np.concatenate(mesh.comm.allgather(meeting)), axis=0)
-    parts = np.unique(np.concatenate(mesh.comm.allgather(np.unique(part))))
-    index = np.searchsorted(parts, meeting[:, 1])
-    same = np.flatnonzero(meeting[1:, 0] == meeting[:-1, 0])
-    body = _smallest(index[same], index[same + 1], parts)
-    return np.searchsorted(np.unique(body), body[np.searchsorted(parts, part)])
-
-
-def _smallest(first: Any, second: Any, numbers: Indices) -> Indices:
-    """The smallest number (n,) among those that edges first-second join each one to."""
-    graph = sp.coo_matrix((np.ones(len(first)), (first, second)), shape=(len(numbers), len(numbers)))
-    from scipy.sparse.csgraph import connected_components  # late: it takes a while
-
-    _, part = connected_components(graph, directed=False)
-    smallest = np.full(part.max(initial=-1) + 1, np.iinfo(np.int64).max)
-    np.minimum.at(smallest, part, numbers)
-    return smallest[part]
+    shared = np.unique(cells[count:])  # nodes of ghost cells
+    return parts_of(MpiComm(mesh.comm), first.ravel(), cells[:, 1:].ravel(), numbers, shared)
 
 
 log = logging.getLogger(__name__)
@@ -72,7 +55,7 @@ def known_matrices(owner: str, system: SemiDiscreteSystem, names: str) -> None:
                     "section and damping given there", owner, " and ".join(found))
 
 
-class FemSpace:
+class FemSpace(NodalSpace):
     """Number the nodal unknowns of a P1/Q1 displacement space, with the prescribed and the tied ones eliminated.
 
     "Full" vectors hold every owned component (bs*i + c); "free" vectors only those the equations solve for.
@@ -90,15 +73,14 @@ class FemSpace:
     def __init__(self, mesh: Any, prescribed: tuple[Prescribed, ...], tied: Sequence[Tied] = ()) -> None:
         self.mesh = mesh
         self.V = compat.vector_space(mesh)
-        self.comm = MpiComm(kept(mesh.comm))
+        self.comm: MpiComm = MpiComm(kept(mesh.comm))
+        self.algebra = PetscAlgebra(self.comm.mpi)
         self.dimension: int = mesh.geometry.dim
         owned = self.V.dofmap.index_map.size_local
         geometry_nodes = compat.dof_to_node(self.V)[:owned]
         self.nodes: Indices = node_numbers(mesh)[geometry_nodes]
         self.points: Array = mesh.geometry.x[geometry_nodes][:, : self.dimension]
-        low = -self.comm.max(-np.min(self.points, axis=0, initial=np.inf))
-        high = self.comm.max(np.max(self.points, axis=0, initial=-np.inf))
-        self.size = float(np.linalg.norm(high - low))  # of the bounding box [m]: tolerances are relative to it
+        self.size = bounding_box(self.comm, self.points)  # tolerances are relative to it
         self.prescribed = prescribed
         self._where_held: list[tuple[Indices, tuple[int, ...]]] = []
         self.held = np.zeros((owned, self.dimension), dtype=bool)
@@ -151,7 +133,7 @@ class FemSpace:
         ids = self.nodes[:, None] * self.dimension + np.arange(self.dimension)
         return np.isin(ids, links.followers[~held[0]])
 
-    def _of_unknowns(self, numbers: Indices, values: Array) -> Array:
+    def _of_unknowns(self, numbers: Indices, values: Any) -> Array:
         """Return owned nodal values (k, d) of unknowns, node number * d + component, on every rank."""
         rows = self.at_nodes(numbers // self.dimension, values.astype(float))
         return rows[np.arange(len(numbers)), numbers % self.dimension]
@@ -159,12 +141,6 @@ class FemSpace:
     def leaders(self, nodes: Indices) -> Indices:
         """Return these node numbers, of nodes that follow another that of the other; -1 for those tied in part."""
         return np.array([self._leader.get(n, n) for n in nodes.tolist()], dtype=np.int64) if self._leader else nodes
-
-    def at_nodes(self, numbers: Indices, values: Array) -> Array:
-        """Return owned nodal values (k, d) at original node numbers, on every rank; zero for nodes of nobody."""
-        found, where = np.zeros((len(numbers), values.shape[1])), self.blocks_of(numbers)
-        found[where >= 0] = values[where[where >= 0]]
-        return self.comm.sum(found)
 
     def _numbers(self, links: Links) -> Indices:
         """The unknown of every owned component, numbered over all ranks."""
@@ -255,35 +231,3 @@ class FemSpace:
     def restrict(self, full: Array) -> Array:
         """Restrict nodal values (owned nodes, d) to the free vector."""
         return full.ravel()[self.free]
-
-    # Points ----------------------------------------------------------------------------------------------------------
-
-    def find_nodes(self, points: Array) -> Indices:
-        """Find the original numbers of the nodes nearest to the points (k, d), equal on all ranks.
-
-        InputError for a point farther from every node than the body is large (5 % of its diagonal).
-        """
-        found = np.empty(len(points), dtype=np.int64)
-        for i, point in enumerate(np.atleast_2d(np.asarray(points, dtype=float))):
-            if point.shape != (self.dimension,):
-                raise InputError(f"point {tuple(point)} has {len(point)} coordinates: give {self.dimension}")
-            distance = np.linalg.norm(self.points - point, axis=1)
-            nearest = -largest(self.comm, -np.min(distance, initial=np.inf))
-            if nearest > 0.05 * self.size:
-                raise InputError(f"point ({', '.join(f'{x:g}' for x in point)}) is {nearest:.3g} m away from the "
-                                 "nearest node: give a point of the body")
-            close = self.nodes[distance <= nearest + 1e-9 * self.size]
-            found[i] = -int(largest(self.comm, -float(np.min(close, initial=np.iinfo(np.int64).max))))
-        return found
-
-    def sample(self, u: Array, nodes: Indices, t: float, derivative: int = 0) -> Array:
-        """Return the nodal values (k, d) at original node numbers, equal on all ranks."""
-        return self.at_nodes(nodes, self.expand(u, t, derivative))
-
-    def blocks_of(self, nodes: Indices) -> Indices:
-        """Return the owned block of each original node number, -1 when another rank owns it."""
-        if not len(self.nodes):
-            return np.full(len(nodes), -1)
-        order = np.argsort(self.nodes)
-        blocks = order[np.minimum(np.searchsorted(self.nodes, nodes, sorter=order), len(order) - 1)]
-        return np.where(self.nodes[blocks] == nodes, blocks, -1)

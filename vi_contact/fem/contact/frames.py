@@ -13,13 +13,12 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from ...core.algebra import Array, Indices, Mask, largest
+from ...core.algebra import Array, Indices, Mask, Matrix, largest
 from ...core.checks import at
 from ...core.corners import PARALLEL, at_right_angles, corner_of
 from ...core.errors import InputError
 from ...core.surfaces import ContactSurface, nodal_blocks, nodal_frames, same_node, tangential_columns
-from ..petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc
-from ..space import FemSpace
+from ..nodal_space import NodalSpace
 from .nodes import Nodes, asked, joined_nodes
 
 INDEPENDENT = 0.01  # least singular value of a node's directions: two that turn by 0.8° (CHOSEN; T has 1 over it)
@@ -48,7 +47,7 @@ class NodalConditions:
 class FemSurface(ContactSurface):
     """Hold a contact surface that remembers what it was made of, so that it can be joined with others."""
 
-    space: FemSpace = field(repr=False)
+    space: NodalSpace = field(repr=False)
     parts: tuple[NodalConditions, ...] = field(repr=False)
 
 
@@ -122,7 +121,7 @@ def given(parts: Sequence[NodalConditions]) -> tuple[Indices, Array, Array, Mask
     return nodes.numbers, nodes.points, np.concatenate([part.directions for part in parts]), nodes.held
 
 
-def surface_of(space: FemSpace, parts: Sequence[NodalConditions], **data: Any) -> FemSurface:
+def surface_of(space: NodalSpace, parts: Sequence[NodalConditions], **data: Any) -> FemSurface:
     """Make the surface of these conditions, one part after the other. ``data``: gap0, weights and whatever else it
     holds of each condition of this rank. Collective."""
     comm, d = space.comm, space.dimension
@@ -141,7 +140,7 @@ def surface_of(space: FemSpace, parts: Sequence[NodalConditions], **data: Any) -
     )
 
 
-def _turn(space: FemSpace, blocks: Array, index: Indices) -> PetscMatrix | None:
+def _turn(space: NodalSpace, blocks: Array, index: Indices) -> Matrix | None:
     """The identity but for the blocks of contact nodes (T, or T⁻ᵀ); None when all are the identity too. Collective."""
     n = len(space.ids)
     if not largest(space.comm, np.any(blocks != np.eye(space.dimension))):
@@ -152,12 +151,12 @@ def _turn(space: FemSpace, blocks: Array, index: Indices) -> PetscMatrix | None:
     plain = np.setdiff1d(np.arange(n), index)
     entries = np.concatenate([rows, plain]), np.concatenate([columns, plain])
     values = np.concatenate([blocks[used], np.ones(len(plain))])
-    return as_petsc(PetscAlgebra(space.comm.mpi).local(*entries, values, n))
+    return space.algebra.local(*entries, values, n)
 
 
 def _coupling(
-    space: FemSpace, parts: Sequence[NodalConditions], frames: NodalFrames, index: Indices
-) -> PetscMatrix | None:
+    space: NodalSpace, parts: Sequence[NodalConditions], frames: NodalFrames, index: Indices
+) -> Matrix | None:
     """R with û = R ǔ: to the unknowns of a node that faces others, q_c·u = ǔ_c + q_c·sum_j P_sj u_j.
 
     At nodes with several conditions each one's own vectors only are relative to what it faces.
@@ -165,7 +164,7 @@ def _coupling(
     if all(part.facing is None for part in parts):
         return None
     _refuse_chains(space, parts)
-    algebra, n = PetscAlgebra(space.comm.mpi), len(space.ids)
+    algebra, n = space.algebra, len(space.ids)
     first, total = algebra.first(n), space.unknowns
     own, entries, start = [np.zeros(0, dtype=np.int64)], [sp.csr_matrix((0, total))], 0
     relative = frames.own_vectors()
@@ -180,10 +179,10 @@ def _coupling(
             own.append(index[place[rows], c])
             diagonal = sp.csr_matrix((np.ones(len(rows)), (np.arange(len(rows)), first + own[-1])), (len(rows), total))
             entries.append(diagonal + _faced(part.facing, rows, turns, frames.blocks[place[rows], :, c], total))
-    return as_petsc(algebra.replaced_rows(n, np.concatenate(own), sp.csr_matrix(sp.vstack(entries))))
+    return algebra.replaced_rows(n, np.concatenate(own), sp.csr_matrix(sp.vstack(entries)))
 
 
-def _turns(space: FemSpace, frames: NodalFrames, numbers: Indices) -> Array:
+def _turns(space: NodalSpace, frames: NodalFrames, numbers: Indices) -> Array:
     """T (k, d, d) of nodes that are faced, of all ranks; the axes where nothing else touches them. Collective."""
     d = space.dimension
     known = np.zeros((len(space.nodes), 1 + d * d))
@@ -204,7 +203,7 @@ def _faced(facing: Facing, rows: Indices, turns: Array, directions: Array, total
     return sp.csr_matrix((values[used], places), shape=(len(rows), total))
 
 
-def _refuse_chains(space: FemSpace, parts: Sequence[NodalConditions]) -> None:
+def _refuse_chains(space: NodalSpace, parts: Sequence[NodalConditions]) -> None:
     """InputError for a node on side 1 of one pair and side 2 of another: R⁻¹ = 2 - R needs them apart. Collective."""
     coupled = [(part.nodes, part.facing) for part in parts if part.facing is not None]
     first = np.zeros((len(space.nodes), 1))
