@@ -6,6 +6,7 @@ elements and function spaces take tuples (0.7), `create_mesh` swapped two argume
 per cell type (0.11).
 """
 
+from collections.abc import Callable
 from contextlib import suppress
 from itertools import product
 from typing import Any
@@ -92,6 +93,36 @@ def entities_to_geometry(mesh: Mesh, dim: int, entities: Indices) -> Indices:
     if _BASIX_ELEMENTS:
         return _mesh.entities_to_geometry(mesh, dim, entities)
     return dolfinx.cpp.mesh.entities_to_geometry(mesh._mesh, dim, entities, False)
+
+
+def tags_of(tags: Any, mesh: Mesh) -> bool:
+    """Return whether MeshTags are those of this mesh; what they refer to, a mesh or a topology, changed in 0.7."""
+    if hasattr(tags, "topology"):
+        return _bare(tags.topology) is _bare(mesh.topology)
+    return _bare(tags.mesh) is _bare(mesh)
+
+
+def _bare(wrapped: Any) -> Any:
+    """What DOLFINx's C++ part knows of an object of its Python part; other objects as they are."""
+    return getattr(wrapped, "_cpp_object", getattr(wrapped, "_mesh", wrapped))
+
+
+def entities_where(mesh: Mesh, dim: int, marker: Callable[[Any], Any]) -> Indices:
+    """Return the local cells, or facets of the boundary, whose vertices ``marker`` (x (3, n) -> (n,)) all marks."""
+    mesh.topology.create_entities(dim)
+    mesh.topology.create_connectivity(dim, mesh.topology.dim)
+    locate = _mesh.locate_entities if dim == mesh.topology.dim else _mesh.locate_entities_boundary
+    return np.asarray(locate(mesh, dim, marker), dtype=np.int32)
+
+
+def cell_numbers(mesh: Mesh) -> npt.NDArray[np.int64]:
+    """Return numbers of the owned cells: those of the input, which any ranks leave as they are, where there are any."""
+    cells, given = mesh.topology.index_map(mesh.topology.dim), ()
+    with suppress(RuntimeError):  # a part of a mesh has none: an empty array in 0.5, an error since
+        given = mesh.topology.original_cell_index
+    known = mesh.comm.allreduce(int(len(given) >= cells.size_local), op=MPI.MIN)
+    here = given if known else cells.local_to_global(np.arange(cells.size_local, dtype=np.int32))
+    return np.asarray(here, dtype=np.int64)[: cells.size_local]
 
 
 def measure(mesh: Mesh, dim: int, indices: Indices) -> ufl.Measure:

@@ -34,7 +34,7 @@ def _group(owner: str, meaning: str, group: Any, mesh: Mesh | None, wanted: type
         raise InputError(f"{owner}: {meaning} is the {KINDS[type(group)]} '{group.name}'; give a {kind}")
     if hasattr(group, "find") and hasattr(group, "indices"):
         raise InputError(f"{owner}: {meaning} is a DOLFINx MeshTags, with several values; give "
-                         f"fem.{wanted.__name__}(name, tags.find(value), mesh) with the value that is meant")
+                         f"fem.{wanted.__name__}.tagged(name, tags, value, mesh) with the value that is meant")
     raise InputError(f"{owner}: {meaning} is {shown(group)}; give a {kind}, such as tags['name'] of fem.read_mesh or "
                      f"fem.{wanted.__name__}(name, numbers, mesh)")
 

@@ -7,14 +7,14 @@ recognised on each rank by the vertices of their members, numbered as in the inp
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
 from dolfinx.mesh import Mesh
 from mpi4py import MPI
 
-from vi_contact.core.checks import instance, provides, refuse, shown
+from vi_contact.core.checks import ended, function, instance, mask, provides, refuse, shown, whole
 from vi_contact.core.errors import InputError
 from vi_contact.core.files import on_root
 from vi_contact.core.stages import stage
@@ -28,6 +28,8 @@ from vi_contact.meshes.rows import found_in, number_alike
 
 TENSOR_ORDER = {"quadrilateral": [0, 1, 3, 2], "hexahedron": [0, 1, 3, 2, 4, 5, 7, 6]}
 """DOLFINx's vertices in Gmsh's numbering, where the two differ; also in VTK's."""
+
+MOST_NAMED = 20  # values of tags in a message
 
 _NOWHERE = (np.zeros(0, dtype=np.int32), np.zeros(1, dtype=np.int32))  # destinations of no cells
 
@@ -54,11 +56,63 @@ class Group:
         refuse([defect], MpiComm(mesh.comm))
         object.__setattr__(self, "indices", np.unique(numbers).astype(np.int32))
 
+    @classmethod
+    def tagged(cls, name: str, meshtags: Any, value: int, mesh: Mesh) -> Self:
+        """Return the group of the facets, or cells, that have this value in DOLFINx MeshTags. Collective.
+
+        InputError, on all ranks, for tags of another mesh or dimension and for a value that none of any rank has.
+        """
+        owner, things = f"{cls.__name__}.tagged", cls.__name__.lower()
+        instance(owner, "mesh", mesh, Mesh, "give the DOLFINx mesh of the tags")
+        provides(owner, "meshtags", meshtags, ("dim", "indices", "values"), "give DOLFINx MeshTags")
+        dim, values = mesh.topology.dim - cls.codimension, np.asarray(meshtags.values)
+        chosen = np.asarray(meshtags.indices)[values == whole(owner, "value", value, least=-(2**31))]
+        defect = ""
+        if not compat.tags_of(meshtags, mesh):
+            defect = f"{owner}: the tags of '{name}' are those of another mesh; give tags of this mesh"
+        elif meshtags.dim != dim:
+            defect = (f"{owner}: the tags of '{name}' are of dimension {meshtags.dim} and {things} of this mesh have "
+                      f"dimension {dim}; give the tags of its {things}")
+        refuse([defect], MpiComm(mesh.comm))
+        if not mesh.comm.allreduce(len(chosen)):
+            found = np.unique(np.concatenate(mesh.comm.allgather(np.unique(values))))
+            there = ", ".join(map(str, found[:MOST_NAMED])) + (", …" if len(found) > MOST_NAMED else "")
+            raise InputError(f"{owner}: no {things} have the value {value} of '{name}'; give one of {there or 'none'}")
+        return cls(name, chosen, mesh)
+
+    @classmethod
+    def where(cls, name: str, mesh: Mesh, marker: Callable[[npt.NDArray[np.float64]], Any]) -> Self:
+        """Return the group of the facets of the boundary, or of the cells, whose vertices are all marked. Collective.
+
+        ``marker``: x (3, n) [m] -> (n,) truth values, as in DOLFINx. InputError, on all ranks, when it fails or marks
+        none on any rank.
+        """
+        owner, things, defects = f"{cls.__name__}.where", cls.__name__.lower(), [""]
+        instance(owner, "mesh", mesh, Mesh, "give a DOLFINx mesh")
+        function(owner, "marker", marker, "give a function of x (3, n) that returns n truth values")
+
+        def safe(x: Any) -> Any:  # the other ranks must not wait where it raises
+            try:
+                if x.shape[1]:
+                    return mask(owner, f"what the marker of '{name}' returned", marker(x), (x.shape[1],))
+            except Exception as error:
+                defects.append(ended(f"{owner}: the marker of '{name}'", error))
+            return np.zeros(x.shape[1], dtype=bool)
+
+        chosen = compat.entities_where(mesh, mesh.topology.dim - cls.codimension, safe)
+        refuse(defects, MpiComm(mesh.comm))
+        if not mesh.comm.allreduce(len(chosen)):
+            of = "facets of the boundary" if cls.codimension else "cells"
+            raise InputError(f"{owner}: the marker of '{name}' marks no {of}; mark all vertices of some {things}, "
+                             "coordinates compared with np.isclose")
+        return cls(name, chosen, mesh)
+
 
 @dataclass(frozen=True, eq=False)
 class Facets(Group):
     """Name a part of the boundary or of an inner surface: local facets, ghosts included; kept ascending. Collective.
 
+    ``Facets.tagged`` takes them from DOLFINx MeshTags, ``Facets.where`` from a function that marks points.
     InputError, on all ranks, for numbers that are no facets of this mesh.
     """
 
@@ -69,6 +123,7 @@ class Facets(Group):
 class Cells(Group):
     """Name a part of the body: local cells, ghosts included; kept ascending. Collective.
 
+    ``Cells.tagged`` takes them from DOLFINx MeshTags, ``Cells.where`` from a function that marks points.
     InputError, on all ranks, for numbers that are no cells of this mesh.
     """
 
@@ -118,8 +173,14 @@ def build_mesh(mesh: MeshScript, comm: MPI.Comm) -> tuple[Mesh, Tags]:
 
 
 def node_numbers(mesh: Mesh) -> npt.NDArray[np.int64]:
-    """Number local geometry nodes (owned, then ghosts) as the input does, from 0: the rank among the nodes in use."""
-    return np.asarray(mesh.geometry.input_global_indices, dtype=np.int64)
+    """Number local geometry nodes (owned, then ghosts) as the input does, from 0: the rank among the nodes in use.
+
+    Collective. A part of a mesh (``create_submesh``) knows the numbers of the whole, and is numbered in their order.
+    """
+    given = np.asarray(mesh.geometry.input_global_indices, dtype=np.int64)
+    if mesh.comm.allreduce(given.max(initial=-1), op=MPI.MAX) < mesh.geometry.index_map().size_global:
+        return given
+    return np.searchsorted(np.unique(np.concatenate(mesh.comm.allgather(given))), given)
 
 
 @stage("mesh")
@@ -133,8 +194,8 @@ def _distribute(comm: MPI.Comm, produce: Callable[[], MeshArrays]) -> tuple[Mesh
     mesh = compat.create_mesh(comm, arrays.cell, vertices, arrays.points, where)
     tags = Tags()
     original = np.asarray(mesh.topology.original_cell_index, dtype=np.int64)
-    for name, mask in arrays.cell_groups.items():
-        tags[name] = Cells(name, np.flatnonzero(mask[original]).astype(np.int32), mesh)
+    for name, members in arrays.cell_groups.items():
+        tags[name] = Cells(name, np.flatnonzero(members[original]).astype(np.int32), mesh)
     everyone = compat.entities_to_geometry(mesh, mesh.topology.dim - 1, np.arange(local_count(mesh, 1), dtype=np.int32))
     facets, *named = number_alike(node_numbers(mesh)[everyone], *arrays.facet_groups.values())
     for name, numbers in zip(arrays.facet_groups, named, strict=True):

@@ -27,9 +27,9 @@ from .ties import PLACE_TOLERANCE, Links, Tied, linked
 def body_numbers(mesh: Any) -> Indices:
     """Return the body (0, 1, ..., in the order of their least node number) of each local geometry node. Collective."""
     cells, numbers = compat.geometry_dofmap(mesh), node_numbers(mesh)
-    count = mesh.topology.index_map(mesh.topology.dim).size_local
     first = np.repeat(cells[:, :1], cells.shape[1] - 1, axis=1)
-    shared = np.unique(cells[count:])  # nodes of ghost cells
+    ghosts = numbers[mesh.geometry.index_map().size_local :]  # there are such also where there are no ghost cells
+    shared = np.flatnonzero(np.isin(numbers, np.concatenate(mesh.comm.allgather(ghosts))))
     return parts_of(MpiComm(mesh.comm), first.ravel(), cells[:, 1:].ravel(), numbers, shared)
 
 

@@ -92,7 +92,7 @@ class FrameWriter:
         owned, slots = problem.surface.owned, problem.surface.slots
         self._contact_nodes = on_first(space.comm, slots, space.ids[owned] // space.dimension)
         self._type, mine = _cells(space.mesh)
-        self._cell_numbers = np.asarray(space.mesh.topology.original_cell_index[: len(mine)], dtype=np.int64)
+        self._cell_numbers = compat.cell_numbers(space.mesh)
         points = on_first(space.comm, space.nodes, _three(space.points))
         cells = on_first(space.comm, self._cell_numbers, mine)
         self._shape = (len(points), *cells.shape)
