@@ -23,6 +23,7 @@ _CONTENTS = {
     "loads": ("BodyForce", "Prescribed", "TangentialTraction", "Traction"),
     "mesh": ("Cells", "Facets", "Tags", "build_mesh", "node_numbers", "read_mesh"),
     "output.fields": ("XDMF",),
+    "output.functions": ("as_function", "read_function"),
     "output.reactions": ("Reactions",),
     "output.section_forces": ("SectionForces",),
     "released_supports": ("release",),

@@ -142,6 +142,26 @@ def vector_space(mesh: Mesh) -> Any:
     return fem.VectorFunctionSpace(mesh, ("Lagrange", 1))
 
 
+def lagrange(mesh: Mesh, degree: int, shape: tuple[int, ...] = (), *, continuous: bool = True) -> Any:
+    """Make the space of Lagrange fields of values of this shape: (), (d,) or (d, d)."""
+    family = "Lagrange" if continuous else "DG" if _BASIX_ELEMENTS or is_simplex(mesh) else "DQ"
+    if _BASIX_ELEMENTS:
+        return fem.functionspace(mesh, (family, degree, shape) if shape else (family, degree))
+    make = (fem.FunctionSpace, fem.VectorFunctionSpace, fem.TensorFunctionSpace)[len(shape)]
+    return make(mesh, (family, degree))
+
+
+def is_simplex(mesh: Mesh) -> bool:
+    """Say whether the cells are intervals, triangles or tetrahedra."""
+    return mesh.topology.cell_type.name in ("interval", "triangle", "tetrahedron")
+
+
+def cell_unknowns(space: Any) -> Indices:
+    """Return the local blocks of unknowns of all cells, one cell after the other: alike in spaces of one element."""
+    rows = space.dofmap.list
+    return np.ravel(rows if isinstance(rows, np.ndarray) else rows.array)
+
+
 def dof_to_node(space: Any) -> Indices:
     """Return the local geometry node of each block of unknowns (owned, then ghosts) of a P1/Q1 space, (n_blocks,).
 

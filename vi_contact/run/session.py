@@ -5,7 +5,7 @@ import time
 from collections import deque
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import closing, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from signal import Signals
 from typing import Any, Protocol
@@ -127,7 +127,8 @@ class Session:
         if warning and self.root:
             log.warning("%s", warning)
         writer.close(facts)
-        yield Solution(self.table.history(), self.table.columns, self.place.state, facts)
+        problem = replace(self.method.problem)  # without the matrices made for the run
+        yield Solution(self.table.history(), self.table.columns, self.place.state, facts, problem, writer.folder)
 
     def _march(self, writer: Writer, signals: StopSignals) -> Iterator[None]:
         place = self.place

@@ -3,11 +3,14 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from textwrap import shorten, wrap
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..core.algebra import Array
+from ..core.errors import InputError
+from ..core.problem import ContactProblem
 from ..core.protocols import Excitation
 from ..core.step import Columns, State
 from ..ground_motion.excitation import GroundMotion
@@ -25,12 +28,32 @@ class Solution:
         columns: column -> (unit, meaning).
         state: the final state, in the rotated basis (``problem.cartesian`` turns it back).
         facts: what summary.json holds; the times of a step are medians in seconds, nan without steps.
+        problem: what was solved, with the mass matrix that the scheme chose. folder: of the run, None without one.
     """
 
     history: Mapping[str, Array]
     columns: Columns
     state: State
     facts: Mapping[str, Any]
+    problem: ContactProblem
+    folder: Path | None = None
+
+    def function(
+        self, name: str, *, t: float | None = None, frame: int | None = None, continuous: bool = False
+    ) -> Any:
+        """Return "u", "v", "stress" or "contact_pressure" as a DOLFINx Function: ``fem.as_function`` of the final state,
+        with ``t`` [s] or ``frame`` ``fem.read_function`` of a frame in the run folder, which see. Collective.
+
+        InputError for a system without a mesh, and without such a frame."""
+        if not hasattr(self.problem.system.space, "V"):
+            raise InputError("function: the system has no mesh, so there are no Functions; use history and state")
+        from ..fem.output.functions import as_function, read_function  # late: runs need no finite elements
+
+        if t is None and frame is None:
+            return as_function(self.problem, self.state, name, continuous=continuous)
+        if self.folder is None:
+            raise InputError("function: the run kept no frames; give it out and fields=fem.XDMF(every=10)")
+        return read_function(self.problem, self.folder, name, t=t, frame=frame, continuous=continuous)
 
     def summary(self) -> str:
         """Return the run in a few lines for people."""

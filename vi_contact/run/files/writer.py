@@ -50,7 +50,7 @@ class Writer:
         self, problem: ContactProblem, folder: Path | None, fields: FieldWriter | None, table: Table,
         stored: StoredRows | None = None,
     ) -> None:
-        self._problem, self._folder, self._table, self._stored = problem, folder, table, stored
+        self._problem, self.folder, self._table, self._stored = problem, folder, table, stored
         self._continued = stored is not None and folder is not None and stored.folder.resolve() == folder.resolve()
         self._settings = fields
         self._comm = problem.system.algebra.comm
@@ -64,13 +64,13 @@ class Writer:
     @property
     def rest(self) -> str:
         """Return what remains of a run that was ended early, for a sentence."""
-        if self._folder is None:
+        if self.folder is None:
             return "without an output folder nothing of it is kept"
-        return f"restart it from its checkpoint in '{self._folder}'"
+        return f"restart it from its checkpoint in '{self.folder}'"
 
     def open(self, state: State) -> None:
         """Make the files and write the first frame."""
-        folder = self._folder
+        folder = self.folder
         if folder is None:
             return
         surface = self._problem.surface
@@ -93,7 +93,7 @@ class Writer:
 
     def append(self, row: Row) -> None:
         """Take a row of the histories; it is written, with all that wait, when the next one might be late."""
-        if self._folder is None:
+        if self.folder is None:
             self._table.append(row)
             return
         self._waiting.append(row)
@@ -123,12 +123,12 @@ class Writer:
         """Write a checkpoint of this place, unless there is one already. ``of``: what problem it is."""
         k = place.state.k
         self.flush()
-        if self._folder is None or self._saved == k:
+        if self.folder is None or self._saved == k:
             return
         files = self._files
         told = on_root(self._comm, lambda: (files.checksum(k), files.sync()) if files else ("", True))
         checksum, safe = self._comm.bcast(told)
-        write_checkpoint(self._folder, self._problem, place, of=of(), rows=checksum, safe=safe)
+        write_checkpoint(self.folder, self._problem, place, of=of(), rows=checksum, safe=safe)
         self._saved = k
         if self._comm.rank == 0:
             log.info("checkpoint of step %d", k)
@@ -143,16 +143,16 @@ class Writer:
             self._close(facts)
 
     def _close(self, facts: Mapping[str, Any]) -> None:
-        if self._folder is None or self._comm.rank != 0:
+        if self.folder is None or self._comm.rank != 0:
             return
         try:
             log.info("%s after %d steps %s", facts["status"], facts["steps"], facts["reason"])
             try:
-                write_atomically(self._folder / SUMMARY, (to_json(facts) + "\n").encode())
+                write_atomically(self.folder / SUMMARY, (to_json(facts) + "\n").encode())
             finally:
                 if self._files is not None:
                     self._files.close()
-                push(self._folder / CHECKPOINT)
+                push(self.folder / CHECKPOINT)
             if self._log is not None:
                 self._log.check()
         finally:

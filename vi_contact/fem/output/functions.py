@@ -1,0 +1,162 @@
+"""Hand out states and stored frames as DOLFINx Functions, along the axes and with the values of ghosts.
+
+u and v are on the space of the system, ``system.space.V``, with the components that are prescribed or tied. The stress
+sigma(u), without viscous parts, is the L2 projection onto discontinuous fields: constant in a cell of triangles and
+tetrahedra, where that of P1 is so, (bi)linear in others. The contact pressure r_n / weight is nodal, zero off the
+contact surface; of several faces of a node it is that of the one which is pressed most.
+"""
+
+import xml.etree.ElementTree as ET
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import ufl
+from petsc4py import PETSc
+
+from ...core.algebra import Array, Indices
+from ...core.checks import flag, instance, number, optional, refuse, shown
+from ...core.errors import InputError
+from ...core.files import FIELDS, FIELDS_INDEX, on_root, open_hdf5
+from ...core.problem import ContactProblem
+from ...core.state_checks import check_problem_given, check_sizes
+from ...core.step import State
+from .. import compat
+from ..space import FemSpace, known_matrices, space_of
+
+NAMES = ("u", "v", "stress", "contact_pressure")
+ACCURACY = 1e-13  # of a projection, in its residual
+SAME = 1e-9  # of the size of the mesh, and of the longest time
+Place = tuple[float, str]  # time of a frame, file and group
+
+
+def as_function(problem: ContactProblem, state: State, name: str, *, continuous: bool = False) -> Any:
+    """Return a state as a DOLFINx Function: "u" [m], "v" [m/s], "stress" [Pa] (d, d) or "contact_pressure" [Pa].
+
+    ``state``: of simulate, march, static_equilibrium or quasi_static of this problem. ``continuous``: the stress
+    projected onto P1 or Q1, ∫ sigma_h : tau = ∫ sigma(u) : tau. Every call makes a Function of its own. Collective.
+    InputError for a state of another problem, and a system without a mesh.
+    """
+    space = _checked("as_function", problem, name, continuous)
+    check_sizes("as_function", problem, state)
+    if name != "contact_pressure":
+        x, derivative = (state.v, 1) if name == "v" else (state.u, 0)
+        return _function(problem, name, space.expand(problem.cartesian(x), state.t, derivative), continuous)
+    surface, pressure = problem.surface, np.zeros(len(space.nodes))
+    each = state.r_n / surface.weights
+    order = np.argsort(np.abs(each), kind="stable")
+    pressure[np.flatnonzero(space.free)[surface.owned[order]] // space.dimension] = each[order]
+    return _function(problem, name, pressure)
+
+
+def read_function(
+    problem: ContactProblem, folder: str | Path, name: str, *, t: float | None = None, frame: int | None = None,
+    continuous: bool = False,
+) -> Any:
+    """Return a frame in the folder of a run (``fields=fem.XDMF(…)``) as ``as_function`` returns a state.
+
+    ``t``: its time [s]; ``frame``: its number in the order of time, 0 for the first and -1 for the last. The run may
+    have had any number of ranks. Collective. InputError for a time without a frame, and fields of another mesh.
+    """
+    space = _checked("read_function", problem, name, continuous)
+    optional(number, "read_function", "t", t, unit="s")
+    optional(instance, "read_function", "frame", frame, int, "give its number, 0 for the first and -1 for the last")
+    kind, comm, d = "u" if name == "stress" else name, space.comm, space.dimension
+    points, values = comm.bcast(on_root(comm, lambda: _stored(Path(folder), kind, t, frame)))
+    fits = len(points) > np.max(space.nodes, initial=-1)
+    fits = fits and np.max(np.abs(points[space.nodes, :d] - space.points), initial=0.0) <= SAME * space.size
+    refuse(["" if fits else f"the fields in '{folder}' are of another mesh: give the problem of that run"], comm)
+    return _function(problem, name, values[space.nodes] if values.ndim == 1 else values[space.nodes, :d], continuous)
+
+
+def _checked(owner: str, problem: Any, name: Any, continuous: Any) -> FemSpace:
+    """The space of the problem; InputError when there is none, or no such quantity."""
+    check_problem_given(owner, problem)
+    flag(owner, "continuous", continuous)
+    if name not in NAMES:
+        raise InputError(f"{owner}: {shown(name)} is no quantity; give one of {', '.join(map(repr, NAMES))}")
+    return space_of(owner, problem.system)
+
+
+def _function(problem: ContactProblem, name: str, nodal: Array, continuous: bool = False) -> Any:
+    """The Function of values at the owned nodes, (k,) or (k, d); the stress is that of displacements."""
+    system, space = problem.system, space_of(name, problem.system)
+    V = system.cached("P1", lambda: compat.lagrange(space.mesh, 1)) if nodal.ndim == 1 else space.V
+    found = compat.function(V)
+    values = nodal[_blocks(V, space.V)].ravel()
+    found.x.array[: values.size] = values
+    found.x.scatter_forward()
+    if name == "stress":
+        known_matrices("stress", system, "K")
+        found = system.cached(f"stress {continuous}", lambda: Stress(space, continuous))(found)
+    found.name = name
+    return found
+
+
+def _blocks(of: Any, among: Any) -> Indices:
+    """The blocks of unknowns of a space (owned) among those of another one of the same element."""
+    owned, ghosts = of.dofmap.index_map.size_local, of.dofmap.index_map.num_ghosts
+    blocks = np.zeros(owned + ghosts, dtype=np.int64)
+    blocks[compat.cell_unknowns(of)] = compat.cell_unknowns(among)
+    return blocks[:owned]
+
+
+class Stress:
+    """Project sigma(u): M sigma_c = ∫ sigma(u) : tau_c for every component c, by conjugate gradients."""
+
+    def __init__(self, space: FemSpace, continuous: bool) -> None:
+        d, degree = space.dimension, 1 if continuous or not compat.is_simplex(space.mesh) else 0
+        self._tensors = compat.lagrange(space.mesh, degree, (d, d), continuous=continuous)
+        self._u, scalars = compat.function(space.V), compat.lagrange(space.mesh, degree, continuous=continuous)
+        self._blocks, dx = _blocks(scalars, self._tensors), ufl.dx(metadata={"quadrature_degree": 2 * degree + 2})
+        sigma = space.forms.stress(self._u) / space.forms.section.thickness
+        self._load = compat.compile_form(ufl.inner(sigma, ufl.TestFunction(self._tensors)) * dx)
+        mass = ufl.inner(ufl.TrialFunction(scalars), ufl.TestFunction(scalars)) * dx
+        matrix = compat.assemble_matrix(compat.compile_form(mass))
+        self._x, self._b = matrix.createVecs()
+        self._ksp = PETSc.KSP().create(matrix.comm)
+        self._ksp.setOperators(matrix)
+        self._ksp.setType("cg")
+        self._ksp.getPC().setType("jacobi")
+        self._ksp.setTolerances(rtol=ACCURACY, atol=0.0)
+
+    def __call__(self, u: Any) -> Any:
+        """Return the stress (d, d) of displacements; collective."""
+        self._u.x.array[:] = u.x.array
+        found = compat.function(self._tensors)
+        values = found.x.array.reshape(-1, self._tensors.dofmap.index_map_bs)
+        loads = compat.assemble_vector(self._load).array_r.reshape(-1, values.shape[1])
+        for c in range(values.shape[1]):
+            self._b.array[:] = loads[self._blocks, c]
+            self._ksp.solve(self._b, self._x)
+            values[self._blocks, c] = self._x.array_r
+        found.x.scatter_forward()
+        return found
+
+
+def _stored(folder: Path, name: str, t: float | None, frame: int | None) -> tuple[Array, Array]:
+    """Points of the mesh, and a quantity of a frame at them."""
+    if not (folder / FIELDS_INDEX).is_file():
+        raise InputError(f"'{folder}' has no {FIELDS_INDEX}: run it with out and fields=fem.XDMF(every=10)")
+    try:
+        grids = ET.parse(folder / FIELDS_INDEX).findall(".//Grid[@GridType='Uniform']")
+        places = sorted((float(grid.find("Time").get("Value")), grid.findtext(f"Attribute[@Name='{name}']/DataItem"))
+                        for grid in grids)  # type: ignore[union-attr, arg-type, type-var]
+        file, path = places[_chosen([time for time, _ in places], t, frame)][1].split(":")  # type: ignore[union-attr]
+        with open_hdf5(folder / FIELDS / "mesh.h5") as mesh, open_hdf5(folder / file) as fields:
+            return mesh["points"][()], fields[path][()]
+    except (ET.ParseError, OSError, KeyError, AttributeError, TypeError) as error:
+        raise InputError(f"the fields in '{folder}' are incomplete or damaged ({error}): restore them") from error
+
+
+def _chosen(times: list[float], t: float | None, frame: int | None) -> int:
+    """The number of the frame of a time, or of this number."""
+    told = ", ".join(f"{one:.9g}" for one in times[:12]) + (f", … {times[-1]:.9g}" if len(times) > 12 else "")
+    stored = f"the {len(times)} frames are at t = {told} s"
+    if (t is None) == (frame is None):
+        raise InputError(f"a stored frame: give either t or frame, and not both; {stored}")
+    slack = SAME * max(map(abs, times), default=0.0)
+    wanted = range(len(times))[frame:][:1] if t is None else [i for i, one in enumerate(times) if abs(one - t) <= slack]
+    if not wanted or (frame or 0) < -len(times):
+        raise InputError(f"no frame {shown(frame)}: {stored}" if t is None else f"no frame at t = {shown(t)} s: {stored}")
+    return wanted[0]
