@@ -2,8 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from textwrap import shorten, wrap
 from pathlib import Path
+from textwrap import shorten, wrap
 from typing import Any
 
 import numpy as np
@@ -41,10 +41,11 @@ class Solution:
     def function(
         self, name: str, *, t: float | None = None, frame: int | None = None, continuous: bool = False
     ) -> Any:
-        """Return "u", "v", "stress" or "contact_pressure" as a DOLFINx Function: ``fem.as_function`` of the final state,
-        with ``t`` [s] or ``frame`` ``fem.read_function`` of a frame in the run folder, which see. Collective.
+        """Return "u", "v", "stress" or "contact_pressure" as a DOLFINx Function, ``fem.as_function`` of the end state.
 
-        InputError for a system without a mesh, and without such a frame."""
+        With ``t`` [s] or ``frame`` that of a frame in the run folder, ``fem.read_function``. Collective.
+        InputError for a system without a mesh, and without such a frame.
+        """
         if not hasattr(self.problem.system.space, "V"):
             raise InputError("function: the system has no mesh, so there are no Functions; use history and state")
         from ..fem.output.functions import as_function, read_function  # late: runs need no finite elements

@@ -27,7 +27,6 @@ from ..space import FemSpace, known_matrices, space_of
 NAMES = ("u", "v", "stress", "contact_pressure")
 ACCURACY = 1e-13  # of a projection, in its residual
 SAME = 1e-9  # of the size of the mesh, and of the longest time
-Place = tuple[float, str]  # time of a frame, file and group
 
 
 def as_function(problem: ContactProblem, state: State, name: str, *, continuous: bool = False) -> Any:
@@ -139,10 +138,10 @@ def _stored(folder: Path, name: str, t: float | None, frame: int | None) -> tupl
     if not (folder / FIELDS_INDEX).is_file():
         raise InputError(f"'{folder}' has no {FIELDS_INDEX}: run it with out and fields=fem.XDMF(every=10)")
     try:
-        grids = ET.parse(folder / FIELDS_INDEX).findall(".//Grid[@GridType='Uniform']")
-        places = sorted((float(grid.find("Time").get("Value")), grid.findtext(f"Attribute[@Name='{name}']/DataItem"))
-                        for grid in grids)  # type: ignore[union-attr, arg-type, type-var]
-        file, path = places[_chosen([time for time, _ in places], t, frame)][1].split(":")  # type: ignore[union-attr]
+        index: Any = ET.parse(folder / FIELDS_INDEX)
+        places = sorted((float(grid.find("Time").get("Value")), grid.find(f"Attribute[@Name='{name}']/DataItem").text)
+                        for grid in index.findall(".//Grid[@GridType='Uniform']"))
+        file, path = places[_chosen([time for time, _ in places], t, frame)][1].split(":")
         with open_hdf5(folder / FIELDS / "mesh.h5") as mesh, open_hdf5(folder / file) as fields:
             return mesh["points"][()], fields[path][()]
     except (ET.ParseError, OSError, KeyError, AttributeError, TypeError) as error:
@@ -158,5 +157,5 @@ def _chosen(times: list[float], t: float | None, frame: int | None) -> int:
     slack = SAME * max(map(abs, times), default=0.0)
     wanted = range(len(times))[frame:][:1] if t is None else [i for i, one in enumerate(times) if abs(one - t) <= slack]
     if not wanted or (frame or 0) < -len(times):
-        raise InputError(f"no frame {shown(frame)}: {stored}" if t is None else f"no frame at t = {shown(t)} s: {stored}")
+        raise InputError(f"no frame {shown(frame) if t is None else f'at t = {shown(t)} s'}: {stored}")
     return wanted[0]
