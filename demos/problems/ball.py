@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import betaincinv
 
+from demos.meshes.ball import BallMesh
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.core.obstacles import HalfSpace
@@ -24,7 +25,6 @@ from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import Prescribed
 from vi_contact.fem.mesh import build_mesh
 from vi_contact.laws.materials import LinearElastic
-from vi_contact.meshes.ball import BallMesh
 
 QUARTERS = 4.0
 FOOT = 1.3  # contact side over the largest contact radius

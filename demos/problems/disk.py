@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from demos.meshes.disk import DiskMesh
 from vi_contact.core.checks import attributes, function, instance
 from vi_contact.core.obstacles import HalfSpace
 from vi_contact.core.problem import ContactProblem
@@ -19,7 +20,6 @@ from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.mesh import build_mesh
 from vi_contact.laws.materials import LinearElastic, PlaneStrain
-from vi_contact.meshes.disk import DiskMesh
 
 
 @dataclass(frozen=True)

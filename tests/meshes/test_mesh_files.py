@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from demos.meshes.ball import BallMesh
+from demos.meshes.disk import DiskMesh
 from vi_contact.core.errors import InputError
-from vi_contact.meshes.ball import BallMesh
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.channel import ChannelMesh
-from vi_contact.meshes.disk import DiskMesh
 from vi_contact.meshes.extract import arrays_from_file
 from vi_contact.meshes.gmsh_session import session, write
 from vi_contact.meshes.wall import WallMesh

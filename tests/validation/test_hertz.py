@@ -20,6 +20,7 @@ from graded import Pressed, even_then_growing, growing, pressed_half
 from hertz_line import HertzLine
 from mpi4py import MPI
 
+from demos.meshes.ball import BallMesh
 from vi_contact.core.obstacles import AnalyticGap, HalfSpace
 from vi_contact.core.problem import ContactProblem
 from vi_contact.exact.hertz import HertzPoint, contact_modulus
@@ -28,7 +29,6 @@ from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import Prescribed, Traction
 from vi_contact.fem.mesh import build_mesh
 from vi_contact.laws.materials import LinearElastic
-from vi_contact.meshes.ball import BallMesh
 from vi_contact.run.static import static_equilibrium
 from vi_contact.solvers.condensed import Condensed
 

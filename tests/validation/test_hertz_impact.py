@@ -15,6 +15,7 @@ import pytest
 from inertia import inertia
 from mpi4py import MPI
 
+from demos.meshes.ball import BallMesh
 from demos.problems.ball import QUARTERS, Ball, BallModel, build, hertz_motion
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
@@ -27,7 +28,6 @@ from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.mesh import build_mesh
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.mass import Redistributed
-from vi_contact.meshes.ball import BallMesh
 from vi_contact.run.march import march
 
 COMM = MPI.COMM_WORLD

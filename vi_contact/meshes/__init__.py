@@ -9,11 +9,9 @@ angles in radians. Begin with ``wall.py``.
 from ..core.lazy import lazy
 
 _CONTENTS = {
-    "ball": ("BallMesh",),
     "block": ("BlockMesh",),
     "channel": ("ChannelMesh",),
     "cut": ("CutOpen", "Welded"),
-    "disk": ("DiskMesh",),
     "raft": ("RaftMesh",),
     "two_blocks": ("Blocks", "TwoBlocks"),
     "wall": ("WallMesh",),
