@@ -41,12 +41,13 @@ def assemble(
     prescribed: Prescribed | Sequence[Prescribed] = (), tied: Tied | Sequence[Tied] = (),
     dashpots: Dashpots | Sequence[Dashpots] = (), loads: Traction | BodyForce | Sequence[Traction | BodyForce] = (),
     damping: Damping | None = None, initial_displacement: Initial = None, initial_velocity: Initial = None,
-    base_inertia: bool = True,
+    base_inertia: bool = True, degree: int = 1,
 ) -> SemiDiscreteSystem:
     """Assemble the system of a body, on the free unknowns.
 
     Args:
-        mesh: DOLFINx mesh (``read_mesh``), first-order cells; unknowns are P1 or Q1.
+        mesh: DOLFINx mesh (``read_mesh``), cells of first order or, with degree 2, of second order too.
+        degree: of the displacement in each cell: 1 for P1 or Q1, 2 for P2 or Q2 (docs/guide/second_order.md).
         material: one material, or (cells, material) pairs that cover the mesh.
         section: PlaneStrain() by default in 2D (Solid() in 3D); PlaneStress(thickness) for panels.
         clamped: facets with u = 0; prescribed: facets that move (eq. 3) or are held in some components.
@@ -58,14 +59,15 @@ def assemble(
         initial_displacement, initial_velocity: constant or points (k, d) -> (k, d) (eqs. 10, 10a), or (cells, value)
             pairs for several bodies; the later pair counts where cells meet, zero where there are none.
     Raises:
-        InputError: cells without material, NaN in data, components that do not exist, dashpots on what is held, groups
-            of another mesh or kind, other displacements prescribed on the same facets.
+        InputError: cells without material, of an order that the degree does not suit, or folded; NaN in data,
+            components that do not exist, dashpots on what is held, groups of another mesh or kind, other displacements
+            prescribed on the same facets.
     """
-    section, damping = check_body(mesh, material, section, damping, base_inertia)
+    section, damping = check_body(mesh, material, section, damping, base_inertia, degree)
     held, moved, boundaries = as_tuple(clamped), as_tuple(prescribed), as_tuple(dashpots)
     check_boundaries(mesh, held, moved, as_tuple(tied), boundaries, as_tuple(loads))
     check_initial(mesh, displacement=initial_displacement, velocity=initial_velocity)
-    space = FemSpace(mesh, tuple(Prescribed(facets) for facets in held) + moved, as_tuple(tied))
+    space = FemSpace(mesh, tuple(Prescribed(facets) for facets in held) + moved, as_tuple(tied), degree)
     forms = ElasticForms(space, cell_materials(mesh, material), section, damping)
     forms.boundaries = boundaries
     algebra = algebra_for(space.comm.mpi, space.dimension, space.unknowns)
