@@ -41,7 +41,7 @@ def assemble(
     prescribed: Prescribed | Sequence[Prescribed] = (), tied: Tied | Sequence[Tied] = (),
     dashpots: Dashpots | Sequence[Dashpots] = (), loads: Traction | BodyForce | Sequence[Traction | BodyForce] = (),
     damping: Damping | None = None, initial_displacement: Initial = None, initial_velocity: Initial = None,
-    base_inertia: bool = True, degree: int = 1,
+    base_inertia: bool = True, degree: int = 1, integration: str = "full",
 ) -> SemiDiscreteSystem:
     """Assemble the system of a body, on the free unknowns.
 
@@ -56,6 +56,8 @@ def assemble(
         damping: NoDamping() by default, MassProportional(c) (eq. 7) or Rayleigh.
         base_inertia: whether a ground motion's inertia load counts the mass that elements share with prescribed nodes,
             as it must to be the motion seen from the ground; False is the load of docs/start/first_wall.md.
+        integration: "full", or "selective" for nearly incompressible bodies of quadrilaterals or hexahedra: each cell
+            takes tr eps as its mean (``fem.dilatation``).
         initial_displacement, initial_velocity: constant or points (k, d) -> (k, d) (eqs. 10, 10a), or (cells, value)
             pairs for several bodies; the later pair counts where cells meet, zero where there are none.
     Raises:
@@ -63,12 +65,12 @@ def assemble(
             components that do not exist, dashpots on what is held, groups of another mesh or kind, other displacements
             prescribed on the same facets.
     """
-    section, damping = check_body(mesh, material, section, damping, base_inertia, degree)
+    section, damping = check_body(mesh, material, section, damping, base_inertia, degree, integration)
     held, moved, boundaries = as_tuple(clamped), as_tuple(prescribed), as_tuple(dashpots)
     check_boundaries(mesh, held, moved, as_tuple(tied), boundaries, as_tuple(loads))
     check_initial(mesh, displacement=initial_displacement, velocity=initial_velocity)
     space = FemSpace(mesh, tuple(Prescribed(facets) for facets in held) + moved, as_tuple(tied), degree)
-    forms = ElasticForms(space, cell_materials(mesh, material), section, damping)
+    forms = ElasticForms(space, cell_materials(mesh, material), section, damping, selective=integration == "selective")
     forms.boundaries = boundaries
     algebra = algebra_for(space.comm.mpi, space.dimension, space.unknowns)
     absorbers = [DashpotMatrix(space, forms, one) for one in boundaries]

@@ -9,7 +9,7 @@ import numpy as np
 import ufl
 from dolfinx.mesh import Mesh
 
-from ..core.checks import flag, instance, provides, refuse, several, shown
+from ..core.checks import check_word, flag, instance, provides, refuse, several, shown
 from ..core.errors import InputError
 from ..laws.materials import Damping, LinearElastic, NoDamping, PlaneStrain, PlaneStress, Section, Solid
 from . import compat
@@ -26,7 +26,7 @@ LOCKING = 0.495  # Poisson's ratio; CHOSEN: 0.49 is common for wet soil, 0.499 i
 
 
 def check_body(
-    mesh: Any, material: Any, section: Any, damping: Any, base_inertia: Any, degree: Any = 1
+    mesh: Any, material: Any, section: Any, damping: Any, base_inertia: Any, degree: Any = 1, integration: Any = "full"
 ) -> tuple[Section, Damping]:
     """Return (section, damping), the usual for None; InputError for objects of another kind, cells of another mesh."""
     instance(OWNER, "mesh", mesh, Mesh, "give a DOLFINx mesh, such as fem.read_mesh(path, comm)[0]")
@@ -49,7 +49,9 @@ def check_body(
                          "Solid(), or leave it out")
     provides(OWNER, "damping", damping, ("coefficients",), "give Rayleigh(alpha, beta), MassProportional(c) or None")
     flag(OWNER, "base_inertia", base_inertia)
-    if degree == 1 and mesh.geometry.dim > 1 and not isinstance(section, PlaneStress) and mesh.comm.rank == 0:
+    _check_integration(mesh, section, degree, integration)
+    thick = mesh.geometry.dim > 1 and not isinstance(section, PlaneStress)
+    if degree == 1 and thick and integration == "full" and mesh.comm.rank == 0:
         _tell_locking([material] if isinstance(material, LinearElastic) else [one for _, one in material])
     return section, damping
 
@@ -75,12 +77,25 @@ def _check_degree(mesh: Mesh, degree: Any) -> None:
                          "mesh them finer, or with straight sides")
 
 
+def _check_integration(mesh: Mesh, section: Section, degree: int, integration: Any) -> None:
+    """Raise InputError for a word that is none, and where cells cannot or need not be integrated selectively."""
+    check_word("integration of assemble", integration, ("full", "selective"))
+    if integration == "full":
+        return
+    if mesh.topology.cell_type.name not in ("quadrilateral", "hexahedron"):
+        raise InputError("assemble: integration='selective' needs quadrilaterals or hexahedra, and these cells lock "
+                         "with it as without; take degree=2")
+    if degree == 2 or isinstance(section, PlaneStress):
+        raise InputError("assemble: integration='selective' is for degree=1 and bodies that cannot thin out: neither "
+                         "degree=2 nor plane stress locks; leave it out")
+
+
 def _tell_locking(materials: Sequence[LinearElastic]) -> None:
     """Warn of materials that first-order cells cannot deform without changing their volume."""
     stiff = max(one.nu for one in materials)
     if stiff > LOCKING:
-        log.warning("Poisson's ratio %.10g locks first-order cells, displacements come out too small: give at most %g",
-                    stiff, LOCKING)
+        log.warning("Poisson's ratio %.10g locks first-order cells, displacements come out too small: give at most %g, "
+                    "integration='selective' (quadrilaterals and hexahedra) or degree=2", stiff, LOCKING)
 
 
 def check_boundaries(mesh: Mesh, clamped: Any, prescribed: Any, tied: Any, dashpots: Any, loads: Any) -> None:

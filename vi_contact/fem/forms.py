@@ -15,6 +15,7 @@ from ..core.system import SemiDiscreteSystem
 from ..laws.materials import Damping, LinearElastic, Section
 from . import compat
 from .dashpots import Dashpots
+from .dilatation import MeanDilatation
 from .mesh import Cells
 from .space import FemSpace
 
@@ -22,12 +23,19 @@ Materials = LinearElastic | Sequence[tuple[Cells, LinearElastic]]
 
 
 class ElasticForms:
-    """Hold the variational forms of one body; constants are cellwise: one compiled form serves all materials."""
+    """Hold the variational forms of one body; constants are cellwise: one compiled form serves all materials.
+
+    ``selective``: tr eps is its mean over each cell, in K, in C = beta K and in stresses (``fem.dilatation``).
+    """
 
     boundaries: tuple[Dashpots, ...] = ()  # of the same system
 
-    def __init__(self, space: FemSpace, materials: list[tuple[Any, LinearElastic]], section: Section, damping: Damping):
+    def __init__(
+        self, space: FemSpace, materials: list[tuple[Any, LinearElastic]], section: Section, damping: Damping,
+        *, selective: bool = False,
+    ) -> None:
         self.space, self.section = space, section
+        self.dilatation = MeanDilatation(space.V) if selective else None
         cells = compat.cell_space(space.mesh)
         names = ("lame", "shear", "rho", "alpha_rho", "beta", "lame_out")
         self.damped = any(any(damping.coefficients(material)) for _, material in materials)
@@ -56,19 +64,31 @@ class ElasticForms:
         return "".join(name for name in names if getattr(system, name) not in (None, *self._matrices[name]))
 
     def stress(self, u: Any) -> Any:
-        """Return sigma(u) times the thickness."""
-        eps = ufl.sym(ufl.grad(u))
-        return self.fields["lame"] * ufl.tr(eps) * ufl.Identity(self.space.dimension) + 2 * self.fields["shear"] * eps
+        """Return sigma(u) times the thickness; ``follow`` when values of the Function u have changed since."""
+        trace = ufl.div(u) if self.dilatation is None else self.dilatation.of(u)
+        return self.fields["lame"] * trace * ufl.Identity(self.space.dimension) + self._deviatoric(u)
+
+    def _deviatoric(self, u: Any) -> Any:
+        return 2 * self.fields["shear"] * ufl.sym(ufl.grad(u))
+
+    def follow(self, u: Any) -> None:
+        """Bring stresses of a Function up to its values. Collective."""
+        if self.dilatation is not None:
+            self.dilatation.update(u)
 
     def matrix(self, name: str) -> Any:
         """Assemble the full matrix M, K, or C of the materials (PETSc), before elimination."""
         u, v = ufl.TrialFunction(self.space.V), ufl.TestFunction(self.space.V)
-        fields, inertia, stiffness = self.fields, ufl.inner(u, v), ufl.inner(self.stress(u), ufl.sym(ufl.grad(v)))
+        stress = self.stress if self.dilatation is None else self._deviatoric
+        fields, inertia, stiffness = self.fields, ufl.inner(u, v), ufl.inner(stress(u), ufl.sym(ufl.grad(v)))
         form = {
             "M": fields["rho"] * inertia * ufl.dx, "K": stiffness * ufl.dx,
             "C": fields["alpha_rho"] * inertia * ufl.dx + fields["beta"] * stiffness * ufl.dx,
         }[name]
-        return compat.assemble_matrix(compat.compile_form(form))
+        matrix = compat.assemble_matrix(compat.compile_form(form))
+        if self.dilatation is not None and name != "M":
+            self.dilatation.add(matrix, fields["lame"], fields["beta"] if name == "C" else None)
+        return matrix
 
 
 def cell_materials(mesh: Any, material: Materials) -> list[tuple[Any, LinearElastic]]:

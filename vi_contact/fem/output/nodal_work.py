@@ -100,6 +100,7 @@ class NodalWork:
             for k, motion in enumerate(rigid_motions(self.space.points, centre)):
                 self._r.x.array[: motion.size] = np.where(where, motion, 0.0).ravel()
                 self._r.x.scatter_forward()
+                self.space.forms.follow(self._r)
                 for own, form, away in zip(rows, forms, [None, *less], strict=True):
                     if form is not None:
                         row = compat.assemble_vector(form).array_r
