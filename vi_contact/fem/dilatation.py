@@ -38,7 +38,7 @@ class MeanDilatation:
         for modulus in (one for one in moduli if one is not None):
             density = density * modulus.x.array[: len(density)]
         weights = aij_of(sp.diags([density], [0]), matrix.comm)
-        matrix.axpy(1.0, triple_product(weights, self._integral.mat), structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        matrix.axpy(1.0, triple_product(weights, self._integral.mat), structure=PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
 
     def of(self, u: Any) -> Any:
         """Return the cellwise mean of tr eps of a Function; ``update`` follows its values."""
