@@ -11,14 +11,12 @@ Appl. Mech. Eng. 4 (1974), 153-177). On other hexahedra the mean passes the patc
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 import ufl
 from petsc4py import PETSc
 
 from ..core.algebra import Array
 from . import compat
-from .petsc_algebra import PetscMatrix, triple_product
-from .petsc_rows import aij_of
+from .petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc, triple_product
 
 
 class MeanDilatation:
@@ -37,8 +35,10 @@ class MeanDilatation:
         density = 1.0 / self._volume
         for modulus in (one for one in moduli if one is not None):
             density = density * modulus.x.array[: len(density)]
-        weights = aij_of(sp.diags([density], [0]), matrix.comm)
-        matrix.axpy(1.0, triple_product(weights, self._integral.mat), structure=PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+        every, algebra = np.arange(len(density)), PetscAlgebra(self._cells.mesh.comm)
+        weights = as_petsc(algebra.local(every, every, density, len(density))).mat
+        different = PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN
+        matrix.axpy(1.0, triple_product(weights, self._integral.mat), structure=different)
 
     def of(self, u: Any) -> Any:
         """Return the cellwise mean of tr eps of a Function; ``update`` follows its values."""
