@@ -123,7 +123,8 @@ def test_section_forces_are_those_of_the_load() -> None:
     ("bar", {"integration": "selective"}, "needs quadrilaterals or hexahedra"),
     ("quadrilaterals", {"integration": "reduced"}, "choose one of full, selective"),
     ("quadrilaterals", {"integration": None}, "choose one of full, selective"),
-    ("quadrilaterals", {"integration": "selective", "section": vc.PlaneStress()}, "plane stress does not lock"),
+    ("quadrilaterals", {"integration": "selective", "section": vc.PlaneStress()}, "nor plane stress locks"),
+    ("hexahedra", {"integration": "selective", "degree": 2}, "neither degree=2"),
 ])
 def test_wrong_uses_are_refused(name: str, data: dict[str, Any], message: str) -> None:
     mesh, _ = block(COMM, **BODIES[name])
@@ -135,6 +136,7 @@ def test_wrong_uses_are_refused(name: str, data: dict[str, Any], message: str) -
 def test_the_warning_names_the_remedy(caplog: pytest.LogCaptureFixture) -> None:
     mesh, _ = block(COMM, **BODIES["quadrilaterals"])
     fem.assemble(mesh, NEARLY, integration="selective")
+    fem.assemble(mesh, NEARLY, degree=2)
     assert not caplog.records
     fem.assemble(mesh, NEARLY)
     assert "integration='selective'" in caplog.text
