@@ -14,6 +14,8 @@ _CONTENTS = {
     "laws.materials": (
         "LinearElastic", "MassProportional", "NoDamping", "PlaneStrain", "PlaneStress", "Rayleigh", "Solid",
     ),
+    "laws.kelvin_voigt": ("KelvinVoigt",),
+    "laws.orthotropic": ("Orthotropic",),
     "core.protocols": ("Frictionless",),
     "laws.friction": ("Coulomb", "ExponentialDecay", "SlipRateCoulomb", "StaticKinetic", "Tresca"),
     "laws.impact": ("ComponentReset", "Elastic", "ImpulseUpdate", "Inelastic", "Newton"),

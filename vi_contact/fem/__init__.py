@@ -19,6 +19,7 @@ _CONTENTS = {
     "contact.pairs": ("contact_pair",),
     "contact.surface": ("contact_surface",),
     "dashpots": ("CompliantBase", "Dashpots"),
+    "heterogeneous": ("Heterogeneous",),
     "initial_stress": ("geometric_stiffness",),
     "loads": ("BodyForce", "Prescribed", "TangentialTraction", "Traction"),
     "mesh": ("Cells", "Facets", "Tags", "build_mesh", "node_numbers", "read_mesh"),

@@ -14,6 +14,7 @@ import numpy as np
 import ufl
 
 from ..core.algebra import Array, Mask, largest
+from ..core.checks import optional, whole
 from ..core.stages import stage
 from ..core.system import Load, SemiDiscreteSystem
 from ..laws.mass_transfer import rigid_motions
@@ -28,6 +29,7 @@ from .loads import ActingLoad, BodyForce, Prescribed, Traction, as_tuple, evalua
 from .mesh import Cells, Facets
 from .petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc
 from .petsc_rows import moved
+from .quadrature import compiled
 from .space import FemSpace
 from .ties import Tied
 
@@ -41,36 +43,36 @@ def assemble(
     prescribed: Prescribed | Sequence[Prescribed] = (), tied: Tied | Sequence[Tied] = (),
     dashpots: Dashpots | Sequence[Dashpots] = (), loads: Traction | BodyForce | Sequence[Traction | BodyForce] = (),
     damping: Damping | None = None, initial_displacement: Initial = None, initial_velocity: Initial = None,
-    base_inertia: bool = True, degree: int = 1, integration: str = "full",
+    base_inertia: bool = True, quadrature_degree: int | None = None,
 ) -> SemiDiscreteSystem:
     """Assemble the system of a body, on the free unknowns.
 
     Args:
-        mesh: DOLFINx mesh (``read_mesh``), cells of first order or, with degree 2, of second order too.
-        degree: of the displacement in each cell: 1 for P1 or Q1, 2 for P2 or Q2 (docs/guide/second_order.md).
-        material: one material, or (cells, material) pairs that cover the mesh.
+        mesh: DOLFINx mesh (``read_mesh``), first-order cells; unknowns are P1 or Q1.
+        material: LinearElastic, Orthotropic or fem.Heterogeneous, or (cells, material) pairs that cover the mesh.
         section: PlaneStrain() by default in 2D (Solid() in 3D); PlaneStress(thickness) for panels.
         clamped: facets with u = 0; prescribed: facets that move (eq. 3) or are held in some components.
         dashpots: absorbing boundaries: Dashpots, CompliantBase, soil.FreeField. Their loss counts as damping.
         tied: boundaries whose opposite nodes move together; loads: tractions (eqs. 4, 6) and body forces.
-        damping: NoDamping() by default, MassProportional(c) (eq. 7) or Rayleigh.
+        damping: NoDamping() by default, MassProportional(c) (eq. 7), Rayleigh or KelvinVoigt.
         base_inertia: whether a ground motion's inertia load counts the mass that elements share with prescribed nodes,
             as it must to be the motion seen from the ground; False is the load of docs/start/first_wall.md.
-        integration: "full", or "selective" for nearly incompressible bodies of quadrilaterals or hexahedra: each cell
-            takes tr eps as its mean (``fem.dilatation``).
         initial_displacement, initial_velocity: constant or points (k, d) -> (k, d) (eqs. 10, 10a), or (cells, value)
             pairs for several bodies; the later pair counts where cells meet, zero where there are none.
+        quadrature_degree: of all integrals over cells and facets; as UFL estimates it when None, which is exact on
+            cells with parallel sides.
     Raises:
-        InputError: cells without material, of an order that the degree does not suit, or folded; NaN in data,
-            components that do not exist, dashpots on what is held, groups of another mesh or kind, other displacements
-            prescribed on the same facets.
+        InputError: cells without material, NaN in data, components that do not exist, dashpots on what is held, groups
+            of another mesh or kind, other displacements prescribed on the same facets.
     """
-    section, damping = check_body(mesh, material, section, damping, base_inertia, degree, integration)
+    section, damping = check_body(mesh, material, section, damping, base_inertia)
     held, moved, boundaries = as_tuple(clamped), as_tuple(prescribed), as_tuple(dashpots)
     check_boundaries(mesh, held, moved, as_tuple(tied), boundaries, as_tuple(loads))
     check_initial(mesh, displacement=initial_displacement, velocity=initial_velocity)
-    space = FemSpace(mesh, tuple(Prescribed(facets) for facets in held) + moved, as_tuple(tied), degree)
-    forms = ElasticForms(space, cell_materials(mesh, material), section, damping, selective=integration == "selective")
+    optional(whole, "assemble", "quadrature_degree", quadrature_degree)
+    space = FemSpace(mesh, tuple(Prescribed(facets) for facets in held) + moved, as_tuple(tied))
+    space.quadrature_degree = quadrature_degree
+    forms = ElasticForms(space, cell_materials(mesh, material), section, damping)
     forms.boundaries = boundaries
     algebra = algebra_for(space.comm.mpi, space.dimension, space.unknowns)
     absorbers = [DashpotMatrix(space, forms, one) for one in boundaries]
@@ -136,7 +138,7 @@ def _integrated(space: FemSpace, section: Section, load: ActingLoad) -> Callable
     """t -> Pᵀ ∫ interpolated value · v, as one product with a matrix assembled here."""
     g, v = ufl.TrialFunction(space.V), ufl.TestFunction(space.V)
     form = ufl.inner(load.acting(g, space.mesh), v) * load.measure(space.mesh)
-    matrix = PetscMatrix(compat.assemble_matrix(compat.compile_form(form)))
+    matrix = PetscMatrix(compat.assemble_matrix(compiled(space, form)))
 
     def at(t: float) -> Array:
         values = evaluate(type(load).__name__, load.value, space.points, t, space.comm)

@@ -29,6 +29,7 @@ from . import compat
 from .groups import components_of, facets_of
 from .mesh import Facets
 from .petsc_algebra import PetscMatrix
+from .quadrature import compiled
 from .space import FemSpace
 
 log = logging.getLogger(__name__)
@@ -106,10 +107,15 @@ class DashpotMatrix:
 
     def __init__(self, space: FemSpace, forms: Any, dashpots: Dashpots) -> None:
         self.space, self.dashpots = space, dashpots
-        moduli = (forms.fields[name].x.array for name in ("lame", "shear", "rho"))  # times the thickness
+        own = dashpots.material is not None
+        if not own and not forms.fields:
+            raise InputError(f"dashpots on '{dashpots.facets.name}' need a density and wave speeds, and forms=… tell "
+                             f"none: give {type(dashpots).__name__}(…, material=), or a material beside the forms")
+        cells = compat.cell_space(space.mesh) if own else forms.fields["rho"].function_space
+        moduli = (0.0 if own else forms.fields[name].x.array for name in ("lame", "shear", "rho"))  # times thickness
         cellwise = []
         for values in impedances(dashpots, forms.section, *moduli):
-            cellwise.append(compat.function(compat.cell_space(space.mesh)))
+            cellwise.append(compat.function(cells))
             cellwise[-1].x.array[:] = values
         self._normal, self._tangential = cellwise
         self.mat = self._matrix(dashpots.facets.indices)
@@ -122,7 +128,7 @@ class DashpotMatrix:
         along = ufl.dot(u, n) * ufl.dot(v, n)
         density = self._normal * along + self._tangential * (ufl.inner(u, v) - along)
         measure = compat.measure(self.space.mesh, self.space.mesh.topology.dim - 1, facets)
-        return compat.assemble_matrix(compat.compile_form(density * measure))
+        return compat.assemble_matrix(compiled(self.space, density * measure))
 
     def _resistance(self, mat: Any) -> Array:
         """∫ e_c·D e_c of every direction c, on all ranks."""
@@ -131,6 +137,9 @@ class DashpotMatrix:
 
     def _refuse_held(self) -> None:
         name, total = self.dashpots.facets.name, self._resistance(self.mat).sum()
+        if np.isnan(total):
+            raise InputError(f"dashpots on '{name}' stand beside orthotropic cells, whose waves have no one speed: "
+                             f"give {type(self.dashpots).__name__}(…, material=)")
         if total == 0.0:
             raise InputError(f"dashpots on '{name}' resist nothing: choose facets of the outer boundary and a positive "
                              "factor")

@@ -1,6 +1,8 @@
 """State the variational forms of a linear elastic body from its materials.
 
     sigma = lambda_eff tr(eps) I + 2 mu eps,   M = ∫ rho u·v,   K = ∫ sigma(u):eps(v),   C = alpha M + beta K
+
+Orthotropic cells have sigma = C eps instead, KelvinVoigt damping adds its viscous stresses to C.
 """
 
 from collections.abc import Sequence
@@ -10,47 +12,64 @@ from weakref import WeakSet
 import numpy as np
 import ufl
 
+from ..core.algebra import Array
 from ..core.errors import InputError
 from ..core.system import SemiDiscreteSystem
-from ..laws.materials import Damping, LinearElastic, Section
+from ..laws.materials import Damping, ElasticValues, LinearElastic, Section
+from ..laws.orthotropic import VOIGT, Orthotropic
 from . import compat
 from .dashpots import Dashpots
-from .dilatation import MeanDilatation
+from .heterogeneous import Heterogeneous
 from .mesh import Cells
+from .quadrature import compiled
 from .space import FemSpace
 
-Materials = LinearElastic | Sequence[tuple[Cells, LinearElastic]]
+Material = LinearElastic | Orthotropic | Heterogeneous
+Materials = Material | Sequence[tuple[Cells, Material]]
+KINDS = (LinearElastic, Orthotropic, Heterogeneous)
 
 
 class ElasticForms:
     """Hold the variational forms of one body; constants are cellwise: one compiled form serves all materials.
 
-    ``selective``: tr eps is its mean over each cell, in K, in C = beta K and in stresses (``fem.dilatation``).
+    Attributes:
+        fields: lame, shear, rho, alpha_rho, lame_out times the section's thickness, and beta: functions of DG0, of DG1
+            where a material changes inside of cells. Lamé constants are NaN in orthotropic cells.
+        damped: whether there is a C; densities: whether ``fields`` tell the mass and its damping, cell by cell.
     """
 
     boundaries: tuple[Dashpots, ...] = ()  # of the same system
+    densities = True
 
     def __init__(
-        self, space: FemSpace, materials: list[tuple[Any, LinearElastic]], section: Section, damping: Damping,
-        *, selective: bool = False,
+        self, space: FemSpace, materials: list[tuple[Any, Material]], section: Section, damping: Damping
     ) -> None:
         self.space, self.section = space, section
-        self.dilatation = MeanDilatation(space.V) if selective else None
-        cells = compat.cell_space(space.mesh)
-        names = ("lame", "shear", "rho", "alpha_rho", "beta", "lame_out")
-        self.damped = any(any(damping.coefficients(material)) for _, material in materials)
-        self.fields = {name: compat.function(cells) for name in names}
-        if not self.damped:
-            self.fields["alpha_rho"] = self.fields["beta"]  # zeros
-        for indices, material in materials:
-            lame, shear = section.elastic_constants(material)
-            alpha, beta = damping.coefficients(material)
-            # sigma_zz = lambda tr(eps) in plane strain, 0 in plane stress: only von Mises stress needs it
-            lame_out = lame if lame == material.lame_lambda and space.dimension == 2 else 0.0
-            values = (lame, shear, material.rho, alpha * material.rho, beta, lame_out)
-            for name, value in zip(names, values, strict=True):
-                self.fields[name].x.array[indices] = section.thickness * value if name != "beta" else value
+        self.u, self.v = ufl.TrialFunction(space.V), ufl.TestFunction(space.V)
         self._matrices: dict[str, WeakSet[Any]] = {name: WeakSet() for name in ("M", "C", "K")}
+        found = [material for _, material in materials]
+        degree = int(any(isinstance(one, Heterogeneous) and one.varies for one in found))
+        cells = compat.cell_space(space.mesh, degree)
+        names = ("lame", "shear", "rho", "alpha_rho", "beta", "lame_out")
+        values = [_constants(cells, where, one) for where, one in materials]
+        self.viscous = _viscous(damping)
+        self.damped = self.viscous is not None or any(np.any(damping.coefficients(one)) for one in values)
+        self.fields = {name: compat.function(cells) for name in names} if materials else {}
+        if not self.damped and materials:
+            self.fields["alpha_rho"] = self.fields["beta"]  # zeros
+        for (where, _), one in zip(materials, values, strict=True):
+            dofs = compat.cell_dofs(cells)[where]
+            for name, value in zip(names, _fields(one, section, damping, space.dimension), strict=True):
+                value = section.thickness * value if name != "beta" else value
+                self.fields[name].x.array[dofs] = value[dofs] if np.ndim(value) else value
+        self._anisotropic: Any = None
+        if any(isinstance(one, Orthotropic) for one in found):
+            self._anisotropic = _anisotropic(cells, degree, materials, self.fields, section, space.dimension)
+
+    def cellwise(self, name: str) -> Array:
+        """Return the means of a field over the local cells, (cells,)."""
+        field = self.fields[name]
+        return np.asarray(field.x.array[compat.cell_dofs(field.function_space)].mean(axis=1))
 
     def own(self, system: SemiDiscreteSystem) -> None:
         """Remember the matrices of a system as made of these materials; the forms are then those of its space."""
@@ -64,38 +83,99 @@ class ElasticForms:
         return "".join(name for name in names if getattr(system, name) not in (None, *self._matrices[name]))
 
     def stress(self, u: Any) -> Any:
-        """Return sigma(u) times the thickness; ``follow`` when values of the Function u have changed since."""
-        trace = ufl.div(u) if self.dilatation is None else self.dilatation.of(u)
-        return self.fields["lame"] * trace * ufl.Identity(self.space.dimension) + self._deviatoric(u)
+        """Return sigma(u) (d, d) times the thickness; None where nothing tells the stresses."""
+        eps, d = ufl.sym(ufl.grad(u)), self.space.dimension
+        if self._anisotropic is not None:
+            flat, place = self._flat_stress(eps), {pair: k for k, pair in enumerate(VOIGT[d])}
+            return ufl.as_tensor([[flat[place[min(i, j), max(i, j)]] for j in range(d)] for i in range(d)])
+        return self.fields["lame"] * ufl.tr(eps) * ufl.Identity(d) + 2 * self.fields["shear"] * eps
 
-    def _deviatoric(self, u: Any) -> Any:
-        return 2 * self.fields["shear"] * ufl.sym(ufl.grad(u))
+    def stress_across(self, u: Any) -> Any:
+        """Return sigma_zz(u) times the thickness of a body in the plane, 0 in plane stress; elsewhere zero."""
+        eps = ufl.sym(ufl.grad(u))
+        if self._anisotropic is not None and self.space.dimension == 2:
+            return self._flat_stress(eps)[3]
+        return self.fields["lame_out"] * ufl.tr(eps)
 
-    def follow(self, u: Any) -> None:
-        """Bring stresses of a Function up to its values. Collective."""
-        if self.dilatation is not None:
-            self.dilatation.update(u)
+    def _flat_stress(self, eps: Any) -> Any:
+        """Stresses in the order of VOIGT, in the plane with sigma_zz."""
+        pairs = VOIGT[self.space.dimension]
+        return ufl.dot(self._anisotropic, ufl.as_vector([eps[i, j] if i == j else 2 * eps[i, j] for i, j in pairs]))
 
-    def matrix(self, name: str) -> Any:
-        """Assemble the full matrix M, K, or C of the materials (PETSc), before elimination."""
-        u, v = ufl.TrialFunction(self.space.V), ufl.TestFunction(self.space.V)
-        stress = self.stress if self.dilatation is None else self._deviatoric
-        fields, inertia, stiffness = self.fields, ufl.inner(u, v), ufl.inner(stress(u), ufl.sym(ufl.grad(v)))
+    def bilinear(self, name: str) -> Any:
+        """Return the form of M, K, or C of the materials in the trial function ``u`` and the test function ``v``."""
+        u, v = self.u, self.v
+        fields, inertia, stiffness = self.fields, ufl.inner(u, v), ufl.inner(self.stress(u), ufl.sym(ufl.grad(v)))
         form = {
             "M": fields["rho"] * inertia * ufl.dx, "K": stiffness * ufl.dx,
             "C": fields["alpha_rho"] * inertia * ufl.dx + fields["beta"] * stiffness * ufl.dx,
         }[name]
-        matrix = compat.assemble_matrix(compat.compile_form(form))
-        if self.dilatation is not None and name != "M":
-            self.dilatation.add(matrix, fields["lame"], fields["beta"] if name == "C" else None)
-        return matrix
+        return form + self._viscous_form() if name == "C" and self.viscous else form
+
+    def _viscous_form(self) -> Any:
+        """∫ of the viscous stresses of KelvinVoigt."""
+        lame, shear = (compat.constant(self.space.mesh, self.section.thickness * one) for one in self.viscous or ())
+        rate, strain = (ufl.sym(ufl.grad(one)) for one in (self.u, self.v))
+        return (lame * ufl.tr(rate) * ufl.tr(strain) + 2 * shear * ufl.inner(rate, strain)) * ufl.dx
+
+    def matrix(self, name: str) -> Any:
+        """Assemble the full matrix M, K, or C of the materials (PETSc), before elimination."""
+        return compat.assemble_matrix(compiled(self.space, self.bilinear(name)))
 
 
-def cell_materials(mesh: Any, material: Materials) -> list[tuple[Any, LinearElastic]]:
+def _constants(space: Any, cells: Any, material: Material) -> Any:
+    """The material, or its values at all unknowns of the space where it is given by functions or has no Lamé constants.
+    Collective."""
+    if isinstance(material, Heterogeneous):
+        return material.at(space, cells)
+    return ElasticValues(np.nan, np.nan, material.rho) if isinstance(material, Orthotropic) else material
+
+
+def _viscous(damping: Damping) -> tuple[float, float] | None:
+    """(lambda_v, mu_v) [Pa s] of viscous stresses; None where there are none."""
+    found: tuple[float, float] | None = getattr(damping, "viscosities", None)
+    return found if found and any(found) else None
+
+
+def _fields(one: Any, section: Section, damping: Damping, dimension: int) -> tuple[Any, ...]:
+    lame, shear = section.elastic_constants(one)
+    alpha, beta = damping.coefficients(one)
+    # sigma_zz = lambda tr(eps) in plane strain, 0 in plane stress: only von Mises stress needs it
+    lame_out = lame if np.array_equal(lame, one.lame_lambda) and dimension == 2 else 0.0
+    return lame, shear, one.rho, alpha * one.rho, beta, lame_out
+
+
+def _anisotropic(
+    cells: Any, degree: int, materials: list[tuple[Any, Material]], fields: dict[str, Any], section: Section, d: int
+) -> Any:
+    """The matrix of all cells (see ``Orthotropic.matrix``) times the thickness, as a function."""
+    if d == 1:
+        raise InputError("Orthotropic has no meaning on a line: give a LinearElastic")
+    found = compat.function(compat.cell_space(cells.mesh, degree, (len(VOIGT[d]) + (d == 2), len(VOIGT[d]))))
+    values = found.x.array.reshape(len(fields["lame"].x.array), -1, len(VOIGT[d]))
+    for where, one in materials:
+        dofs = np.ravel(compat.cell_dofs(cells)[where])
+        if isinstance(one, Orthotropic):
+            values[dofs] = section.thickness * one.matrix(section, d)
+        else:
+            lame, shear, out = (fields[name].x.array[dofs][:, None, None] for name in ("lame", "shear", "lame_out"))
+            values[dofs] = _isotropic(lame, shear, out, d)
+    return found
+
+
+def _isotropic(lame: Array, shear: Array, out: Array, d: int) -> Array:
+    """Return the same matrix for isotropic constants (k, 1, 1)."""
+    trace = np.array([float(i == j) for i, j in VOIGT[d]])
+    whole = lame * np.outer(trace, trace) + shear * np.diag(1.0 + trace)
+    across = np.broadcast_to(out * trace, (len(whole), 1, len(trace)))
+    return np.concatenate([whole, across], axis=1) if d == 2 else whole
+
+
+def cell_materials(mesh: Any, material: Materials) -> list[tuple[Any, Material]]:
     """Return (local cells, material) pairs that cover every local cell once; InputError for cells with none or two."""
     cell_map = mesh.topology.index_map(mesh.topology.dim)
     count = cell_map.size_local + cell_map.num_ghosts
-    if isinstance(material, LinearElastic):
+    if isinstance(material, KINDS):
         return [(np.arange(count), material)]
     covered = np.zeros(count, dtype=np.int64)
     for cells, _ in material:

@@ -24,6 +24,7 @@ from ..core.step import State
 from ..core.system import Load, SemiDiscreteSystem
 from . import compat
 from .petsc_algebra import PetscMatrix
+from .quadrature import compiled
 from .space import FemSpace, known_matrices, space_of
 
 
@@ -70,7 +71,7 @@ def initial_stress_matrix(space: FemSpace, nodal: Array) -> Any:
     u, v = ufl.TrialFunction(space.V), ufl.TestFunction(space.V)
     sigma = forms.stress(u0)
     form = ufl.inner(ufl.dot(ufl.grad(u), sigma), ufl.grad(v)) * ufl.dx
-    return compat.assemble_matrix(compat.compile_form(form))
+    return compat.assemble_matrix(compiled(space, form))
 
 
 def _with_prescribed(space: FemSpace, full: PetscMatrix, load: Load, t0: float) -> Load:

@@ -5,7 +5,7 @@ Everything here is a frozen value checked when it is built; SI units throughout;
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from typing import Any, ClassVar, Protocol
 
 from ..core.checks import number
 from ..core.errors import InputError
@@ -70,6 +70,17 @@ class LinearElastic:
     def c_s(self) -> float:
         """Return the shear wave speed sqrt(shear_modulus / rho) [m/s]."""
         return math.sqrt(self.shear_modulus / self.rho)
+
+
+@dataclass(frozen=True)
+class ElasticValues:
+    """Hold E [Pa], nu and rho [kg/m³] at points, (k,) each or one for all; sections and damping take them alike."""
+
+    E: Any
+    nu: Any
+    rho: Any
+    lame_lambda = LinearElastic.lame_lambda
+    shear_modulus = LinearElastic.shear_modulus
 
 
 class Section(Protocol):

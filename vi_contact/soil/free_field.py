@@ -143,11 +143,15 @@ def _column(space: FemSpace, forms: Any, given: FreeField) -> tuple[SoilColumn, 
     cells = np.array([mesh.topology.connectivity(1, 2).links(facet)[0] for facet in owned], dtype=np.int64)
     ends = mesh.geometry.x[compat.entities_to_geometry(mesh, 1, owned)][:, :, :2]
     middles = np.array([mesh.geometry.x[compat.geometry_dofmap(mesh)[cell], 0].mean() for cell in cells])
-    values = [forms.fields[key].x.array[cells] for key in ("lame", "shear", "rho", "alpha_rho", "beta")]
+    _refuse_unlike(forms, name)
+    values = [forms.cellwise(key)[cells] for key in ("lame", "shear", "rho", "alpha_rho", "beta")]
     low, high = ends[:, :, 1].min(axis=1), ends[:, :, 1].max(axis=1)
     mine = np.column_stack([low, high, *values, ends[:, 0, 0], ends[:, 1, 0], middles]).reshape(-1, 10)
     rows = np.concatenate(space.comm.bcast(space.comm.gather(mine)))
     rows = rows[np.argsort(rows[:, 0])]
+    if np.isnan(rows).any():
+        raise InputError(f"free-field side '{name}' stands beside orthotropic cells, of which its column cannot be: "
+                         "put a LinearElastic there, or Dashpots(…, material=)")
     x, close = rows[:, 7:9], 1e-9 * space.size
     if np.ptp(x) > close or np.any(np.abs(rows[1:, 0] - rows[:-1, 1]) > close):
         raise InputError(f"free-field side '{name}' is not one vertical line of facets: give a straight side of "
@@ -155,3 +159,10 @@ def _column(space: FemSpace, forms: Any, given: FreeField) -> tuple[SoilColumn, 
     lame, shear, rho, alpha_rho, beta = rows[:, 2:7].T
     column = SoilColumn(np.append(rows[:, 0], rows[-1, 1]), lame, shear, rho, alpha_rho / rho, beta)
     return column, 1.0 if x[0, 0] > rows[0, 9] else -1.0
+
+
+def _refuse_unlike(forms: Any, name: str) -> None:
+    """Raise InputError where the column could not be what the body is beside it."""
+    if forms.viscous or not forms.fields:
+        what = "of Rayleigh damping only, not KelvinVoigt" if forms.fields else "of materials, and forms=… tell none"
+        raise InputError(f"free-field side '{name}': its column is {what}: put Dashpots(…, material=) there")

@@ -22,6 +22,7 @@ from ...core.step import Report, State
 from .. import compat
 from ..groups import facets_of
 from ..loads import BodyForce, Traction, as_tuple, evaluate
+from ..quadrature import compiled
 from ..space import known_matrices, space_of
 
 log = logging.getLogger(__name__)
@@ -61,22 +62,19 @@ class NodalWork:
         if self._gravity.shape != (space.dimension,):
             raise InputError(f"gravity has {self._gravity.size} components: give {space.dimension}")
         self._r, self._inside = compat.function(space.V), compat.function(compat.cell_space(space.mesh))
-        self._forms = [None if form is None else compat.compile_form(form) for form in self._motions()]
+        self._forms = [self._motion(name) if name != "C" or space.forms.damped else None for name in ("K", "C", "M")]
         g, mesh, factor = ufl.TestFunction(space.V), space.mesh, space.forms.section.thickness * self._inside
         self._load_forms = [  # their products with nodal values of the loads are rᵀf
-            compat.compile_form(factor * ufl.inner(self._r, load.acting(g, mesh)) * load.measure(mesh))
+            compiled(space, factor * ufl.inner(self._r, load.acting(g, mesh)) * load.measure(mesh))
             for load in self._loads
         ]
         self._tell_constant_loads(owner)
 
-    def _motions(self) -> tuple[Any, Any | None, Any]:
-        """(K r, C r, M r) of the cells inside, as linear forms."""
-        forms, w, r, inside = self.space.forms, ufl.TestFunction(self.space.V), self._r, self._inside
-        strain = ufl.inner(forms.stress(r), ufl.sym(ufl.grad(w)))
-        mass = ufl.inner(r, w)
-        fields = forms.fields
-        damping = inside * (fields["alpha_rho"] * mass + fields["beta"] * strain) * ufl.dx if forms.damped else None
-        return inside * strain * ufl.dx, damping, inside * fields["rho"] * mass * ufl.dx
+    def _motion(self, name: str) -> Any:
+        """rᵀA of the cells inside, A = K, C or M, as a linear form: its bilinear form with r as test function."""
+        forms = self.space.forms
+        form = ufl.replace(forms.bilinear(name), {forms.u: forms.v, forms.v: self._inside * self._r})
+        return compiled(self.space, form)
 
     def _tell_constant_loads(self, owner: str) -> None:
         """Warn when the system has constant loads and none were given: who forgets the weight measures reactions that
@@ -90,17 +88,19 @@ class NodalWork:
 
     def take(self, parts: Sequence[Rigid]) -> None:
         """Take the rigid motions of each part as r, one after the other. Collective."""
-        forms, constants = [*self._forms, *self._load_forms], self.space.forms.fields
-        densities = [(constants[name].x.array, None) for name in ("alpha_rho", "rho")]
-        densities += [(self.space.forms.section.thickness, load) for load in self._loads]
+        forms, ours = [*self._forms, *self._load_forms], self.space.forms
+        if not ours.densities and any(beyond for *_, beyond in parts):
+            raise InputError("a section goes through elements, and forms=… do not tell the mass of their parts: let it "
+                             "run along element sides, or leave the mass to the density of a material beside the forms")
+        densities = [(ours.cellwise(name), None) if ours.densities else None for name in ("alpha_rho", "rho")]
+        densities += [(ours.section.thickness, load) for load in self._loads]
         rows: list[list[Any]] = [[] for _ in forms]
         for where, centre, cells, beyond in parts:
             self._inside.x.array[:] = 1.0 if cells is None else cells
-            less = [beyond and beyond(*density) for density in densities]
+            less = [beyond and beyond(*density) for density in densities]  # type: ignore[misc]
             for k, motion in enumerate(rigid_motions(self.space.points, centre)):
                 self._r.x.array[: motion.size] = np.where(where, motion, 0.0).ravel()
                 self._r.x.scatter_forward()
-                self.space.forms.follow(self._r)
                 for own, form, away in zip(rows, forms, [None, *less], strict=True):
                     if form is not None:
                         row = compat.assemble_vector(form).array_r

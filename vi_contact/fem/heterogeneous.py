@@ -1,0 +1,100 @@
+"""Describe a material that changes from place to place, by functions."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from ..core.algebra import Array, Indices, Mask
+from ..core.checks import at, on_all, refuse, shown
+from ..core.checks import number as number_given
+from ..core.errors import InputError
+from ..laws.materials import ElasticValues
+from . import compat
+from .communicators import MpiComm
+
+Values = Any  # a number, a scalar DOLFINx Function, or a function of points (3, k)
+RANGES: dict[str, tuple[str, float, float, str]] = {
+    "E": ("Young's modulus E [Pa]", 0.0, np.inf, "values above zero"),
+    "nu": ("Poisson's ratio nu", -1.0, 0.5, "values between -1 and 0.5, both excluded"),
+    "rho": ("the mass density rho [kg/m³]", 0.0, np.inf, "values above zero"),
+}
+
+
+@dataclass(frozen=True)
+class Heterogeneous:
+    """Describe isotropic elasticity with E(x) [Pa], nu(x) and rho(x) [kg/m³].
+
+    Each is a number, a scalar DOLFINx Function on the mesh of the body, or a function of points x (3, k) [m] that
+    returns values (k,), as ``Function.interpolate`` takes it (an expression of UFL: interpolate it into a Function).
+
+    A Function that is constant on every cell is taken as it is. Of all others the Lamé constants and rho are taken at
+    the vertices of every cell and are linear in it (DG1), so that E and rho may be linear exactly. Where the material
+    jumps inside of a function, at a side of a cell, vertices cannot tell which side is meant: give (cells, material)
+    pairs or a Function of DG0. The body keeps the values of the moment when it is assembled.
+
+    Raises InputError: neither number nor function; and when a body is assembled, values outside E > 0, -1 < nu < 1/2,
+    rho > 0, with the first place of them, and Functions of another mesh.
+    """
+
+    E: Values
+    nu: Values
+    rho: Values
+
+    def __post_init__(self) -> None:
+        for name, (words, low, high, remedy) in RANGES.items():
+            value = getattr(self, name)
+            if _is_function(value):
+                if value.ufl_shape:
+                    raise InputError(f"Heterogeneous: {words} is a Function of shape {value.ufl_shape}; give a scalar "
+                                     "one")
+                continue
+            given = callable(value) and not isinstance(value, type)
+            if not given and not low < number_given("Heterogeneous", words, value) < high:
+                raise InputError(f"Heterogeneous: {words} is {shown(value)}; give {remedy}")
+
+    @property
+    def varies(self) -> bool:
+        """Return whether something changes inside of cells."""
+        return any(callable(one) and not _on_cells(one) for one in (self.E, self.nu, self.rho))
+
+    def at(self, space: Any, cells: Indices) -> ElasticValues:
+        """Return the constants at all unknowns of a DG0 or DG1 space. InputError, on all ranks, for values on these
+        cells that no material has. Collective."""
+        comm = MpiComm(space.mesh.comm)
+        mine = np.zeros(len(compat.function(space).x.array), dtype=bool)
+        mine[compat.cell_dofs(space)[cells]] = True
+        values = {name: _values(words, getattr(self, name), space, comm) for name, (words, *_) in RANGES.items()}
+        refuse(_defects(values, mine, space), comm)
+        return ElasticValues(**values)
+
+
+def _is_function(value: Any) -> bool:
+    return hasattr(value, "function_space") and hasattr(value, "x")
+
+
+def _on_cells(value: Any) -> bool:
+    """Whether it is a Function that is constant on every cell."""
+    return _is_function(value) and int(value.function_space.dofmap.dof_layout.num_dofs) == 1
+
+
+def _values(words: str, value: Values, space: Any, comm: MpiComm) -> Array:
+    found = compat.function(space)
+    if not callable(value):
+        found.x.array[:] = value
+        return np.array(found.x.array)
+    if _is_function(value) and value.function_space.mesh is not space.mesh:
+        raise InputError(f"Heterogeneous: {words} is a Function on another mesh; give one on the mesh of the body")
+    on_all(comm, f"Heterogeneous: {words}", partial(found.interpolate, value))
+    return np.array(found.x.array)
+
+
+def _defects(values: dict[str, Array], mine: Mask, space: Any) -> Iterator[str]:
+    """What is wrong with the values of this rank."""
+    for name, (words, low, high, remedy) in RANGES.items():
+        wrong = np.flatnonzero(mine & ~((values[name] > low) & (values[name] < high)))
+        if len(wrong):
+            place = space.tabulate_dof_coordinates()[wrong[0], : space.mesh.geometry.dim]
+            yield f"Heterogeneous: {words} is {values[name][wrong[0]]:g} at {at(place)}; give {remedy}"

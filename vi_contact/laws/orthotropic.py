@@ -1,0 +1,108 @@
+"""Describe orthotropic elasticity: nine engineering constants along three material axes at right angles."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from ..core.algebra import Array
+from ..core.checks import array, number
+from ..core.errors import InputError
+from .materials import PlaneStress, Section
+
+NORMAL, SHEAR = ("1", "2", "3"), ("12", "13", "23")
+DEFINITE = 1e-12  # the least eigenvalue of the scaled compliance, whose diagonal is one
+ROUND_OFF = 1e-12
+VOIGT = {2: ((0, 0), (1, 1), (0, 1)), 3: ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))}
+"""Components of a symmetric tensor as a vector, by dimension; of strains 2 eps_ij where i != j."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Orthotropic:
+    """Describe orthotropic elasticity along material axes 1, 2, 3 at right angles.
+
+        eps_ii = sigma_ii / E_i - sum_j (nu_ij / E_i) sigma_jj,   nu_ji / E_j = nu_ij / E_i,   sigma_ij = 2 G_ij eps_ij
+
+    with i != j: nu_ij is the contraction along j under a stress along i alone.
+
+    Args:
+        E1, E2, E3: Young's moduli [Pa] > 0; G12, G13, G23: shear moduli [Pa] > 0; rho: mass density [kg/m³] > 0.
+        nu12, nu13, nu23: Poisson's ratios.
+        axes: the angle [rad] from x to axis 1, anticlockwise about z, which is axis 3; or a rotation matrix (3, 3)
+            whose columns are the axes 1, 2, 3. A body in the plane needs z among the axes.
+    Raises:
+        InputError: a modulus or density that is not positive, ratios with which some strain would have negative energy,
+            axes that are no rotation.
+    """
+
+    E1: float
+    E2: float
+    E3: float
+    nu12: float
+    nu13: float
+    nu23: float
+    G12: float
+    G13: float
+    G23: float
+    rho: float
+    axes: float | Sequence[Sequence[float]] = 0.0
+
+    def __post_init__(self) -> None:
+        for name in (*(f"E{i}" for i in NORMAL), *(f"G{ij}" for ij in SHEAR), "rho"):
+            number("Orthotropic", name, getattr(self, name), positive=True)
+        for name in (f"nu{ij}" for ij in SHEAR):
+            number("Orthotropic", name, getattr(self, name))
+        root = np.sqrt([self.E1, self.E2, self.E3])
+        if np.linalg.eigvalsh(root[:, None] * self._compliance * root)[0] < DEFINITE:
+            raise InputError(f"Orthotropic: with nu12 = {self.nu12:g}, nu13 = {self.nu13:g} and nu23 = {self.nu23:g} "
+                             "some strain has no positive energy at these moduli; give ratios nu_ij well below "
+                             "sqrt(E_i / E_j)")
+        Q = self._rotation
+        if not np.allclose(Q.T @ Q, np.eye(3), atol=1e-9) or np.linalg.det(Q) < 0.0:
+            raise InputError("Orthotropic: axes is no rotation; give an angle [rad], or a matrix whose columns are "
+                             "right-handed unit vectors at right angles")
+
+    @property
+    def _compliance(self) -> Array:
+        """Return (3, 3) strains along the axes under unit stresses along them [1/Pa]."""
+        a, b, c = -self.nu12 / self.E1, -self.nu13 / self.E1, -self.nu23 / self.E2
+        return np.array([[1.0 / self.E1, a, b], [a, 1.0 / self.E2, c], [b, c, 1.0 / self.E3]])
+
+    @property
+    def _rotation(self) -> Array:
+        """Return Q (3, 3), whose columns are the material axes."""
+        if np.ndim(self.axes):
+            return array("Orthotropic", "axes", self.axes, (3, 3))
+        c, s = (f(number("Orthotropic", "the angle [rad] of the axes", self.axes)) for f in (np.cos, np.sin))
+        return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+    @property
+    def stiffness(self) -> Array:
+        """Return C (3, 3, 3, 3) [Pa] of sigma_ij = C_ijkl eps_kl along x, y, z."""
+        C = np.zeros((3, 3, 3, 3))
+        for (i, j), value in np.ndenumerate(np.linalg.inv(self._compliance)):
+            C[i, i, j, j] = value
+        for (i, j), G in zip(((0, 1), (0, 2), (1, 2)), (self.G12, self.G13, self.G23), strict=True):
+            for p, q in product(((i, j), (j, i)), repeat=2):
+                C[p + q] = G
+        Q = self._rotation
+        return np.einsum("ip,jq,kr,ls,pqrs->ijkl", Q, Q, Q, Q, C, optimize=True)
+
+    def matrix(self, section: Section, dimension: int) -> Array:
+        """Return the stresses (rows in the order of ``VOIGT``, in the plane then sigma_zz) of unit strains [Pa].
+
+        (4, 3) in the plane, (6, 6) in space; InputError for material axes that leave the plane, and on a line.
+        """
+        if dimension not in VOIGT:
+            raise InputError("Orthotropic has no meaning on a line: give a LinearElastic")
+        C = self.stiffness
+        if dimension == 2:
+            out = np.abs(C[:, :, :2, 2])[[0, 1, 0, 2], [0, 1, 1, 2]]  # shear across the plane by strains in it
+            if out.max() > ROUND_OFF * C.max():
+                raise InputError("Orthotropic: a body in the plane would leave it, for z is none of the material axes; "
+                                 "give the angle of axis 1 in the plane")
+            if isinstance(section, PlaneStress):
+                C = C - np.einsum("ij,kl->ijkl", C[:, :, 2, 2], C[2, 2]) / C[2, 2, 2, 2]
+        rows = VOIGT[dimension] if dimension == 3 else (*VOIGT[2], (2, 2))
+        return np.array([[C[row + column] for column in VOIGT[dimension]] for row in rows])
