@@ -360,7 +360,7 @@ def runs() -> Table:
             "record": recorded, "out": {"number": 3, "list": ["a"], "class": Path}, "restart": {"none": None,
             "number": 3},
             "checkpoint_every": COUNT | {"none": None}, "progress": FLAG, "cross_check": THING,
-            "fields": {"without a folder": fem.XDMF()}, "t_end": {"both": 1.0},
+            "fields": {"without a folder": fem.XDMF()}, "t_end": {"both": 1.0}, "callback": FUNCTION,
         }),
         (vc.cross_check, given | {"solvers": (vc.Condensed(), vc.Condensed(solvers.Hildreth()))}, {
             "problem": NEEDED, "solvers": {"one": vc.Condensed(), "alone": [vc.Condensed()],

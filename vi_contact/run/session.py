@@ -3,7 +3,7 @@
 import logging
 import time
 from collections import deque
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -12,8 +12,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..core.algebra import Comm
-from ..core.errors import Interrupted, OutOfTime
+from ..core.algebra import Comm, largest
+from ..core.checks import on_all
+from ..core.errors import InputError, Interrupted, OutOfTime
 from ..core.stages import done
 from ..core.step import Recorder, Report, State, StepResult
 from .files.checkpoint import RestartPoint
@@ -49,7 +50,7 @@ class Session:
         recorders: the user's, after those of every run. wall_time: when the process has to have ended.
         table: the rows so far. step_plan: the base steps. place: the end of the last base step.
         loop: its steps, where others have them too. resumed_from: the step of the checkpoint that it continues, None
-            for a new run.
+            for a new run. stopped: in words, when the callback has asked for the end.
     """
 
     method: Method
@@ -63,6 +64,8 @@ class Session:
     wall_time: WallTime
     loop: March | None = None
     resumed_from: int | None = None
+    callback: Callable[[State, Report], Any] | None = None
+    stopped: str = ""
     last: Report | None = None
     dt: float = float("nan")
     memory: Mapping[str, Any] = field(default_factory=dict)
@@ -122,7 +125,8 @@ class Session:
             if isinstance(error, Interrupted):  # on all ranks: none ends before the first has written
                 self._comm.bcast(None)
             raise
-        facts = self._facts("finished", "", time.perf_counter() - begin) | {"seconds_per_linear_step": linear}
+        status = "stopped" if self.stopped else "finished"
+        facts = self._facts(status, self.stopped, time.perf_counter() - begin) | {"seconds_per_linear_step": linear}
         warning = energy_warning(facts)
         if warning and self.root:
             log.warning("%s", warning)
@@ -150,6 +154,10 @@ class Session:
                 self.seconds.append(time.perf_counter() - begin)
                 if len(self.seconds) == 1:
                     self._measure()
+                if self.callback is not None:
+                    self._call(self.callback, report, writer)
+                if loop.ended and self.stopped:
+                    return
                 if loop.ended and self.left:
                     self._stop_if_asked(writer, signals)
                 if loop.ended:
@@ -167,6 +175,21 @@ class Session:
         if number:
             raise Interrupted(f"{Signals(number).name} {rest}", number)
         raise OutOfTime(f"{self.wall_time.words} {rest}")
+
+    def _call(self, callback: Callable[[State, Report], Any], report: Report, writer: Writer) -> None:
+        """Show a step to the callback, which may ask for the end of the run or raise, on one rank. Collective."""
+        state = report.new
+        for array in (state.r_n, state.active, state.r_t, *state.memory.values()):
+            if array is not None:
+                array.setflags(write=False)  # u and v are so
+        place = f"after step {state.k}, t = {state.t:.6g} s"
+        try:
+            said = on_all(self._comm, "it", lambda: callback(state, report))
+        except InputError as error:
+            self._checkpoint(writer)
+            raise InputError(f"the callback {place}: {error}") from error
+        if largest(self._comm, isinstance(said, bool | np.bool_) and bool(said)):
+            self.stopped = f"the callback ended the run {place}"
 
     def _keep(self, state: State, report: Report, writer: Writer) -> None:
         """Everything that is recorded of a step, be it a base step or a part of one."""

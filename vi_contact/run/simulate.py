@@ -1,18 +1,18 @@
 """Simulate: march, listen with recorders, and keep everything in a folder that a crash cannot spoil."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from ..core.algebra import Comm
-from ..core.checks import flag, instance, provides, several, whole
+from ..core.checks import flag, function, instance, optional, provides, several, whole
 from ..core.errors import InputError
 from ..core.files import on_root
 from ..core.problem import ContactProblem
 from ..core.state_checks import initial_state
-from ..core.step import Columns, Recorder, Row, Scheme, Solver, State
+from ..core.step import Columns, Recorder, Report, Row, Scheme, Solver, State
 from ..solvers.certified import TOLERANCE
 from .files.checkpoint import RestartPoint, read_checkpoint
 from .files.folder import HISTORY_H5, locked, run_folder
@@ -36,6 +36,7 @@ def simulate(
     tolerance: float = TOLERANCE, checkpoint_every: int = 100, restart: bool | str | Path = False,
     changed: bool = False, progress: bool = True, fields: FieldWriter | None = None,
     cross_check: Comparison | None = None, wall_time: str | None = None,
+    callback: Callable[[State, Report], Any] | None = None,
 ) -> Solution:
     """March to t_end, or for so many steps, and records. Collective; every rank gets the solution.
 
@@ -57,6 +58,10 @@ def simulate(
         progress: a progress line on a terminal. fields: fem.XDMF(every=10) for ParaView.
         cross_check: whose report() goes into the summary.
         wall_time: "11:30:00", as Slurm reads --time, from the start of the process: the run ends before it is over.
+        callback: called as callback(state, report) on all ranks after every step that is accepted, be it a part of a
+            halved one, when its row is recorded; the arrays of the state are read-only. Where it returns True on some
+            rank the run ends with this base step, with a checkpoint and status "stopped". What it raises ends the run
+            as an InputError that says where, on all ranks and with a checkpoint.
     Raises:
         InputError: before anything is computed or overwritten; also when another run writes into the folder.
         Interrupted: after the step in which some rank got SIGINT (Ctrl-C), SIGTERM or SIGHUP, with a checkpoint.
@@ -74,11 +79,12 @@ def opened(
     steps: int | None, record: Sequence[Recorder] | None, out: str | Path | None, state: State | None,
     escalation: Sequence[Solver], tolerance: float, checkpoint_every: int, restart: bool | str | Path, changed: bool,
     progress: bool, fields: FieldWriter | None, cross_check: Comparison | None, wall_time: str | None,
-    others: Sequence[ContactProblem] = (), runs: int = 1,
+    callback: Callable[[State, Report], Any] | None, others: Sequence[ContactProblem] = (), runs: int = 1,
 ) -> Iterator[tuple[Session, Writer]]:
     """Check the arguments of ``simulate`` and set a run up, in its locked folder. ``others``: problems that lend their
     matrices and factors to it, if they are its own. ``runs``: how many take turns. Collective."""
     _check_outputs(record, out, restart, checkpoint_every, (progress, changed), fields, cross_check)
+    optional(function, "simulate", "callback", callback, "give a function of a state and a report, or None")
     if wall_time is not None and out is None:
         raise InputError("wall_time needs out, the folder of the run to continue afterwards")
     end = WallTime(wall_time, runs)
@@ -101,7 +107,7 @@ def opened(
         if stored is not None:
             _started(problem, recorders, place.state, _restored(table, stored, comm))
         session = Session(method, recorders, table, plan, place, checkpoint_every, cross_check, progress, end,
-                          resumed_from=None if stored is None else stored.k)
+                          resumed_from=None if stored is None else stored.k, callback=callback)
         yield session, Writer(problem, folder, fields, table, stored)
 
 
