@@ -196,12 +196,19 @@ REFUSED = {
         msh(SQUARE | {5: (2, 0, 0)}, [(QUADRANGLE, 1, 1, (1, 2, 3, 4)), (TRIANGLE, 1, 1, (2, 5, 3))]),
         "mixes cells (Quadrilateral 4, Triangle 3): mesh it with cells of one type",
     ),
-    "second order": (
+    "serendipity": (
         msh(
-            {1: (0, 0, 0), 2: (1, 0, 0), 3: (0, 1, 0), 4: (0.5, 0, 0), 5: (0.5, 0.5, 0), 6: (0, 0.5, 0)},
+            SQUARE | {5: (0.5, 0, 0), 6: (1, 0.5, 0), 7: (0.5, 1, 0), 8: (0, 0.5, 0)},
+            [(16, 1, 1, (1, 2, 3, 4, 5, 6, 7, 8))],
+        ),
+        "cells of an order above 2, or without all mid-points (Quadrilateral 8)",
+    ),
+    "folded between curved sides": (
+        msh(
+            {1: (0, 0, 0), 2: (1, 0, 0), 3: (0, 1, 0), 4: (0.5, 0.6, 0), 5: (0.5, 0.5, 0), 6: (0, 0.5, 0)},
             [(9, 1, 1, (1, 2, 3, 4, 5, 6))],
         ),
-        "cells of higher order (Triangle 6), but nodal contact conditions are exact only on first-order cells (P1, Q1)",
+        "has a fold between its curved sides",
     ),
     "prisms": (
         msh(SQUARE | {5: (0, 0, 1), 6: (1, 0, 1), 7: (1, 1, 1)}, [(PRISM, 1, 1, (1, 2, 3, 5, 6, 7))]),

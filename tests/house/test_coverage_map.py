@@ -43,6 +43,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "fem/test_heterogeneous.py": "fem.quadrature laws.kelvin_voigt",
     "fem/test_mortar_in_space.py": "fem.contact.clipping fem.contact.sight",
     "fem/test_pairs.py": "fem.contact.matching",
+    "fem/test_second_order.py": "fem.numbering",
     "fem/test_section_forces.py":
         "fem.contact.frames fem.output.nodal_work fem.output.reactions laws.weight",
     "fem/test_space.py": "fem.nodal_space",

@@ -43,12 +43,13 @@ def assemble(
     prescribed: Prescribed | Sequence[Prescribed] = (), tied: Tied | Sequence[Tied] = (),
     dashpots: Dashpots | Sequence[Dashpots] = (), loads: Traction | BodyForce | Sequence[Traction | BodyForce] = (),
     damping: Damping | None = None, initial_displacement: Initial = None, initial_velocity: Initial = None,
-    base_inertia: bool = True, quadrature_degree: int | None = None,
+    base_inertia: bool = True, degree: int = 1, quadrature_degree: int | None = None, integration: str = "full",
 ) -> SemiDiscreteSystem:
     """Assemble the system of a body, on the free unknowns.
 
     Args:
-        mesh: DOLFINx mesh (``read_mesh``), first-order cells; unknowns are P1 or Q1.
+        mesh: DOLFINx mesh (``read_mesh``), cells of first order or, with degree 2, of second order too.
+        degree: of the displacement in each cell: 1 for P1 or Q1, 2 for P2 or Q2 (docs/guide/second_order.md).
         material: LinearElastic, Orthotropic or fem.Heterogeneous, or (cells, material) pairs that cover the mesh.
         section: PlaneStrain() by default in 2D (Solid() in 3D); PlaneStress(thickness) for panels.
         clamped: facets with u = 0; prescribed: facets that move (eq. 3) or are held in some components.
@@ -57,22 +58,24 @@ def assemble(
         damping: NoDamping() by default, MassProportional(c) (eq. 7), Rayleigh or KelvinVoigt.
         base_inertia: whether a ground motion's inertia load counts the mass that elements share with prescribed nodes,
             as it must to be the motion seen from the ground; False is the load of docs/start/first_wall.md.
+        integration: "full", or "selective" for nearly incompressible bodies of quadrilaterals or hexahedra: each cell
+            takes tr eps as its mean (``fem.dilatation``).
         initial_displacement, initial_velocity: constant or points (k, d) -> (k, d) (eqs. 10, 10a), or (cells, value)
             pairs for several bodies; the later pair counts where cells meet, zero where there are none.
         quadrature_degree: of all integrals over cells and facets; as UFL estimates it when None, which is exact on
             cells with parallel sides.
     Raises:
-        InputError: cells without material, NaN in data, components that do not exist, dashpots on what is held, groups
-            of another mesh or kind, other displacements prescribed on the same facets.
+        InputError: cells without material, of an order that the degree does not suit, or folded; NaN in data,
+            components that do not exist, dashpots on what is held, groups of another mesh or kind, contradictions.
     """
-    section, damping = check_body(mesh, material, section, damping, base_inertia)
+    section, damping = check_body(mesh, material, section, damping, base_inertia, degree, integration)
     held, moved, boundaries = as_tuple(clamped), as_tuple(prescribed), as_tuple(dashpots)
     check_boundaries(mesh, held, moved, as_tuple(tied), boundaries, as_tuple(loads))
     check_initial(mesh, displacement=initial_displacement, velocity=initial_velocity)
     optional(whole, "assemble", "quadrature_degree", quadrature_degree)
-    space = FemSpace(mesh, tuple(Prescribed(facets) for facets in held) + moved, as_tuple(tied))
+    space = FemSpace(mesh, tuple(Prescribed(facets) for facets in held) + moved, as_tuple(tied), degree)
     space.quadrature_degree = quadrature_degree
-    forms = ElasticForms(space, cell_materials(mesh, material), section, damping)
+    forms = ElasticForms(space, cell_materials(mesh, material), section, damping, selective=integration == "selective")
     forms.boundaries = boundaries
     algebra = algebra_for(space.comm.mpi, space.dimension, space.unknowns)
     absorbers = [DashpotMatrix(space, forms, one) for one in boundaries]
@@ -80,10 +83,8 @@ def assemble(
     load = assemble_loads(space, section, as_tuple(loads))
     rigid = np.column_stack([space.restrict(one) for one in space.translations])
     K, pull = _reduced(forms.matrix("K"), space, algebra, 0)  # one after the other: each is large before it is reduced
-    dampers = ([forms.matrix("C")] if forms.damped else []) + [one.mat for one in absorbers]
-    terms = [(1.0, PetscMatrix(one)) for one in dampers]
-    damper = as_petsc(PetscAlgebra(mesh.comm).combine(terms)).mat if terms else None
-    C, viscous = _reduced(damper, space, algebra, 1) if terms else (None, ())
+    damper = _damper(forms, absorbers)
+    C, viscous = _reduced(damper, space, algebra, 1) if damper is not None else (None, ())
     mass = forms.matrix("M")
     # less M r, what accelerated prescribed nodes pull on the free ones
     momenta = [space.pull(PetscMatrix(mass) @ one) for one in space.translations] if base_inertia else []
@@ -102,9 +103,17 @@ def assemble(
         companions=tuple(one for part in (*moved, *acting) for one in part.companions),
     )
     forms.own(system)
-    del absorbers, dampers, terms, damper, mass
+    del absorbers, damper, mass
     give_back(mesh.comm)
     return system
+
+
+def _damper(forms: ElasticForms, absorbers: Sequence[DashpotMatrix]) -> Any:
+    """C of materials and absorbing boundaries, before elimination (PETSc); None where nothing damps."""
+    terms = ([forms.matrix("C")] if forms.damped else []) + [one.mat for one in absorbers]
+    if not terms:
+        return None
+    return as_petsc(PetscAlgebra(forms.space.mesh.comm).combine([(1.0, PetscMatrix(one)) for one in terms])).mat
 
 
 def _reduced(

@@ -6,16 +6,19 @@ from itertools import combinations, product
 from typing import Any
 
 import numpy as np
+import ufl
 from dolfinx.mesh import Mesh
 
-from ..core.checks import flag, instance, provides, refuse, several
+from ..core.checks import check_word, flag, instance, provides, refuse, several, shown
 from ..core.errors import InputError
 from ..laws.materials import Damping, LinearElastic, NoDamping, PlaneStrain, PlaneStress, Section, Solid
+from . import compat
 from .communicators import MpiComm
 from .dashpots import Dashpots
 from .forms import KINDS
 from .groups import cells_of, facets_of, field_given
 from .loads import BodyForce, Prescribed, Traction
+from .numbering import is_curved
 from .ties import Tied
 
 log = logging.getLogger(__name__)
@@ -23,12 +26,15 @@ OWNER = "assemble"
 LOCKING = 0.495  # Poisson's ratio; CHOSEN: 0.49 is common for wet soil, 0.499 is 10 % to 40 % too stiff
 
 
-def check_body(mesh: Any, material: Any, section: Any, damping: Any, base_inertia: Any) -> tuple[Section, Damping]:
+def check_body(
+    mesh: Any, material: Any, section: Any, damping: Any, base_inertia: Any, degree: Any = 1, integration: Any = "full"
+) -> tuple[Section, Damping]:
     """Return (section, damping), the usual for None; InputError for objects of another kind, cells of another mesh."""
     instance(OWNER, "mesh", mesh, Mesh, "give a DOLFINx mesh, such as fem.read_mesh(path, comm)[0]")
     if mesh.topology.dim != mesh.geometry.dim:
         raise InputError(f"assemble: the mesh has cells of dimension {mesh.topology.dim} at points of "
                          f"{mesh.geometry.dim} coordinates; read it with gdim={mesh.topology.dim}")
+    _check_degree(mesh, degree)
     if not isinstance(material, KINDS):
         remedy = "give a LinearElastic, Orthotropic or Heterogeneous, or (cells, material) pairs"
         for pair in several(OWNER, "material", material, remedy):
@@ -47,18 +53,59 @@ def check_body(mesh: Any, material: Any, section: Any, damping: Any, base_inerti
         raise InputError(f"assemble: {damping} in PlaneStress, where the strain across the panel would have a motion "
                          "of its own; give Rayleigh(0, beta), or another section")
     flag(OWNER, "base_inertia", base_inertia)
-    if mesh.geometry.dim > 1 and not isinstance(section, PlaneStress) and mesh.comm.rank == 0:
-        found = [material] if isinstance(material, KINDS) else [one for _, one in material]
+    found = [material] if isinstance(material, KINDS) else [one for _, one in material]
+    _check_integration(mesh, found, section, damping, degree, integration)
+    thick = mesh.geometry.dim > 1 and not isinstance(section, PlaneStress)
+    if degree == 1 and thick and integration == "full" and mesh.comm.rank == 0:
         _tell_locking([one for one in found if isinstance(one, LinearElastic)])
     return section, damping
+
+
+def _check_degree(mesh: Mesh, degree: Any) -> None:
+    """Raise InputError unless the degree is 1 or 2 and suits the cells, and curved cells are not folded. Collective."""
+    if isinstance(degree, bool) or degree not in (1, 2):
+        raise InputError(f"assemble: degree is {shown(degree)}; give 1 for P1 and Q1, 2 for P2 and Q2")
+    if not is_curved(mesh):
+        return
+    if degree == 1:
+        raise InputError("assemble: the mesh has cells of second order; give degree=2, or mesh it with first order")
+    if compat.geometry_dofmap(mesh).shape[1] != compat.cell_blocks(compat.vector_space(mesh, 2)).shape[1]:
+        raise InputError("assemble: the mesh has cells of an order above 2 or without all mid-points; mesh it with "
+                         "complete cells of first or second order")
+    size, det = ufl.TestFunction(compat.cell_space(mesh)), ufl.JacobianDeterminant(mesh)
+    signed, whole = (
+        compat.assemble_vector(compat.compile_form(one * size * ufl.dx)).array_r for one in (det / abs(det), 1.0)
+    )
+    folded = mesh.comm.allreduce(int(np.sum(np.abs(signed) < (1.0 - 1e-9) * whole)))
+    if folded:
+        raise InputError(f"assemble: {folded} curved cells of the mesh are folded, their Jacobian changes its sign; "
+                         "mesh them finer, or with straight sides")
+
+
+def _check_integration(
+    mesh: Mesh, materials: Sequence[Any], section: Section, damping: Damping, degree: int, integration: Any
+) -> None:
+    """Raise InputError for a word that is none, and where cells cannot or need not be integrated selectively."""
+    check_word("integration of assemble", integration, ("full", "selective"))
+    if integration == "full":
+        return
+    if mesh.topology.cell_type.name not in ("quadrilateral", "hexahedron"):
+        raise InputError("assemble: integration='selective' needs quadrilaterals or hexahedra, and these cells lock "
+                         "with it as without; take degree=2")
+    if degree == 2 or isinstance(section, PlaneStress):
+        raise InputError("assemble: integration='selective' is for degree=1 and bodies that cannot thin out: neither "
+                         "degree=2 nor plane stress locks; leave it out")
+    if any(getattr(damping, "viscosities", ())) or not all(isinstance(one, LinearElastic) for one in materials):
+        raise InputError("assemble: integration='selective' is for LinearElastic materials without KelvinVoigt "
+                         "damping; take degree=2 for others")
 
 
 def _tell_locking(materials: Sequence[LinearElastic]) -> None:
     """Warn of materials that first-order cells cannot deform without changing their volume."""
     stiff = max((one.nu for one in materials), default=0.0)
     if stiff > LOCKING:
-        log.warning("Poisson's ratio %.10g locks first-order cells, displacements come out too small: give at most %g",
-                    stiff, LOCKING)
+        log.warning("Poisson's ratio %.10g locks first-order cells, displacements come out too small: give at most %g, "
+                    "integration='selective' (quadrilaterals and hexahedra) or degree=2", stiff, LOCKING)
 
 
 def check_boundaries(mesh: Mesh, clamped: Any, prescribed: Any, tied: Any, dashpots: Any, loads: Any) -> None:

@@ -11,6 +11,7 @@ from contextlib import suppress
 from itertools import product
 from typing import Any
 
+import basix
 import dolfinx
 import numpy as np
 import numpy.typing as npt
@@ -43,10 +44,10 @@ def create_mesh(
     comm: MPI.Comm, cell: str, cells: npt.NDArray[np.int64], x: npt.NDArray[np.float64],
     destinations: tuple[Indices, Indices],
 ) -> Mesh:
-    """Create a first-order mesh, distributed as told.
+    """Create a mesh of cells of first or second order, distributed as told.
 
     `cell` is a UFL name ("interval", "triangle", "quadrilateral", "tetrahedron", "hexahedron"). `cells`
-    (n_cells, n_vertices) holds rows of `x` in DOLFINx's (tensor-product) vertex order, `x` (n_points, gdim) the points
+    (n_cells, n_nodes) holds rows of `x` in DOLFINx's order of vertices and mid-points, `x` (n_points, gdim) the points
     [m], `destinations` the ranks each cell goes to, its owner first, and the offsets of the cells in that list. A rank
     without input passes arrays of the right width and no rows. Collective.
     """
@@ -55,20 +56,37 @@ def create_mesh(
         return dolfinx.cpp.graph.AdjacencyList_int32(*destinations)
 
     gdim = x.shape[1]
+    degree = 1 if cells.shape[1] == len(basix.topology(getattr(basix.CellType, cell))[0]) else 2
     if _BASIX_ELEMENTS:
-        import basix.ufl
+        from basix.ufl import element
 
-        domain = ufl.Mesh(basix.ufl.element("Lagrange", cell, 1, shape=(gdim,)))
+        domain = ufl.Mesh(element("Lagrange", cell, degree, shape=(gdim,)))
         return _mesh.create_mesh(comm, cells=cells, x=x, e=domain, partitioner=told)
-    domain = ufl.Mesh(ufl.VectorElement("Lagrange", ufl.Cell(cell, geometric_dimension=gdim), 1))
+    domain = ufl.Mesh(ufl.VectorElement("Lagrange", ufl.Cell(cell, geometric_dimension=gdim), degree))
     return _mesh.create_mesh(comm, cells, x, domain, ghost_mode=GhostMode.shared_facet, partitioner=told)
 
 
 def geometry_dofmap(mesh: Mesh) -> Indices:
-    """Return the local geometry nodes of each local cell (owned, then ghosts), (n_cells, n_vertices)."""
+    """Return the local geometry nodes of each local cell (owned, then ghosts), (n_cells, n_nodes), vertices first."""
     if _DOFMAP_PER_CELL_TYPE:
         return mesh.geometry.dofmaps[0]
-    return _as_table(mesh.geometry.dofmap, mesh)
+    rows = mesh.geometry.dofmap
+    return rows if VERSION >= (0, 6) else _as_table(rows, mesh.geometry.cmap.create_dof_layout())
+
+
+def sub_entities(mesh: Mesh, dim: int) -> list[list[int]]:
+    """Return the local vertices of each entity of a dimension of a cell, in DOLFINx's order."""
+    return basix.topology(getattr(basix.CellType, mesh.topology.cell_type.name))[dim]
+
+
+def gmsh_order(cell: str, nodes: int) -> Any:
+    """Return the places in Gmsh's row of a cell of the nodes in DOLFINx's order; `cell` is a UFL name."""
+    return dolfinx.cpp.io.perm_gmsh(getattr(_mesh.CellType, cell), nodes)
+
+
+def vtk_order(mesh: Mesh, nodes: int) -> Any:
+    """Return the places in DOLFINx's row of a cell of the nodes in VTK's order, which is that of XDMF."""
+    return np.argsort(dolfinx.cpp.io.perm_vtk(mesh.topology.cell_type, nodes))
 
 
 def mesh_bytes(mesh: Mesh) -> int:
@@ -82,16 +100,16 @@ def mesh_bytes(mesh: Mesh) -> int:
 
 
 def entities_to_geometry(mesh: Mesh, dim: int, entities: Indices) -> Indices:
-    """Return local geometry nodes of each given entity, (n_entities, n_vertices). Builds connectivity: collective."""
+    """Return local geometry nodes of the vertices of each entity, (n_entities, n_vertices). Collective."""
     tdim, cell = mesh.topology.dim, mesh.topology.cell_type
     mesh.topology.create_entities(dim)
     mesh.topology.create_connectivity(dim, tdim)
     mesh.topology.create_connectivity(tdim, dim)
+    count = dolfinx.cpp.mesh.cell_num_vertices(dolfinx.cpp.mesh.cell_entity_type(cell, dim, 0))
     if not len(entities):  # 0.9 divides by their number
-        entity = dolfinx.cpp.mesh.cell_entity_type(cell, dim, 0)
-        return np.empty((0, dolfinx.cpp.mesh.cell_num_vertices(entity)), dtype=np.int32)
+        return np.empty((0, count), dtype=np.int32)
     if _BASIX_ELEMENTS:
-        return _mesh.entities_to_geometry(mesh, dim, entities)
+        return _mesh.entities_to_geometry(mesh, dim, entities)[:, :count]  # since 0.8 mid-points follow
     return dolfinx.cpp.mesh.entities_to_geometry(mesh._mesh, dim, entities, False)
 
 
@@ -135,11 +153,11 @@ def measure(mesh: Mesh, dim: int, indices: Indices) -> ufl.Measure:
 # Function spaces ------------------------------------------------------------------------------------------------------
 
 
-def vector_space(mesh: Mesh) -> Any:
-    """Make the space of P1 or Q1 vector fields with as many components as coordinates; the block size is gdim."""
+def vector_space(mesh: Mesh, degree: int = 1) -> Any:
+    """Make the space of continuous vector fields (P1, Q1, P2, Q2) with gdim components; the block size is gdim."""
     if _BASIX_ELEMENTS:
-        return fem.functionspace(mesh, ("Lagrange", 1, (mesh.geometry.dim,)))
-    return fem.VectorFunctionSpace(mesh, ("Lagrange", 1))
+        return fem.functionspace(mesh, ("Lagrange", degree, (mesh.geometry.dim,)))
+    return fem.VectorFunctionSpace(mesh, ("Lagrange", degree))
 
 
 def lagrange(mesh: Mesh, degree: int, shape: tuple[int, ...] = (), *, continuous: bool = True) -> Any:
@@ -163,7 +181,9 @@ def cell_unknowns(space: Any) -> Indices:
 
 
 def dof_to_node(space: Any) -> Indices:
-    """Return the local geometry node of each block of unknowns (owned, then ghosts) of a P1/Q1 space, (n_blocks,).
+    """Return the local geometry node of each block of unknowns (owned, then ghosts), (n_blocks,).
+
+    Only of a space that has a node for every node of the mesh: P1 or Q1 on first-order, P2 or Q2 on second-order cells.
 
     Unknown c of block i (index bs*i + c) is component c at the point `mesh.geometry.x[dof_to_node(space)[i]]`.
     """
@@ -174,15 +194,13 @@ def dof_to_node(space: Any) -> Indices:
 
 
 def cell_blocks(space: Any) -> Indices:
-    """Return the local blocks of unknowns of each cell of a P1/Q1 space (owned, then ghosts), (n_cells, n_vertices)."""
-    return _as_table(space.dofmap.list, space.mesh)
+    """Return the local blocks of unknowns of each cell (owned, then ghosts), (n_cells, n_nodes), vertices first."""
+    return _as_table(space.dofmap.list, space.dofmap.dof_layout)
 
 
-def _as_table(rows: Any, mesh: Mesh) -> Indices:
-    """First-order cell rows as a table: an AdjacencyList in 0.5, an array since. A rank may have none."""
-    if isinstance(rows, np.ndarray):
-        return rows
-    return rows.array.reshape(-1, dolfinx.cpp.mesh.cell_num_vertices(mesh.topology.cell_type))
+def _as_table(rows: Any, layout: Any) -> Indices:
+    """Cell rows as a table: an AdjacencyList in 0.5, an array since. A rank may have none."""
+    return rows if isinstance(rows, np.ndarray) else rows.array.reshape(-1, layout.num_dofs)
 
 
 # Assembly -------------------------------------------------------------------------------------------------------------

@@ -19,6 +19,7 @@ from ..laws.materials import Damping, ElasticValues, LinearElastic, Section
 from ..laws.orthotropic import VOIGT, Orthotropic
 from . import compat
 from .dashpots import Dashpots
+from .dilatation import MeanDilatation
 from .heterogeneous import Heterogeneous
 from .mesh import Cells
 from .quadrature import compiled
@@ -36,15 +37,19 @@ class ElasticForms:
         fields: lame, shear, rho, alpha_rho, lame_out times the section's thickness, and beta: functions of DG0, of DG1
             where a material changes inside of cells. Lamé constants are NaN in orthotropic cells.
         damped: whether there is a C; densities: whether ``fields`` tell the mass and its damping, cell by cell.
+        dilatation: with ``selective``, the mean of tr eps over each cell, which takes its place in K, in C = beta K
+            and in stresses (``fem.dilatation``); None otherwise.
     """
 
     boundaries: tuple[Dashpots, ...] = ()  # of the same system
     densities = True
 
     def __init__(
-        self, space: FemSpace, materials: list[tuple[Any, Material]], section: Section, damping: Damping
+        self, space: FemSpace, materials: list[tuple[Any, Material]], section: Section, damping: Damping,
+        *, selective: bool = False,
     ) -> None:
         self.space, self.section = space, section
+        self.dilatation = MeanDilatation(space.V) if selective else None
         self.u, self.v = ufl.TrialFunction(space.V), ufl.TestFunction(space.V)
         self._matrices: dict[str, WeakSet[Any]] = {name: WeakSet() for name in ("M", "C", "K")}
         found = [material for _, material in materials]
@@ -83,19 +88,31 @@ class ElasticForms:
         return "".join(name for name in names if getattr(system, name) not in (None, *self._matrices[name]))
 
     def stress(self, u: Any) -> Any:
-        """Return sigma(u) (d, d) times the thickness; None where nothing tells the stresses."""
+        """Return sigma(u) (d, d) times the thickness; None where nothing tells the stresses. With selective integration
+        of a Function u: ``follow`` when its values have changed since."""
         eps, d = ufl.sym(ufl.grad(u)), self.space.dimension
         if self._anisotropic is not None:
             flat, place = self._flat_stress(eps), {pair: k for k, pair in enumerate(VOIGT[d])}
             return ufl.as_tensor([[flat[place[min(i, j), max(i, j)]] for j in range(d)] for i in range(d)])
-        return self.fields["lame"] * ufl.tr(eps) * ufl.Identity(d) + 2 * self.fields["shear"] * eps
+        return self.fields["lame"] * self._trace(u) * ufl.Identity(d) + 2 * self.fields["shear"] * eps
+
+    def _trace(self, u: Any) -> Any:
+        """tr eps or, of a Function, its mean over each cell; none in bilinear forms where ``dilatation`` adds it."""
+        if self.dilatation is None:
+            return ufl.tr(ufl.sym(ufl.grad(u)))
+        return 0.0 if u is self.u else self.dilatation.of(u)
+
+    def follow(self, u: Any) -> None:
+        """Bring stresses of a Function up to its values. Collective."""
+        if self.dilatation is not None:
+            self.dilatation.update(u)
 
     def stress_across(self, u: Any) -> Any:
         """Return sigma_zz(u) times the thickness of a body in the plane, 0 in plane stress; elsewhere zero."""
         eps = ufl.sym(ufl.grad(u))
         if self._anisotropic is not None and self.space.dimension == 2:
             return self._flat_stress(eps)[3]
-        return self.fields["lame_out"] * ufl.tr(eps)
+        return self.fields["lame_out"] * self._trace(u)
 
     def _flat_stress(self, eps: Any) -> Any:
         """Stresses in the order of VOIGT, in the plane with sigma_zz."""
@@ -112,6 +129,15 @@ class ElasticForms:
         }[name]
         return form + self._viscous_form() if name == "C" and self.viscous else form
 
+    def against(self, name: str, r: Any, inside: Any) -> Any:
+        """Return rᵀA of the cells inside, A = M, K or C, as a linear form: the bilinear form with r as test function.
+        ``follow`` when the values of the Function r have changed since."""
+        form = ufl.replace(self.bilinear(name), {self.u: self.v, self.v: inside * r})
+        if self.dilatation is None or name == "M":
+            return form
+        modulus = self.fields["lame"] * (self.fields["beta"] if name == "C" else 1.0)
+        return form + inside * modulus * self.dilatation.of(r) * ufl.div(self.v) * ufl.dx
+
     def _viscous_form(self) -> Any:
         """∫ of the viscous stresses of KelvinVoigt."""
         lame, shear = (compat.constant(self.space.mesh, self.section.thickness * one) for one in self.viscous or ())
@@ -120,7 +146,10 @@ class ElasticForms:
 
     def matrix(self, name: str) -> Any:
         """Assemble the full matrix M, K, or C of the materials (PETSc), before elimination."""
-        return compat.assemble_matrix(compiled(self.space, self.bilinear(name)))
+        matrix = compat.assemble_matrix(compiled(self.space, self.bilinear(name)))
+        if self.dilatation is not None and name != "M":
+            self.dilatation.add(matrix, self.fields["lame"], self.fields["beta"] if name == "C" else None)
+        return matrix
 
 
 def _constants(space: Any, cells: Any, material: Material) -> Any:

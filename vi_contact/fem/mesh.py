@@ -26,9 +26,6 @@ from vi_contact.meshes.gmsh_session import MeshScript
 from vi_contact.meshes.partition import destinations
 from vi_contact.meshes.rows import found_in, number_alike
 
-TENSOR_ORDER = {"quadrilateral": [0, 1, 3, 2], "hexahedron": [0, 1, 3, 2, 4, 5, 7, 6]}
-"""DOLFINx's vertices in Gmsh's numbering, where the two differ; also in VTK's."""
-
 MOST_NAMED = 20  # values of tags in a message
 
 _NOWHERE = (np.zeros(0, dtype=np.int32), np.zeros(1, dtype=np.int32))  # destinations of no cells
@@ -154,10 +151,11 @@ def alone() -> MPI.Comm:
 
 
 def read_mesh(path: str | Path, comm: MPI.Comm) -> tuple[Mesh, Tags]:
-    """Read a first-order mesh of intervals, triangles, quadrilaterals, tetrahedra or hexahedra and its physical groups.
+    """Read a mesh of intervals, triangles, quadrilaterals, tetrahedra or hexahedra and its physical groups.
 
-    Coordinates in metres; a file in Gmsh's own format, MSH 2 to 4, text or binary. InputError, the same on every rank,
-    if the file is missing, a script, or no usable mesh (reasons: `vi_contact.meshes.extract.extract`). Collective.
+    Cells of second order, which may be curved, want ``assemble(…, degree=2)``. Coordinates in metres; a file in Gmsh's
+    own format, MSH 2 to 4, text or binary. InputError, the same on every rank, if the file is missing, a script, or no
+    usable mesh (reasons: `vi_contact.meshes.extract.extract`). Collective.
     """
     instance("read_mesh", "path", path, (str, Path), "give the path of a mesh file")
     return _distribute(comm, lambda: arrays_from_file(path))
@@ -189,9 +187,9 @@ def _distribute(comm: MPI.Comm, produce: Callable[[], MeshArrays]) -> tuple[Mesh
     arrays = on_root(MpiComm(comm), produce)  # what rank 0 raises, all ranks raise
     groups = comm.bcast(arrays and replace(arrays, points=arrays.points[:0], cells=arrays.cells[:0]))
     arrays = arrays or groups  # without points and cells on the others
-    vertices = arrays.cells[:, TENSOR_ORDER.get(arrays.cell, slice(None))]
+    cells = arrays.cells[:, compat.gmsh_order(arrays.cell, arrays.cells.shape[1])]
     where = destinations(arrays.points, arrays.cells, arrays.cell, comm.size) if comm.rank == 0 else _NOWHERE
-    mesh = compat.create_mesh(comm, arrays.cell, vertices, arrays.points, where)
+    mesh = compat.create_mesh(comm, arrays.cell, cells, arrays.points, where)
     tags = Tags()
     original = np.asarray(mesh.topology.original_cell_index, dtype=np.int64)
     for name, members in arrays.cell_groups.items():

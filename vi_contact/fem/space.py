@@ -19,6 +19,7 @@ from .groups import components_of
 from .loads import Prescribed, evaluate_here
 from .mesh import Facets, node_numbers
 from .nodal_space import NodalSpace, bounding_box, parts_of
+from .numbering import facet_rows, numbered
 from .petsc_algebra import PetscAlgebra, PetscMatrix, triple_product
 from .petsc_rows import aij_of
 from .ties import PLACE_TOLERANCE, Links, Tied, linked
@@ -56,7 +57,7 @@ def known_matrices(owner: str, system: SemiDiscreteSystem, names: str) -> None:
 
 
 class FemSpace(NodalSpace):
-    """Number the nodal unknowns of a P1/Q1 displacement space, with the prescribed and the tied ones eliminated.
+    """Number the nodal unknowns of a displacement space, with the prescribed and the tied ones eliminated.
 
     "Full" vectors hold every owned component (bs*i + c); "free" vectors only those the equations solve for.
 
@@ -65,21 +66,26 @@ class FemSpace(NodalSpace):
         held, tied: (owned nodes, d) masks of components that are prescribed, or follow those of another node;
             tied_nodes: numbers of all nodes that move together with another, on every rank.
         numbers: (owned nodes, d) which unknown of all ranks a component is, also one that follows; -1 where held.
-        nodes: original node numbers of the owned blocks; points: their coordinates (k, d).
+        degree: 1 for P1 and Q1, 2 for P2 and Q2.
+        nodes: numbers of the nodes of the owned blocks, those of the mesh (``fem.numbering``: of mid-points too);
+            points: their coordinates (k, d); node_of_block: the numbers, those of ghosts too.
         ids: rank-independent numbers of the free unknowns (node * d + component).
         unknowns: number of free unknowns on all ranks.
     """
 
-    def __init__(self, mesh: Any, prescribed: tuple[Prescribed, ...], tied: Sequence[Tied] = ()) -> None:
-        self.mesh = mesh
-        self.V = compat.vector_space(mesh)
+    def __init__(
+        self, mesh: Any, prescribed: tuple[Prescribed, ...], tied: Sequence[Tied] = (), degree: int = 1
+    ) -> None:
+        self.mesh, self.degree = mesh, degree
+        self.V = compat.vector_space(mesh, degree)
         self.comm: MpiComm = MpiComm(kept(mesh.comm))
         self.algebra = PetscAlgebra(self.comm.mpi)
         self.dimension: int = mesh.geometry.dim
         owned = self.V.dofmap.index_map.size_local
-        geometry_nodes = compat.dof_to_node(self.V)[:owned]
-        self.nodes: Indices = node_numbers(mesh)[geometry_nodes]
-        self.points: Array = mesh.geometry.x[geometry_nodes][:, : self.dimension]
+        numbers, points = numbered(self.V)
+        self.node_of_block: Indices = numbers
+        self.nodes: Indices = numbers[:owned]
+        self.points: Array = points[:owned]
         self.size = bounding_box(self.comm, self.points)  # tolerances are relative to it
         self.prescribed = prescribed
         self._where_held: list[tuple[Indices, tuple[int, ...]]] = []
@@ -116,6 +122,12 @@ class FemSpace(NodalSpace):
         """Return the owned blocks (nodes) on the facets, wherever the facets are owned."""
         blocks = compat.facet_dofs(self.V, facets)
         return np.asarray(blocks[blocks < len(self.nodes)], dtype=np.int64)
+
+    def nodes_of_facets(self, facets: Any) -> Indices:
+        """Return the numbers (k, n) of the nodes on each of these local facets, ghosts' too. Collective."""
+        if self.degree == 1:
+            return node_numbers(self.mesh)[compat.entities_to_geometry(self.mesh, self.mesh.topology.dim - 1, facets)]
+        return self.node_of_block[facet_rows(self.V, facets)]
 
     def _everywhere(self, facets: Facets) -> tuple[Indices, Array]:
         """(original numbers, points) of the nodes of facets, ascending, on every rank."""
@@ -176,7 +188,9 @@ class FemSpace(NodalSpace):
     @cached_property
     def body_of_node(self) -> Indices:
         """Return the body of every owned node: parts of the mesh that share no node, in the order of node numbers."""
-        return body_numbers(self.mesh)[compat.dof_to_node(self.V)[: len(self.nodes)]]
+        body = np.empty_like(self.node_of_block)
+        body[compat.cell_blocks(self.V)] = body_numbers(self.mesh)[compat.geometry_dofmap(self.mesh)[:, :1]]
+        return body[: len(self.nodes)]
 
     @property
     def bodies(self) -> Indices:

@@ -35,8 +35,8 @@ def check_cells(points: Array, cells: Rows, cell: str, source: str) -> None:
     noise = _ROUND_OFF * np.abs(points).max() * longest ** (d - 1)  # error of det from the rounding of coordinates
     flat = np.abs(det).min(axis=1) <= noise
     twisted = ~flat & (det.min(axis=1) < 0.0) & (det.max(axis=1) > 0.0)
-    _refuse(flat, "no volume", points, cells, source)
-    _refuse(twisted, "crossing sides", points, cells, source)
+    refuse_cells(flat, "no volume", points, cells, source)
+    refuse_cells(twisted, "crossing sides", points, cells, source)
 
 
 def check_folds(points: Array, cells: Rows, cell: str, source: str) -> None:
@@ -49,7 +49,7 @@ def check_folds(points: Array, cells: Rows, cell: str, source: str) -> None:
     wrong = (count > 2) | ((count == 2) & (balance != 0.0))
     bad = np.zeros(len(cells), dtype=bool)
     bad[owner[wrong[number]]] = True
-    _refuse(bad, "a neighbour on the same side of a common facet", points, cells, source)
+    refuse_cells(bad, "a neighbour on the same side of a common facet", points, cells, source)
 
 
 def check_sides(groups: dict[str, Rows], cells: Rows, cell: str, source: str) -> None:
@@ -72,7 +72,7 @@ def _normals(x: Array) -> Array:
     return np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
 
 
-def _refuse(bad: Mask, what: str, points: Array, cells: Rows, source: str) -> None:
+def refuse_cells(bad: Mask, what: str, points: Array, cells: Rows, source: str) -> None:
     """Raise InputError that counts the bad cells and says where the first one is."""
     if bad.any():
         count, have = ("1 cell", "has") if bad.sum() == 1 else (f"{bad.sum()} cells", "have")

@@ -16,7 +16,7 @@ from vi_contact.core.algebra import Array
 from vi_contact.core.checks import at
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.extract import MeshArrays, Source, add_arrays, arrays_of
-from vi_contact.meshes.rows import Mask, Rows, cell_sides, number_alike
+from vi_contact.meshes.rows import Mask, Rows, cell_sides, number_alike, vertex_count
 
 
 @dataclass(frozen=True)
@@ -113,6 +113,8 @@ def welded(arrays: MeshArrays, first: str, second: str) -> MeshArrays:
 
 
 def _group(arrays: MeshArrays, name: str) -> Rows:
+    if arrays.cells.shape[1] > vertex_count(arrays.cell):
+        raise InputError("a mesh of second order cannot be cut or welded: mesh it with Mesh.ElementOrder = 1")
     if name not in arrays.facet_groups:
         has = ", ".join(arrays.facet_groups) or "none"
         raise InputError(f"mesh has no boundary group '{name}'; it has {has}: name it in Gmsh as a physical group")

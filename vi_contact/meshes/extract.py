@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 
 from vi_contact.core.errors import InputError
-from vi_contact.meshes.checks import Array, check_cells, check_folds, check_sides
+from vi_contact.meshes.checks import Array, check_cells, check_folds, check_sides, refuse_cells
 from vi_contact.meshes.gmsh_session import MeshScript, session
 from vi_contact.meshes.grid import Grid
 from vi_contact.meshes.mesh_file import safe_copy
-from vi_contact.meshes.rows import GMSH_NUMBERS, Mask, Rows, number_alike
+from vi_contact.meshes.rows import GMSH_NUMBERS, SECOND_ORDER, Mask, Rows, number_alike, vertex_count
 
 Source = MeshScript | str | Path
 _Elements = dict[int, tuple[Rows, Rows]]
@@ -28,8 +28,8 @@ _Elements = dict[int, tuple[Rows, Rows]]
 class MeshArrays:
     """Hold a mesh without its library.
 
-    `cell` is UFL's name, `points` (n_points, d) are in metres, `cells` (n_cells, n_vertices) rows of points. Groups
-    by name: of cells as masks (n_cells,), of facets as rows of points (n_facets, n_facet_vertices).
+    `cell` is UFL's name, `points` (n_points, d) are in metres, `cells` (n_cells, n_nodes) rows of points, vertices
+    first. Groups by name: of cells as masks (n_cells,), of facets as rows of points (n_facets, n_facet_vertices).
     """
 
     cell: str
@@ -90,8 +90,9 @@ def extract(gmsh: Any, source: str) -> MeshArrays:
 
     As in Gmsh, the mesh is what the physical groups of the highest dimension hold; without any, all cells are taken,
     as a group "all". Nodes no cell uses are dropped, the others numbered from 0 in the order of their tags. Raises
-    InputError for a model without cells; mixed or higher-order cells; cells without volume, twisted, or folded over a
-    neighbour; a mesh of triangles or quadrilaterals outside the plane z = 0; named facets that are no sides of cells.
+    InputError for a model without cells; mixed cells, or of an order above 2; cells without volume, twisted, or folded
+    over a neighbour; a mesh of triangles or quadrilaterals outside the plane z = 0; named facets that are no sides of
+    cells.
     """
     model = gmsh.model
     d = max((model.mesh.getElementProperties(kind)[1] for kind in model.mesh.getElements()[0]), default=0)
@@ -100,15 +101,18 @@ def extract(gmsh: Any, source: str) -> MeshArrays:
         raise InputError(f"{source} calls both cells and facets '{min(both)}': give one of the groups another name")
     named = sorted({entity for entities in body.values() for entity in entities})
     elements = _elements(model, d, named or [entity for _, entity in model.getEntities(d)])
-    cell, number = _first_order(model, elements, d, source)
+    cell, number, side = _kind(model, elements, d, source)
     nodes, entity = elements[number]
     tags, cells = np.unique(nodes, return_inverse=True)
     points = _flat(_coordinates(model, tags, source), d, source)
     cells = cells.reshape(nodes.shape).astype(np.int64)
     kept, position = _without_repeats(cells)
     cells = cells[kept]
-    check_cells(points, cells, cell, source)
-    check_folds(points, cells, cell, source)
+    corners = cells[:, : vertex_count(cell)]
+    check_cells(points, corners, cell, source)
+    check_folds(points, corners, cell, source)
+    if cells.shape[1] > corners.shape[1]:
+        refuse_cells(_folded(model, number, entity, d)[kept], "a fold between its curved sides", points, cells, source)
     cell_groups = {} if body else {"all": np.ones(len(cells), dtype=bool)}
     for name, entities in body.items():
         cell_groups[name] = np.zeros(len(cells), dtype=bool)
@@ -116,10 +120,10 @@ def extract(gmsh: Any, source: str) -> MeshArrays:
     facet_groups = {}
     for name, entities in sides.items():
         what = f"boundary group '{name}' of {source}"
-        facets = _facets(model, entities, GMSH_NUMBERS[cell][1], tags, points, what)
+        facets = _facets(model, entities, side, tags, points, what)
         if len(facets):
             facet_groups[name] = facets
-    check_sides(facet_groups, cells, cell, source)
+    check_sides(facet_groups, corners, cell, source)
     return MeshArrays(cell, points, cells, cell_groups, facet_groups)
 
 
@@ -145,20 +149,32 @@ def _elements(model: Any, dim: int, entities: Iterable[int]) -> _Elements:
     }
 
 
-def _first_order(model: Any, elements: _Elements, dim: int, source: str) -> tuple[str, int]:
-    """Return the one type of cell there is: UFL's name and Gmsh's number."""
+def _kind(model: Any, elements: _Elements, dim: int, source: str) -> tuple[str, int, int]:
+    """Return the one type of cell there is: UFL's name, Gmsh's number, that of its sides."""
     if dim == 0 or not elements:
         raise InputError(f"{source} has no cells: mesh the geometry in Gmsh before saving it")
     names = {kind: model.mesh.getElementProperties(kind)[0] for kind in elements}
-    if high := [kind for kind in elements if model.mesh.getElementProperties(kind)[2] > 1]:
-        raise InputError(f"{source} has cells of higher order ({names[high[0]]}), but nodal contact conditions are "
-                         "exact only on first-order cells (P1, Q1): mesh it with Mesh.ElementOrder = 1")
+    known = {number: (cell, side) for kinds in (GMSH_NUMBERS, SECOND_ORDER) for cell, (number, side) in kinds.items()}
+    high = [kind for kind in elements if model.mesh.getElementProperties(kind)[2] > 1 and kind not in known]
+    if high:
+        raise InputError(f"{source} has cells of an order above 2, or without all mid-points ({names[high[0]]}): mesh "
+                         "it with Mesh.ElementOrder = 1, or with 2 and Mesh.SecondOrderIncomplete = 0")
     if len(elements) > 1:
         raise InputError(f"{source} mixes cells ({', '.join(sorted(names.values()))}): mesh it with cells of one type")
-    known = {number: cell for cell, (number, _) in GMSH_NUMBERS.items()}
     if (only := next(iter(elements))) not in known:
-        raise InputError(f"{source} has cells of type {names[only]}: use {', '.join(known.values())} cells")
-    return known[only], only
+        raise InputError(f"{source} has cells of type {names[only]}: use {', '.join(GMSH_NUMBERS)} cells")
+    return known[only][0], only, known[only][1]
+
+
+def _folded(model: Any, kind: int, entity: Rows, dim: int) -> Mask:
+    """Tell which curved cells of entities, in this order, have Jacobians of both signs at points of quadrature."""
+    places, _ = model.mesh.getIntegrationPoints(kind, "Gauss4")
+    bad = []
+    for one in dict.fromkeys(entity.tolist()):
+        jacobians = np.reshape(model.mesh.getJacobians(kind, places, one)[0], (-1, len(places) // 3, 3, 3))
+        det = np.linalg.det(jacobians[:, :, :dim, :dim])
+        bad.append((det.min(axis=1) <= 0.0) & (det.max(axis=1) >= 0.0))
+    return np.concatenate(bad)
 
 
 def _coordinates(model: Any, tags: Rows, source: str) -> Array:
@@ -193,7 +209,7 @@ def _without_repeats(rows: Rows) -> tuple[Rows, Rows]:
 
 
 def _facets(model: Any, entities: list[int], kind: int, tags: Rows, points: Array, what: str) -> Rows:
-    """Return the facets of a group as rows of points, each once; -1 for nodes that are at no point.
+    """Return the facets of a group as rows of points at their vertices, each once; -1 for nodes that are at no point.
 
     OpenCASCADE may copy a curve or surface when it bounds a body with it, and the named original is then meshed by
     itself, with nodes at the places of the body's (dolfinx#2456). Such a node stands for the one point at its place.
@@ -203,7 +219,7 @@ def _facets(model: Any, entities: list[int], kind: int, tags: Rows, points: Arra
         return np.empty((0, 1), dtype=np.int64)
     if list(found) != [kind]:
         raise InputError(f"{what} is not of the shapes of the cells' sides: mesh body and boundary together")
-    nodes, _ = found[kind]
+    nodes = found[kind][0][:, : model.mesh.getElementProperties(kind)[5]]
     place = np.minimum(np.searchsorted(tags, nodes), len(tags) - 1)
     rows = np.where(tags[place] == nodes, place, -1)
     if (rows < 0).any():

@@ -30,7 +30,11 @@ class MeshScript(Protocol):
     """Describe anything that can put a mesh into Gmsh's current model."""
 
     def build(self, gmsh: Any) -> None:
-        """Add geometry, named physical groups and first-order cells to the current (empty) model."""
+        """Add geometry, named physical groups and cells to the current (empty) model.
+
+        They are of first order unless it says ``gmsh.model.mesh.setOrder(2)`` at its end, which puts mid-points on the
+        curves of the geometry.
+        """
 
 
 @contextmanager

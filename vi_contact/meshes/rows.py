@@ -10,6 +10,10 @@ GMSH_NUMBERS = {  # Gmsh's numbers of a cell, called by UFL's name, and of its s
     "interval": (1, 15), "triangle": (2, 1), "quadrilateral": (3, 1), "tetrahedron": (4, 2), "hexahedron": (5, 3),
 }
 
+SECOND_ORDER = {  # the same of cells with a node in the middle of every edge, side and cell, after their vertices
+    "interval": (8, 15), "triangle": (9, 8), "quadrilateral": (10, 8), "tetrahedron": (11, 9), "hexahedron": (12, 10),
+}
+
 _SIDES: dict[str, list[tuple[int, ...]]] = {
     "interval": [(0,), (1,)],
     "triangle": [(0, 1), (1, 2), (2, 0)],
@@ -17,6 +21,11 @@ _SIDES: dict[str, list[tuple[int, ...]]] = {
     "tetrahedron": [(0, 1, 2), (0, 1, 3), (0, 2, 3), (1, 2, 3)],
     "hexahedron": [(0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)],
 }
+
+
+def vertex_count(cell: str) -> int:
+    """Return how many vertices a cell has: the first of its nodes."""
+    return len({vertex for side in _SIDES[cell] for vertex in side})
 
 
 def cell_sides(cells: Rows, cell: str) -> tuple[Rows, Rows]:

@@ -166,6 +166,7 @@ def read_frames(run: RunFolder | str | Path) -> StoredFrames:
         raise InputError(f"no frames in {folder / FIELDS}: run it with out and fields=fem.XDMF(every=...)")
     with _opened(folder / FIELDS / "mesh.h5") as file:
         points, cells = file["points"][:], file["cells"][:]
+    cells = cells[:, : {6: 3, 9: 4, 10: 4, 27: 8}.get(cells.shape[1])]  # of second order: the vertices
     d = 3 if np.any(points[:, 2]) else 2  # a mesh of the plane is stored with z = 0
     return StoredFrames(points[:, :d], cells, np.array([times[k] for k in places]), tuple(places.values()))
 

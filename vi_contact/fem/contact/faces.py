@@ -18,7 +18,7 @@ from ...core.checks import at, number
 from ...core.errors import InputError
 from ...meshes.rows import number_alike
 from .. import compat
-from ..mesh import Facets, node_numbers
+from ..mesh import Facets
 from ..space import FemSpace
 from .nodes import Nodes
 
@@ -32,7 +32,8 @@ class Boundary:
     """Hold facets of a group, the same on every rank in the order of the numbers of their nodes.
 
     Attributes:
-        vertices: (k, v) original numbers of their nodes, ascending; normals: (k, d) outward, of length one.
+        vertices: (k, v) numbers of their nodes, mid-points too, ascending; normals: (k, d) outward, of length one, on
+            curved facets of the plane through the corners.
         local: this rank's facets of the group; place: their numbers among the k.
     """
 
@@ -76,7 +77,7 @@ def boundary(space: FemSpace, facets: Facets, *, beyond: float | None = None) ->
     it from others: of a smooth boundary none. Collective."""
     mesh, local = space.mesh, np.asarray(facets.indices)
     geometry = compat.entities_to_geometry(mesh, mesh.topology.dim - 1, local)
-    vertices, normals = node_numbers(mesh)[geometry].astype(np.int64), _outward(mesh, local, geometry)
+    vertices, normals = space.nodes_of_facets(local), _outward(mesh, local, geometry)
     if beyond is not None:
         kept = np.isin(vertices, _turning(space, vertices, normals, beyond)).any(axis=1)
         local, vertices, normals = local[kept], vertices[kept], normals[kept]

@@ -51,6 +51,9 @@ class DualMortar:
         d = one.nodes.points.shape[1]
         if d == 1:
             raise InputError("DualMortar joins sides of plane and solid bodies: use matching=NodeToNode() for bars")
+        if max(one.facets.shape[1], two.facets.shape[1]) > (2 if d == 2 else 4):
+            raise InputError(f"DualMortar joins facets of first order and those of '{one.name}' and '{two.name}' have "
+                             "mid-points (degree=2): mesh both sides alike for matching=NodeToNode(), or use degree=1")
         D, M, longest = in_space(one, two) if d == 3 else _in_plane(one, two)
         rows = np.flatnonzero(D > 0.0)
         if not len(rows):

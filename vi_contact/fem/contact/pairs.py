@@ -26,8 +26,7 @@ from ...core.stages import stage
 from ...core.surfaces import ContactSurface, tangential_columns
 from ...core.system import SemiDiscreteSystem
 from ...meshes.rows import number_alike
-from .. import compat
-from ..mesh import Facets, node_numbers
+from ..mesh import Facets
 from ..space import FemSpace
 from .faces import Boundary, boundary, checked_angle, split, tell_corners
 from .frames import Facing, NodalConditions, NodalFrames, given, surface_of
@@ -98,9 +97,8 @@ def contact_pair(
 
 def side_of(space: FemSpace, facets: Facets) -> Side:
     """Gather all nodes and facets of a boundary, on every rank, in the order of the mesh's numbers. Collective."""
-    mesh, nodes = space.mesh, everywhere(space.comm, nodes_on(space, facets))
-    vertices = node_numbers(mesh)[compat.entities_to_geometry(mesh, mesh.topology.dim - 1, facets.indices)]
-    rows = np.concatenate(space.comm.bcast(space.comm.gather(vertices.astype(np.int64))))
+    nodes = everywhere(space.comm, nodes_on(space, facets))
+    rows = np.concatenate(space.comm.bcast(space.comm.gather(space.nodes_of_facets(facets.indices))))
     _, first = np.unique(np.sort(rows, axis=1), axis=0, return_index=True)
     return Side(facets.name, nodes, np.searchsorted(nodes.numbers, rows[first]))
 

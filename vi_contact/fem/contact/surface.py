@@ -18,12 +18,14 @@ from ...core.surfaces import ContactSurface
 from ...core.system import SemiDiscreteSystem
 from ..groups import facets_of
 from ..mesh import Facets
+from ..numbering import supports
 from ..space import FemSpace, space_of
 from .faces import boundary, checked_angle, in_symmetry_planes, integrals, split, tell_corners
 from .frames import NodalConditions, surface_of
 from .nodes import Nodes, asked, everywhere, joined_nodes, slots_of
 
 log = logging.getLogger(__name__)
+TETRAHEDRON = 10  # nodes of one of degree 2
 
 
 @stage("contact")
@@ -124,6 +126,9 @@ def contact_space(owner: str, system: SemiDiscreteSystem, groups: Mapping[str, F
     space = space_of(owner, system)
     for meaning, group in groups.items():
         facets_of(owner, meaning, group, space.mesh)
+    if space.degree == 2 and space.dimension == 3 and len(supports(space.V)) == TETRAHEDRON:
+        raise InputError(f"{owner}: the vertices of P2 tetrahedra have no weight in a pressure, so conditions at nodes "
+                         "do not serve; use degree=1, or hexahedra")
     for point in () if points is None else several(owner, "points", points, "give a list of points, or None"):
         several(owner, "a point", point, f"give {space.dimension} coordinates")
         array(owner, "a point", point, (None,))

@@ -21,7 +21,6 @@ from ...core.files import FIELDS, FIELDS_INDEX, frames_of, hdf5_atomically, on_r
 from ...core.problem import ContactProblem
 from ...core.step import Report, State
 from .. import compat
-from ..mesh import TENSOR_ORDER, node_numbers
 from ..space import FemSpace, known_matrices, space_of
 
 
@@ -52,8 +51,12 @@ class VonMises:
         return np.asarray(compat.assemble_vector(self._form).array_r / self._volume)
 
 
-_CELLS = {(1, 2): "Polyline", (2, 3): "Triangle", (2, 4): "Quadrilateral", (3, 4): "Tetrahedron", (3, 8): "Hexahedron"}
-"""XDMF's name of a cell by its dimension and number of vertices."""
+_CELLS = {
+    (1, 2): "Polyline", (2, 3): "Triangle", (2, 4): "Quadrilateral", (3, 4): "Tetrahedron", (3, 8): "Hexahedron",
+    (1, 3): "Edge_3", (2, 6): "Triangle_6", (2, 9): "Quadrilateral_9", (3, 10): "Tetrahedron_10",
+    (3, 27): "Hexahedron_27",
+}
+"""XDMF's name of a cell by its dimension and number of nodes."""
 
 _VECTORS = ("u", "v", "a")
 _RUBBING = ("contact_traction_t", "slip")
@@ -90,7 +93,7 @@ class FrameWriter:
         self._von_mises = VonMises(space.forms)
         owned, slots = problem.surface.owned, problem.surface.slots
         self._contact_nodes = on_first(space.comm, slots, space.ids[owned] // space.dimension)
-        self._type, mine = _cells(space.mesh)
+        self._type, mine = _cells(space)
         self._cell_numbers = compat.cell_numbers(space.mesh)
         points = on_first(space.comm, space.nodes, _three(space.points))
         cells = on_first(space.comm, self._cell_numbers, mine)
@@ -241,9 +244,9 @@ def _three(nodal: Array) -> Array:
     return np.pad(nodal, ((0, 0), (0, 3 - nodal.shape[1])))
 
 
-def _cells(mesh: Any) -> tuple[str, Indices]:
-    """XDMF's name of the cells, and the nodes of the owned ones by their input numbers, in the order of VTK."""
+def _cells(space: FemSpace) -> tuple[str, Indices]:
+    """XDMF's name of the cells, and the nodes of the owned ones by their numbers, in the order of VTK."""
+    mesh = space.mesh
     dim = mesh.topology.dim
-    vertices = node_numbers(mesh)[compat.geometry_dofmap(mesh)][: mesh.topology.index_map(dim).size_local]
-    kind = _CELLS[dim, vertices.shape[1]]
-    return kind, vertices[:, TENSOR_ORDER.get(kind.lower(), slice(None))]
+    rows = space.node_of_block[compat.cell_blocks(space.V)[: mesh.topology.index_map(dim).size_local]]
+    return _CELLS[dim, rows.shape[1]], rows[:, compat.vtk_order(mesh, rows.shape[1])]

@@ -62,19 +62,16 @@ class NodalWork:
         if self._gravity.shape != (space.dimension,):
             raise InputError(f"gravity has {self._gravity.size} components: give {space.dimension}")
         self._r, self._inside = compat.function(space.V), compat.function(compat.cell_space(space.mesh))
-        self._forms = [self._motion(name) if name != "C" or space.forms.damped else None for name in ("K", "C", "M")]
+        self._forms = [
+            compiled(space, space.forms.against(name, self._r, self._inside))
+            if name != "C" or space.forms.damped else None for name in ("K", "C", "M")
+        ]
         g, mesh, factor = ufl.TestFunction(space.V), space.mesh, space.forms.section.thickness * self._inside
         self._load_forms = [  # their products with nodal values of the loads are rᵀf
             compiled(space, factor * ufl.inner(self._r, load.acting(g, mesh)) * load.measure(mesh))
             for load in self._loads
         ]
         self._tell_constant_loads(owner)
-
-    def _motion(self, name: str) -> Any:
-        """rᵀA of the cells inside, A = K, C or M, as a linear form: its bilinear form with r as test function."""
-        forms = self.space.forms
-        form = ufl.replace(forms.bilinear(name), {forms.u: forms.v, forms.v: self._inside * self._r})
-        return compiled(self.space, form)
 
     def _tell_constant_loads(self, owner: str) -> None:
         """Warn when the system has constant loads and none were given: who forgets the weight measures reactions that
@@ -101,6 +98,7 @@ class NodalWork:
             for k, motion in enumerate(rigid_motions(self.space.points, centre)):
                 self._r.x.array[: motion.size] = np.where(where, motion, 0.0).ravel()
                 self._r.x.scatter_forward()
+                self.space.forms.follow(self._r)
                 for own, form, away in zip(rows, forms, [None, *less], strict=True):
                     if form is not None:
                         row = compat.assemble_vector(form).array_r

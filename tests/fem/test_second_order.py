@@ -1,0 +1,203 @@
+"""Displacements of second order: numbers of mid-points on any ranks, patch tests of contact, rates, refusals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("dolfinx")
+
+from fem_problems import BODIES, block, nodal
+from mpi4py import MPI
+from two_bodies import SOFT, blocks
+
+from vi_contact.core.algebra import Array
+from vi_contact.core.errors import InputError
+from vi_contact.core.problem import ContactProblem
+from vi_contact.fem.assembly import assemble
+from vi_contact.fem.contact.mortar import DualMortar
+from vi_contact.fem.contact.pairs import contact_pair
+from vi_contact.fem.contact.surface import contact_surface
+from vi_contact.fem.loads import Prescribed, Traction
+from vi_contact.fem.mesh import build_mesh
+from vi_contact.meshes.block import BlockMesh
+from vi_contact.meshes.extract import arrays_from_script
+from vi_contact.run.static import static_equilibrium
+
+COMM = MPI.COMM_WORLD
+bodies = pytest.mark.parametrize("name", BODIES)
+
+
+def everywhere(system: Any) -> tuple[Array, Array]:
+    """(numbers, points) of all nodes."""
+    found = COMM.allgather((system.space.nodes, system.space.points))
+    return tuple(np.concatenate([part[i] for part in found]) for i in (0, 1))
+
+
+@bodies
+def test_mid_points_are_numbered_after_the_vertices_by_those_of_their_edges(name: str) -> None:
+    arrays = arrays_from_script(BlockMesh(**BODIES[name]))
+    mesh, _ = block(COMM, **BODIES[name])
+    numbers, points = everywhere(assemble(mesh, SOFT, degree=2))
+    assert np.array_equal(np.sort(numbers), np.arange(len(numbers)))
+    points = points[np.argsort(numbers)]
+    vertices, corner = len(arrays.points), arrays.cells.shape[1]
+    assert np.allclose(points[:vertices], arrays.points, rtol=0.0, atol=1e-14)
+    sides = {  # pairs of Gmsh's vertices of a cell that are edges
+        "quadrilateral": [(0, 1), (1, 2), (2, 3), (3, 0)],
+        "hexahedron": [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)],
+    }.get(arrays.cell, list(combinations(range(corner), 2)))
+    edges = np.unique(np.sort(arrays.cells[:, np.array(sides)].reshape(-1, 2), axis=1), axis=0)
+    middles = arrays.points[edges].mean(axis=1)
+    assert np.allclose(points[vertices:][: len(edges)], middles, rtol=0.0, atol=1e-14)
+    if arrays.cell in ("quadrilateral", "hexahedron"):
+        found, centres = points[len(points) - len(arrays.cells) :], arrays.points[arrays.cells].mean(axis=1)
+        order = [np.lexsort(np.round(one, 9).T) for one in (found, centres)]
+        assert np.allclose(found[order[0]], centres[order[1]], rtol=0.0, atol=1e-14)
+    else:
+        assert len(points) == vertices + len(edges)
+
+
+def wavy(x: Array) -> Array:
+    """Bend the inside of a block of height 1.5 and length 2 (and depth 1.2), but none of its sides."""
+    lengths = np.array([2.0, 1.5, 1.2])[: x.shape[1]]
+    bump = np.prod(np.sin(np.pi * x / lengths), axis=1)
+    return x + 0.12 * bump[:, None] * np.array([1.0, -0.7, 0.5])[: x.shape[1]]
+
+
+MIDDLES = {  # Gmsh's number of a type of second order, and the vertices whose means its further nodes are, in its order
+    "interval": (8, [(0, 1)]),
+    "triangle": (9, [(0, 1), (1, 2), (2, 0)]),
+    "quadrilateral": (10, [(0, 1), (1, 2), (2, 3), (3, 0), (0, 1, 2, 3)]),
+    "hexahedron": (12, [
+        (0, 1), (0, 3), (0, 4), (1, 2), (1, 5), (2, 3), (2, 6), (3, 7), (4, 5), (4, 7), (5, 6), (6, 7), (0, 1, 2, 3),
+        (0, 1, 4, 5), (0, 3, 4, 7), (1, 2, 5, 6), (2, 3, 6, 7), (4, 5, 6, 7), (0, 1, 2, 3, 4, 5, 6, 7),
+    ]),
+}
+
+
+@dataclass(frozen=True)
+class Curved:
+    """A mesh of grids with mid-points, all of whose nodes are moved by a smooth map: cells with curved sides."""
+
+    mesh: Any
+    move: Any = wavy
+
+    def build(self, gmsh: Any) -> None:
+        arrays = arrays_from_script(self.mesh)
+        d, known, points = arrays.points.shape[1], {}, list(arrays.points)
+        side = {"triangle": "interval", "quadrilateral": "interval", "hexahedron": "quadrilateral"}[arrays.cell]
+
+        def raised(rows: Any, cell: str) -> Any:
+            for row in rows.tolist():
+                for around in MIDDLES[cell][1]:
+                    key = tuple(sorted(row[i] for i in around))
+                    if key not in known:
+                        known[key] = len(points)
+                        points.append(arrays.points[list(key)].mean(axis=0))
+                    row.append(known[key])
+                yield row
+
+        parts = [(d, arrays.cell, name, list(raised(arrays.cells[mask], arrays.cell)))
+                 for name, mask in arrays.cell_groups.items()]
+        parts += [(d - 1, side, name, list(raised(rows, side))) for name, rows in arrays.facet_groups.items()]
+        places = np.zeros((len(points), 3))
+        places[:, :d] = self.move(np.array(points))
+        home = gmsh.model.addDiscreteEntity(d)
+        gmsh.model.mesh.addNodes(d, home, 1 + np.arange(len(points)), places.ravel())
+        for dim, cell, name, rows in parts:
+            entity = gmsh.model.addDiscreteEntity(dim)
+            gmsh.model.mesh.addElementsByType(entity, MIDDLES[cell][0], [], 1 + np.array(rows).ravel())
+            gmsh.model.setPhysicalName(dim, gmsh.model.addPhysicalGroup(dim, [entity]), name)
+
+
+SHAPES: dict[str, dict[str, Any]] = {
+    "triangles": {"lengths": (2.0, 1.5), "divisions": (3, 3), "simplices": True},
+    "quadrilaterals": {"lengths": (2.0, 1.5), "divisions": (3, 3)},
+    "hexahedra": {"lengths": (2.0, 1.5, 1.2), "divisions": (2, 2, 2)},
+}
+shapes = pytest.mark.parametrize("name", SHAPES)
+curved = pytest.mark.parametrize("curved", [False, True], ids=["straight", "curved"])
+
+
+def mesh_of(name: str, curved: bool) -> Any:
+    return Curved(BlockMesh(**SHAPES[name])) if curved else BlockMesh(**SHAPES[name], deform=wavy)
+
+
+PRESSURE = 1.0e4
+
+
+def pressed_down(x: Array) -> Array:
+    """The displacement of a free block under a uniform pressure on its top, plane strain in the plane."""
+    E, nu, d = SOFT.E, SOFT.nu, x.shape[1]
+    strain = np.full(d, nu * (1.0 + nu if d == 2 else 1.0) * PRESSURE / E)
+    strain[1] = -(1.0 - nu**2 if d == 2 else 1.0) * PRESSURE / E
+    return x * strain
+
+
+@shapes
+@curved
+def test_a_uniform_pressure_is_exact_at_every_node_of_a_rigid_support(name: str, curved: bool) -> None:
+    mesh, tags = build_mesh(mesh_of(name, curved), COMM)
+    rollers = [Prescribed(tags[side], components=(c,)) for c, side in ((0, "left"), (2, "back")) if side in tags]
+    load = Traction(tags["top"], (0.0, -PRESSURE, 0.0)[: mesh.geometry.dim])
+    system = assemble(mesh, SOFT, prescribed=rollers, loads=load, degree=2)
+    surface = contact_surface(system, tags["bottom"])
+    state = static_equilibrium(ContactProblem(system, surface))
+    assert surface.total == (5**2 if name == "hexahedra" else 7)
+    assert np.allclose(state.r_n, PRESSURE * surface.weights, rtol=1e-10, atol=0.0)
+    exact = nodal(system, pressed_down)
+    assert np.allclose(state.u, exact, rtol=0.0, atol=1e-10 * np.abs(exact).max(initial=1e-300) + 1e-16)
+
+
+PAIRS: dict[str, dict[str, Any]] = {
+    "triangles": {"d": 2, "simplices": True},
+    "quadrilaterals": {"d": 2},
+    "hexahedra": {"d": 3, "upper": (2, 2, 2), "lower": (2, 1, 2)},
+}
+
+
+def bent_bodies(x: Array) -> Array:
+    """Bend two blocks of heights 1 on one another inside, the sides and the interface stay where they are."""
+    lengths = np.array([1.5, 1.0, 1.2])[: x.shape[1]]
+    bump = np.prod(np.sin(np.pi * x / lengths), axis=1)
+    return x + 0.06 * bump[:, None] * np.array([1.0, -0.7, 0.5])[: x.shape[1]]
+
+
+@pytest.mark.parametrize("name", PAIRS)
+@curved
+def test_a_uniform_pressure_goes_through_the_nodes_between_two_bodies(name: str, curved: bool) -> None:
+    both = blocks(**PAIRS[name])
+    mesh, tags = build_mesh(Curved(both, bent_bodies) if curved else both, COMM)
+    held = [Prescribed(tags["lower_bottom"], components=(1,))]
+    for c, side in ((0, "left"), (2, "back")):
+        held += [Prescribed(tags[name], components=(c,)) for name in (f"lower_{side}", f"upper_{side}") if name in tags]
+    load = Traction(tags["upper_top"], (0.0, -PRESSURE, 0.0)[: mesh.geometry.dim])
+    system = assemble(mesh, SOFT, prescribed=held, loads=load, degree=2)
+    surface = contact_pair(system, *(tags[side] for side in both.interface))
+    problem = ContactProblem(system, surface)
+    state = static_equilibrium(problem)
+    assert surface.total == (5**2 if name == "hexahedra" else 9)
+    assert np.allclose(state.r_n, PRESSURE * surface.weights, rtol=1e-10, atol=0.0)
+    exact = nodal(system, pressed_down)
+    assert np.allclose(problem.cartesian(state.u), exact, rtol=0.0, atol=1e-10 * 2.0 * PRESSURE / SOFT.E)
+
+
+def test_conditions_that_do_not_serve_are_refused() -> None:
+    mesh, tags = block(COMM, **BODIES["tetrahedra"])
+    with pytest.raises(InputError, match="vertices of P2 tetrahedra have no weight"):
+        contact_surface(assemble(mesh, SOFT, degree=2), tags["bottom"])
+    both = blocks(2)
+    mesh, tags = build_mesh(both, COMM)
+    with pytest.raises(InputError, match=r"DualMortar joins facets of first order .* have mid-points"):
+        contact_pair(assemble(mesh, SOFT, degree=2), *(tags[side] for side in both.interface), matching=DualMortar())
+    for degree in (0, 3, 2.5, True, "2"):
+        with pytest.raises(InputError, match="assemble: degree is .*; give 1 for P1 and Q1, 2 for P2 and Q2"):
+            assemble(mesh, SOFT, degree=degree)
+    mesh, _ = build_mesh(mesh_of("triangles", curved=True), COMM)
+    with pytest.raises(InputError, match="the mesh has cells of second order; give degree=2"):
+        assemble(mesh, SOFT)
