@@ -1,0 +1,1 @@
+../vi_contact/meshes/__main__.py

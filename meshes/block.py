@@ -1,0 +1,1 @@
+../vi_contact/meshes/block.py

@@ -1,0 +1,1 @@
+../vi_contact/meshes/two_blocks.py
