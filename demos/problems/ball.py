@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import betaincinv
 
-from demos.meshes.ball import BallMesh
+from meshes.ball import BallMesh
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.core.obstacles import HalfSpace

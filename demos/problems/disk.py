@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from demos.meshes.disk import DiskMesh
+from meshes.disk import DiskMesh
 from vi_contact.core.checks import attributes, function, instance
 from vi_contact.core.obstacles import HalfSpace
 from vi_contact.core.problem import ContactProblem

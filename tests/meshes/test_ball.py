@@ -5,7 +5,7 @@ from math import pi
 import numpy as np
 import pytest
 
-from demos.meshes.ball import BallMesh
+from meshes.ball import BallMesh
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.extract import MeshArrays, arrays_from_file, arrays_from_script
 from vi_contact.meshes.gmsh_session import write

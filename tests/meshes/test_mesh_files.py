@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from demos.meshes.ball import BallMesh
-from demos.meshes.disk import DiskMesh
+from meshes.ball import BallMesh
+from meshes.disk import DiskMesh
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.channel import ChannelMesh

@@ -234,10 +234,15 @@ def test_every_number_of_a_shape_is_an_option(shape: str, capsys):
         assert field.name in ("corner", "deform") or f"--{field.name.replace('_', '-')} " in said.replace("]", " ")
 
 
-def test_a_script_of_the_source_tree_is_the_command_of_its_shape(tmp_path):
-    done = run(SOURCE_TREE / "meshes" / "wall.py", "--divisions", 2, 4, "-o", "wall.msh", cwd=tmp_path)
+@pytest.mark.parametrize(
+    "shape, words, kind",
+    [("wall", "--divisions 2 4", "quadrilateral"), ("disk", "--radius 1 --size 0.5 --foot 0.5", "triangle"),
+     ("ball", "--radius 1 --size 0.25 --foot 0.5", "tetrahedron")],
+)
+def test_a_script_of_the_source_tree_is_the_command_of_its_shape(shape: str, words: str, kind: str, tmp_path):
+    done = run(SOURCE_TREE / "meshes" / f"{shape}.py", *words.split(), "-o", "it.msh", cwd=tmp_path)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
-    assert len(arrays_from_file(tmp_path / "wall.msh").cells) == 8
+    assert arrays_from_file(tmp_path / "it.msh").cell == kind
 
 
 def test_meshes_explain_bad_input_in_one_line(tmp_path):

@@ -20,7 +20,7 @@ from graded import Pressed, even_then_growing, growing, pressed_half
 from hertz_line import HertzLine
 from mpi4py import MPI
 
-from demos.meshes.ball import BallMesh
+from meshes.ball import BallMesh
 from vi_contact.core.obstacles import AnalyticGap, HalfSpace
 from vi_contact.core.problem import ContactProblem
 from vi_contact.exact.hertz import HertzPoint, contact_modulus

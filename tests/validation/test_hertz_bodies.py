@@ -15,7 +15,7 @@ pytest.importorskip("dolfinx")
 from mpi4py import MPI
 from spheres import hertz
 
-from demos.meshes.ball import BallMesh
+from meshes.ball import BallMesh
 from vi_contact.core.problem import ContactProblem
 from vi_contact.exact.hertz import HertzPoint, contact_modulus
 from vi_contact.fem.assembly import assemble

@@ -15,8 +15,8 @@ import pytest
 from inertia import inertia
 from mpi4py import MPI
 
-from demos.meshes.ball import BallMesh
 from demos.problems.ball import QUARTERS, Ball, BallModel, build, hertz_motion
+from meshes.ball import BallMesh
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.core.obstacles import HalfSpace, Touching

@@ -2,9 +2,10 @@
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, fields
 from pathlib import Path
+from typing import Any
 
 if not __package__:  # run as a folder of the source tree, maybe not installed
     sys.path[0] = str(Path(__file__).resolve().parents[2])
@@ -13,15 +14,14 @@ from vi_contact import meshes
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.gmsh_session import write
 
-SHAPES = {name.removesuffix("Mesh").lower(): name for name in meshes.__all__ if name.endswith("Mesh")}
+SHAPES = {name.removesuffix("Mesh").lower(): getattr(meshes, name) for name in meshes.__all__ if name.endswith("Mesh")}
 
 
-def parser() -> argparse.ArgumentParser:
+def parser(shapes: Mapping[str, Any] = SHAPES) -> argparse.ArgumentParser:
     """Build the parser: a command for every shape, an option for each of its numbers, which its docstring explains."""
     top = argparse.ArgumentParser(prog="meshes", description=__doc__)
-    commands = top.add_subparsers(dest="shape", required=True, metavar=f"{{{','.join(SHAPES)}}}")
-    for shape, name in SHAPES.items():
-        mesh = getattr(meshes, name)
+    commands = top.add_subparsers(dest="shape", required=True, metavar=f"{{{','.join(shapes)}}}")
+    for shape, mesh in shapes.items():
         one = commands.add_parser(shape, description=mesh.__doc__, argument_default=argparse.SUPPRESS)
         for field in fields(mesh):
             option = f"--{field.name.replace('_', '-')}"
@@ -35,10 +35,10 @@ def parser() -> argparse.ArgumentParser:
     return top
 
 
-def main(words: Sequence[str]) -> None:
+def main(words: Sequence[str], shapes: Mapping[str, Any] = SHAPES) -> None:
     """Write the mesh that the words of a command ask for, or end with a sentence."""
-    given = vars(parser().parse_args(words))
-    mesh, output = getattr(meshes, SHAPES[given.pop("shape")]), given.pop("output")
+    given = vars(parser(shapes).parse_args(words))
+    mesh, output = shapes[given.pop("shape")], given.pop("output")
     try:
         write(mesh(**{name: tuple(x) if isinstance(x, list) else x for name, x in given.items()}), output)
     except InputError as error:
