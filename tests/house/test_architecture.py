@@ -134,6 +134,13 @@ def test_imports_point_down():
     assert not upward(every_import(SOURCES))
 
 
+def test_what_is_imported_by_name_stands_below_too():
+    """But for ``Solution.plot``: a notebook asks a run for its figure, and no run needs one."""
+    asked = re.compile(r"import_module\(f?\"vi_contact\.(\w+)")
+    found = {(source, room) for source, text in SOURCES.items() for room in asked.findall(text)}
+    assert found == {("run.solution", "plots")}
+
+
 def test_one_upward_import_is_found():
     """The rule has teeth: any single import of a room on the same floor or above makes it fail."""
     for here, there in (("core.errors", "laws.friction"), ("solvers.condensed", "run.march"), ("fem.mesh", "solvers"),

@@ -75,7 +75,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "plots/test_faces.py": "plots.bodies plots.rendered",
     "plots/test_report.py": "cli.report run.files.reading",
     "run/test_folder.py": "core.files run.files.history run.files.stored_rows run.files.table",
-    "run/test_fuzz_folders.py": "run.files.writer run.session run.solution",
+    "run/test_fuzz_folders.py": "run.files.writer run.session",
     "run/test_march.py": "core.state_checks",
     "run/test_march_many.py": "run.rows run.together",
     "run/test_proximal.py": "run.rigid_bodies",

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from .algebra import Array
+from .checks import shown
 from .problem_checks import check_parts
 from .protocols import Excitation, FrictionLaw, Frictionless, ImpactLaw, MassLaw
 from .stages import stage
@@ -37,6 +38,13 @@ class ContactProblem:
         total, slots = self.surface.total, self.surface.slots
         own = with_values(self.friction, self.surface, lambda v: tuple(v[i] for i in slots) if len(v) == total else v)
         object.__setattr__(self, "friction", own)
+
+    def __repr__(self) -> str:
+        """Return unknowns, conditions and laws in a few lines, those of all ranks: not the arrays."""
+        laws = {"friction": self.friction, "impact": self.impact, "mass": self.mass or "that of the time scheme"}
+        parts = [self.system, self.surface, *(f"{name}: {shown(one)}" for name, one in laws.items())]
+        parts += [f"excitation: {shown(one)}" for one in self.excitations]
+        return "\n  ".join([f"ContactProblem with {self.surface.total} contact conditions", *map(str, parts)])
 
     @cached_property
     def excitations(self) -> tuple[Excitation, ...]:

@@ -54,6 +54,11 @@ class State:
     memory: Mapping[str, Array] = field(default_factory=dict)
     r_t: Array | None = None
 
+    def __repr__(self) -> str:
+        """Return time, step and sizes on this rank: not the arrays."""
+        closed = f"{np.count_nonzero(self.active)} of {np.size(self.active)} contact conditions closed"
+        return f"State(t={self.t} s, k={self.k}, {np.size(self.u)} unknowns, {closed})"
+
     def with_velocity(self, v: Array) -> "State":
         """Return the state with another velocity."""
         return State(self.t, self.k, self.u, v, self.r_n, self.active, self.memory, self.r_t)

@@ -72,6 +72,12 @@ class ContactSurface:
     nodes: Indices | None = None
     frictionless_corners: bool = False
 
+    def __repr__(self) -> str:
+        """Return how many conditions this rank has, and of which kind: not the arrays."""
+        springs, held = np.count_nonzero(self.compliance), np.count_nonzero(self.bilateral)
+        moves = "" if self.motion is None and self.slide is None else ", on a moving obstacle"
+        return f"{type(self).__name__}({self.count} conditions here: {springs} on springs, {held} bilateral{moves})"
+
     @property
     def count(self) -> int:
         """Return the number of contact conditions m of this rank."""

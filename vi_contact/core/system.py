@@ -164,6 +164,11 @@ class SemiDiscreteSystem:
             if not isinstance(value, np.ndarray) or value.ndim != axes or value.dtype.kind not in "iuf":
                 raise InputError(f"SemiDiscreteSystem: {name} is {shown(value)}; give real numbers along {axes} axes")
 
+    def __repr__(self) -> str:
+        """Return what it is, in words: not the arrays."""
+        kind = f"{'un' if self.C is None else ''}damped, {'floating' if self.floating else 'supported'}"
+        return f"SemiDiscreteSystem({self.space.unknowns} unknowns in {self.space.dimension}D, {kind})"
+
     @property
     def rows(self) -> int:
         """Return how many unknowns this rank owns."""

@@ -11,6 +11,7 @@ _CONTENTS = {
     "faces": ("plot_faces",),
     "histories": ("plot_certificate", "plot_energy", "plot_excitation", "plot_points", "plot_runs"),
     "maps": ("plot_contact",),
+    "overview": ("plot_overview",),
     "records": ("plot_loop", "plot_motion", "plot_spectra", "plot_transfer"),
     "rendered": ("render_deformed",),
     "report": ("plot_report",),

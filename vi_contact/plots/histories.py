@@ -138,18 +138,24 @@ LEDGER = (
 def plot_energy(history: History, path: str | Path, *, title: str = "Energy ledger") -> Path:
     """Draw the ledger's terms, and its defect relative to the largest of them."""
     figure, (top, bottom) = panels(2, (9.0, 6.0), height_ratios=(3, 1))
-    present = [entry for entry in LEDGER if entry[0] in history and np.any(history[entry[0]])]
-    size = max((float(np.max(np.abs(history[name]))) for name, *_ in present), default=0.0)
-    factor, unit = scale(size, "J")
-    for name, label, colour, style in present:
-        top.plot(history["t"], history[name] * factor, color=colour, ls=style, lw=1.0, label=label)
-    if present:
-        top.legend(fontsize=8, ncol=2)
+    size, unit = draw_ledger(top, history)
     top.set(ylabel=f"energy, cumulative work [{unit}]", title=title)
     log_axis(bottom, history["t"], np.abs(history["energy_defect"]) / (size or 1.0))
     bottom.axhline(1e-10, color="tab:red", ls="--", lw=0.8)
     bottom.set(ylabel="relative defect [-]")
     return save(figure, path)
+
+
+def draw_ledger(axis: Any, history: History) -> tuple[float, str]:
+    """Draw the ledger's terms; return the largest [J], and the unit of the axis."""
+    present = [entry for entry in LEDGER if entry[0] in history and np.any(history[entry[0]])]
+    size = max((float(np.max(np.abs(history[name]))) for name, *_ in present), default=0.0)
+    factor, unit = scale(size, "J")
+    for name, label, colour, style in present:
+        axis.plot(history["t"], history[name] * factor, color=colour, ls=style, lw=1.0, label=label)
+    if present:
+        axis.legend(fontsize=8, ncol=2)
+    return size, unit
 
 
 def plot_certificate(history: History, path: str | Path, *, tolerance: float = 1e-9) -> Path:

@@ -1,7 +1,11 @@
 """Hold what a run leaves behind: histories, the final state and a summary in figures."""
 
+from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from html import escape
+from importlib import import_module
+from io import BytesIO
 from pathlib import Path
 from textwrap import shorten, wrap
 from typing import Any
@@ -58,7 +62,22 @@ class Solution:
 
     def summary(self) -> str:
         """Return the run in a few lines for people."""
-        return "\n".join(_lines(self.facts))
+        return "\n".join(f"  {name:<26} {value}" if name else value for name, value in _entries(self.facts))
+
+    __repr__ = summary
+
+    def plot(self) -> Any:
+        """Return a matplotlib Figure of what was recorded: probes, contact force, energy ledger, certificates."""
+        return import_module("vi_contact.plots").plot_overview(self)  # by name: on a floor above, and no run needs it
+
+    def _repr_html_(self) -> str:
+        """Return summary and figure for a notebook, without reference to anything outside."""
+        rows = "".join(f"<tr><th>{escape(name)}</th><td>{escape(value)}</td></tr>" if name else
+                       f'<tr><td colspan="2">{escape(value)}</td></tr>' for name, value in _entries(self.facts))
+        image = BytesIO()
+        self.plot().savefig(image, format="png", dpi=70)
+        picture = b64encode(image.getvalue()).decode()
+        return f'<table>{rows}</table><img alt="histories of the run" src="data:image/png;base64,{picture}">'
 
 
 def energy_warning(facts: Mapping[str, Any]) -> str | None:
@@ -80,44 +99,43 @@ def sampling_warning(excitations: Sequence[Excitation], dt: float) -> str | None
             "cannot carry")
 
 
-def _lines(facts: Mapping[str, Any]) -> list[str]:
-    def line(name: str, value: str) -> str:
-        return f"  {name:<26} {value}"
-
+def _entries(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """(name, value) of every line of the summary; those without a name are whole lines."""
     iterations, warning, dt = facts["iterations_per_step"], energy_warning(facts), facts["dt"]
     length = f"({facts['base_steps']} base steps of {dt})" if isinstance(dt, str) else f"of {dt:g} s"
     lines = [
-        f"run {facts['status']}: {facts['steps']} steps {length}, "
-        f"t = {facts['t_start']:g} to {facts['t_end']:g} s, on {facts['ranks']} rank(s)",
-        line("scheme", facts["scheme"]),
-        line("mass matrix", facts["mass"]),
-        line("solver", shorten(facts["solver"], 88, placeholder=" …")),
-        line("unknowns, contact points", f"{facts['unknowns']}, {facts['contact_points']}"),
-        line("iterations per step", f"{iterations['mean']:.2f} on average, {iterations['max']} at most"),
-        line("worst certificate", f"{facts['worst_certificate']:.2e}"),
-        line("escalated steps", str(facts["escalated_steps"])),
+        ("", f"run {facts['status']}: {facts['steps']} steps {length}, "
+             f"t = {facts['t_start']:g} to {facts['t_end']:g} s, on {facts['ranks']} rank(s)"),
+        ("scheme", facts["scheme"]),
+        ("mass matrix", facts["mass"]),
+        ("solver", shorten(facts["solver"], 88, placeholder=" …")),
+        ("unknowns, contact points", f"{facts['unknowns']}, {facts['contact_points']}"),
+        ("iterations per step", f"{iterations['mean']:.2f} on average, {iterations['max']} at most"),
+        ("worst certificate", f"{facts['worst_certificate']:.2e}"),
+        ("escalated steps", str(facts["escalated_steps"])),
     ]
     if facts["halved_steps"]:
-        lines.append(line("halved steps", str(facts["halved_steps"])))
+        lines.append(("halved steps", str(facts["halved_steps"])))
     if "steps_in_contact" in facts:
         uplift = f"largest uplift {facts['largest_uplift']:.3f}"
-        lines.append(line("steps in contact", f"{facts['steps_in_contact']}, {uplift}"))
-        lines.append(line("smallest gap", f"{facts['smallest_gap']:.3e} m"))
+        lines.append(("steps in contact", f"{facts['steps_in_contact']}, {uplift}"))
+        lines.append(("smallest gap", f"{facts['smallest_gap']:.3e} m"))
     for method, difference in (facts["cross_check"] or {}).items():
         values = ", ".join(f"{name} {value:.2e}" for name, value in difference.items())
-        lines.append(line(f"cross-check {method}", values))
+        lines.append((f"cross-check {method}", values))
     if "energy" in facts:
-        lines.append("  energy ledger [J]")
-        lines.append(line("  energy at the start", f"{facts['energy']['energy_start']: .6e}"))
-        lines += [line(f"  {title}", f"{facts['energy'][name]: .6e}") for name, title in LEDGER[:-1]]
-        lines.append(line("  defect, relative", f"{facts['energy_defect']: .2e}"))
+        lines.append(("", "  energy ledger [J]"))
+        lines.append(("  energy at the start", f"{facts['energy']['energy_start']: .6e}"))
+        lines += [(f"  {title}", f"{facts['energy'][name]: .6e}") for name, title in LEDGER[:-1]]
+        lines.append(("  defect, relative", f"{facts['energy_defect']: .2e}"))
     for one in filter(None, (warning, facts.get("sampling"))):
-        lines += wrap(f"WARNING: {one}", 110, initial_indent="  ", subsequent_indent="  ")
+        told = wrap(f"WARNING: {one}", 110, initial_indent="  ", subsequent_indent="  ")
+        lines += [("", text) for text in told]
     if np.isfinite(facts["seconds_per_step"]):
         mean, plain = facts["seconds_per_step"], facts["seconds_per_linear_step"]
         ratio = f", plain linear step {plain:.3e} s, ratio {mean / plain:.2f}" if np.isfinite(plain) else ""
         extra = " (with records, output and the cross-check)" if facts["cross_check"] else " (with records and output)"
-        lines.append(line("wall time per step", f"{mean:.3e} s{ratio}{extra}"))
+        lines.append(("wall time per step", f"{mean:.3e} s{ratio}{extra}"))
     if facts["reason"]:
-        lines.append(line("reason", facts["reason"]))
+        lines.append(("reason", facts["reason"]))
     return lines

@@ -43,7 +43,7 @@ class NodalConditions:
     facing: Facing | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class FemSurface(ContactSurface):
     """Hold a contact surface that remembers what it was made of, so that it can be joined with others."""
 
