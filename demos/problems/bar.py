@@ -29,13 +29,17 @@ UP = {1: 0, 2: 1, 3: 1}  # component of the bar's axis
 
 @dataclass(frozen=True)
 class Bar:
-    """Describe a bar. ``case``: exact solution with its data; ``elements`` along the bar, ``across`` it (cubes)."""
+    """Describe a bar. ``case``: exact solution with its data; ``elements`` along the bar, ``across`` it (cubes).
+
+    ``degree`` 2 for P2 or Q2.
+    """
 
     case: ThrownBar | BouncingBar | PeriodicBar = field(default_factory=ThrownBar)
     elements: int = 100
     dimension: int = 1
     across: int = 3
     triangles: bool = False
+    degree: int = 1
 
     @property
     def length(self) -> float:
@@ -109,4 +113,4 @@ def build(bar: Bar, comm: Any) -> BarModel:
         data["clamped"] = top
         data["initial_displacement"] = lambda x: np.outer(0.5 * (1.0 - x[:, UP[d]]), bar.along(1.0))
     section = {1: None, 2: PlaneStrain(), 3: Solid()}[d]
-    return BarModel(bar, assemble(mesh, bar.material, section=section, **data), foot, gap)
+    return BarModel(bar, assemble(mesh, bar.material, section=section, degree=bar.degree, **data), foot, gap)

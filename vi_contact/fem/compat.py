@@ -155,9 +155,7 @@ def measure(mesh: Mesh, dim: int, indices: Indices) -> ufl.Measure:
 
 def vector_space(mesh: Mesh, degree: int = 1) -> Any:
     """Make the space of continuous vector fields (P1, Q1, P2, Q2) with gdim components; the block size is gdim."""
-    if _BASIX_ELEMENTS:
-        return fem.functionspace(mesh, ("Lagrange", degree, (mesh.geometry.dim,)))
-    return fem.VectorFunctionSpace(mesh, ("Lagrange", degree))
+    return lagrange(mesh, degree, (mesh.geometry.dim,))
 
 
 def lagrange(mesh: Mesh, degree: int, shape: tuple[int, ...] = (), *, continuous: bool = True) -> Any:
@@ -172,12 +170,6 @@ def lagrange(mesh: Mesh, degree: int, shape: tuple[int, ...] = (), *, continuous
 def is_simplex(mesh: Mesh) -> bool:
     """Say whether the cells are intervals, triangles or tetrahedra."""
     return mesh.topology.cell_type.name in ("interval", "triangle", "tetrahedron")
-
-
-def cell_unknowns(space: Any) -> Indices:
-    """Return the local blocks of unknowns of all cells, one cell after the other: alike in spaces of one element."""
-    rows = space.dofmap.list
-    return np.ravel(rows if isinstance(rows, np.ndarray) else rows.array)
 
 
 def dof_to_node(space: Any) -> Indices:

@@ -19,7 +19,7 @@ from ..core.surfaces import ContactSurface
 from ..core.system import SemiDiscreteSystem
 from .mass_transfer import from_neighbours, named, rigid_motions
 
-LIGHT = 1e-9  # of the diagonal entry of M: a row sum that is no mass
+LIGHT = 1e-9  # of the diagonal entry of M: a row sum that is none
 LARGEST_CORRECTION = 0.35  # of a node's lumped mass: beyond, the mesh is too coarse to move mass about
 
 
@@ -45,8 +45,10 @@ class Redistributed:
     total mass is kept.
 
     ``lumping`` 0.4 balances the dispersion of mesh and time step: consistent mass sends high frequencies ahead of
-    the wave, lumped mass leaves them behind (table in docs/guide/schemes.md). InputError for lumping outside [0, 1], a
-    contact node with no material behind it, or a mesh too coarse to hold the inertia.
+    the wave, lumped mass leaves them behind (table in docs/guide/schemes.md). Row sums of P2 are zero at the vertices
+    of plane triangles, which does no harm, and may be negative on curved ones: those want lumping 0. InputError for
+    lumping outside [0, 1] or above 0 with negative row sums, a contact node with no material behind it, or a mesh too
+    coarse to hold the inertia.
     """
 
     lumping: float = 0.4
@@ -59,10 +61,11 @@ class Redistributed:
             return system
         massless, contact = _contact_unknowns(system, surface, tangential)
         algebra, nodal, own = system.algebra, _row_sums(system), system.M.diagonal()
-        wrong = int(total(algebra.comm, np.sum((own > 0.0) & (nodal <= LIGHT * own))))  # as of elements of higher order
-        if wrong:
-            raise InputError(f"redistributed mass needs positive row sums of M and {wrong} unknowns have none: give "
-                             "the problem mass=ConsistentMass(), or elements of first order")
+        wrong = int(total(algebra.comm, np.sum(nodal < -LIGHT * own)))  # as of elements of higher order
+        if wrong and self.lumping:
+            raise InputError(f"redistributed mass cannot lump negative row sums of M and {wrong} unknowns have such: "
+                             "give the problem mass=Redistributed(lumping=0.0) or ConsistentMass()")
+        nodal = own if wrong else np.maximum(nodal, 0.0)
         lumped = algebra.local(*lumped_entries(surface, nodal), system.rows)
         bulk = algebra.combine([(1.0 - self.lumping, system.M), (self.lumping, lumped)])
         levels = from_neighbours(system, massless, contact, nodal)

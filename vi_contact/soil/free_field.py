@@ -80,6 +80,8 @@ class FreeFieldSide:
         self.run = CompanionRun(f"FreeField on '{given.facets.name}'", self._problem)
         if self.space.dimension != 2:
             raise InputError("FreeField is for bodies in the plane: tie the sides of others, or put dashpots on them")
+        if self.space.degree > 1:
+            raise InputError("FreeField has a column of first-order elements: give assemble degree=1")
         self._section: Section = forms.section
         self._dashpots = PetscMatrix(absorber.mat)
         self.column, self._sign = _column(self.space, forms, self.given)

@@ -2,8 +2,9 @@
 
 u and v are on the space of the system, ``system.space.V``, with the components that are prescribed or tied. The stress
 sigma(u), without viscous parts, is the L2 projection onto discontinuous fields: constant in a cell of triangles and
-tetrahedra, where that of P1 is so, (bi)linear in others. The contact pressure r_n / weight is nodal, zero off the
-contact surface; of several faces of a node it is that of the one which is pressed most.
+tetrahedra, where that of P1 is so, (bi)linear in others; of P2 and Q2 one degree higher. The contact pressure
+r_n / weight is nodal, zero off the contact surface; of several faces of a node it is that of the one which is pressed
+most.
 """
 
 import xml.etree.ElementTree as ET
@@ -33,8 +34,8 @@ def as_function(problem: ContactProblem, state: State, name: str, *, continuous:
     """Return a state as a DOLFINx Function: "u" [m], "v" [m/s], "stress" [Pa] (d, d) or "contact_pressure" [Pa].
 
     ``state``: of simulate, march, static_equilibrium or quasi_static of this problem. ``continuous``: the stress
-    projected onto P1 or Q1, ∫ sigma_h : tau = ∫ sigma(u) : tau. Every call makes a Function of its own. Collective.
-    InputError for a state of another problem, and a system without a mesh.
+    projected onto P1, Q1, P2 or Q2, ∫ sigma_h : tau = ∫ sigma(u) : tau. Every call makes a Function of its own.
+    Collective. InputError for a state of another problem, and a system without a mesh.
     """
     space = _checked("as_function", problem, name, continuous)
     check_sizes("as_function", problem, state)
@@ -80,7 +81,7 @@ def _checked(owner: str, problem: Any, name: Any, continuous: Any) -> FemSpace:
 def _function(problem: ContactProblem, name: str, nodal: Array, continuous: bool = False) -> Any:
     """The Function of values at the owned nodes, (k,) or (k, d); the stress is that of displacements."""
     system, space = problem.system, space_of(name, problem.system)
-    V = system.cached("P1", lambda: compat.lagrange(space.mesh, 1)) if nodal.ndim == 1 else space.V
+    V = system.cached("scalars", lambda: compat.lagrange(space.mesh, space.degree)) if nodal.ndim == 1 else space.V
     found = compat.function(V)
     values = nodal[_blocks(V, space.V)].ravel()
     found.x.array[: values.size] = values
@@ -96,7 +97,7 @@ def _blocks(of: Any, among: Any) -> Indices:
     """The blocks of unknowns of a space (owned) among those of another one of the same element."""
     owned, ghosts = of.dofmap.index_map.size_local, of.dofmap.index_map.num_ghosts
     blocks = np.zeros(owned + ghosts, dtype=np.int64)
-    blocks[compat.cell_unknowns(of)] = compat.cell_unknowns(among)
+    blocks[compat.cell_blocks(of)] = compat.cell_blocks(among)
     return blocks[:owned]
 
 
@@ -104,7 +105,7 @@ class Stress:
     """Project sigma(u): M sigma_c = ∫ sigma(u) : tau_c for every component c, by conjugate gradients."""
 
     def __init__(self, space: FemSpace, continuous: bool) -> None:
-        d, degree = space.dimension, 1 if continuous or not compat.is_simplex(space.mesh) else 0
+        d, degree = space.dimension, space.degree - (compat.is_simplex(space.mesh) and not continuous)
         self._tensors = compat.lagrange(space.mesh, degree, (d, d), continuous=continuous)
         self._u, scalars = compat.function(space.V), compat.lagrange(space.mesh, degree, continuous=continuous)
         self._blocks, dx = _blocks(scalars, self._tensors), ufl.dx(metadata={"quadrature_degree": 2 * degree + 2})

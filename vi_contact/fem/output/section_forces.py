@@ -52,18 +52,19 @@ class SectionForces:
 
         N = F·n,  V_2 = F·e_2,  V_3 = F·e_3,  M_t = M·n,  M_2 = M·e_2 = ∫ s_3 sigma_n,  M_3 = M·e_3 = -∫ s_2 sigma_n
 
-    A cut may run along element sides or through elements, at any inclination. F is minus the sum of the nodal forces
-    K u + C v + M a - f (a absolute) of the cells on the cut at their nodes on one side, without inertia and loads of
-    the parts of cells on this side: not integrated stresses, but the forces by which these elements are in equilibrium,
-    exact on any mesh for what acts on them. Contact forces act at nodes; those on nodes of the cut itself belong to
-    neither side and are left out. Values are those of the step's equation of motion, row 0 those of the initial state
-    at rest; per thickness of the section (plane strain: per metre).
+    A cut may run along element sides or, of P1 and Q1, through elements, at any inclination. F is minus the sum of the
+    nodal forces K u + C v + M a - f (a absolute) of the cells on the cut at their nodes on one side, without inertia
+    and loads of the parts of cells on this side: not integrated stresses, but the forces by which these elements are in
+    equilibrium, exact on any mesh for what acts on them. Contact forces act at nodes; those on nodes of the cut itself
+    belong to neither side and are left out. Values are those of the step's equation of motion, row 0 those of the
+    initial state at rest; per thickness of the section (plane strain: per metre).
 
     Args:
         cells: the group that is cut, the whole mesh when None: a cut of a wall with soil on both sides needs it.
         loads: those given to ``assemble``. gravity: acceleration (d,) [m/s²] of ``with_weight``, if these cells weigh.
     Raises:
-        InputError: a cut that leaves the group (in space: misses it) or ends inside it, corners of no rectangle.
+        InputError: a cut that leaves the group (in space: misses it) or ends inside it, or goes through cells of degree
+            2; corners of no rectangle.
     """
 
     cuts: Mapping[str, Sequence[Sequence[float]]]
@@ -141,7 +142,8 @@ def find_cut(space: FemSpace, name: str, given: Any, group: Cells | None) -> tup
     x = mesh.geometry.x[compat.geometry_dofmap(mesh)][:, :, : space.dimension]
     inside = np.zeros(len(x), dtype=bool)
     inside[slice(None) if group is None else cells_of(f"section '{name}'", "cells", group, mesh).indices] = True
-    trace = _Trace((x - corners[0]) @ axes[1:].T, level(x), size, tol)
+    vertices = x[:, : len(compat.sub_entities(mesh, 0))]
+    trace = _Trace((vertices - corners[0]) @ axes[1:].T, level(vertices), size, tol)
     inside &= trace.touches
     sides = [[(inside & ends & side).any() for side in (trace.left, trace.right)] for ends in trace.beyond]
     if space.comm.max(np.array(sides, dtype=float)).all(axis=1).any():
@@ -156,7 +158,9 @@ def find_cut(space: FemSpace, name: str, given: Any, group: Cells | None) -> tup
     sign = 1.0 if left >= right else -1.0
     away, at = level(space.points), (space.points - corners[0]) @ axes[1:].T
     nodes = (sign * away < 0.0) | ((away == 0.0) & ((at >= -tol) & (at <= size + tol)).all(axis=1))
-    crossed = inside & trace.left & trace.right
+    crossed = inside & (level(x).max(axis=1) > 0.0) & (level(x).min(axis=1) < 0.0)
+    if space.degree > 1 and space.comm.max(np.array([float(crossed.any())]))[0]:
+        raise InputError(f"section '{name}' goes through cells of degree 2: let it follow their plane sides")
     middle = corners[0] + 0.5 * (corners[1:] - corners[0]).sum(axis=0)
     motions = partial(rigid_motions, centre=middle)
     beyond = partial(work_beyond, space, crossed, lambda points: sign * level(points), motions) if through else None
